@@ -67,6 +67,7 @@ def _document(parameter_set: "ParameterSet") -> dict[str, Any]:
         "completed_by": parameter_set.completed_by,
         "default_valve": parameter_set.default_valve,
         "valves": dict(parameter_set.valve_kinds),
+        "actuator": parameter_set.actuator_kind,
         "values": [{"path": path, **entry.model_dump(mode="json")} for path, entry in entries],
         "accepted": dict(parameter_set.accepted),
     }
@@ -84,7 +85,8 @@ def _text(parameter_set: "ParameterSet") -> str:
     if document["citation"] is not None:
         lines += ["", *textwrap.wrap(_citation(document["citation"]), _WIDTH)]
     valves = ", ".join(f"{name} ({kind})" for name, kind in document["valves"].items())
-    lines += ["", f"valves: {valves}; default {document['default_valve']}", "", *_table(document["values"])]
+    lines += ["", f"valves: {valves}; default {document['default_valve']}; actuator: {document['actuator']}", ""]
+    lines += _table(document["values"])
     for finding, reason in document["accepted"].items():
         lines += ["", *textwrap.wrap(f"accepted: {finding}: {reason}", _WIDTH, subsequent_indent="    ")]
     return "\n".join(lines)

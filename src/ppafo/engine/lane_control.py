@@ -3,6 +3,7 @@
 from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
 from ppafo.engine.scheme.parts import SAME_INSTANT
 from ppafo.engine.scheme.pneumatics import held_pressures
+from ppafo.engine.scheme.shaped_gas import seen_with_torque, torque_at
 from ppafo.model.gait_sensors import GaitMeasurement, late_measurement, measure_gait, samples_late
 from ppafo.model.plant import chamber_pressures
 from ppafo.model.sensors import Measurement, follow_signals, measure
@@ -53,12 +54,20 @@ def sense(rows: LaneRows) -> list[str]:
         signals = current_readings(rows)
     if not rows.program.ideal_sensors:
         seen = f"{add(measure)}(sensors, angle, pressure_1, pressure_2, plant.torque_constant, sample_index)"
-        return [rows.load("sensors"), *signals, f"seen = {seen}"]
+        shaped = [f"seen = {add(seen_with_torque)}(plant, seen)"] if rows.program.has_shape else []
+        return [rows.load("sensors"), *signals, f"seen = {seen}", *shaped]
     return [
         *signals,
-        f"torque = {add(actuator_torque)}(pressure_1, pressure_2, plant.torque_constant)",
+        torque_line(rows, "angle"),
         f"seen = {add(Measurement)}(angle, pressure_1, pressure_2, torque)",
     ]
+
+
+def torque_line(rows: LaneRows, angle: str) -> str:
+    """Line that makes the torque of both pressures, at an angle where the actuator is no vane."""
+    if rows.program.has_shape:
+        return f"torque = {rows.add(torque_at)}(plant, {angle}, pressure_1, pressure_2)"
+    return f"torque = {rows.add(actuator_torque)}(pressure_1, pressure_2, plant.torque_constant)"
 
 
 def current_readings(rows: LaneRows) -> list[str]:

@@ -2,7 +2,7 @@
 
 from ppafo.engine.lane_control import present_pressures
 from ppafo.engine.lane_rows import LaneRows
-from ppafo.engine.scheme import joined_chambers, pneumatics, stage_flows, supply_lines, thermal_gas
+from ppafo.engine.scheme import joined_chambers, pneumatics, shaped_gas, stage_flows, supply_lines, thermal_gas
 
 
 def open_valve(rows: LaneRows) -> list[str]:
@@ -70,6 +70,8 @@ def begin_gas(rows: LaneRows) -> str:
         return f"gas = {add(thermal_gas.begin_thermal_gas)}(plant, thermal, state, masses, next_angle, {given})"
     if program.keeps_volumes:
         return f"gas = {add(pneumatics.begin_still_gas)}(state, held, {given})"
+    if program.has_shape:
+        return f"gas = {add(shaped_gas.begin_shaped_gas)}(plant, state, next_angle, {given})"
     held = "held" if program.hands_chambers_on else f"{add(pneumatics.held_chambers)}(plant, state.angle)"
     return f"gas = {add(pneumatics.begin_moving_gas)}(plant, state, {held}, next_angle, {given})"
 

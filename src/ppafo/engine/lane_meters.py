@@ -4,11 +4,10 @@ Samples are the ones that a recording would have. The course of the reference, o
 once before the first sample, then followed.
 """
 
-from ppafo.engine.lane_control import present_pressures
+from ppafo.engine.lane_control import present_pressures, torque_line
 from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths
-from ppafo.model.vane import actuator_torque
 from ppafo.signals.meter import SAME_LEVEL, Sample, WalkSample, advance_course, is_away
 
 TRACED: dict[str, str] = {
@@ -88,7 +87,7 @@ def sample_lines(rows: LaneRows, moment: str) -> list[str]:
     return [
         *[rows.load(group) for group in ("timing", "plant", "state", "result", "reference", *thermal, *groups)],
         *present_pressures(rows),
-        f"torque = {add(actuator_torque)}(pressure_1, pressure_2, plant.torque_constant)",
+        torque_line(rows, "state.angle"),
         f"wanted = {wanted}",
         f"sample = {add(WalkSample if of_walk else Sample)}"
         f"({', '.join(f'{name}={value}' for name, value in (values | of_walk).items())})",

@@ -5,6 +5,7 @@ from ppafo.engine.lane_meters import measure_sample
 from ppafo.engine.lane_rows import VECTOR, LaneRows, indent, over_lanes
 from ppafo.engine.lane_step import find_begin, over_rows, plant_loop
 from ppafo.engine.program import Program
+from ppafo.engine.scheme.shaped_gas import links_of
 from ppafo.engine.source_text import SourceCollector
 
 HEADER = '''"""Generated from the functions of ppafo; their hash is in the file name. Not to be edited."""
@@ -73,6 +74,7 @@ def lane_loop(program: Program, collector: SourceCollector, name: str, lanes: in
 
     That of one lane takes the first column of its arrays, however many there are.
     """
+    collector.links.update(links_of(program.actuator))
     rows = LaneRows(program, collector, lanes)
     body = [
         COMPILED,

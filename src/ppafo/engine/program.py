@@ -15,12 +15,14 @@ from ppafo.engine.scheme.supply_lines import FedGas, FedThermalGas
 from ppafo.engine.scheme.thermal_flows import ThermalFlows
 from ppafo.engine.scheme.thermal_gas import ThermalGas
 from ppafo.engine.scheme.walking import WalkEnd, WalkState, WalkStep
+from ppafo.model.actuators.kind import ActuatorModel
+from ppafo.model.actuators.vane import MODEL as VANE
 from ppafo.model.course import Course as WalkCourse
 from ppafo.model.course import Marks
 from ppafo.model.gait import GaitNow, GaitPlace, GaitSeries, GaitTiming
 from ppafo.model.gait_sensors import GaitSeen, GaitSensors
 from ppafo.model.leg import LegParameters
-from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
+from ppafo.model.plant import PlantState, ThermalParameters, ThermalState
 from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import SensorParameters, SensorRates, SensorState
 from ppafo.model.valves.kind import ValveModel
@@ -76,7 +78,7 @@ class Program:
     constant pressures. ``is_adaptive`` True divides each step as its error asks, ``samples_inside`` True where recorded
     samples lie between the steps. ``meters`` are updated at every sample that a recording would have, ``traced`` names
     channels that are kept at some of them. ``starts_apart`` True lets the run of each lane begin at a step of its own,
-    while others of the block are under way.
+    while others of the block are under way. ``actuator`` is what stands between the chambers and the joint.
     """
 
     valve: ValveModel
@@ -97,12 +99,13 @@ class Program:
     meters: tuple[MeterKind, ...] = ()
     traced: tuple[str, ...] = ()
     starts_apart: bool = False
+    actuator: ActuatorModel = VANE
 
     def parameter_rows(self) -> dict[str, type]:
         """Groups of parameter rows of this program, in order."""
         return {
             "timing": LaneTiming,
-            "plant": PlantParameters,
+            "plant": self.actuator.plant,
             "thermal": ThermalParameters if self.is_thermal else NoParameters,
             "valve": self.valve.parameters,
             "controller": NoParameters if self.controller is None else self.controller.parameters,
@@ -170,9 +173,14 @@ class Program:
         return self.angle is CONSTANT
 
     @property
+    def has_shape(self) -> bool:
+        """True where the actuator is no vane, so that chambers and torque are those of its kind."""
+        return self.actuator is not VANE
+
+    @property
     def keeps_volumes(self) -> bool:
-        """True where the chambers of a held vane are worked out once; gas of lines or with heat counts as moving."""
-        return self.is_held and not (self.is_thermal or self.has_lines)
+        """True where the chambers of a held vane are worked out once; other gas counts as moving."""
+        return self.is_held and not (self.is_thermal or self.has_lines or self.has_shape)
 
     @property
     def hands_chambers_on(self) -> bool:

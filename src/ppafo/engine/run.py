@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.engine.actuator_values import pressures_of
 from ppafo.engine.lane_step import MAXIMUM_PARTS
 from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_batch
 from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program
@@ -186,6 +187,17 @@ def initial_sensors(run: Run) -> SensorState | NoParameters:
     """Slow sensors that show what is true at the start of a run; nothing where there are none."""
     if not run.program.slow_sensors:
         return NoParameters()
+    if run.program.has_shape:
+        initial = run.initial
+        pressures = pressures_of(run.program.actuator, run.plant, initial.angle, initial.mass_1, initial.mass_2)
+        return SensorState(
+            angle=initial.angle,
+            pressure_1=pressures[0],
+            pressure_2=pressures[1],
+            true_angle=initial.angle,
+            true_pressure_1=pressures[0],
+            true_pressure_2=pressures[1],
+        )
     return sensors_at_start(run.plant, run.initial)
 
 

@@ -63,7 +63,10 @@ def as_it_is(_function: FunctionType, tree: ast.FunctionDef) -> ast.FunctionDef:
 
 @dataclass(slots=True)
 class SourceCollector:
-    """Gathers definitions in the order in which they must stand; ``adapt`` may write a definition in another way."""
+    """Gathers definitions in the order in which they must stand; ``adapt`` may write a definition in another way.
+
+    Where a function is among ``links``, the one that it is linked to is added and called in its place.
+    """
 
     decorator: str
     adapt: Adaptation = as_it_is
@@ -71,9 +74,11 @@ class SourceCollector:
     owners: dict[str, Any] = field(default_factory=dict)
     reads: list[Read] = field(default_factory=list)
     functions: list[Made] = field(default_factory=list)
+    links: dict[Any, Any] = field(default_factory=dict)
 
     def add(self, item: Callable[..., Any] | type) -> str:
         """Add a function or NamedTuple class and all that it needs; return the name it has in the module."""
+        item = self.links.get(item, item)
         if not is_row(item):
             check_is_plain(item)
         name = emitted_name(item)

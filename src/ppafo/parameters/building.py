@@ -2,13 +2,18 @@
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 from ppafo.errors import ParameterError, UnitError, nearest_name
+from ppafo.model.actuators.catalog import ACTUATORS
+from ppafo.model.actuators.kind import Range
+from ppafo.model.actuators.table import Table
 from ppafo.model.declaration import Quantity
 from ppafo.model.gas import SPECIES
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters import declaration
 from ppafo.parameters.device import (
+    VANE,
     Actuator,
     Device,
     Flow,
@@ -29,7 +34,10 @@ from ppafo.parameters.parameter_set import (
     number_text,
     with_second_pressure,
 )
+from ppafo.parameters.plant import plant_parameters
 
+_SAME = 1.0e-9
+"""Angles [rad] this near are one, written in two ways."""
 _FLAT_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 
 
@@ -42,9 +50,7 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None) -> Devic
     device = Device(
         name=parameter_set.name,
         gas=Gas(_species(parameter_set), **_section(reader, "gas", declaration.GAS)),
-        actuator=Actuator(
-            **_section(reader, "actuator", declaration.ACTUATOR), leak=_orifice(parameter_set, reader, "actuator.leak")
-        ),
+        actuator=_actuator(parameter_set, reader),
         friction=Friction(**_section(reader, "friction", declaration.FRICTION)),
         foot_plate=FootPlate(**_section(reader, "foot_plate", declaration.FOOT_PLATE)),
         supply=Supply(**_section(reader, "supply", declaration.SUPPLY), relieving=_is_relieving(parameter_set)),
@@ -53,7 +59,66 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None) -> Devic
         valve_name=name,
     )
     _check_consistent(parameter_set, device)
-    return device
+    return device if device.actuator.kind == VANE else _with_means(device)
+
+
+def _with_means(device: Device) -> Device:
+    """Return the device with what a vane of its mean size would have."""
+    growth = plant_parameters(device).volume_per_angle
+    return replace(device, actuator=replace(device.actuator, torque_constant=growth, volume_per_angle=growth))
+
+
+def _actuator(parameter_set: ParameterSet, read: Callable[[str], float]) -> Actuator:
+    """Return the actuator: a vane, or one of another kind with its settings."""
+    leak, kind = _orifice(parameter_set, read, "actuator.leak"), ACTUATORS[parameter_set.actuator_kind]
+    quantities = declaration.actuator_quantities(parameter_set.actuator_kind)
+    given = {item.name: _given_or_default(parameter_set, read, "actuator", item) for item in quantities}
+    actuator = Actuator(
+        torque_constant=given.get("torque_constant", 0.0),
+        volume_per_angle=given.get("volume_per_angle", 0.0),
+        angle_min=given["angle_min"],
+        angle_max=given["angle_max"],
+        dead_volume_1=given["dead_volume_1"],
+        dead_volume_2=given["dead_volume_2"],
+        restitution=given["restitution"],
+        leak=leak,
+        kind=parameter_set.actuator_kind,
+        settings={} if kind.name == VANE else {item.name: given[item.name] for item in kind.quantities},
+        table=parameter_set.actuator_table,
+    )
+    if actuator.angle_min < actuator.angle_max and (problem := actuator_problem(actuator)):
+        raise ParameterError(f"{parameter_set.file}: actuator: {problem}")
+    return actuator
+
+
+def actuator_problem(actuator: Actuator) -> str:
+    """Return what of the numbers of an actuator does not fit together, in words; empty where all of it does."""
+    stops = Range(
+        angle_min=actuator.angle_min,
+        angle_max=actuator.angle_max,
+        dead_volume_1=actuator.dead_volume_1,
+        dead_volume_2=actuator.dead_volume_2,
+    )
+    return ACTUATORS[actuator.kind].problem(actuator.settings, stops) or _outside(actuator.table, stops)
+
+
+def _outside(table: Table | None, stops: Range) -> str:
+    """Return what is wrong where the stops are beyond the angles that were measured."""
+    if table is None or (table.first_angle <= stops.angle_min + _SAME and stops.angle_max <= table.last_angle + _SAME):
+        return ""
+    measured, wanted = (
+        f"{math.degrees(low):.4g} to {math.degrees(high):.4g} deg"
+        for low, high in ((table.first_angle, table.last_angle), (stops.angle_min, stops.angle_max))
+    )
+    return f"its file was measured from {measured}, and the stops are at {wanted}"
+
+
+def _given_or_default(
+    parameter_set: ParameterSet, read: Callable[[str], float], section: str, quantity: Quantity
+) -> float:
+    path = f"{section}.{quantity.name}"
+    given = path in parameter_set.numbers or quantity.default is None
+    return read(path) if given else float(quantity.default or 0.0)
 
 
 def _reader(parameter_set: ParameterSet) -> Callable[[str], float]:
@@ -110,11 +175,9 @@ def _orifice(parameter_set: ParameterSet, read: Callable[[str], float], section:
 def _valve(parameter_set: ParameterSet, read: Callable[[str], float], name: str) -> Valve:
     kind = parameter_set.valve_kinds[name]
     section = f"valves.{name}"
-    settings = {}
-    for quantity in VALVES[kind].quantities:
-        path = f"{section}.{quantity.name}"
-        given = path in parameter_set.numbers or quantity.default is None
-        settings[quantity.name] = read(path) if given else float(quantity.default or 0.0)
+    settings = {
+        quantity.name: _given_or_default(parameter_set, read, section, quantity) for quantity in VALVES[kind].quantities
+    }
     return Valve(kind, _orifice(parameter_set, read, section), settings)
 
 
@@ -142,7 +205,12 @@ def _uses_sonic_form(parameter_set: ParameterSet, section: str) -> bool:
 
 
 def _check_complete(parameter_set: ParameterSet, valve: str) -> None:
-    needed = [f"{name}.{member.name}" for name in _FLAT_SECTIONS for member in declaration.SECTIONS[name]]
+    needed = [
+        f"{name}.{member.name}"
+        for name in _FLAT_SECTIONS
+        for member in declaration.members(name, parameter_set.actuator_kind)
+        if member.default is None
+    ]
     for section in ("actuator.leak", f"valves.{valve}"):
         sonic = _uses_sonic_form(parameter_set, section)
         form = declaration.SONIC_FORM if sonic else declaration.AREA_FORM

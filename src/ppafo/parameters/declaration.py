@@ -9,6 +9,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
+from ppafo.model.actuators.catalog import ACTUATORS
+from ppafo.model.actuators.vane import KIND as VANE
 from ppafo.model.declaration import Quantity
 from ppafo.model.valves.catalog import VALVES
 
@@ -38,14 +40,14 @@ SONIC_FORM = (
 )
 ORIFICE = AREA_FORM + SONIC_FORM
 ACTUATOR = (
-    Quantity("torque_constant", "m^3", "torque per pressure difference", minimum=0.0, minimum_allowed=False),
-    Quantity("volume_per_angle", "m^3/rad", "chamber volume per angle", minimum=0.0, minimum_allowed=False),
+    *VANE.quantities,
     Quantity("angle_min", "rad", "lower stop, where chamber 1 is smallest", minimum=-10.0, maximum=10.0),
     Quantity("angle_max", "rad", "upper stop, where chamber 2 is smallest", minimum=-10.0, maximum=10.0),
     Quantity("dead_volume_1", "m^3", "line and clearance of chamber 1", minimum=0.0, minimum_allowed=False),
     Quantity("dead_volume_2", "m^3", "line and clearance of chamber 2", minimum=0.0, minimum_allowed=False),
     Quantity("restitution", "", "rebound speed over impact speed at a stop", minimum=0.0, maximum=1.0),
 )
+_OF_A_VANE = frozenset(quantity.name for quantity in VANE.quantities)
 FRICTION = (
     Quantity("static_torque", "N m", "maximum friction torque at rest", minimum=0.0, maximum=1e4),
     Quantity("dynamic_torque", "N m", "friction torque in motion", minimum=0.0, maximum=1e4),
@@ -111,19 +113,31 @@ def is_within(value: float, quantity: Quantity) -> bool:
     return above and value <= quantity.maximum
 
 
-def quantities(valve_kinds: Mapping[str, str]) -> Mapping[str, Quantity]:
-    """Return every number's declaration by dotted path, for a set whose valves have the given names and kinds."""
-    return _by_path(tuple(valve_kinds.items()))
+def actuator_quantities(kind: str) -> tuple[Quantity, ...]:
+    """Return what a set says of an actuator of a kind, beside its leak; that of the vane is ``ACTUATOR``."""
+    if kind == VANE.name:
+        return ACTUATOR
+    return (*ACTUATORS[kind].quantities, *(quantity for quantity in ACTUATOR if quantity.name not in _OF_A_VANE))
+
+
+def members(section: str, actuator_kind: str) -> tuple[Quantity, ...]:
+    """Return the numbers of a section of ``SECTIONS``, with an actuator of a kind."""
+    return actuator_quantities(actuator_kind) if section == "actuator" else SECTIONS[section]
+
+
+def quantities(valve_kinds: Mapping[str, str], actuator_kind: str = VANE.name) -> Mapping[str, Quantity]:
+    """Return every number's declaration by dotted path, for a set with such valves, by name, and such an actuator."""
+    return _by_path(tuple(valve_kinds.items()), actuator_kind)
 
 
 @functools.lru_cache(maxsize=32)
-def _by_path(valve_kinds: tuple[tuple[str, str], ...]) -> Mapping[str, Quantity]:
-    return MappingProxyType({quantity.name: quantity for quantity in _declare(valve_kinds)})
+def _by_path(valve_kinds: tuple[tuple[str, str], ...], actuator_kind: str) -> Mapping[str, Quantity]:
+    return MappingProxyType({quantity.name: quantity for quantity in _declare(valve_kinds, actuator_kind)})
 
 
-def _declare(valve_kinds: Iterable[tuple[str, str]]) -> Iterator[Quantity]:
-    for section, members in SECTIONS.items():
-        yield from (_at(section, member) for member in members)
+def _declare(valve_kinds: Iterable[tuple[str, str]], actuator_kind: str) -> Iterator[Quantity]:
+    for section in SECTIONS:
+        yield from (_at(section, member) for member in members(section, actuator_kind))
     for name, kind in valve_kinds:
         yield from (_at(f"valves.{name}", member) for member in ORIFICE + VALVES[kind].quantities)
         yield from (_at(f"reported.valves.{name}", member) for member in REPORTED_OF_A_VALVE)

@@ -2,11 +2,15 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
+from ppafo.errors import ParameterError
+from ppafo.model.actuators.table import Table
 from ppafo.model.gas import specific_gas_constant
 
+VANE = "vane"
+"""The kind of actuator that is the paper's; see the catalogue of actuators."""
 SAME_PRESSURE = 1.0e-6
 """Relative difference below which two pressures are one that was written in two units."""
 
@@ -44,10 +48,12 @@ class SonicOrifice:
 
 @dataclass(frozen=True, slots=True)
 class Actuator:
-    """A vane actuator between two stops; chamber 1 grows with the angle. Equations (2), (4), (5).
+    """An actuator between two stops; chamber 1 grows with the angle. Equations (2), (4), (5).
 
     torque_constant [m^3], volume_per_angle [m^3/rad], angle_min and angle_max [rad], dead_volume_1 and dead_volume_2
-    [m^3], restitution of the stops [-], leak across the vane.
+    [m^3], restitution of the stops [-], leak between the chambers. ``kind`` is that of the catalogue; one that is no
+    vane has ``settings`` in SI, all of them present, one that was measured its ``table``, and the first two numbers are
+    then means over the range.
     """
 
     torque_constant: float
@@ -58,6 +64,9 @@ class Actuator:
     dead_volume_2: float
     restitution: float
     leak: Orifice | SonicOrifice
+    kind: str = VANE
+    settings: Mapping[str, float] = field(default_factory=dict)
+    table: Table | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,3 +133,8 @@ class Device:
     valve: Valve
     flow: Flow
     valve_name: str
+
+    def check_vane(self, what: str) -> None:
+        """Raise ParameterError where the actuator is no vane, for ``what`` is made for a vane alone."""
+        if self.actuator.kind != VANE:
+            raise ParameterError(f"{what} is made for a vane, and '{self.name}' has an actuator '{self.actuator.kind}'")

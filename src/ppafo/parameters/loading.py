@@ -13,9 +13,13 @@ from pydantic import BaseModel, Field
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name
+from ppafo.model.actuators.catalog import ACTUATORS
+from ppafo.model.actuators.table import Table
+from ppafo.model.actuators.vane import KIND as VANE
 from ppafo.model.declaration import Quantity
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters import declaration
+from ppafo.parameters.actuator_table import read_actuator_table
 from ppafo.parameters.building import build_device
 from ppafo.parameters.device import Device
 from ppafo.parameters.overrides import apply_overrides
@@ -36,17 +40,35 @@ def _section(name: str, quantities: tuple[Quantity, ...], extra: dict[str, Any] 
     return table(name, _fields(quantities) | (extra or {}))
 
 
+def _capital(kind: str) -> str:
+    return re.sub(r"[^A-Za-z0-9_]", "_", kind.capitalize())
+
+
 def _valve_section(kind: str) -> Any:
     return _section(
-        f"{re.sub(r'[^A-Za-z0-9_]', '_', kind.capitalize())}Valve",
+        f"{_capital(kind)}Valve",
         declaration.ORIFICE + VALVES[kind].quantities,
         {"kind": (Literal[kind], Field(description=VALVES[kind].summary))},
     )
 
 
+def _actuator_section(kind: str) -> Any:
+    """Return the section of an actuator of a kind; a vane needs no ``kind``: older sets have none."""
+    described = ACTUATORS[kind].summary
+    named = Field(kind, description=described) if kind == VANE.name else Field(description=described)
+    leak = _section("Leak", declaration.ORIFICE)
+    extra: dict[str, Any] = {
+        "kind": (Literal[kind], named),
+        "leak": optional(leak, "leak from chamber 1 to chamber 2"),
+    }
+    if ACTUATORS[kind].model.table is not None:
+        extra["file"] = (str, Field(min_length=1, description="its file, seen from the folder of the set"))
+    name = "Actuator" if kind == VANE.name else f"{_capital(kind)}Actuator"
+    return _section(name, declaration.actuator_quantities(kind), extra)
+
+
 def _sections() -> dict[str, Any]:
     """Return the sections that hold values, each a model, all of them optional: a set may have gaps."""
-    leak = _section("Leak", declaration.ORIFICE)
     valve_reports = _section("ReportedOfAValve", declaration.REPORTED_OF_A_VALVE)
     reported = {
         declaration.REPORTED_FORMULA: optional(TextEntry, "exponent inside C1, a formula in k"),
@@ -54,7 +76,7 @@ def _sections() -> dict[str, Any]:
     }
     return {
         "gas": _section("Gas", declaration.GAS, {"species": optional(TextEntry, "name of the gas")}),
-        "actuator": _section("Actuator", declaration.ACTUATOR, {"leak": optional(leak, "leak across the vane")}),
+        "actuator": one_of([_actuator_section(kind) for kind in ACTUATORS]),
         "friction": _section("Friction", declaration.FRICTION),
         "foot_plate": _section("FootPlate", declaration.FOOT_PLATE),
         "supply": _section("Supply", declaration.SUPPLY, {"relieving": optional(FlagEntry, declaration.RELIEVING)}),
@@ -64,8 +86,8 @@ def _sections() -> dict[str, Any]:
 
 
 def parameter_file() -> type[BaseModel]:
-    """Return the model of a parameter set file, for the valves that are loaded."""
-    return _parameter_file(tuple(VALVES.items()))
+    """Return the model of a parameter set file, for the valves and actuators that are loaded."""
+    return _parameter_file((*VALVES.items(), *ACTUATORS.items()))
 
 
 @functools.lru_cache(maxsize=4)
@@ -89,8 +111,9 @@ def _parameter_file(_kinds: Any) -> type[BaseModel]:
 
 
 def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a parameter set file, with the valves of all packages."""
+    """Return the JSON Schema of a parameter set file, with the valves and actuators of all packages."""
     VALVES.load_all()
+    ACTUATORS.load_all()
     return make_schema(parameter_file(), "ppafo parameter set")
 
 
@@ -113,17 +136,20 @@ def load_device(name_or_path: str | Path, valve: str | None = None, overrides: I
 
 def load_parameter_set(name_or_path: str | Path) -> ParameterSet:
     """Return a parameter set by its name in the package or by the path of a TOML file."""
-    return parse_parameter_set(_FILE.read(name_or_path), label(str(name_or_path)))
+    content, file = _FILE.read(name_or_path), label(str(name_or_path))
+    return parse_parameter_set(content, file, Path(name_or_path).parent)
 
 
-def parse_parameter_set(content: bytes, file: str) -> ParameterSet:
+def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -> ParameterSet:
     """Return the parameter set in the bytes of a TOML file; ``file`` is what messages call it.
 
-    ParameterError for one that is not usable.
+    Where its actuator has a file, that is looked for from ``folder``. ParameterError for one that is not usable.
     """
     document = _FILE.parse(content, file)
     _find_valves(document)
-    parameter_set = _flatten(validate(parameter_file(), document, file, ParameterError), file)
+    _find_actuator(document)
+    parsed: Any = validate(parameter_file(), document, file, ParameterError)
+    parameter_set = _flatten(parsed, file, _read_table(parsed.actuator, folder or Path()))
     _check(parameter_set)
     return parameter_set
 
@@ -137,7 +163,23 @@ def _find_valves(document: dict[str, Any]) -> None:
             VALVES.get(kind)
 
 
-def _flatten(parsed: Any, file: str) -> ParameterSet:
+def _find_actuator(document: dict[str, Any]) -> None:
+    """Say that an actuator without a kind is a vane, and load its kind where it is one of other packages."""
+    actuator = document.get("actuator")
+    if not isinstance(actuator, dict):
+        return
+    kind = actuator.setdefault("kind", VANE.name)
+    if isinstance(kind, str):
+        ACTUATORS.get(kind)
+
+
+def _read_table(actuator: Any, folder: Path) -> Table | None:
+    """Return what the file of an actuator holds; None for a kind without one."""
+    has_file = actuator is not None and ACTUATORS[actuator.kind].model.table is Table
+    return read_actuator_table(folder / actuator.file) if has_file else None
+
+
+def _flatten(parsed: Any, file: str, actuator_table: Table | None) -> ParameterSet:
     leaves = dict(_leaves(parsed, ""))
     return ParameterSet(
         file=file,
@@ -148,6 +190,9 @@ def _flatten(parsed: Any, file: str) -> ParameterSet:
         completed_by=parsed.completed_by,
         default_valve=parsed.default_valve,
         valve_kinds={name: valve.kind for name, valve in parsed.valves.items()},
+        actuator_kind=VANE.name if parsed.actuator is None else parsed.actuator.kind,
+        actuator_file=getattr(parsed.actuator, "file", ""),
+        actuator_table=actuator_table,
         numbers={path: leaf for path, leaf in leaves.items() if isinstance(leaf, Entry)},
         texts={path: leaf for path, leaf in leaves.items() if isinstance(leaf, TextEntry)},
         flags={path: leaf for path, leaf in leaves.items() if isinstance(leaf, FlagEntry)},

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import ParameterError, UnitError, nearest_name
+from ppafo.model.actuators.table import Table
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import alternatives, quantities
 from ppafo.parameters.device import SAME_PRESSURE
@@ -21,7 +22,9 @@ class ParameterSet:
     """Values as given, with their provenance; conflicts and gaps allowed. ``build_device`` asks for more.
 
     ``file`` is what messages call the set; ``numbers``, ``texts`` and ``flags`` are keyed by paths such as
-    ``actuator.leak.area`` or ``valves.solenoid.area``; ``valve_kinds`` gives each valve's kind in the catalogue.
+    ``actuator.leak.area`` or ``valves.solenoid.area``; ``valve_kinds`` gives each valve's kind in the catalogue,
+    ``actuator_kind`` the actuator's, ``actuator_file`` the file of one that was measured, and ``actuator_table`` what
+    is in it.
     """
 
     file: str
@@ -32,6 +35,9 @@ class ParameterSet:
     completed_by: str
     default_valve: str
     valve_kinds: Mapping[str, str]
+    actuator_kind: str
+    actuator_file: str
+    actuator_table: Table | None
     numbers: Mapping[str, Entry]
     texts: Mapping[str, TextEntry]
     flags: Mapping[str, FlagEntry]
@@ -48,7 +54,7 @@ class ParameterSet:
 
     def declarations(self) -> Mapping[str, Quantity]:
         """Return the declaration of every number that this set may hold, by path."""
-        return quantities(self.valve_kinds)
+        return quantities(self.valve_kinds, self.actuator_kind)
 
 
 def chosen_valve(parameter_set: ParameterSet, valve: str | None) -> str:

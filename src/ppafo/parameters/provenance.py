@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field
 
-from ppafo.documents.models import STRICT, Text
+from ppafo.documents.models import STRICT, Text, Texts
 
 Origin = Literal["published", "datasheet", "derived", "identified", "fitted", "assumed"]
 """How a value came to be known; ``fitted`` is one that recordings do not fix, or whose recordings no model explains."""
@@ -51,7 +51,7 @@ class Citation(BaseModel):
     model_config = STRICT
 
     title: Text
-    authors: tuple[str, ...] = ()
+    authors: Texts = ()
     year: Annotated[int | None, Field(ge=1800, le=2200)] = None
     doi: str = ""
     note: str = ""

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator
 
+from ppafo.parameters.device import VANE
 from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.parameters.provenance import Citation, Entry, FlagEntry, TextEntry
 
@@ -24,6 +25,8 @@ def _lines(parameter_set: ParameterSet) -> Iterator[str]:
     yield from (f"{key} = {_text(value)}" for key, value in head.items() if value)
     if parameter_set.citation is not None:
         yield from _citation(parameter_set.citation)
+    if parameter_set.actuator_kind != VANE:
+        yield from _actuator(parameter_set)
     for path, entry in _sorted_entries(parameter_set):
         valve = path.split(".")[1] if path.startswith("valves.") else None
         if valve is not None and path == _first_path(parameter_set, valve):
@@ -34,6 +37,12 @@ def _lines(parameter_set: ParameterSet) -> Iterator[str]:
             yield from _valve(parameter_set, valve)
     for finding, reason in parameter_set.accepted.items():
         yield from ("", "[[accepted]]", f"finding = {_text(finding)}", f"reason = {_text(reason)}")
+
+
+def _actuator(parameter_set: ParameterSet) -> Iterator[str]:
+    yield from ("", "[actuator]", f"kind = {_text(parameter_set.actuator_kind)}")
+    if parameter_set.actuator_file:
+        yield f"file = {_text(parameter_set.actuator_file)}"
 
 
 def _valve(parameter_set: ParameterSet, valve: str) -> Iterator[str]:

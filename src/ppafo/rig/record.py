@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.errors import ParameterError, nearest_name, one_line
-from ppafo.parameters.device import Device
+from ppafo.parameters.device import VANE, Device
+from ppafo.parameters.loading import load_parameter_set
 from ppafo.rig.catalog import EXPERIMENTS, Experiment
 from ppafo.rig.preset import PREFIX, Preset, load_preset
 from ppafo.rig.request import Outcome, Request
@@ -49,6 +50,9 @@ def record(
     of_preset = tuple(item for item in words if item.strip().startswith(PREFIX))
     others = tuple(item for item in words if item not in of_preset)
     used = _refuse_overrides(preset, of_preset) if isinstance(preset, Preset) else load_preset(preset, of_preset)
+    kind = load_parameter_set(device).actuator_kind
+    if kind != VANE:
+        raise ParameterError(f"the virtual rig is made for a vane, and '{one_line(device)}' has an actuator '{kind}'")
     outcome = chosen.record(Request(used, seed, device, valve, others))
     return RigRecording(outcome.recording, outcome.device, _truth(chosen, used, seed, device, words, outcome))
 

@@ -80,7 +80,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
     device = _device(reading, hardware)
     clock = read_clock(reading)
     before = Reading(request.file, request.content)
-    return Scenario(
+    scenario = Scenario(
         name=document["name"],
         description=document.get("description", ""),
         device=device,
@@ -98,6 +98,19 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         thermal=read_thermal(reading),
         supply_lines=read_supply_lines(reading, device),
     )
+    _check_actuator(reading, scenario)
+    return scenario
+
+
+def _check_actuator(reading: Reading, scenario: Scenario) -> None:
+    """Refuse what only a vane has."""
+    try:
+        if scenario.thermal is not None:
+            scenario.device.check_vane("gas with an energy balance")
+        if scenario.control.is_fixed:
+            scenario.device.check_vane("a controller on whole numbers")
+    except ParameterError as error:
+        raise _of_device(reading, error) from error
 
 
 def _hardware(reading: Reading, request: ScenarioRequest, overrides: tuple[str, ...]) -> Hardware:

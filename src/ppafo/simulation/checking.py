@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ppafo.engine.actuator_values import pressures_of, volumes_of
 from ppafo.engine.run import Run
 from ppafo.errors import SimulationError
 from ppafo.metrics.metric import Floats
-from ppafo.model.plant import chamber_volumes
 from ppafo.signals import Recording
 from ppafo.simulation.check import ALLOWED_CHANGE, HALF_ERROR, MOVE, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck
 from ppafo.simulation.plan import plan_run
@@ -82,7 +82,9 @@ def _start_moved(run: Run, move: float) -> Run:
     if run.program.angle is None:
         shifted = angle + move * (plant.angle_max - plant.angle_min)
         angle = min(max(shifted, plant.angle_min), plant.angle_max)
-    before, after = chamber_volumes(plant, start.angle), chamber_volumes(plant, angle)
+    actuator = run.program.actuator
+    pressures = pressures_of(actuator, plant, start.angle, start.mass_1, start.mass_2)
+    before, after = (volumes_of(actuator, plant, at, *pressures) for at in (start.angle, angle))
     mass_1, mass_2 = (
         mass * now / then * (1.0 + move)
         for mass, now, then in zip((start.mass_1, start.mass_2), after, before, strict=True)

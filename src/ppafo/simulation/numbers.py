@@ -11,7 +11,7 @@ from ppafo.control.controllers import constant
 from ppafo.model.declaration import Quantity
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.valves.catalog import VALVES
-from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SECTIONS, SONIC_FORM
+from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, members
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.parameter_set import PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.simulation import declaration
@@ -44,7 +44,11 @@ def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
 
 def device_numbers(device: Device) -> dict[str, Quantity]:
     """Return the declaration of every number of a device, by path; both forms of an orifice."""
-    found = {f"{section}.{item.name}": item for section in _DEVICE_SECTIONS for item in SECTIONS[section]}
+    found = {
+        f"{section}.{item.name}": item
+        for section in _DEVICE_SECTIONS
+        for item in members(section, device.actuator.kind)
+    }
     found |= {f"actuator.leak.{item.name}": item for item in ORIFICE}
     return found | {f"valve.{item.name}": item for item in (*ORIFICE, *VALVES[device.valve.kind].quantities)}
 
@@ -133,6 +137,8 @@ def _place_in_device(path: str, device: Device) -> tuple[str, ...]:
     section, _, name = path.rpartition(".")
     if section == "valve":
         return ("valve", "orifice" if name in _names(device.valve.orifice) else "settings", name)
+    if section == "actuator" and name in device.actuator.settings:
+        return (section, "settings", name)
     return tuple(path.split("."))
 
 

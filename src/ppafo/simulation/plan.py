@@ -8,11 +8,14 @@ import numpy as np
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
+from ppafo.engine.actuator_values import volumes_of
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.reference.derivative import ExactOrifice
 from ppafo.engine.rows import rebuilt
 from ppafo.engine.run import Lines, Run, Walk
 from ppafo.errors import ScenarioError
+from ppafo.model.actuators.catalog import ACTUATORS
+from ppafo.model.actuators.vane import KIND as VANE
 from ppafo.model.columns import Problem, at, first, over_runs, whole
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters
 from ppafo.model.regulator import SupplyLines
@@ -27,6 +30,7 @@ from ppafo.simulation.preparation import (
     lines_at_start,
     rates_of_sensors,
     state_at_start,
+    state_with_volumes,
     step_counts,
     thermal_gas,
 )
@@ -97,6 +101,7 @@ def compose_run(pieces: Pieces, plant: PlantParameters, rule: StepRule, start: S
     plant = plant_behind_lines(plant, pieces.supply_lines)
     steps = rule(plant)
     program = Program(
+        actuator=ACTUATORS[pieces.device.actuator.kind].model,
         valve=pieces.valve,
         reference=PROFILES[pieces.reference.kind],
         controller=pieces.controller,
@@ -271,7 +276,7 @@ def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> Any:
 
     For arrays (runs,) in the scenario an array of truth values.
     """
-    if scenario.supply_lines is not None:
+    if scenario.supply_lines is not None or scenario.device.actuator.kind != VANE.name:
         return True
     if not isinstance(scenario.motion, PrescribedMotion) or scenario.motion.profile.kind != "constant":
         return True
@@ -293,10 +298,16 @@ def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
     if isinstance(motion, FreeMotion):
         angle, rate = motion.angle, motion.angular_velocity
     else:
-        kind = PROFILES[motion.profile.kind]
-        numbers = [motion.profile.settings[item.name] for item in kind.quantities]
-        angle, rate, _ = over_runs(lambda *values: kind.value(rebuilt(kind.parameters, values), 0.0), *numbers)
-    return state_at_start(plant, angle, rate, scenario.initial_pressure_1, scenario.initial_pressure_2)
+        path = PROFILES[motion.profile.kind]
+        numbers = [motion.profile.settings[item.name] for item in path.quantities]
+        angle, rate, _ = over_runs(lambda *values: path.value(rebuilt(path.parameters, values), 0.0), *numbers)
+    pressures = scenario.initial_pressure_1, scenario.initial_pressure_2
+    kind = scenario.device.actuator.kind
+    if kind == VANE.name:
+        return state_at_start(plant, angle, rate, *pressures)
+    return state_with_volumes(
+        plant, angle, rate, *volumes_of(ACTUATORS[kind].model, plant, angle, *pressures), *pressures
+    )
 
 
 def exact_orifice(orifice: Orifice | SonicOrifice, device: Device) -> ExactOrifice:

@@ -79,6 +79,27 @@ def state_at_start(
     )
 
 
+def state_with_volumes(
+    plant: PlantParameters,
+    angle: Any,
+    angular_velocity: Any,
+    volume_1: float,
+    volume_2: float,
+    pressure_1: float,
+    pressure_2: float,
+) -> PlantState:
+    """As ``state_at_start``, of chambers whose volumes [m^3] at that angle and those pressures are known."""
+    return PlantState(
+        angle=angle,
+        angular_velocity=angular_velocity,
+        mass_1=chamber_mass(pressure_1, volume_1, plant.gas_product),
+        mass_2=chamber_mass(pressure_2, volume_2, plant.gas_product),
+        supplied_mass=0.0,
+        vented_mass=0.0,
+        leaked_mass=0.0,
+    )
+
+
 def lines_at_start(plant: PlantParameters, lines: SupplyLines) -> LineState:
     """Both lines at the pressures that their regulators are set to, and nothing let through yet."""
     return LineState(

@@ -8,15 +8,14 @@ from typing import Any, final
 import numpy as np
 
 from ppafo.control.kind import PythonController
+from ppafo.engine.actuator_values import seen_with_torque
 from ppafo.engine.lane_control import SIGNALS
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, load_program, samples_in
 from ppafo.engine.metering import group_of
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import Run
 from ppafo.errors import SimulationError
-from ppafo.model.plant import chamber_pressures
 from ppafo.model.sensors import Measurement, measure
-from ppafo.model.vane import actuator_torque
 
 
 @final
@@ -117,7 +116,7 @@ def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measu
     """What the controller measures at a sample: the present state, or an earlier one where sensors are late."""
     program, per_sample = batch.program, batch.clock.steps_per_sample
     rows = row_numbers(program.state_rows())
-    plant, sensors = _group(batch, "plant"), _group(batch, "sensors")
+    plant, sensors, actuator = _group(batch, "plant"), _group(batch, "sensors"), program.actuator
 
     def see(sample: int) -> Measurement:
         state = block.states[:, 0]
@@ -128,14 +127,15 @@ def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measu
         else:
             angle = float(state[rows["state.angle"]])
             masses = float(state[rows["state.mass_1"]]), float(state[rows["state.mass_2"]])
-            pressure_1, pressure_2 = chamber_pressures(plant, angle, *masses)
+            pressure_1, pressure_2 = actuator.pressures(plant, angle, *masses)
         if program.ideal_sensors:
             return Measurement(
                 angle=angle,
                 pressure_1=pressure_1,
                 pressure_2=pressure_2,
-                torque=actuator_torque(pressure_1, pressure_2, plant.torque_constant),
+                torque=actuator.torque(plant, angle, pressure_1, pressure_2),
             )
-        return measure(sensors, angle, pressure_1, pressure_2, plant.torque_constant, sample)
+        seen = measure(sensors, angle, pressure_1, pressure_2, plant.torque_constant, sample)
+        return seen_with_torque(actuator, plant, seen) if program.has_shape else seen
 
     return see

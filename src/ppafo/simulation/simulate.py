@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ppafo.engine.actuator_values import pressures_of, torque_of
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together
 from ppafo.metrics.catalog import evaluate
-from ppafo.model.plant import chamber_pressures
 from ppafo.model.regulator import LineState, line_pressures
 from ppafo.model.thermal import energy_per_content
 from ppafo.model.vane import gravity_torque, sliding_friction
@@ -97,8 +97,9 @@ def _status(outcome: BatchResult, record: Floats, rows: dict[str, int], times: F
 
 def _recording(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]) -> Recording:
     angle, rate = rows["state.angle"], rows["state.angular_velocity"]
-    pressure_1, pressure_2 = chamber_pressures(run.plant, angle, rows["state.mass_1"], rows["state.mass_2"])
-    torque = run.plant.torque_constant * np.subtract(pressure_1, pressure_2)
+    actuator = run.program.actuator
+    pressure_1, pressure_2 = pressures_of(actuator, run.plant, angle, rows["state.mass_1"], rows["state.mass_2"])
+    torque = np.asarray(torque_of(actuator, run.plant, angle, pressure_1, pressure_2))
     channels = {
         "angle": (angle, "rad"),
         "angular_velocity": (rate, "rad/s"),

@@ -245,9 +245,11 @@ def _device(document: dict[str, Any], overrides: list[str], file: str) -> Device
     valve = section.get("valve")
     try:
         parameters = apply_overrides(load_parameter_set(section["set"]), section.get("overrides", ()), valve)
-        return build_device(apply_overrides(parameters, overrides, valve), valve)
+        device = build_device(apply_overrides(parameters, overrides, valve), valve)
+        device.check_vane("a walk")
     except ParameterError as error:
         raise ParameterError(f"{file}: [device]: {one_line(error)}") from error
+    return device
 
 
 def _lines(

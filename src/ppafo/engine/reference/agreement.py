@@ -8,7 +8,6 @@ from ppafo.engine.lanes import BatchResult, Floats, run_batch
 from ppafo.engine.reference.solver import ReferenceResult, solve_reference
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.run import Run, batch_of
-from ppafo.model.plant import chamber_pressures
 
 IMPACT_WINDOW = 5.0e-3
 
@@ -86,5 +85,6 @@ def plant_states(run: Run, outcome: BatchResult) -> Floats:
 
 def chamber_pressures_of(run: Run, states: Floats) -> tuple[Floats, Floats]:
     """Both pressures [Pa absolute] of states (records, 7)."""
-    pairs = [chamber_pressures(run.plant, float(row[0]), float(row[2]), float(row[3])) for row in states]
+    pressures = run.program.actuator.pressures
+    pairs = [pressures(run.plant, float(row[0]), float(row[2]), float(row[3])) for row in states]
     return np.array([pair[0] for pair in pairs]), np.array([pair[1] for pair in pairs])

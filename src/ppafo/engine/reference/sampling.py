@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.engine.actuator_values import seen_with_torque
 from ppafo.engine.run import Run
 from ppafo.errors import SimulationError
 from ppafo.model.sensors import Measurement, measure
-from ppafo.model.vane import actuator_torque
 
 SAME_TIME = 1.0e-12
 
@@ -70,9 +70,10 @@ class SampledControl:
                 angle=angle,
                 pressure_1=pressure_1,
                 pressure_2=pressure_2,
-                torque=actuator_torque(pressure_1, pressure_2, run.plant.torque_constant),
+                torque=run.program.actuator.torque(run.plant, angle, pressure_1, pressure_2),
             )
-        return measure(run.sensors, *signals, run.plant.torque_constant, sample)
+        seen = measure(run.sensors, *signals, run.plant.torque_constant, sample)
+        return seen_with_torque(run.program.actuator, run.plant, seen) if run.program.has_shape else seen
 
 
 Floats = NDArray[np.float64]

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.engine.actuator_values import driving_torque_of
 from ppafo.engine.cache import load_generated
 from ppafo.engine.lanes import samples_in
 from ppafo.engine.program import NoParameters
@@ -21,7 +22,6 @@ from ppafo.engine.reference.source import (
 from ppafo.engine.rows import numbers, rebuild
 from ppafo.engine.run import Run, initial_sensors
 from ppafo.errors import SimulationError
-from ppafo.model.plant import chamber_pressures
 
 Floats = NDArray[np.float64]
 
@@ -125,14 +125,17 @@ class _Solution:
         """Root functions of the present mode."""
         plant = self.run.plant
         if self.way == 0.0:
-            return vane_mode.roots_at_rest(plant, y[0], vane_mode.torque_on_vane(plant, y[0], y[2], y[3]))
+            return vane_mode.roots_at_rest(plant, y[0], self.torque(y))
         return vane_mode.roots_sliding(plant, y[0], y[1], self.way)
 
     def rest_mode(self) -> float:
         """Mode of the vane at rest with the present gas."""
         plant = self.run.plant
-        torque = vane_mode.torque_on_vane(plant, self.y[0], self.y[2], self.y[3])
-        return vane_mode.mode_at_rest(plant, self.y[0], torque)
+        return vane_mode.mode_at_rest(plant, self.y[0], self.torque(self.y))
+
+    def torque(self, y: Floats) -> float:
+        """Driving torque [N m] with unknowns."""
+        return driving_torque_of(self.run.program.actuator, self.run.plant, y[0], y[2], y[3])
 
     def is_thrown_at_its_stop(self) -> bool:
         """True for a vane on a stop with an angular velocity into it; a root that is 0 at the start is no event."""
@@ -157,7 +160,7 @@ class _Solution:
         """Angle and pressures now, as the sensors show them."""
         run = self.run
         angle = self.y[0] if run.program.angle is None else run.program.angle.value(run.path, self.time)[0]
-        pressure_1, pressure_2 = chamber_pressures(run.plant, angle, self.y[2], self.y[3])
+        pressure_1, pressure_2 = run.program.actuator.pressures(run.plant, angle, self.y[2], self.y[3])
         signals = float(angle), float(pressure_1), float(pressure_2)
         rates = run.sensor_rates
         if isinstance(rates, NoParameters):
@@ -232,7 +235,7 @@ class _Solution:
         plant = self.run.plant
         if self.way == 0.0:
             # The torque equals the static limit to rounding here, so its sign alone says which way the vane goes.
-            self.way = 1.0 if vane_mode.torque_on_vane(plant, self.y[0], self.y[2], self.y[3]) > 0.0 else -1.0
+            self.way = 1.0 if self.torque(self.y) > 0.0 else -1.0
             self.result.breakaways.append(self.time)
             return
         roots = self.roots(self.y)

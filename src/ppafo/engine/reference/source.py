@@ -12,8 +12,9 @@ from ppafo.engine.reference.derivative import (
     thermal_gas_rates,
 )
 from ppafo.engine.rows import leaf_paths, row_expression
+from ppafo.engine.scheme.shaped_gas import links_of
 from ppafo.engine.source_text import SourceCollector
-from ppafo.model.plant import PlantParameters, ThermalParameters, chamber_pressures
+from ppafo.model.plant import ThermalParameters, chamber_pressures
 from ppafo.model.sensors import SensorRates
 
 PLANT_UNKNOWNS = 7
@@ -44,7 +45,7 @@ COMPILED = f'@njit({SIGNATURE}, cache=True, error_model="numpy")'
 def parameter_groups(program: Program) -> dict[str, type]:
     """Groups of numbers that the right-hand side needs, in order."""
     return {
-        "plant": PlantParameters,
+        "plant": program.actuator.plant,
         "thermal": ThermalParameters if program.is_thermal else NoParameters,
         "valve_orifice": ExactOrifice,
         "leak_orifice": ExactOrifice,
@@ -61,6 +62,7 @@ def right_hand_side_source(program: Program) -> str:
     balance, what slow sensors show of angle and pressures, and the state of the valve.
     """
     collector = SourceCollector(INLINE)
+    collector.links.update(links_of(program.actuator))
     add = collector.add
     cells: dict[str, str] = {}
     for name, row in parameter_groups(program).items():

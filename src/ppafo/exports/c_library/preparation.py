@@ -16,7 +16,7 @@ from ppafo.parameters.building import consistency
 from ppafo.parameters.device import Device
 from ppafo.simulation.motion import TOLERANCE
 from ppafo.simulation.numbers import HELD_ANGLE, TIMES, declared_numbers, number_at, other_form
-from ppafo.simulation.preparation import is_slow_held, rates_of_sensors, state_at_start, step_counts
+from ppafo.simulation.preparation import is_slow_held, rates_of_sensors, state_at_start, state_with_volumes, step_counts
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
 
 SAID = {
@@ -104,7 +104,7 @@ def _steps(scenario: Scenario, writing: Writing) -> Iterator[str]:
     given = "run_duration, run_step, run_output_interval, controller_period"
     yield f"counts_of_steps = {writing.add(step_counts)}({given})"
     yield from writing.timing("sensors_delay")
-    if scenario.supply_lines is not None or not writing.program.is_held:
+    if scenario.supply_lines is not None or not writing.program.is_held or writing.program.has_shape:
         yield "needs_parts = True"
         return
     stiffness = "1.0" if scenario.thermal is None else "gas_heat_capacity_ratio"
@@ -152,7 +152,12 @@ def _start(scenario: Scenario, writing: Writing) -> Iterator[str]:
         assert program.angle is not None, "the angle is prescribed"
         yield f"angle, angular_velocity, _ = {add(program.angle.value)}(path, 0.0)"
     given = "initial_pressure_1, initial_pressure_2"
-    yield f"state = {add(state_at_start)}(plant, {', '.join(moved)}, {given})"
+    if program.has_shape:
+        yield f"filled = {add(program.actuator.chambers)}(plant, {moved[0]}, {given})"
+        volumes = "filled.volume_1, filled.volume_2"
+        yield f"state = {add(state_with_volumes)}(plant, {', '.join(moved)}, {volumes}, {given})"
+    else:
+        yield f"state = {add(state_at_start)}(plant, {', '.join(moved)}, {given})"
     yield from writing.start()
     if program.slow_sensors:
         yield f"sensor_state = {add(sensors_at_start)}(plant, state)"

@@ -10,6 +10,7 @@ from ppafo.engine.lane_rows import HANDED, indent
 from ppafo.engine.lane_source import HEADER, INLINE, lane_loop
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
+from ppafo.engine.scheme.shaped_gas import links_of
 from ppafo.engine.source_text import SourceCollector
 from ppafo.metrics.catalog import METRICS
 from ppafo.metrics.metric import Floats, Readings
@@ -79,7 +80,7 @@ class ExportedProgram:
     @property
     def chooses_parts(self) -> bool:
         """True where the settings decide whether the error decides about the parts of a step."""
-        return self.program.is_held and not self.program.has_lines
+        return self.program.is_held and not (self.program.has_lines or self.program.has_shape)
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -133,6 +134,7 @@ def c_text(
     With ``together`` each lane loop stands there once more, with ``TOGETHER`` after its name, for so many runs at once.
     """
     collector = one_run_collector(INLINE)
+    collector.links.update(links_of(item.program.actuator))
     entries = [metrics_entry(item, collector), *([] if further is None else [further(collector)])]
     loops = [lane_loop(program, collector, name, lanes=1) for name, program in item.loops.items()]
     if together:

@@ -12,11 +12,12 @@ from ppafo.engine.scheme.parts import Pace
 from ppafo.engine.source_text import SourceCollector
 from ppafo.exports.c_library.files import Setting, c_identifier
 from ppafo.exports.c_library.program import COUNTS
+from ppafo.model.actuators.kind import Range, mean_growth, plant_in_shape
 from ppafo.model.gas import specific_gas_constant
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.catalog import VALVES
-from ppafo.parameters.declaration import SECTIONS
+from ppafo.parameters.declaration import members
 from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.parameters.plant import area_restriction, plant_with, sonic_restriction
 from ppafo.simulation.preparation import lines_at_start, thermal_gas
@@ -88,7 +89,12 @@ class Writing:
     def plant(self, name: str, torque: str) -> Iterator[str]:
         """Lines that make the device and its plant under a name, with an external torque."""
         add = self.add
-        fields = {section: self.section(section, [item.name for item in SECTIONS[section]]) for section in _SECTIONS}
+        kind = self.device.actuator.kind
+        fields = {
+            section: self.section(section, [item.name for item in members(section, kind)]) for section in _SECTIONS
+        }
+        if self.program.has_shape:
+            fields["actuator"] |= {"torque_constant": "0.0", "volume_per_angle": "0.0"}
         constant = f"{add(specific_gas_constant)}({UNIVERSAL_GAS_CONSTANT!r}, gas_molar_mass)"
         fields["gas"] = fields["gas"] | {"specific_gas_constant": constant}
         takes_back = self.device.supply.relieving or self.lines is not None
@@ -98,7 +104,21 @@ class Writing:
         yield f"device = {self.row('Device', {section: section for section in fields})}"
         yield f"valve_restriction = {self._restriction('valve', self.device.valve.orifice)}"
         yield f"leak_restriction = {self._restriction('actuator.leak', self.device.actuator.leak)}"
-        yield f"{name} = {add(plant_with)}(device, valve_restriction, leak_restriction, {torque})"
+        made = f"vane_{name}" if self.program.has_shape else name
+        yield f"{made} = {add(plant_with)}(device, valve_restriction, leak_restriction, {torque})"
+        if self.program.has_shape:
+            yield from self._shape(made, name)
+
+    def _shape(self, vane: str, name: str) -> Iterator[str]:
+        """Lines that make a plant of that of a vane and the actuator's shape; what came from a file is constant."""
+        add, actuator, model = self.add, self.device.actuator, self.program.actuator
+        settings = self.section("actuator", list(actuator.settings))
+        measured = "" if actuator.table is None else f", {self.constant(actuator.table, 'table')}"
+        yield f"stops = {add(Range)}({', '.join(self.section('actuator', Range._fields).values())})"
+        yield f"shape = {add(model.prepare)}({self.row('ActuatorSettings', settings)}, stops{measured})"
+        gauge = f"{vane}.supply_pressure - {vane}.atmospheric_pressure"
+        yield f"growth = {add(mean_growth)}(shape, stops, {gauge}, {add(model.chambers)})"
+        yield f"{name} = {add(plant_in_shape)}({vane}, shape, growth)"
 
     def _restriction(self, section: str, orifice: Any) -> str:
         """An orifice with the gas, in the form that it has."""

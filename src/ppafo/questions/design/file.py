@@ -256,6 +256,7 @@ def _task(table: TaskTable, kinds: Sequence[str], folder: Path, file: str, whole
                 f"{file}: task '{table.name}': scenario '{scenario.name}' follows no reference (controller "
                 f"'{OPEN_LOOP}'), so it has no tracking error"
             )
+        scenario.device.check_vane("a design")
         own = scenario.device.valve.kind
         if own != kind:
             raise StudyError(

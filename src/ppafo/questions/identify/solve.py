@@ -14,6 +14,7 @@ from ppafo.identification.procedures import Setting, prospects_of, run_procedure
 from ppafo.identification.source import Source, Use, double_use, source_of
 from ppafo.identification.trajectory.outcome import TrajectoryOutcome, solve_section
 from ppafo.identification.trajectory.section import Setting as FitSetting
+from ppafo.parameters.device import VANE
 from ppafo.parameters.loading import load_parameter_set
 from ppafo.parameters.overrides import apply_overrides
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, chosen_valve
@@ -72,6 +73,10 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
     """
     before = _base_set(problem, folder)
     valve = chosen_valve(before, problem.device.valve)
+    if before.actuator_kind != VANE:
+        raise IdentificationError(
+            f"{file}: identification is made for a vane, and '{before.name}' has an actuator '{before.actuator_kind}'"
+        )
     current, results = before, list[BenchResult]()
     tasks = _tasks(problem, folder, file, before)
     used = _uses(tasks, before, valve, file)

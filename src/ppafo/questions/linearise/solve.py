@@ -154,6 +154,7 @@ def _check(scenario: Scenario, run: Run) -> None:
     """Refuse what has no linear model; ScenarioError."""
     if scenario.supply_lines is not None:
         raise ScenarioError(f"{scenario.name}: linear models are for constant supplies; omit [supply_line]")
+    scenario.device.check_vane("a linear model")
     if not answers_to_command(run):
         raise ScenarioError(
             f"{scenario.name}: valve '{scenario.device.valve_name}' is on or off: its flow has no derivative by the "

@@ -194,6 +194,7 @@ def _scenario(document: SizingFile, profile: TorqueProfile, folder: Path, file: 
     """Return the scenario with the profile as its reference, for a whole number of samples over all repetitions."""
     name = _place(document.scenario, folder)
     plain = load_scenario(name, document.overrides)
+    plain.device.check_vane("the size of a device")
     if plain.control.kind == OPEN_LOOP:
         raise StudyError(f"{file}: scenario '{plain.name}' follows no reference (controller '{OPEN_LOOP}')")
     grain = _common_multiple(plain.control.period, plain.output_interval)

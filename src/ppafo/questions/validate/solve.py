@@ -67,6 +67,7 @@ def validate(
     """
     report = progress or report_nothing
     device = load_device(parameter_set, valve, overrides)
+    device.check_vane("a replay of recordings")
     settings = ReplaySettings(
         motion=_motion(motion),
         initial=parse_initial(initial, device.supply.atmospheric_pressure),

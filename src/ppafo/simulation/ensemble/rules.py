@@ -2,13 +2,15 @@
 
 import operator
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ppafo.engine.lanes import Floats
 from ppafo.model.columns import Problem, at
-from ppafo.parameters.building import consistency
+from ppafo.parameters.building import actuator_problem, consistency
+from ppafo.parameters.device import VANE
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY
 from ppafo.simulation.motion import TOLERANCE, profile_problem
 from ppafo.simulation.numbers import HELD_ANGLE
@@ -30,6 +32,31 @@ def _inconsistent(scenario: Scenario) -> tuple[Problem, ...]:
         ), lambda run: f"{path} = {at(first, run):.9g} must be {relation} {other} = {at(second, run):.9g} (SI units)"
 
     return tuple(problem(*rule) for rule in consistency(scenario.device))
+
+
+def _misshapen(scenario: Scenario) -> tuple[Problem, ...]:
+    """An actuator that is no vane, whose numbers do not fit together."""
+    actuator = scenario.device.actuator
+    stops = actuator.angle_min, actuator.angle_max, actuator.dead_volume_1, actuator.dead_volume_2
+    varied: list[Any] = [value for value in (*stops, *actuator.settings.values()) if isinstance(value, np.ndarray)]
+    if actuator.kind == VANE or not varied:
+        return ()
+
+    def words(run: int) -> str:
+        low, high, dead_1, dead_2 = (at(value, run) for value in stops)
+        alone = replace(
+            actuator,
+            angle_min=low,
+            angle_max=high,
+            dead_volume_1=dead_1,
+            dead_volume_2=dead_2,
+            settings={name: at(value, run) for name, value in actuator.settings.items()},
+        )
+        problem = actuator_problem(alone)
+        return f"actuator: {problem}" if problem else ""
+
+    found = [words(run) for run in range(varied[0].size)]
+    return ((np.array([bool(line) for line in found]), lambda run: found[run]),)
 
 
 def _beyond_the_stops(scenario: Scenario) -> tuple[Problem, ...]:
@@ -100,4 +127,4 @@ def _second_regulator_above_the_first(scenario: Scenario) -> tuple[Problem, ...]
     return ((np.atleast_1d(supply.dorsiflexion_pressure > supply.pressure), line),)
 
 
-RULES: tuple[Rule, ...] = (_inconsistent, _beyond_the_stops, _too_late, _second_regulator_above_the_first)
+RULES: tuple[Rule, ...] = (_inconsistent, _misshapen, _beyond_the_stops, _too_late, _second_regulator_above_the_first)

@@ -95,7 +95,9 @@ class World:
             self.episodes = walk_episodes(walk, randomise, seconds)
         else:
             words = words if duration is None else (*words, f"run.duration={duration!r} s")
-            self.episodes = scenario_episodes(load_scenario(file, words), randomise, varied, targets)
+            chosen = load_scenario(file, words)
+            chosen.device.check_vane("an environment")
+            self.episodes = scenario_episodes(chosen, randomise, varied, targets)
         bounds = observed_bounds(self.task, self.episodes.device)
         self.judging = Judging(
             error_weight=self.task.error_weight if error_weight is None else error_weight,

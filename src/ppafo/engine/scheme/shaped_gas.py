@@ -1,0 +1,118 @@
+"""The gas of an actuator that is no vane: chambers of any shape, which may give under pressure.
+
+A program is linked: where its text calls ``chamber_volumes``, ``chamber_pressures`` and the other functions of the
+vane's chambers, it calls those of its actuator. ``chambers_at``, ``pressures_at`` and ``torque_at``
+stand for the kind's own.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from ppafo.engine.scheme.pneumatics import (
+    SHORTEST,
+    MovingGas,
+    StillGas,
+    linearise,
+    response,
+    solve_stage,
+)
+from ppafo.engine.scheme.stage_flows import SlopedFlows
+from ppafo.model.actuators.kind import ActuatorModel, Chambers, ShapedPlant, shaped_plant_with
+from ppafo.model.actuators.vane import MODEL as VANE
+from ppafo.model.plant import (
+    PlantState,
+    chamber_pressures,
+    chamber_volumes,
+    driving_torque,
+    plant_with,
+    pressures_per_mass,
+)
+from ppafo.model.sensors import Measurement
+from ppafo.model.vane import gravity_torque, net_driving_torque
+
+
+def chambers_at(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: float) -> Chambers:
+    """Both chambers at an angle [rad] and two absolute pressures [Pa], as the kind has them."""
+    raise NotImplementedError
+
+
+def torque_at(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: float) -> float:
+    """Torque [N m] at an angle [rad] and two absolute pressures [Pa], as the kind has it."""
+    raise NotImplementedError
+
+
+def pressures_at(plant: ShapedPlant, angle: float, mass_1: float, mass_2: float) -> tuple[float, float]:
+    """Absolute pressures [Pa] at an angle [rad] of two masses [kg], as the kind has them."""
+    raise NotImplementedError
+
+
+def rest_volumes(plant: ShapedPlant, angle: float) -> tuple[float, float]:
+    """Volumes of both chambers [m^3] at the pressures of their supplies: what errors of gas are seen against."""
+    still = chambers_at(plant, angle, plant.supply_pressure, plant.dorsiflexion_pressure)
+    return still.volume_1, still.volume_2
+
+
+def rest_pressures_per_mass(plant: ShapedPlant, angle: float) -> tuple[float, float]:
+    """Pressures over masses [Pa/kg] of both chambers at the pressures of their supplies."""
+    volume_1, volume_2 = rest_volumes(plant, angle)
+    return plant.gas_product / volume_1, plant.gas_product / volume_2
+
+
+def shaped_driving_torque(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: float) -> float:
+    """Torque before friction and damping [N m], positive in plantarflexion. Equation (1)."""
+    actuator = torque_at(plant, angle, pressure_1, pressure_2)
+    return net_driving_torque(actuator, gravity_torque(angle, plant.gravity_torque), plant.external_torque)
+
+
+def seen_with_torque(plant: ShapedPlant, seen: Measurement) -> Measurement:
+    """What the sensors show, with the torque that the actuator would have at the angle and pressures shown."""
+    torque = torque_at(plant, seen.angle, seen.pressure_1, seen.pressure_2)
+    return Measurement(angle=seen.angle, pressure_1=seen.pressure_1, pressure_2=seen.pressure_2, torque=torque)
+
+
+def begin_shaped_gas(
+    plant: ShapedPlant, state: PlantState, next_angle: float, flowing: SlopedFlows, step: float
+) -> MovingGas:
+    """First stage of one step [s] in which the angle runs to ``next_angle`` [rad]; as ``begin_moving_gas``.
+
+    Mass answers to pressure as V + p dV/dp: a chamber that gives takes up more gas.
+    """
+    pressure_1, pressure_2 = pressures_at(plant, state.angle, state.mass_1, state.mass_2)
+    here = chambers_at(plant, state.angle, pressure_1, pressure_2)
+    ahead = chambers_at(plant, next_angle, pressure_1, pressure_2)
+    per_mass_1 = plant.gas_product / (here.volume_1 + pressure_1 * here.compliance_1)
+    per_mass_2 = plant.gas_product / (here.volume_2 + pressure_2 * here.compliance_2)
+    linear, flows = linearise(per_mass_1, per_mass_2, flowing, step)
+    per_duration = 1.0 / (plant.gas_product * max(step, SHORTEST))
+    drift = response(
+        linear,
+        pressure_1 * (here.volume_1 - ahead.volume_1) * per_duration,
+        pressure_2 * (here.volume_2 - ahead.volume_2) * per_duration,
+    )
+    first = solve_stage(
+        linear,
+        flows.mass_1 + drift.mass_1,
+        flows.mass_2 + drift.mass_2,
+        flows.supplied + drift.supplied,
+        flows.leaked + drift.leaked,
+    )
+    end_1, end_2 = pressures_at(
+        plant, next_angle, state.mass_1 + step * first.mass_1, state.mass_2 + step * first.mass_2
+    )
+    return MovingGas(StillGas(linear=linear, first=first, end_1=end_1, end_2=end_2), drift)
+
+
+def links_of(actuator: ActuatorModel) -> dict[Callable[..., Any], Callable[..., Any]]:
+    """What a program with this actuator calls in place of the functions of the vane; nothing for the vane."""
+    if actuator is VANE:
+        return {}
+    return {
+        chambers_at: actuator.chambers,
+        torque_at: actuator.torque,
+        pressures_at: actuator.pressures,
+        chamber_pressures: actuator.pressures,
+        chamber_volumes: rest_volumes,
+        pressures_per_mass: rest_pressures_per_mass,
+        driving_torque: shaped_driving_torque,
+        plant_with: shaped_plant_with,
+    }

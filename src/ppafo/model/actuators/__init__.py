@@ -1,0 +1,1 @@
+"""The kinds of actuator: volume and torque over angle and pressure."""

@@ -1,0 +1,133 @@
+"""A double-acting cylinder between two pins that drives a lever: the law of cosines between joint, base and rod end.
+
+Chamber 1 is on the side of the piston, chamber 2 on that of the rod. The cylinder grows longer with the angle.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from ppafo.model.actuators.kind import ActuatorKind, ActuatorModel, Chambers, Range, ShapedPlant
+from ppafo.model.actuators.linear_chambers import (
+    LinearChamber,
+    linear_chambers,
+    linear_pressures,
+    linear_torque,
+    rigid,
+)
+from ppafo.model.declaration import Quantity
+from ppafo.model.turns import TURNS_OF_RADIAN, sine_and_cosine
+
+LEAST_SINE = 0.05
+"""Sine of the angle between lever and base below which the lever is too near its dead centre."""
+
+
+class Cylinder(NamedTuple):
+    """Areas of piston and rod side [m^2], lever and base from the joint [m], angle between them at 0 [rad].
+
+    Then dead volumes [m^3] and the lengths between the pins at both stops [m].
+    """
+
+    piston_area: float
+    rod_side_area: float
+    lever: float
+    base: float
+    offset: float
+    dead_volume_1: float
+    dead_volume_2: float
+    shortest: float
+    longest: float
+
+
+class Pins(NamedTuple):
+    """Distance of the pins [m], and what it grows per radian [m/rad]: the arm at which the cylinder pushes."""
+
+    length: float
+    arm: float
+
+
+def pins_at(lever: float, base: float, between: float) -> Pins:
+    """Pins of a lever and a base [m] with an angle [rad] between them: the law of cosines."""
+    sine, cosine = sine_and_cosine(between * TURNS_OF_RADIAN)
+    length = math.sqrt(lever * lever + base * base - 2.0 * lever * base * cosine)
+    return Pins(length=length, arm=lever * base * sine / length)
+
+
+def chamber_1(shape: Cylinder, pins: Pins) -> LinearChamber:
+    """The side of the piston, which grows with the angle."""
+    swept = shape.piston_area * (pins.length - shape.shortest)
+    return rigid(shape.dead_volume_1 + swept, shape.piston_area * pins.arm)
+
+
+def chamber_2(shape: Cylinder, pins: Pins) -> LinearChamber:
+    """The side of the rod, which shrinks with the angle."""
+    swept = shape.rod_side_area * (shape.longest - pins.length)
+    return rigid(shape.dead_volume_2 + swept, -shape.rod_side_area * pins.arm)
+
+
+def chambers(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: float) -> Chambers:
+    """Both chambers at an angle [rad]."""
+    shape: Cylinder = plant.shape
+    pins = pins_at(shape.lever, shape.base, angle + shape.offset)
+    return linear_chambers(plant, chamber_1(shape, pins), chamber_2(shape, pins), pressure_1, pressure_2)
+
+
+def pressures(plant: ShapedPlant, angle: float, mass_1: float, mass_2: float) -> tuple[float, float]:
+    """Absolute pressures [Pa] of two masses [kg]. Equation (3)."""
+    shape: Cylinder = plant.shape
+    pins = pins_at(shape.lever, shape.base, angle + shape.offset)
+    return linear_pressures(plant, chamber_1(shape, pins), chamber_2(shape, pins), mass_1, mass_2)
+
+
+def torque(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: float) -> float:
+    """Torque [N m] of two absolute pressures [Pa]; the atmosphere pushes on the rod."""
+    shape: Cylinder = plant.shape
+    pins = pins_at(shape.lever, shape.base, angle + shape.offset)
+    return linear_torque(plant, chamber_1(shape, pins), chamber_2(shape, pins), pressure_1, pressure_2)
+
+
+def prepare(settings: Mapping[str, float], stops: Range) -> Cylinder:
+    """Numbers of the cylinder."""
+    bore, rod = settings["bore"], settings["rod_diameter"]
+    lever, base, offset = settings["lever_length"], settings["base_distance"], settings["lever_offset"]
+    quarter = 0.25 * math.pi
+    return Cylinder(
+        piston_area=quarter * bore * bore,
+        rod_side_area=quarter * (bore * bore - rod * rod),
+        lever=lever,
+        base=base,
+        offset=offset,
+        dead_volume_1=stops.dead_volume_1,
+        dead_volume_2=stops.dead_volume_2,
+        shortest=pins_at(lever, base, stops.angle_min + offset).length,
+        longest=pins_at(lever, base, stops.angle_max + offset).length,
+    )
+
+
+def problem(settings: Mapping[str, float], stops: Range) -> str:
+    """A rod as wide as the bore, or a lever that comes to its dead centre between the stops."""
+    if settings["rod_diameter"] >= settings["bore"]:
+        return "rod_diameter must be below bore"
+    between = [angle + settings["lever_offset"] for angle in (stops.angle_min, stops.angle_max)]
+    if min(between) <= 0.0 or max(between) >= math.pi or min(math.sin(angle) for angle in between) < LEAST_SINE:
+        low, high = (math.degrees(angle) for angle in between)
+        return (
+            f"lever and base are {low:.4g} to {high:.4g} deg apart between the stops, and must stay "
+            f"{math.degrees(math.asin(LEAST_SINE)):.2g} deg from being in line: change lever_offset or the stops"
+        )
+    return ""
+
+
+KIND = ActuatorKind(
+    name="cylinder",
+    summary="A double-acting cylinder between two pins that drives a lever.",
+    quantities=(
+        Quantity("bore", "m", "diameter of the piston", minimum=1.0e-3, maximum=0.5),
+        Quantity("rod_diameter", "m", "diameter of the rod", minimum=0.0, maximum=0.5),
+        Quantity("lever_length", "m", "joint to rod end", minimum=1.0e-3, maximum=2.0),
+        Quantity("base_distance", "m", "joint to the base of the cylinder", minimum=1.0e-3, maximum=2.0),
+        Quantity("lever_offset", "rad", "angle between lever and base where the joint is at 0", 0.0, -10.0, 10.0),
+    ),
+    model=ActuatorModel(Cylinder, prepare, chambers, pressures, torque),
+    problem=problem,
+)

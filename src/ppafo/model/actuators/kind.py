@@ -1,0 +1,200 @@
+"""What a kind of actuator declares of itself: volumes, pressures and torque over angle, as the plant computes them.
+
+Each chamber has a co-energy Phi(angle, gauge pressure) with the volume V = dPhi/dp and the torque tau = dPhi/dangle, so
+that d tau/dp = dV/dangle: what the gas gives as p dV the shaft gets. A kind is that relation as functions of floats.
+"""
+
+from collections import namedtuple
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple, get_type_hints
+
+from ppafo.model.declaration import Quantity
+from ppafo.model.orifice import FlowCurve
+from ppafo.model.plant import PlantParameters
+
+
+class Range(NamedTuple):
+    """Stops of an actuator [rad], dead volumes of its lines and chambers [m^3]."""
+
+    angle_min: float
+    angle_max: float
+    dead_volume_1: float
+    dead_volume_2: float
+
+
+class Chambers(NamedTuple):
+    """Volumes of both chambers [m^3], and how they grow with their own pressures [m^3/Pa]."""
+
+    volume_1: float
+    volume_2: float
+    compliance_1: float
+    compliance_2: float
+
+
+@dataclass(frozen=True, slots=True)
+class ActuatorModel:
+    """Compiled side of a kind; the functions take a plant, an angle [rad] and absolute pressures [Pa] or masses [kg].
+
+    ``shape`` is the NamedTuple of floats that stands as ``plant.shape``, None for the vane, which needs none;
+    ``prepare(settings, range)`` makes it from the declared settings. ``table`` is the NamedTuple of what a set names a
+    file for, which ``prepare`` is then given third; None for a kind without a file.
+    ``chambers(plant, angle, pressure_1, pressure_2)`` returns ``Chambers``, ``pressures(plant, angle, mass_1, mass_2)``
+    the two pressures at which p V = m R T, and ``torque(plant, angle, pressure_1, pressure_2)`` the torque [N m],
+    positive in plantarflexion.
+    """
+
+    shape: type | None
+    prepare: Callable[..., Any]
+    chambers: Callable[..., Chambers]
+    pressures: Callable[..., tuple[float, float]]
+    torque: Callable[..., float]
+    table: type | None = None
+
+    @property
+    def plant(self) -> type:
+        """The NamedTuple of a plant with this actuator."""
+        return PlantParameters if self.shape is None else _plant_with(self.shape)
+
+
+@dataclass(frozen=True, slots=True)
+class ActuatorKind:
+    """An actuator as the catalogue knows it: name, what it is, its numbers beside stops and dead volumes, its model.
+
+    ``problem(settings, range)`` says in words what of the numbers does not fit together; empty where all of it does.
+    """
+
+    name: str
+    summary: str
+    quantities: tuple[Quantity, ...]
+    model: ActuatorModel
+    problem: Callable[[Mapping[str, float], Range], str]
+
+
+class ShapedPlant(NamedTuple):
+    """A plant whose actuator is no vane: ``PlantParameters`` with the numbers of its kind.
+
+    ``volume_per_angle`` is the mean growth of chamber 1 between the stops and ``torque_constant`` the same number:
+    what scales errors, and what laws that were made for a vane believe.
+    """
+
+    gas_product: float
+    torque_constant: float
+    volume_per_angle: float
+    angle_min: float
+    angle_max: float
+    dead_volume_1: float
+    dead_volume_2: float
+    restitution: float
+    static_torque: float
+    dynamic_torque: float
+    viscous_damping: float
+    inertia: float
+    gravity_torque: float
+    external_torque: float
+    supply_pressure: float
+    dorsiflexion_pressure: float
+    atmospheric_pressure: float
+    valve_conductance: float
+    leak_conductance: float
+    valve_curve: FlowCurve
+    leak_curve: FlowCurve
+    relieving: float
+    shape: Any
+
+
+class AtRest(NamedTuple):
+    """What a kind's ``chambers`` ask of a plant, where pressures count from the atmosphere."""
+
+    shape: Any
+    atmospheric_pressure: float
+
+
+def mean_growth(shape: Any, stops: Range, gauge: float, chambers: Callable[..., Chambers]) -> float:
+    """Mean growth of chamber 1 between the stops [m^3/rad] at a gauge pressure [Pa]: torque per pressure, too."""
+    still = AtRest(shape, 0.0)
+    first = chambers(still, stops.angle_min, gauge, 0.0).volume_1
+    last = chambers(still, stops.angle_max, gauge, 0.0).volume_1
+    return (last - first) / max(stops.angle_max - stops.angle_min, 1.0e-9)
+
+
+def shaped_plant(
+    plant: Any,
+    shape: Any,
+    growth: float,
+    supply_pressure: float,
+    dorsiflexion_pressure: float,
+    leak_conductance: float,
+    leak_curve: FlowCurve,
+) -> ShapedPlant:
+    """A plant with a shape, its mean growth [m^3/rad], supply pressures [Pa] and leak [kg/(s Pa)]; the rest stays."""
+    return ShapedPlant(
+        gas_product=plant.gas_product,
+        torque_constant=growth,
+        volume_per_angle=growth,
+        angle_min=plant.angle_min,
+        angle_max=plant.angle_max,
+        dead_volume_1=plant.dead_volume_1,
+        dead_volume_2=plant.dead_volume_2,
+        restitution=plant.restitution,
+        static_torque=plant.static_torque,
+        dynamic_torque=plant.dynamic_torque,
+        viscous_damping=plant.viscous_damping,
+        inertia=plant.inertia,
+        gravity_torque=plant.gravity_torque,
+        external_torque=plant.external_torque,
+        supply_pressure=supply_pressure,
+        dorsiflexion_pressure=dorsiflexion_pressure,
+        atmospheric_pressure=plant.atmospheric_pressure,
+        valve_conductance=plant.valve_conductance,
+        leak_conductance=leak_conductance,
+        valve_curve=plant.valve_curve,
+        leak_curve=leak_curve,
+        relieving=plant.relieving,
+        shape=shape,
+    )
+
+
+def plant_in_shape(plant: PlantParameters, shape: Any, growth: float) -> ShapedPlant:
+    """The plant of another kind from that of a vane with the same stops, gas and orifices."""
+    return shaped_plant(
+        plant,
+        shape,
+        growth,
+        plant.supply_pressure,
+        plant.dorsiflexion_pressure,
+        plant.leak_conductance,
+        plant.leak_curve,
+    )
+
+
+def shaped_plant_with(
+    plant: ShapedPlant,
+    supply_pressure: float,
+    dorsiflexion_pressure: float,
+    leak_conductance: float,
+    leak_curve: FlowCurve,
+) -> ShapedPlant:
+    """The plant with other supply pressures [Pa] and another leak [kg/(s Pa)], all else as it is."""
+    return shaped_plant(
+        plant,
+        plant.shape,
+        plant.volume_per_angle,
+        supply_pressure,
+        dorsiflexion_pressure,
+        leak_conductance,
+        leak_curve,
+    )
+
+
+def _plant_with(shape: type) -> type:
+    """``ShapedPlant`` with the shape of one kind: one class for each, which stands under the same name in a program."""
+    if shape not in _PLANTS:
+        make: Any = namedtuple
+        row = make(ShapedPlant.__name__, ShapedPlant._fields)
+        row.__annotations__ = get_type_hints(ShapedPlant, include_extras=True) | {"shape": shape}
+        _PLANTS[shape] = row
+    return _PLANTS[shape]
+
+
+_PLANTS: dict[type, type] = {}

@@ -1,0 +1,80 @@
+"""Chambers whose volumes grow linearly with the pressure, V = rest + compliance p: what most kinds are made of.
+
+The co-energy of one is Phi = rest p + compliance p^2/2 at gauge pressure p, rest and compliance functions of the angle.
+Rigid chambers have no compliance.
+"""
+
+import math
+from typing import NamedTuple
+
+from ppafo.model.actuators.kind import Chambers, ShapedPlant
+
+
+class LinearChamber(NamedTuple):
+    """A chamber at an angle: volume at no gauge pressure [m^3], compliance [m^3/Pa], both once more per radian."""
+
+    rest: float
+    compliance: float
+    rest_slope: float
+    compliance_slope: float
+
+
+def rigid(volume: float, slope: float) -> LinearChamber:
+    """A chamber of a volume [m^3], growing with the angle [m^3/rad], that does not give under pressure."""
+    return LinearChamber(rest=volume, compliance=0.0, rest_slope=slope, compliance_slope=0.0)
+
+
+def stretching(dead_volume: float, volume: float, slope: float, stretch: float) -> LinearChamber:
+    """A chamber whose volume [m^3] grows by a share per gauge pressure [1/Pa], and its slope [m^3/rad] with it."""
+    return LinearChamber(
+        rest=dead_volume + volume, compliance=stretch * volume, rest_slope=slope, compliance_slope=stretch * slope
+    )
+
+
+def grown(chamber: LinearChamber, gauge: float) -> float:
+    """Volume [m^3] at a gauge pressure [Pa]: dPhi/dp."""
+    return chamber.rest + chamber.compliance * gauge
+
+
+def turning(chamber: LinearChamber, gauge: float) -> float:
+    """Torque [N m] at a gauge pressure [Pa]: dPhi/dangle."""
+    return gauge * (chamber.rest_slope + 0.5 * chamber.compliance_slope * gauge)
+
+
+def pressure_in(chamber: LinearChamber, content: float, atmosphere: float) -> float:
+    """Absolute pressure [Pa] at which p V is a content [J], by the root of p V that does not cancel."""
+    above = content - chamber.rest * atmosphere
+    half = 0.5 * (chamber.rest + chamber.compliance * atmosphere)
+    return atmosphere + above / (half + math.sqrt(max(half * half + chamber.compliance * above, 0.0)))
+
+
+def linear_chambers(
+    plant: ShapedPlant, chamber_1: LinearChamber, chamber_2: LinearChamber, pressure_1: float, pressure_2: float
+) -> Chambers:
+    """Both chambers at two absolute pressures [Pa]."""
+    room = plant.atmospheric_pressure
+    return Chambers(
+        volume_1=grown(chamber_1, pressure_1 - room),
+        volume_2=grown(chamber_2, pressure_2 - room),
+        compliance_1=chamber_1.compliance,
+        compliance_2=chamber_2.compliance,
+    )
+
+
+def linear_pressures(
+    plant: ShapedPlant, chamber_1: LinearChamber, chamber_2: LinearChamber, mass_1: float, mass_2: float
+) -> tuple[float, float]:
+    """Absolute pressures [Pa] of two masses [kg]. Equation (3)."""
+    room = plant.atmospheric_pressure
+    return (
+        pressure_in(chamber_1, mass_1 * plant.gas_product, room),
+        pressure_in(chamber_2, mass_2 * plant.gas_product, room),
+    )
+
+
+def linear_torque(
+    plant: ShapedPlant, chamber_1: LinearChamber, chamber_2: LinearChamber, pressure_1: float, pressure_2: float
+) -> float:
+    """Torque [N m] of both chambers at two absolute pressures [Pa]: the atmosphere is on the other side of each."""
+    room = plant.atmospheric_pressure
+    return turning(chamber_1, pressure_1 - room) + turning(chamber_2, pressure_2 - room)

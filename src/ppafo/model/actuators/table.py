@@ -1,0 +1,259 @@
+"""An actuator that was measured: volumes of both chambers over angle and pressure, from a file.
+
+Over the angle a volume is a cubic spline through what was measured, with two continuous derivatives; over the pressure
+it runs straight from one measured pressure to the next, and no further. Its integral over the pressure is written down,
+and the torque is the derivative of that over the angle: d tau/dp = dV/dangle holds to rounding, whatever was measured.
+"""
+
+from collections.abc import Mapping
+from typing import Annotated, NamedTuple
+
+from ppafo.model.actuators.kind import ActuatorKind, ActuatorModel, Chambers, Range, ShapedPlant
+from ppafo.model.actuators.linear_chambers import LinearChamber, pressure_in
+from ppafo.model.declaration import Quantity
+
+BENDS, RISES = 8, 4
+"""Places inside the range of the angle where a spline may bend, and stretches between two measured pressures."""
+MOST_ANGLES, MOST_PRESSURES = BENDS + 4, RISES + 1
+
+
+class Curve(NamedTuple):
+    """A cubic spline [m^3] over the share of the range: four coefficients of powers, one for each bend."""
+
+    powers: Annotated[tuple[float, ...], 4]
+    bends: Annotated[tuple[float, ...], BENDS]
+
+
+class Rise(NamedTuple):
+    """A stretch between two gauge pressures [Pa]: its lower end, its length, and what the volume gains over it."""
+
+    lower: float
+    length: float
+    gain: Curve
+
+
+class Chamber(NamedTuple):
+    """A chamber: its volume [m^3] up to the lowest pressure measured, then stretch by stretch."""
+
+    lowest: Curve
+    rises: Annotated[tuple[Rise, ...], RISES]
+
+
+class Table(NamedTuple):
+    """Both chambers over the share of a range of angles: where it begins [rad], one over its length, its bends [-]."""
+
+    first_angle: float
+    last_angle: float
+    per_angle: float
+    bends: Annotated[tuple[float, ...], BENDS]
+    chamber_1: Chamber
+    chamber_2: Chamber
+
+
+class Measured(NamedTuple):
+    """A table with dead volumes beside it [m^3], passive stiffness [N m/rad], and where that gives no torque [rad]."""
+
+    table: Table
+    dead_volume_1: float
+    dead_volume_2: float
+    stiffness: float
+    rest_angle: float
+
+
+class Bases(NamedTuple):
+    """What the coefficients of a curve stand before: of its value, and of its slope [1/rad]."""
+
+    value: Curve
+    slope: Curve
+
+
+class Level(NamedTuple):
+    """A volume [m^3] and its slope [m^3/rad]."""
+
+    volume: float
+    slope: float
+
+
+class Levels(NamedTuple):
+    """A chamber at an angle: up to the lowest pressure, and what each stretch adds."""
+
+    lowest: Level
+    gains: Annotated[tuple[Level, ...], RISES]
+
+
+def bases_at(table: Table, angle: float) -> Bases:
+    """Bases of all curves of a table at an angle [rad]."""
+    share = (angle - table.first_angle) * table.per_angle
+    square, per = share * share, table.per_angle
+    at = table.bends
+    d0, d1 = max(share - at[0], 0.0), max(share - at[1], 0.0)
+    d2, d3 = max(share - at[2], 0.0), max(share - at[3], 0.0)
+    d4, d5 = max(share - at[4], 0.0), max(share - at[5], 0.0)
+    d6, d7 = max(share - at[6], 0.0), max(share - at[7], 0.0)
+    s0, s1, s2, s3 = d0 * d0, d1 * d1, d2 * d2, d3 * d3
+    s4, s5, s6, s7 = d4 * d4, d5 * d5, d6 * d6, d7 * d7
+    three = 3.0 * per
+    return Bases(
+        value=Curve(
+            (1.0, share, square, square * share),
+            (s0 * d0, s1 * d1, s2 * d2, s3 * d3, s4 * d4, s5 * d5, s6 * d6, s7 * d7),
+        ),
+        slope=Curve(
+            (0.0, per, 2.0 * per * share, three * square),
+            (three * s0, three * s1, three * s2, three * s3, three * s4, three * s5, three * s6, three * s7),
+        ),
+    )
+
+
+def along(curve: Curve, basis: Curve) -> float:
+    """A curve, or its slope, by its basis."""
+    a, b, c, d = curve.powers, basis.powers, curve.bends, basis.bends
+    smooth = (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3])
+    low = (c[0] * d[0] + c[1] * d[1]) + (c[2] * d[2] + c[3] * d[3])
+    return smooth + (low + ((c[4] * d[4] + c[5] * d[5]) + (c[6] * d[6] + c[7] * d[7])))
+
+
+def level_of(curve: Curve, bases: Bases) -> Level:
+    """Value and slope of a curve."""
+    return Level(along(curve, bases.value), along(curve, bases.slope))
+
+
+def levels_of(chamber: Chamber, bases: Bases, dead_volume: float) -> Levels:
+    """A chamber with a dead volume [m^3] at an angle."""
+    lowest, rises = level_of(chamber.lowest, bases), chamber.rises
+    return Levels(
+        Level(lowest.volume + dead_volume, lowest.slope),
+        (
+            level_of(rises[0].gain, bases),
+            level_of(rises[1].gain, bases),
+            level_of(rises[2].gain, bases),
+            level_of(rises[3].gain, bases),
+        ),
+    )
+
+
+def share_of(rise: Rise, gauge: float) -> float:
+    """Share of a stretch [-] below a gauge pressure [Pa]."""
+    return max(0.0, min(1.0, (gauge - rise.lower) / rise.length))
+
+
+def filled_share(rise: Rise, gauge: float) -> float:
+    """Integral of ``share_of`` over the pressure, from 0 to a gauge pressure [Pa]."""
+    inside = share_of(rise, gauge)
+    return rise.length * 0.5 * inside * inside + max(gauge - rise.lower - rise.length, 0.0)
+
+
+def volume_at(chamber: Chamber, levels: Levels, gauge: float) -> float:
+    """Volume [m^3] at a gauge pressure [Pa]."""
+    rises, gains = chamber.rises, levels.gains
+    low = gains[0].volume * share_of(rises[0], gauge) + gains[1].volume * share_of(rises[1], gauge)
+    high = gains[2].volume * share_of(rises[2], gauge) + gains[3].volume * share_of(rises[3], gauge)
+    return levels.lowest.volume + (low + high)
+
+
+def compliance_in(rise: Rise, gain: Level, gauge: float) -> float:
+    """Growth of the volume with the pressure [m^3/Pa] in a stretch, 0 outside."""
+    return gain.volume / rise.length if gauge >= rise.lower and gauge < rise.lower + rise.length else 0.0
+
+
+def compliance_at(chamber: Chamber, levels: Levels, gauge: float) -> float:
+    """Growth of the volume with the pressure [m^3/Pa] at a gauge pressure [Pa]."""
+    rises, gains = chamber.rises, levels.gains
+    low = compliance_in(rises[0], gains[0], gauge) + compliance_in(rises[1], gains[1], gauge)
+    return low + (compliance_in(rises[2], gains[2], gauge) + compliance_in(rises[3], gains[3], gauge))
+
+
+def turning(chamber: Chamber, levels: Levels, gauge: float) -> float:
+    """Torque [N m] at a gauge pressure [Pa]: the integral of the volume's slope over the pressure."""
+    rises, gains = chamber.rises, levels.gains
+    low = gains[0].slope * filled_share(rises[0], gauge) + gains[1].slope * filled_share(rises[1], gauge)
+    high = gains[2].slope * filled_share(rises[2], gauge) + gains[3].slope * filled_share(rises[3], gauge)
+    return levels.lowest.slope * gauge + (low + high)
+
+
+def climb(rise: Rise, gain: Level, volume: float, found: float, content: float, atmosphere: float) -> float:
+    """Absolute pressure [Pa] that a stretch says, where the content [J] reaches it; else the one found below it."""
+    begin = rise.lower + atmosphere
+    stretch = LinearChamber(
+        rest=volume, compliance=gain.volume / rise.length, rest_slope=gain.slope, compliance_slope=0.0
+    )
+    inside = pressure_in(stretch, content, begin)
+    beyond = content / (volume + gain.volume)
+    own = inside if inside < begin + rise.length else beyond
+    return own if content > begin * volume else found
+
+
+def pressure_at(chamber: Chamber, levels: Levels, content: float, atmosphere: float) -> float:
+    """Absolute pressure [Pa] at which p V is a content [J]."""
+    rises, gains = chamber.rises, levels.gains
+    volume = levels.lowest.volume
+    pressure = climb(rises[0], gains[0], volume, content / volume, content, atmosphere)
+    second = volume + gains[0].volume
+    pressure = climb(rises[1], gains[1], second, pressure, content, atmosphere)
+    third = second + gains[1].volume
+    pressure = climb(rises[2], gains[2], third, pressure, content, atmosphere)
+    return climb(rises[3], gains[3], third + gains[2].volume, pressure, content, atmosphere)
+
+
+def chambers(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: float) -> Chambers:
+    """Both chambers at an angle [rad]."""
+    shape: Measured = plant.shape
+    room = plant.atmospheric_pressure
+    first, second, bases = shape.table.chamber_1, shape.table.chamber_2, bases_at(shape.table, angle)
+    levels_1 = levels_of(first, bases, shape.dead_volume_1)
+    levels_2 = levels_of(second, bases, shape.dead_volume_2)
+    return Chambers(
+        volume_1=volume_at(first, levels_1, pressure_1 - room),
+        volume_2=volume_at(second, levels_2, pressure_2 - room),
+        compliance_1=compliance_at(first, levels_1, pressure_1 - room),
+        compliance_2=compliance_at(second, levels_2, pressure_2 - room),
+    )
+
+
+def pressures(plant: ShapedPlant, angle: float, mass_1: float, mass_2: float) -> tuple[float, float]:
+    """Absolute pressures [Pa] of two masses [kg]. Equation (3)."""
+    shape: Measured = plant.shape
+    room = plant.atmospheric_pressure
+    first, second, bases = shape.table.chamber_1, shape.table.chamber_2, bases_at(shape.table, angle)
+    return (
+        pressure_at(first, levels_of(first, bases, shape.dead_volume_1), mass_1 * plant.gas_product, room),
+        pressure_at(second, levels_of(second, bases, shape.dead_volume_2), mass_2 * plant.gas_product, room),
+    )
+
+
+def torque(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: float) -> float:
+    """Torque [N m] of two absolute pressures [Pa], and of what is passive."""
+    shape: Measured = plant.shape
+    room = plant.atmospheric_pressure
+    first, second, bases = shape.table.chamber_1, shape.table.chamber_2, bases_at(shape.table, angle)
+    active_1 = turning(first, levels_of(first, bases, 0.0), pressure_1 - room)
+    active_2 = turning(second, levels_of(second, bases, 0.0), pressure_2 - room)
+    return active_1 + active_2 - shape.stiffness * (angle - shape.rest_angle)
+
+
+def prepare(settings: Mapping[str, float], stops: Range, table: Table) -> Measured:
+    """Numbers of the actuator."""
+    return Measured(
+        table=table,
+        dead_volume_1=stops.dead_volume_1,
+        dead_volume_2=stops.dead_volume_2,
+        stiffness=settings["passive_stiffness"],
+        rest_angle=settings["rest_angle"],
+    )
+
+
+def problem(settings: Mapping[str, float], stops: Range) -> str:
+    """Nothing: the file is judged where it is read."""
+    return ""
+
+
+KIND = ActuatorKind(
+    name="table",
+    summary="An actuator that was measured: volumes over angle and pressure, from a CSV file.",
+    quantities=(
+        Quantity("passive_stiffness", "N m/rad", "torque of the material per angle from rest", 0.0, 0.0, 1.0e4),
+        Quantity("rest_angle", "rad", "angle at which the material gives no torque", 0.0, -10.0, 10.0),
+    ),
+    model=ActuatorModel(Measured, prepare, chambers, pressures, torque, table=Table),
+    problem=problem,
+)

@@ -1,0 +1,45 @@
+"""The vane of the paper: two chambers whose volumes run linearly with the angle. Equations (2), (4), (5).
+
+Torque constant and volume per angle are given apart, as they are printed. By virtual work they are one number but for
+losses; where they are not, the vane does not give the shaft what its gas does (docs/decisions/0014).
+"""
+
+from collections.abc import Mapping
+
+from ppafo.model.actuators.kind import ActuatorKind, ActuatorModel, Chambers, Range
+from ppafo.model.declaration import Quantity
+from ppafo.model.plant import PlantParameters, chamber_pressures, chamber_volumes
+from ppafo.model.vane import actuator_torque
+
+
+def chambers(plant: PlantParameters, angle: float, pressure_1: float, pressure_2: float) -> Chambers:
+    """Both chambers, which no pressure widens. Equations (4), (5)."""
+    volume_1, volume_2 = chamber_volumes(plant, angle)
+    return Chambers(volume_1=volume_1, volume_2=volume_2, compliance_1=0.0, compliance_2=0.0)
+
+
+def torque(plant: PlantParameters, angle: float, pressure_1: float, pressure_2: float) -> float:
+    """Torque [N m] of two absolute pressures [Pa], the same at every angle. Equation (2)."""
+    return actuator_torque(pressure_1, pressure_2, plant.torque_constant)
+
+
+def prepare(settings: Mapping[str, float], stops: Range) -> None:
+    """Nothing: the numbers of a vane stand in the plant itself."""
+
+
+def problem(settings: Mapping[str, float], stops: Range) -> str:
+    """Nothing: the declared limits say all."""
+    return ""
+
+
+MODEL = ActuatorModel(None, prepare, chambers, chamber_pressures, torque)
+KIND = ActuatorKind(
+    name="vane",
+    summary="A vane between two chambers whose volumes run linearly with the angle.",
+    quantities=(
+        Quantity("torque_constant", "m^3", "torque per pressure difference", minimum=0.0, minimum_allowed=False),
+        Quantity("volume_per_angle", "m^3/rad", "chamber volume per angle", minimum=0.0, minimum_allowed=False),
+    ),
+    model=MODEL,
+    problem=problem,
+)

@@ -1,0 +1,242 @@
+"""The file of a measured actuator: one line for each angle and pressure, with the volumes of its chambers.
+
+    angle [deg],pressure [kPa_g],volume_1 [mL],volume_2 [mL]
+
+Without a column ``volume_2`` the actuator has one chamber, and chamber 2 is nothing but its dead volume.
+"""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise, product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, read_regular_file
+from ppafo.documents.toml_text import label
+from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, reason
+from ppafo.model.actuators.table import (
+    BENDS,
+    MOST_ANGLES,
+    MOST_PRESSURES,
+    RISES,
+    Chamber,
+    Curve,
+    Rise,
+    Table,
+)
+from ppafo.units import to_si
+
+Floats = NDArray[np.float64]
+
+COLUMNS = {"angle": "rad", "pressure": "Pa_a", "volume_1": "m^3", "volume_2": "m^3"}
+LARGEST = {"angle": 10.0, "pressure": 1.0e7, "volume_1": 1.0, "volume_2": 1.0}
+"""Sizes [SI] beyond which a number is a slip of the pen; pressures are above the atmosphere here."""
+NEVER = 1.0e12
+"""A pressure [Pa] and a share of the range that nothing comes to: there is no stretch, or no bend."""
+_NEAREST = 0.01
+"""Angles nearer than this share of their range make a spline swing."""
+_LOOKED_AT = 201
+_SHOWN = 40
+
+
+def read_actuator_table(path: Path) -> Table:
+    """Return the curves of a measured actuator; ParameterError says in one line what is wrong with its file."""
+    file = label(str(path))
+    try:
+        text = read_regular_file(path, MAXIMUM_BYTES_TYPED).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ParameterError(f"{file}: is not a text file in UTF-8 (byte {error.start})") from error
+    except (OSError, ValueError) as error:
+        raise ParameterError(f"{file}: cannot be read: {reason(error)}") from error
+    return table_of(_columns(text, file), file)
+
+
+def table_of(columns: dict[str, Floats], file: str) -> Table:
+    """Return the curves of columns in SI units, pressures above the atmosphere; ParameterError where they cannot be."""
+    angles, pressures = np.unique(columns["angle"]), np.unique(columns["pressure"])
+    _check_grid(columns, angles, pressures, file)
+    order = np.lexsort((columns["pressure"], columns["angle"]))
+    given = [columns[name] for name in ("volume_1", "volume_2") if name in columns]
+    volumes = [volume[order].reshape(angles.size, pressures.size) for volume in given]
+    for number, volume in enumerate(volumes, 1):
+        _check_volume(volume, angles, pressures, f"volume_{number}", file)
+    bends = (angles[2:-2] - angles[0]) / (angles[-1] - angles[0])
+    made = [_chamber(volume, angles, pressures, bends) for volume in volumes]
+    for number, chamber in enumerate(made, 1):
+        _check_curves(chamber, bends, angles, f"volume_{number}", file)
+    return Table(
+        first_angle=float(angles[0]),
+        last_angle=float(angles[-1]),
+        per_angle=1.0 / float(angles[-1] - angles[0]),
+        bends=_padded(bends, BENDS, NEVER),
+        chamber_1=made[0],
+        chamber_2=made[1] if len(made) > 1 else _none_like(made[0]),
+    )
+
+
+def _columns(text: str, file: str) -> dict[str, Floats]:
+    """Return the columns of a file in SI units, by name."""
+    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
+    if not lines:
+        raise ParameterError(f"{file}: is empty; its header is 'angle [deg],pressure [kPa_g],volume_1 [mL]'")
+    names, units = _header([cell.strip().strip('"') for cell in lines[0][1].split(",")], file)
+    rows: list[list[float]] = []
+    for number, line in lines[1:]:
+        cells = [cell.strip() for cell in line.split(",")]
+        if len(cells) != len(names):
+            raise ParameterError(f"{file}, line {number}: has {len(cells)} values, the header has {len(names)}")
+        rows.append([_number(cell, name, f"{file}, line {number}") for cell, name in zip(cells, names, strict=True)])
+    if not rows:
+        raise ParameterError(f"{file}: has a header and no line of numbers")
+    columns: dict[str, Floats] = {}
+    for place, (name, unit) in enumerate(zip(names, units, strict=True)):
+        # Over a vacuum a gauge pressure is its own SI value.
+        column = np.array([to_si(row[place], unit, COLUMNS[name], 0.0) for row in rows])
+        worst = int(np.argmax(np.abs(column)))
+        if abs(column[worst]) > LARGEST[name]:
+            raise ParameterError(
+                f"{file}, line {lines[worst + 1][0]}: {name} = {rows[worst][place]:g} {unit} is beyond "
+                f"{LARGEST[name]:g} {COLUMNS[name].removesuffix('_a')}"
+            )
+        columns[name] = column
+    return columns
+
+
+def _header(cells: Sequence[str], file: str) -> tuple[list[str], list[str]]:
+    """Return names and units of the columns."""
+    names, units = [], []
+    for cell in cells:
+        name, bracket, unit = (part.strip() for part in cell.strip().removesuffix("]").partition("["))
+        if name not in COLUMNS:
+            shown, hint = one_line(name)[:_SHOWN], nearest_name(name, COLUMNS)
+            raise ParameterError(f"{file}: unknown column '{shown}'{hint}; allowed: {', '.join(COLUMNS)}")
+        if name in names:
+            raise ParameterError(f"{file}: there are two columns '{name}'")
+        if not bracket:
+            raise ParameterError(f"{file}: column '{name}' has no unit; write for example '{name} [{_EXAMPLES[name]}]'")
+        if name == "pressure" and not unit.endswith("_g"):
+            raise ParameterError(
+                f"{file}: column 'pressure' is in '{one_line(unit)[:_SHOWN]}'; give gauge, as in kPa_g"
+            )
+        try:
+            to_si(1.0, unit, COLUMNS[name], 0.0)
+        except UnitError as error:
+            raise ParameterError(f"{file}: column '{name}': {error}") from error
+        names.append(name)
+        units.append(unit)
+    missing = [name for name in ("angle", "pressure", "volume_1") if name not in names]
+    if missing:
+        raise ParameterError(f"{file}: column '{missing[0]}' is missing")
+    return names, units
+
+
+_EXAMPLES = {"angle": "deg", "pressure": "kPa_g", "volume_1": "mL", "volume_2": "mL"}
+
+
+def _number(cell: str, name: str, where: str) -> float:
+    try:
+        value = float(cell) if len(cell) <= _SHOWN and "_" not in cell else math.nan
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ParameterError(f"{where}: {name} = '{one_line(cell)[:_SHOWN]}' is not a finite number")
+    return value
+
+
+def _check_grid(columns: dict[str, Floats], angles: Floats, pressures: Floats, file: str) -> None:
+    """Refuse angles and pressures of which not every pair is there once, and more than there is room for."""
+    if angles.size < 2:
+        raise ParameterError(f"{file}: has one angle only, at least 2 are needed")
+    if pressures[0] < 0.0:
+        raise ParameterError(f"{file}: pressure = {pressures[0]:g} Pa_g is below the atmosphere")
+    _check_places("angle", angles, MOST_ANGLES, _NEAREST * float(np.ptp(angles)), file)
+    _check_places("pressure", pressures, MOST_PRESSURES, 1.0, file)
+    pairs = list(zip(columns["angle"].tolist(), columns["pressure"].tolist(), strict=True))
+    if len(set(pairs)) < len(pairs):
+        raise ParameterError(f"{file}: a pair of angle and pressure is there twice")
+    for angle, pressure in product(angles.tolist(), pressures.tolist()):
+        if (angle, pressure) not in pairs:
+            at = f"{math.degrees(angle):.6g} deg and {pressure / 1e3:.6g} kPa_g"
+            raise ParameterError(f"{file}: there is no line for {at}; every angle needs every pressure")
+
+
+def _check_places(name: str, found: Floats, most: int, least: float, file: str) -> None:
+    """Refuse values of which there are too many, or that are nearer to each other than ``least``."""
+    if found.size > most:
+        raise ParameterError(f"{file}: has {found.size} values of {name}, at most {most} are taken: leave some out")
+    if found.size > 1 and float(np.diff(found).min()) < least:
+        raise ParameterError(f"{file}: two values of {name} are next to the same; round them")
+
+
+def _check_volume(volume: Floats, angles: Floats, pressures: Floats, name: str, file: str) -> None:
+    """Refuse volumes (angles, pressures) that are negative or fall with the pressure, or with the angle turn about."""
+    falls = np.argwhere(np.diff(volume, axis=1) < 0.0)
+    if volume.min() < 0.0:
+        raise ParameterError(f"{file}: {name} = {volume.min() * 1e6:.6g} mL is negative")
+    if falls.size:
+        angle, pressure = math.degrees(angles[falls[0][0]]), pressures[falls[0][1] + 1] / 1e3
+        raise ParameterError(f"{file}: {name} falls with the pressure at {angle:.6g} deg and {pressure:.6g} kPa_g")
+    way = 1.0 if name == "volume_1" else -1.0
+    turns = np.argwhere(way * np.diff(volume[:, -1]) <= 0.0)
+    if turns.size:
+        angle, must = math.degrees(angles[turns[0][0] + 1]), "grow" if way > 0.0 else "shrink"
+        raise ParameterError(
+            f"{file}: {name} must {must} with the angle at the highest pressure, and does not at {angle:.6g} deg"
+        )
+
+
+def _check_curves(chamber: Chamber, bends: Floats, angles: Floats, name: str, file: str) -> None:
+    """Refuse curves that swing between the angles so far that a volume is negative or falls with the pressure."""
+    shares = np.linspace(0.0, 1.0, _LOOKED_AT)
+    basis = _basis(shares, bends)
+    curves = [chamber.lowest, *(rise.gain for rise in chamber.rises)]
+    for number, curve in enumerate(curves):
+        values = basis @ np.array([*curve.powers, *curve.bends[: bends.size]])
+        slack = 1.0e-12 if number == 0 else 1.0e-9 * float(np.abs(values).max())
+        if values.min() < -slack:
+            angle = math.degrees(angles[0] + shares[int(np.argmin(values))] * (angles[-1] - angles[0]))
+            what = "is negative" if number == 0 else "falls with the pressure"
+            raise ParameterError(
+                f"{file}: between its angles the curve of {name} {what} near {angle:.4g} deg; smooth the numbers, or "
+                "measure more angles there"
+            )
+
+
+def _chamber(volume: Floats, angles: Floats, pressures: Floats, bends: Floats) -> Chamber:
+    """Return the curves of a chamber from its volumes (angles, pressures)."""
+    shares = (angles - angles[0]) / (angles[-1] - angles[0])
+    rises = [
+        Rise(float(lower), float(upper - lower), _curve(volume[:, place + 1] - volume[:, place], shares, bends))
+        for place, (lower, upper) in enumerate(pairwise(pressures))
+    ]
+    rises += [_no_rise()] * (RISES - len(rises))
+    return Chamber(_curve(volume[:, 0], shares, bends), tuple(rises))
+
+
+def _curve(values: Floats, shares: Floats, bends: Floats) -> Curve:
+    """Return the spline through some values that is one cubic over its first two and last two stretches."""
+    found = np.linalg.solve(_basis(shares, bends)[:, : values.size], values)
+    powers = _padded(found[: min(4, values.size)], 4, 0.0)
+    return Curve(powers, _padded(found[4:], BENDS, 0.0))
+
+
+def _basis(shares: Floats, bends: Floats) -> Floats:
+    """Values (shares, functions) of the powers and of what begins at each bend."""
+    powers = shares[:, None] ** np.arange(4)
+    return np.hstack([powers, np.maximum(shares[:, None] - bends, 0.0) ** 3])
+
+
+def _padded(values: Any, length: int, rest: float) -> tuple[float, ...]:
+    return (*(float(value) for value in values), *([rest] * (length - len(values))))
+
+
+def _no_rise() -> Rise:
+    return Rise(NEVER, 1.0, Curve((0.0,) * 4, (0.0,) * BENDS))
+
+
+def _none_like(chamber: Chamber) -> Chamber:
+    """Return a chamber that is nothing but its dead volume."""
+    return Chamber(_no_rise().gain, tuple(rise._replace(gain=_no_rise().gain) for rise in chamber.rises))
