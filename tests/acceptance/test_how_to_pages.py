@@ -22,12 +22,14 @@ from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.compile_errors import mistake
 from ppafo.engine.reference.agreement import compare_with_reference
+from ppafo.model.actuators.catalog import ACTUATORS
 from ppafo.model.command import VENT
 from ppafo.model.sensors import Measurement
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.building import build_device
 from ppafo.parameters.device import Valve
 from ppafo.parameters.loading import parse_parameter_set
+from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.loading import parse_scenario, scenario_from_dict
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PrescribedMotion
@@ -44,7 +46,7 @@ def blocks(page: str, language: str) -> list[str]:
 @pytest.fixture
 def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., ModuleType]]:
     """Installs the module of a page as a package offers it, and imports it; forgotten at the end of the test."""
-    catalogues = [(kinds, set(kinds)) for kinds in (CONTROLLERS, WALKING_CONTROLLERS, VALVES)]
+    catalogues = [(kinds, set(kinds)) for kinds in (CONTROLLERS, WALKING_CONTROLLERS, VALVES, ACTUATORS)]
     packages: set[str] = set()
 
     def installed(module: str, text: str, entry_points: str) -> ModuleType:
@@ -262,6 +264,31 @@ def test_the_valve_of_the_page_agrees_with_the_reference_solver() -> None:
     agreement = compare_with_reference(plan_run(scenario))
     assert agreement.angle < 2e-4
     assert agreement.worst_pressure < 1e-3
+
+
+@pytest.fixture
+def diaphragms(install: Callable[..., ModuleType]) -> ModuleType:
+    """The actuator of the page, installed for the length of a test."""
+    _, offered, _ = blocks("add-an-actuator.md", "toml")
+    return install("my_actuators.diaphragms", blocks("add-an-actuator.md", "python")[0], offered)
+
+
+@pytest.mark.usefixtures("diaphragms")
+def test_the_actuator_of_the_page_gives_the_shaft_what_its_gas_gives() -> None:
+    shipped = (files("ppafo.parameters") / "sets" / "fabric-bladder.toml").read_text()
+    head, tail = shipped.split("[actuator]")
+    common = tail[tail.index("[actuator.angle_min]") :]
+    for kind in ("diaphragms", "my_actuators.diaphragms:KIND"):
+        own = blocks("add-an-actuator.md", "toml")[2].replace('"diaphragms"', f'"{kind}"')
+        device = build_device(parse_parameter_set(f"{head}\n{own}\n{common}".encode(), "mine.toml"))
+        assert device.actuator.kind == kind
+        assert device.actuator.torque_constant == pytest.approx(8e-4 * 0.025)
+        plant, model = plant_parameters(device), ACTUATORS[kind].model
+        room, pressed, step = plant.atmospheric_pressure, plant.atmospheric_pressure + 5e4, 1e-6
+        for angle in (0.6, 1.2, 1.8):
+            after, before = (model.chambers(plant, angle + way, pressed, room).volume_1 for way in (step, -step))
+            more, less = (model.torque(plant, angle, pressed + way, room) for way in (1.0, -1.0))
+            assert 0.5 * (more - less) == pytest.approx(0.5 * (after - before) / step, rel=1e-6)
 
 
 def test_the_publication_of_the_page_is_judged(

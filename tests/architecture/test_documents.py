@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from ppafo.model import plant, sensors
+from ppafo.model.actuators.catalog import ACTUATORS
 from ppafo.model.declaration import Quantity
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters import declaration, device
@@ -105,6 +106,7 @@ def names_of(folder: Path, only_numbers: bool) -> set[str]:
 def declared_units() -> dict[str, str]:
     """Unit of every declared value and channel by name, as the nomenclature writes it."""
     quantities: list[Quantity] = [item for section in declaration.SECTIONS.values() for item in section]
+    quantities += [item for kind in ACTUATORS.values() for item in kind.quantities]
     quantities += [item for kind in VALVES.values() for item in kind.quantities]
     units = {item.name: item.unit.removesuffix("_a") or "-" for item in quantities}
     return units | {name: kind.unit for name, kind in CHANNELS.items()}

@@ -14,8 +14,8 @@ from ppafo.cli.main import build_parser, main
 
 ROOT = Path(__file__).parents[3]
 EXAMPLES = load_examples()
-SCRIPTS = ("first-steps", "compare-controllers", "learn-a-controller", "mujoco", "opensim")
-"""Examples that are no part of a page: scripts, which tests of their own run."""
+SCRIPTS = ("first-steps", "compare-controllers", "learn-a-controller", "mujoco", "opensim", "actuators")
+"""Examples that are no part of a page: scripts, which tests of their own run, and scenarios of actuators."""
 
 
 @pytest.fixture(autouse=True)

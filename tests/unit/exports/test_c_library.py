@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -97,6 +98,18 @@ def test_the_example_prints_the_torque_task_with_the_bits_of_python(tmp_path: Pa
     assert len(shown) == 2
     assert set(shown) <= set(lines)
     assert len(lines) > 3000
+    assert done.stdout.splitlines() == lines
+
+
+def test_an_actuator_from_a_file_prints_the_bits_of_python(tmp_path: Path) -> None:
+    example = resources.files("ppafo") / "examples" / "actuators" / "torque-task-measured-bladder.toml"
+    scenario = load_scenario(str(example), ("run.duration=0.3 s",))
+    for file, content in c_library(scenario).items():
+        (tmp_path / file).write_bytes(content)
+    lines = printed(simulate(scenario), scenario_library(scenario).program.outputs)
+    assert len(lines) > 300
+    done = subprocess.run(["make", "-s", "-C", str(tmp_path), "check"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.splitlines() == lines
 
 

@@ -1,0 +1,183 @@
+"""Actuators in parameter sets: kinds, what does not fit together, and the file of one that was measured."""
+
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.engine.rows import leaves
+from ppafo.errors import ParameterError, PpafoError
+from ppafo.model.actuators.table import bases_at, level_of
+from ppafo.parameters.actuator_table import read_actuator_table, table_of
+from ppafo.parameters.loading import load_device, load_parameter_set, parse_parameter_set
+from ppafo.parameters.writing import parameter_set_toml
+from ppafo.simulation.ensemble.columns import check_columns
+from ppafo.simulation.ensemble.planning import screen_columns
+from ppafo.simulation.loading import load_scenario
+
+EXAMPLE = Path(str(resources.files("ppafo") / "examples" / "actuators"))
+HEADER = "angle [deg],pressure [kPa_g],volume_1 [mL]"
+GOOD = ["20,0,100", "20,50,130", "60,0,120", "60,50,160", "100,0,150", "100,50,200"]
+
+
+def measured(folder: Path, *lines: str) -> Path:
+    """A file of a measured actuator."""
+    path = folder / "mine.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def test_a_set_without_a_kind_has_a_vane_and_one_that_names_it_is_the_same() -> None:
+    text = (resources.files("ppafo.parameters") / "sets" / "ppafo2011.toml").read_text(encoding="utf-8")
+    named = text.replace("[actuator.torque_constant]", '[actuator]\nkind = "vane"\n\n[actuator.torque_constant]', 1)
+    assert parse_parameter_set(named.encode(), "a.toml") == parse_parameter_set(text.encode(), "a.toml")
+    assert load_device("ppafo2011").actuator.kind == "vane"
+
+
+def test_the_torque_constant_of_another_kind_is_its_mean_growth() -> None:
+    actuator = load_device("cylinder-lever").actuator
+    stroke = 2.0 * 0.025 * np.sin(np.radians(55.0))
+    area = 0.25 * np.pi * 0.0257**2
+    assert actuator.torque_constant == actuator.volume_per_angle
+    assert actuator.torque_constant == pytest.approx(area * stroke / np.radians(110.0), rel=0.01)
+
+
+def test_a_muscle_of_the_set_pulls_as_its_catalogue_prints() -> None:
+    muscles = load_device("muscle-pair").actuator.settings
+    thread, turns = muscles["thread_length"], muscles["turns"]
+    # Chou and Hannaford, F = p b^2 (3 cos^2 - 1)/(4 pi n^2), at the nominal length; 40 mm has four times the area.
+    cosine = 0.2 / thread
+    force = 6.0e5 * thread**2 * (3.0 * cosine**2 - 1.0) / (4.0 * np.pi * turns**2)
+    assert 4.0 * force == pytest.approx(6000.0, rel=0.01)
+
+
+def test_a_measured_set_is_written_with_its_file(tmp_path: Path) -> None:
+    text = parameter_set_toml(load_parameter_set(EXAMPLE / "measured-bladder.toml"))
+    (tmp_path / "measured-bladder.csv").write_bytes((EXAMPLE / "measured-bladder.csv").read_bytes())
+    (tmp_path / "again.toml").write_text(text, encoding="utf-8")
+    assert load_device(tmp_path / "again.toml") == load_device(EXAMPLE / "measured-bladder.toml")
+
+
+@pytest.mark.parametrize("angles", [2, 3, 4, 7, 12])
+def test_a_curve_is_a_cubic_where_the_volume_is_one(angles: int) -> None:
+    degree = min(3, angles - 1)
+    places = np.linspace(0.3, 1.9, angles)
+    polynomial = np.polynomial.Polynomial([2e-4, 1e-4, 3e-5, 2e-5][: degree + 1])
+    columns = {"angle": places, "pressure": np.zeros(angles), "volume_1": polynomial(places)}
+    table = table_of(columns, "a.csv")
+    for angle in np.linspace(0.3, 1.9, 31):
+        level = level_of(table.chamber_1.lowest, bases_at(table, angle))
+        assert level.volume == pytest.approx(polynomial(angle), rel=1e-10)
+        assert level.slope == pytest.approx(polynomial.deriv()(angle), rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ((), "is empty"),
+        ((HEADER,), "no line of numbers"),
+        (("angel [deg],pressure [kPa_g],volume_1 [mL]", "1,2,3"), "unknown column 'angel', did you mean 'angle'?"),
+        (("angle [deg],pressure [kPa_g]", "1,2"), "column 'volume_1' is missing"),
+        (("angle,pressure [kPa_g],volume_1 [mL]", "1,2,3"), "column 'angle' has no unit"),
+        (("angle [deg],pressure [kPa],volume_1 [mL]", "1,2,3"), "give gauge, as in kPa_g"),
+        (("angle [kg],pressure [kPa_g],volume_1 [mL]", "1,2,3"), "column 'angle'"),
+        (("angle [deg],angle [deg],volume_1 [mL]", "1,2,3"), "there are two columns 'angle'"),
+        ((HEADER, "1,2"), "line 2: has 2 values, the header has 3"),
+        ((HEADER, "1,2,nan"), "line 2: volume_1 = 'nan' is not a finite number"),
+        ((HEADER, *GOOD, "100,90,1e9"), "line 8: volume_1 = 1e+09 mL is beyond"),
+        ((HEADER, *GOOD[:-1]), "there is no line for 100 deg and 50 kPa_g"),
+        ((HEADER, *GOOD, GOOD[0]), "is there twice"),
+        ((HEADER, *GOOD[:2]), "has one angle only"),
+        ((HEADER, *(line.replace(",0,", ",-1,") for line in GOOD)), "is below the atmosphere"),
+        ((HEADER, *GOOD[:-1], "100,50,140"), "volume_1 falls with the pressure at 100 deg"),
+        ((HEADER, "20,0,-5", *GOOD[1:]), "is negative"),
+        ((HEADER, *GOOD[:3], "60,50,220", *GOOD[4:]), "must grow with the angle at the highest pressure"),
+        ((HEADER, "20,0,1", "21,0,9", "22,0,9.1", "60,0,9.2"), "the curve of volume_1 is negative near"),
+        ((HEADER, *(f"{angle},0,{100 + angle}" for angle in range(20, 34))), "at most 12 are taken"),
+        ((HEADER, "20,0,100", "20.0001,0,101", "60,0,120"), "next to the same"),
+    ],
+)
+def test_a_file_that_is_wrong_is_refused_in_one_line(tmp_path: Path, lines: tuple[str, ...], said: str) -> None:
+    path = measured(tmp_path, *lines)
+    with pytest.raises(ParameterError) as caught:
+        read_actuator_table(path)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_columns_and_lines_may_stand_in_any_order(tmp_path: Path) -> None:
+    rows = [
+        (angle, pressure, 100 + angle + pressure, 300 - angle + pressure) for angle in (20, 60) for pressure in (0, 9)
+    ]
+    one = read_actuator_table(measured(tmp_path, f"{HEADER},volume_2 [mL]", *(",".join(map(str, row)) for row in rows)))
+    header = "volume_2 [L],volume_1 [mL],pressure [bar_g],angle [deg]"
+    lines = [f"{second / 1000},{first},{pressure / 100},{angle}" for angle, pressure, first, second in rows[::-1]]
+    other = read_actuator_table(measured(tmp_path, header, "# upside down", *lines))
+    assert leaves(other) == pytest.approx(leaves(one))
+    bases = bases_at(one, np.radians(60.0))
+    assert level_of(one.chamber_1.lowest, bases).volume == pytest.approx(160e-6)
+    assert level_of(one.chamber_2.lowest, bases).volume == pytest.approx(240e-6)
+
+
+def test_stops_beyond_what_was_measured_are_refused(tmp_path: Path) -> None:
+    measured(tmp_path, HEADER, *GOOD).rename(tmp_path / "measured-bladder.csv")
+    (tmp_path / "set.toml").write_bytes((EXAMPLE / "measured-bladder.toml").read_bytes())
+    with pytest.raises(ParameterError, match="was measured from 20 to 100 deg, and the stops are at 20 to 110 deg"):
+        load_device(tmp_path / "set.toml")
+
+
+@pytest.mark.parametrize(
+    ("name", "override", "said"),
+    [
+        ("muscle-pair", "actuator.pulley_radius=60 mm", "a muscle is 0.1184 to 0.2336 m long"),
+        ("cylinder-lever", "actuator.lever_offset=60 deg", "lever and base are 80 to 190 deg apart"),
+        ("cylinder-lever", "actuator.rod_diameter=30 mm", "rod_diameter must be below bore"),
+        ("fabric-bladder", "actuator.straight_angle_1=60 deg", "bladder 1 is folded by -50 to 40 deg"),
+        ("fabric-bladder", "actuator.tube_length=5 cm", "tube_length must be above 0.16 m"),
+        ("muscle-pair", "actuator.torque_constant=1e-5 m^3", "has no value 'actuator.torque_constant'"),
+    ],
+)
+def test_numbers_that_do_not_fit_together_are_refused(name: str, override: str, said: str) -> None:
+    with pytest.raises(PpafoError) as caught:
+        load_device(name, overrides=[override])
+    assert said in str(caught.value)
+
+
+THERMAL = ("gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)")
+
+
+@pytest.mark.parametrize(
+    "overrides", [(*THERMAL, "gas_model.wall_area_per_volume=100 1/m"), ("controller.arithmetic=fixed",)]
+)
+def test_a_scenario_asks_no_more_of_another_actuator_than_it_can(overrides: tuple[str, ...]) -> None:
+    with pytest.raises(ParameterError, match="is made for a vane, and 'muscle-pair' has an actuator 'muscle_pair'"):
+        load_scenario(EXAMPLE / "torque-task-muscles.toml", overrides)
+
+
+def test_a_run_of_an_ensemble_whose_muscles_are_too_long_is_refused_and_the_others_go_on() -> None:
+    base = load_scenario(EXAMPLE / "torque-task-muscles.toml")
+    screen = screen_columns(check_columns(base, {"actuator.pulley_radius": np.array([0.02, 0.06, 0.025])}))
+    assert screen.members.tolist() == [0, 2]
+    assert "actuator: a muscle is 0.1184 to 0.2336 m long" in screen.reasons[1]
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["walk", "proportional", "--set", "device.set=muscle-pair"],
+        ["linearise", str(EXAMPLE / "torque-task-muscles.toml")],
+        ["rig", "record", "step-response", "--device", "muscle-pair", "--out", "out"],
+        ["validate", "muscle-pair", "missing.csv"],
+    ],
+    ids=lambda command: command[0],
+)
+def test_what_is_made_for_a_vane_refuses_another_actuator_in_one_line(
+    command: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(command) == 2
+    said = capsys.readouterr().err
+    assert "is made for a vane, and 'muscle-pair' has an actuator 'muscle_pair'" in said
+    assert said.count("\n") == 1
