@@ -61,10 +61,12 @@ def draw(out: Path) -> None:
         room = plant_parameters(load_device(name)).atmospheric_pressure
         angles.plot(recording.time, np.degrees(recording["angle"]), color=f"C{number}")
         pressures.plot(recording.time, 1e-3 * (recording["pressure_1"] - room), color=f"C{number}")
-    torques.set(xlabel="angle [deg]", ylabel="torque [N m]")
-    volumes.set(xlabel="angle [deg]", ylabel="volume of chamber 1 [mL]", yscale="log")
-    angles.set(xlabel="time [s]", ylabel="angle [deg]", title="step response")
-    pressures.set(xlabel="time [s]", ylabel="gauge pressure in chamber 1 [kPa]", title="step response")
+    torques.set(
+        xlabel="angle [deg]", ylabel="torque [N m]", title="chamber 1 at supply pressure (dashed: at half of it)"
+    )
+    volumes.set(xlabel="angle [deg]", ylabel="volume of chamber 1 [mL]", yscale="log", title="the same")
+    angles.set(xlabel="time [s]", ylabel="angle [deg]", title="step response of the example")
+    pressures.set(xlabel="time [s]", ylabel="gauge pressure 1 [kPa]", title="the same")
     torques.legend()
     figure.savefig(out, dpi=110)
 
