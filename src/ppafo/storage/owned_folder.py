@@ -4,7 +4,7 @@ A folder that is taken ends up with exactly the new files; until they are all wr
 """
 
 import os
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -135,18 +135,32 @@ def read_json(path: Path) -> Any:
 
 
 def _check_own(folder: Path, kind: FolderKind) -> None:
-    try:
-        present = {entry.name for entry in folder.iterdir()}
-    except OSError as error:
-        raise DataError(f"{folder}: cannot be read: {reason(error)}") from error
+    present = {entry.name for entry in _listed(folder)}
     if not present:
         return
     own = kind.files_of(folder) if kind.mark in present else kind.earlier_files_of(folder)
     if not own:
         raise DataError(f"{folder}: is not empty and not a {kind.noun} (it has no {kind.mark}); choose another folder")
-    foreign = sorted(name for name in present if name not in own or (folder / name).is_dir())
+    foreign = sorted(_foreign(folder, own))
     if foreign:
         shown = ", ".join(foreign[:_NAMED]) + (", ..." if len(foreign) > _NAMED else "")
         raise DataError(
             f"{folder}: contains files that are not part of its {kind.noun} ({shown}); move them or use another folder"
         )
+
+
+def _listed(folder: Path) -> list[Path]:
+    try:
+        return list(folder.iterdir())
+    except OSError as error:
+        raise DataError(f"{folder}: cannot be read: {reason(error)}") from error
+
+
+def _foreign(folder: Path, own: Collection[str], above: str = "") -> Iterator[str]:
+    """Names in a folder, with those of its own folders ``above``, that are none of the result's own files."""
+    for entry in _listed(folder):
+        name = f"{above}{entry.name}"
+        if entry.is_dir() and not entry.is_symlink() and any(file.startswith(f"{name}/") for file in own):
+            yield from _foreign(entry, own, f"{name}/")
+        elif name not in own or entry.is_dir():
+            yield name

@@ -71,6 +71,20 @@ def test_a_result_of_version_0_1_is_replaced_but_not_with_files_of_others(
     assert contents(out) == WHOLE
 
 
+def test_folders_inside_a_result_are_its_own_and_what_others_put_into_them_is_not(tmp_path: Path) -> None:
+    out, kind = tmp_path / "out", marked_folder("export mujoco")
+    write_marked_folder(out, {"README.md": b"", "sources/deep/engine.c": b"1"}, "export mujoco")
+    write_marked_folder(out, {"README.md": b"", "sources/deep/engine.c": b"2"}, "export mujoco")
+    assert (out / "sources" / "deep" / "engine.c").read_bytes() == b"2"
+    (out / "sources" / "deep" / "notes.txt").write_text("mine")
+    with pytest.raises(DataError, match=r"\(sources/deep/notes\.txt\)"):
+        check_owned_folder(out, kind)
+    (out / "sources" / "deep" / "notes.txt").unlink()
+    (out / "sources" / "mine").mkdir()
+    with pytest.raises(DataError, match=r"\(sources/mine\)"):
+        check_owned_folder(out, kind)
+
+
 def something_else(folder: Path) -> str:
     (folder / "thesis.txt").write_text("years of work")
     return rf"is not empty and not a result of 'ppafo reproduce' \(it has no {MARK}\); choose another folder"
