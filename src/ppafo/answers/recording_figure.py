@@ -107,7 +107,7 @@ PANELS = (
         (
             Line("supplied_mass", "supplied", ACTUAL),
             Line("vented_mass", "vented", ORANGE),
-            Line("leaked_mass", "leaked past the vane", GREEN),
+            Line("leaked_mass", "leaked between the chambers", GREEN),
         ),
     ),
 )

@@ -27,7 +27,7 @@ def gas_vented(recording: Recording) -> float:
 
 
 def gas_leaked(recording: Recording) -> float:
-    """Gas leaked past the vane [kg], in either direction."""
+    """Gas leaked from chamber to chamber [kg], in either direction."""
     return _gain(recording, "leaked_mass")
 
 
@@ -54,7 +54,7 @@ def lowest_temperature(recording: Recording) -> float:
 
 
 def mechanical_work(recording: Recording) -> float:
-    """Work of the actuator on the vane [J]: integral of torque over angle, which is torque times speed over time.
+    """Work of the actuator on the joint [J]: integral of torque over angle, which is torque times speed over time.
 
     Over the angle it needs no speed, and an impact at a stop costs no accuracy.
     """
@@ -224,7 +224,7 @@ METRICS = (
     MetricKind(
         "gas_leaked",
         "kg",
-        "gas leaked past the vane, in either direction",
+        "gas leaked from chamber to chamber, in either direction",
         ("leaked_mass",),
         gas_leaked,
         read_gas_leaked,
@@ -261,7 +261,7 @@ METRICS = (
     MetricKind(
         "mechanical_work",
         "J",
-        "work of the actuator on the vane",
+        "work of the actuator on the joint",
         _MOTION,
         mechanical_work,
         read_mechanical_work,

@@ -6,6 +6,7 @@ Without a column ``volume_2`` the actuator has one chamber, and chamber 2 is not
 """
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise, product
 from pathlib import Path
@@ -77,15 +78,25 @@ def table_of(columns: dict[str, Floats], file: str) -> Table:
     )
 
 
+def highest_pressure(table: Table) -> float:
+    """Return the highest pressure measured [Pa, gauge]; infinity where one pressure stands for all."""
+    ends = [rise.lower + rise.length for rise in table.chamber_1.rises if rise.lower < NEVER]
+    return max(ends, default=math.inf)
+
+
 def _columns(text: str, file: str) -> dict[str, Floats]:
     """Return the columns of a file in SI units, by name."""
     lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
     if not lines:
         raise ParameterError(f"{file}: is empty; its header is 'angle [deg],pressure [kPa_g],volume_1 [mL]'")
-    names, units = _header([cell.strip().strip('"') for cell in lines[0][1].split(",")], file)
+    header = lines[0][1]
+    if "," not in header and (other := next((sign for sign in ";\t" if sign in header), "")):
+        shown = "tabs" if other == "\t" else "semicolons"
+        raise ParameterError(f"{file}: its columns are separated by {shown}; commas are needed")
+    names, units = _header([_bare(cell) for cell in header.split(",")], file)
     rows: list[list[float]] = []
     for number, line in lines[1:]:
-        cells = [cell.strip() for cell in line.split(",")]
+        cells = [_bare(cell) for cell in line.split(",")]
         if len(cells) != len(names):
             raise ParameterError(f"{file}, line {number}: has {len(cells)} values, the header has {len(names)}")
         rows.append([_number(cell, name, f"{file}, line {number}") for cell, name in zip(cells, names, strict=True)])
@@ -133,6 +144,10 @@ def _header(cells: Sequence[str], file: str) -> tuple[list[str], list[str]]:
     return names, units
 
 
+def _bare(cell: str) -> str:
+    return cell.strip().strip('"')
+
+
 _EXAMPLES = {"angle": "deg", "pressure": "kPa_g", "volume_1": "mL", "volume_2": "mL"}
 
 
@@ -152,15 +167,25 @@ def _check_grid(columns: dict[str, Floats], angles: Floats, pressures: Floats, f
         raise ParameterError(f"{file}: has one angle only, at least 2 are needed")
     if pressures[0] < 0.0:
         raise ParameterError(f"{file}: pressure = {pressures[0]:g} Pa_g is below the atmosphere")
+    if pressures.size > 1 and pressures[0] > 0.0:
+        raise ParameterError(
+            f"{file}: the lowest pressure is {pressures[0] / 1e3:.4g} kPa_g; volumes at 0 kPa_g, vented, are needed too"
+        )
     _check_places("angle", angles, MOST_ANGLES, _NEAREST * float(np.ptp(angles)), file)
     _check_places("pressure", pressures, MOST_PRESSURES, 1.0, file)
     pairs = list(zip(columns["angle"].tolist(), columns["pressure"].tolist(), strict=True))
-    if len(set(pairs)) < len(pairs):
-        raise ParameterError(f"{file}: a pair of angle and pressure is there twice")
+    twice = [pair for pair, count in Counter(pairs).items() if count > 1]
+    if twice:
+        raise ParameterError(f"{file}: there is more than one line for {_place(*twice[0])}")
     for angle, pressure in product(angles.tolist(), pressures.tolist()):
         if (angle, pressure) not in pairs:
-            at = f"{math.degrees(angle):.6g} deg and {pressure / 1e3:.6g} kPa_g"
-            raise ParameterError(f"{file}: there is no line for {at}; every angle needs every pressure")
+            raise ParameterError(
+                f"{file}: there is no line for {_place(angle, pressure)}; every angle needs every pressure"
+            )
+
+
+def _place(angle: float, pressure: float) -> str:
+    return f"{math.degrees(angle):.6g} deg and {pressure / 1e3:.6g} kPa_g"
 
 
 def _check_places(name: str, found: Floats, most: int, least: float, file: str) -> None:
@@ -175,10 +200,12 @@ def _check_volume(volume: Floats, angles: Floats, pressures: Floats, name: str, 
     """Refuse volumes (angles, pressures) that are negative or fall with the pressure, or with the angle turn about."""
     falls = np.argwhere(np.diff(volume, axis=1) < 0.0)
     if volume.min() < 0.0:
-        raise ParameterError(f"{file}: {name} = {volume.min() * 1e6:.6g} mL is negative")
+        row, column = np.unravel_index(int(np.argmin(volume)), volume.shape)
+        at = _place(angles[row], pressures[column])
+        raise ParameterError(f"{file}: {name} = {volume.min() * 1e6:.6g} mL at {at} is negative")
     if falls.size:
-        angle, pressure = math.degrees(angles[falls[0][0]]), pressures[falls[0][1] + 1] / 1e3
-        raise ParameterError(f"{file}: {name} falls with the pressure at {angle:.6g} deg and {pressure:.6g} kPa_g")
+        at = _place(angles[falls[0][0]], pressures[falls[0][1] + 1])
+        raise ParameterError(f"{file}: {name} falls with the pressure at {at}")
     way = 1.0 if name == "volume_1" else -1.0
     turns = np.argwhere(way * np.diff(volume[:, -1]) <= 0.0)
     if turns.size:

@@ -12,6 +12,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.model.gas import SPECIES
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters import declaration
+from ppafo.parameters.actuator_table import highest_pressure
 from ppafo.parameters.device import (
     VANE,
     Actuator,
@@ -38,6 +39,8 @@ from ppafo.parameters.plant import plant_parameters
 
 _SAME = 1.0e-9
 """Angles [rad] this near are one, written in two ways."""
+_COVERED = 1.01
+"""A supply this much above the pressures of a table is still covered by it."""
 _FLAT_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 
 
@@ -65,6 +68,10 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None) -> Devic
 def _with_means(device: Device) -> Device:
     """Return the device with what a vane of its mean size would have."""
     growth = plant_parameters(device).volume_per_angle
+    if not growth > 0.0:
+        raise ParameterError(
+            f"{device.name}: chamber 1 must grow with the angle, and grows by {growth:.4g} m^3/rad at supply pressure"
+        )
     return replace(device, actuator=replace(device.actuator, torque_constant=growth, volume_per_angle=growth))
 
 
@@ -111,6 +118,16 @@ def _outside(table: Table | None, stops: Range) -> str:
         for low, high in ((table.first_angle, table.last_angle), (stops.angle_min, stops.angle_max))
     )
     return f"its file was measured from {measured}, and the stops are at {wanted}"
+
+
+def _beyond_pressures(device: Device) -> str:
+    """Return what is wrong where the supply is above the pressures at which a table was measured."""
+    table, supply = device.actuator.table, device.supply
+    highest = math.inf if table is None else highest_pressure(table)
+    gauge = max(supply.pressure, supply.dorsiflexion_pressure) - supply.atmospheric_pressure
+    if gauge <= _COVERED * highest:
+        return ""
+    return f"its file was measured up to {highest / 1e3:.4g} kPa_g, and the supply has {gauge / 1e3:.4g}"
 
 
 def _given_or_default(
@@ -243,6 +260,8 @@ def consistency(device: Device) -> tuple[tuple[str, str, str, bool], ...]:
 
 
 def _check_consistent(parameter_set: ParameterSet, device: Device) -> None:
+    if problem := _beyond_pressures(device):
+        raise ParameterError(f"{parameter_set.file}: actuator: {problem}")
     for path, relation, other, holds in consistency(device):
         if not holds:
             given, limit = number_text(parameter_set.numbers[path]), number_text(parameter_set.numbers[other])

@@ -27,7 +27,7 @@ CHANNELS: dict[str, ChannelKind] = {
     "supplied_mass": ChannelKind("kg", "gas taken from the supply since the start"),
     "vented_mass": ChannelKind("kg", "gas vented to the atmosphere since the start"),
     "leaked_mass": ChannelKind(
-        "kg", "gas from chamber to chamber, past the vane or through a valve, either way, since the start"
+        "kg", "gas from chamber to chamber, leaked or through a valve, either way, since the start"
     ),
     "external_torque": ChannelKind("N m", "torque on the wearer, T_ex of equation (1)"),
     "shank_angle": ChannelKind("rad", "shank from the vertical, above 0 while the ankle is in front of the knee"),

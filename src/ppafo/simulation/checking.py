@@ -156,7 +156,7 @@ def _metric_range(result: Result, name: str, unit: str, pressures: float) -> flo
     """Range of the quantity of a metric; 1 for a number of events, 0 for a unit that has none."""
     scenario, recording = result.scenario, result.recording
     actuator = scenario.device.actuator
-    angles, torques = actuator.angle_max - actuator.angle_min, actuator.torque_constant * pressures
+    angles, torques = actuator.angle_max - actuator.angle_min, abs(actuator.torque_constant) * pressures
     ranges = {
         "rad": angles,
         "rad/s": float(np.max(np.abs(recording["angular_velocity"]))),

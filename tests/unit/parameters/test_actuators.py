@@ -8,11 +8,13 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.engine.rows import leaves
-from ppafo.errors import ParameterError, PpafoError
+from ppafo.errors import ParameterError, PpafoError, SimulationError
 from ppafo.model.actuators.table import bases_at, level_of
 from ppafo.parameters.actuator_table import read_actuator_table, table_of
 from ppafo.parameters.loading import load_device, load_parameter_set, parse_parameter_set
 from ppafo.parameters.writing import parameter_set_toml
+from ppafo.questions.league.lower_bound import check_bounded
+from ppafo.questions.tune.search import shortfall
 from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import screen_columns
 from ppafo.simulation.loading import load_scenario
@@ -88,7 +90,9 @@ def test_a_curve_is_a_cubic_where_the_volume_is_one(angles: int) -> None:
         ((HEADER, "1,2,nan"), "line 2: volume_1 = 'nan' is not a finite number"),
         ((HEADER, *GOOD, "100,90,1e9"), "line 8: volume_1 = 1e+09 mL is beyond"),
         ((HEADER, *GOOD[:-1]), "there is no line for 100 deg and 50 kPa_g"),
-        ((HEADER, *GOOD, GOOD[0]), "is there twice"),
+        ((HEADER, *GOOD, GOOD[0]), "there is more than one line for 20 deg and 0 kPa_g"),
+        ((HEADER, *(line.replace(",0,", ",10,") for line in GOOD)), "volumes at 0 kPa_g, vented, are needed too"),
+        ((HEADER.replace(",", ";"), *GOOD), "separated by semicolons; commas are needed"),
         ((HEADER, *GOOD[:2]), "has one angle only"),
         ((HEADER, *(line.replace(",0,", ",-1,") for line in GOOD)), "is below the atmosphere"),
         ((HEADER, *GOOD[:-1], "100,50,140"), "volume_1 falls with the pressure at 100 deg"),
@@ -119,6 +123,28 @@ def test_columns_and_lines_may_stand_in_any_order(tmp_path: Path) -> None:
     bases = bases_at(one, np.radians(60.0))
     assert level_of(one.chamber_1.lowest, bases).volume == pytest.approx(160e-6)
     assert level_of(one.chamber_2.lowest, bases).volume == pytest.approx(240e-6)
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        (("20,0,100", "20,60,130", "110,0,150", "110,60,200"), "was measured up to 60 kPa_g, and the supply has 65.47"),
+        (("20,0,1000", "20,500,1100", "110,0,500", "110,500,1600"), "chamber 1 must grow with the angle, and grows by"),
+    ],
+)
+def test_a_table_must_hold_at_supply_pressure(tmp_path: Path, lines: tuple[str, ...], said: str) -> None:
+    measured(tmp_path, HEADER, *lines).rename(tmp_path / "measured-bladder.csv")
+    (tmp_path / "set.toml").write_bytes((EXAMPLE / "measured-bladder.toml").read_bytes())
+    with pytest.raises(ParameterError, match=said):
+        load_device(tmp_path / "set.toml")
+
+
+def test_of_another_actuator_no_torque_ceiling_and_no_lower_bound_is_known() -> None:
+    # The muscles give 25 N m at 20 deg, and 16 as the mean over the angles.
+    scenario = load_scenario(EXAMPLE / "torque-task-muscles.toml", ["reference.level=20 N m"])
+    assert shortfall(scenario).tolist() == [0.0]
+    with pytest.raises(SimulationError, match="the lower bound is for a vane, not 'muscle_pair'"):
+        check_bounded(scenario)
 
 
 def test_stops_beyond_what_was_measured_are_refused(tmp_path: Path) -> None:

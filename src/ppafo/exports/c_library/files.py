@@ -29,7 +29,7 @@ OUTPUTS = {
     "mass_2": ("kg", "gas in chamber 2"),
     "supplied_mass": ("kg", "gas from the supply so far"),
     "vented_mass": ("kg", "gas to the atmosphere so far"),
-    "leaked_mass": ("kg", "gas past the vane so far"),
+    "leaked_mass": ("kg", "gas leaked from chamber to chamber so far"),
     "strides": ("-", "heel strikes so far"),
     "phase": ("-", "time in the stride, 0 at its heel strike, in turns"),
     "contact": ("-", "where the foot stands: 0 swing, 1 heel, 2 flat, 3 toes"),

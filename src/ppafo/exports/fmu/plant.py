@@ -152,7 +152,7 @@ def _path_at_start(motion: PrescribedMotion) -> tuple[float, float, float]:
 def _inputs(scenario: Scenario) -> tuple[Input, ...]:
     motion = scenario.motion
     if isinstance(motion, FreeMotion):
-        said = "torque T_ex on the vane, above 0 works against plantarflexion"
+        said = "torque T_ex on the joint, above 0 works against plantarflexion"
         return (COMMAND, Input("external_torque", "N m", said, motion.external_torque))
     angle = motion.profile.settings["start_level"]
     return (

@@ -18,6 +18,7 @@ from ppafo.errors import SimulationError
 from ppafo.metrics.gas import gas_supplied
 from ppafo.metrics.tracking import rms_error
 from ppafo.model.plant import chamber_pressures
+from ppafo.parameters.device import VANE
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.league.bound_problem import BOUNDED_VALVES, at_once
 from ppafo.questions.league.bound_solver import BoundSolver, Optimum
@@ -85,6 +86,8 @@ def check_bounded(scenario: Scenario) -> None:
     if find_spec("casadi") is None:
         raise SimulationError(MISSING_EXTRA)
     check_without_opensim()
+    if scenario.device.actuator.kind != VANE:
+        raise SimulationError(f"{scenario.name}: the lower bound is for a vane, not '{scenario.device.actuator.kind}'")
     if not isinstance(scenario.motion, PrescribedMotion):
         raise SimulationError(f"{scenario.name}: the lower bound needs a fixed or prescribed ankle, not a free one")
     if scenario.thermal is not None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.parameters.device import VANE
 from ppafo.questions.tune.problem import Constraint, Effort, Goal, Problem, Spread
 from ppafo.simulation.plan import profile_bounds
 from ppafo.simulation.scenario import Scenario
@@ -65,8 +66,10 @@ def shortfall(scenario: Scenario) -> Floats:
     """Return what the supply lacks of the largest reference [N m] in each run (runs,); 0 for nothing.
 
     With one chamber at its supply and the other at the atmosphere the vane holds at most the torque constant times the
-    difference of the two (equation (2)), whatever the controller does.
+    difference of the two (equation (2)), whatever the controller does. Of another actuator no such limit is known here.
     """
+    if scenario.device.actuator.kind != VANE:
+        return np.zeros(1)
     supply, constant = scenario.device.supply, scenario.device.actuator.torque_constant
     lowest, highest = profile_bounds(scenario.reference)
     above = highest - constant * (supply.pressure - supply.atmospheric_pressure)
