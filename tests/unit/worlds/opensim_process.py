@@ -21,6 +21,7 @@ FRICTIONLESS = ["friction.static_torque=0 N m", "friction.dynamic_torque=0 N m"]
 START = [*FRICTIONLESS, "initial.pressure_1=atmosphere", "initial.pressure_2=atmosphere", "motion.angle=70 deg"]
 FREE = [*START, "foot_plate.gravity_torque=0.3 N m", "controller.command=0.15", "run.duration=0.2 s"]
 PULL = 3.0
+TORQUE = "torque\nendheader\ntime\tankle_angle_r_device\n0\t1\n1\t2\n"
 FORCE, LEVER = 600.0, 0.1
 
 
@@ -262,6 +263,42 @@ def with_script(folder: Path) -> np.ndarray:
         expected = np.interp(moment, torque.time, torque["ankle_angle_r_device"])
         rows.append((actuator.getActuation(states[0]), expected, *rates))
     return np.array(rows)
+
+
+def script_twice(folder: Path, first: list[str], second: list[str]) -> list[int]:
+    """Exit codes of the exported script on a model and on what it wrote."""
+    from ppafo.exports.opensim.add_device import main
+
+    (folder / "torque.sto").write_text(TORQUE, encoding="utf-8")
+    slide_and_foot().printToXML(str(folder / "leg.osim"))
+    torque = ["--torque", str(folder / "torque.sto"), "--out"]
+    return [
+        main([str(folder / "leg.osim"), *torque, str(folder / "one.osim"), *first]),
+        main([str(folder / "one.osim"), *torque, str(folder / "two.osim"), *second]),
+    ]
+
+
+def slide_and_foot() -> Any:
+    """The leg, and a body beside it that slides along ``slide``."""
+    import opensim
+
+    model = leg()
+    sledge = opensim.Body("sledge", 1.0, opensim.Vec3(0), opensim.Inertia(1.0))
+    model.addBody(sledge)
+    rail = opensim.SliderJoint("rail", model.getGround(), sledge)
+    rail.updCoordinate().setName("slide")
+    model.addJoint(rail)
+    model.finalizeConnections()
+    return model
+
+
+def two_devices(first: str, second: str) -> None:
+    """One co-simulation after the other on one model."""
+    from ppafo.worlds.opensim import CoSimulation, DeviceAtAnkle
+
+    model, device = slide_and_foot(), DeviceAtAnkle(load_walk("solenoid"), 1.0e-3, 1.0)
+    for coordinate in (first, second):
+        CoSimulation(model, coordinate, device)
 
 
 def meet(first: str, second: str) -> str:

@@ -126,6 +126,55 @@ def test_the_script_puts_the_same_torque_into_a_model_in_both_forms(run: Run, tm
 
 
 @needs_opensim
+@pytest.mark.parametrize(
+    ("first", "second", "codes"),
+    [
+        ([], [], [0, 2]),
+        (["--as-load"], ["--as-load"], [0, 2]),
+        (["--as-load"], [], [0, 2]),
+        (["--coordinate", "slide"], [], [2, 2]),
+    ],
+)
+def test_the_script_puts_one_device_on_an_angle(
+    run: Run, tmp_path: Path, first: list[str], second: list[str], codes: list[int]
+) -> None:
+    assert run(apart.script_twice, tmp_path, first, second) == codes
+    assert not (tmp_path / "two.osim").exists()
+
+
+@needs_opensim
+@pytest.mark.parametrize(
+    ("coordinates", "said"),
+    [
+        (("ankle_angle_r", "ankle_angle_r"), "leg: has a device at 'ankle_angle_r' already (ankle_angle_r_device)"),
+        (("slide", "slide"), "leg: 'slide' is no angle about one axis"),
+    ],
+)
+def test_a_model_takes_one_device_at_an_angle(run: Run, coordinates: tuple[str, str], said: str) -> None:
+    with pytest.raises(DataError) as error:
+        run(apart.two_devices, *coordinates)
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@needs_opensim
+@pytest.mark.parametrize("content", ["", "<OpenSimDocument", "<?xml version='1.0'?><a/>", None])
+def test_the_script_says_in_one_line_what_is_wrong_with_a_model(tmp_path: Path, content: str | None) -> None:
+    (tmp_path / "torque.sto").write_text(apart.TORQUE, encoding="utf-8")
+    if content is not None:
+        (tmp_path / "leg.osim").write_text(content, encoding="utf-8")
+    before = set(tmp_path.iterdir())
+    script = Path(apart.ppafo.__file__).parent / "exports" / "opensim" / "add_device.py"
+    words = [sys.executable, script, "leg.osim", "--torque", "torque.sto", "--out", "with.osim"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert done.stderr.startswith("add_device: leg.osim: ")
+    assert "std::exception" not in done.stderr
+    assert ".cpp" not in done.stderr
+    assert set(tmp_path.iterdir()) == before
+
+
+@needs_opensim
 def test_the_example_without_a_model_runs(tmp_path: Path) -> None:
     script = Path(apart.ppafo.__file__).parent / "examples" / "opensim" / "co_simulation.py"
     done = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True, check=False)

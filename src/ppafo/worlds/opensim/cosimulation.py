@@ -9,7 +9,7 @@ from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import SimulationError, one_line
 from ppafo.exports.opensim.add_device import add_actuator
 from ppafo.worlds.opensim.device import DeviceAtAnkle, to_model
-from ppafo.worlds.opensim.models import coordinate_of_model, load_model
+from ppafo.worlds.opensim.models import check_place, load_model
 
 PLATE_MASS = 0.5
 """Mass of a foot plate [kg] whose set says nothing but its inertia and its weight's torque about the ankle."""
@@ -30,13 +30,13 @@ class CoSimulation:
 
     The model gets an actuator, whose control is set between two steps, and a foot plate. In a step the torque is that
     of its middle, extrapolated from the last two samples, and the gas follows the angle that came of it. ``state`` may
-    be changed until the first step. DataError for a model without the coordinate.
+    be changed until the first step. DataError for a coordinate that the model lacks, that is no angle, or has a device.
     """
 
     def __init__(self, model: Any, coordinate: str, device: DeviceAtAnkle) -> None:
         self.model = load_model(model) if isinstance(model, str | Path) else model
         self.device = device
-        coordinate_of_model(self.model, coordinate)
+        check_place(self.model, coordinate)
         add_foot_plate(self.model, coordinate, device)
         name = add_actuator(self.model, coordinate, opensim.Constant(0.0))
         self.state = self.model.initSystem()
