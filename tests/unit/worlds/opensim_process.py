@@ -301,6 +301,45 @@ def two_devices(first: str, second: str) -> None:
         CoSimulation(model, coordinate, device)
 
 
+def command_after_a_step(command: float) -> float:
+    """How far [s] OpenSim went under a command that is refused, or the time after one that is not."""
+    from ppafo.worlds.opensim import CoSimulation, DeviceAtAnkle
+
+    together = CoSimulation(leg(is_led=False), "ankle_angle_r", DeviceAtAnkle(load_walk("solenoid"), 1.0e-3, 1.0))
+    before = together.go_on(0.0).time
+    try:
+        return together.go_on(command).time - before
+    except ppafo.errors.DataError as error:
+        assert "must be -1 to 1, or 2 to vent" in str(error)
+        return float(together.state.getTime()) - before
+
+
+def begun_at(angle: float) -> None:
+    """A device at an angle [rad] of the package."""
+    from ppafo.worlds.opensim import DeviceAtAnkle
+
+    DeviceAtAnkle(load_walk("solenoid"), 1.0e-3, 1.0).begin(angle)
+
+
+def anew() -> tuple[list[Any], list[Any], tuple[int, float, float]]:
+    """Samples of one co-simulation from the same state twice; steps and gas at the second beginning, and gas later."""
+    import opensim
+
+    from ppafo.worlds.opensim import CoSimulation, DeviceAtAnkle
+
+    device = DeviceAtAnkle(load_walk("solenoid"), 1.0e-3, 0.02)
+    together = CoSimulation(leg(is_led=False), "ankle_angle_r", device)
+    start, found = opensim.State(together.state), []
+    for _ in range(2):
+        together.state = start
+        first, begun = together.begin(), (device.taken, device.supplied_mass())
+        found.append([first, *(together.go_on(1.0) for _ in range(device.steps))])
+    used = device.supplied_mass()
+    together.begin()
+    assert together.go_on(0.5).time > found[1][-1].time
+    return *found, (*begun, used)
+
+
 def meet(first: str, second: str) -> str:
     """What is said where CasADi and OpenSim would meet in one process, by the one that comes second."""
     loaders = {"casadi": _load_casadi, "opensim": _load_opensim}

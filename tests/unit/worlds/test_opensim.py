@@ -80,6 +80,33 @@ def test_an_ankle_beyond_the_stops_is_an_error_with_time_and_angle(run: Run) -> 
 
 
 @needs_opensim
+@pytest.mark.parametrize("command", [np.nan, np.inf, -np.inf, 5.0, 1.2, 1.5, 1.99, -1.01])
+def test_what_is_no_command_is_refused_before_opensim_goes_on(run: Run, command: float) -> None:
+    assert run(apart.command_after_a_step, command) == 0.0
+
+
+@needs_opensim
+@pytest.mark.parametrize("command", [-1.0, 1.0, 2.0])
+def test_commands_reach_from_vent_to_full(run: Run, command: float) -> None:
+    assert run(apart.command_after_a_step, command) == pytest.approx(1.0e-3)
+
+
+@needs_opensim
+@pytest.mark.parametrize("angle", [np.nan, 9.0, -np.inf])
+def test_a_device_begins_between_its_stops(run: Run, angle: float) -> None:
+    with pytest.raises(SimulationError, match=r"solenoid: at 0 s the ankle goes to \S+ deg, beyond the stops"):
+        run(apart.begun_at, angle)
+
+
+@needs_opensim
+def test_a_co_simulation_begins_anew(run: Run) -> None:
+    first, second, (taken, supplied, used) = run(apart.anew)
+    assert first == second
+    assert (taken, supplied) == (0, 0.0)
+    assert used > 0.0
+
+
+@needs_opensim
 def test_muscles_and_device_come_to_the_moment_of_inverse_dynamics(run: Run, tmp_path: Path) -> None:
     found = run(apart.muscles, tmp_path)
     assert found["moment"]["without"] - found["moment"]["with"] == pytest.approx(found["device"], abs=1.0e-4)

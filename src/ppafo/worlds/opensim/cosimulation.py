@@ -8,7 +8,7 @@ import opensim
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import SimulationError, one_line
 from ppafo.exports.opensim.add_device import add_actuator
-from ppafo.worlds.opensim.device import DeviceAtAnkle, to_model
+from ppafo.worlds.opensim.device import DeviceAtAnkle, check_command, to_model
 from ppafo.worlds.opensim.models import check_place, load_model
 
 PLATE_MASS = 0.5
@@ -48,14 +48,21 @@ class CoSimulation:
         self._start, self._last = 0.0, 0.0
 
     def begin(self) -> Sample:
-        """Take ``state`` for the beginning; returns the first sample."""
+        """Take ``state`` for the beginning, with the device vented; returns the first sample.
+
+        SimulationError for an ankle beyond the stops of the device.
+        """
+        # The state after a step is the manager's, and would go with it.
+        self.state = opensim.State(self.state)
+        self._torque.setValue(0.0)
         self._start = self.state.getTime()
-        self._manager = opensim.Manager(self.model)
-        self._manager.setWriteToStorage(False)
-        self._manager.setPerformAnalyses(False)
-        self._manager.initialize(self.state)
+        manager = opensim.Manager(self.model)
+        manager.setWriteToStorage(False)
+        manager.setPerformAnalyses(False)
+        manager.initialize(self.state)
         self.model.realizeVelocity(self.state)
         self.device.begin(to_model(self._ankle.getValue(self.state)))
+        self._manager = manager
         first = self._sample()
         self._last = first.torque
         return first
@@ -63,8 +70,9 @@ class CoSimulation:
     def go_on(self, command: float) -> Sample:
         """Go one step on under a command to the valve [-]; returns the sample that it leads to.
 
-        SimulationError where OpenSim's integrator gives up, and for what ``DeviceAtAnkle.go_on`` says.
+        SimulationError where OpenSim's integrator gives up, and errors of ``DeviceAtAnkle.go_on``.
         """
+        check_command(command)
         before = self.begin() if self._manager is None else self._sample()
         self._torque.setValue(1.5 * before.torque - 0.5 * self._last)
         self._last = before.torque
