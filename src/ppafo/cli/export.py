@@ -74,7 +74,8 @@ def _add_torque(actions: Any) -> argparse.ArgumentParser:
     torque.add_argument(
         "--strikes",
         metavar="T1,T2,...",
-        help="heel strikes of your motion [s], to put the mean stride on; default: the walk as it is, from 0 s on",
+        help="heel strikes of your motion [s], to put the mean stride on "
+        "(--strikes=-0.4,0.8 where time begins below 0); default: the walk as it is, from 0 s on",
     )
     return torque
 

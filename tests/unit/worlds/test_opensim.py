@@ -212,6 +212,27 @@ def test_the_example_without_a_model_runs(tmp_path: Path) -> None:
 
 
 @needs_opensim
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["co_simulation.py", "leg.osim", "no.mot"], "co_simulation: leg.osim: there is no such file"),
+        (["co_simulation.py", "leg.osim"], "a model wants a motion"),
+        (["ankle_muscles.py"], "the following arguments are required: model, motion, forces"),
+        (["ankle_muscles.py", "leg.osim", "no.mot", "no.mot"], "ankle_muscles: out/mine/mine.toml: cannot be read"),
+    ],
+)
+def test_an_example_without_its_files_says_so(tmp_path: Path, words: list[str], said: str) -> None:
+    script = Path(apart.ppafo.__file__).parent / "examples" / "opensim" / words[0]
+    done = subprocess.run(
+        [sys.executable, script, *words[1:]], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@needs_opensim
 @pytest.mark.skipif(find_spec("casadi") is None, reason="needs the extra 'control'")
 @pytest.mark.parametrize(
     ("first", "second", "said"),
