@@ -23,6 +23,8 @@ _UNIT = "write a scenario or a walk as a functional mock-up unit (FMU) for co-si
 _MUJOCO = "write a scenario's device as an engine plugin of MuJoCo, with an example model"
 _TORQUE = "write the torque of a walk for OpenSim, and a script that puts it into a model"
 _CONTROLLER = "write a scenario's integer controller in C behind the protocol of 'ppafo hil'"
+_FEW_STRIDES = 0.2
+"""Minutes of a walk without a course for OpenSim, unless given."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -66,12 +68,14 @@ def _add_torque(actions: Any) -> argparse.ArgumentParser:
         "opensim", help=_TORQUE, description=f"{_TORQUE[:1].upper()}{_TORQUE[1:]}."
     )
     torque.add_argument("--gait", metavar="GAIT", help="name of a gait, or a gait file; default: that of the walk")
-    torque.add_argument("--minutes", metavar="N", type=minutes, default=0.2, help="time to walk; default 0.2")
+    said = f"time to walk; default: all of a course, else {_FEW_STRIDES:g}"
+    torque.add_argument("--minutes", metavar="N", type=minutes, help=said)
     torque.add_argument("--side", choices=("right", "left"), default="right", help="which foot; default right")
     torque.add_argument(
         "--strikes",
         metavar="T1,T2,...",
-        help="heel strikes of your motion [s], to put the mean stride on; default: the walk as it is, from 0 s on",
+        help="heel strikes of your motion [s], to put the mean stride on "
+        "(--strikes=-0.4,0.8 where time begins below 0); default: the walk as it is, from 0 s on",
     )
     return torque
 
@@ -132,12 +136,15 @@ def _platforms(parsed: argparse.Namespace) -> list[str]:
 
 def _torque(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
     from ppafo.exports.opensim import check_strikes, opensim_files
+    from ppafo.walking.loading import load_walk
     from ppafo.walking.walk import walk
 
     strikes = () if parsed.strikes is None else _times(parsed.strikes)
     if parsed.strikes is not None:
         check_strikes(strikes)
-    result = walk(parsed.scenario, parsed.minutes, parsed.overrides, parsed.gait)
+    chosen = load_walk(parsed.scenario, parsed.overrides, parsed.gait)
+    few_strides = _FEW_STRIDES if chosen.course is None else None
+    result = walk(chosen, few_strides if parsed.minutes is None else parsed.minutes)
     contents = opensim_files(result, parsed.side, strikes)
     following = f"python {shlex.quote(str(parsed.out / 'add_device.py'))} MODEL.osim --out with-device.osim"
     return contents, following

@@ -77,6 +77,40 @@ def test_the_command_writes_the_folder(tmp_path: Path, capsys: pytest.CaptureFix
     assert "add_device.py' MODEL.osim --out with-device.osim" in capsys.readouterr().out
 
 
+COURSE = """schema_version = 1
+name = "short"
+description = "A few steps."
+
+[[segment]]
+kind = "walk"
+speed = "1.2 m/s"
+duration = "4 s"
+"""
+
+
+@pytest.mark.parametrize(("given", "end"), [([], 4.0), (["--minutes", "2 s"], 2.0)])
+def test_a_walk_is_as_long_as_its_course_unless_minutes_are_given(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], given: list[str], end: float
+) -> None:
+    (tmp_path / "short.toml").write_text(COURSE, encoding="utf-8")
+    words = ["export", "opensim", "solenoid", "--set", f"course={tmp_path / 'short.toml'}", *given]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 0, capsys.readouterr().err
+    _, times, _ = read_torque(tmp_path / "out" / "device_torque.sto")
+    # A segment is a whole number of strides.
+    assert (times[0], times[-1]) == (0.0, pytest.approx(end, abs=0.6))
+
+
+def test_a_motion_may_begin_below_0_s_and_the_help_says_how(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["export", "opensim", "--help"])
+    assert "--strikes=-0.4,0.8" in capsys.readouterr().out
+    words = ["export", "opensim", "solenoid", "--minutes", "0.1", "--strikes=-0.4,0.8", "--out", str(tmp_path / "out")]
+    assert main(words) == 0
+    _, times, _ = read_torque(tmp_path / "out" / "device_torque.sto")
+    assert (times[0], times[-1]) == (-0.4, 0.8)
+    assert "goes from -0.4 to 0.8 s" in (tmp_path / "out" / "README.md").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize("times", ["", "a,b", "0.5", "0.5,nan", "1,2,1.5"])
 def test_bad_strikes_are_one_line_and_exit_code_2(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], times: str

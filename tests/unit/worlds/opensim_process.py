@@ -21,6 +21,7 @@ FRICTIONLESS = ["friction.static_torque=0 N m", "friction.dynamic_torque=0 N m"]
 START = [*FRICTIONLESS, "initial.pressure_1=atmosphere", "initial.pressure_2=atmosphere", "motion.angle=70 deg"]
 FREE = [*START, "foot_plate.gravity_torque=0.3 N m", "controller.command=0.15", "run.duration=0.2 s"]
 PULL = 3.0
+TORQUE = "torque\nendheader\ntime\tankle_angle_r_device\n0\t1\n1\t2\n"
 FORCE, LEVER = 600.0, 0.1
 
 
@@ -262,6 +263,81 @@ def with_script(folder: Path) -> np.ndarray:
         expected = np.interp(moment, torque.time, torque["ankle_angle_r_device"])
         rows.append((actuator.getActuation(states[0]), expected, *rates))
     return np.array(rows)
+
+
+def script_twice(folder: Path, first: list[str], second: list[str]) -> list[int]:
+    """Exit codes of the exported script on a model and on what it wrote."""
+    from ppafo.exports.opensim.add_device import main
+
+    (folder / "torque.sto").write_text(TORQUE, encoding="utf-8")
+    slide_and_foot().printToXML(str(folder / "leg.osim"))
+    torque = ["--torque", str(folder / "torque.sto"), "--out"]
+    return [
+        main([str(folder / "leg.osim"), *torque, str(folder / "one.osim"), *first]),
+        main([str(folder / "one.osim"), *torque, str(folder / "two.osim"), *second]),
+    ]
+
+
+def slide_and_foot() -> Any:
+    """The leg, and a body beside it that slides along ``slide``."""
+    import opensim
+
+    model = leg()
+    sledge = opensim.Body("sledge", 1.0, opensim.Vec3(0), opensim.Inertia(1.0))
+    model.addBody(sledge)
+    rail = opensim.SliderJoint("rail", model.getGround(), sledge)
+    rail.updCoordinate().setName("slide")
+    model.addJoint(rail)
+    model.finalizeConnections()
+    return model
+
+
+def two_devices(first: str, second: str) -> None:
+    """One co-simulation after the other on one model."""
+    from ppafo.worlds.opensim import CoSimulation, DeviceAtAnkle
+
+    model, device = slide_and_foot(), DeviceAtAnkle(load_walk("solenoid"), 1.0e-3, 1.0)
+    for coordinate in (first, second):
+        CoSimulation(model, coordinate, device)
+
+
+def command_after_a_step(command: float) -> float:
+    """How far [s] OpenSim went under a command that is refused, or the time after one that is not."""
+    from ppafo.worlds.opensim import CoSimulation, DeviceAtAnkle
+
+    together = CoSimulation(leg(is_led=False), "ankle_angle_r", DeviceAtAnkle(load_walk("solenoid"), 1.0e-3, 1.0))
+    before = together.go_on(0.0).time
+    try:
+        return together.go_on(command).time - before
+    except ppafo.errors.DataError as error:
+        assert "must be -1 to 1, or 2 to vent" in str(error)
+        return float(together.state.getTime()) - before
+
+
+def begun_at(angle: float) -> None:
+    """A device at an angle [rad] of the package."""
+    from ppafo.worlds.opensim import DeviceAtAnkle
+
+    DeviceAtAnkle(load_walk("solenoid"), 1.0e-3, 1.0).begin(angle)
+
+
+def anew() -> tuple[list[Any], list[Any], tuple[int, float, float]]:
+    """Samples of one co-simulation from the same state twice; steps and gas at the second beginning, and gas later."""
+    import opensim
+
+    from ppafo.worlds.opensim import CoSimulation, DeviceAtAnkle
+
+    device = DeviceAtAnkle(load_walk("solenoid"), 1.0e-3, 0.02)
+    together = CoSimulation(leg(is_led=False), "ankle_angle_r", device)
+    start, found = opensim.State(together.state), []
+    for _ in range(2):
+        together.state = start
+        first, begun = together.begin(), (device.taken, device.supplied_mass())
+        found.append([first, *(together.go_on(1.0) for _ in range(device.steps))])
+    used = device.supplied_mass()
+    together.begin()
+    assert together.go_on(0.5).time > found[1][-1].time
+    return *found, (*begun, used)
 
 
 def meet(first: str, second: str) -> str:

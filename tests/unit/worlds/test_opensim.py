@@ -80,6 +80,33 @@ def test_an_ankle_beyond_the_stops_is_an_error_with_time_and_angle(run: Run) -> 
 
 
 @needs_opensim
+@pytest.mark.parametrize("command", [np.nan, np.inf, -np.inf, 5.0, 1.2, 1.5, 1.99, -1.01])
+def test_what_is_no_command_is_refused_before_opensim_goes_on(run: Run, command: float) -> None:
+    assert run(apart.command_after_a_step, command) == 0.0
+
+
+@needs_opensim
+@pytest.mark.parametrize("command", [-1.0, 1.0, 2.0])
+def test_commands_reach_from_vent_to_full(run: Run, command: float) -> None:
+    assert run(apart.command_after_a_step, command) == pytest.approx(1.0e-3)
+
+
+@needs_opensim
+@pytest.mark.parametrize("angle", [np.nan, 9.0, -np.inf])
+def test_a_device_begins_between_its_stops(run: Run, angle: float) -> None:
+    with pytest.raises(SimulationError, match=r"solenoid: at 0 s the ankle goes to \S+ deg, beyond the stops"):
+        run(apart.begun_at, angle)
+
+
+@needs_opensim
+def test_a_co_simulation_begins_anew(run: Run) -> None:
+    first, second, (taken, supplied, used) = run(apart.anew)
+    assert first == second
+    assert (taken, supplied) == (0, 0.0)
+    assert used > 0.0
+
+
+@needs_opensim
 def test_muscles_and_device_come_to_the_moment_of_inverse_dynamics(run: Run, tmp_path: Path) -> None:
     found = run(apart.muscles, tmp_path)
     assert found["moment"]["without"] - found["moment"]["with"] == pytest.approx(found["device"], abs=1.0e-4)
@@ -126,12 +153,82 @@ def test_the_script_puts_the_same_torque_into_a_model_in_both_forms(run: Run, tm
 
 
 @needs_opensim
+@pytest.mark.parametrize(
+    ("first", "second", "codes"),
+    [
+        ([], [], [0, 2]),
+        (["--as-load"], ["--as-load"], [0, 2]),
+        (["--as-load"], [], [0, 2]),
+        (["--coordinate", "slide"], [], [2, 2]),
+    ],
+)
+def test_the_script_puts_one_device_on_an_angle(
+    run: Run, tmp_path: Path, first: list[str], second: list[str], codes: list[int]
+) -> None:
+    assert run(apart.script_twice, tmp_path, first, second) == codes
+    assert not (tmp_path / "two.osim").exists()
+
+
+@needs_opensim
+@pytest.mark.parametrize(
+    ("coordinates", "said"),
+    [
+        (("ankle_angle_r", "ankle_angle_r"), "leg: has a device at 'ankle_angle_r' already (ankle_angle_r_device)"),
+        (("slide", "slide"), "leg: 'slide' is no angle about one axis"),
+    ],
+)
+def test_a_model_takes_one_device_at_an_angle(run: Run, coordinates: tuple[str, str], said: str) -> None:
+    with pytest.raises(DataError) as error:
+        run(apart.two_devices, *coordinates)
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@needs_opensim
+@pytest.mark.parametrize("content", ["", "<OpenSimDocument", "<?xml version='1.0'?><a/>", None])
+def test_the_script_says_in_one_line_what_is_wrong_with_a_model(tmp_path: Path, content: str | None) -> None:
+    (tmp_path / "torque.sto").write_text(apart.TORQUE, encoding="utf-8")
+    if content is not None:
+        (tmp_path / "leg.osim").write_text(content, encoding="utf-8")
+    before = set(tmp_path.iterdir())
+    script = Path(apart.ppafo.__file__).parent / "exports" / "opensim" / "add_device.py"
+    words = [sys.executable, script, "leg.osim", "--torque", "torque.sto", "--out", "with.osim"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert done.stderr.startswith("add_device: leg.osim: ")
+    assert "std::exception" not in done.stderr
+    assert ".cpp" not in done.stderr
+    assert set(tmp_path.iterdir()) == before
+
+
+@needs_opensim
 def test_the_example_without_a_model_runs(tmp_path: Path) -> None:
     script = Path(apart.ppafo.__file__).parent / "examples" / "opensim" / "co_simulation.py"
     done = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     rows = [line for line in done.stdout.splitlines() if "ankle" in line]
     assert len(rows) == 8
+    assert list(tmp_path.iterdir()) == []
+
+
+@needs_opensim
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["co_simulation.py", "leg.osim", "no.mot"], "co_simulation: leg.osim: there is no such file"),
+        (["co_simulation.py", "leg.osim"], "a model wants a motion"),
+        (["ankle_muscles.py"], "the following arguments are required: model, motion, forces"),
+        (["ankle_muscles.py", "leg.osim", "no.mot", "no.mot"], "ankle_muscles: out/mine/mine.toml: cannot be read"),
+    ],
+)
+def test_an_example_without_its_files_says_so(tmp_path: Path, words: list[str], said: str) -> None:
+    script = Path(apart.ppafo.__file__).parent / "examples" / "opensim" / words[0]
+    done = subprocess.run(
+        [sys.executable, script, *words[1:]], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
     assert list(tmp_path.iterdir()) == []
 
 

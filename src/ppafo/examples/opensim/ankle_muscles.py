@@ -4,12 +4,14 @@ ppafo gait import MOTION.mot FORCES.mot --body-mass '72.6 kg' --speed '1.14 m/s'
 python ankle_muscles.py MODEL.osim MOTION.mot FORCES.mot [WALK]
 """
 
+import argparse
 import sys
 from pathlib import Path
 
 import numpy as np
 import opensim
 
+from ppafo.errors import DataError, PpafoError
 from ppafo.exports.opensim import device_torque
 from ppafo.storage.opensim import read_opensim
 from ppafo.walking.loading import load_walk
@@ -27,9 +29,16 @@ STRIDES = 2
 def heel_strikes(forces: Path, start: float) -> tuple[float, ...]:
     """Times [s] at which the right foot is loaded, from a time on: as many strides as are wanted."""
     table = read_opensim(forces)
+    if "ground_force_vy" not in table.columns:
+        raise DataError(f"{forces}: has no column 'ground_force_vy', the force under the right foot")
     vertical = table.columns["ground_force_vy"]
     loaded = np.flatnonzero((vertical[1:] > LOADED) & (vertical[:-1] <= LOADED)) + 1
-    return tuple(time for time in table.time[loaded].tolist() if time > start)[: STRIDES + 1]
+    strikes = tuple(time for time in table.time[loaded].tolist() if time > start)[: STRIDES + 1]
+    if len(strikes) < 2:
+        raise DataError(
+            f"{forces}: the right foot is loaded {len(strikes)} times after {start:g} s; a stride needs two"
+        )
+    return strikes
 
 
 def write_loads(forces: Path, path: Path) -> None:
@@ -49,14 +58,29 @@ def write_loads(forces: Path, path: Path) -> None:
     loads.printToXML(str(path))
 
 
-model, motion, forces = (Path(word) for word in sys.argv[1:4])
-name = sys.argv[4] if len(sys.argv) > 4 else "proportional"
-# Muscles keep the measured ankle, whatever the device does: the motion is that of the recording.
-result = walk(load_walk(name, ["wearer.keeps_gait=1"], GAIT), 0.2)
-strikes = heel_strikes(forces, float(read_opensim(motion).time[0]))
-write_loads(forces, Path("loads.xml"))
-found = ankle_muscles(model, motion, "loads.xml", device_torque(result, "right", strikes))
-print(found)
-Path("out").mkdir(exist_ok=True)
-found.plot().savefig(f"out/ankle-muscles-{name}.png", dpi=110)
-print(f"written: loads.xml, out/ankle-muscles-{name}.png")
+def main() -> None:
+    """Let the device walk, lay its stride on the recording, and print what the muscles have to give."""
+    parser = argparse.ArgumentParser(description="Muscles of the right ankle with the device and without it.")
+    parser.add_argument("model", type=Path, help="a model of OpenSim (.osim)")
+    parser.add_argument("motion", type=Path, help="its motion (.mot)")
+    parser.add_argument("forces", type=Path, help="forces under the feet (.mot)")
+    parser.add_argument("walk", nargs="?", default="proportional", help="a walk; default: proportional")
+    parsed = parser.parse_args()
+    # Muscles keep the measured ankle, whatever the device does: the motion is that of the recording.
+    configuration = load_walk(parsed.walk, ["wearer.keeps_gait=1"], GAIT)
+    strikes = heel_strikes(parsed.forces, float(read_opensim(parsed.motion).time[0]))
+    result = walk(configuration, 0.2)
+    write_loads(parsed.forces, Path("loads.xml"))
+    found = ankle_muscles(parsed.model, parsed.motion, "loads.xml", device_torque(result, "right", strikes))
+    print(found)
+    Path("out").mkdir(exist_ok=True)
+    found.plot().savefig(f"out/ankle-muscles-{Path(parsed.walk).stem}.png", dpi=110)
+    print(f"written: loads.xml, out/ankle-muscles-{Path(parsed.walk).stem}.png")
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except PpafoError as error:
+        print(f"ankle_muscles: {error}", file=sys.stderr)
+        raise SystemExit(2) from None

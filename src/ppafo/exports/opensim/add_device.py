@@ -12,6 +12,7 @@ Part of ppafo, MIT licence.
 
 import argparse
 import math
+import re
 import sys
 from collections.abc import Sequence
 from itertools import pairwise
@@ -22,6 +23,10 @@ SUFFIX = "_device"
 """The actuator's name is that of its coordinate and this."""
 _HERE = Path(__file__).parent
 _LARGEST = 1.0e6
+_CODE = re.compile(
+    r"^.*?\)( const)?': |SimTK Exception thrown at \S+: |Error detected by Simbody method \S+ "
+    r"|\s*(Thrown at |In Object |\(Required condition ).*$"
+)
 
 
 def read_torque(path: Path) -> tuple[str, list[float], list[float]]:
@@ -45,12 +50,43 @@ def read_torque(path: Path) -> tuple[str, list[float], list[float]]:
     return columns[0], times, torques
 
 
+def read_model(path: Path) -> Any:
+    """Return a model of OpenSim; ValueError for a file that is none."""
+    import opensim
+
+    if not path.is_file():
+        raise ValueError(f"{path}: there is no such file; give a model of OpenSim (.osim)")
+    try:
+        model = opensim.Model(str(path))
+        model.initSystem()
+    except RuntimeError as error:
+        raise ValueError(f"{path}: OpenSim cannot read it as a model: {without_code(error)}") from error
+    if model.getCoordinateSet().getSize() == 0:
+        raise ValueError(f"{path}: is no model of OpenSim, or one without joints")
+    return model
+
+
+def without_code(error: Exception) -> str:
+    """Return what an error says on one line, without the functions and lines of OpenSim's source."""
+    return _CODE.sub("", " ".join(str(error).split()))
+
+
 def check_coordinate(model: Any, name: str) -> None:
-    """Refuse a coordinate that the model does not have; ValueError."""
+    """Refuse a coordinate that the model does not have, one that is no angle, and one with a device; ValueError."""
+    import opensim
+
     coordinates = model.getCoordinateSet()
     names = [coordinates.get(index).getName() for index in range(coordinates.getSize())]
     if name not in names:
         raise ValueError(f"{model.getName()}: has no coordinate '{name}'; there are: {', '.join(names)}")
+    if coordinates.get(name).getMotionType() != opensim.Coordinate.Rotational:
+        raise ValueError(f"{model.getName()}: '{name}' is no angle about one axis; a torque needs one that is")
+    forces = [model.getForceSet().get(index).getName() for index in range(model.getForceSet().getSize())]
+    there = [force for force in forces if force == f"{name}{SUFFIX}" or force.startswith(f"{name}{SUFFIX}_")]
+    if there:
+        raise ValueError(
+            f"{model.getName()}: has a device at '{name}' already ({', '.join(there)}); take the model without it"
+        )
 
 
 def add_actuator(model: Any, coordinate: str, function: Any) -> str:
@@ -134,6 +170,14 @@ def _axes_at(model: Any, state: Any, coordinate: str, frames: Sequence[Any], ang
     ]
 
 
+def _quiet() -> None:
+    """Else OpenSim leaves a file opensim.log, and lines about every component on the screen."""
+    import opensim
+
+    opensim.Logger.removeFileSink()
+    opensim.Logger.setLevelString("Error")
+
+
 def main(words: Sequence[str] | None = None) -> int:
     """Read model and torque, and write the model with the device; returns the exit code."""
     parser = argparse.ArgumentParser(description="Put the torque of a device into a model of OpenSim.")
@@ -145,18 +189,19 @@ def main(words: Sequence[str] | None = None) -> int:
     parsed = parser.parse_args(words)
     try:
         name, times, torques = read_torque(parsed.torque)
-        import opensim
-
-        model = opensim.Model(str(parsed.model))
+        _quiet()
+        model = read_model(parsed.model)
         coordinate = parsed.coordinate or name.removesuffix(SUFFIX)
         check_coordinate(model, coordinate)
         if parsed.as_load:
             add_load(model, coordinate, times, torques)
         else:
             add_actuator(model, coordinate, line(times, torques))
+        if not parsed.out.parent.is_dir():
+            raise ValueError(f"{parsed.out}: there is no folder {parsed.out.parent}")
         model.printToXML(str(parsed.out))
     except (OSError, ValueError, ImportError, RuntimeError) as error:
-        print(f"add_device: {' '.join(str(error).split())}", file=sys.stderr)
+        print(f"add_device: {without_code(error)}", file=sys.stderr)
         return 2
     print(f"written: {parsed.out}, with {times[0]:g} to {times[-1]:g} s of torque along {coordinate}")
     return 0

@@ -8,8 +8,8 @@ import opensim
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import SimulationError, one_line
 from ppafo.exports.opensim.add_device import add_actuator
-from ppafo.worlds.opensim.device import DeviceAtAnkle, to_model
-from ppafo.worlds.opensim.models import coordinate_of_model, load_model
+from ppafo.worlds.opensim.device import DeviceAtAnkle, check_command, to_model
+from ppafo.worlds.opensim.models import check_place, load_model
 
 PLATE_MASS = 0.5
 """Mass of a foot plate [kg] whose set says nothing but its inertia and its weight's torque about the ankle."""
@@ -30,13 +30,13 @@ class CoSimulation:
 
     The model gets an actuator, whose control is set between two steps, and a foot plate. In a step the torque is that
     of its middle, extrapolated from the last two samples, and the gas follows the angle that came of it. ``state`` may
-    be changed until the first step. DataError for a model without the coordinate.
+    be changed until the first step. DataError for a coordinate that the model lacks, that is no angle, or has a device.
     """
 
     def __init__(self, model: Any, coordinate: str, device: DeviceAtAnkle) -> None:
         self.model = load_model(model) if isinstance(model, str | Path) else model
         self.device = device
-        coordinate_of_model(self.model, coordinate)
+        check_place(self.model, coordinate)
         add_foot_plate(self.model, coordinate, device)
         name = add_actuator(self.model, coordinate, opensim.Constant(0.0))
         self.state = self.model.initSystem()
@@ -48,14 +48,21 @@ class CoSimulation:
         self._start, self._last = 0.0, 0.0
 
     def begin(self) -> Sample:
-        """Take ``state`` for the beginning; returns the first sample."""
+        """Take ``state`` for the beginning, with the device vented; returns the first sample.
+
+        SimulationError for an ankle beyond the stops of the device.
+        """
+        # The state after a step is the manager's, and would go with it.
+        self.state = opensim.State(self.state)
+        self._torque.setValue(0.0)
         self._start = self.state.getTime()
-        self._manager = opensim.Manager(self.model)
-        self._manager.setWriteToStorage(False)
-        self._manager.setPerformAnalyses(False)
-        self._manager.initialize(self.state)
+        manager = opensim.Manager(self.model)
+        manager.setWriteToStorage(False)
+        manager.setPerformAnalyses(False)
+        manager.initialize(self.state)
         self.model.realizeVelocity(self.state)
         self.device.begin(to_model(self._ankle.getValue(self.state)))
+        self._manager = manager
         first = self._sample()
         self._last = first.torque
         return first
@@ -63,8 +70,9 @@ class CoSimulation:
     def go_on(self, command: float) -> Sample:
         """Go one step on under a command to the valve [-]; returns the sample that it leads to.
 
-        SimulationError where OpenSim's integrator gives up, and for what ``DeviceAtAnkle.go_on`` says.
+        SimulationError where OpenSim's integrator gives up, and errors of ``DeviceAtAnkle.go_on``.
         """
+        check_command(command)
         before = self.begin() if self._manager is None else self._sample()
         self._torque.setValue(1.5 * before.torque - 0.5 * self._last)
         self._last = before.torque

@@ -8,7 +8,7 @@ import numpy as np
 from ppafo.engine.lanes import begin_block
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import Run, batch_of
-from ppafo.errors import ScenarioError, SimulationError
+from ppafo.errors import DataError, ScenarioError, SimulationError
 from ppafo.model.command import VENT
 from ppafo.model.plant import chamber_pressures
 from ppafo.model.sensors import SensorParameters
@@ -47,17 +47,20 @@ class DeviceAtAnkle:
         self.taken = 0
         self.plant = plant_parameters(item.device)
         run = _run_of(item, period, self.steps)
-        batch = batch_of(run)
+        self._batch = batch_of(run)
         self._fed = run.plant
-        self._block = begin_block(batch)
-        self._path = [row_numbers(batch.program.parameter_rows())[name] for name in _PATH]
-        rows = row_numbers(batch.program.state_rows())
+        self._block = begin_block(self._batch)
+        self._path = [row_numbers(self._batch.program.parameter_rows())[name] for name in _PATH]
+        rows = row_numbers(self._batch.program.state_rows())
         self._command, self._failure = rows["result.command"], rows["result.failure_time"]
         self._state = [rows[f"state.{name}"] for name in ("angle", "mass_1", "mass_2")]
         self._supplied = rows["state.supplied_mass"]
 
     def begin(self, angle: float) -> None:
-        """Put the vented device at an angle [rad]; once, before the first step."""
+        """Put the vented device at an angle [rad], with all of its time ahead; SimulationError beyond its stops."""
+        self._check_angle(angle, 0.0)
+        self.taken = 0
+        self._block = begin_block(self._batch)
         state = vented_state(self._fed, angle, 0.0)
         self._block.states[self._state, 0] = state.angle, state.mass_1, state.mass_2
 
@@ -83,26 +86,38 @@ class DeviceAtAnkle:
     def go_on(self, command: float, angle: float, next_angle: float) -> None:
         """Go one step on under a command [-], while the ankle turns from an angle to the next one [rad].
 
-        SimulationError after the last step, and where the gas has left what is possible.
+        DataError for what is no command. SimulationError after the last step, for an angle beyond the stops, and where
+        the gas has left what is possible.
         """
+        check_command(command)
         if self.taken >= self.steps:
             raise SimulationError(f"{self.name}: there was time for {self.steps * self.period:g} s; begin with more")
         begun = self.taken * self.period
-        if not self.plant.angle_min <= next_angle <= self.plant.angle_max:
-            lowest, highest = (math.degrees(to_model(stop)) for stop in (self.plant.angle_max, self.plant.angle_min))
-            raise SimulationError(
-                f"{self.name}: at {begun:g} s the ankle goes to {math.degrees(to_model(next_angle)):.4g} deg, beyond "
-                f"the stops of the device at {lowest:g} and {highest:g} deg (dorsiflexion above 0)"
-            )
+        self._check_angle(angle, begun)
+        self._check_angle(next_angle, begun)
         path = (angle, 2.0 * next_angle - angle, begun, 2.0 * self.period)
         self._block.set_parameters(self._path, np.array(path))
-        self._block.states[self._command] = max(-1.0, min(VENT, command))
+        self._block.states[self._command] = command
         self._block.advance(1)
         self.taken += 1
         if not bool(np.isfinite(self._block.states).all()):
             raise SimulationError(
                 f"{self.name}: the gas diverged at {begun:g} s; try a shorter step than {self.period:g} s"
             )
+
+    def _check_angle(self, angle: float, time: float) -> None:
+        if not self.plant.angle_min <= angle <= self.plant.angle_max:
+            lowest, highest = (math.degrees(to_model(stop)) for stop in (self.plant.angle_max, self.plant.angle_min))
+            raise SimulationError(
+                f"{self.name}: at {time:g} s the ankle goes to {math.degrees(to_model(angle)):.4g} deg, beyond "
+                f"the stops of the device at {lowest:g} and {highest:g} deg (dorsiflexion above 0)"
+            )
+
+
+def check_command(command: float) -> None:
+    """Refuse what is no command [-]; DataError."""
+    if not (-1.0 <= command <= 1.0 or command == VENT):
+        raise DataError(f"a command of {command:g}: must be -1 to 1, or {VENT:g} to vent both chambers")
 
 
 def to_model(angle: float) -> float:

@@ -7,7 +7,7 @@ from typing import Any
 import opensim
 
 from ppafo.errors import DataError, nearest_name, one_line
-from ppafo.exports.opensim.add_device import line
+from ppafo.exports.opensim.add_device import check_coordinate, line, read_model
 from ppafo.storage.opensim import OpenSimTable, read_opensim
 
 _STATE = "/value"
@@ -17,22 +17,10 @@ CONTACT = ("HuntCrossleyForce", "ElasticFoundationForce", "SmoothSphereHalfSpace
 
 def load_model(path: str | Path) -> Any:
     """Return a model of OpenSim; DataError for a file that is none."""
-    if not Path(path).is_file():
-        raise DataError(f"{path}: there is no such file; give a model of OpenSim (.osim)")
     try:
-        model = opensim.Model(str(path))
-        model.initSystem()
-    except RuntimeError as error:
-        raise DataError(f"{path}: OpenSim cannot read it as a model: {_said(error)}") from error
-    if model.getCoordinateSet().getSize() == 0:
-        raise DataError(f"{path}: is no model of OpenSim, or one without joints")
-    return model
-
-
-def _said(error: RuntimeError) -> str:
-    """Return the middle of what OpenSim says: it begins with a function and ends with a line of its source."""
-    text = one_line(error).partition("': ")[2] or one_line(error)
-    return text.partition(" Thrown at ")[0].partition(" In Object ")[0]
+        return read_model(Path(path))
+    except ValueError as error:
+        raise DataError(one_line(error)) from error
 
 
 def coordinate_of_model(model: Any, name: str) -> Any:
@@ -44,6 +32,15 @@ def coordinate_of_model(model: Any, name: str) -> Any:
             f"there are: {', '.join(names)}"
         )
     return model.getCoordinateSet().get(name)
+
+
+def check_place(model: Any, name: str) -> None:
+    """Refuse a coordinate that cannot take a device: one that is not there, is no angle, or has one; DataError."""
+    coordinate_of_model(model, name)
+    try:
+        check_coordinate(model, name)
+    except ValueError as error:
+        raise DataError(f"model {error}") from error
 
 
 def coordinate_names(model: Any) -> list[str]:

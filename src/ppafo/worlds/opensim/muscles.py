@@ -20,8 +20,8 @@ from ppafo.exports.opensim.add_device import SUFFIX, add_load
 from ppafo.signals import Recording
 from ppafo.worlds.opensim.models import (
     CONTACT,
+    check_place,
     coordinate_names,
-    coordinate_of_model,
     load_model,
     muscles_across,
     read_motion,
@@ -186,7 +186,7 @@ def _loads_file(path: str | Path) -> Path:
 
 def _check_fit(model: Any, task: "_Task", coordinate: str, motion: str | Path) -> None:
     """Refuse a motion and loads that do not fit the model, and a motion that does not last as long as the torque."""
-    coordinate_of_model(model, coordinate)
+    check_place(model, coordinate)
     _check_loads(task.loads, model)
     time = read_motion(motion, model, coordinate).time
     if not time[0] <= task.start < task.end <= time[-1]:
