@@ -167,15 +167,27 @@ def test_work_into_the_joint_is_that_of_the_gas(solenoid: Folder) -> None:
     into_joint, difference, turned = 0.0, [0.0], []
     for command in commands:
         data.ctrl[0] = command
-        before = data.qpos[0]
+        before, rate = data.qpos[0], data.qvel[0]
         mujoco.mj_step(model, data)
         turned.append(data.qpos[0] - before)
-        into_joint += data.qfrc_actuator[0] * turned[-1]
+        into_joint += data.qfrc_actuator[0] * 0.5 * STEP * (rate + data.qvel[0])
         difference.append(data.plugin_state[names.index("pressure_1")] - data.plugin_state[names.index("pressure_2")])
     mean = 0.5 * (np.array(difference)[1:] + np.array(difference)[:-1])
     of_gas = float((mean * turned).sum()) * solenoid.scenario.device.actuator.volume_per_angle
     assert of_gas > 1.0
     assert into_joint == pytest.approx(of_gas, rel=0.01)
+
+
+@pytest.mark.parametrize("integrator", ["EULER", "RK4", "IMPLICIT", "IMPLICITFAST"])
+def test_shut_chambers_are_a_spring_that_keeps_its_energy(integrator: str, proportional: Folder) -> None:
+    shut = {"actuator.leak.area": 0.0, "initial.pressure_1": 4.0e5, "initial.pressure_2": 3.5e5}
+    model = model_of(proportional, settings=shut)
+    model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator}")
+    model.opt.gravity[:] = model.dof_damping[:] = model.dof_frictionloss[:] = 0.0
+    data = mujoco.MjData(model)
+    swings = driven(model, data, np.zeros(800), proportional)[0]
+    assert np.ptp(swings[:200]) > 0.1
+    assert np.ptp(swings[-200:]) == pytest.approx(np.ptp(swings[:200]), rel=0.01)
 
 
 def test_a_joint_that_counts_the_other_way_round_moves_the_other_way(solenoid: Folder) -> None:

@@ -380,8 +380,10 @@ static void compute(const mjModel *m, mjData *d, int instance, int capability)
     const double *state = d->plugin_state + m->plugin_stateadr[instance];
     int sensor;
     if (capability == mjPLUGIN_ACTUATOR) {
-        /* The mean over the step that comes, from the slope of the last one: the work into the joint is then the gas'. */
-        d->actuator_force[item->force] = state[AT_TORQUE] + 0.5 * (state[AT_TORQUE] - state[AT_BEFORE]);
+        /* Semi-implicit steps are centred as they are, and RK4 wants the mean over the step, here from the last slope:
+         * else a shut chamber would take energy from the joint, or give it some. */
+        const double ahead = m->opt.integrator == mjINT_RK4 ? 0.5 : 0.0;
+        d->actuator_force[item->force] = state[AT_TORQUE] + ahead * (state[AT_TORQUE] - state[AT_BEFORE]);
         return;
     }
     for (sensor = 0; sensor < m->nsensor; ++sensor) {
