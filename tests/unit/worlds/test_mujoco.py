@@ -244,6 +244,21 @@ def test_a_finer_step_of_mujoco_is_taken_between_two_runs(solenoid: Folder) -> N
     assert data.plugin_state[2] < 0.8 * high
 
 
+def test_a_coarser_step_soon_after_the_beginning_keeps_the_gas(solenoid: Folder) -> None:
+    model = model_of(solenoid)
+    model.opt.timestep = 1.0e-4
+    data = mujoco.MjData(model)
+    data.ctrl[0] = 1.0
+    mujoco.mj_step(model, data, 4)
+    place = list(solenoid.plugin.outputs).index("supplied_mass")
+    supplied = data.plugin_state[place]
+    assert supplied > 0.0
+    model.opt.timestep = 1.0e-3
+    data.ctrl[0] = 0.0
+    mujoco.mj_step(model, data)
+    assert data.plugin_state[place] >= supplied
+
+
 def test_a_valve_with_a_delay_keeps_the_step_that_its_model_was_compiled_with(proportional: Folder) -> None:
     model = model_of(proportional)
     data = mujoco.MjData(model)

@@ -25,6 +25,7 @@ enum {
     AT_STEPS_DONE = OUTPUTS,
     AT_ANGLE,  /* where the vane stands [rad] */
     AT_BEFORE, /* torque one step before [N m] */
+    AT_BEGUN,  /* 1 after the first step of MuJoCo; until then the joint may be put elsewhere */
     AT_RUN,    /* states of the run, then late signals and commands */
     AT_HISTORY = AT_RUN + STATES
 };
@@ -327,6 +328,7 @@ static void reset(const mjModel *m, mjtNum *state, void *data, int instance)
     (void)instance;
     begin(item, angle);
     store(item, state, angle);
+    state[AT_BEGUN] = 0.0;
 }
 
 /* What another step of MuJoCo comes to, and whether the run can take it: delays are kept in steps. */
@@ -357,8 +359,7 @@ static void advance_device(const mjModel *m, mjData *d, int instance)
         begin(item, start);
         state[AT_STEPS_DONE] = floor(time / item->settings.run_step + 0.5);
     }
-    if (state[AT_STEPS_DONE] == 0.0) {
-        /* The joint may have been put elsewhere since the reset. */
+    if (state[AT_BEGUN] == 0.0) {
         start = vane_angle(item, d->actuator_length[item->force]);
         begin(item, start);
     } else {
@@ -372,6 +373,7 @@ static void advance_device(const mjModel *m, mjData *d, int instance)
             PLUGIN, d->time);
     }
     store(item, state, end);
+    state[AT_BEGUN] = 1.0;
 }
 
 static void compute(const mjModel *m, mjData *d, int instance, int capability)
