@@ -219,6 +219,29 @@ def test_the_example_of_the_folder_runs_and_is_reset(solenoid: Folder) -> None:
     assert np.array_equal(data.plugin_state, first)
 
 
+def test_settings_of_mujoco_for_its_actuators_are_heeded(proportional: Folder) -> None:
+    place = list(proportional.plugin.outputs).index("command")
+
+    def after_ten(model: Any, command: float = 1.0) -> tuple[float, float]:
+        data = mujoco.MjData(model)
+        data.ctrl[0] = command
+        mujoco.mj_step(model, data, 10)
+        return float(data.plugin_state[place]), float(data.qfrc_actuator[0])
+
+    model = model_of(proportional)
+    assert after_ten(model, math.inf)[0] == 0.0
+    model.actuator_ctrlrange[0] = 0.1, 0.25
+    assert [after_ten(model, command)[0] for command in (1.0, -1.0)] == [0.25, 0.1]
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL
+    assert after_ten(model)[0] == 1.0
+    assert after_ten(model)[1] > 0.0
+    model.opt.disableactuator = 1 << int(model.actuator_group[0])
+    assert after_ten(model) == (0.0, 0.0)
+    model.opt.disableactuator = 0
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
+    assert after_ten(model) == (0.0, 0.0)
+
+
 def test_a_command_that_is_no_number_is_none_and_an_angle_beyond_the_stops_is_a_stop(solenoid: Folder) -> None:
     model = model_of(solenoid)
     data = mujoco.MjData(model)

@@ -58,7 +58,8 @@ typedef struct {
     double longest;  /* step of the engine that is allowed [s] */
     double neutral;  /* angle of the device where the joint is at 0 [rad] */
     int64_t parts;   /* steps of the engine in one of MuJoCo */
-    int control;     /* places in ctrl, in actuator_force, and of its joint in qpos */
+    int number;      /* of the actuator; places in ctrl, in actuator_force, and of its joint in qpos */
+    int control;
     int force;
     int place;
 } device;
@@ -184,6 +185,7 @@ static const char *find_joint(const mjModel *m, int instance, device *item, char
         (void)snprintf(said, room, "%s: the actuator must move a hinge joint", PLUGIN);
         return said;
     }
+    item->number = own;
     item->control = CONTROL_OF(m, own);
     item->force = FORCE_OF(m, own);
     item->place = m->jnt_qposadr[joint];
@@ -222,8 +224,7 @@ static void restore(const device *item, const double *state)
 static void lead(const device *item, double command, double time, double angle, double rate)
 {
     double *rows = item->run->parameters;
-    const double known = command == command ? command : 0.0; /* so does MuJoCo itself, which warns */
-    rows[PARAMETER_CONTROLLER_COMMAND] = known < -1.0 ? -1.0 : (known > 1.0 ? 1.0 : known);
+    rows[PARAMETER_CONTROLLER_COMMAND] = command < -1.0 ? -1.0 : (command > 1.0 ? 1.0 : command);
     rows[PARAMETER_PATH_START] = time;
     rows[PARAMETER_PATH_LEVEL] = angle;
     rows[PARAMETER_PATH_RATE] = rate;
@@ -340,6 +341,28 @@ static bool takes_step(device *item, double timestep)
         && (int64_t)@name@_size(&item->settings) == bytes;
 }
 
+/* Whether MuJoCo has switched the actuator off, by itself or with its group. */
+static bool is_off(const mjModel *m, const device *item)
+{
+    const int group = m->actuator_group[item->number];
+    return (m->opt.disableflags & mjDSBL_ACTUATION) != 0
+        || (group >= 0 && group <= 30 && ((unsigned)m->opt.disableactuator >> group & 1U) != 0);
+}
+
+/* The command in ctrl, within its range; 0 where it is off, and where it is not finite (MuJoCo then takes all as 0). */
+static double command_of(const mjModel *m, const mjData *d, const device *item)
+{
+    const double given = d->ctrl[item->control];
+    const double *range = m->actuator_ctrlrange + 2 * item->control;
+    if (is_off(m, item) || given - given != 0.0) {
+        return 0.0;
+    }
+    if (!m->actuator_ctrllimited[item->control] || (m->opt.disableflags & mjDSBL_CLAMPCTRL) != 0) {
+        return given;
+    }
+    return given < range[0] ? range[0] : (given > range[1] ? range[1] : given);
+}
+
 static void advance_device(const mjModel *m, mjData *d, int instance)
 {
     device *item = (device *)d->plugin_data[instance];
@@ -367,7 +390,7 @@ static void advance_device(const mjModel *m, mjData *d, int instance)
     }
     now = state[AT_STEPS_DONE] * item->run->parameters[PARAMETER_TIMING_PERIOD];
     then = (state[AT_STEPS_DONE] + (double)item->parts) * item->run->parameters[PARAMETER_TIMING_PERIOD];
-    lead(item, d->ctrl[item->control], now, start, (end - start) / (then - now));
+    lead(item, command_of(m, d, item), now, start, (end - start) / (then - now));
     if (!advance_steps(item->run, item->parts)) {
         of_mujoco.error("%s: the run left what is possible at %g s: try a smaller timestep, and check volumes and areas",
             PLUGIN, d->time);
@@ -385,7 +408,8 @@ static void compute(const mjModel *m, mjData *d, int instance, int capability)
         /* Semi-implicit steps are centred as they are, and RK4 wants the mean over the step, here from the last slope:
          * else a shut chamber would take energy from the joint, or give it some. */
         const double ahead = m->opt.integrator == mjINT_RK4 ? 0.5 : 0.0;
-        d->actuator_force[item->force] = state[AT_TORQUE] + ahead * (state[AT_TORQUE] - state[AT_BEFORE]);
+        d->actuator_force[item->force] =
+            is_off(m, item) ? 0.0 : state[AT_TORQUE] + ahead * (state[AT_TORQUE] - state[AT_BEFORE]);
         return;
     }
     for (sensor = 0; sensor < m->nsensor; ++sensor) {
