@@ -1,6 +1,7 @@
 """The plugin of MuJoCo: bits of the lanes on the angle that the joint took, restored states, work, refusals."""
 
 import copy
+import json
 import math
 import re
 import runpy
@@ -312,6 +313,9 @@ def test_what_cannot_be_put_at_a_joint_is_refused(solenoid: Folder, tmp_path: Pa
         ({"joint": "ankel"}, "no joint 'ankel', did you mean 'ankle'"),
         ({"joint": "ankle", "gear": 2.0}, "must be 1 or -1"),
         ({"joint": "ankle", "settings": {"supply.presure": 1.0}}, "did you mean 'supply.pressure'"),
+        ({"joint": "ankle", "gear": "-1"}, "gear '-1': must be 1 or -1"),
+        ({"joint": "ankle", "settings": {"supply.pressure": "4.5 bar"}}, "supply.pressure '4.5 bar': must be a number"),
+        ({"joint": "ankle", "settings": {"supply.pressure": None}}, "supply.pressure None: must be a number"),
     ):
         with pytest.raises(ScenarioError, match=said):
             add_device(spec, solenoid.plugin, "device", **words)
@@ -325,6 +329,33 @@ def test_what_cannot_be_put_at_a_joint_is_refused(solenoid: Folder, tmp_path: Pa
     )
     with pytest.raises(ScenarioError, match=r"built for MuJoCo 3\.0\.0"):
         load_plugin(tmp_path)
+
+
+def test_a_folder_that_is_damaged_is_refused_with_its_cause(solenoid: Folder, tmp_path: Path) -> None:
+    from ppafo.worlds.mujoco import load_plugin
+
+    numbers = json.loads((solenoid.path / "device.json").read_text())
+    library = (solenoid.path / numbers["libraries"]["linux64"]).read_bytes()
+    own, name = {"linux64": "a.so"}, numbers["plugin"]
+    elsewhere = b"\x7fELF" + bytes(60) + name.encode() + b"\0"
+    for place, (changed, content, said) in enumerate(
+        (
+            ({"libraries": ["a.so"]}, library, "device.json cannot be read"),
+            ({"libraries": {"linux64": 3}}, library, "device.json cannot be read"),
+            ({"plugin": 3}, library, "device.json cannot be read"),
+            ({"plugin": f"{name}_other"}, library, "or not of plugin"),
+            ({}, b"damaged", r"a\.so is damaged"),
+            ({}, library[: len(library) // 2], r"a\.so is damaged"),
+            ({}, elsewhere, "Error loading .* run 'ppafo export mujoco' again"),
+            ({}, library, "a process takes one plugin of a name"),
+        )
+    ):
+        folder = tmp_path / str(place)
+        folder.mkdir()
+        (folder / "device.json").write_text(json.dumps({**numbers, "libraries": own, **changed}))
+        (folder / "a.so").write_bytes(content)
+        with pytest.raises(ScenarioError, match=said):
+            load_plugin(folder)
 
 
 def test_the_example_tells_what_an_ideal_motor_hides(
