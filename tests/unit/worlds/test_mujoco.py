@@ -283,6 +283,24 @@ def test_a_coarser_step_soon_after_the_beginning_keeps_the_gas(solenoid: Folder)
     assert data.plugin_state[place] >= supplied
 
 
+@pytest.mark.parametrize("step", [0.0, -1.0e-3, 1.0e-9])
+def test_a_timestep_that_cannot_be_is_refused_as_such(step: float, solenoid: Folder) -> None:
+    model = model_of(solenoid)
+    data = mujoco.MjData(model)
+    model.opt.timestep = step
+    for _ in range(2):
+        with pytest.raises(mujoco.FatalError, match=f"no timestep of {step:g} s is possible"):
+            mujoco.mj_step(model, data)
+
+
+def test_white_space_about_a_number_is_none_of_it(solenoid: Folder) -> None:
+    text = (solenoid.path / "example.xml").read_text()
+    spaced = re.sub(r'(key="supply.pressure" value=")[^"]*', r"\1 &#9;4.0e5&#9;&#10; ", text)
+    assert spaced != text
+    data = mujoco.MjData(mujoco.MjModel.from_xml_string(spaced))
+    assert data.plugin_state[0] > 0.0
+
+
 def test_a_valve_with_a_delay_keeps_the_step_that_its_model_was_compiled_with(proportional: Folder) -> None:
     model = model_of(proportional)
     data = mujoco.MjData(model)

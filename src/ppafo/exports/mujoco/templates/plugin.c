@@ -83,7 +83,7 @@ static bool read_number(const mjModel *m, int instance, const char *name, double
         return true;
     }
     *value = strtod(text, &end);
-    while (*end == ' ') {
+    while (*end == ' ' || (*end >= '\t' && *end <= '\r')) {
         ++end;
     }
     return end != text && *end == '\0' && *value - *value == 0.0;
@@ -332,13 +332,23 @@ static void reset(const mjModel *m, mjtNum *state, void *data, int instance)
     state[AT_BEGUN] = 0.0;
 }
 
-/* What another step of MuJoCo comes to, and whether the run can take it: delays are kept in steps. */
-static bool takes_step(device *item, double timestep)
+/* Take another step of MuJoCo, or stop with the reason: delays are kept in steps. */
+static void take_step(device *item, double timestep)
 {
-    const int64_t bytes = item->run->bytes;
-    divide(item, timestep);
-    return item->run->signal_delay + item->run->command_delay == 0 && @name@_bad_setting(&item->settings) == NULL
-        && (int64_t)@name@_size(&item->settings) == bytes;
+    const double before = item->timestep;
+    const bool delays = item->run->signal_delay + item->run->command_delay != 0;
+    bool possible = timestep > 0.0 && timestep <= 1000.0; /* the range of run.step; parts stay a number */
+    divide(item, possible ? timestep : before);
+    possible = possible && @name@_bad_setting(&item->settings) == NULL;
+    if (possible && !delays && (int64_t)@name@_size(&item->settings) == item->run->bytes) {
+        return;
+    }
+    divide(item, before); /* who goes on after the error is told again */
+    if (possible) {
+        of_mujoco.error("%s: delays of its valve fix the timestep with which the model is compiled", PLUGIN);
+    } else {
+        of_mujoco.error("%s: no timestep of %g s is possible", PLUGIN, timestep);
+    }
 }
 
 /* Whether MuJoCo has switched the actuator off, by itself or with its group. */
@@ -376,9 +386,7 @@ static void advance_device(const mjModel *m, mjData *d, int instance)
     }
     if (m->opt.timestep != item->timestep) {
         const double time = state[AT_STEPS_DONE] * item->settings.run_step;
-        if (!takes_step(item, m->opt.timestep)) {
-            of_mujoco.error("%s: delays of its valve fix the timestep with which the model is compiled", PLUGIN);
-        }
+        take_step(item, m->opt.timestep);
         begin(item, start);
         state[AT_STEPS_DONE] = floor(time / item->settings.run_step + 0.5);
     }
