@@ -109,15 +109,15 @@ def _seconds_of_a_step(model: Any) -> float:
 
 
 def _work(model: Any, plugin: Plugin, torque_constant: float) -> tuple[float, float]:
-    """Work into the joints, and of the gas by the mean pressures of each step [J]."""
+    """Work into the joints by the mean rates of each step, which is what they move with, and of the gas [J]."""
     data, into_joints, of_gas = mujoco.MjData(model), 0.0, 0.0
     before = dict.fromkeys(SIDES, 0.0)
     for _ in range(3 * TIMED):
         _command(data)
-        angles = data.qpos.copy()
+        angles, rates = data.qpos.copy(), data.qvel.copy()
         mujoco.mj_step(model, data)
         turned = data.qpos - angles
-        into_joints += float(data.qfrc_actuator @ turned)
+        into_joints += 0.5 * STEP * float(data.qfrc_actuator @ (rates + data.qvel))
         for side, angle in zip(SIDES, turned, strict=True):
             found = outputs_of(model, data, plugin, side)
             difference = found["pressure_1"] - found["pressure_2"]

@@ -1,6 +1,7 @@
 """The plugin of MuJoCo: bits of the lanes on the angle that the joint took, restored states, work, refusals."""
 
 import copy
+import json
 import math
 import re
 import runpy
@@ -167,15 +168,27 @@ def test_work_into_the_joint_is_that_of_the_gas(solenoid: Folder) -> None:
     into_joint, difference, turned = 0.0, [0.0], []
     for command in commands:
         data.ctrl[0] = command
-        before = data.qpos[0]
+        before, rate = data.qpos[0], data.qvel[0]
         mujoco.mj_step(model, data)
         turned.append(data.qpos[0] - before)
-        into_joint += data.qfrc_actuator[0] * turned[-1]
+        into_joint += data.qfrc_actuator[0] * 0.5 * STEP * (rate + data.qvel[0])
         difference.append(data.plugin_state[names.index("pressure_1")] - data.plugin_state[names.index("pressure_2")])
     mean = 0.5 * (np.array(difference)[1:] + np.array(difference)[:-1])
     of_gas = float((mean * turned).sum()) * solenoid.scenario.device.actuator.volume_per_angle
     assert of_gas > 1.0
     assert into_joint == pytest.approx(of_gas, rel=0.01)
+
+
+@pytest.mark.parametrize("integrator", ["EULER", "RK4", "IMPLICIT", "IMPLICITFAST"])
+def test_shut_chambers_are_a_spring_that_keeps_its_energy(integrator: str, proportional: Folder) -> None:
+    shut = {"actuator.leak.area": 0.0, "initial.pressure_1": 4.0e5, "initial.pressure_2": 3.5e5}
+    model = model_of(proportional, settings=shut)
+    model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator}")
+    model.opt.gravity[:] = model.dof_damping[:] = model.dof_frictionloss[:] = 0.0
+    data = mujoco.MjData(model)
+    swings = driven(model, data, np.zeros(800), proportional)[0]
+    assert np.ptp(swings[:200]) > 0.1
+    assert np.ptp(swings[-200:]) == pytest.approx(np.ptp(swings[:200]), rel=0.01)
 
 
 def test_a_joint_that_counts_the_other_way_round_moves_the_other_way(solenoid: Folder) -> None:
@@ -207,6 +220,29 @@ def test_the_example_of_the_folder_runs_and_is_reset(solenoid: Folder) -> None:
     assert np.array_equal(data.plugin_state, first)
 
 
+def test_settings_of_mujoco_for_its_actuators_are_heeded(proportional: Folder) -> None:
+    place = list(proportional.plugin.outputs).index("command")
+
+    def after_ten(model: Any, command: float = 1.0) -> tuple[float, float]:
+        data = mujoco.MjData(model)
+        data.ctrl[0] = command
+        mujoco.mj_step(model, data, 10)
+        return float(data.plugin_state[place]), float(data.qfrc_actuator[0])
+
+    model = model_of(proportional)
+    assert after_ten(model, math.inf)[0] == 0.0
+    model.actuator_ctrlrange[0] = 0.1, 0.25
+    assert [after_ten(model, command)[0] for command in (1.0, -1.0)] == [0.25, 0.1]
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL
+    assert after_ten(model)[0] == 1.0
+    assert after_ten(model)[1] > 0.0
+    model.opt.disableactuator = 1 << int(model.actuator_group[0])
+    assert after_ten(model) == (0.0, 0.0)
+    model.opt.disableactuator = 0
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
+    assert after_ten(model) == (0.0, 0.0)
+
+
 def test_a_command_that_is_no_number_is_none_and_an_angle_beyond_the_stops_is_a_stop(solenoid: Folder) -> None:
     model = model_of(solenoid)
     data = mujoco.MjData(model)
@@ -230,6 +266,39 @@ def test_a_finer_step_of_mujoco_is_taken_between_two_runs(solenoid: Folder) -> N
     mujoco.mj_step(model, data, 600)
     # The pair switches at most every 50 ms of a time that went on.
     assert data.plugin_state[2] < 0.8 * high
+
+
+def test_a_coarser_step_soon_after_the_beginning_keeps_the_gas(solenoid: Folder) -> None:
+    model = model_of(solenoid)
+    model.opt.timestep = 1.0e-4
+    data = mujoco.MjData(model)
+    data.ctrl[0] = 1.0
+    mujoco.mj_step(model, data, 4)
+    place = list(solenoid.plugin.outputs).index("supplied_mass")
+    supplied = data.plugin_state[place]
+    assert supplied > 0.0
+    model.opt.timestep = 1.0e-3
+    data.ctrl[0] = 0.0
+    mujoco.mj_step(model, data)
+    assert data.plugin_state[place] >= supplied
+
+
+@pytest.mark.parametrize("step", [0.0, -1.0e-3, 1.0e-9])
+def test_a_timestep_that_cannot_be_is_refused_as_such(step: float, solenoid: Folder) -> None:
+    model = model_of(solenoid)
+    data = mujoco.MjData(model)
+    model.opt.timestep = step
+    for _ in range(2):
+        with pytest.raises(mujoco.FatalError, match=f"no timestep of {step:g} s is possible"):
+            mujoco.mj_step(model, data)
+
+
+def test_white_space_about_a_number_is_none_of_it(solenoid: Folder) -> None:
+    text = (solenoid.path / "example.xml").read_text()
+    spaced = re.sub(r'(key="supply.pressure" value=")[^"]*', r"\1 &#9;4.0e5&#9;&#10; ", text)
+    assert spaced != text
+    data = mujoco.MjData(mujoco.MjModel.from_xml_string(spaced))
+    assert data.plugin_state[0] > 0.0
 
 
 def test_a_valve_with_a_delay_keeps_the_step_that_its_model_was_compiled_with(proportional: Folder) -> None:
@@ -262,6 +331,9 @@ def test_what_cannot_be_put_at_a_joint_is_refused(solenoid: Folder, tmp_path: Pa
         ({"joint": "ankel"}, "no joint 'ankel', did you mean 'ankle'"),
         ({"joint": "ankle", "gear": 2.0}, "must be 1 or -1"),
         ({"joint": "ankle", "settings": {"supply.presure": 1.0}}, "did you mean 'supply.pressure'"),
+        ({"joint": "ankle", "gear": "-1"}, "gear '-1': must be 1 or -1"),
+        ({"joint": "ankle", "settings": {"supply.pressure": "4.5 bar"}}, "supply.pressure '4.5 bar': must be a number"),
+        ({"joint": "ankle", "settings": {"supply.pressure": None}}, "supply.pressure None: must be a number"),
     ):
         with pytest.raises(ScenarioError, match=said):
             add_device(spec, solenoid.plugin, "device", **words)
@@ -275,6 +347,33 @@ def test_what_cannot_be_put_at_a_joint_is_refused(solenoid: Folder, tmp_path: Pa
     )
     with pytest.raises(ScenarioError, match=r"built for MuJoCo 3\.0\.0"):
         load_plugin(tmp_path)
+
+
+def test_a_folder_that_is_damaged_is_refused_with_its_cause(solenoid: Folder, tmp_path: Path) -> None:
+    from ppafo.worlds.mujoco import load_plugin
+
+    numbers = json.loads((solenoid.path / "device.json").read_text())
+    library = (solenoid.path / numbers["libraries"]["linux64"]).read_bytes()
+    own, name = {"linux64": "a.so"}, numbers["plugin"]
+    elsewhere = b"\x7fELF" + bytes(60) + name.encode() + b"\0"
+    for place, (changed, content, said) in enumerate(
+        (
+            ({"libraries": ["a.so"]}, library, "device.json cannot be read"),
+            ({"libraries": {"linux64": 3}}, library, "device.json cannot be read"),
+            ({"plugin": 3}, library, "device.json cannot be read"),
+            ({"plugin": f"{name}_other"}, library, "or not of plugin"),
+            ({}, b"damaged", r"a\.so is damaged"),
+            ({}, library[: len(library) // 2], r"a\.so is damaged"),
+            ({}, elsewhere, "Error loading .* run 'ppafo export mujoco' again"),
+            ({}, library, "a process takes one plugin of a name"),
+        )
+    ):
+        folder = tmp_path / str(place)
+        folder.mkdir()
+        (folder / "device.json").write_text(json.dumps({**numbers, "libraries": own, **changed}))
+        (folder / "a.so").write_bytes(content)
+        with pytest.raises(ScenarioError, match=said):
+            load_plugin(folder)
 
 
 def test_the_example_tells_what_an_ideal_motor_hides(

@@ -18,10 +18,11 @@ import json
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
-from ppafo.errors import ScenarioError, nearest_name
+from ppafo.errors import ScenarioError, nearest_name, one_line
 
 try:
     import mujoco
@@ -30,6 +31,8 @@ except ImportError as error:
 
 _LIBRARIES = {"Linux": "linux64", "Windows": "win64"}
 _NUMBERS = "device.json"
+_SECTIONS = (slice(40, 48), slice(58, 60), slice(60, 62))
+"""Where an ELF library of 64 bits says at which byte its table of sections is, how long an entry is, and how many."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,19 +52,9 @@ class Plugin:
 def load_plugin(folder: str | Path) -> Plugin:
     """Load the plugin of a folder of ``ppafo export mujoco``; a second time it only reads the numbers.
 
-    ScenarioError where the folder is none, or its library is for another MuJoCo or another system.
+    ScenarioError where the folder is none, or its library is damaged, or for another MuJoCo or another system.
     """
-    try:
-        numbers = json.loads((Path(folder) / _NUMBERS).read_text(encoding="utf-8"))
-        name, version, libraries = numbers["plugin"], numbers["mujoco"], numbers["libraries"]
-        plugin = Plugin(
-            name,
-            {item["name"]: item["unit"] for item in numbers["outputs"]},
-            {item["name"]: float(item["value"]) for item in numbers["attributes"]},
-            {key: float(value) for key, value in numbers["joint"].items()},
-        )
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise ScenarioError(f"{folder}: no folder of 'ppafo export mujoco' ({_NUMBERS} cannot be read)") from error
+    plugin, version, libraries = _read_numbers(folder)
     if version != mujoco.__version__:
         raise ScenarioError(
             f"{folder}: built for MuJoCo {version}, this is {mujoco.__version__}: run 'ppafo export mujoco' again"
@@ -72,13 +65,54 @@ def load_plugin(folder: str | Path) -> Plugin:
     path = (Path(folder) / library).resolve()
     if not path.is_file():
         raise ScenarioError(f"{folder}: {library} is missing: run 'ppafo export mujoco' again")
+    if not _is_whole(path.read_bytes(), plugin.name):
+        raise ScenarioError(
+            f"{folder}: {library} is damaged, or not of plugin {plugin.name}: run 'ppafo export mujoco' again"
+        )
     try:
         mujoco.mj_loadPluginLibrary(str(path))
     except mujoco.FatalError as error:
-        raise ScenarioError(
-            f"{folder}: {error}: a process takes one plugin of a name; change its attributes"
-        ) from error
+        said = one_line(error)
+        remedy = "a process takes one plugin of a name; change its attributes"
+        if "already registered" not in said:
+            remedy = "run 'ppafo export mujoco' again"
+        raise ScenarioError(f"{folder}: {said}: {remedy}") from error
     return plugin
+
+
+def _is_whole(library: bytes, name: str) -> bool:
+    """Whether a library has the name of its plugin and, in the format of Linux, the table of sections at its end.
+
+    The loader of Linux kills the process where a library was cut.
+    """
+    end = 0
+    if library.startswith(b"\x7fELF"):
+        table, size, count = (int.from_bytes(library[at], "little") for at in _SECTIONS)
+        end = table + size * count
+    return name.encode() + b"\0" in library and end <= len(library)
+
+
+def _read_numbers(folder: str | Path) -> tuple[Plugin, str, dict[str, str]]:
+    """What the folder of a plugin says: the plugin, the version of MuJoCo, and the library of each system."""
+    try:
+        numbers = json.loads((Path(folder) / _NUMBERS).read_text(encoding="utf-8"))
+        libraries = {system: _text(file) for system, file in numbers["libraries"].items()}
+        plugin = Plugin(
+            _text(numbers["plugin"]),
+            {item["name"]: item["unit"] for item in numbers["outputs"]},
+            {item["name"]: float(item["value"]) for item in numbers["attributes"]},
+            {key: float(value) for key, value in numbers["joint"].items()},
+        )
+        return plugin, _text(numbers["mujoco"]), libraries
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise ScenarioError(f"{folder}: no folder of 'ppafo export mujoco' ({_NUMBERS} cannot be read)") from error
+
+
+def _text(value: object) -> str:
+    """A text of the numbers; TypeError where it is none."""
+    if not isinstance(value, str):
+        raise TypeError(f"{value!r} is no text")
+    return value
 
 
 def add_device(
@@ -94,16 +128,19 @@ def add_device(
 
     ``gear`` -1 where the joint counts dorsiflexion as positive; ``neutral`` is the angle of the device with the joint
     at 0 [rad], ``settings`` change attributes [SI]. The joint keeps its limits, and gets the inertia and friction of
-    the device on top of its own. ScenarioError for a name that is not known, or a gear other than 1 and -1.
+    the device on top of its own. ScenarioError for a name that is not known, a gear other than 1 and -1,
+    or a setting that is no number.
     """
     _joint(spec, joint)
-    if gear not in (1.0, -1.0):
-        raise ScenarioError(f"gear {gear:g}: must be 1 or -1, for the vane sits on the joint")
+    if not isinstance(gear, Real) or gear not in (1.0, -1.0):
+        raise ScenarioError(f"gear {gear!r}: must be 1 or -1, for the vane sits on the joint")
     given = {**(settings or {}), **({} if neutral is None else {"neutral": neutral})}
-    for key in given:
+    for key, value in given.items():
         if key not in plugin.attributes:
             hint = nearest_name(key, plugin.attributes)
             raise ScenarioError(f"'{key}' is no attribute of {plugin.name}{hint}; README.md of its folder lists them")
+        if not isinstance(value, Real):
+            raise ScenarioError(f"{key} {value!r}: must be a number in the SI unit that README.md of its folder lists")
     if not any(item.plugin_name == plugin.name for item in spec.plugins):
         spec.activate_plugin(plugin.name)
     instance = spec.add_plugin(name=name, plugin_name=plugin.name)

@@ -25,6 +25,7 @@ enum {
     AT_STEPS_DONE = OUTPUTS,
     AT_ANGLE,  /* where the vane stands [rad] */
     AT_BEFORE, /* torque one step before [N m] */
+    AT_BEGUN,  /* 1 after the first step of MuJoCo; until then the joint may be put elsewhere */
     AT_RUN,    /* states of the run, then late signals and commands */
     AT_HISTORY = AT_RUN + STATES
 };
@@ -57,7 +58,8 @@ typedef struct {
     double longest;  /* step of the engine that is allowed [s] */
     double neutral;  /* angle of the device where the joint is at 0 [rad] */
     int64_t parts;   /* steps of the engine in one of MuJoCo */
-    int control;     /* places in ctrl, in actuator_force, and of its joint in qpos */
+    int number;      /* of the actuator; places in ctrl, in actuator_force, and of its joint in qpos */
+    int control;
     int force;
     int place;
 } device;
@@ -81,7 +83,7 @@ static bool read_number(const mjModel *m, int instance, const char *name, double
         return true;
     }
     *value = strtod(text, &end);
-    while (*end == ' ') {
+    while (*end == ' ' || (*end >= '\t' && *end <= '\r')) {
         ++end;
     }
     return end != text && *end == '\0' && *value - *value == 0.0;
@@ -183,6 +185,7 @@ static const char *find_joint(const mjModel *m, int instance, device *item, char
         (void)snprintf(said, room, "%s: the actuator must move a hinge joint", PLUGIN);
         return said;
     }
+    item->number = own;
     item->control = CONTROL_OF(m, own);
     item->force = FORCE_OF(m, own);
     item->place = m->jnt_qposadr[joint];
@@ -221,8 +224,7 @@ static void restore(const device *item, const double *state)
 static void lead(const device *item, double command, double time, double angle, double rate)
 {
     double *rows = item->run->parameters;
-    const double known = command == command ? command : 0.0; /* so does MuJoCo itself, which warns */
-    rows[PARAMETER_CONTROLLER_COMMAND] = known < -1.0 ? -1.0 : (known > 1.0 ? 1.0 : known);
+    rows[PARAMETER_CONTROLLER_COMMAND] = command < -1.0 ? -1.0 : (command > 1.0 ? 1.0 : command);
     rows[PARAMETER_PATH_START] = time;
     rows[PARAMETER_PATH_LEVEL] = angle;
     rows[PARAMETER_PATH_RATE] = rate;
@@ -327,15 +329,48 @@ static void reset(const mjModel *m, mjtNum *state, void *data, int instance)
     (void)instance;
     begin(item, angle);
     store(item, state, angle);
+    state[AT_BEGUN] = 0.0;
 }
 
-/* What another step of MuJoCo comes to, and whether the run can take it: delays are kept in steps. */
-static bool takes_step(device *item, double timestep)
+/* Take another step of MuJoCo, or stop with the reason: delays are kept in steps. */
+static void take_step(device *item, double timestep)
 {
-    const int64_t bytes = item->run->bytes;
-    divide(item, timestep);
-    return item->run->signal_delay + item->run->command_delay == 0 && @name@_bad_setting(&item->settings) == NULL
-        && (int64_t)@name@_size(&item->settings) == bytes;
+    const double before = item->timestep;
+    const bool delays = item->run->signal_delay + item->run->command_delay != 0;
+    bool possible = timestep > 0.0 && timestep <= 1000.0; /* the range of run.step; parts stay a number */
+    divide(item, possible ? timestep : before);
+    possible = possible && @name@_bad_setting(&item->settings) == NULL;
+    if (possible && !delays && (int64_t)@name@_size(&item->settings) == item->run->bytes) {
+        return;
+    }
+    divide(item, before); /* who goes on after the error is told again */
+    if (possible) {
+        of_mujoco.error("%s: delays of its valve fix the timestep with which the model is compiled", PLUGIN);
+    } else {
+        of_mujoco.error("%s: no timestep of %g s is possible", PLUGIN, timestep);
+    }
+}
+
+/* Whether MuJoCo has switched the actuator off, by itself or with its group. */
+static bool is_off(const mjModel *m, const device *item)
+{
+    const int group = m->actuator_group[item->number];
+    return (m->opt.disableflags & mjDSBL_ACTUATION) != 0
+        || (group >= 0 && group <= 30 && ((unsigned)m->opt.disableactuator >> group & 1U) != 0);
+}
+
+/* The command in ctrl, within its range; 0 where it is off, and where it is not finite (MuJoCo then takes all as 0). */
+static double command_of(const mjModel *m, const mjData *d, const device *item)
+{
+    const double given = d->ctrl[item->control];
+    const double *range = m->actuator_ctrlrange + 2 * item->control;
+    if (is_off(m, item) || given - given != 0.0) {
+        return 0.0;
+    }
+    if (!m->actuator_ctrllimited[item->control] || (m->opt.disableflags & mjDSBL_CLAMPCTRL) != 0) {
+        return given;
+    }
+    return given < range[0] ? range[0] : (given > range[1] ? range[1] : given);
 }
 
 static void advance_device(const mjModel *m, mjData *d, int instance)
@@ -351,14 +386,11 @@ static void advance_device(const mjModel *m, mjData *d, int instance)
     }
     if (m->opt.timestep != item->timestep) {
         const double time = state[AT_STEPS_DONE] * item->settings.run_step;
-        if (!takes_step(item, m->opt.timestep)) {
-            of_mujoco.error("%s: delays of its valve fix the timestep with which the model is compiled", PLUGIN);
-        }
+        take_step(item, m->opt.timestep);
         begin(item, start);
         state[AT_STEPS_DONE] = floor(time / item->settings.run_step + 0.5);
     }
-    if (state[AT_STEPS_DONE] == 0.0) {
-        /* The joint may have been put elsewhere since the reset. */
+    if (state[AT_BEGUN] == 0.0) {
         start = vane_angle(item, d->actuator_length[item->force]);
         begin(item, start);
     } else {
@@ -366,12 +398,13 @@ static void advance_device(const mjModel *m, mjData *d, int instance)
     }
     now = state[AT_STEPS_DONE] * item->run->parameters[PARAMETER_TIMING_PERIOD];
     then = (state[AT_STEPS_DONE] + (double)item->parts) * item->run->parameters[PARAMETER_TIMING_PERIOD];
-    lead(item, d->ctrl[item->control], now, start, (end - start) / (then - now));
+    lead(item, command_of(m, d, item), now, start, (end - start) / (then - now));
     if (!advance_steps(item->run, item->parts)) {
         of_mujoco.error("%s: the run left what is possible at %g s: try a smaller timestep, and check volumes and areas",
             PLUGIN, d->time);
     }
     store(item, state, end);
+    state[AT_BEGUN] = 1.0;
 }
 
 static void compute(const mjModel *m, mjData *d, int instance, int capability)
@@ -380,8 +413,11 @@ static void compute(const mjModel *m, mjData *d, int instance, int capability)
     const double *state = d->plugin_state + m->plugin_stateadr[instance];
     int sensor;
     if (capability == mjPLUGIN_ACTUATOR) {
-        /* The mean over the step that comes, from the slope of the last one: the work into the joint is then the gas'. */
-        d->actuator_force[item->force] = state[AT_TORQUE] + 0.5 * (state[AT_TORQUE] - state[AT_BEFORE]);
+        /* Semi-implicit steps are centred as they are, and RK4 wants the mean over the step, here from the last slope:
+         * else a shut chamber would take energy from the joint, or give it some. */
+        const double ahead = m->opt.integrator == mjINT_RK4 ? 0.5 : 0.0;
+        d->actuator_force[item->force] =
+            is_off(m, item) ? 0.0 : state[AT_TORQUE] + ahead * (state[AT_TORQUE] - state[AT_BEFORE]);
         return;
     }
     for (sensor = 0; sensor < m->nsensor; ++sensor) {
