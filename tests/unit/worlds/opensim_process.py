@@ -314,6 +314,13 @@ def command_after_a_step(command: float) -> float:
         return float(together.state.getTime()) - before
 
 
+def device_of(scenario: Path) -> None:
+    """The device of a scenario at an ankle."""
+    from ppafo.worlds.opensim import DeviceAtAnkle
+
+    DeviceAtAnkle(load_scenario(scenario))
+
+
 def begun_at(angle: float) -> None:
     """A device at an angle [rad] of the package."""
     from ppafo.worlds.opensim import DeviceAtAnkle

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
+from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.errors import DataError, SimulationError
+from ppafo.errors import DataError, ParameterError, SimulationError
 from tests.unit.worlds import opensim_process as apart
 
 needs_opensim = pytest.mark.skipif(find_spec("opensim") is None, reason="needs the extra 'opensim' (Python up to 3.13)")
@@ -42,6 +43,13 @@ def replayed(run: Run, tmp_path_factory: pytest.TempPathFactory) -> dict[str, An
     """A shipped walk whose ankle OpenSim leads."""
     found: dict[str, Any] = run(apart.replay, "solenoid", tmp_path_factory.mktemp("replay"))
     return found
+
+
+@needs_opensim
+def test_an_actuator_that_is_no_vane_is_refused(run: Run) -> None:
+    muscles = Path(str(files("ppafo") / "examples" / "actuators" / "torque-task-muscles.toml"))
+    with pytest.raises(ParameterError, match="co-simulation in OpenSim is made for a vane, and 'muscle-pair'"):
+        run(apart.device_of, muscles)
 
 
 @needs_opensim

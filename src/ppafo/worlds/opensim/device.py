@@ -41,6 +41,7 @@ class DeviceAtAnkle:
             raise ScenarioError(f"a step of {period:g} s: must be {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s")
         if not period <= duration <= LONGEST:
             raise ScenarioError(f"a duration of {duration:g} s: must be a step of {period:g} s to {LONGEST:g} s")
+        item.device.check_vane("co-simulation in OpenSim")
         self.name = item.name
         self.period = period
         self.steps = round(duration / period)
