@@ -58,8 +58,8 @@ typedef struct {
     double longest;  /* step of the engine that is allowed [s] */
     double neutral;  /* angle of the device where the joint is at 0 [rad] */
     int64_t parts;   /* steps of the engine in one of MuJoCo */
-    int number;      /* of the actuator; places in ctrl, in actuator_force, and of its joint in qpos */
-    int control;
+    int number;      /* of the actuator */
+    int control;     /* places in ctrl, in actuator_force, and of its joint in qpos */
     int force;
     int place;
 } device;
