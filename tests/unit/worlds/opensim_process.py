@@ -369,3 +369,26 @@ def _load_casadi() -> None:
 
 def _load_opensim() -> None:
     import ppafo.worlds.opensim  # noqa: F401
+
+
+def table_as_read(path: Path) -> dict[str, Any]:
+    """What OpenSim reads in a table: time, columns, two words of its head, and the lines its older reader finds."""
+    import opensim
+
+    opensim.Logger.removeFileSink()
+    table = opensim.TimeSeriesTable(str(path))
+    labels = list(table.getColumnLabels())
+    return {
+        "time": list(table.getIndependentColumn()),
+        "columns": {name: table.getDependentColumn(name).to_numpy().tolist() for name in labels},
+        "said": {name: table.getTableMetaDataAsString(name) for name in ("inDegrees", "kind")},
+        "storage size": opensim.Storage(str(path)).getSize(),
+    }
+
+
+def write_again(source: Path, target: Path) -> None:
+    """Let OpenSim write a table that it has read."""
+    import opensim
+
+    opensim.Logger.removeFileSink()
+    opensim.STOFileAdapter.write(opensim.TimeSeriesTable(str(source)), str(target))
