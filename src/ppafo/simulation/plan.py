@@ -100,26 +100,8 @@ def compose_run(pieces: Pieces, plant: PlantParameters, rule: StepRule, start: S
     delay = pieces.valve.command_delay(settings)
     plant = plant_behind_lines(plant, pieces.supply_lines)
     steps = rule(plant)
-    program = Program(
-        actuator=ACTUATORS[pieces.device.actuator.kind].model,
-        valve=pieces.valve,
-        reference=PROFILES[pieces.reference.kind],
-        controller=pieces.controller,
-        angle=None if pieces.path is None else PROFILES[pieces.path.kind],
-        ideal_sensors=pieces.has_ideal_sensors,
-        late_commands=first(delay) > 0.0,
-        late_signals=walk is None and first(pieces.signal_delay) > 0.0,
-        late_readings=walk is not None and first(pieces.signal_delay) > 0.0,
-        is_thermal=pieces.thermal is not None,
-        walks=walk is not None,
-        takes_course=walk is not None and walk.course is not None,
-        has_lines=pieces.supply_lines is not None,
-        slow_sensors=isinstance(pieces.sensor_rates, SensorRates),
-        is_adaptive=bool(first(steps.needs_parts)),
-        samples_inside=bool(first(steps.record_every % 1.0)),
-    )
     return Run(
-        program=program,
+        program=_program(pieces, steps, walk, has_delay=first(delay) > 0.0),
         plant=plant,
         thermal=thermal_parameters(pieces.thermal, pieces.device),
         valve_orifice=exact_orifice(pieces.device.valve.orifice, pieces.device),
@@ -140,6 +122,29 @@ def compose_run(pieces: Pieces, plant: PlantParameters, rule: StepRule, start: S
         walk=walk,
         lines=initial_lines(plant, pieces.supply_lines),
         sensor_rates=pieces.sensor_rates,
+    )
+
+
+def _program(pieces: Pieces, steps: Steps, walk: Walk | None, has_delay: bool) -> Program:
+    """Return what the lanes are composed of."""
+    is_late = first(pieces.signal_delay) > 0.0
+    return Program(
+        actuator=ACTUATORS[pieces.device.actuator.kind].model,
+        valve=pieces.valve,
+        reference=PROFILES[pieces.reference.kind],
+        controller=pieces.controller,
+        angle=None if pieces.path is None else PROFILES[pieces.path.kind],
+        ideal_sensors=pieces.has_ideal_sensors,
+        late_commands=has_delay,
+        late_signals=walk is None and is_late,
+        late_readings=walk is not None and is_late,
+        is_thermal=pieces.thermal is not None,
+        walks=walk is not None,
+        takes_course=walk is not None and walk.course is not None,
+        has_lines=pieces.supply_lines is not None,
+        slow_sensors=isinstance(pieces.sensor_rates, SensorRates),
+        is_adaptive=bool(first(steps.needs_parts)),
+        samples_inside=bool(first(steps.record_every % 1.0)),
     )
 
 
