@@ -81,6 +81,21 @@ def _plain(*given: Any) -> None:
     lines[:] = restructured(lines)
 
 
+def lead_back_to_one_page(app: Any) -> list[Any]:
+    """Let the source of a module lead back to the page of its room alone; no page is added.
+
+    Viewcode keeps one name of a module, and of each member the page that was read last. A member that is also on a page
+    of the public interface would lead to the name of the one on the page of the other.
+    """
+    known = app.env._viewcode_modules
+    for module, entry in known.items():
+        code, tags, used, reference = entry or ("", {}, {}, module)
+        room = next((page for page in used.values() if page.startswith("api/rooms/")), "")
+        if room and reference != module:
+            known[module] = code, tags, dict.fromkeys(used, room), module
+    return []
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Add these to Sphinx, and a language that forges know and Pygments does not."""
     from pygments.lexers.special import TextLexer
@@ -88,5 +103,7 @@ def setup(app: Any) -> dict[str, bool]:
     app.connect("autodoc-process-docstring", _plain)
     app.connect("doctree-resolved", link_names)
     app.connect("viewcode-follow-imported", home_of_builtins)
+    # Before viewcode makes its pages.
+    app.connect("html-collect-pages", lead_back_to_one_page, priority=400)
     app.add_lexer("csv", TextLexer)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
