@@ -127,7 +127,7 @@ def _plugin(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
 
 
 def _platforms(parsed: argparse.Namespace) -> list[str]:
-    """The platforms that are asked for, once each; this computer where none is named."""
+    """The requested platforms without duplicates; by default that of this computer."""
     from ppafo.exports.fmu.binaries import host_platform
 
     chosen = [host_platform()] if parsed.platforms is None else parsed.platforms.split(",")

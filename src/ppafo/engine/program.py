@@ -179,7 +179,7 @@ class Program:
 
     @property
     def keeps_volumes(self) -> bool:
-        """True where the chambers of a held vane are worked out once; other gas counts as moving."""
+        """True where the chamber volumes of a held vane are computed once; all other chambers are treated as moving."""
         return self.is_held and not (self.is_thermal or self.has_lines or self.has_shape)
 
     @property

@@ -37,7 +37,7 @@ class Reference(Protocol[Shown_contra]):
         """Forget everything."""
 
     def sample(self, readings: Shown_contra, /) -> tuple[int, int]:
-        """Command in steps, and the word that the chip tells with it."""
+        """Command in steps, and the status word that the chip reports with it."""
 
 
 class PythonChip:
