@@ -68,15 +68,7 @@ def state_at_start(
 ) -> PlantState:
     """The vane at an angle [rad] with a rate [rad/s], and the gas of two absolute pressures [Pa]."""
     volume_1, volume_2 = chamber_volumes(plant, angle)
-    return PlantState(
-        angle=angle,
-        angular_velocity=angular_velocity,
-        mass_1=chamber_mass(pressure_1, volume_1, plant.gas_product),
-        mass_2=chamber_mass(pressure_2, volume_2, plant.gas_product),
-        supplied_mass=0.0,
-        vented_mass=0.0,
-        leaked_mass=0.0,
-    )
+    return state_with_volumes(plant, angle, angular_velocity, volume_1, volume_2, pressure_1, pressure_2)
 
 
 def state_with_volumes(

@@ -1,10 +1,12 @@
 """The plugin of MuJoCo: bits of the lanes on the angle that the joint took, restored states, work, refusals."""
 
 import copy
+import ctypes
 import json
 import math
 import re
 import runpy
+import threading
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
@@ -355,7 +357,7 @@ def test_a_folder_that_is_damaged_is_refused_with_its_cause(solenoid: Folder, tm
     numbers = json.loads((solenoid.path / "device.json").read_text())
     library = (solenoid.path / numbers["libraries"]["linux64"]).read_bytes()
     own, name = {"linux64": "a.so"}, numbers["plugin"]
-    elsewhere = b"\x7fELF" + bytes(60) + name.encode() + b"\0"
+    elsewhere = b"\x7fELF" + bytes(60) + name.encode() + b"\0ppafo_plugin_is_offered\0"
     for place, (changed, content, said) in enumerate(
         (
             ({"libraries": ["a.so"]}, library, "device.json cannot be read"),
@@ -374,6 +376,11 @@ def test_a_folder_that_is_damaged_is_refused_with_its_cause(solenoid: Folder, tm
         (folder / "a.so").write_bytes(content)
         with pytest.raises(ScenarioError, match=said):
             load_plugin(folder)
+    # An error of MuJoCo that leaves the loader of the system by a jump lets no other thread load anything any more.
+    other = threading.Thread(target=ctypes.CDLL, args=(None,), daemon=True)
+    other.start()
+    other.join(10.0)
+    assert not other.is_alive()
 
 
 def test_the_example_tells_what_an_ideal_motor_hides(

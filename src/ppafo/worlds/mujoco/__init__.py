@@ -14,6 +14,7 @@
 Needs the extra ``mujoco``. How to use it: docs/how-to/mujoco.md.
 """
 
+import ctypes
 import json
 import platform
 from collections.abc import Mapping
@@ -31,6 +32,8 @@ except ImportError as error:
 
 _LIBRARIES = {"Linux": "linux64", "Windows": "win64"}
 _NUMBERS = "device.json"
+_IS_OFFERED = "ppafo_plugin_is_offered"
+"""The function of a library that says whether MuJoCo has its plugin, and not another one of that name."""
 _SECTIONS = (slice(40, 48), slice(58, 60), slice(60, 62))
 """Where an ELF library of 64 bits says at which byte its table of sections is, how long an entry is, and how many."""
 
@@ -72,16 +75,16 @@ def load_plugin(folder: str | Path) -> Plugin:
     try:
         mujoco.mj_loadPluginLibrary(str(path))
     except mujoco.FatalError as error:
-        said = one_line(error)
-        remedy = "a process takes one plugin of a name; change its attributes"
-        if "already registered" not in said:
-            remedy = "run 'ppafo export mujoco' again"
-        raise ScenarioError(f"{folder}: {said}: {remedy}") from error
+        raise ScenarioError(f"{folder}: {one_line(error)}: run 'ppafo export mujoco' again") from error
+    if not getattr(ctypes.CDLL(str(path)), _IS_OFFERED)():
+        raise ScenarioError(
+            f"{folder}: another {plugin.name} is loaded, and a process takes one plugin of a name; change its attributes"
+        )
     return plugin
 
 
 def _is_whole(library: bytes, name: str) -> bool:
-    """Whether a library has the name of its plugin and, in the format of Linux, the table of sections at its end.
+    """Whether a library has the names that it must have and, in the format of Linux, the table of sections at its end.
 
     The loader of Linux kills the process where a library was cut.
     """
@@ -89,7 +92,7 @@ def _is_whole(library: bytes, name: str) -> bool:
     if library.startswith(b"\x7fELF"):
         table, size, count = (int.from_bytes(library[at], "little") for at in _SECTIONS)
         end = table + size * count
-    return name.encode() + b"\0" in library and end <= len(library)
+    return all(word + b"\0" in library for word in (name.encode(), _IS_OFFERED.encode())) and end <= len(library)
 
 
 def _read_numbers(folder: str | Path) -> tuple[Plugin, str, dict[str, str]]:

@@ -69,6 +69,7 @@ static struct {
     int (*version)(void);
     const char *(*version_text)(void);
     int (*plugin)(const mjpPlugin *);
+    const mjpPlugin *(*registered)(const char *, int *);
     const char *(*config)(const mjModel *, int, const char *);
     void (*error)(const char *, ...);
 } of_mujoco;
@@ -460,13 +461,32 @@ static bool take(void *place, const char *name)
     return found != NULL;
 }
 
+static int offered;
+
+/* Whether MuJoCo has the plugin of this library, and not another one of its name. */
+#if defined(_WIN32)
+__declspec(dllexport)
+#else
+__attribute__((visibility("default")))
+#endif
+int ppafo_plugin_is_offered(void)
+{
+    return offered;
+}
+
 __attribute__((constructor)) static void offer(void)
 {
     mjpPlugin plugin;
+    int slot;
     if (!take(&of_mujoco.version, "mj_version") || !take(&of_mujoco.version_text, "mj_versionString")
         || !take(&of_mujoco.plugin, "mjp_registerPlugin") || !take(&of_mujoco.config, "mj_getPluginConfig")
-        || !take(&of_mujoco.error, "mju_error")) {
+        || !take(&of_mujoco.registered, "mjp_getPlugin") || !take(&of_mujoco.error, "mju_error")) {
         (void)fprintf(stderr, "%s: MuJoCo is not loaded; load this library by mj_loadPluginLibrary\n", PLUGIN);
+        return;
+    }
+    /* MuJoCo would leave this function by a jump, and the loader of the system would stay locked for ever. */
+    if (of_mujoco.registered(PLUGIN, &slot) != NULL) {
+        (void)fprintf(stderr, "%s: not loaded, for another library has given a plugin of this name\n", PLUGIN);
         return;
     }
     memset(&plugin, 0, sizeof(plugin));
@@ -484,4 +504,5 @@ __attribute__((constructor)) static void offer(void)
     plugin.compute = compute;
     plugin.advance = advance_device;
     (void)of_mujoco.plugin(&plugin);
+    offered = 1;
 }
