@@ -78,7 +78,8 @@ def load_plugin(folder: str | Path) -> Plugin:
         raise ScenarioError(f"{folder}: {one_line(error)}: run 'ppafo export mujoco' again") from error
     if not getattr(ctypes.CDLL(str(path)), _IS_OFFERED)():
         raise ScenarioError(
-            f"{folder}: another {plugin.name} is loaded, and a process takes one plugin of a name; change its attributes"
+            f"{folder}: another {plugin.name} is loaded, and a process takes one plugin of a name;"
+            " change the attributes of that one"
         )
     return plugin
 
