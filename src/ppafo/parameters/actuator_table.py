@@ -193,7 +193,7 @@ def _check_places(name: str, found: Floats, most: int, least: float, file: str) 
     if found.size > most:
         raise ParameterError(f"{file}: has {found.size} values of {name}, at most {most} are taken: leave some out")
     if found.size > 1 and float(np.diff(found).min()) < least:
-        raise ParameterError(f"{file}: two values of {name} are next to the same; round them")
+        raise ParameterError(f"{file}: two values of {name} are almost equal; merge or round them")
 
 
 def _check_volume(volume: Floats, angles: Floats, pressures: Floats, name: str, file: str) -> None:

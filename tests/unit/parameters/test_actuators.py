@@ -100,7 +100,7 @@ def test_a_curve_is_a_cubic_where_the_volume_is_one(angles: int) -> None:
         ((HEADER, *GOOD[:3], "60,50,220", *GOOD[4:]), "must grow with the angle at the highest pressure"),
         ((HEADER, "20,0,1", "21,0,9", "22,0,9.1", "60,0,9.2"), "the curve of volume_1 is negative near"),
         ((HEADER, *(f"{angle},0,{100 + angle}" for angle in range(20, 34))), "at most 12 are taken"),
-        ((HEADER, "20,0,100", "20.0001,0,101", "60,0,120"), "next to the same"),
+        ((HEADER, "20,0,100", "20.0001,0,101", "60,0,120"), "almost equal"),
     ],
 )
 def test_a_file_that_is_wrong_is_refused_in_one_line(tmp_path: Path, lines: tuple[str, ...], said: str) -> None:

@@ -321,6 +321,47 @@ def device_of(scenario: Path) -> None:
     DeviceAtAnkle(load_scenario(scenario))
 
 
+def warm_at_rest(angle: float) -> list[tuple[float, float]]:
+    """Absolute pressures [Pa] of shut chambers, whose gas has an energy balance, at an angle [rad] for 50 ms."""
+    from ppafo.worlds.opensim import DeviceAtAnkle
+
+    words = ("kind=thermal", "heat_transfer_coefficient=50 W/(m^2 K)", "wall_area_per_volume=100 1/m")
+    given = [*(f"gas_model.{word}" for word in words), "actuator.leak.area=0 mm^2"]
+    device = DeviceAtAnkle(load_scenario("torque-task-proportional", given), 1.0e-3, 1.0)
+    device.begin(angle)
+    found = [device.pressures()]
+    for _ in range(50):
+        device.go_on(0.0, angle, angle)
+        found.append(device.pressures())
+    return found
+
+
+def failed() -> None:
+    """A device whose run has failed with numbers that are finite."""
+    from ppafo.worlds.opensim import DeviceAtAnkle
+
+    device = DeviceAtAnkle(load_walk("solenoid"), 1.0e-3, 1.0)
+    device._block.states[device._failure] = 0.0
+    device.go_on(1.0, 1.5, 1.5)
+
+
+def heavy_plate() -> tuple[float, float]:
+    """Inertia [kg m^2] and moment of the weight [N m] about the ankle, of a plate with a long lever, in the model."""
+    import opensim
+
+    from ppafo.worlds.opensim import DeviceAtAnkle
+    from ppafo.worlds.opensim.cosimulation import add_foot_plate
+
+    device = DeviceAtAnkle(load_walk("solenoid"), 1.0e-3, 1.0)
+    device.plant = device.plant._replace(inertia=0.0084, gravity_torque=1.0)
+    model = leg()
+    add_foot_plate(model, "ankle_angle_r", device)
+    plate = model.getBodySet().get("ankle_angle_r_foot_plate")
+    mass, lever = plate.getMass(), plate.getMassCenter().get(0)
+    about_centre = opensim.Body.safeDownCast(plate).getInertia().getMoments().get(2)
+    return about_centre + mass * lever * lever, mass * lever * 9.80665
+
+
 def begun_at(angle: float) -> None:
     """A device at an angle [rad] of the package."""
     from ppafo.worlds.opensim import DeviceAtAnkle

@@ -1,5 +1,6 @@
 """Environments of Gymnasium: spaces, seeds, the bits of a simulation, and many beside one."""
 
+import math
 import warnings
 from typing import Any
 
@@ -16,7 +17,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv  # noqa: E402
 
 import ppafo.worlds.gym  # noqa: E402
 from ppafo.worlds.gym.environments import PneumaticEnv, PneumaticVectorEnv  # noqa: E402
-from ppafo.worlds.gym.tasks import BAR, TASKS, reward_of, within  # noqa: E402
+from ppafo.worlds.gym.tasks import BAR, TASKS, finite, reward_of, within  # noqa: E402
 
 TORQUE, ANGLE, WALK = TASK_NAMES = tuple(ppafo.worlds.gym.TASKS)
 SHORT = {TORQUE: 0.02, ANGLE: 0.02, WALK: 6.0}
@@ -59,6 +60,16 @@ def play(env: PneumaticEnv, commands: list[float], seed: int = 3) -> tuple[list[
 def drawn_commands(count: int) -> list[float]:
     """Commands as an agent gives them, in 32 bits."""
     return np.random.default_rng(1).uniform(-1.0, 1.0, count).astype(np.float32).tolist()
+
+
+def test_an_episode_is_there_after_a_reset() -> None:
+    env = one(TORQUE, duration=np.float64(0.01))
+    with pytest.raises(SimulationError, match="call reset"):
+        env.episode()
+
+
+def test_what_is_not_finite_counts_as_nothing() -> None:
+    assert [finite(value) for value in (-2.5, math.nan, math.inf, -math.inf)] == [-2.5, 0.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize("name", TASK_NAMES)

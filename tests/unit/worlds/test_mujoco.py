@@ -19,7 +19,7 @@ from ppafo.cli.main import main
 from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
-from ppafo.errors import ScenarioError
+from ppafo.errors import ParameterError, ScenarioError
 from ppafo.exports.fmu.binaries import host_platform
 from ppafo.exports.mujoco import attributes_of, installed_headers, plugin_files, plugin_library
 from ppafo.simulation.loading import load_scenario
@@ -285,13 +285,27 @@ def test_a_coarser_step_soon_after_the_beginning_keeps_the_gas(solenoid: Folder)
     assert data.plugin_state[place] >= supplied
 
 
+def test_a_state_that_was_saved_at_another_step_keeps_its_time(solenoid: Folder) -> None:
+    model = model_of(solenoid)
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 500)
+    saved = np.zeros(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_INTEGRATION))
+    mujoco.mj_getState(model, data, saved, mujoco.mjtState.mjSTATE_INTEGRATION)
+    model.opt.timestep = 1.0e-4
+    mujoco.mj_step(model, data, 10)
+    mujoco.mj_setState(model, data, saved, mujoco.mjtState.mjSTATE_INTEGRATION)
+    mujoco.mj_step(model, data)
+    steps_done = data.plugin_state[len(solenoid.plugin.outputs)]
+    assert steps_done * 1.0e-4 == pytest.approx(500 * STEP + 1.0e-4, abs=1.0e-9)
+
+
 @pytest.mark.parametrize("step", [0.0, -1.0e-3, 1.0e-9])
 def test_a_timestep_that_cannot_be_is_refused_as_such(step: float, solenoid: Folder) -> None:
     model = model_of(solenoid)
     data = mujoco.MjData(model)
     model.opt.timestep = step
     for _ in range(2):
-        with pytest.raises(mujoco.FatalError, match=f"no timestep of {step:g} s is possible"):
+        with pytest.raises(mujoco.FatalError, match=f"a timestep of {step:g} s is out of range"):
             mujoco.mj_step(model, data)
 
 
@@ -307,7 +321,7 @@ def test_a_valve_with_a_delay_keeps_the_step_that_its_model_was_compiled_with(pr
     model = model_of(proportional)
     data = mujoco.MjData(model)
     model.opt.timestep = 1.0e-4
-    with pytest.raises(mujoco.FatalError, match="delays of its valve fix the timestep"):
+    with pytest.raises(mujoco.FatalError, match="the delay of the valve is counted in timesteps"):
         mujoco.mj_step(model, data)
 
 
@@ -315,14 +329,32 @@ def test_a_valve_with_a_delay_keeps_the_step_that_its_model_was_compiled_with(pr
     ("settings", "said"),
     [
         ({"supply.pressure": -5.0}, "supply.pressure is out of range"),
-        ({"supply.pressure": math.nan}, "supply.pressure is no number"),
+        ({"supply.pressure": math.nan}, "supply.pressure is not a number"),
         ({"run.step": 0.0}, "run.step must be above 0"),
+        ({"run.step": 1e-30}, "run.step is out of range"),
         ({"valve.switching_interval": 9e9}, "valve.switching_interval is out of range"),
     ],
 )
 def test_numbers_that_cannot_be_are_refused_by_name(settings: dict[str, float], said: str, solenoid: Folder) -> None:
     with pytest.raises((ValueError, mujoco.FatalError), match=said):
         model_of(solenoid, settings=settings)
+
+
+def test_stops_may_leave_out_the_angle_that_the_export_had(solenoid: Folder) -> None:
+    model = model_of(solenoid, settings={"actuator.angle_min": 1.7})
+    assert mujoco.MjData(model).plugin_state[0] == 1.7
+
+
+def test_the_page_of_a_folder_says_what_its_valve_does_and_its_snippet_runs(
+    solenoid: Folder, proportional: Folder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = (solenoid.path / "README.md").read_text()
+    assert "0 neither: both chambers vent" in page
+    assert "at 0 both chambers are shut" in (proportional.path / "README.md").read_text()
+    monkeypatch.chdir(solenoid.path)
+    names: dict[str, Any] = {}
+    exec(page.split("```python\n")[1].split("```")[0], names)
+    assert names["data"].sensor("device").data[2] > 2.0e5
 
 
 def test_what_cannot_be_put_at_a_joint_is_refused(solenoid: Folder, tmp_path: Path) -> None:
@@ -357,13 +389,14 @@ def test_a_folder_that_is_damaged_is_refused_with_its_cause(solenoid: Folder, tm
     numbers = json.loads((solenoid.path / "device.json").read_text())
     library = (solenoid.path / numbers["libraries"]["linux64"]).read_bytes()
     own, name = {"linux64": "a.so"}, numbers["plugin"]
-    elsewhere = b"\x7fELF" + bytes(60) + name.encode() + b"\0ppafo_plugin_is_offered\0"
+    elsewhere = b"\x7fELF" + bytes(60) + name.encode() + b"\0ppafo_plugin_identity\0"
     for place, (changed, content, said) in enumerate(
         (
             ({"libraries": ["a.so"]}, library, "device.json cannot be read"),
             ({"libraries": {"linux64": 3}}, library, "device.json cannot be read"),
             ({"plugin": 3}, library, "device.json cannot be read"),
             ({"plugin": f"{name}_other"}, library, "or not of plugin"),
+            ({"identity": ""}, library, "a process takes one plugin of a name"),
             ({}, b"damaged", r"a\.so is damaged"),
             ({}, library[: len(library) // 2], r"a\.so is damaged"),
             ({}, elsewhere, "Error loading .* run 'ppafo export mujoco' again"),
@@ -398,13 +431,24 @@ def test_the_example_tells_what_an_ideal_motor_hides(
 
 def test_a_joint_that_is_no_hinge_is_refused_by_the_plugin(solenoid: Folder) -> None:
     text = (solenoid.path / "example.xml").read_text().replace('type="hinge"', 'type="slide"')
-    with pytest.raises(ValueError, match="must move a hinge joint"):
+    with pytest.raises(ValueError, match="must drive a hinge joint"):
         mujoco.MjModel.from_xml_string(text)
 
 
 def test_a_platform_that_is_none_is_refused() -> None:
     with pytest.raises(ScenarioError, match="platform 'linux65' is not known, did you mean 'linux64'"):
         plugin_files(load_scenario("step-response"), ["linux65"], installed_headers())
+
+
+def test_a_computer_without_a_library_of_its_own_is_told_of_platforms() -> None:
+    with pytest.raises(ScenarioError, match="--platforms linux64 or win64"):
+        plugin_files(load_scenario("torque-task-solenoid"), [], installed_headers())
+
+
+def test_an_actuator_that_is_no_vane_is_refused() -> None:
+    muscles = resources.files("ppafo") / "examples" / "actuators" / "torque-task-muscles.toml"
+    with pytest.raises(ParameterError, match="a plugin of MuJoCo is made for a vane"):
+        plugin_library(load_scenario(Path(str(muscles))))
 
 
 def test_friction_is_the_joints_and_no_attribute() -> None:

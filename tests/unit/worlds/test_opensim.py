@@ -53,6 +53,23 @@ def test_an_actuator_that_is_no_vane_is_refused(run: Run) -> None:
 
 
 @needs_opensim
+def test_gas_with_an_energy_balance_begins_at_rest_at_any_angle(run: Run) -> None:
+    pressures = np.array(run(apart.warm_at_rest, 1.2))
+    assert pressures == pytest.approx(np.full_like(pressures, pressures[0, 0]), rel=1.0e-6)
+
+
+@needs_opensim
+def test_a_run_that_failed_with_finite_numbers_says_so(run: Run) -> None:
+    with pytest.raises(SimulationError, match="the simulation diverged at 0 s"):
+        run(apart.failed)
+
+
+@needs_opensim
+def test_a_plate_has_the_inertia_and_weight_of_its_set_whatever_its_lever(run: Run) -> None:
+    assert run(apart.heavy_plate) == pytest.approx((0.0084, 1.0), rel=1.0e-12)
+
+
+@needs_opensim
 def test_the_joint_torque_of_a_shipped_walk_is_within_a_percent(replayed: dict[str, Any]) -> None:
     found = replayed
     gas, torque = found["gas"], found["torque"]

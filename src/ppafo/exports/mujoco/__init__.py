@@ -1,5 +1,6 @@
 """A scenario's device as an engine plugin of MuJoCo: library, example model, numbers; no Python in the step."""
 
+import hashlib
 import importlib.util
 import json
 import math
@@ -29,7 +30,8 @@ NEUTRAL = "neutral"
 OLDEST, NEWEST = (3, 4), (4, 0)
 """Versions of MuJoCo, first two numbers, that a plugin can be built for."""
 _PROPORTIONAL = "-1 to 1, the opening of the valve: above 0 feeds chamber 1, at 0 both chambers are shut"
-_VALVES = {"solenoid_pair": "-1, 0 or 1, the valves on or off: above 0 feeds chamber 1, at 0 both chambers are vented"}
+_PAIR = "-1, 0 or 1: above 0 energises valve A (it feeds chamber 1), below 0 valve B, 0 neither: both chambers vent"
+_VALVES = {"solenoid": _PAIR, "solenoid_recycling": f"{_PAIR}, after the chambers were joined"}
 _NEUTRAL_ANGLE = 0.5 * math.pi
 _VERSION = re.compile(r"#define mjVERSION_HEADER (\d+)")
 _OF_LOADER = {"linux64": ("-ldl",), "win64": ()}
@@ -78,10 +80,12 @@ def plugin_files(scenario: Scenario, platforms: Sequence[str], mujoco: Headers) 
         if name not in BUILT_FOR:
             hint = nearest_name(name, BUILT_FOR)
             raise ScenarioError(f"platform '{name}' is not known{hint}; available: {', '.join(BUILT_FOR)}")
+    if not platforms:
+        raise ScenarioError(f"no plugin is built on this computer for itself; --platforms {' or '.join(BUILT_FOR)}")
     library = plugin_library(scenario)
-    sources = _sources(library, mujoco)
+    sources, identity = _sources(library, mujoco)
     binaries = {name: _library_name(library, name) for name in platforms}
-    numbers = _numbers(scenario, library, mujoco, binaries)
+    numbers = {"identity": identity, **_numbers(scenario, library, mujoco, binaries)}
     words = _page_words(scenario, library, mujoco, numbers)
     include = ("-I", str(mujoco.include))
     return {
@@ -101,7 +105,11 @@ def plugin_files(scenario: Scenario, platforms: Sequence[str], mujoco: Headers) 
 
 
 def plugin_library(scenario: Scenario) -> Library:
-    """The library of the plant alone, whose vane follows straight pieces of an angle as in a replay."""
+    """The library of the plant alone, whose vane follows straight pieces of an angle as in a replay.
+
+    ScenarioError for any other actuator.
+    """
+    scenario.device.check_vane("a plugin of MuJoCo")
     chosen = replace(commanded(scenario), motion=held_vane(_angle_at_start(scenario)))
     library = scenario_library(chosen)
     program = prescribe_recorded_angle(replace(library.program.program, meters=(), is_adaptive=True))
@@ -137,9 +145,10 @@ def _library_name(library: Library, platform: str) -> str:
     return f"{'' if platform == 'win64' else 'lib'}{library.name}{PLATFORMS[platform].suffix}"
 
 
-def _sources(library: Library, mujoco: Headers) -> dict[str, bytes]:
-    """The sources of a plugin by name; headers of MuJoCo come from the version that is installed."""
+def _sources(library: Library, mujoco: Headers) -> tuple[dict[str, bytes], str]:
+    """The sources of a plugin by name, without headers of MuJoCo, and a hash that tells this export from others."""
     name, written = library.name, library_files(library)
+    identity = hashlib.sha256(written[f"{name}.c"] + f"{mujoco.version} {__version__}".encode()).hexdigest()[:16]
     chosen = attributes_of(library)
     places = [item.path for item in library.settings]
     words = {
@@ -155,12 +164,11 @@ def _sources(library: Library, mujoco: Headers) -> dict[str, bytes]:
         "neutral": repr(_NEUTRAL_ANGLE),
         "torque": str(library.program.outputs.index("torque")),
         "steps": steps_source(library),
+        "identity": identity,
     }
     plugin = files(__name__).joinpath("templates", "plugin.c").read_text(encoding="utf-8")
-    return {
-        **{file: written[file] for file in (f"{name}.c", f"{name}.h", "LICENSE")},
-        "plugin.c": filled(plugin, words).encode(),
-    }
+    program = {file: written[file] for file in (f"{name}.c", f"{name}.h", "LICENSE")}
+    return {**program, "plugin.c": filled(plugin, words).encode()}, identity
 
 
 def _numbers(scenario: Scenario, library: Library, mujoco: Headers, binaries: Mapping[str, str]) -> dict[str, object]:

@@ -94,7 +94,7 @@ class World:
             seconds = walk_duration(walk, (WALKING_TIME if duration is None else duration) / 60.0)
             self.episodes = walk_episodes(walk, randomise, seconds)
         else:
-            words = words if duration is None else (*words, f"run.duration={duration!r} s")
+            words = words if duration is None else (*words, f"run.duration={float(duration)!r} s")
             chosen = load_scenario(file, words)
             chosen.device.check_vane("an environment")
             self.episodes = scenario_episodes(chosen, randomise, varied, targets)
@@ -181,7 +181,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
             task, scenario, overrides, actions, randomise, vary, targets, duration, error_weight, gas_weight
         )
         self.observation_space, self.action_space = self.world.observation_space, self.world.action_space
-        self._drawn = np.zeros(0)
+        self._drawn: Floats | None = None
         self._lanes = self.world.lanes(1)
 
     def reset(
@@ -212,7 +212,12 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         )
 
     def episode(self) -> Any:
-        """Return the scenario of this episode with what was drawn, or the walk before anything is drawn."""
+        """Return the scenario of this episode with the numbers that were drawn, or the walk before anything is drawn.
+
+        SimulationError before the first ``reset``.
+        """
+        if self._drawn is None:
+            raise SimulationError("there is no episode yet: call reset")
         return self.world.episodes.shown(self._drawn)
 
     def numbers(self) -> dict[str, float]:

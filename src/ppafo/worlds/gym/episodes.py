@@ -235,7 +235,7 @@ def walk_episodes(configuration: Configuration, randomise: bool, seconds: float)
     """
     for name in ("course", "bottle"):
         if getattr(configuration, name) is not None:
-            raise ScenarioError(f"{configuration.file}: {name}: an environment walks without one; leave it away")
+            raise ScenarioError(f"{configuration.file}: {name}: an environment does not support it; leave it out")
     settings = configuration.settings
     if not set(TorqueProfile._fields) <= set(settings):
         kind = configuration.controller.name

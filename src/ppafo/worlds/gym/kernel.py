@@ -21,7 +21,17 @@ from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ScenarioError
 from ppafo.model.vane import actuator_torque
-from ppafo.worlds.gym.tasks import Goal, Memory, Requested, Task, reward_of, valve_command, valve_or_dump, within
+from ppafo.worlds.gym.tasks import (
+    Goal,
+    Memory,
+    Requested,
+    Task,
+    finite,
+    reward_of,
+    valve_command,
+    valve_or_dump,
+    within,
+)
 
 Flags = NDArray[np.bool_]
 Places = NDArray[np.intp]
@@ -131,9 +141,9 @@ def _observed(rows: LaneRows, task: Task) -> list[str]:
         f"view = {view}",
         f"error = {error}",
         *[observation.format(column, add(within), path) for column, path in enumerate(task.observed_paths)],
-        f"outcomes[{REWARD}, first + lane] = {add(reward_of)}(error, gas, {weights})",
-        f"outcomes[{ERROR}, first + lane] = error",
-        f"outcomes[{SUPPLIED}, first + lane] = state.supplied_mass",
+        f"outcomes[{REWARD}, first + lane] = {add(finite)}({add(reward_of)}(error, gas, {weights}))",
+        f"outcomes[{ERROR}, first + lane] = {add(finite)}(error)",
+        f"outcomes[{SUPPLIED}, first + lane] = {add(finite)}(state.supplied_mass)",
         "ends[0, first + lane] = result.failure_time <= time",
         "ends[1, first + lane] = step_index >= steps_in_all",
     ]

@@ -142,6 +142,11 @@ def reward_of(error: float, gas: float, error_weight: float, gas_weight: float, 
     return -(error_weight * error * error * period + gas_weight * (gas / GRAM))
 
 
+def finite(value: float) -> float:
+    """The value, 0 for what is not finite: of a run that failed nothing else can be said."""
+    return value if value - value == 0.0 else 0.0
+
+
 def within(value: float, lowest: float, highest: float) -> float:
     """The value between two bounds, the lowest for what is no number: a converter shows nothing else."""
     above = value if value >= lowest else lowest

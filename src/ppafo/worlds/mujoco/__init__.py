@@ -32,8 +32,8 @@ except ImportError as error:
 
 _LIBRARIES = {"Linux": "linux64", "Windows": "win64"}
 _NUMBERS = "device.json"
-_IS_OFFERED = "ppafo_plugin_is_offered"
-"""The function of a library that says whether MuJoCo has its plugin, and not another one of that name."""
+_IDENTITY = "ppafo_plugin_identity"
+"""The function of a library that says which export it is, and nothing where MuJoCo has another one of its name."""
 _SECTIONS = (slice(40, 48), slice(58, 60), slice(60, 62))
 """Where an ELF library of 64 bits says at which byte its table of sections is, how long an entry is, and how many."""
 
@@ -57,7 +57,7 @@ def load_plugin(folder: str | Path) -> Plugin:
 
     ScenarioError where the folder is none, or its library is damaged, or for another MuJoCo or another system.
     """
-    plugin, version, libraries = _read_numbers(folder)
+    plugin, version, identity, libraries = _read_numbers(folder)
     if version != mujoco.__version__:
         raise ScenarioError(
             f"{folder}: built for MuJoCo {version}, this is {mujoco.__version__}: run 'ppafo export mujoco' again"
@@ -76,10 +76,12 @@ def load_plugin(folder: str | Path) -> Plugin:
         mujoco.mj_loadPluginLibrary(str(path))
     except mujoco.FatalError as error:
         raise ScenarioError(f"{folder}: {one_line(error)}: run 'ppafo export mujoco' again") from error
-    if not getattr(ctypes.CDLL(str(path)), _IS_OFFERED)():
+    identity_of = getattr(ctypes.CDLL(str(path)), _IDENTITY)
+    identity_of.restype = ctypes.c_char_p
+    if not identity or identity_of() != identity.encode():
         raise ScenarioError(
             f"{folder}: another {plugin.name} is loaded, and a process takes one plugin of a name;"
-            " change the attributes of that one"
+            " change the attributes of that one, or start a new process"
         )
     return plugin
 
@@ -93,11 +95,11 @@ def _is_whole(library: bytes, name: str) -> bool:
     if library.startswith(b"\x7fELF"):
         table, size, count = (int.from_bytes(library[at], "little") for at in _SECTIONS)
         end = table + size * count
-    return all(word + b"\0" in library for word in (name.encode(), _IS_OFFERED.encode())) and end <= len(library)
+    return all(word + b"\0" in library for word in (name.encode(), _IDENTITY.encode())) and end <= len(library)
 
 
-def _read_numbers(folder: str | Path) -> tuple[Plugin, str, dict[str, str]]:
-    """What the folder of a plugin says: the plugin, the version of MuJoCo, and the library of each system."""
+def _read_numbers(folder: str | Path) -> tuple[Plugin, str, str, dict[str, str]]:
+    """What a folder says: the plugin, the version of MuJoCo, which export it is, and the library of each system."""
     try:
         numbers = json.loads((Path(folder) / _NUMBERS).read_text(encoding="utf-8"))
         libraries = {system: _text(file) for system, file in numbers["libraries"].items()}
@@ -107,7 +109,7 @@ def _read_numbers(folder: str | Path) -> tuple[Plugin, str, dict[str, str]]:
             {item["name"]: float(item["value"]) for item in numbers["attributes"]},
             {key: float(value) for key, value in numbers["joint"].items()},
         )
-        return plugin, _text(numbers["mujoco"]), libraries
+        return plugin, _text(numbers["mujoco"]), _text(numbers["identity"]), libraries
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise ScenarioError(f"{folder}: no folder of 'ppafo export mujoco' ({_NUMBERS} cannot be read)") from error
 
@@ -137,7 +139,7 @@ def add_device(
     """
     _joint(spec, joint)
     if not isinstance(gear, Real) or gear not in (1.0, -1.0):
-        raise ScenarioError(f"gear {gear!r}: must be 1 or -1, for the vane sits on the joint")
+        raise ScenarioError(f"gear {gear!r}: must be 1 or -1, because the vane sits on the joint")
     given = {**(settings or {}), **({} if neutral is None else {"neutral": neutral})}
     for key, value in given.items():
         if key not in plugin.attributes:
@@ -187,7 +189,7 @@ def _joint(spec: Any, name: str) -> Any:
         names = [item.name for item in spec.joints]
         raise ScenarioError(f"the model has no joint '{name}'{nearest_name(name, names)}")
     if found.type != mujoco.mjtJoint.mjJNT_HINGE:
-        raise ScenarioError(f"joint '{name}' is no hinge: the vane turns about one axis")
+        raise ScenarioError(f"joint '{name}' is not a hinge: the vane turns about one axis")
     return found
 
 

@@ -30,7 +30,8 @@ class CoSimulation:
 
     The model gets an actuator, whose control is set between two steps, and a foot plate. In a step the torque is that
     of its middle, extrapolated from the last two samples, and the gas follows the angle that came of it. ``state`` may
-    be changed until the first step. DataError for a coordinate that the model lacks, that is no angle, or has a device.
+    be changed until ``begin``, which the first step calls where nobody has. DataError for a coordinate that the model
+    lacks, that is no angle, or has a device.
     """
 
     def __init__(self, model: Any, coordinate: str, device: DeviceAtAnkle) -> None:
@@ -98,10 +99,12 @@ class CoSimulation:
 def add_foot_plate(model: Any, coordinate: str, device: DeviceAtAnkle) -> None:
     """Put the plate's inertia and weight on the foot: a body whose axes are those of the foot, X forward."""
     inertia, moment = device.plant.inertia, device.plant.gravity_torque / STANDARD_GRAVITY
-    lever = moment / PLATE_MASS
-    about_centre = max(1.0e-9, inertia - PLATE_MASS * lever * lever)
+    # Heavy enough for its inertia about its own centre to be above 0.
+    mass = max(PLATE_MASS, 1.01 * moment * moment / inertia)
+    lever = moment / mass
+    about_centre = inertia - mass * lever * lever
     name = f"{coordinate}_foot_plate"
-    plate = opensim.Body(name, PLATE_MASS, opensim.Vec3(lever, 0.0, 0.0), opensim.Inertia(*(3 * [about_centre])))
+    plate = opensim.Body(name, mass, opensim.Vec3(lever, 0.0, 0.0), opensim.Inertia(*(3 * [about_centre])))
     model.addBody(plate)
     ankle = model.getCoordinateSet().get(coordinate).getJoint().getChildFrame()
     foot, centre = model.getBodySet().get(ankle.findBaseFrame().getName()), ankle.findTransformInBaseFrame().p()

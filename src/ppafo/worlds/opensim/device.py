@@ -7,7 +7,7 @@ import numpy as np
 
 from ppafo.engine.lanes import begin_block
 from ppafo.engine.rows import row_numbers
-from ppafo.engine.run import Run, batch_of
+from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.errors import DataError, ScenarioError, SimulationError
 from ppafo.model.command import VENT
 from ppafo.model.plant import chamber_pressures
@@ -55,6 +55,8 @@ class DeviceAtAnkle:
         rows = row_numbers(self._batch.program.state_rows())
         self._command, self._failure = rows["result.command"], rows["result.failure_time"]
         self._state = [rows[f"state.{name}"] for name in ("angle", "mass_1", "mass_2")]
+        # True masses, which gas with an energy balance has beside those at the reference temperature.
+        self._true = [rows[path] for path in ("masses.mass_1", "masses.mass_2") if path in rows]
         self._supplied = rows["state.supplied_mass"]
 
     def begin(self, angle: float) -> None:
@@ -64,6 +66,8 @@ class DeviceAtAnkle:
         self._block = begin_block(self._batch)
         state = vented_state(self._fed, angle, 0.0)
         self._block.states[self._state, 0] = state.angle, state.mass_1, state.mass_2
+        if self._true:
+            self._block.states[self._true, 0] = state.mass_1, state.mass_2
 
     def pressures(self) -> tuple[float, float]:
         """Absolute pressures [Pa] in both chambers."""
@@ -101,9 +105,10 @@ class DeviceAtAnkle:
         self._block.states[self._command] = command
         self._block.advance(1)
         self.taken += 1
-        if not bool(np.isfinite(self._block.states).all()):
+        states = self._block.states
+        if states[self._failure, 0] < NEVER_FAILED or not bool(np.isfinite(states).all()):
             raise SimulationError(
-                f"{self.name}: the gas diverged at {begun:g} s; try a shorter step than {self.period:g} s"
+                f"{self.name}: the simulation diverged at {begun:g} s; try a shorter step than {self.period:g} s"
             )
 
     def _check_angle(self, angle: float, time: float) -> None:

@@ -8,6 +8,7 @@
 #endif
 #include "@name@.c"
 
+#include <locale.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -26,6 +27,7 @@ enum {
     AT_ANGLE,  /* where the vane stands [rad] */
     AT_BEFORE, /* torque one step before [N m] */
     AT_BEGUN,  /* 1 after the first step of MuJoCo; until then the joint may be put elsewhere */
+    AT_STEP,   /* step of the engine that is counted by AT_STEPS_DONE [s] */
     AT_RUN,    /* states of the run, then late signals and commands */
     AT_HISTORY = AT_RUN + STATES
 };
@@ -38,6 +40,8 @@ enum { ATTRIBUTE_COUNT = sizeof(ATTRIBUTES) / sizeof(ATTRIBUTES[0]) };
 /* Which settings these are; the last one is none. */
 static const int PLACES[ATTRIBUTE_COUNT] = {@places@, -1};
 #define NEUTRAL "neutral"
+
+#define MOST_PARTS 1.0e12
 
 /* In newer versions of MuJoCo controls and forces of an actuator have addresses of their own. */
 #if @apart@
@@ -74,6 +78,15 @@ static struct {
     void (*error)(const char *, ...);
 } of_mujoco;
 
+/* Numbers are read with a decimal point, whatever the program around has for its own. */
+#if defined(_WIN32)
+static _locale_t plain;
+#define READ_NUMBER(text, end) _strtod_l(text, end, plain)
+#else
+static locale_t plain;
+#define READ_NUMBER(text, end) strtod_l(text, end, plain)
+#endif
+
 @steps@
 /* A number of the model's configuration; what is not given stays as it is. False where it is none. */
 static bool read_number(const mjModel *m, int instance, const char *name, double *value)
@@ -83,7 +96,7 @@ static bool read_number(const mjModel *m, int instance, const char *name, double
     if (text == NULL || text[0] == '\0') {
         return true;
     }
-    *value = strtod(text, &end);
+    *value = READ_NUMBER(text, &end);
     while (*end == ' ' || (*end >= '\t' && *end <= '\r')) {
         ++end;
     }
@@ -110,13 +123,22 @@ static const char *path_of(const char *name)
 /* The settings under a step of MuJoCo, which is divided into the fewest equal steps of the engine. */
 static void divide(device *item, double timestep)
 {
+    const double parts = timestep / item->longest + 1.0 - 1.0e-9;
     item->timestep = timestep;
-    item->parts = (int64_t)(timestep / item->longest + 1.0 - 1.0e-9);
-    item->parts = item->parts < 1 ? 1 : item->parts;
+    item->parts = parts < 1.0 ? 1 : (int64_t)(parts < MOST_PARTS ? parts : MOST_PARTS); /* more give no valid step */
     item->settings.run_step = timestep / (double)item->parts;
     item->settings.controller_period = item->settings.run_step;
     item->settings.run_output_interval = item->settings.run_step;
     item->settings.run_duration = 1000.0 * item->settings.run_step;
+}
+
+/* The angle of the vane for a length of the actuator; beyond its stops it stands at them. */
+static double vane_angle(const device *item, double length)
+{
+    const double angle = item->neutral + length;
+    const double low = item->settings.actuator_angle_min;
+    const double high = item->settings.actuator_angle_max;
+    return angle < low ? low : (angle > high ? high : angle);
 }
 
 /* Read the configuration of an instance; NULL where it is good, else what is wrong, in memory of the caller. */
@@ -128,12 +150,12 @@ static const char *configure(const mjModel *m, int instance, device *item, char 
     item->neutral = @neutral@;
     @name@_defaults(&item->settings);
     if (!read_number(m, instance, NEUTRAL, &item->neutral)) {
-        (void)snprintf(said, room, "%s: " NEUTRAL " is no number", PLUGIN);
+        (void)snprintf(said, room, "%s: " NEUTRAL " is not a number", PLUGIN);
         return said;
     }
     for (place = 0; place < ATTRIBUTE_COUNT; ++place) {
         if (PLACES[place] >= 0 && !read_number(m, instance, ATTRIBUTES[place], &settings[PLACES[place]])) {
-            (void)snprintf(said, room, "%s: %s is no number", PLUGIN, ATTRIBUTES[place]);
+            (void)snprintf(said, room, "%s: %s is not a number", PLUGIN, ATTRIBUTES[place]);
             return said;
         }
     }
@@ -143,6 +165,7 @@ static const char *configure(const mjModel *m, int instance, device *item, char 
         return said;
     }
     divide(item, m->opt.timestep);
+    item->settings.motion_angle = vane_angle(item, 0.0);
     bad = @name@_bad_setting(&item->settings);
     if (bad != NULL) {
         (void)snprintf(said, room, "%s: %s is out of range or contradicts another", PLUGIN, path_of(bad));
@@ -171,19 +194,19 @@ static const char *find_joint(const mjModel *m, int instance, device *item, char
     for (number = 0; number < ACTUATORS(m); ++number) {
         if (m->actuator_plugin[number] == instance) {
             if (own >= 0) {
-                (void)snprintf(said, room, "%s: one instance cannot move two actuators", PLUGIN);
+                (void)snprintf(said, room, "%s: one instance cannot drive two actuators", PLUGIN);
                 return said;
             }
             own = number;
         }
     }
     if (own < 0) {
-        (void)snprintf(said, room, "%s: the instance moves no actuator", PLUGIN);
+        (void)snprintf(said, room, "%s: no actuator uses this instance of the plugin", PLUGIN);
         return said;
     }
     joint = m->actuator_trnid[2 * own];
     if (m->actuator_trntype[own] != mjTRN_JOINT || m->jnt_type[joint] != mjJNT_HINGE) {
-        (void)snprintf(said, room, "%s: the actuator must move a hinge joint", PLUGIN);
+        (void)snprintf(said, room, "%s: the actuator must drive a hinge joint", PLUGIN);
         return said;
     }
     item->number = own;
@@ -193,15 +216,6 @@ static const char *find_joint(const mjModel *m, int instance, device *item, char
     return NULL;
 }
 
-/* The angle of the vane for a length of the actuator; beyond its stops it stands at them. */
-static double vane_angle(const device *item, double length)
-{
-    const double angle = item->neutral + length;
-    const double low = item->settings.actuator_angle_min;
-    const double high = item->settings.actuator_angle_max;
-    return angle < low ? low : (angle > high ? high : angle);
-}
-
 static void store(const device *item, double *state, double angle)
 {
     const @name@_run *run = item->run;
@@ -209,6 +223,7 @@ static void store(const device *item, double *state, double angle)
     state[AT_BEFORE] = run->steps_done > 0 ? state[AT_TORQUE] : run->samples[0][AT_TORQUE];
     memcpy(state, run->samples[sample % 2], sizeof(run->samples[0]));
     state[AT_STEPS_DONE] = (double)run->steps_done;
+    state[AT_STEP] = item->settings.run_step;
     state[AT_ANGLE] = angle;
     memcpy(state + AT_RUN, run->states, sizeof(run->states));
     memcpy(state + AT_HISTORY, run + 1, (size_t)run->bytes - sizeof(*run));
@@ -242,18 +257,23 @@ static void begin(device *item, double angle)
     (void)advance_steps(item->run, 0);
 }
 
+static const char *other_version(char *said, size_t room)
+{
+    if (of_mujoco.version() == mjVERSION_HEADER) {
+        return NULL;
+    }
+    (void)snprintf(said, room, "%s was built for MuJoCo @mujoco@, this is %s: run 'ppafo export mujoco' where that is installed",
+        PLUGIN, of_mujoco.version_text());
+    return said;
+}
+
 static int count_states(const mjModel *m, int instance)
 {
     device item;
     char said[256];
-    const char *bad;
+    const char *bad = other_version(said, sizeof(said));
     memset(&item, 0, sizeof(item));
-    if (of_mujoco.version() != mjVERSION_HEADER) {
-        of_mujoco.error("%s was built for MuJoCo @mujoco@, this is %s: run 'ppafo export mujoco' where that is installed",
-            PLUGIN, of_mujoco.version_text());
-        return 0;
-    }
-    bad = configure(m, instance, &item, said, sizeof(said));
+    bad = bad != NULL ? bad : configure(m, instance, &item, said, sizeof(said));
     if (bad != NULL) {
         of_mujoco.error("%s", bad);
         return 0;
@@ -273,10 +293,13 @@ static int make(const mjModel *m, mjData *d, int instance)
 {
     char said[256];
     device *item = (device *)calloc(1, sizeof(device));
-    const char *bad = item == NULL ? "no memory" : configure(m, instance, item, said, sizeof(said));
+    const char *bad = item == NULL ? "no memory" : other_version(said, sizeof(said));
+    bad = bad != NULL ? bad : configure(m, instance, item, said, sizeof(said));
     bad = bad != NULL ? bad : find_joint(m, instance, item, said, sizeof(said));
     if (bad == NULL && state_count(item) != m->plugin_statenum[instance]) {
-        (void)snprintf(said, sizeof(said), "%s: delays of its valve fix the timestep with which the model is compiled", PLUGIN);
+        (void)snprintf(said, sizeof(said),
+            "%s: the model was compiled with another timestep, which the delay of the valve is counted in, or another export",
+            PLUGIN);
         bad = said;
     }
     if (bad == NULL) {
@@ -346,9 +369,9 @@ static void take_step(device *item, double timestep)
     }
     divide(item, before); /* who goes on after the error is told again */
     if (possible) {
-        of_mujoco.error("%s: delays of its valve fix the timestep with which the model is compiled", PLUGIN);
+        of_mujoco.error("%s: the delay of the valve is counted in timesteps: compile the model with the new one", PLUGIN);
     } else {
-        of_mujoco.error("%s: no timestep of %g s is possible", PLUGIN, timestep);
+        of_mujoco.error("%s: a timestep of %g s is out of range", PLUGIN, timestep);
     }
 }
 
@@ -386,10 +409,11 @@ static void advance_device(const mjModel *m, mjData *d, int instance)
         return; /* MuJoCo resets a state that is no number */
     }
     if (m->opt.timestep != item->timestep) {
-        const double time = state[AT_STEPS_DONE] * item->settings.run_step;
         take_step(item, m->opt.timestep);
         begin(item, start);
-        state[AT_STEPS_DONE] = floor(time / item->settings.run_step + 0.5);
+    }
+    if (state[AT_STEP] != item->settings.run_step) {
+        state[AT_STEPS_DONE] = floor(state[AT_STEPS_DONE] * state[AT_STEP] / item->settings.run_step + 0.5);
     }
     if (state[AT_BEGUN] == 0.0) {
         start = vane_angle(item, d->actuator_length[item->force]);
@@ -401,7 +425,7 @@ static void advance_device(const mjModel *m, mjData *d, int instance)
     then = (state[AT_STEPS_DONE] + (double)item->parts) * item->run->parameters[PARAMETER_TIMING_PERIOD];
     lead(item, command_of(m, d, item), now, start, (end - start) / (then - now));
     if (!advance_steps(item->run, item->parts)) {
-        of_mujoco.error("%s: the run left what is possible at %g s: try a smaller timestep, and check volumes and areas",
+        of_mujoco.error("%s: the simulation diverged at %g s: try a smaller timestep, and check volumes and areas",
             PLUGIN, d->time);
     }
     store(item, state, end);
@@ -461,23 +485,28 @@ static bool take(void *place, const char *name)
     return found != NULL;
 }
 
-static int offered;
+static const char *identity = "";
 
-/* Whether MuJoCo has the plugin of this library, and not another one of its name. */
+/* Which export this library is; nothing where MuJoCo has another plugin of its name. */
 #if defined(_WIN32)
 __declspec(dllexport)
 #else
 __attribute__((visibility("default")))
 #endif
-int ppafo_plugin_is_offered(void)
+const char *ppafo_plugin_identity(void)
 {
-    return offered;
+    return identity;
 }
 
 __attribute__((constructor)) static void offer(void)
 {
     mjpPlugin plugin;
     int slot;
+#if defined(_WIN32)
+    plain = _create_locale(LC_ALL, "C");
+#else
+    plain = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+#endif
     if (!take(&of_mujoco.version, "mj_version") || !take(&of_mujoco.version_text, "mj_versionString")
         || !take(&of_mujoco.plugin, "mjp_registerPlugin") || !take(&of_mujoco.config, "mj_getPluginConfig")
         || !take(&of_mujoco.registered, "mjp_getPlugin") || !take(&of_mujoco.error, "mju_error")) {
@@ -504,5 +533,5 @@ __attribute__((constructor)) static void offer(void)
     plugin.compute = compute;
     plugin.advance = advance_device;
     (void)of_mujoco.plugin(&plugin);
-    offered = 1;
+    identity = "@identity@";
 }
