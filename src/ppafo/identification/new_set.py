@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from ppafo.errors import ParameterError
 from ppafo.identification.estimate import Estimate
+from ppafo.identification.trajectory.uncertainty import interval_factor
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.building import build_device
 from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, alternatives, is_within
@@ -16,7 +17,7 @@ from ppafo.parameters.parameter_set import (
     has_one_pressure,
     number_text,
 )
-from ppafo.parameters.provenance import Entry
+from ppafo.parameters.provenance import CONFIDENCE, Entry
 from ppafo.units import from_si
 
 _FORMS = (frozenset(item.name for item in AREA_FORM), frozenset(item.name for item in SONIC_FORM))
@@ -68,14 +69,14 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate) -> Parameter
         if before is None
         else f"the set had {number_text(before)} ({before.origin}: {before.source})"
     )
-    interval = f"{estimate.confidence:.0%} interval {low:.6g} to {high:.6g} {unit}".rstrip()
+    interval = f"{100.0 * estimate.confidence:g}% interval {low:.6g} to {high:.6g} {unit}".rstrip()
     entry = Entry(
         value=value,
         unit=unit,
         origin="identified" if estimate.is_identified else "fitted",
         source="; ".join(estimate.recordings),
         note=f"{estimate.verdict_in_words}, {interval}. {estimate.explanation} Before, {was}.",
-        uncertainty=max(high - value, value - low),
+        uncertainty=max(high - value, value - low) * interval_factor(CONFIDENCE) / interval_factor(estimate.confidence),
     )
     kept = {path: old for path, old in parameter_set.numbers.items() if path not in _other_form(estimate.path)}
     found = {estimate.path: entry}

@@ -29,8 +29,10 @@ from ppafo.identification.problem import (
     VaneLeakProblem,
 )
 from ppafo.identification.source import Source
+from ppafo.identification.trajectory.uncertainty import interval_factor
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.parameter_set import ParameterSet, chosen_valve, number_in_si
+from ppafo.parameters.provenance import CONFIDENCE
 from ppafo.units import parse_quantity, to_si
 
 UNKNOWN = "unknown"
@@ -64,12 +66,12 @@ class Setting:
         except UnitError as error:
             raise IdentificationError(f"{self.place}: {name} = {text!r}: {error}") from error
 
-    def gas(self, species: str | None, text: str | None = None) -> GasAt:
+    def gas(self, species: str | None, text: str | None, confidence: float) -> GasAt:
         """Return the gas of the bench; species and temperature are the set's where none is named.
 
         IdentificationError for an unknown species.
         """
-        temperature, half_width = self._temperature(text)
+        temperature, half_width = self._temperature(text, confidence)
         if species is None:
             own = self.number("gas.molar_mass"), self.number("gas.heat_capacity_ratio")
             return GasAt(*own, temperature, half_width)
@@ -80,23 +82,24 @@ class Setting:
         known_gas = SPECIES[species]
         return GasAt(known_gas.molar_mass, known_gas.heat_capacity_ratio, temperature, half_width)
 
-    def _temperature(self, text: str | None) -> tuple[float, float]:
+    def _temperature(self, text: str | None, confidence: float) -> tuple[float, float]:
         """Return the gas temperature [K] and half the width of its interval [K], which one that is given has not."""
         given = self.quantity("temperature", text, "K")
         if given is None:
-            return self.number("gas.temperature"), self.half_width("gas.temperature", "K")
+            return self.number("gas.temperature"), self.half_width("gas.temperature", "K", confidence)
         if not _COLDEST <= given <= _HOTTEST:
             raise IdentificationError(
                 f"{self.place}: temperature = {text!r} must be from {_COLDEST:g} to {_HOTTEST:g} K"
             )
         return given, 0.0
 
-    def half_width(self, path: str, unit: str) -> float:
-        """Return the uncertainty of a value as the set has it [unit], a difference; 0 where it has none."""
+    def half_width(self, path: str, unit: str, confidence: float) -> float:
+        """Return half the interval of a value in the set [unit], for some confidence; 0 where it has none."""
         entry = self.parameter_set.numbers.get(path)
         if entry is None or not entry.uncertainty:
             return 0.0
-        return to_si(entry.value + entry.uncertainty, entry.unit, unit) - to_si(entry.value, entry.unit, unit)
+        stated = to_si(entry.value + entry.uncertainty, entry.unit, unit) - to_si(entry.value, entry.unit, unit)
+        return stated * interval_factor(confidence) / interval_factor(CONFIDENCE)
 
     def valve_path(self, name: str | None) -> str:
         """Return the path of a valve in the set, ``valves.main``."""
@@ -145,18 +148,25 @@ def _inertia(problem: FreeDecayProblem, setting: Setting) -> tuple[float | None,
     if entry is None:
         return None, 0.0, ""
     value = setting.number("foot_plate.inertia")
-    return value, setting.half_width("foot_plate.inertia", "kg m^2"), f"{entry.origin} in {setting.parameter_set.name}"
+    return (
+        value,
+        setting.half_width("foot_plate.inertia", "kg m^2", problem.confidence),
+        f"{entry.origin} in {setting.parameter_set.name}",
+    )
 
 
 def _open_valve_flow(problem: OpenValveFlowProblem, setting: Setting) -> OpenValveFlowSettings:
     path = setting.valve_path(problem.valve)
     area = number_in_si(setting.parameter_set, f"{path}.area")
-    gas, sure = setting.gas(problem.gas, problem.temperature), (problem.confidence, problem.calibration)
+    gas, sure = (
+        setting.gas(problem.gas, problem.temperature, problem.confidence),
+        (problem.confidence, problem.calibration),
+    )
     return OpenValveFlowSettings(gas, problem.law, area, path, *sure)
 
 
 def _valve_map(problem: ValveMapProblem, setting: Setting) -> ValveMapSettings:
-    gas, path = setting.gas(problem.gas, problem.temperature), setting.valve_path(problem.valve)
+    gas, path = setting.gas(problem.gas, problem.temperature, problem.confidence), setting.valve_path(problem.valve)
     return ValveMapSettings(gas, path, problem.confidence, problem.calibration)
 
 
@@ -166,7 +176,7 @@ def _vane_leak(problem: VaneLeakProblem, setting: Setting) -> VaneLeakSettings:
     forms = ("discharge_coefficient", "critical_ratio")
     coefficient, ratio = (number_in_si(setting.parameter_set, f"actuator.leak.{name}") for name in forms)
     return VaneLeakSettings(
-        gas=setting.gas(problem.gas, problem.temperature),
+        gas=setting.gas(problem.gas, problem.temperature, problem.confidence),
         volume_1=volume_1,
         volume_2=volume_2,
         discharge_coefficient=coefficient,

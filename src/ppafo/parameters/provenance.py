@@ -10,6 +10,10 @@ Origin = Literal["published", "datasheet", "derived", "identified", "fitted", "a
 """How a value came to be known; ``fitted`` is one that recordings do not fix, or whose recordings no model explains."""
 
 
+CONFIDENCE = 0.95
+"""Of the interval whose half width an entry states."""
+
+
 class Entry(BaseModel):
     """A number as it was given, in its own unit."""
 

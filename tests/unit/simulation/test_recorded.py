@@ -56,9 +56,14 @@ def test_both_regulators_follow_the_supply_unless_they_have_two_pressures() -> N
     assert supply_paths(one) == ("plant.supply_pressure", "plant.dorsiflexion_pressure")
     assert supply_paths(two) == ("plant.supply_pressure",)
     given = recording(np.array([0.0, 1.0]), np.ones(2), np.array([5.0e5, 6.0e5]))
-    assert supply_paths(with_highest_supply(one, given)) == supply_paths(one)
-    assert with_highest_supply(one, given).supply.pressure == 6.0e5
-    assert with_highest_supply(two, given).supply.dorsiflexion_pressure == 3.0e5
+    assert supply_paths(with_highest_supply(one, given, given.names)) == supply_paths(one)
+    assert with_highest_supply(one, given, given.names).supply.pressure == 6.0e5
+    assert with_highest_supply(two, given, given.names).supply.dorsiflexion_pressure == 3.0e5
+    other = {**given.channels, "dorsiflexion_pressure": Channel(np.array([6.1e5, 6.1e5]), "Pa")}
+    with_both = Recording(given.label, given.time, other)
+    followed = with_highest_supply(one, with_both, ["supply_pressure"])
+    assert supply_paths(followed) == supply_paths(one)
+    assert with_highest_supply(one, with_both, with_both.names).supply.dorsiflexion_pressure == 6.1e5
 
 
 def test_rest_ends_at_the_first_command_and_lasts_fifty_milliseconds_at_most() -> None:

@@ -201,9 +201,8 @@ def _tight_leak(
     slope, half = float(fit.values[0]) / longest, float(fit.half_widths[0]) / longest
     rate = max(slope, 0.0)
     most = FittedLaw("orifice", "", rate, max(slope + half, 0.0) - rate, "1/s", fit.rms * scale, 0.0, (), 1.0)
-    text = (
-        f"No leak is visible in {longest:.4g} s; with {settings.confidence:.0%} confidence it is below the upper end."
-    )
+    sure = f"with {100.0 * settings.confidence:g}% confidence"
+    text = f"No leak is visible in {longest:.4g} s; {sure} it is below the upper end."
     evidence = Evidence(traces(sources), settings.confidence, settings.gas.flow_uncertainty())
     estimates = tuple(
         replace(evidence.estimate(number, number.half_width * (1.0 + evidence.calibration), "upper bound"), low=0.0)

@@ -187,7 +187,9 @@ def _bench_prior(item: ParameterSection, path: str, setting: Setting) -> Prior:
             f"{setting.file}: parameter '{item.path}': prior = 'bench': no procedure of this problem identified it; "
             f"identified: {have}"
         )
-    return Prior(estimate.value, estimate.half_width / interval_factor(estimate.confidence))
+    # An interval that was cut at zero is too narrow on that side.
+    wider = max(estimate.high - estimate.value, estimate.value - estimate.low)
+    return Prior(estimate.value, wider / interval_factor(estimate.confidence))
 
 
 def experiment_without_scenario(item: ExperimentSection, source: Source, setting: Setting) -> Experiment:

@@ -16,7 +16,7 @@ from ppafo.signals import Recording
 from ppafo.simulation import numbers
 from ppafo.simulation.declaration import FREE, INITIAL
 from ppafo.simulation.recorded.checks import check_absolute, check_command, check_gaps
-from ppafo.simulation.recorded.inputs import ANGLE, COMMAND, EXTERNAL_TORQUE, SUPPLY, between_stops
+from ppafo.simulation.recorded.inputs import ANGLE, COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY, between_stops
 from ppafo.simulation.recorded.scenario import replay_control, with_highest_supply
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, Scenario, Sensors
 
@@ -26,7 +26,7 @@ FITTED_CHANNELS = ("angle", "pressure_1", "pressure_2")
 INPUTS = (COMMAND, SUPPLY, EXTERNAL_TORQUE)
 """Channels that a run follows where they were recorded, sample by sample, if it has no scenario."""
 
-ALL_INPUTS = (*INPUTS, ANGLE)
+ALL_INPUTS = (*INPUTS, DORSIFLEXION_SUPPLY, ANGLE)
 """Channels that a run may follow instead of its scenario; a recorded angle prescribes that of the vane."""
 
 InitialState = Literal["scenario", "recording"]
@@ -37,8 +37,9 @@ class Experiment:
     """A recording and the scenario that is to explain it; time ``start`` [s] of the recording is time 0 of the run.
 
     ``noise`` is the standard deviation by channel [rad], [Pa]; channels without one have it estimated from the
-    recording. ``channels`` are those that are compared. ``inputs`` names measured channels that the run follows sample
-    by sample: ``command``, in place of the scenario's controller, ``supply_pressure``, ``external_torque``, ``angle``.
+    recording. ``channels`` are those that are compared, to the end of the recording. ``inputs`` names measured channels
+    that the run follows sample by sample: ``command``, in place of the scenario's controller, ``supply_pressure`` (of
+    both inlets where they have one pressure), ``dorsiflexion_pressure``, ``external_torque``, ``angle``.
     ``initial_state`` takes angle and pressures at the start from the scenario or, as means of the samples up to the
     start, from the recording. ``source`` names the file and its hash.
     """
@@ -110,8 +111,8 @@ _FITS = 1.0e-6
 def scenario_of(experiment: Experiment) -> Scenario:
     """Return the scenario of an experiment with all that it takes from the recording, but for the samples of inputs."""
     scenario, recording = experiment.scenario, experiment.recording
-    if SUPPLY in experiment.inputs:
-        scenario = replace(scenario, device=with_highest_supply(scenario.device, recording))
+    if {SUPPLY, DORSIFLEXION_SUPPLY} & set(experiment.inputs):
+        scenario = replace(scenario, device=with_highest_supply(scenario.device, recording, experiment.inputs))
     if COMMAND in experiment.inputs:
         # Nobody measures for a controller that nobody asks.
         scenario = replace(scenario, control=replay_control(recording), sensors=Sensors())

@@ -18,8 +18,8 @@ from ppafo.identification.trajectory.uncertainty import interval_factor
 from ppafo.simulation.scenario import Scenario
 
 POINTS_PER_SIDE = 4
-REACH = 2.6
-"""Standard errors on each side that a profile covers; a 95 % interval ends at 1.96 of them."""
+REACH = 1.33
+"""Half widths of an interval on each side that a profile covers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,8 @@ def _held_coordinates(fit: TrajectoryFit, index: int) -> tuple[Floats, Floats]:
     low, high = (float(side[index]) for side in coordinate_bounds(fit.optimum.residuals.ranges))
     error = float(np.sqrt(fit.uncertainty.covariance[index, index]))
     fractions = np.arange(1, POINTS_PER_SIDE + 1) / POINTS_PER_SIDE
-    down, up = min(REACH * error, at - low), min(REACH * error, high - at)
+    reach = REACH * interval_factor(fit.problem.search.confidence) * error
+    down, up = min(reach, at - low), min(reach, high - at)
     return (at - down * fractions if down > 0.0 else fractions[:0]), (
         at + up * fractions if up > 0.0 else fractions[:0]
     )

@@ -17,7 +17,7 @@ from ppafo.identification.trajectory.experiment import (
     scenario_of,
 )
 from ppafo.model.declaration import Quantity
-from ppafo.simulation.recorded.inputs import EXTERNAL_TORQUE, SUPPLY, supply_paths
+from ppafo.simulation.recorded.inputs import DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY, supply_paths
 
 Scale = Literal["log", "linear"]
 
@@ -164,9 +164,11 @@ def _default_bounds(path: str, quantity: Quantity, start: float, scale: Scale) -
 
 def _refuse_followed(parameter: FreeParameter, path: str, experiment: Experiment) -> None:
     """Refuse a number that a run takes from its recording instead."""
-    followed = _SUPPLIES.get(path) in supply_paths(experiment.scenario.device) and SUPPLY in experiment.inputs
-    channel = SUPPLY if followed else EXTERNAL_TORQUE
-    if followed or (path == "motion.external_torque" and EXTERNAL_TORQUE in experiment.inputs):
+    followed = dict.fromkeys(supply_paths(experiment.scenario.device), SUPPLY)
+    if DORSIFLEXION_SUPPLY in experiment.inputs:
+        followed["plant.dorsiflexion_pressure"] = DORSIFLEXION_SUPPLY
+    channel = EXTERNAL_TORQUE if path == "motion.external_torque" else followed.get(_SUPPLIES.get(path, ""))
+    if channel in experiment.inputs:
         raise IdentificationError(
             f"{parameter.name}: the run of experiment '{experiment.label}' follows the recorded '{channel}', so this "
             f"number has no effect in it; omit one of the two"
@@ -253,7 +255,7 @@ def ranges_of(problem: TrajectoryProblem) -> tuple[Range, ...]:
 
 def use_of(item: Experiment) -> Use:
     """Return what of its recording an experiment is compared with."""
-    last = item.start + item.scenario.duration
+    last = float(item.recording.time[-1])
     trace = item.source or item.recording.label
     return Use(f"experiment '{item.label}'", trace, item.recording, frozenset(item.channels), item.start, last)
 

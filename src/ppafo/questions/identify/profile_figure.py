@@ -80,7 +80,7 @@ def _label(figure: "Figure", confidence: float) -> None:
     figure.text(0.12 / width, 1.0 - 0.12 / height, "Profile likelihood", ha="left", va="top", fontweight="bold")
     handles = [
         Line2D([], [], color=BLUE, marker="o", markersize=4, label="all other numbers refitted"),
-        Line2D([], [], color=GREY, linestyle=(0, (4, 3)), linewidth=1.0, label=f"threshold of {confidence:.0%}"),
+        Line2D([], [], color=GREY, linestyle=(0, (4, 3)), linewidth=1.0, label=f"threshold of {100.0 * confidence:g}%"),
         Line2D([], [], color=VERMILION, linewidth=1.0, label="interval"),
     ]
     place = (0.02 / width, 1.0 - 0.3 / height)

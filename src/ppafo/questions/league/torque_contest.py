@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
-from ppafo.errors import ScenarioError
+from ppafo.errors import ScenarioError, SimulationError
 from ppafo.progress import Report
 from ppafo.questions.league.draws import NOISE_DRAWS, draw_devices, draw_factors, draw_seeds, with_noise
 from ppafo.questions.league.entrants import ENTRANTS, Entrant
@@ -51,6 +51,8 @@ class TorqueContest:
         learnt = [] if learning is None else [f"controller.{name}={value!r}" for name, value in table_of(final).items()]
         words = [word for override in (*entrant.overrides, *learnt, *self.overrides) for word in ("--set", override)]
         result = simulate(final)
+        if not result.status.is_completed:
+            raise SimulationError(result.status.message)
         return Standing(
             entrant=entrant,
             settings=dict(final.control.settings),

@@ -141,7 +141,8 @@ def _identification_claim(printed: Printed, item: _Parameter, bench: BenchStudy)
     unit = printed.unit(item.path)
     note = (
         f"{_ONLY_THE_PROCEDURE} has this value. The paper's value was planted in the virtual rig "
-        f"(preset {item.preset}, {item.why}); the {found.confidence:.0%} interval, {low:.4g} to {high:.4g} {unit}, "
+        f"(preset {item.preset}, {item.why}); the {100.0 * found.confidence:g}% interval, "
+        f"{low:.4g} to {high:.4g} {unit}, "
         f"{'holds' if holds else 'does not hold'} it."
     )
     return Claim(

@@ -128,8 +128,8 @@ def _check(uncertainty: Uncertainty, method: Method, settings: Settings) -> None
         raise StudyError(
             f"samples = {settings.samples}: {method.name} needs {method.fewest} to {method.most:,} {method.sizes_label}"
         )
-    if settings.seed < 1:
-        raise StudyError(f"seed = {settings.seed}: must be 1 or more")
+    if settings.seed < 0:
+        raise StudyError(f"seed = {settings.seed}: must be 0 or more")
     check_confidence(settings.confidence)
     check_fraction(settings.maximum_failed, "maximum_failed")
 

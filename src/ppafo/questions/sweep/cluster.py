@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from typing import Any
+from uuid import uuid4
 
 from ppafo.errors import PpafoError, StudyError, one_line
 from ppafo.questions.sweep.compute import Finished, Task, work_on_chunk
@@ -28,9 +29,11 @@ def compute_on_cluster(address: str, task: Task, numbers: Iterable[int], finish:
 def _work_through(client: Any, task: Task, numbers: Any, finish: Callable[[Finished], None], distributed: Any) -> None:
     queue = distributed.as_completed(loop=client.loop)
 
+    sweep = f"{task.study.name}-{uuid4().hex[:8]}"
+
     def submit(count: int) -> None:
         for _, number in zip(range(count), numbers, strict=False):
-            queue.add(client.submit(work_on_chunk, task, number, key=f"{task.study.name}-{number}", pure=False))
+            queue.add(client.submit(work_on_chunk, task, number, key=f"{sweep}-{number}", pure=False))
 
     submit(max(4, _TASKS_PER_THREAD * sum(client.nthreads().values())))
     for future in queue:

@@ -14,7 +14,7 @@ from ppafo.errors import DataError, StudyError
 from ppafo.metrics import METRICS
 from ppafo.questions.sweep.bands import Bins
 from ppafo.questions.sweep.chunks import chunk_count, chunk_size
-from ppafo.simulation.document import scenario_document
+from ppafo.simulation.document import plain, scenario_document
 from ppafo.storage.places import Place, read_document
 from ppafo.studies.study import Study
 from ppafo.version import __version__
@@ -24,7 +24,7 @@ STUDY_COPY = "study.toml"
 FORMAT = "ppafo study results"
 SCHEMA_VERSION = 1
 _NAMED = 4
-_COMPARED = ("ppafo", "study", "scenarios", "varied")
+_COMPARED = ("ppafo", "study", "scenarios", "varied", "drawn")
 
 BinsOf = Mapping[str, Mapping[str, Bins]]
 """Bins by configuration and channel."""
@@ -33,7 +33,10 @@ BinsOf = Mapping[str, Mapping[str, Bins]]
 def manifest(study: Study, bins: BinsOf) -> dict[str, Any]:
     """Return the document: study, base scenarios in SI units, runs, columns with units; no time and no machine."""
     scenarios = {item.name: _without_origin(item.scenario) for item in study.configurations}
-    requested = {"ppafo": __version__, "study": _plain(study.document), "scenarios": scenarios}
+    # What is drawn may come from a parameter set, or have been changed in Python, and the file says neither.
+    parts = {name: getattr(study, name) for name in ("axes", "drawn", "same", "scores", "sample", "outputs")}
+    drawn = _plain(plain(parts))
+    requested = {"ppafo": __version__, "study": _plain(study.document), "scenarios": scenarios, "drawn": drawn}
     return {
         "format": FORMAT,
         "schema_version": SCHEMA_VERSION,

@@ -44,6 +44,9 @@ def answer_of(tuning: Tuning) -> Answer:
 def verdict(tuning: Tuning) -> str:
     """Return the result in a sentence."""
     before, after, name = tuning.before, tuning.after, tuning.problem.name
+    if after.without_value[0]:
+        failing = percentage(after.without_value[0], 3)
+        return f"{name}: with the best gains found, {failing} of the runs fail or lack a goal or a constraint"
     if not after.is_feasible_in_search:
         broken = f"the best found exceed the limits by {percentage(after.violation[0], 3)}"
         return f"{name}: no gains within the bounds satisfy all constraints; {broken}{_by_ceiling(tuning)}"

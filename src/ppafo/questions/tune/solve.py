@@ -116,6 +116,8 @@ def tune(
     problem = _problem_of(tuning, overrides)
     if seed is not None:
         problem = replace(problem, effort=replace(problem.effort, seed=seed))
+        if problem.spread is not None and not problem.spread.study:
+            problem = replace(problem, spread=replace(problem.spread, seed=seed))
     tally = Tally(_most_runs(problem), progress)
     model = scenario_model(problem.scenario, problem.metrics, threads, tally.add)
     fixed = _draws(problem, 0, 1 if problem.spread is None else problem.spread.draws)

@@ -1,5 +1,6 @@
 """The scenario of a recording that has none: a free or held vane from its start, the command left to the recording."""
 
+from collections.abc import Collection
 from dataclasses import replace
 
 from ppafo.parameters.device import Device, Orifice
@@ -66,10 +67,10 @@ def replay_control(recording: Recording) -> Control:
     return Control(PYTHON_CONTROLLER, {}, sample_period(recording.time))
 
 
-def with_highest_supply(device: Device, recording: Recording) -> Device:
-    """Return the device with the highest supply that was recorded, for which the steps must be fine enough."""
+def with_highest_supply(device: Device, recording: Recording, followed: Collection[str]) -> Device:
+    """Return the device with the highest supply of the channels followed, for which the steps must be fine enough."""
     supply = device.supply
-    recorded = {name: float(recording[name].max()) for name in (SUPPLY, DORSIFLEXION_SUPPLY) if name in recording}
+    recorded = {name: float(recording[name].max()) for name in (SUPPLY, DORSIFLEXION_SUPPLY) if name in followed}
     highest = max(supply.pressure, recorded.get(SUPPLY, 0.0))
     both = supply.has_one_pressure
     other = max(highest if both else supply.dorsiflexion_pressure, recorded.get(DORSIFLEXION_SUPPLY, 0.0))

@@ -117,8 +117,12 @@ def test_the_same_recording_in_two_experiments_is_refused_and_two_parts_of_it_ar
     other = dataclasses.replace(experiment, label="again")
     with pytest.raises(IdentificationError, match=r"experiment 'step'.*experiment 'again'.* are the same recording"):
         TrajectoryProblem((FLOW,), (experiment, other))
+    # A run is compared to the end of its recording, however long its scenario is.
     late = dataclasses.replace(other, start=0.35)
-    assert len(TrajectoryProblem((FLOW,), (experiment, late)).experiments) == 2
+    with pytest.raises(IdentificationError, match="would count twice"):
+        TrajectoryProblem((FLOW,), (experiment, late))
+    early = dataclasses.replace(experiment, recording=experiment.recording.between(0.0, 0.3))
+    assert len(TrajectoryProblem((FLOW,), (early, late)).experiments) == 2
 
 
 def test_a_supply_that_is_followed_cannot_be_fitted_too(experiment: Experiment) -> None:
