@@ -45,3 +45,12 @@ def test_fitted_supply_pressure_is_that_of_both_regulators_unless_they_are_apart
     supply = build_device(with_estimates(before, [estimate]).parameter_set).supply
     assert supply.pressure == pytest.approx(fitted, rel=1e-12)
     assert supply.dorsiflexion_pressure == pytest.approx(to_si(second, "psi_g", "Pa_a"), rel=1e-12)
+
+
+def test_a_set_states_the_half_width_for_its_own_confidence() -> None:
+    wide = Estimate(
+        "foot_plate.inertia", 0.01, "kg m^2", 0.009, 0.011, "identified", "Why.", ("a.csv",), confidence=0.99
+    )
+    entry = with_estimates(load_parameter_set("ppafo2011"), [wide]).parameter_set.numbers["foot_plate.inertia"]
+    assert entry.uncertainty == pytest.approx(0.1 * entry.value * 1.959964 / 2.575829, rel=1e-6)
+    assert "99% interval" in entry.note

@@ -9,13 +9,14 @@ import pytest
 
 import ppafo
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.errors import ScenarioError
-from ppafo.questions.league import lower_bound
+from ppafo.errors import ScenarioError, SimulationError
+from ppafo.questions.league import lower_bound, torque_contest
 from ppafo.questions.league.answer import league_remarks
 from ppafo.questions.league.draws import UNCERTAINTIES, draw_devices, draw_factors
 from ppafo.questions.league.entrants import ENTRANTS
 from ppafo.questions.league.solve import League, league
 from ppafo.questions.league.standing import Robustness
+from ppafo.simulation.result import Status
 
 SHORT = ("run.duration=0.6 s", "reference.ramp_time=0.3 s", "reference.level=3 N m")
 BY_NAME = {entrant.name: entrant for entrant in ENTRANTS}
@@ -26,6 +27,17 @@ def small() -> League:
     """Three entrants on a short task, with a few draws."""
     chosen = [BY_NAME[name] for name in ("on_off", "pid-paper", "feedback_linearisation")]
     return league("torque-task-proportional", SHORT, draws=6, entrants=chosen)
+
+
+def test_an_entrant_whose_run_diverges_is_absent(monkeypatch: pytest.MonkeyPatch) -> None:
+    contest = torque_contest.torque_contest("torque-task-proportional", SHORT)
+    failed = dataclasses.replace(
+        torque_contest.simulate(contest.scenario_of(BY_NAME["pid-paper"])),
+        status=Status("diverged", 0.1, "it diverged"),
+    )
+    monkeypatch.setattr(torque_contest, "simulate", lambda _: failed)
+    with pytest.raises(SimulationError, match="it diverged"):
+        contest.evaluate(BY_NAME["pid-paper"], 0, 1, print)
 
 
 def test_every_controller_that_follows_a_reference_plays_under_a_name_of_its_own() -> None:

@@ -1,5 +1,6 @@
 """A study from its file to its rows: every run is what it is alone, failures are rows, a stopped study goes on."""
 
+import dataclasses
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -269,6 +270,13 @@ def test_the_folder_of_another_study_is_refused(small_results: StudyResults, sma
     small["name"] = "other"
     with pytest.raises(StudyError, match="contains the results of the study 'small', not of 'other'"):
         sweep(small, small_results.place.address)
+
+
+def test_a_study_whose_draws_were_changed_in_python_is_refused(small_results: StudyResults, small: Any) -> None:
+    study = load_study(small)
+    other = dataclasses.replace(study, sample=dataclasses.replace(study.sample, seed=study.sample.seed + 1))
+    with pytest.raises(StudyError, match=r"drawn\.sample\.seed was 3 and is now 4"):
+        sweep(other, small_results.place.address)
 
 
 def test_a_folder_of_something_else_is_refused_and_left_alone(small: Any, tmp_path: Path) -> None:
