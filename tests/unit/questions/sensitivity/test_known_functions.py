@@ -163,7 +163,7 @@ def test_bad_settings_are_one_line() -> None:
     assert "need a power of 2, such as 128" in refused(ANGLES, "sobol", Settings(100))
     assert "morris needs 8 to" in refused(ANGLES, "morris", Settings(2))
     assert "maximum_failed = 1.0" in refused(ANGLES, "morris", Settings(16, maximum_failed=1.0))
-    assert "seed = 0" in refused(ANGLES, "sobol", Settings(64, seed=0))
+    assert "seed = -1: must be 0 or more" in refused(ANGLES, "sobol", Settings(64, seed=-1))
     assert "vary two or more" in refused(Uncertainty(ANGLES.drawn[:1]), "sobol", Settings(64))
     correlated = Uncertainty(ANGLES.drawn[:2], ((1.0, 0.0), (0.6, 0.8)))
     assert "sobol need values that are independent" in refused(correlated, "sobol", Settings(64))
