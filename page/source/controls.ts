@@ -91,7 +91,7 @@ export class Controls {
         controls.push(...settings.map((setting) => this.made(setting)));
         group.append(...controls.map(({ row }) => row));
       }
-      this.update();
+      this.update(true);
     });
     this.groups.push({ isOpen: () => group.open, controls });
     return group;
@@ -146,7 +146,8 @@ export class Controls {
     value.addEventListener("keydown", (event) => {
       if (event.key !== "Escape") return;
       control.isTyped = false;
-      this.update();
+      blame(control, "");
+      this.update(true);
       value.blur();
     });
     back.addEventListener("click", () => wish(null, false));
@@ -164,7 +165,7 @@ export class Controls {
   }
 
   /** Show the values. What was refused stays to be read, with its fault, until a configuration is another one. */
-  private update(isSame = false): void {
+  private update(isSame: boolean): void {
     const { configurations } = this;
     const values = configurations.map((configuration) => valuesOf(this.content, configuration));
     const usual = configurations.map(({ program }) => programNamed(this.content, program).usual);

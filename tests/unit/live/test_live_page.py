@@ -126,7 +126,7 @@ def test_a_text_that_a_control_shows_can_be_edited_and_what_is_refused_is_forgot
     page.get_by_label("Add a configuration").select_option("torque-task-solenoid")
     page.locator(".target label").last.click()
     page.get_by_role("button", name="Reset all").click()
-    page.wait_for_function("document.querySelectorAll('.chip').length === 2")
+    page.locator(".chip").nth(2).wait_for(state="detached")
     assert page.locator(".target input:checked").get_attribute("value") == "null"
     assert field.is_visible()
     assert page.locator("main h2").all_inner_texts() == ["Results"]
@@ -297,7 +297,7 @@ def test_a_map_comes_in_two_parts_and_is_run_again_only_where_that_can_change_it
     other.wait_for_selector(whole)
     assert page.locator(".scale").inner_text() == other.locator(".scale").inner_text()
     error = page.evaluate("workbench.run(0).metrics.rms_error")
-    assert f"White line: current value, {error:.3g} N m" in page.locator(".scale").inner_text()
+    assert f"White line: current value, {error:.3g} N\u00a0m" in page.locator(".scale").inner_text()
 
 
 @has_browser
@@ -372,10 +372,10 @@ def test_a_recording_of_one_s_own_is_compared_as_validate_does(chromium: Any, fi
     assert f"{expected.rms:.3g} N m" in shown
     assert f"{100.0 * expected.fraction:.3g} %" in shown
     # Of two files that are read at once the later one counts, and only what the run has is compared.
-    longer = f"time [s],torque [N m]\n{rows}\n{recording.time[-1] + 0.5!r},0.0\n"
+    longer = f"time [s],torque [N m]\n{rows}\n3.5,0.0\n"
     page.evaluate("text => Promise.all([workbench.read('b.csv', text), workbench.read('c.csv', text)])", longer)
     assert page.locator(".notice").inner_text().startswith("c.csv is overlaid")
-    page.wait_for_function("document.querySelector('.recording .note')?.textContent.includes('is compared up to 3 s')")
+    page.locator(".recording .note", has_text="is compared up to 3 s").wait_for(state="attached")
     assert f"{expected.rms:.3g} N m" in page.locator(".recording tbody tr").first.inner_text()
 
 
