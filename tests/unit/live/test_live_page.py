@@ -157,6 +157,10 @@ def test_a_walk_is_short_and_no_shorter_than_python_allows(chromium: Any, file: 
     page.locator(".control[data-key='controller.first_stride_time'] input[type=range]").press("Home")
     values = page.evaluate("[workbench.values(0), workbench.values(1)].map(all => all['controller.first_stride_time'])")
     assert values == [0.52, 0.52]
+    # More samples than a module can be asked for are a message and not a trap.
+    page.evaluate("workbench.open('tab=3&3=solenoid;run.duration=60+min;run.step=0.1+ms;run.output_interval=0.1+ms')")
+    page.locator("main > .fault", has_text="too many samples").wait_for()
+    assert page.said == []
 
 
 @has_browser
