@@ -39,7 +39,7 @@ MOST_STEPS = 100_000
 """Steps of a run that is tried; longer ones only take time."""
 AT_ONCE = 50
 """States that the page judges before it is asked for more: its browser takes one that works for minutes for dead."""
-_SHORT = {"scenario": "0.1 s", "walk": "2 s"}
+_SHORT = {"scenario": "0.1 s", "walk": "6 s"}
 _TIMES = ("run.duration", "run.step", "run.output_interval", "controller.period")
 
 _VERDICTS = """addresses => addresses.map(address => {
@@ -170,7 +170,7 @@ def disagreements(page: Any, tab: int, program: Mapping[str, Any], given: Sequen
     ]
     found, file = [], folder / "state.toml"
     for one, changes, verdict in zip(given, shortened, verdicts, strict=True):
-        if verdict is None or verdict.get("isFull") or "another program" in verdict["refused"]:
+        if verdict is None or verdict.get("isFull") or "different compiled program" in verdict["refused"]:
             continue
         if verdict["refused"]:
             # The file of a walk has no length: only the page can refuse one.

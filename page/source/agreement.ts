@@ -23,6 +23,10 @@ export interface ChannelError {
   readonly bias: number;
   readonly fraction: number;
   readonly delay: number;
+  /** Whether the best delay is the longest that is tried; none is taken out then. */
+  readonly isAtLimit: boolean;
+  /** Time [s] up to which the recording is compared, where it goes on after the run; else null. */
+  readonly cutAt: number | null;
 }
 
 /** One channel of both: measured values at their times, the model's at its own, and the full range. */
@@ -46,7 +50,7 @@ interface ChannelAgreement {
   readonly fraction: number;
 }
 
-const LONGEST_DELAY = 0.02;
+export const LONGEST_DELAY = 0.02;
 export const ACCEPTABLE_FRACTION = 0.1;
 const SHIFTS = 81;
 const MOST_SAMPLES = 4000;
@@ -82,8 +86,11 @@ export function drawnOf({ time, channels }: Overlay): Overlay {
 }
 
 /** Errors of one run against a recording, channel by channel. */
-export function compare(recorded: Overlay, run: Overlay, values: Values, isHeld: boolean): ChannelError[] {
-  if (run.time.length < 2) return [];
+export function compare(whole: Overlay, run: Overlay, values: Values, isHeld: boolean): ChannelError[] {
+  const end = run.time.at(-1) ?? 0;
+  const recorded = upTo(whole, end);
+  if (run.time.length < 2 || recorded.time.length < 2) return [];
+  const cutAt = recorded.time.length < whole.time.length ? end : null;
   const measured = withDifference(recorded.channels);
   const model = withDifference(run.channels);
   const ranges = fullRanges(recorded, values);
@@ -99,7 +106,14 @@ export function compare(recorded: Overlay, run: Overlay, values: Values, isHeld:
   const delay = estimateDelay(together);
   const correction = delay.isAtLimit ? 0 : delay.value;
   const weights = sampleWeights(recorded.time);
-  return names.map((name) => ({ channel: name, delay: correction, ...channelAgreement(curves.get(name)!, correction, weights) }));
+  return names.map((name) => ({ channel: name, delay: correction, isAtLimit: delay.isAtLimit, cutAt, ...channelAgreement(curves.get(name)!, correction, weights) }));
+}
+
+/** A recording up to a time [s], with what rounding adds to it. */
+function upTo({ time, channels }: Overlay, end: number): Overlay {
+  const after = time.findIndex((at) => at > end + 1e-9);
+  if (after < 0) return { time, channels };
+  return { time: time.subarray(0, after), channels: new Map([...channels].map(([name, values]) => [name, values.subarray(0, after)])) };
 }
 
 function fullRanges(recorded: Overlay, values: Values): Readonly<Record<string, number>> {

@@ -34,6 +34,8 @@ export class App {
   private readonly bytes = new Map<string, Promise<ArrayBuffer>>();
   private readonly runs = new Map<Configuration, Run>();
   private readonly bands = new WeakMap<Configuration, ReadonlyMap<string, Band>>();
+  /** The last bands, by the place of their configuration: those stand until the next ones are there. */
+  private readonly latest = new Map<number, ReadonlyMap<string, Band>>();
   private readonly frame: PageFrame;
   private readonly controls: Controls;
   readonly panels: Panels;
@@ -95,7 +97,10 @@ export class App {
     const program = programNamed(this.content, configuration.program);
     const engine = this.engines.get(program.name);
     if (engine === undefined) {
-      void this.load(program).then(() => this.schedule());
+      void this.load(program).then(() => {
+        this.schedule();
+        this.settle();
+      });
       return null;
     }
     const values = valuesOf(this.content, configuration);
@@ -131,6 +136,14 @@ export class App {
     if (!isOnTheWay) this.history.keep(this.dragged ?? this.state);
     else this.dragged ??= this.state;
     if (!isOnTheWay) this.dragged = null;
+    this.enter(state);
+  }
+
+  /** Show a state; what belongs to another tab, or to a configuration that is gone, is forgotten. */
+  private enter(state: State): void {
+    const [before, after] = [this.bench.length, state.benches[state.tab]?.length ?? 0];
+    if (state.tab !== this.state.tab || after !== before) this.latest.clear();
+    if (state.tab !== this.state.tab || (this.target ?? 0) >= after) this.target = null;
     this.state = state;
     this.schedule();
     this.settle();
@@ -143,7 +156,7 @@ export class App {
         if (this.target !== null && place !== this.target) return configuration;
         const setting = settingsByKey(programNamed(this.content, configuration.program)).get(key);
         if (setting === undefined) return configuration;
-        const next = changed(configuration, key, text === null ? null : normalText(setting, text));
+        const next = changed(configuration, key, text === null ? (programNamed(this.content, configuration.program).usual[key] ?? null) : normalText(setting, text));
         valuesOf(this.content, next);
         return next;
       });
@@ -162,13 +175,23 @@ export class App {
 
   /** Change some settings of one configuration. */
   changeOne(place: number, texts: readonly (readonly [string, string])[]): void {
-    this.becomeBench(
-      this.bench.map((configuration, number) => (number === place ? texts.reduce((next, [key, text]) => changed(next, key, text), configuration) : configuration)),
-    );
+    const configuration = this.bench[place];
+    if (configuration === undefined) return;
+    const known = settingsByKey(programNamed(this.content, configuration.program));
+    const next = texts.filter(([key]) => known.has(key)).reduce((all, [key, text]) => changed(all, key, text), configuration);
+    try {
+      valuesOf(this.content, next);
+    } catch (error) {
+      telling((words) => this.tell(words))(error);
+      return;
+    }
+    this.becomeBench(this.bench.map((other, number) => (number === place ? next : other)));
   }
 
   addConfiguration(program: string): void {
-    if (this.bench.length < MOST_CONFIGURATIONS) this.becomeBench([...this.bench, { program, changes: {} }]);
+    if (this.bench.length >= MOST_CONFIGURATIONS) return;
+    const begun = this.tab.start.find((one) => one.program === program)?.changes;
+    this.becomeBench([...this.bench, { program, changes: begun ?? programNamed(this.content, program).usual }]);
   }
 
   removeConfiguration(place: number): void {
@@ -183,7 +206,6 @@ export class App {
   }
 
   openTab(tab: number): void {
-    this.target = null;
     this.become({ ...this.state, tab });
   }
 
@@ -218,9 +240,7 @@ export class App {
 
   private restore(state: State): void {
     this.target = null;
-    this.state = state;
-    this.schedule();
-    this.settle();
+    this.enter(state);
   }
 
   overlayWith(overlay: Overlay | null): void {
@@ -255,7 +275,7 @@ export class App {
       return [stateOfAddress(this.content, location.hash), ""];
     } catch (error) {
       if (!(error instanceof InputError)) throw error;
-      return [first, `The address holds no state of this page: ${error.message}. It begins as usual.`];
+      return [first, `The address holds no state of this page: ${error.message}. The default state is shown.`];
     }
   }
 
@@ -289,18 +309,13 @@ export class App {
     this.outcome.show(done);
     this.extras.follow(named);
     // Plots come last: they ask how wide they may be, and then all else is in its place.
+    for (const part of [this.frame.stage, this.frame.panels]) part.classList.toggle("absent", shown.length === 0);
     if (shown.length > 0) {
       this.stage.show(shown);
-      this.panels.show(shown.map((item) => ({ ...item, band: this.hasBand ? (this.bands.get(item.configuration) ?? this.lastBand(item.place)) : null })), this.isBeside, this.overlay);
+      this.panels.show(shown.map((item) => ({ ...item, band: this.hasBand ? (this.bands.get(item.configuration) ?? this.latest.get(item.place) ?? null) : null })), this.isBeside, this.overlay);
     }
     this.frame.root.dataset["milliseconds"] = taken.toFixed(2);
     this.frame.root.dataset["ready"] = "true";
-  }
-
-  private readonly latest = new Map<number, ReadonlyMap<string, Band>>();
-
-  private lastBand(place: number): ReadonlyMap<string, Band> | null {
-    return this.latest.get(place) ?? null;
   }
 
   /** What waits until a drag is over: the address, bands, errors against a recording. */
@@ -317,7 +332,9 @@ export class App {
   private async drawBand(configuration: Configuration, place: number): Promise<void> {
     const run = this.runOf(configuration);
     if (run === null || run.time.length < 2 || this.bands.has(configuration)) return;
-    const band = await bandOf(this.content, this.workers, configuration, run);
+    const isWanted = () => this.hasBand && this.bench[place] === configuration;
+    const band = await bandOf(this.content, this.workers, configuration, run, isWanted);
+    if (band === null || !isWanted()) return;
     this.bands.set(configuration, band);
     this.latest.set(place, band);
     this.schedule();

@@ -67,6 +67,8 @@ export interface Program {
   readonly label: string;
   readonly description: string;
   readonly document: Table;
+  /** Texts by key that a configuration begins with, and to which a setting is put back. */
+  readonly usual: Readonly<Record<string, string>>;
   readonly deviceSections: readonly string[];
   readonly settings: readonly Setting[];
   readonly relations: readonly Relation[];

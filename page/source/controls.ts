@@ -1,6 +1,6 @@
 /** A control for every number: a slider, a value with its unit, where it comes from, and the way back. */
 
-import type { Content, Program, Setting } from "./content";
+import { type Content, type Program, programNamed, type Setting } from "./content";
 import { element, say } from "./dom";
 import { ATMOSPHERE, type Configuration, rangeText, settingsByKey, shownNumber, valuesOf } from "./settings";
 import { readableUnit } from "./units";
@@ -32,6 +32,9 @@ interface Control {
   readonly slider: HTMLInputElement;
   readonly value: HTMLInputElement;
   readonly back: HTMLButtonElement;
+  readonly fault: HTMLElement;
+  /** Whether somebody is typing: the text is theirs until they are done. */
+  isTyped: boolean;
 }
 
 /** What the controls tell the page. */
@@ -59,8 +62,9 @@ export class Controls {
       this.programs = names;
       this.build(programs, first);
     }
+    const isSame = configurations.length === this.configurations.length && configurations.every((one, place) => one === this.configurations[place]);
     this.configurations = configurations;
-    this.update();
+    this.update(isSame);
   }
 
   private build(programs: readonly Program[], first: readonly string[]): void {
@@ -87,7 +91,7 @@ export class Controls {
         controls.push(...settings.map((setting) => this.made(setting)));
         group.append(...controls.map(({ row }) => row));
       }
-      this.update();
+      this.update(true);
     });
     this.groups.push({ isOpen: () => group.open, controls });
     return group;
@@ -121,21 +125,32 @@ export class Controls {
     const value = element("input", { type: "text", inputmode: "text", autocomplete: "off", spellcheck: "false", "aria-label": label });
     const back = element("button", { type: "button", class: "back", title: "Put back", "aria-label": `Put ${label} back` }, "↺");
     const fault = element("p", { class: "fault", role: "alert", hidden: true });
-    const wish = (text: string | null, isDragging: boolean) => {
-      const wrong = this.wishes.change(key, text, isDragging);
-      say(fault, wrong);
-      fault.hidden = wrong === "";
-      value.setAttribute("aria-invalid", String(wrong !== ""));
-    };
+    const row = element("div", { class: "control", "data-key": key }, name, value, slider, back, fault, about);
+    const control = { setting, row, slider, value, back, fault, isTyped: false };
+    this.listen(control);
+    return control;
+  }
+
+  private listen(control: Control): void {
+    const { setting, slider, value, back } = control;
+    const wish = (text: string | null, isDragging: boolean) => blame(control, this.wishes.change(setting.key, text, isDragging));
     slider.addEventListener("input", () => wish(this.textAt(setting, Number(slider.value)), true));
     slider.addEventListener("change", () => wish(this.textAt(setting, Number(slider.value)), false));
-    value.addEventListener("change", () => wish(value.value.trim() === "" ? null : value.value, false));
+    value.addEventListener("input", () => (control.isTyped = true));
+    value.addEventListener("change", () => {
+      if (!control.isTyped) return;
+      control.isTyped = false;
+      wish(value.value.trim() === "" ? null : value.value, false);
+    });
+    value.addEventListener("blur", () => (control.isTyped = false));
     value.addEventListener("keydown", (event) => {
-      if (event.key === "Escape") wish(null, false);
+      if (event.key !== "Escape") return;
+      control.isTyped = false;
+      blame(control, "");
+      this.update(true);
+      value.blur();
     });
     back.addEventListener("click", () => wish(null, false));
-    const row = element("div", { class: "control", "data-key": key }, name, value, slider, back, fault, about);
-    return { setting, row, slider, value, back };
   }
 
   /** What is known of a setting, line by line. */
@@ -149,10 +164,13 @@ export class Controls {
     ];
   }
 
-  private update(): void {
+  /** Show the values. What was refused stays to be read, with its fault, until a configuration is another one. */
+  private update(isSame: boolean): void {
     const { configurations } = this;
     const values = configurations.map((configuration) => valuesOf(this.content, configuration));
-    for (const { setting, row, slider, value, back } of this.groups.flatMap(({ isOpen, controls }) => (isOpen() ? controls : []))) {
+    const usual = configurations.map(({ program }) => programNamed(this.content, program).usual);
+    for (const control of this.groups.flatMap(({ isOpen, controls }) => (isOpen() ? controls : []))) {
+      const { setting, row, slider, value, back, fault } = control;
       const { key } = setting;
       const having = configurations.map((_, place) => place).filter((place) => values[place]?.has(key));
       row.hidden = having.length === 0;
@@ -160,14 +178,15 @@ export class Controls {
       const texts = having.map((place) => shownNumber(this.content, setting, values[place]?.get(key) ?? 0, values[place]?.get(ATMOSPHERE) ?? 101325));
       const different = [...new Set(texts)];
       const unit = readableUnit(setting.shown);
-      if (document.activeElement !== value || different.length === 1) {
+      if (!control.isTyped && (fault.hidden || !isSame)) {
+        blame(control, "");
         const text = `${different.join(" | ")}${unit === "" || unit === "-" || different.length > 2 ? "" : ` ${unit}`}`;
         if (value.value !== text) value.value = text;
       }
       const place = String(placeOf(setting, Number(texts[0])));
       if (document.activeElement !== slider && slider.value !== place) slider.value = place;
       if (slider.getAttribute("aria-valuetext") !== value.value) slider.setAttribute("aria-valuetext", value.value);
-      const isChanged = having.some((place) => configurations[place]?.changes[key] !== undefined);
+      const isChanged = having.some((place) => configurations[place]?.changes[key] !== usual[place]?.[key]);
       row.classList.toggle("changed", isChanged);
       back.disabled = !isChanged;
     }
@@ -175,9 +194,7 @@ export class Controls {
 
   /** The text that a place of a slider stands for: round decimals, so that no arithmetic of the browser is in it. */
   private textAt(setting: Setting, place: number): string {
-    const [from, to] = setting.slider;
-    const decimals = decimalsOf((to - from) / STEPS);
-    return `${plainFixed(from + ((to - from) * place) / STEPS, decimals)} ${setting.shown}`.trim();
+    return textOnSlider(setting, place / STEPS);
   }
 }
 
@@ -191,14 +208,30 @@ function placeOf(setting: Setting, shown: number): number {
   return Math.round(((shown - from) / (to - from)) * STEPS);
 }
 
-/** Decimals that tell two neighbouring places of a slider apart. */
-export function decimalsOf(step: number): number {
+/** Say what is wrong with what was wanted of a setting; nothing, where the text is empty. */
+function blame({ fault, value }: Control, wrong: string): void {
+  say(fault, wrong);
+  fault.hidden = wrong === "";
+  value.setAttribute("aria-invalid", String(wrong !== ""));
+}
+
+/** A text somewhere on a slider, from 0 to 1, with the decimals that tell two neighbouring places apart; never beyond its ends. */
+export function textOnSlider({ slider: [from, to], shown }: Setting, share: number): string {
+  const decimals = decimalsOf((to - from) / STEPS);
+  const unit = 10 ** -decimals;
+  const value = from + (to - from) * share;
+  const rounded = Number(value.toFixed(decimals));
+  const inside = rounded < from ? rounded + unit : rounded > to ? rounded - unit : rounded;
+  return `${plainFixed(inside, decimals)} ${shown}`.trim();
+}
+
+function decimalsOf(step: number): number {
   let decimals = 0;
   for (let edge = 1; step < edge && decimals < 12; edge /= 10) decimals += 1;
   return decimals;
 }
 
-export function plainFixed(value: number, decimals: number): string {
+function plainFixed(value: number, decimals: number): string {
   const text = value.toFixed(decimals);
   return text.includes(".") ? text.replace(/\.?0+$/, "") : text;
 }

@@ -47,6 +47,8 @@ export interface Ensemble {
 }
 
 const NUMBER = 8;
+/** What a module can be asked for at once. */
+const MOST_BYTES = 2 ** 31 - 1;
 /** Angle [rad] by which a vane may be beyond a stop, as in Python. */
 const SLACK = 1e-9;
 
@@ -78,10 +80,11 @@ export class Engine {
       const { exports, program } = this;
       const count = exports.samples(settings);
       const rows = program.channels.length + 1;
+      if (count === 0 || count * rows * NUMBER > MOST_BYTES) return failedRun("no memory", ENDING_TEXTS["no memory"]);
       const columns = exports.reserve(count * rows * NUMBER);
       const metrics = exports.reserve(program.metrics.length * NUMBER);
       const good = exports.reserve(NUMBER);
-      if (columns === 0 || metrics === 0 || good === 0) return failedRun("no memory", "the run has too many samples for this page");
+      if (columns === 0 || metrics === 0 || good === 0) return failedRun("no memory", ENDING_TEXTS["no memory"]);
       const ending = ENDINGS[exports.run(settings, columns, metrics, good)] ?? "refused";
       const { buffer } = exports.memory;
       const length = new Int32Array(buffer, good, 1)[0] ?? 0;
@@ -133,7 +136,7 @@ export class Engine {
     if (found < 0) return "";
     const setting = this.program.settings[found];
     if (setting !== undefined) return `${setting.key} is out of range, or contradicts another setting`;
-    return "another program is needed, and this page has that of the scenario as it began: a setting that is 0 there has to stay 0, one that is not has to stay above 0, and samples have to fall on steps (run.output_interval, run.step, controller.period)";
+    return "this change needs a different compiled program, which this page does not contain: a setting that is 0 there has to stay 0, one that is not has to stay above 0, and samples have to fall on steps (run.output_interval, run.step, controller.period)";
   }
 
   /** Memory that is taken meanwhile is given back. */
@@ -158,7 +161,7 @@ function beyondStops({ document }: Program, values: Values, time: Float64Array, 
 
 const ENDING_TEXTS: Readonly<Record<Ending, string>> = {
   completed: "",
-  diverged: "the run left what is possible: try a smaller step; check inertia, volumes and areas",
+  diverged: "the run diverged: try a smaller step; check inertia, volumes and areas",
   "too many parts": "a step was cut into 100,000 parts and was still not done: check inertia, volumes and areas",
   refused: "the settings were refused",
   "no memory": "the run has too many samples for this page",

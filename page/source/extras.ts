@@ -9,7 +9,7 @@ import { MapView } from "./map";
 import { shownMetric } from "./outcome";
 import { agreementTable, askForColumns, columnsOf, type ColumnMap, mapOfHeader } from "./recording";
 import { scenarioFile } from "./scenario_file";
-import { shownNumber, valuesOf } from "./settings";
+import { type Configuration, shownNumber, valuesOf } from "./settings";
 import { samplesText, savePicture, saveState, saveText } from "./sharing";
 import { addressOf, stateOfFile } from "./state";
 import { InputError, plain, readableUnit, telling } from "./units";
@@ -23,13 +23,17 @@ export class Extras {
   private readonly errors = element("div");
   private readonly asked = element("div");
   private readonly effects = element("div");
+  /** Configurations of which the effects of assumptions are shown. */
+  private moved: readonly Configuration[] = [];
+  /** How many files were to be read: only the last one counts. */
+  private readings = 0;
   private readonly files = element("div", { class: "buttons files" });
 
   constructor(
     private readonly frame: PageFrame,
     private readonly app: App,
   ) {
-    this.map = new MapView(frame.map, app.content, app.workers, (place, texts) => app.changeOne(place, texts));
+    this.map = new MapView(frame.map, app.content, app.workers, (configuration) => app.runOf(configuration), (place, texts) => app.changeOne(place, texts));
     frame.map.closest("details")?.addEventListener("toggle", () => this.follow(app.named));
     this.makeShare();
     this.makeRecording();
@@ -38,6 +42,10 @@ export class Extras {
 
   /** Follow the configurations, frame by frame. */
   follow(named: readonly Named[]): void {
+    if (named.length !== this.moved.length || named.some(({ configuration }, place) => configuration !== this.moved[place])) {
+      this.effects.replaceChildren();
+      this.moved = [];
+    }
     if (this.map.isOpen && this.app.content.form === "page") this.map.refresh(named.map(({ configuration }) => configuration), named.map(({ name }) => name));
     const layout = JSON.stringify(named.map(({ name }) => name));
     if (this.files.dataset["layout"] === layout) return;
@@ -115,7 +123,7 @@ export class Extras {
 
   private makeRecording(): void {
     const chooser = element("input", { type: "file", accept: ".csv,text/csv,.txt", "aria-label": "Recording as CSV" });
-    const clear = element("button", { type: "button", onclick: () => this.clear() }, "Take it away");
+    const clear = element("button", { type: "button", onclick: () => this.clear() }, "Remove recording");
     chooser.addEventListener("change", () => {
       const file = chooser.files?.[0];
       chooser.value = "";
@@ -146,8 +154,13 @@ export class Extras {
   /** Read a file in a worker, so that the page goes on, and show it. */
   async read(file: File): Promise<void> {
     this.app.tell(`Reading ${file.name} ...`);
+    this.readings += 1;
+    const mine = this.readings;
+    const isLast = () => mine === this.readings;
     try {
-      const { reading, heads } = await this.app.workers.readTable(file);
+      const read = await this.app.workers.readTable(file, isLast);
+      if (read === null || !isLast()) return;
+      const { reading, heads } = read;
       const map = mapOfHeader(heads);
       if (map !== null) await this.take(file.name, reading, map);
       else {
@@ -158,7 +171,7 @@ export class Extras {
       }
     } catch (error) {
       if (!(error instanceof InputError)) throw error;
-      this.app.tell(`${file.name}: ${error.message}.`);
+      if (isLast()) this.app.tell(`${file.name}: ${error.message}.`);
     }
   }
 
@@ -167,7 +180,7 @@ export class Extras {
       const atmosphere = valuesOf(this.app.content, this.app.bench[0]!).get("supply.atmospheric_pressure") ?? 101325;
       this.app.overlayWith(await this.app.workers.takeRecording(reading, columnsOf(this.app.content, map, atmosphere)));
       this.asked.replaceChildren();
-      this.app.tell(`${name} is drawn over the runs; below it is said how far they are from it.`);
+      this.app.tell(`${name} is overlaid on the runs; the errors are listed below.`);
       const details = this.frame.recording.closest("details");
       if (details !== null) details.open = true;
     } catch (error) {
@@ -192,14 +205,17 @@ export class Extras {
     const { app } = this;
     const run = element("button", { type: "button", onclick: () => void this.showEffects().catch(telling((words) => app.tell(words))) }, "Move each assumption");
     this.frame.assumptions.append(
-      element("p", {}, "Nobody printed some of the numbers. Each of these is moved alone, over its interval where one is known, else by a fifth down and up; the others stay."),
+      element("p", {}, "Some values are unpublished. Each is varied on its own over its interval, or by ±20 %; the others stay."),
       element("div", { class: "buttons" }, run),
       this.effects,
     );
   }
 
   private async showEffects(): Promise<void> {
+    const { bench } = this.app;
     const found = await Promise.all(this.app.named.map(async (item) => ({ item, effects: await effectsOf(this.app.content, this.app.workers, item.configuration) })));
+    if (this.app.bench !== bench) return;
+    this.moved = bench;
     this.effects.replaceChildren(...found.flatMap(({ item, effects }) => this.effectsTable(item, effects)));
   }
 

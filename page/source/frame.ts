@@ -35,7 +35,7 @@ export function makeFrame(host: HTMLElement, content: Content, app: App): PageFr
     element("button", { type: "button", onclick: () => app.redo(), title: "Redo (Ctrl+Shift+Z)" }, "Redo"),
     element("button", { type: "button", onclick: () => app.resetAll() }, "Reset all"),
   ];
-  const beside = choice("Beside each other", (isOn) => app.arrange(isOn));
+  const beside = choice("Side by side", (isOn) => app.arrange(isOn));
   const band = choice("Uncertainty", (isOn) => app.band(isOn));
   band.label.title = "Where 95 % of 200 draws lie, each number drawn evenly from its interval";
   const side = element(
@@ -53,7 +53,7 @@ export function makeFrame(host: HTMLElement, content: Content, app: App): PageFr
     element("div", { class: "bench-line" }, bench, element("div", { class: "switches" }, band.label, beside.label)),
     stage,
     panels,
-    element("h2", {}, "What comes of it"),
+    element("h2", {}, "Results"),
     outcome,
   );
   const folded = (title: string, inner: HTMLElement) => element("details", { class: "folded" }, element("summary", {}, title), inner);

@@ -92,12 +92,14 @@ export class Workers {
     return together(found.slice(0, done));
   }
 
-  /** Read the table in a file, which a worker keeps. The page reads it, piece by piece: in WebKit a worker of a page from a file may not. */
-  async readTable(file: Blob): Promise<{ readonly reading: number; readonly heads: Heads }> {
+  /** Read the table in a file, which a worker keeps. The page reads it, piece by piece: in WebKit a worker of a page from a file may not. Null where no longer wanted. */
+  async readTable(file: Blob, isWanted: () => boolean): Promise<{ readonly reading: number; readonly heads: Heads } | null> {
     this.start();
     const reading = this.next;
+    this.next += 1;
     for (let place = 0; ; place += PIECE) {
       const bytes = await file.slice(place, place + PIECE).arrayBuffer().catch(refuseFile);
+      if (!isWanted()) return null;
       const isLast = place + PIECE >= file.size;
       const { heads } = await this.ask(this.crew.length - 1, (number) => ({ kind: "table", number, reading, bytes, isLast }), [bytes]);
       if (heads !== undefined) return { reading, heads };

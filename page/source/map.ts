@@ -2,8 +2,9 @@
 
 import { colour, shade } from "./colours";
 import { type Content, type Metric, programNamed, type Setting } from "./content";
-import { plainFixed, decimalsOf } from "./controls";
+import { textOnSlider } from "./controls";
 import { element, say } from "./dom";
+import type { Run } from "./engine";
 import type { Workers } from "./jobs";
 import { shownMetric } from "./outcome";
 import { ATMOSPHERE, type Configuration, settingsByKey, shownNumber, valuesOf } from "./settings";
@@ -34,6 +35,7 @@ export class MapView {
     private readonly host: HTMLElement,
     private readonly content: Content,
     private readonly workers: Workers,
+    private readonly runOf: (configuration: Configuration) => Run | null,
     private readonly go: (place: number, texts: readonly (readonly [string, string])[]) => void,
   ) {
     const field = (words: string, select: HTMLElement) => element("label", {}, words, select);
@@ -71,8 +73,9 @@ export class MapView {
     this.program = name;
     const program = programNamed(this.content, name);
     const tab = this.content.tabs.find((item) => item.programs.includes(name));
-    const first = (tab?.first ?? []).filter((key) => settingsByKey(program).has(key));
-    const keys = [...new Set([...first, ...program.settings.map((setting) => setting.key)])];
+    const first = (tab?.first ?? []).filter((key) => (settingsByKey(program).get(key)?.kept ?? "zero") !== "zero");
+    const free = program.settings.filter(({ key, kept }) => kept !== "zero" && !key.endsWith(".seed"));
+    const keys = [...new Set([...first, ...free.map((setting) => setting.key)])];
     const fillIn = (select: HTMLSelectElement, entries: readonly (readonly [string, string])[], chosen: string | undefined) =>
       select.replaceChildren(...entries.map(([value, words]) => element("option", { value, selected: value === chosen }, words)));
     const settings = keys.map((key) => [key, settingsByKey(program).get(key)?.label ?? key] as const);
@@ -138,8 +141,8 @@ export class MapView {
     const [low, high] = [good.reduce((a, b) => Math.min(a, b), Infinity), good.reduce((a, b) => Math.max(a, b), -Infinity)];
     this.paint(context, values, side, low, high);
     const here = this.present(configuration, across, up);
-    const [scale, cell] = [side / SIDE, this.canvas.width / SIDE];
-    const level = sampleAt(values, side, here[0] * scale, here[1] * scale);
+    const cell = this.canvas.width / SIDE;
+    const level = this.runOf(configuration)?.metrics.get(metric.name) ?? NaN;
     contour(context, values, side, level, cell);
     const [x, y] = [(here[0] + 0.5) * cell, (SIDE - 0.5 - here[1]) * cell];
     for (const [width, stroke] of [[7, "#000"], [3, "#fff"]] as const) {
@@ -175,7 +178,7 @@ export class MapView {
     say(this.axes[1], `${ends(up)} →`);
     const text = (value: number) => plain(shownMetric(this.content, metric, value), 3);
     const unit = readableUnit(metric.shown);
-    say(this.scale, `${metric.label}: from ${text(low)} (yellow) to ${text(high)} ${unit} (violet). White line: as here, ${text(level)} ${unit}.`);
+    say(this.scale, `${metric.label}: from ${text(low)} (yellow) to ${text(high)} ${unit} (violet). White line: current value, ${text(level)} ${unit}.`);
     this.canvas.setAttribute(
       "aria-label",
       `Map of ${metric.label} over ${across.label} and ${up.label}, ${text(low)} to ${text(high)} ${unit}, here ${text(level)}. Arrow keys move.`,
@@ -211,11 +214,7 @@ export class MapView {
   private goTo(x: number, y: number): void {
     if (this.landscape === null) return;
     const { across, up } = this.landscape;
-    const text = (setting: Setting, place: number): string => {
-      const [from, to] = setting.slider;
-      const inside = Math.min(SIDE - 1, Math.max(0, place));
-      return `${plainFixed(from + ((to - from) * inside) / (SIDE - 1), decimalsOf((to - from) / 400))} ${setting.shown}`.trim();
-    };
+    const text = (setting: Setting, place: number) => textOnSlider(setting, Math.min(SIDE - 1, Math.max(0, place)) / (SIDE - 1));
     this.go(Math.max(0, this.of.selectedIndex), [[across.key, text(across, x)], [up.key, text(up, y)]]);
   }
 }
@@ -224,16 +223,6 @@ export class MapView {
 function wishOf({ configuration, across, up, metric }: Axes & { configuration: Configuration }): string {
   const { [across.key]: _, [up.key]: __, ...others } = configuration.changes;
   return JSON.stringify([configuration.program, across.key, up.key, metric.name, others]);
-}
-
-/** The value between four cells. */
-function sampleAt(values: Float64Array, side: number, x: number, y: number): number {
-  const [left, below] = [Math.min(side - 2, Math.floor(x)), Math.min(side - 2, Math.floor(y))];
-  const at = (column: number, row: number) => values[row * side + column] ?? NaN;
-  const [u, v] = [Math.min(1, x - left), Math.min(1, y - below)];
-  const lower = at(left, below) * (1 - u) + at(left + 1, below) * u;
-  const upper = at(left, below + 1) * (1 - u) + at(left + 1, below + 1) * u;
-  return lower * (1 - v) + upper * v;
 }
 
 /** The line of one value, by marching squares; `cell` is the size of one of a full map. */

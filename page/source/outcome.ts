@@ -20,7 +20,7 @@ interface Row {
 
 /** Metrics this small in SI are what rounding leaves of a balance. */
 const ROUNDING = 1e-12;
-const TOLD = ["rms_error", "gas_supplied", "switchings"];
+const TOLD = ["rms_error", "gas_supplied", "switchings", "gas", "push_off_work", "toe_clearance"];
 
 export class OutcomeTable {
   private rows: Row[] = [];
@@ -74,7 +74,7 @@ export class OutcomeTable {
       return element("tr", {}, element("th", { scope: "row" }, words), ...cells, ...changes);
     });
     this.table.replaceChildren(
-      element("caption", { class: "unseen" }, "What came of each configuration"),
+      element("caption", { class: "unseen" }, "Metrics of each configuration"),
       element("thead", {}, head),
       element("tbody", {}, ...body),
     );

@@ -73,6 +73,8 @@ export class Panels {
   private shown: readonly Shown[] = [];
   private overlay: Overlay | null = null;
   private layout = "";
+  /** The time [s] of the cursor, null where there is none. */
+  private time: number | null = null;
   private first: Panel | null = null;
   private ranges = new Map<Panel, readonly [number, number]>();
   private readonly watcher = new ResizeObserver(() => this.fit());
@@ -90,7 +92,7 @@ export class Panels {
     addEventListener("beforeprint", () => this.drawAll());
   }
 
-  /** Draw runs, over each other or beside each other. */
+  /** Draw runs, over each other or side by side. */
   show(shown: readonly Shown[], isBeside: boolean, overlay: Overlay | null): void {
     this.shown = shown;
     this.overlay = overlay;
@@ -106,6 +108,7 @@ export class Panels {
     } else {
       for (const item of this.drawn) item.isStale = true;
       for (const item of this.drawn) if (item.isInSight) this.draw(item);
+      if (this.time !== null) this.read(this.time);
     }
     this.rest();
   }
@@ -225,6 +228,7 @@ export class Panels {
   }
 
   private read(time: number | null): void {
+    this.time = time;
     for (const { panel, shown, readout } of this.drawn) {
       const values = this.linesOf(panel, shown).map((line) => {
         const run = this.shown[line.place]?.run;

@@ -1,6 +1,6 @@
 /** A recording of one's own: which channels its columns are, and what is said of the runs beside it. */
 
-import { ACCEPTABLE_FRACTION, type ChannelError, type RecordedColumn } from "./agreement";
+import { ACCEPTABLE_FRACTION, type ChannelError, LONGEST_DELAY, type RecordedColumn } from "./agreement";
 import { type Content, scalesOf } from "./content";
 import { element, say } from "./dom";
 import type { Heads } from "./table";
@@ -88,9 +88,9 @@ const SHOWN: Readonly<Record<string, readonly [number, string]>> = {
 /** The table of errors, as a person reads it. */
 export function agreementTable(found: readonly { readonly name: string; readonly errors: readonly ChannelError[] }[]): HTMLElement {
   const rows = found.flatMap(({ name, errors }) =>
-    errors.map(({ channel, rms, bias, fraction }) => {
+    errors.map(({ channel, rms, bias, fraction, delay, isAtLimit }) => {
       const [factor, unit] = SHOWN[channel] ?? [1, ""];
-      const cells = [`${plain(rms * factor, 3)} ${unit}`, `${plain(bias * factor, 3)} ${unit}`, `${plain(fraction * 100, 3)} %`];
+      const cells = [`${plain(rms * factor, 3)} ${unit}`, `${plain(bias * factor, 3)} ${unit}`, `${plain(fraction * 100, 3)} %`, isAtLimit ? "none" : `${plain(delay * 1000, 3)} ms`];
       const verdict = fraction <= ACCEPTABLE_FRACTION ? "within 10 %" : "beyond 10 %";
       return element(
         "tr",
@@ -100,9 +100,12 @@ export function agreementTable(found: readonly { readonly name: string; readonly
       );
     }),
   );
-  const head = ["Channel", "RMS error", "Bias", "of full range", ""].map((text, place) => element("th", { scope: "col", class: place === 0 ? "" : "number" }, text));
-  const delay = found[0]?.errors[0]?.delay ?? 0;
+  const head = ["Channel", "RMS error", "Bias", "of full range", "Delay", ""].map((text, place) => element("th", { scope: "col", class: place === 0 ? "" : "number" }, text));
+  const all = found.flatMap(({ errors }) => errors);
+  const cutAt = Math.max(...all.map((error) => error.cutAt ?? 0));
+  const cut = cutAt > 0 ? ` The recording is longer than the run and is compared up to ${plain(cutAt, 4)} s.` : "";
+  const limit = all.some(({ isAtLimit }) => isAtLimit) ? ` Where it says none, the best delay is at the limit of ${LONGEST_DELAY * 1000} ms, and none could be taken out.` : "";
   const note = element("p", { class: "note" });
-  say(note, `A delay of ${plain(delay * 1000, 3)} ms is taken out, as 'ppafo validate' does. The runs follow the controller of the scenario, not the recorded command.`);
+  say(note, `The common delay of all channels of a run is taken out, as 'ppafo validate' does.${limit}${cut} The runs follow the controller of the scenario, not the recorded command.`);
   return element("div", { class: "wide" }, element("table", { class: "outcome" }, element("thead", {}, element("tr", {}, ...head)), element("tbody", {}, ...rows)), note);
 }

@@ -71,7 +71,7 @@ export function numberFrom(content: Content, setting: Setting, text: string, atm
     throw new InputError(`${setting.key}: '${short(text)}' is outside of its range, ${rangeText(content, setting, atmosphere)}`);
   }
   if (setting.kept !== "" && (setting.kept === "zero") !== (value === 0)) {
-    throw new InputError(`${setting.key}: must stay ${setting.kept === "zero" ? "0" : "above 0"} on this page; another value is another program`);
+    throw new InputError(`${setting.key}: must stay ${setting.kept === "zero" ? "0" : "above 0"} on this page; another value needs a different compiled program`);
   }
   if (setting.key.endsWith(".seed") && !Number.isInteger(value)) throw new InputError(`${setting.key}: must be a whole number`);
   return value;
@@ -89,7 +89,9 @@ export function normalText(setting: Setting, text: string): string {
   const trimmed = text.trim().replace(/\s+/g, " ");
   if (Object.hasOwn(setting.words, trimmed)) return trimmed;
   const { number, unit } = splitQuantity(trimmed);
-  return `${String(number)} ${unit === "" ? setting.shown : unit}`.trim();
+  // What a control shows may be edited and given back: `50 psi gauge`.
+  const isShown = unit === "" || unit === readableUnit(setting.shown).replace(/\u00a0/g, " ");
+  return `${String(number)} ${isShown ? setting.shown : unit}`.trim();
 }
 
 export function rangeText(content: Content, setting: Setting, atmosphere: number): string {

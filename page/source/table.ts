@@ -13,6 +13,8 @@ export interface RecordedTable {
 const MOST_COLUMNS = 200;
 const MOST_ROWS = 20_000_000;
 const LONGEST_LINE = 100_000;
+/** A longer cell names no unit: the pattern of one that does takes its time. */
+const LONGEST_HEAD = 200;
 const HEAD = /^\s*(.+?)\s*[[(]\s*([^\])]*?)\s*[\])]\s*$/;
 
 type Mark = "," | ";" | "\t";
@@ -75,7 +77,7 @@ export class TableReading {
     if (cells.length < 2) throw new InputError("the header names one column only; a recording has time and a channel");
     if (cells.length > MOST_COLUMNS) throw new InputError(`the header has ${cells.length} columns, at most ${MOST_COLUMNS} are read`);
     this.heads = cells.map((cell, place) => {
-      const match = HEAD.exec(cell);
+      const match = cell.length > LONGEST_HEAD ? null : HEAD.exec(cell);
       return { name: short(match?.[1] ?? (cell || `column ${place + 1}`)), unit: (match?.[2] ?? "").trim() };
     });
     this.columns = cells.map(() => new Float64Array(1024));

@@ -19,7 +19,8 @@ const ORDER = [...CELLS.filter(isOfFirst), ...CELLS.filter((cell) => !isOfFirst(
 const FIRST = CELLS.filter(isOfFirst).length;
 const DRAWS = 200;
 const BAND_PLACES = 300;
-const OUTSIDE = 5;
+/** Of so many draws one is left out at either end; with fewer there is no band. */
+const ONE_OF = 40;
 const BANDED = ["torque", "pressure_1", "pressure_2", "supplied_mass", "angle"];
 
 /** Settings of a run by key that are not those of a configuration. */
@@ -101,6 +102,19 @@ function differences(content: Content, configuration: Configuration, setting: Se
   return [...other].filter(([key, number]) => number !== base.get(key));
 }
 
+/** What differs in a run, with the settings that have the value of another one as long as nobody changes them. */
+function withFollowers(program: Program, configuration: Configuration, given: Differences): Differences {
+  const found = new Map(given);
+  const own = new Set(found.keys());
+  // A follower may be followed in its turn.
+  for (const { key, follows, words } of [...program.settings, ...program.settings]) {
+    const typed = configuration.changes[key];
+    const value = found.get(typed === undefined ? follows : (words[typed] ?? ""));
+    if (value !== undefined && !own.has(key)) found.set(key, value);
+  }
+  return [...found];
+}
+
 /** The settings of many runs, one after the other: those of a configuration but for what differs in each. */
 function rowsOf(program: Program, base: Values, differing: readonly Differences[]): Float64Array<ArrayBuffer> {
   const usual = Float64Array.from(program.settings, (setting) => base.get(setting.key) ?? setting.value);
@@ -118,8 +132,14 @@ export function uncertainSettings(program: Program): Setting[] {
   return program.settings.filter((setting) => setting.interval !== null);
 }
 
-/** Between which values 95 % of 200 draws lie, channel by channel; each number is drawn evenly from its interval. */
-export async function bandOf(content: Content, workers: Workers, configuration: Configuration, run: Run): Promise<ReadonlyMap<string, Band>> {
+/** Between which values 95 % of 200 draws lie, channel by channel; each number is drawn evenly from its interval. Null where no longer wanted. */
+export async function bandOf(
+  content: Content,
+  workers: Workers,
+  configuration: Configuration,
+  run: Run,
+  isWanted: () => boolean,
+): Promise<ReadonlyMap<string, Band> | null> {
   const program = programNamed(content, configuration.program);
   const base = valuesOf(content, configuration);
   const draw = evenly();
@@ -127,22 +147,25 @@ export async function bandOf(content: Content, workers: Workers, configuration: 
   const drawn = Array.from({ length: DRAWS }, () =>
     free.map(({ key, interval }): [string, number] => [key, (interval?.[0] ?? 0) + ((interval?.[1] ?? 0) - (interval?.[0] ?? 0)) * draw()]),
   );
-  const rows = rowsOf(program, base, drawn);
+  const rows = rowsOf(program, base, drawn.map((changes) => withFollowers(program, configuration, changes)));
   const every = Math.max(1, Math.floor(run.time.length / BAND_PLACES));
   const places = Math.floor((run.time.length - 1) / every) + 1;
   const time = Float64Array.from({ length: places }, (_, place) => run.time[place * every] ?? 0);
   const channels = BANDED.filter((name) => run.channels.has(name));
-  const found = await Promise.all(channels.map((channel) => workers.runMany(program, rows, { channel, every, places })));
+  const found = await Promise.all(channels.map((channel) => workers.runMany(program, rows, { channel, every, places }, isWanted)));
+  if (found.some(({ ended }) => ended.length < DRAWS)) return null;
   return new Map(found.map(({ traces, ended }, place) => [channels[place] ?? "", { time, ...ends(traces, ended, places) }]));
 }
 
 function ends(traces: Float64Array, ended: Int32Array, places: number): { low: Float64Array; high: Float64Array } {
   const [low, high] = [new Float64Array(places), new Float64Array(places)];
   const good = [...ended.keys()].filter((run) => ended[run] === 0);
+  const outside = Math.floor(good.length / ONE_OF);
+  if (outside === 0) return { low: low.fill(NaN), high: high.fill(NaN) };
   for (let place = 0; place < places; place += 1) {
     const column = Float64Array.from(good, (run) => traces[run * places + place] ?? 0).sort();
-    low[place] = column[OUTSIDE] ?? 0;
-    high[place] = column[column.length - 1 - OUTSIDE] ?? 0;
+    low[place] = column[outside] ?? 0;
+    high[place] = column[column.length - 1 - outside] ?? 0;
   }
   return { low, high };
 }
@@ -180,7 +203,7 @@ export async function effectsOf(content: Content, workers: Workers, configuratio
   const moved = found.filter(isMoved);
   const assumed = moved.map(([setting]) => setting);
   const ends = moved.map(([, both]) => both);
-  const differing = assumed.flatMap(({ key }, place) => (ends[place] ?? [0, 0]).map((end) => [[key, end] as const]));
+  const differing = assumed.flatMap(({ key }, place) => (ends[place] ?? [0, 0]).map((end) => withFollowers(program, configuration, [[key, end]])));
   if (differing.length === 0) return [];
   const runs = await workers.runMany(program, rowsOf(program, base, differing));
   const width = program.metrics.length;

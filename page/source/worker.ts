@@ -34,6 +34,8 @@ async function engineOf(program: Program, bytes: ArrayBuffer): Promise<Engine> {
 
 function read({ number, reading, bytes, isLast }: Job & { kind: "table" }): void {
   const begun = readings.get(reading) ?? new TableReading();
+  // A reading that another one overtook is never ended.
+  readings.clear();
   readings.set(reading, begun);
   begun.take(bytes, isLast);
   if (!isLast) {

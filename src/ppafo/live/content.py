@@ -25,6 +25,7 @@ from ppafo.version import __version__
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.contradictions import COMPRESSION
 from ppafo.walking.loading import load_walk
+from ppafo.walking.walk import LONGEST_MINUTES, SHORTEST_STRIDES
 
 Interval = tuple[float, float]
 
@@ -59,6 +60,10 @@ _OF_FILES = (
     ("controller.fill_time", "valve.delay", 1.0),
     ("controller.vent_time", "valve.delay", 1.0),
 )
+_WALKED = 6
+"""Length [s] of a walk in a page, unless somebody wants more: five strides."""
+_ABSOLUTE = ("largest_pressure",)
+"""Metrics whose name says that a pressure is absolute."""
 _NICE = (1.0, 2.0, 2.5, 5.0, 10.0)
 
 
@@ -88,6 +93,7 @@ def program_content(item: Simulated, module: str, intervals: Mapping[str, Interv
         "label": item.label,
         "description": " ".join(told["title"].split()),
         "document": document,
+        "usual": usual_changes(item.scenario),
         "deviceSections": sorted(
             {entry["key"].partition(".")[0] for entry in told["settings"] if is_of_device(entry["key"])}
         ),
@@ -109,6 +115,13 @@ def program_content(item: Simulated, module: str, intervals: Mapping[str, Interv
     }
 
 
+def usual_changes(scenario: Scenario | Configuration) -> dict[str, str]:
+    """Return the changes that a configuration of a page begins with, texts by key: a walk is short."""
+    if isinstance(scenario, Scenario):
+        return {}
+    return {"run.duration": f"{max(_WALKED, math.ceil(SHORTEST_STRIDES * scenario.gait.stride_time))} s"}
+
+
 def _relations_of_files(told: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Contradictions that the file of a walk refuses and its program does not."""
     keys = {entry["key"] for entry in told["settings"]}
@@ -120,9 +133,12 @@ def _relations_of_files(told: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _as_in_files(entry: Mapping[str, Any], item: Scenario | Configuration) -> dict[str, Any]:
-    """A setting with what only a file of a walk knows: the stride of its gait, and which pressures are absolute."""
+    """A setting with what only Python knows of a walk: its stride and length, and which pressures are absolute."""
     if isinstance(item, Configuration) and entry["key"] == _FIRST_STRIDE:
         return {**entry, "minimum": 0.5 * item.gait.stride_time, "maximum": 2.0 * item.gait.stride_time}
+    if isinstance(item, Configuration) and entry["key"] == "run.duration":
+        shortest = SHORTEST_STRIDES * item.gait.stride_time
+        return {**entry, "minimum": shortest, "maximum": 60.0 * LONGEST_MINUTES, "is_minimum_allowed": True}
     if entry["group"] == "controller" and entry["display"]["unit"] == "psi_g":
         return {**entry, "display": {**entry["display"], "unit": "psi_a", "zero": 0.0}}
     return dict(entry)
@@ -238,7 +254,7 @@ def _shown(entry: Mapping[str, Any]) -> dict[str, str]:
     return {
         "name": entry["name"],
         "unit": unit,
-        "shown": _bare(entry["display"]["unit"]),
+        "shown": "psi_a" if entry["name"] in _ABSOLUTE else _bare(entry["display"]["unit"]),
         "label": text[:1].upper() + text[1:],
     }
 

@@ -47,8 +47,11 @@ def bundled(name: str) -> str:
 def is_page(path: Path) -> bool:
     """Tell whether a file is such a page, which may be written anew."""
     try:
+        # A pipe would be waited for.
+        if not path.is_file():
+            return False
         with path.open("rb") as file:
-            return path.is_file() and _MARK in file.read(_MARKED)
+            return _MARK in file.read(_MARKED)
     except OSError:
         return False
 

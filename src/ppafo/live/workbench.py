@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from ppafo.answers import LivePart
-from ppafo.errors import PpafoError, ScenarioError
+from ppafo.errors import PpafoError, ScenarioError, nearest_name
 from ppafo.exports.loading import load_exportable
 from ppafo.exports.wasm import module_of
-from ppafo.live.content import Interval, Simulated, page_content, program_content, words
+from ppafo.live.content import Interval, Simulated, page_content, program_content, usual_changes, words
 from ppafo.live.page import block_of, packed, page_of, policy_of_block
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.studies.loading import load_study
@@ -21,8 +21,7 @@ Simulable = Scenario | Configuration
 TITLE = "The powered ankle-foot orthosis, live"
 DEFAULT = ("torque-task-solenoid", "torque-task-proportional", "step-response", "solenoid")
 MOST_SCENARIOS = 24
-_WALKED = "6 s"
-"""How long a walk is in a page, unless somebody wants more: five strides."""
+_MOST_CONFIGURATIONS = 4
 _OPEN = 2
 """Configurations that a tab opens with."""
 _STUDY = "torque-task-uncertainty"
@@ -57,14 +56,43 @@ def workbench(
     ``start`` are the configurations that the page opens with, at most four for a tab: a ``program`` (the name of a
     scenario) and ``changes``, texts by key. Without it each tab opens with its first two scenarios. ``summary`` is
     what a page of one tab says of it.
-    ScenarioError for none, too many, or two of one name; ProgramError where a program has to be built and cannot be.
+    ScenarioError for none, too many, two of one name, or a start that the page does not have; ProgramError where a
+    program has to be built and cannot be.
     """
     content, modules = _content(list(scenarios), overrides, title, "page")
+    _check_start(start, content)
     for tab in content["tabs"]:
         own = [dict(item) for item in start if item["program"] in tab["programs"]]
         tab["start"] = own or tab["start"]
         tab["summary"] = summary if summary and len(content["tabs"]) == 1 else tab["summary"]
     return page_of(title, content, modules)
+
+
+def _check_start(start: Sequence[Mapping[str, Any]], content: Mapping[str, Any]) -> None:
+    """Refuse what the script of the page could not open."""
+    known = {program["name"]: {one["key"] for one in program["settings"]} for program in content["programs"]}
+    for place, item in enumerate(start):
+        name, changes = (item.get("program"), item.get("changes")) if isinstance(item, Mapping) else (None, None)
+        if not isinstance(name, str) or not isinstance(changes, Mapping):
+            raise ScenarioError(f"start, configuration {place + 1}: must be a table of 'program' and 'changes'")
+        if name not in known:
+            raise ScenarioError(
+                f"start, configuration {place + 1}: '{name}' is not on this page{nearest_name(name, known)}; "
+                f"allowed: {', '.join(known)}"
+            )
+        for key, text in changes.items():
+            if key not in known[name]:
+                raise ScenarioError(
+                    f"start, '{name}': there is no setting '{key}'{nearest_name(str(key), known[name])}"
+                )
+            if not isinstance(text, str):
+                raise ScenarioError(f"start, '{name}', {key}: must be a text such as '50 psi_g', not {text!r}")
+    for tab in content["tabs"]:
+        count = sum(item["program"] in tab["programs"] for item in start)
+        if count > _MOST_CONFIGURATIONS:
+            raise ScenarioError(
+                f"start: {count} configurations in the tab '{tab['title']}', at most {_MOST_CONFIGURATIONS}"
+            )
 
 
 def live_part(scenarios: Sequence[str | Simulable]) -> LivePart | None:
@@ -138,12 +166,11 @@ def _task(scenario: Simulable) -> str:
 
 def _tab(title: str, group: Sequence[Simulated]) -> dict[str, Any]:
     alone = " ".join(group[0].scenario.description.split()).replace("psi_g", "psi") if len(group) == 1 else ""
-    changes = {"run.duration": _WALKED} if title == _WALK else {}
     return {
         "title": title,
         "summary": alone or _SUMMARIES.get(title, ""),
         "programs": [item.scenario.name for item in group],
-        "start": [{"program": item.scenario.name, "changes": changes} for item in group[:_OPEN]],
+        "start": [{"program": item.scenario.name, "changes": usual_changes(item.scenario)} for item in group[:_OPEN]],
         "first": words()["first_of_walks" if title == _WALK else "first"],
         "claims": words()["claims_of_walks" if title == _WALK else "claims"],
     }

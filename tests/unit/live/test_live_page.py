@@ -1,5 +1,6 @@
 """The page that simulates, in a headless browser: what it asks for, whether its bits are Python's, what damage does."""
 
+import os
 import random
 import re
 import shutil
@@ -10,6 +11,8 @@ from typing import Any
 
 import pytest
 
+from ppafo.errors import ScenarioError
+from ppafo.exports import wasm
 from ppafo.live import page as pages
 from ppafo.live.workbench import DEFAULT, workbench
 from ppafo.simulation.loading import load_scenario
@@ -73,6 +76,91 @@ def test_every_default_of_the_page_is_what_its_text_says() -> None:
         assert "supply.pressure" in texts
         for setting in texts.values():
             assert parse_quantity(setting["text"], setting["unit"]) == setting["value"]
+
+
+@pytest.mark.parametrize(
+    ("start", "said"),
+    [
+        ({"program": "torque-task-solenoid"}, "must be a table of 'program' and 'changes'"),
+        ({"program": "torque-task-selenoid", "changes": {}}, "did you mean 'torque-task-solenoid'?"),
+        ({"program": "torque-task-solenoid", "changes": {"valve.aera": "3 mm^2"}}, "did you mean 'valve.area'?"),
+        ({"program": "torque-task-solenoid", "changes": {"valve.area": 3}}, "must be a text"),
+    ],
+)
+def test_a_start_that_the_page_does_not_have_is_refused_in_one_line(start: dict[str, Any], said: str) -> None:
+    with pytest.raises(ScenarioError, match=re.escape(said)):
+        workbench(["torque-task-solenoid"], start=[start])
+
+
+def test_a_pipe_is_no_page_and_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.html")
+    assert not pages.is_page(tmp_path / "pipe.html")
+
+
+def test_the_decision_has_the_sizes_of_the_programs() -> None:
+    sizes = sorted(file.stat().st_size // 1000 for file in Path(wasm.__file__).parent.glob("programs/*.wasm"))
+    decision = SOURCES.parent / "docs" / "decisions" / "0020-programs-for-a-page.md"
+    assert decision.read_text(encoding="utf-8").count(f"{sizes[0]} to {sizes[-1]} kB") == 2
+
+
+@has_browser
+def test_a_text_that_a_control_shows_can_be_edited_and_what_is_refused_is_forgotten(chromium: Any, file: Path) -> None:
+    page = opened(chromium, file, viewport={"width": 1400, "height": 1000})
+    field = page.get_by_label("Supply pressure", exact=True)
+    assert field.input_value().split() == ["50", "psi", "gauge"]
+    field.fill(field.input_value().replace("50", "55"))
+    field.press("Enter")
+    assert page.evaluate("workbench.values(0)")["supply.pressure"] == parse_quantity("55 psi_g", "Pa_a")
+    field.fill("70")
+    field.press("Escape")
+    assert field.input_value().split() == ["55", "psi", "gauge"]
+    assert page.evaluate("workbench.values(0)")["supply.pressure"] == parse_quantity("55 psi_g", "Pa_a")
+    field.fill("5 parsec")
+    field.press("Enter")
+    fault = page.locator(".control[data-key='supply.pressure'] .fault")
+    assert "does not fit here" in fault.inner_text()
+    page.get_by_role("button", name="Reset all").click()
+    fault.wait_for(state="hidden")
+    assert (field.input_value().split()[0], field.get_attribute("aria-invalid")) == ("50", "false")
+    # Of a configuration that is gone no controls are wanted.
+    page.get_by_label("Add a configuration").select_option("torque-task-solenoid")
+    page.locator(".target label").last.click()
+    page.get_by_role("button", name="Reset all").click()
+    page.locator(".chip").nth(2).wait_for(state="detached")
+    assert page.locator(".target input:checked").get_attribute("value") == "null"
+    assert field.is_visible()
+    assert page.locator("main h2").all_inner_texts() == ["Results"]
+    assert page.get_by_label("Side by side").count() == 1
+    page.evaluate("workbench.open('1=torque-task-solenoid;run.output_interval=0.7+ms')")
+    page.wait_for_selector(".panels.absent", state="attached")
+    assert page.said == []
+
+
+@has_browser
+def test_a_walk_is_short_and_no_shorter_than_python_allows(chromium: Any, file: Path) -> None:
+    page = opened(chromium, file, "#tab=3", viewport={"width": 1400, "height": 1000})
+    lengths = "JSON.parse(workbench.file()).benches[2].map(({changes}) => changes['run.duration'])"
+    page.get_by_label("Add a configuration").select_option("solenoid")
+    assert page.evaluate(lengths) == ["6 s", "6 s"]
+    field = page.get_by_label("Length of the run", exact=True)
+    for text in ("5 s", "61 min"):
+        field.fill(text)
+        field.press("Enter")
+        assert "outside of its range" in page.locator(".control[data-key='run.duration'] .fault").inner_text()
+    field.fill("7")
+    field.press("Enter")
+    assert page.evaluate(lengths) == ["7 s", "7 s"]
+    page.get_by_label("Put Length of the run back").click()
+    assert page.evaluate(lengths) == ["6 s", "6 s"]
+    # The lowest stride time, 0.5192 s, is not a round one: no text of the slider is below it.
+    page.locator("summary", has_text="Controller").click()
+    page.locator(".control[data-key='controller.first_stride_time'] input[type=range]").press("Home")
+    values = page.evaluate("[workbench.values(0), workbench.values(1)].map(all => all['controller.first_stride_time'])")
+    assert values == [0.52, 0.52]
+    # More samples than a module can be asked for are a message and not a trap.
+    page.evaluate("workbench.open('tab=3&3=solenoid;run.duration=60+min;run.step=0.1+ms;run.output_interval=0.1+ms')")
+    page.locator("main > .fault", has_text="too many samples").wait_for()
+    assert page.said == []
 
 
 @has_browser
@@ -212,6 +300,8 @@ def test_a_map_comes_in_two_parts_and_is_run_again_only_where_that_can_change_it
     other.locator("summary", has_text="Map of two settings").click()
     other.wait_for_selector(whole)
     assert page.locator(".scale").inner_text() == other.locator(".scale").inner_text()
+    error = page.evaluate("workbench.run(0).metrics.rms_error")
+    assert f"White line: current value, {error:.3g} N\u00a0m" in page.locator(".scale").inner_text()
 
 
 @has_browser
@@ -272,7 +362,7 @@ def test_a_recording_of_one_s_own_is_compared_as_validate_does(chromium: Any, fi
     late = np.interp(time - 0.004, recording.time, recording["torque"]) + 0.1 * np.sin(40.0 * time)
     rows = "\n".join(f"{t!r},{x!r}" for t, x in zip(time.tolist(), late.tolist(), strict=True))
     page = opened(chromium, file)
-    assert "is drawn over the runs" in page.evaluate(
+    assert "is overlaid on the runs" in page.evaluate(
         "text => workbench.read('a.csv', text)", f"time [s],torque [N m]\n{rows}\n"
     )
     page.wait_for_selector(".recording table")
@@ -285,6 +375,12 @@ def test_a_recording_of_one_s_own_is_compared_as_validate_does(chromium: Any, fi
     )
     assert f"{expected.rms:.3g} N m" in shown
     assert f"{100.0 * expected.fraction:.3g} %" in shown
+    # Of two files that are read at once the later one counts, and only what the run has is compared.
+    longer = f"time [s],torque [N m]\n{rows}\n3.5,0.0\n"
+    page.evaluate("text => Promise.all([workbench.read('b.csv', text), workbench.read('c.csv', text)])", longer)
+    assert page.locator(".notice").inner_text().startswith("c.csv is overlaid")
+    page.locator(".recording .note", has_text="is compared up to 3 s").wait_for(state="attached")
+    assert f"{expected.rms:.3g} N m" in page.locator(".recording tbody tr").first.inner_text()
 
 
 @has_browser
@@ -313,7 +409,7 @@ def test_a_large_recording_is_read_and_compared_while_the_page_goes_on(chromium:
     assert page.evaluate("size") > 50_000_000
     # A comparison on the page's own thread holds it up for seconds.
     assert longest < 1500.0
-    assert "is drawn over the runs" in page.locator(".notice").inner_text()
+    assert "is overlaid on the runs" in page.locator(".notice").inner_text()
 
 
 @has_browser
