@@ -61,7 +61,7 @@ def check_finite(values: Floats, place: str, time: Floats) -> None:
     """Raise DataError for a column with a gap within its ``time`` [s]; ``place`` is what the message calls it."""
     known = np.flatnonzero(np.isfinite(values))
     if known.size == 0:
-        raise DataError(f"{place} has no number at all; give a file or a gait map with another column")
+        raise DataError(f"{place} contains no numbers; use another file, or map another column")
     first = int(known[0])
     bad = first + np.flatnonzero(~np.isfinite(values[first : int(known[-1]) + 1]))
     if bad.size:
