@@ -99,27 +99,25 @@ def _thresholds(
     configuration: Configuration, run: Run, count: int, generator: np.random.Generator
 ) -> dict[str, Floats]:
     """Thresholds of an event-based controller about its settings; both of a sensor move together and stay apart."""
-    settings, is_whole = configuration.settings, isinstance(run.controller, WalkRows)
+    is_whole = isinstance(run.controller, WalkRows)
     if not is_whole and not hasattr(run.controller, "phases"):
         return {}
+    names = ("load_threshold", "unload_threshold", "push_off_start")
+    rules = configuration.settings if is_whole else run.controller.phases._asdict()
+    load, unload, usual = (rules[name] for name in names)
     scale = 1.0 + THRESHOLD_VARIATION * draw_bounded_normal(generator, (count,))
-    start = settings["push_off_start"] + START_VARIATION * draw_bounded_normal(generator, (count,))
-    scale[0], start[0] = 1.0, settings["push_off_start"]
-    load, unload = settings["load_threshold"] * scale, settings["unload_threshold"] * scale
-    start = np.clip(start, 0.0, 1.0)
+    start = usual + START_VARIATION * draw_bounded_normal(generator, (count,))
+    scale[0], start[0] = 1.0, usual
+    drawn = (load * scale, unload * scale, np.clip(start, 0.0, 1.0))
     if not is_whole:
-        return {
-            "controller.phases.load_threshold": load,
-            "controller.phases.unload_threshold": unload,
-            "controller.phases.push_off_start": start,
-        }
+        return {f"controller.phases.{name}": values for name, values in zip(names, drawn, strict=True)}
     own = converter_of_walk(configuration)
-    counts = (own.scale * (force - own.force_zero) / own.force_step for force in (load, unload))
+    counts = (own.scale * (force - own.force_zero) / own.force_step for force in drawn[:2])
     loaded, unloaded = (np.floor(np.clip(count, 0.0, own.scale * own.top) + 0.5) for count in counts)
     return {
         "controller.numbers.phase.load": loaded,
         "controller.numbers.phase.unload": unloaded,
-        "controller.numbers.phase.push_off_start": np.floor(start * STRIDE_SHARE + 0.5),
+        "controller.numbers.phase.push_off_start": np.floor(drawn[2] * STRIDE_SHARE + 0.5),
     }
 
 
