@@ -30,7 +30,7 @@ STRIDES = Quantity("strides", "1", "number of strides, in place of a duration", 
 ONE_STRIDE = Quantity("strides", "1", "number of strides that it takes", 1.0, 1.0, 20.0)
 CONTACT = Quantity("contact", "s", "how long the toes touch the ground in the swing", 0.04, 1.0e-3, 0.2)
 TIME = Quantity("time", "1", "time of the stride over that of the others", 0.75, 0.6, 1.6)
-LENGTH = Quantity("length", "1", "length of the stride over that of the others", 0.6, 0.2, 1.4)
+LENGTH = Quantity("length", "1", "length in the middle of the stride over that of the others", 0.6, 0.2, 1.4)
 
 _PACE = (SPEED, CADENCE, WALKED_FOR, STRIDES)
 KINDS: dict[str, tuple[str, tuple[Quantity, ...]]] = {
@@ -42,7 +42,7 @@ KINDS: dict[str, tuple[str, tuple[Quantity, ...]]] = {
     "stop": ("stops and stands", (ONE_STRIDE,)),
     "stairs": ("climbs: the toes meet the ground before the heel", _PACE),
     "scuff": ("one stride in which the toes touch the ground in mid-swing", (CONTACT,)),
-    "stumble": ("one stride of another time and length", (TIME, LENGTH)),
+    "stumble": ("one stride of another time, shorter or longer in its middle", (TIME, LENGTH)),
 }
 """Kinds of segment: what the wearer does, and the values that it takes."""
 
@@ -117,7 +117,7 @@ def _contradictions(segments: Iterable[Segment]) -> Iterator[tuple[int, str]]:
     for index, segment in enumerate(segments):
         values = segment.values
         if segment.kind in _NEED_WALKING and not walks:
-            yield index, "the wearer stands there: walk before it"
+            yield index, "the wearer is standing at this point; insert a walking segment first"
         if segment.kind == "start" and walks:
             yield index, "the wearer walks there already: take 'ramp', or stop before it"
         if "speed" in values and "cadence" in values:

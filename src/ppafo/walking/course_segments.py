@@ -1,4 +1,4 @@
-"""What happened on each segment of a course: strides, help, gas, toes, and where the controller vented."""
+"""What happened on each segment of a course: strides, help, gas, toes, and where the controller helped less."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,8 +26,8 @@ class SegmentResult:
     ``strides`` begin in it with a strike, ``helped`` are those of them in which the controller was not in its safe
     state up to the next strike, or to the end. ``gas`` [kg], ``push_off_work`` [J] of the strides that begin in it,
     ``lowest_toes`` [m] over the ground in the middle of its swings, None without one. ``flat_push`` [N m] is the
-    largest torque in plantarflexion with a loaded heel, ``safe_time`` [s] when the controller vented, None where it did
-    not.
+    largest torque in plantarflexion with a loaded heel, ``safe_time`` [s] when the controller first helped less (lifted
+    only, paused or stopped), None where it did not.
     """
 
     kind: str
@@ -117,7 +117,7 @@ def _lowest_toes(configuration: Configuration, recording: Recording, own: NDArra
 
 
 def _safe_time(recording: Recording, own: NDArray[np.bool_]) -> float | None:
-    """When the controller vented for its own safety within a segment [s]; None where it did not."""
+    """When the controller first helped less within a segment [s]; None where it did not."""
     if "safe_state" not in recording:
         return None
     safe = recording["safe_state"] > 0.5
@@ -139,12 +139,15 @@ def course_metrics(
 ) -> dict[str, Metric]:
     """Numbers of a whole course by name, SI units, or of what was walked of it."""
     toes = [segment.lowest_toes for segment in segments if segment.lowest_toes is not None]
+    # A walk may go on after its course.
+    end = min(float(recording.time[-1]), float(planned.duration))
+    gas = float(np.interp(end, recording.time, recording["supplied_mass"]))
     found = {
-        "course_time": Metric(float(recording.time[-1]), "s", "length of the course, as far as it was walked"),
+        "course_time": Metric(end, "s", "length of the course, as far as it was walked"),
         "course_planned_time": Metric(float(planned.duration), "s", "length of the whole course"),
         "steady_strides": Metric(float(steady), "-", "whole strides at an even speed on level ground"),
         "course_strides": Metric(float(sum(item.strides for item in segments)), "-", "strides of the course"),
-        "course_gas": Metric(float(recording["supplied_mass"][-1]), "kg", "gas taken from the supply on the course"),
+        "course_gas": Metric(gas, "kg", "gas taken from the supply on the course"),
         "course_work": Metric(
             sum(item.push_off_work for item in segments), "J", "work of T_ex while the foot rolls over the toes"
         ),

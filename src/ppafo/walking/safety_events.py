@@ -15,7 +15,7 @@ from ppafo.units import from_si
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.recorded import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
 
-_WORDS = {LIFTS: "lifts the foot but does not push from", PAUSED: "paused at", STOPPED: "stopped for good at"}
+_WORDS = {LIFTS: "lift-only (no push-off) from", PAUSED: "paused at", STOPPED: "stopped for good at"}
 _RETURNS = {HELPS: "help came back", LIFTS: "the foot is lifted again"}
 _NAMES = {HELPS: "help", LIFTS: "lift", PAUSED: "pause", STOPPED: "stop"}
 _UNITS = {"heel_force": "N", "toe_force": "N", "angle": "rad", "pressure_1": "Pa_a", "pressure_2": "Pa_a"}

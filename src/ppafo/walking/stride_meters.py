@@ -1,6 +1,7 @@
 """Metrics of a walk stride by stride, without a recording: one meter that goes through the samples once.
 
-What is counted is that of ``walking/strides.py`` and ``walking/walk_metrics.py``; tests hold both together.
+What is counted is that of ``walking/strides.py`` and ``walking/walk_metrics.py``; tests hold both together. Only
+a landing on the toes counts for the stride that it ends here, and there for the one that it begins.
 """
 
 import math
@@ -255,9 +256,16 @@ TRACKING = (
 COUNTS = (
     StrideMetric("strides", "-", "whole strides of the walk", _whole),
     StrideMetric("helped_strides", "-", "whole strides with help from strike to strike", _helped),
-    StrideMetric("vented_strides", "-", "whole strides with the chambers vented in at least a part of them", _vented),
+    StrideMetric(
+        "vented_strides",
+        "-",
+        "whole strides with less help (lifted only, paused or stopped) in at least a part of them",
+        _vented,
+    ),
     StrideMetric("total_gas", "kg", "gas taken from the supply in the whole walk", _total_gas),
-    StrideMetric("safe_state_time", "s", "time at which the controller first paused or stopped", _safe_time),
+    StrideMetric(
+        "safe_state_time", "s", "time at which the controller first lifted only, paused or stopped", _safe_time
+    ),
 )
 
 

@@ -56,7 +56,9 @@ def stride_starts(strides: Floats) -> NDArray[np.intp]:
 
 def per_stride(totals: Mapping[str, Floats], starts: NDArray[np.intp]) -> dict[str, Floats]:
     """Numbers of each whole stride [SI], shape (strides,), from running totals at the heel strikes."""
-    return {name: np.diff(totals[item.total][starts]) for name, item in PER_STRIDE.items()}
+    # A landing on the toes is counted in the step of the strike, of which ``starts`` has the sample after it.
+    firsts = {name: starts - 1 if name == "toe_landing" else starts for name in PER_STRIDE}
+    return {name: np.diff(totals[item.total][firsts[name]]) for name, item in PER_STRIDE.items()}
 
 
 def helped_strides(level: Floats, starts: NDArray[np.intp]) -> NDArray[np.bool_]:

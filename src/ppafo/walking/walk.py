@@ -58,10 +58,10 @@ class WalkResult:
     """A finished walk: recording, numbers of each stride (strides,), curves over the stride, and numbers of the whole.
 
     ``averages`` and ``metrics`` are those of the strides with help, without the first ones, in which the controller
-    learns; ``vented_metrics`` those of the strides in which it paused or had stopped, {} without such. ``starts`` are
-    the samples of the recording right after each heel strike, ``helped`` tells of each stride whether it had help
-    throughout, and ``events`` are the pauses, the stop and the returns of help. ``segments`` are those of a course,
-    none without one; means are then over its strides at an even speed on level ground.
+    learns; ``vented_metrics`` those of the strides with less help (lifted only, paused or stopped), {} without such.
+    ``starts`` are the samples of the recording right after each heel strike, ``helped`` tells of each stride whether
+    it had help throughout, and ``events`` are the pauses, the stop and the returns of help. ``segments`` are those of a
+    course, none without one; means are then over its strides at an even speed on level ground.
     ``supply`` is the bottle over the walk, None where the device hangs on none.
     """
 
@@ -147,10 +147,11 @@ def walk(
 
 
 def integral_of_a_stride(result: WalkResult, values: Floats) -> float:
-    """Return the integral of a channel over the ankle angle, in its unit times rad, mean of the strides with help."""
+    """Return the integral of a channel over the ankle angle, in its unit times rad, mean over the counted strides."""
     turned = np.diff(result.recording["angle"])
     done = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * turned)])
-    return float(np.diff(done[result.starts])[settled(result.helped)].mean())
+    counted = result.helped & _counted(result.configuration, result.recording, result.starts)
+    return float(np.diff(done[result.starts])[counted].mean())
 
 
 def walk_duration(configuration: Configuration, minutes: float | None = None) -> float:
@@ -224,9 +225,7 @@ def _walk_result(
     strides = per_stride(record, starts)
     helped = helped_strides(record.get(SAFE_ROW, np.zeros(recording.time.size)), starts)
     planned = course_of_walk(configuration)
-    steady = settled(np.ones(helped.size, dtype=np.bool_))
-    if planned is not None:
-        steady = steady_strides(planned, recording.time[starts])
+    steady = _counted(configuration, recording, starts)
     averages, vented = (mean_curves(recording, starts, chosen & steady) for chosen in (helped, ~helped))
     metrics = walk_metrics(configuration, recording, strides, averages, starts, helped, steady)
     without = ~helped & steady
@@ -239,6 +238,14 @@ def _walk_result(
     return WalkResult(
         configuration, recording, strides, averages, metrics, status, starts, helped, apart, events, segments
     )
+
+
+def _counted(configuration: Configuration, recording: Recording, starts: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """True for each whole stride that counts for means: not the first ones, of a course those at an even speed."""
+    planned = course_of_walk(configuration)
+    if planned is not None:
+        return steady_strides(planned, recording.time[starts])
+    return settled(np.ones(max(starts.size - 1, 0), dtype=np.bool_))
 
 
 def _status(failed: float, too_many_parts: bool, states: Floats) -> Status:

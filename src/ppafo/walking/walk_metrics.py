@@ -32,7 +32,11 @@ def walk_metrics(
     counts = (
         Metric(float(helped.size), "-", "whole strides of the walk"),
         Metric(float(helped.sum()), "-", "whole strides with help from strike to strike"),
-        Metric(float((~helped).sum()), "-", "whole strides with the chambers vented in at least a part of them"),
+        Metric(
+            float((~helped).sum()),
+            "-",
+            "whole strides with less help (lifted only, paused or stopped) in at least a part of them",
+        ),
         Metric(float(np.ptp(recording["supplied_mass"][[0, -1]])), "kg", "gas taken from the supply in the whole walk"),
     )
     found = stride_metrics(configuration, strides, averages, helped & counted)
@@ -104,11 +108,11 @@ def _tracking(recording: Recording, starts: NDArray[np.intp], chosen: NDArray[np
 
 
 def _safety(recording: Recording) -> dict[str, Metric]:
-    """When the controller first vented both chambers; nothing where it never did."""
+    """When the controller first helped less; nothing where it never did."""
     if "safe_state" not in recording or not recording["safe_state"].any():
         return {}
     time = float(recording.time[int(np.argmax(recording["safe_state"] > 0.5))])
-    return {"safe_state_time": Metric(time, "s", "time at which the controller first paused or stopped")}
+    return {"safe_state_time": Metric(time, "s", "time at which the controller first lifted only, paused or stopped")}
 
 
 def healthy_positive_work(configuration: Configuration) -> float:

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.control.fixed.walking.lanes import WalkRows
+from ppafo.control.fixed.walking.phases import STRIDE_SHARE
 from ppafo.engine.lanes import Batch, Floats
 from ppafo.engine.rows import leaf_paths, leaves, row_numbers
 from ppafo.engine.run import Run, batch_of
@@ -19,6 +21,7 @@ from ppafo.walking.anthropometry import Build, draw_bounded_normal, segment_valu
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.course_planning import PlannedCourse, plan_course, standing_gait
 from ppafo.walking.declaration import LARGEST_SEED
+from ppafo.walking.fixed_point import converter_of_walk
 from ppafo.walking.varied_gait import VariedGaits
 
 THRESHOLD_VARIATION = 0.15
@@ -47,9 +50,8 @@ def batch_of_many(
     leg, segments = run.walk.leg, segment_values(configuration.wearer, build)
     segments |= {name: getattr(leg, name) * build.stature for name in ("heel_lever", "flat_heel_lever")}
     parameters, states = (np.repeat(column, count, axis=1) for column in (single.parameters, single.states))
-    _overwrite(
-        parameters, row_numbers(single.program.parameter_rows()), _parameter_rows(run, segments, gaits, generator)
-    )
+    varied = _parameter_rows(run, segments, gaits) | _thresholds(configuration, run, count, generator)
+    _overwrite(parameters, row_numbers(single.program.parameter_rows()), varied)
     _overwrite(states, row_numbers(single.program.state_rows()), _state_rows(run, segments, gaits, planned))
     if planned is not None:
         _overwrite(parameters, row_numbers(single.program.parameter_rows()), _course_rows(planned))
@@ -77,9 +79,7 @@ def _overwrite(table: Floats, rows: Mapping[str, int], values: Mapping[str, Floa
         table[rows[path]] = row
 
 
-def _parameter_rows(
-    run: Run, segments: Mapping[str, Floats], gaits: VariedGaits, generator: np.random.Generator
-) -> dict[str, Floats]:
+def _parameter_rows(run: Run, segments: Mapping[str, Floats], gaits: VariedGaits) -> dict[str, Floats]:
     found = {f"leg.{name}": values for name, values in segments.items() if name in LegParameters._fields}
     assert run.walk is not None, "a population walks"
     foot = segments["foot_inertia"] + segments["foot_mass"] * segments["foot_mass_centre"] ** 2
@@ -92,21 +92,32 @@ def _parameter_rows(
         for name, values in series.rows().items()
     }
     found |= {f"gait_timing.{name}": values for name, values in gaits.timing.items()}
-    return found | _thresholds(run, segments["body_mass"].size, generator)
+    return found
 
 
-def _thresholds(run: Run, count: int, generator: np.random.Generator) -> dict[str, Floats]:
+def _thresholds(
+    configuration: Configuration, run: Run, count: int, generator: np.random.Generator
+) -> dict[str, Floats]:
     """Thresholds of an event-based controller about its settings; both of a sensor move together and stay apart."""
-    rules = getattr(run.controller, "phases", None)
-    if rules is None:
+    is_whole = isinstance(run.controller, WalkRows)
+    if not is_whole and not hasattr(run.controller, "phases"):
         return {}
+    names = ("load_threshold", "unload_threshold", "push_off_start")
+    rules = configuration.settings if is_whole else run.controller.phases._asdict()
+    load, unload, usual = (rules[name] for name in names)
     scale = 1.0 + THRESHOLD_VARIATION * draw_bounded_normal(generator, (count,))
-    start = rules.push_off_start + START_VARIATION * draw_bounded_normal(generator, (count,))
-    scale[0], start[0] = 1.0, rules.push_off_start
+    start = usual + START_VARIATION * draw_bounded_normal(generator, (count,))
+    scale[0], start[0] = 1.0, usual
+    drawn = (load * scale, unload * scale, np.clip(start, 0.0, 1.0))
+    if not is_whole:
+        return {f"controller.phases.{name}": values for name, values in zip(names, drawn, strict=True)}
+    own = converter_of_walk(configuration)
+    counts = (own.scale * (force - own.force_zero) / own.force_step for force in drawn[:2])
+    loaded, unloaded = (np.floor(np.clip(count, 0.0, own.scale * own.top) + 0.5) for count in counts)
     return {
-        "controller.phases.load_threshold": rules.load_threshold * scale,
-        "controller.phases.unload_threshold": rules.unload_threshold * scale,
-        "controller.phases.push_off_start": np.clip(start, 0.0, 1.0),
+        "controller.numbers.phase.load": loaded,
+        "controller.numbers.phase.unload": unloaded,
+        "controller.numbers.phase.push_off_start": np.floor(drawn[2] * STRIDE_SHARE + 0.5),
     }
 
 

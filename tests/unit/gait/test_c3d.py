@@ -11,6 +11,7 @@ import pytest
 from ppafo.errors import DataError
 from ppafo.gait import Gait
 from ppafo.gait.recorded import ImportSettings, import_gait
+from ppafo.gait.recorded.c3d import open_c3d
 from ppafo.gait.recorded.mapping import AngleMap, ForceMap, GaitMap, KneeMap, ShankMap
 from ppafo.gait.recorded.table import read_table
 from ppafo.signals import Recording
@@ -114,6 +115,20 @@ def test_a_walk_the_other_way_is_seen_in_the_markers_and_a_map_may_name_axes_and
     forwards = columns.model_copy(update={"shank_angle": ShankMap(knee="RKNE", ankle="RANK")})
     with pytest.raises(DataError, match="shank_angle grows while the foot stands"):
         import_gait([path], ImportSettings(normative.body_mass, columns=forwards))
+
+
+@pytest.mark.parametrize("stored", [1.0, -1.0])
+def test_the_weight_on_a_plate_is_upwards_whichever_axis_is_up(
+    written: Callable[..., Path], monkeypatch: pytest.MonkeyPatch, stored: float
+) -> None:
+    path = written()
+    content = open_c3d(path)
+    weight = np.full(content["data"]["points"].shape[2], 600.0)
+    plates = [{"force": stored * np.array([0.1 * weight, weight, -0.02 * weight])}]
+    read = {"header": content["header"], "parameters": content["parameters"]}
+    read["data"] = {name: content["data"][name] for name in ("points", "analogs")} | {"platform": plates}
+    monkeypatch.setattr("ppafo.gait.recorded.c3d.open_c3d", lambda _path: read)
+    assert np.all(read_table(path).columns["force plate 1.y"] == weight)
 
 
 def test_a_gap_in_a_marker_is_named(written: Callable[..., Path], walk: Recording) -> None:

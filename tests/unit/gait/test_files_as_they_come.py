@@ -8,14 +8,17 @@ import pytest
 from ppafo.errors import DataError
 from ppafo.gait import Gait, load_gait, walk_recording
 from ppafo.gait.opensim_names import opensim_recording
+from ppafo.gait.plausible.loads import check_force_scale
 from ppafo.gait.recorded import ImportSettings, import_gait
-from ppafo.gait.recorded.mapping import Side
+from ppafo.gait.recorded.conventions import find_convention
+from ppafo.gait.recorded.mapping import AngleMap, GaitMap, ShankMap, Side
 from ppafo.gait.recorded.one_cycle import wrap_cycle
 from ppafo.gait.recorded.signal import Signal
+from ppafo.gait.recorded.table import read_table
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
 from ppafo.storage.opensim import write_opensim
-from tests.unit.gait.laboratory import GAIT, MASS, STRIDE, UNLOADED, angles, curve, force, markers, opensim, trc
+from tests.unit.gait.laboratory import GAIT, MASS, SPEED, STRIDE, UNLOADED, angles, curve, force, markers, opensim, trc
 
 PHASES = np.linspace(0.0, 1.0, 101)
 TIME, FAST = np.arange(0.0, 5.2, 0.01), np.arange(0.0, 5.2, 0.002)
@@ -68,6 +71,17 @@ def test_forces_are_of_the_foot_that_their_names_or_their_time_say(tmp_path: Pat
         ik = opensim(tmp_path / f"{side}.mot", TIME, angles(TIME, side), "inDegrees=yes")
         both = opensim(tmp_path / "grf.mot", FAST, {left: force(FAST, "left"), right: force(FAST, "right")})
         assert_true(import_gait([ik, both], ImportSettings(MASS, side)).gait)  # type: ignore[arg-type]
+
+
+def test_one_contact_in_a_long_record_of_a_plate_is_a_force() -> None:
+    time = np.arange(0.0, 60.0, 0.01)
+    weights = force(time, "right", [1]) / (MASS * 9.80665)
+    assert np.count_nonzero(weights) < 0.02 * time.size
+    check_force_scale("plate", weights, "columns")
+    with pytest.raises(DataError, match="its sign is reversed"):
+        check_force_scale("plate", -weights, "columns")
+    with pytest.raises(DataError, match="is the body mass right"):
+        check_force_scale("plate", 10.0 * weights, "columns")
 
 
 def test_several_plates_of_one_foot_are_summed_and_named(tmp_path: Path) -> None:
@@ -152,6 +166,33 @@ def test_markers_give_shank_knee_and_an_ankle_whose_zero_is_the_flat_foot(tmp_pa
     assert not any("zero of ankle_angle" in line for line in found.remarks)
 
 
+def test_a_neutral_reading_is_taken_off_the_angle_of_markers_too(tmp_path: Path) -> None:
+    path = walked(tmp_path)
+    usual = import_gait([path], PERSON).gait.ankle_angle.mean
+    for neutral in (10.0, -4.0):
+        found = import_gait([path], ImportSettings(MASS, ankle_neutral=np.radians(neutral)))
+        assert np.degrees(usual - found.gait.ankle_angle.mean) == pytest.approx(neutral, abs=0.01)
+    shifted = import_gait([path], ImportSettings(MASS, ankle_neutral=np.radians(10.0)))
+    (said,) = [line for line in shifted.remarks if "zero of ankle_angle" in line]
+    advised = float(said.split("--ankle-neutral '")[1].split(" deg")[0])
+    assert abs(advised) < 5.0, "the advice leads back to the foot that stands flat"
+    mapped = AngleMap(heel="RHEE", toe="RTOE", vertical="y", positive="dorsiflexion", neutral="10 deg")
+    columns = GaitMap(shank_angle=ShankMap(knee="RKNE", ankle="RANK", vertical="y"), ankle_angle=mapped)
+    other = import_gait([path], ImportSettings(MASS, columns=columns)).gait.ankle_angle.mean
+    assert np.degrees(other - usual) == pytest.approx(10.0, abs=0.01)
+
+
+def test_the_foot_says_which_way_a_part_of_a_stride_on_a_treadmill_goes(tmp_path: Path) -> None:
+    time = TIME[: int(1.6 * STRIDE / 0.01)]
+    points = markers(time)
+    for point in points.values():
+        # The belt takes the standing foot back; from a heel strike to the next toe-off but one that is a net way.
+        point[0] -= 1000.0 * SPEED * time
+    assert points["RANK"][0, -1] - points["RANK"][0, 0] < -500.0
+    table = read_table(trc(tmp_path / "belt.trc", time, points))
+    assert find_convention([table], "right", MASS).columns.shank_angle.forward == "x"
+
+
 def test_gaps_are_filled_up_to_the_length_that_is_stated_and_named(tmp_path: Path) -> None:
     path = walked(tmp_path, (120, 126))
     with pytest.raises(
@@ -174,6 +215,9 @@ def test_rows_that_are_missing_are_bridged_up_to_the_same_length(tmp_path: Path)
     path = opensim(tmp_path / "ik.mot", kept, angles(kept), "inDegrees=yes")
     with pytest.raises(DataError, match=r"the time jumps in row 201 from 1.99 s to 2.06 s"):
         import_gait([path], PERSON)
+    cut = import_gait([path], ImportSettings(MASS, start=2.06))
+    assert_true(cut.gait, ("shank_angle", "ankle_angle"))
+    assert not any("bridged" in line for line in cut.remarks)
     found = import_gait([path], ImportSettings(MASS, longest_gap=0.08))
     assert_true(found.gait, ("shank_angle", "ankle_angle"))
     assert "ik.mot: rows from 1.99 to 2.06 s are missing and were bridged" in found.remarks

@@ -23,6 +23,7 @@ from ppafo.gait.recorded.mapping import (
     PressureMap,
     ShankMap,
     Side,
+    opensim_map,
     package_map,
 )
 from ppafo.gait.writing import gait_toml
@@ -197,6 +198,11 @@ def test_a_knee_that_counts_flexion_above_zero_is_recognised(opensim_files: dict
     flipped = ["\t".join([*row[:3], str(-float(row[3])), *row[4:]]) for row in cells]
     path.write_text(head + "time\t" + "\n".join([labels, *flipped]) + "\n")
     assert_same(import_gait(list(opensim_files.values()), ImportSettings(normative.body_mass)).gait, normative)
+    stated = ShankMap(terms=("pelvis_tilt", "hip_flexion_r", "-knee_angle_r"))
+    columns_map = opensim_map("right").model_copy(update={"shank_angle": stated, "knee": None})
+    settings = ImportSettings(normative.body_mass, columns=columns_map)
+    found = import_gait(list(opensim_files.values()), settings).gait
+    assert largest_difference(found, normative, "shank_angle") < LIMITS["shank_angle"], "a map's sign is as it says"
 
 
 def test_without_a_force_the_strides_come_from_the_shank(opensim_files: dict[str, Path], normative: Gait) -> None:

@@ -1,6 +1,7 @@
 """Courses: files and their mistakes, segments in time, and what the foot, the gas and many wearers do on them."""
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,14 @@ from ppafo.gait import load_gait
 from ppafo.model.chambers import chamber_mass
 from ppafo.model.contact import FLAT
 from ppafo.model.plant import chamber_volumes
+from ppafo.questions.endurance.draw import walk_gas
+from ppafo.questions.walk.course import course_sections
 from ppafo.walking import load_walk, walk, walk_population
+from ppafo.walking.comparison import Comparison
 from ppafo.walking.course import WalkingCourse, list_courses, load_course
+from ppafo.walking.course_segments import course_metrics, steady_strides
 from ppafo.walking.planning import plan_walk, planned_course
-from ppafo.walking.walk import WalkResult, plan_of
+from ppafo.walking.walk import WalkResult, integral_of_a_stride, plan_of
 
 HEAD = 'schema_version = 1\nname = "tried"\n'
 STAND = '[[segment]]\nkind = "stand"\nduration = "1 s"\n'
@@ -46,8 +51,8 @@ MISTAKES = {
     "both lengths": (WALK + 'duration = "3 s"\n', ("segment 1 (walk): give either duration or strides, not both",)),
     "no length": (WALK.replace("strides = 2\n", ""), ("segment 1 (walk): give either duration or strides",)),
     "both speeds": (WALK + 'cadence = "100 1/min"\n', ("segment 1 (walk): give either speed or cadence, not both",)),
-    "stop in standing": (STAND + '[[segment]]\nkind = "stop"\n', ("segment 2 (stop): the wearer stands there",)),
-    "scuff in standing": ('[[segment]]\nkind = "scuff"\n', ("segment 1 (scuff): the wearer stands there",)),
+    "stop in standing": (STAND + '[[segment]]\nkind = "stop"\n', ("segment 2 (stop): the wearer is standing at this",)),
+    "scuff in standing": ('[[segment]]\nkind = "scuff"\n', ("segment 1 (scuff): the wearer is standing at this",)),
     "start in walking": (
         WALK + '[[segment]]\nkind = "start"\n',
         ("segment 2 (start): the wearer walks there already",),
@@ -193,6 +198,32 @@ def test_means_are_over_the_strides_at_an_even_speed_on_level_ground(corridor: W
     steady = int(corridor.metrics["steady_strides"].value)
     assert 0 < steady <= sum(inside)
     assert "even speed" in corridor.metrics["gas"].summary
+
+
+def test_an_integral_of_a_stride_is_over_the_strides_of_the_means(corridor: WalkResult) -> None:
+    steady = steady_strides(planned_course(load_course("corridor"), GAIT), corridor.recording.time[corridor.starts])
+    angle = corridor.recording["angle"]
+    # Of the angle itself it is half of what its square gained from strike to strike.
+    gains = np.diff(0.5 * angle[corridor.starts] ** 2)[steady & corridor.helped]
+    assert integral_of_a_stride(corridor, angle) == pytest.approx(gains.mean(), abs=1.0e-12)
+
+
+def test_a_walk_longer_than_its_course_has_the_gas_and_the_time_of_the_course(corridor: WalkResult) -> None:
+    planned = planned_course(load_course("corridor"), GAIT)
+    longer = course_metrics(replace(planned, duration=40.0), corridor.segments, corridor.recording, 0)
+    assert longer["course_time"].value == longer["course_planned_time"].value == 40.0
+    assert longer["course_gas"].value == corridor.recording["supplied_mass"][corridor.recording.time <= 40.0][-1]
+    gas = walk_gas(replace(corridor, metrics={**corridor.metrics, **longer}))
+    assert (gas.stride_time, gas.gas_per_stride) == (40.0, longer["course_gas"].value)
+    assert gas.is_whole
+
+
+def test_the_table_of_a_course_counts_helped_strides_as_it_counts_strides(corridor: WalkResult) -> None:
+    table = course_sections(Comparison(corridor, corridor, {}))[0].table
+    assert table is not None
+    for column in (3, 4):
+        *parts, whole = (int(str(row[column])) for row in table.rows)
+        assert whole == sum(parts)
 
 
 def test_the_toe_sensor_shows_a_scuff_in_the_swing(corridor: WalkResult) -> None:

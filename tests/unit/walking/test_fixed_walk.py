@@ -17,12 +17,16 @@ from ppafo.exports.firmware.walking.lock_step import PythonWalkChip
 from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import Fault, GaitMeasurement, GaitSensors
 from ppafo.simulation.sampled import state_row_numbers
+from ppafo.walking.anthropometry import draw_builds
 from ppafo.walking.comparison import with_device_off
+from ppafo.walking.fixed_point import converter_of_walk
 from ppafo.walking.loading import load_walk
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.recorded import SAFE_ROW
 from ppafo.walking.sampled import run_sampled_walk
+from ppafo.walking.varied_gait import draw_gaits
 from ppafo.walking.walk import plan_of, walk
+from ppafo.walking.wearers_rows import batch_of_many
 
 FIXED = "controller.arithmetic=fixed"
 
@@ -48,6 +52,31 @@ def test_whole_numbers_cost_less_than_one_percent_of_gas_and_angle_with_either_v
         assert fixed.metrics[name].value == pytest.approx(floats.metrics[name].value, rel=0.01)
     assert fixed.metrics["vented_strides"].value == floats.metrics["vented_strides"].value == 0.0
     assert fixed.recording["command"].tolist() != floats.recording["command"].tolist()
+
+
+def test_the_thresholds_of_many_wearers_vary_on_whole_numbers_as_in_floats() -> None:
+    tables = {}
+    for name, given in (("floats", ()), ("fixed", (FIXED,))):
+        configuration = load_walk("solenoid", given)
+        generator = np.random.default_rng(3)
+        build = draw_builds(40, generator)
+        gaits = draw_gaits(configuration.gait, build.stature, generator)
+        run = plan_walk(plan_of(configuration, 4.0))
+        found = batch_of_many(configuration, run, build, gaits, generator)
+        tables[name] = {path: found.parameters[row] for path, row in row_numbers(run.program.parameter_rows()).items()}
+        alone = batch_of(run).parameters
+        paths = [path for path in tables[name] if path.startswith("controller.")]
+        assert all(tables[name][path][0] == alone[row_numbers(run.program.parameter_rows())[path], 0] for path in paths)
+    converter = converter_of_walk(load_walk("solenoid", (FIXED,)))
+    for whole, name in (("load", "load_threshold"), ("unload", "unload_threshold")):
+        force = tables["floats"][f"controller.phases.{name}"]
+        counts = tables["fixed"][f"controller.numbers.phase.{whole}"]
+        shown = converter.force_zero + counts * converter.force_step / converter.scale
+        assert np.allclose(shown, force, atol=0.51 * converter.force_step / converter.scale)
+        assert np.unique(counts).size > 1
+        assert np.array_equal(counts, np.rint(counts))
+    starts = tables["fixed"]["controller.numbers.phase.push_off_start"] / 2.0**14
+    assert np.allclose(starts, tables["floats"]["controller.phases.push_off_start"], atol=2.0**-15)
 
 
 def test_the_lanes_decide_as_python_does() -> None:

@@ -1,4 +1,4 @@
-"""The wearer comes with the gait that is named; what a walk file states wins, and a difference is said."""
+"""The wearer comes with the gait that is named; what a walk file states wins, and any discrepancy is reported."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -12,7 +12,16 @@ from ppafo.signals import CHANNELS, Channel, Recording
 from ppafo.storage.opensim import read_opensim
 from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk
 from ppafo.walking.gait_series import NEARLY_FLAT, gait_timing
-from ppafo.walking.strides import PHASES, SETTLING, helped_strides, mean_curves, samples_of, stride_starts
+from ppafo.walking.strides import (
+    PER_STRIDE,
+    PHASES,
+    SETTLING,
+    helped_strides,
+    mean_curves,
+    per_stride,
+    samples_of,
+    stride_starts,
+)
 
 MINUTES = 0.15
 
@@ -143,6 +152,18 @@ def test_a_result_can_be_drawn_and_says_what_it_is() -> None:
     result = compared("proportional").with_device
     assert len(result.plot().axes) == 5
     assert repr(result).startswith("Walk 'proportional', 0.15 min: completed\n  gas ")
+
+
+def test_a_landing_on_the_toes_is_that_of_the_stride_that_it_begins() -> None:
+    strikes = {5: 0.0, 15: 1.0, 25: 0.0, 35: 1.0}
+    strides, landings = (np.zeros(40) for _ in range(2))
+    for sample, on_toes in strikes.items():
+        strides[sample:] += 1.0
+        landings[sample:] += on_toes
+    totals = {item.total: landings if name == "toe_landing" else strides for name, item in PER_STRIDE.items()}
+    found = per_stride(totals, stride_starts(strides))
+    assert found["toe_landing"].tolist() == [0.0, 1.0, 0.0]
+    assert found["gas"].tolist() == [1.0, 1.0, 1.0]
 
 
 def test_a_stride_has_help_only_if_every_sample_of_it_has() -> None:

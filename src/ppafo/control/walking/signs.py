@@ -82,10 +82,10 @@ class Sign:
 
 
 SIGNS: dict[float, Sign] = {
-    FORCE_RANGE: Sign("force_range", "a force that no foot gives", FORCES, ("lowest_force", "largest_force")),
+    FORCE_RANGE: Sign("force_range", "implausible foot force", FORCES, ("lowest_force", "largest_force")),
     ANGLE_RANGE: Sign("angle_range", "an angle that no ankle has", ("angle",), ("lowest_angle", "highest_angle")),
     PRESSURE_RANGE: Sign(
-        "pressure_range", "a pressure that no chamber has", PRESSURES, ("lowest_pressure", "highest_pressure")
+        "pressure_range", "implausible chamber pressure", PRESSURES, ("lowest_pressure", "highest_pressure")
     ),
     NO_RISE: Sign(
         "no_rise",
@@ -113,7 +113,7 @@ SIGNS: dict[float, Sign] = {
         "still_angle", "an angle in stance that stays the same while something else moves", ("angle",), ("frozen_time",)
     ),
     ENDLESS_PHASE: Sign(
-        "endless_phase", "a swing without end, or as long on heel or toes alone", FORCES, ("longest_phase",)
+        "endless_phase", "swing, heel-only or toe-only contact lasting too long", FORCES, ("longest_phase",)
     ),
     RESTLESS: Sign("restless", "a stance without end in which heel or toes come and go", FORCES, ("longest_phase",)),
     NO_TOES: Sign("no_toes", "a swing right after the heel strike, without the toes", FORCES, ()),

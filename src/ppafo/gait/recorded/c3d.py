@@ -156,7 +156,9 @@ def _plates(content: Any, frames: int) -> Iterator[tuple[str, Floats]]:
             continue
         # Some laboratories store what the plate feels, some what it gives back; a foot loads it downwards.
         force = force[:, :: force.shape[1] // frames][:, :frames]
-        sign = -1.0 if np.nansum(force[2]) < 0.0 else 1.0
+        # Whichever axis is up, the weight is the largest of the sums.
+        total = np.nansum(force, axis=1)
+        sign = -1.0 if total[np.argmax(np.abs(total))] < 0.0 else 1.0
         for row, axis in enumerate(_AXES):
             yield f"{PLATE}{number}.{axis}", sign * force[row]
 

@@ -61,7 +61,7 @@ def check_finite(values: Floats, place: str, time: Floats) -> None:
     """Raise DataError for a column with a gap within its ``time`` [s]; ``place`` is what the message calls it."""
     known = np.flatnonzero(np.isfinite(values))
     if known.size == 0:
-        raise DataError(f"{place} has no number at all; give a file or a gait map with another column")
+        raise DataError(f"{place} contains no numbers; use another file, or map another column")
     first = int(known[0])
     bad = first + np.flatnonzero(~np.isfinite(values[first : int(known[-1]) + 1]))
     if bad.size:
@@ -82,9 +82,12 @@ def _remedy(time: Floats, known: "np.ndarray[tuple[int], np.dtype[np.intp]]") ->
 
 
 def find_columns(
-    curve: str, names: Sequence[str], tables: Sequence[MotionTable], optional: bool
+    curve: str, names: Sequence[str], tables: Sequence[MotionTable], optional: bool, is_default: bool
 ) -> CurveColumns | None:
-    """Return the one table that has every column of a curve; None where it may be missing and no table has one."""
+    """Return the one table that has every column of a curve; None where it may be missing and no table has one.
+
+    The sign of the knee is detected only with the map of the package (``is_default``): a user's map states it.
+    """
     bare = [name.removeprefix("-") for name in names]
     holders = [table for table in tables if all(name in table.columns for name in bare)]
     if len(holders) > 1:
@@ -92,7 +95,9 @@ def find_columns(
         raise DataError(f"{curve}: both {files} have the column {bare[0]!r}; give one of them, or name another column")
     if holders:
         signs = [-1.0 if name.startswith("-") else 1.0 for name in names]
-        terms = _detect_knee(holders[0], tuple(zip(signs, bare, strict=True)))
+        terms = tuple(zip(signs, bare, strict=True))
+        if is_default:
+            terms = _detect_knee(holders[0], terms)
         return CurveColumns(f"{curve}.unit", holders[0], terms, curve in LOADS)
     if optional and not any(name in table.columns for name in bare for table in tables):
         return None

@@ -224,7 +224,8 @@ def _axes(
 ) -> tuple[str, str, tuple[str, ...]]:
     """Return the axes along the walk and upwards, and a remark where they are not x and z.
 
-    Up is where the knee stays from the ankle; forward where the foot points, or where the ankle goes.
+    Up is where the knee stays from the ankle, the axis of the walk where the ankle goes or the foot points. The foot
+    tells forwards from backwards: on a treadmill the ankle of a part of a stride may end behind.
     """
     at_knee, at_ankle = _point(table, knee), _point(table, ankle)
     if at_knee is None or at_ankle is None:
@@ -232,19 +233,21 @@ def _axes(
     apart = at_knee - at_ankle
     up = int(np.argmax(np.abs(np.nanmean(apart, axis=1)) - 2.0 * np.nanstd(apart, axis=1)))
     way = _way(at_ankle)
+    pointing = _pointing(table, foot, labels)
     if np.hypot(*np.delete(way, up)) < _LEAST_WAY * _per_metre(table, ankle):
-        at_heel, at_toe = (_point(table, _first(labels, foot, names) or "") for names in (_HEELS, _TOES))
-        if at_heel is None or at_toe is None:
+        if pointing is None:
             return "x" if up else "y", "xyz"[up], ()
-        way = np.nanmean(at_toe - at_heel, axis=1)
+        way = pointing
+    elif pointing is not None and np.delete(pointing, up) @ np.delete(way, up) < 0.0:
+        way = -way
     along = max((axis for axis in range(3) if axis != up), key=lambda axis: abs(float(way[axis])))
     across = 3 - up - along
     oblique = float(np.degrees(np.arctan2(abs(way[across]), abs(way[along]))))
     if oblique > _MOST_OBLIQUE:
         raise DataError(
             f"{table.file}: the walk goes {oblique:.0f} deg off the axis {'xyz'[along]} of the laboratory, and "
-            f"the lean of the shank is seen along an axis, to {_MOST_OBLIQUE:g} deg; turn the axes into the "
-            "walk"
+            f"the lean of the shank is seen along an axis, to {_MOST_OBLIQUE:g} deg; rotate "
+            "the coordinates so that one axis points along the walk"
         )
     forward = f"{'-' if way[along] < 0.0 else ''}{'xyz'[along]}"
     said = () if (forward, up) == ("x", 2) else (f"the walk goes along {forward}, upwards is {'xyz'[up]}",)
@@ -254,6 +257,16 @@ def _axes(
 def _point(table: MotionTable, label: str) -> Floats | None:
     rows = [table.columns.get(f"{label}.{axis}") for axis in "xyz"]
     return None if any(row is None for row in rows) else np.array(rows)
+
+
+def _pointing(table: MotionTable, foot: str, labels: Sequence[str]) -> Floats | None:
+    """Return the mean way from heel to toes, (3,); None where the markers are not there or never seen together."""
+    at_heel, at_toe = (_point(table, _first(labels, foot, names) or "") for names in (_HEELS, _TOES))
+    if at_heel is None or at_toe is None:
+        return None
+    apart = at_toe - at_heel
+    seen = np.isfinite(apart).all(axis=0)
+    return np.asarray(apart[:, seen].mean(axis=1)) if seen.any() else None
 
 
 def _way(point: Floats) -> Floats:

@@ -27,7 +27,7 @@ def between_markers(found: CurveColumns, mapped: ShankMap | AngleMap, first: str
 
 
 def foot_markers_angle(found: CurveColumns, mapped: AngleMap, shank: Signal) -> Signal:
-    """Return the ankle angle [rad] of a line from heel to toes; it stands at 90 deg plus the shank while flat."""
+    """Return the ankle angle [rad] of a line from heel to toes: flat, 90 deg plus the shank, less the neutral one."""
     ahead, up = between_markers(found, mapped, str(mapped.heel), str(mapped.toe))
     pitch = Signal(found.table.file, found.table.time, np.arctan2(up, ahead))
     seen = without_ends(pitch)
@@ -41,7 +41,8 @@ def foot_markers_angle(found: CurveColumns, mapped: AngleMap, shank: Signal) -> 
             "shank leans forward, so the zero of the ankle is unknown; give the angle itself in ankle_angle.terms "
             "of a gait map"
         )
-    angle = 0.5 * np.pi + lean - (values - float(np.median(values[flat])))
+    sign, neutral = mapped.sign_and_neutral()
+    angle = 0.5 * np.pi + lean - (values - float(np.median(values[flat]))) - sign * neutral
     return Signal(found.table.file, time, angle)
 
 

@@ -33,7 +33,6 @@ from ppafo.gait.recorded.source import Source, read_source
 from ppafo.gait.recorded.strides import CurveStatistics, mean_curve, strides_within, without_outliers
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats
-from ppafo.units import parse_quantity
 
 LARGEST_STRIDE_CHANGE = 0.25
 """Fraction of the median stride time; a stride that differs by more has a missed event, or is not steady walking."""
@@ -112,9 +111,8 @@ def _finish(
 def _zero_remarks(columns: GaitMap, means: Mapping[str, Floats]) -> list[str]:
     """Return what there is to say of the ankle's zero, with the reading that would be neutral."""
     tilt = standing_tilt(means["shank_angle"], means["ankle_angle"])
-    mapped = columns.ankle_angle
-    sign = 1.0 if mapped.positive == "plantarflexion" else -1.0
-    neutral = float(np.degrees(parse_quantity(mapped.neutral, "rad"))) + sign * tilt
+    sign, taken_off = columns.ankle_angle.sign_and_neutral()
+    neutral = float(np.degrees(taken_off)) + sign * tilt
     return zero_remarks(tilt, f"--ankle-neutral '{neutral:.1f} deg', or ankle_angle.neutral in a gait map, corrects it")
 
 

@@ -37,7 +37,7 @@ def knee_signals(
             return {}
         raise DataError("knee.thigh needs a length: give knee.thigh_length in the gait map, or the stature")
     thigh = mapped.thigh or ()
-    found = find_columns("knee", (*mapped.forward, *mapped.up, *thigh), tables, optional=is_default)
+    found = find_columns("knee", (*mapped.forward, *mapped.up, *thigh), tables, is_default, is_default)
     if found is None:
         return {}
     ends = len(mapped.forward), len(mapped.forward) + len(mapped.up)

@@ -13,7 +13,8 @@ from pydantic import BaseModel, Field, model_validator
 from ppafo.documents.models import STRICT, Text, make_schema, validate
 from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, read_regular_file
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import DataError, reason
+from ppafo.errors import DataError, UnitError, reason
+from ppafo.units import parse_quantity
 
 _FILE = TomlKind("gait map", "gait-map", resources.files("ppafo.gait.recorded"), DataError)
 _Terms = Annotated[
@@ -49,7 +50,7 @@ class ShankMap(BaseModel):
 class AngleMap(BaseModel):
     """Ankle angle: a sum of columns, or two markers of the foot, whose line turns against the shank.
 
-    With markers the zero is the foot that stands flat, and ``neutral`` is added to it.
+    With markers the zero is the foot that stands flat, and ``neutral`` is taken off as it is from columns.
     """
 
     model_config = STRICT
@@ -70,6 +71,14 @@ class AngleMap(BaseModel):
         if (self.terms is None) == (self.heel is None) or (self.heel is None) != (self.toe is None):
             raise ValueError("give either terms, or both heel and toe")
         return self
+
+    def sign_and_neutral(self) -> tuple[float, float]:
+        """Return 1 where plantarflexion is positive, else -1, and ``neutral`` [rad]; DataError for its unit."""
+        try:
+            neutral = parse_quantity(self.neutral, "rad")
+        except UnitError as error:
+            raise DataError(f"ankle_angle.neutral = {self.neutral!r}: {error}") from error
+        return 1.0 if self.positive == "plantarflexion" else -1.0, neutral
 
 
 class MomentMap(BaseModel):

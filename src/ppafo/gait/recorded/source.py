@@ -12,7 +12,7 @@ from ppafo.gait.recorded.plates import force_of_plates
 from ppafo.gait.recorded.repairs import fill_gaps
 from ppafo.gait.recorded.settings import ImportSettings
 from ppafo.gait.recorded.signal import Signal
-from ppafo.gait.recorded.table import MotionTable, cut, read_table
+from ppafo.gait.recorded.table import MotionTable, read_table
 from ppafo.gait.recorded.walk import Person, walk_signals
 from ppafo.units import format_quantity
 
@@ -36,7 +36,7 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings) -> Source
     """Return the signals in recorded files; DataError names what is wrong and what to do."""
     if not files:
         raise DataError("no file was given; a gait needs at least the angles of shank and ankle")
-    tables = [cut(read_table(path, settings.longest_gap), settings.start, settings.end) for path in files]
+    tables = [read_table(path, settings.longest_gap, settings.start, settings.end) for path in files]
     settings, said = _with_subject(settings, tables)
     person = Person(settings.body_mass or 0.0, settings.stature)
     convention = (

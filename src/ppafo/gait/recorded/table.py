@@ -43,10 +43,12 @@ class MotionTable:
     trial: Trial | None = None
 
 
-def read_table(path: str | Path, longest_gap: float = 0.0) -> MotionTable:
-    """Return the table in a ``.mot``, ``.sto``, ``.csv``, ``.c3d`` or ``.trc`` file; its clock runs without a gap.
+def read_table(
+    path: str | Path, longest_gap: float = 0.0, start: float | None = None, end: float | None = None
+) -> MotionTable:
+    """Return the table in a ``.mot``, ``.sto``, ``.csv``, ``.c3d`` or ``.trc`` file from ``start`` to ``end`` [s].
 
-    Rows that are missing for no longer than ``longest_gap`` [s] are bridged and remarked.
+    Its clock runs without a gap there: rows missing for no longer than ``longest_gap`` [s] are bridged and remarked.
     """
     suffix = Path(path).suffix.lower()
     if suffix in (".mot", ".sto"):
@@ -60,12 +62,15 @@ def read_table(path: str | Path, longest_gap: float = 0.0) -> MotionTable:
         table = MotionTable(str(path), C3D, found.time, found.columns, found.units, trial=found.trial)
     else:
         raise DataError(f"{path}: is not a {FILES} file")
-    return _bridge_gaps(table, longest_gap)
+    if table.time.size < 3:
+        raise DataError(f"{table.file}: has {table.time.size} rows; a stride needs several tens")
+    low = float(table.time[0] if start is None else start)
+    high = float(table.time[-1] if end is None else end)
+    return _cut(_bridge_gaps(table, longest_gap, low, high), low, high)
 
 
-def cut(table: MotionTable, start: float | None, end: float | None) -> MotionTable:
+def _cut(table: MotionTable, low: float, high: float) -> MotionTable:
     """Return the rows of a table between two times [s]."""
-    low, high = table.time[0] if start is None else start, table.time[-1] if end is None else end
     inside = (table.time >= low) & (table.time <= high)
     if not inside.any():
         raise DataError(
@@ -124,13 +129,12 @@ def _of_trc(path: str | Path) -> MotionTable:
     return MotionTable(str(path), TRC, found.time, columns, dict.fromkeys(columns, found.unit))
 
 
-def _bridge_gaps(table: MotionTable, longest: float) -> MotionTable:
-    """Return the table with a remark on rows that are missing; DataError where they are missing for too long."""
-    if table.time.size < 3:
-        raise DataError(f"{table.file}: has {table.time.size} rows; a stride needs several tens")
+def _bridge_gaps(table: MotionTable, longest: float, low: float, high: float) -> MotionTable:
+    """Return the table with a remark on rows missing between two times [s]; DataError where for too long."""
     steps = np.diff(table.time)
     median = float(np.median(steps))
-    jumps = np.flatnonzero(steps > _LARGEST_JUMP * median).tolist()
+    seen = (table.time[:-1] >= low) & (table.time[1:] <= high)
+    jumps = np.flatnonzero(seen & (steps > _LARGEST_JUMP * median)).tolist()
     for index in jumps:
         if steps[index] > longest + 1.5 * median:
             raise DataError(

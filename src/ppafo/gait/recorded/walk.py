@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.errors import DataError, UnitError
 from ppafo.gait.gait import REQUIRED
 from ppafo.gait.recorded.columns import LOADS, CurveColumns, find_columns
 from ppafo.gait.recorded.conventions import column_names
@@ -23,7 +22,6 @@ from ppafo.gait.recorded.mapping import (
 from ppafo.gait.recorded.signal import Signal, with_absence, without_ends
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats
-from ppafo.units import parse_quantity
 
 _RIGHT_ANGLE = 0.5 * np.pi
 
@@ -49,7 +47,8 @@ def walk_signals(
         mapped = getattr(columns, name)
         if mapped is None:
             continue
-        found = find_columns(name, column_names(mapped), tables, optional=is_default and name not in REQUIRED)
+        optional = is_default and name not in REQUIRED
+        found = find_columns(name, column_names(mapped), tables, optional, is_default)
         if found is not None:
             if isinstance(mapped, AngleMap) and mapped.terms is None:
                 signal = foot_markers_angle(found, mapped, walk["shank_angle"])
@@ -80,11 +79,7 @@ def _marker_angle(found: CurveColumns, mapped: ShankMap) -> Floats:
 
 def _ankle(found: CurveColumns, mapped: AngleMap, _body_mass: float) -> Signal:
     values, _ = found.in_unit(mapped.unit, ("rad",))
-    try:
-        neutral = parse_quantity(mapped.neutral, "rad")
-    except UnitError as error:
-        raise DataError(f"ankle_angle.neutral = {mapped.neutral!r}: {error}") from error
-    sign = 1.0 if mapped.positive == "plantarflexion" else -1.0
+    sign, neutral = mapped.sign_and_neutral()
     return Signal(found.table.file, found.table.time, _RIGHT_ANGLE + sign * (values - neutral))
 
 

@@ -187,7 +187,7 @@ def walk_gas(result: WalkResult) -> WalkGas:
         configuration.name,
         result.recording,
         0.0 if gas is None else gas.value,
-        configuration.gait.stride_time if course is None else result.recording.duration,
+        configuration.gait.stride_time if course is None else result.metrics["course_time"].value,
         Actuator(**{name: getattr(actuator, name) for name in Actuator.__slots__}),
         course="" if course is None else course.name,
         course_time=0.0 if course is None else result.metrics["course_planned_time"].value,

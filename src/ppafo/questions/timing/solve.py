@@ -116,9 +116,14 @@ def event_timing(
 def ways_of(configuration: Configuration) -> dict[str, WalkingCourse | None]:
     """The ways to walk: steadily, unevenly, and the courses that come with the package."""
     if configuration.course is not None:
-        raise ScenarioError(f"{configuration.file}: course: events are timed on courses of their own; leave it away")
+        raise ScenarioError(f"{configuration.file}: course: event timing uses its own courses; remove this one")
     if configuration.bottle is not None:
-        raise ScenarioError(f"{configuration.file}: bottle: events are timed at one supply pressure; leave it away")
+        raise ScenarioError(f"{configuration.file}: bottle: events are timed at one supply pressure; remove it")
+    if configuration.converter is not None:
+        raise ScenarioError(
+            f"{configuration.file}: controller.arithmetic = 'fixed': events are timed for controllers in floats; "
+            "remove it"
+        )
     cadence = 2.0 / configuration.gait.stride_time
     return {STEADY: None, UNEVEN: uneven_course(cadence)} | {name: load_course(name) for name in list_courses()}
 

@@ -37,7 +37,7 @@ from ppafo.walking.walk import WalkResult
 
 SCHEMA_VERSION = 1
 _HEAD = ("", "with", "without", "healthy")
-_VENTED = "vented"
+_VENTED = "less help"
 _ROWS = (
     ("body_mass", "Body mass of the wearer", "mass", 1),
     ("gas", "Gas per stride", "gas mass", 3),
@@ -60,8 +60,8 @@ _EXPLAINED = (
     "'Without' is the same wearer with the same device and both chambers vented. 'Healthy' is the gait itself. The "
     "first two strides, in which the controller learns the stride time, are left out, and so is one that has begun "
     "when the walk ends. The device is on one leg, so a "
-    "stride is one step of that leg. A stride in which the controller paused or had stopped is not in 'with' but in "
-    "'vented', where there is one."
+    "stride is one step of that leg. A stride with less help (lifted only, paused or stopped) is not in 'with' but in "
+    "'less help', where there is one."
 )
 _LEGS = "Shank and foot on the path that the gait prescribes. A cross marks toes below the ground: they would drag."
 _MOVING = "Two strides at half speed. A dark red foot drags."
@@ -144,7 +144,7 @@ def _set_up(comparison: Comparison) -> tuple[str, ...]:
 def comparison_table(comparison: Comparison) -> Table:
     """Return a row for each number: with the device, without it, and of a healthy ankle.
 
-    Strides in which the controller paused or had stopped have a column of their own, where there are any.
+    Strides with less help have a column of their own, where there are any.
     """
     healthy = dict(comparison.healthy)
     if "push_off_work" in healthy:
@@ -177,7 +177,7 @@ def _slap(comparison: Comparison) -> str:
         return ""
     return (
         "remark: the foot comes down faster than without the device: it is lifted, and falls further; 'ppafo timing' "
-        "says what it comes from"
+        "breaks down the causes"
     )
 
 

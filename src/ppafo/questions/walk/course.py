@@ -25,7 +25,7 @@ _HEAD = (
     Column("lowest toes (cm)"),
     Column("... without (cm)"),
     Column("push, heel loaded (N m)"),
-    Column("pause or stop at (s)"),
+    Column("less help at (s)"),
 )
 _WHOLE, _PART = "whole course", "as far as walked"
 _COURSE = (
@@ -33,10 +33,10 @@ _COURSE = (
     "chambers vented."
 )
 _EXPLAINED = (
-    "A stride counts for the segment in which its foot strikes; it is helped where the controller does not go into its "
-    "safe state before the next strike. Work is that on the wearer while the foot rolls over the toes. Lowest toes are "
-    "over the ground, in the middle part of a swing. A push with the heel loaded is torque in plantarflexion while the "
-    "heel carries more than a tenth of the body weight.",
+    "A stride counts for the segment in which its foot strikes; it is helped where the controller neither lifts only "
+    "nor pauses nor has stopped before the next strike. Work is that on the wearer while the foot rolls over the toes. "
+    "Lowest toes are over the ground, in the middle part of a swing. A push with the heel loaded is torque in "
+    "plantarflexion while the heel carries more than a tenth of the body weight.",
     "Angles go with the length of the stride, which goes with the square root of the speed, as the strides per second "
     "do: a constant walk ratio. Standing is a vertical shank over a flat foot. The forces of a stride and the fraction "
     "of the stance stay those of the gait at every speed.",
@@ -92,7 +92,7 @@ def _whole(comparison: Comparison) -> tuple[str | None, ...]:
         "0.0",
         f"{numbers['course_time']:.1f}",
         f"{numbers['course_strides']:.0f}",
-        f"{numbers['helped_strides']:.0f}",
+        f"{sum(segment.helped for segment in worn.segments)}",
         _text(numbers["course_gas"], "gas mass", 2),
         _text(numbers["course_work"], "energy", 1),
         _text(numbers.get("course_lowest_toes"), "body length", 1),

@@ -38,7 +38,9 @@ def wearers_answer(population: Population, volumes: Mapping[str, Population]) ->
     ]
     figure = Figure("wearers", _CAPTION, lambda: population_figure(population))
     stopped = f"safe state: the controllers of {population.vented} wearers vented both chambers permanently"
-    paused = f"paused: the controllers of {population.paused} wearers vented both chambers for some strides"
+    paused = (
+        f"less help: the controllers of {population.paused} wearers lifted the foot only, or paused, for some strides"
+    )
     remarks = [
         *person_remarks(configuration),
         *[stopped] * bool(population.vented),

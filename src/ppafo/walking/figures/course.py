@@ -59,7 +59,7 @@ def course_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
 
 
 def _background(axes: "Axes", worn: WalkResult) -> None:
-    """Every other segment on grey, and a line where the controller vented."""
+    """Every other segment on grey, and a line where the controller helps less."""
     for segment in worn.segments[1::2]:
         axes.axvspan(segment.start, segment.end, color=_SHADED, zorder=0, linewidth=0.0)
     for segment in worn.segments:
@@ -144,5 +144,5 @@ def _head(figure: "Figure", worn: WalkResult, height: float) -> None:
     course = worn.configuration.course
     title = f"{worn.configuration.name}, course {'' if course is None else course.name}"
     figure.text(0.12 / _WIDTH, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
-    remark = "blue: with the device; orange: without it; red line: the controller vents"
+    remark = "blue: with the device; orange: without it; red line: the controller helps less"
     figure.text(0.12 / _WIDTH, 1.0 - 0.34 / height, remark, ha="left", va="top", fontsize=8.5, color=GREY)
