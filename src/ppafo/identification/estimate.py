@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import Literal, get_args
 
 from ppafo.errors import IdentificationError
@@ -26,6 +27,16 @@ _USABLE: tuple[Verdict, ...] = ("identified", "holds for this model only", "weak
 
 WORTH_TELLING = 1.05
 """Widening of an interval from which the law is reported to miss the recordings."""
+
+
+def interval_factor(confidence: float) -> float:
+    """Return the standard errors [-] on each side of an interval with this confidence, 1.96 for 95 %."""
+    return NormalDist().inv_cdf(0.5 + 0.5 * confidence)
+
+
+def half_width_for(confidence: float, half_width: float, stated: float) -> float:
+    """Return half the width of an interval for some confidence, from that of one ``stated`` for another."""
+    return half_width * interval_factor(confidence) / interval_factor(stated)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +96,11 @@ class Estimate:
     def half_width(self) -> float:
         """Half the width of the interval, in ``unit``."""
         return (self.high - self.low) / 2.0
+
+    @property
+    def wider_half_width(self) -> float:
+        """The width [unit] of the wider side of the interval: one that was cut at zero is too narrow there."""
+        return max(self.high - self.value, self.value - self.low)
 
     @property
     def relative_half_width(self) -> float:

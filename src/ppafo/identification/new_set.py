@@ -4,8 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from ppafo.errors import ParameterError
-from ppafo.identification.estimate import Estimate
-from ppafo.identification.trajectory.uncertainty import interval_factor
+from ppafo.identification.estimate import Estimate, half_width_for
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.building import build_device
 from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, alternatives, is_within
@@ -76,7 +75,7 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate) -> Parameter
         origin="identified" if estimate.is_identified else "fitted",
         source="; ".join(estimate.recordings),
         note=f"{estimate.verdict_in_words}, {interval}. {estimate.explanation} Before, {was}.",
-        uncertainty=max(high - value, value - low) * interval_factor(CONFIDENCE) / interval_factor(estimate.confidence),
+        uncertainty=half_width_for(CONFIDENCE, max(high - value, value - low), estimate.confidence),
     )
     kept = {path: old for path, old in parameter_set.numbers.items() if path not in _other_form(estimate.path)}
     found = {estimate.path: entry}

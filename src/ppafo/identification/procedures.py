@@ -19,7 +19,7 @@ from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.bench.static_torque import StaticTorqueSettings, static_prospects, static_torque
 from ppafo.identification.bench.valve_map import ValveMapSettings, map_prospects, valve_map
 from ppafo.identification.bench.vane_leak import leak_prospects, vane_leak
-from ppafo.identification.estimate import Prospect
+from ppafo.identification.estimate import Prospect, half_width_for
 from ppafo.identification.problem import (
     FreeDecayProblem,
     OpenValveFlowProblem,
@@ -29,7 +29,6 @@ from ppafo.identification.problem import (
     VaneLeakProblem,
 )
 from ppafo.identification.source import Source
-from ppafo.identification.trajectory.uncertainty import interval_factor
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.parameter_set import ParameterSet, chosen_valve, number_in_si
 from ppafo.parameters.provenance import CONFIDENCE
@@ -99,7 +98,7 @@ class Setting:
         if entry is None or not entry.uncertainty:
             return 0.0
         stated = to_si(entry.value + entry.uncertainty, entry.unit, unit) - to_si(entry.value, entry.unit, unit)
-        return stated * interval_factor(confidence) / interval_factor(CONFIDENCE)
+        return half_width_for(confidence, stated, CONFIDENCE)
 
     def valve_path(self, name: str | None) -> str:
         """Return the path of a valve in the set, ``valves.main``."""
@@ -148,21 +147,15 @@ def _inertia(problem: FreeDecayProblem, setting: Setting) -> tuple[float | None,
     if entry is None:
         return None, 0.0, ""
     value = setting.number("foot_plate.inertia")
-    return (
-        value,
-        setting.half_width("foot_plate.inertia", "kg m^2", problem.confidence),
-        f"{entry.origin} in {setting.parameter_set.name}",
-    )
+    half_width = setting.half_width("foot_plate.inertia", "kg m^2", problem.confidence)
+    return value, half_width, f"{entry.origin} in {setting.parameter_set.name}"
 
 
 def _open_valve_flow(problem: OpenValveFlowProblem, setting: Setting) -> OpenValveFlowSettings:
     path = setting.valve_path(problem.valve)
     area = number_in_si(setting.parameter_set, f"{path}.area")
-    gas, sure = (
-        setting.gas(problem.gas, problem.temperature, problem.confidence),
-        (problem.confidence, problem.calibration),
-    )
-    return OpenValveFlowSettings(gas, problem.law, area, path, *sure)
+    gas = setting.gas(problem.gas, problem.temperature, problem.confidence)
+    return OpenValveFlowSettings(gas, problem.law, area, path, problem.confidence, problem.calibration)
 
 
 def _valve_map(problem: ValveMapProblem, setting: Setting) -> ValveMapSettings:

@@ -83,10 +83,8 @@ def _plan(measured: Measured, device: Device, start: Start, motion: Motion, extr
     """The run of a free or a held vane; the steps of a free one are fine enough for a prescribed one too."""
     recording = measured.recording
     duration = recording.duration + max(extra, sample_period(recording.time))
-    highest, held = (
-        with_highest_supply(device, recording, recording.names),
-        held_vane(start.angle) if motion == "held" else None,
-    )
+    highest = with_highest_supply(device, recording, recording.names)
+    held = held_vane(start.angle) if motion == "held" else None
     scenario = replay_scenario(recording, highest, start, duration, measured.file, held)
     run = plan_run(scenario)
     if run.step_count > MAXIMUM_STEPS:

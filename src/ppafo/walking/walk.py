@@ -20,6 +20,7 @@ from ppafo.simulation.result import Status
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.storage.opensim import write_opensim
 from ppafo.walking.configuration import Configuration
+from ppafo.walking.course_planning import PlannedCourse
 from ppafo.walking.course_segments import SegmentResult, course_metrics, segment_results, steady_strides
 from ppafo.walking.fixed_point import controller_of
 from ppafo.walking.loading import load_walk
@@ -150,7 +151,8 @@ def integral_of_a_stride(result: WalkResult, values: Floats) -> float:
     """Return the integral of a channel over the ankle angle, in its unit times rad, mean over the counted strides."""
     turned = np.diff(result.recording["angle"])
     done = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * turned)])
-    counted = result.helped & _counted(result.configuration, result.recording, result.starts)
+    planned = course_of_walk(result.configuration)
+    counted = result.helped & _counted(planned, result.recording, result.starts)
     return float(np.diff(done[result.starts])[counted].mean())
 
 
@@ -225,7 +227,7 @@ def _walk_result(
     strides = per_stride(record, starts)
     helped = helped_strides(record.get(SAFE_ROW, np.zeros(recording.time.size)), starts)
     planned = course_of_walk(configuration)
-    steady = _counted(configuration, recording, starts)
+    steady = _counted(planned, recording, starts)
     averages, vented = (mean_curves(recording, starts, chosen & steady) for chosen in (helped, ~helped))
     metrics = walk_metrics(configuration, recording, strides, averages, starts, helped, steady)
     without = ~helped & steady
@@ -240,9 +242,8 @@ def _walk_result(
     )
 
 
-def _counted(configuration: Configuration, recording: Recording, starts: NDArray[np.intp]) -> NDArray[np.bool_]:
+def _counted(planned: PlannedCourse | None, recording: Recording, starts: NDArray[np.intp]) -> NDArray[np.bool_]:
     """True for each whole stride that counts for means: not the first ones, of a course those at an even speed."""
-    planned = course_of_walk(configuration)
     if planned is not None:
         return steady_strides(planned, recording.time[starts])
     return settled(np.ones(max(starts.size - 1, 0), dtype=np.bool_))

@@ -146,7 +146,7 @@ def _library_name(library: Library, platform: str) -> str:
 
 
 def _sources(library: Library, mujoco: Headers) -> tuple[dict[str, bytes], str]:
-    """The sources of a plugin by name, without headers of MuJoCo, and a hash that tells this export from others."""
+    """The source files of a plugin by name, without MuJoCo's headers, and a hash that identifies the export."""
     name, written = library.name, library_files(library)
     identity = hashlib.sha256(written[f"{name}.c"] + f"{mujoco.version} {__version__}".encode()).hexdigest()[:16]
     chosen = attributes_of(library)

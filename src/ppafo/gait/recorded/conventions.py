@@ -224,8 +224,8 @@ def _axes(
 ) -> tuple[str, str, tuple[str, ...]]:
     """Return the axes along the walk and upwards, and a remark where they are not x and z.
 
-    Up is where the knee stays from the ankle, the axis of the walk where the ankle goes or the foot points. The foot
-    tells forwards from backwards: on a treadmill the ankle of a part of a stride may end behind.
+    Upwards is from ankle to knee; the walk follows the ankle's travel, or the foot where the ankle hardly travels. The
+    foot gives the sign: over part of a stride on a treadmill the ankle may travel backwards.
     """
     at_knee, at_ankle = _point(table, knee), _point(table, ankle)
     if at_knee is None or at_ankle is None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ppafo.documents.models import validate
 from ppafo.errors import IdentificationError
+from ppafo.identification.estimate import interval_factor
 from ppafo.identification.source import Source, common_use, source_of
 from ppafo.identification.trajectory.experiment import (
     FITTED_CHANNELS,
@@ -29,7 +30,6 @@ from ppafo.identification.trajectory.section import (
     noise_of_channels,
     quantity_of,
 )
-from ppafo.identification.trajectory.uncertainty import interval_factor
 from ppafo.parameters import apply_overrides, build_device
 from ppafo.parameters.device import Device
 from ppafo.signals import Recording
@@ -187,9 +187,7 @@ def _bench_prior(item: ParameterSection, path: str, setting: Setting) -> Prior:
             f"{setting.file}: parameter '{item.path}': prior = 'bench': no procedure of this problem identified it; "
             f"identified: {have}"
         )
-    # An interval that was cut at zero is too narrow on that side.
-    wider = max(estimate.high - estimate.value, estimate.value - estimate.low)
-    return Prior(estimate.value, wider / interval_factor(estimate.confidence))
+    return Prior(estimate.value, estimate.wider_half_width / interval_factor(estimate.confidence))
 
 
 def experiment_without_scenario(item: ExperimentSection, source: Source, setting: Setting) -> Experiment:

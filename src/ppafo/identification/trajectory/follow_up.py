@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
+from ppafo.identification.estimate import interval_factor
 from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, full_path
 from ppafo.identification.trajectory.information import covariance, data_information, directions_for
 from ppafo.identification.trajectory.preparation import Floats, Measured, PreparedExperiment, Samples, prepare_times
@@ -14,7 +15,6 @@ from ppafo.identification.trajectory.problem import Range, reach_of
 from ppafo.identification.trajectory.residuals import Residuals, coordinate_bounds, trajectories
 from ppafo.identification.trajectory.result import TrajectoryFit
 from ppafo.identification.trajectory.search import descend, is_at_bound
-from ppafo.identification.trajectory.uncertainty import interval_factor
 from ppafo.simulation.scenario import Scenario
 
 POINTS_PER_SIDE = 4

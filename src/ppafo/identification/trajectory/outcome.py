@@ -7,7 +7,7 @@ import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.bench.result import count_of
-from ppafo.identification.estimate import Check, Estimate, Prospect
+from ppafo.identification.estimate import Check, Estimate, Prospect, interval_factor
 from ppafo.identification.trajectory.document import candidates_of, trajectory_problem
 from ppafo.identification.trajectory.experiment import broken_rule, full_path
 from ppafo.identification.trajectory.fitting import fit, noise_in, residuals_of
@@ -19,7 +19,7 @@ from ppafo.identification.trajectory.residuals import FIRST_STEP, Residuals, pri
 from ppafo.identification.trajectory.result import TrajectoryFit
 from ppafo.identification.trajectory.search import is_at_bound
 from ppafo.identification.trajectory.section import Setting, TrajectorySection, name_in_refusals
-from ppafo.identification.trajectory.uncertainty import FROM_PRIOR, STRONG, interval_factor, relative_to_number
+from ppafo.identification.trajectory.uncertainty import FROM_PRIOR, STRONG, relative_to_number
 from ppafo.progress import Progress, Report
 from ppafo.units import percentage
 

@@ -3,11 +3,10 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from statistics import NormalDist
 
 import numpy as np
 
-from ppafo.identification.estimate import Estimate, Verdict
+from ppafo.identification.estimate import Estimate, Verdict, interval_factor
 from ppafo.identification.trajectory.information import Mixture, covariance, data_information, prior_information
 from ppafo.identification.trajectory.misfit import Misfit, misfit_of
 from ppafo.identification.trajectory.posterior import DRAWS, HEAVY_DRAWS, draw_posterior
@@ -77,11 +76,6 @@ def estimate_of(evidence: Evidence, index: int) -> Estimate:
 def half_width(evidence: Evidence, index: int) -> float:
     """Return half the width of the interval, in units of the coordinate."""
     return 0.5 * float(evidence.interval[1][index] - evidence.interval[0][index])
-
-
-def interval_factor(confidence: float) -> float:
-    """Return the standard errors [-] on each side of an interval with this confidence, 1.96 for 95 %."""
-    return NormalDist().inv_cdf(0.5 + 0.5 * confidence)
 
 
 def relative_half_width(evidence: Evidence, index: int, half: float) -> float:
