@@ -17,7 +17,8 @@ from ppafo.model.gait_sensors import GaitMeasurement
 class LastReadings(NamedTuple):
     """Last readings of heel, toe [N] and angle [rad], how long each stayed the same [s], and each filtered.
 
-    Only time in which another sensor moves, or the wearer steps, counts as time in which one stayed the same.
+    Only time in which another sensor moves, or the wearer steps, counts as time in which one stayed the same; for the
+    angle only since the strike before, for a foot that hangs or sits may show one angle for long.
     """
 
     heel_force: float
@@ -149,14 +150,17 @@ def slow_reading(last: float, reading: float, is_first: bool, period: float) -> 
     return reading if is_first else followed
 
 
-def next_readings(last: LastReadings, measurement: GaitMeasurement, phase: PhaseState, period: float) -> LastReadings:
-    """The last readings after a sample, taken every ``period`` [s]; ``phase`` is that of the sample.
+def next_readings(
+    last: LastReadings, measurement: GaitMeasurement, before: PhaseState, phase: PhaseState, period: float
+) -> LastReadings:
+    """The last readings after a sample, taken every ``period`` [s]; ``before`` and ``phase`` are its phases.
 
     Who stands with heel and toes on the ground has no moving sensor, and the steps of a converter then hold a reading
     for long: a sensor is still only while another one moves. On the toes alone nobody stands still, and nobody lands
     for long; on the heel alone somebody stands whose toes the device holds up.
     """
     is_first = last.angle == 0.0
+    same_angle = min(last.angle_unchanged, before.since_strike)
     slow_heel = slow_reading(last.slow_heel, measurement.heel_force, is_first, period)
     slow_toe = slow_reading(last.slow_toe, measurement.toe_force, is_first, period)
     slow_angle = slow_reading(last.slow_angle, measurement.angle, is_first, period)
@@ -178,7 +182,7 @@ def next_readings(last: LastReadings, measurement: GaitMeasurement, phase: Phase
             last.heel_force, measurement.heel_force, last.heel_unchanged, beside_heel, period
         ),
         toe_unchanged=time_unchanged(last.toe_force, measurement.toe_force, last.toe_unchanged, beside_toe, period),
-        angle_unchanged=time_unchanged(last.angle, measurement.angle, last.angle_unchanged, beside_angle, period),
+        angle_unchanged=time_unchanged(last.angle, measurement.angle, same_angle, beside_angle, period),
         slow_heel=slow_heel,
         slow_toe=slow_toe,
         slow_angle=slow_angle,
@@ -224,7 +228,7 @@ def still_sign(rules: SafetyRules, readings: LastReadings, before: PhaseState, p
     longest = max(rules.frozen_time, DWELLS * phase.stride_time)
     heel = (readings.heel_unchanged > longest) & (phase.heel.loaded > 0.5)
     toe = (readings.toe_unchanged > longest) & (phase.toe.loaded > 0.5)
-    # A slow swing lets a held foot hang at one angle for long, so only the time since the strike counts.
+    # At the strike the angle may have been the same for all of a slow swing.
     angle = min(readings.angle_unchanged, phase.since_strike) > max(rules.frozen_time, TURNS_BACK * phase.stride_time)
     whole = (before.phase == SWING) & (phase.phase != SWING)
     whole = whole & (before.since_strike > HALF * phase.stride_time) & (before.since_strike < phase.stride_time / HALF)

@@ -211,7 +211,7 @@ def remembered(
     period: float,
 ) -> SafetyState:
     """The state with what the signs remember of a sample of ``period`` [s]; the level is as it was."""
-    seen = readings.next_readings(state.readings, measurement, phase, period)
+    seen = readings.next_readings(state.readings, measurement, before, phase, period)
     enters = (before.phase == SWING) & (phase.phase != SWING)
     on_toes = (state.stance.heel_seen < 0.5) & (before.strikes > 0.5)
     usual = abs(before.since_strike - phase.stride_time) < STEADY * phase.stride_time

@@ -161,6 +161,23 @@ def test_the_time_at_one_angle_in_a_slow_swing_does_not_count_in_stance(since: f
     assert vents(now=phase(MID_STANCE, since), state=safety.START._replace(readings=shown)) is is_sign
 
 
+def test_the_time_at_one_angle_while_sitting_does_not_count_when_the_wearer_stands_up() -> None:
+    sitting, light = phase(SWING, 0.0, heel=0.0, toe=0.0), GOOD._replace(heel_force=35.0, toe_force=35.0)
+    state = safety.START
+    for sample in range(4000):
+        now = sitting._replace(since_strike=sample * PERIOD)
+        state = safety.monitor(RULES, state, now, now, light, PERIOD)
+    assert state.readings.angle_unchanged > 3.9
+    before, stands = now, phase(MID_STANCE, 0.0)
+    state = safety.monitor(RULES, state, before, stands, GOOD, PERIOD)
+    assert state.finding.sign == signs.NO_SIGN, "it is no stride"
+    for sample in range(1000):
+        before, stands = stands, phase(MID_STANCE, sample * PERIOD)
+        state = safety.monitor(RULES, state, before, stands, GOOD, PERIOD)
+    assert state.finding.sign == signs.NO_SIGN, "who stands does not step"
+    assert state.readings.angle_unchanged < 0.2, "forces that have just come on count as a move"
+
+
 @pytest.mark.parametrize(("name", "sensor"), [("heel_force", "heel"), ("toe_force", "toe")])
 def test_a_large_force_that_is_gone_within_a_sample_stops_and_one_that_falls_quickly_does_not(
     name: str, sensor: str

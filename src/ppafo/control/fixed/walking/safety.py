@@ -34,7 +34,7 @@ def remembered(
         good_strides = min(good_strides + 1, MOST_STRIDES) if good else 0
         on_toes = state.heel_seen == 0 and before.strikes > 0
         toe_strides = min(toe_strides + 1, MOST_STRIDES) if on_toes else 0
-    seen = next_sensors(numbers.trace, state.seen, given, phase)
+    seen = next_sensors(numbers.trace, state.seen, given, before, phase)
     is_thin = min(given.pressure_1, given.pressure_2) < numbers.ranges.thin
     return SafetyCounts(
         level=state.level,

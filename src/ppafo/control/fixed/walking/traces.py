@@ -45,7 +45,10 @@ class EmptyingNumbers(NamedTuple):
 
 
 class TraceCounts(NamedTuple):
-    """The last reading of a sensor, samples in which it was the same while something else moved, the slow one."""
+    """The last reading of a sensor, samples in which it was the same while something else moved, the slow one.
+
+    Those of the angle count from the strike before.
+    """
 
     last: int
     still: int
@@ -94,15 +97,18 @@ def has_moved(reading: int, slow: int, limit: int) -> bool:
     return reading - slow > limit or slow - reading > limit
 
 
-def next_trace(trace: TraceCounts, reading: int, slow: int, moves: bool) -> TraceCounts:
+def next_trace(last: int, still: int, reading: int, slow: int, moves: bool) -> TraceCounts:
     """What is remembered of a sensor after a sample in which something else ``moves`` or not."""
-    still = counted(trace.still) if moves else trace.still
-    return TraceCounts(last=reading, still=still if reading == trace.last else 0, slow=slow)
+    kept = counted(still) if moves else still
+    return TraceCounts(last=reading, still=kept if reading == last else 0, slow=slow)
 
 
-def next_sensors(numbers: TraceNumbers, last: SensorCounts, given: GaitReadings, phase: PhaseCounts) -> SensorCounts:
-    """What is remembered of forces and angle after a sample in some phase; the first readings count at once."""
+def next_sensors(
+    numbers: TraceNumbers, last: SensorCounts, given: GaitReadings, before: PhaseCounts, phase: PhaseCounts
+) -> SensorCounts:
+    """What is remembered of forces and angle after a sample, between two phases; the first readings count at once."""
     begins = last.angle.last == 0
+    same_angle = min(last.angle.still, before.since_strike)
     heel = given.heel if begins else followed(last.heel.slow, given.heel, numbers.slow_share)
     toe = given.toe if begins else followed(last.toe.slow, given.toe, numbers.slow_share)
     angle = given.angle if begins else followed(last.angle.slow, given.angle, numbers.slow_share)
@@ -113,9 +119,9 @@ def next_sensors(numbers: TraceNumbers, last: SensorCounts, given: GaitReadings,
     toe_moves = has_moved(given.toe, toe, numbers.moves)
     turns = has_moved(given.angle, angle, numbers.turns)
     return SensorCounts(
-        heel=next_trace(last.heel, given.heel, heel, toe_moves or turns or steps),
-        toe=next_trace(last.toe, given.toe, toe, heel_moves or turns or steps),
-        angle=next_trace(last.angle, given.angle, angle, heel_moves or toe_moves or steps),
+        heel=next_trace(last.heel.last, last.heel.still, given.heel, heel, toe_moves or turns or steps),
+        toe=next_trace(last.toe.last, last.toe.still, given.toe, toe, heel_moves or turns or steps),
+        angle=next_trace(last.angle.last, same_angle, given.angle, angle, heel_moves or toe_moves or steps),
     )
 
 
