@@ -4,8 +4,11 @@ import copy
 import ctypes
 import json
 import math
+import os
 import re
 import runpy
+import shutil
+import subprocess
 import threading
 from dataclasses import dataclass, replace
 from importlib import resources
@@ -20,8 +23,8 @@ from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.errors import ParameterError, ScenarioError
-from ppafo.exports.fmu.binaries import host_platform
-from ppafo.exports.mujoco import attributes_of, installed_headers, plugin_files, plugin_library
+from ppafo.exports.fmu.binaries import compiler_for, host_platform
+from ppafo.exports.mujoco import Headers, attributes_of, installed_headers, plugin_files, plugin_library
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.recorded.inputs import with_prescribed_angle
@@ -36,6 +39,8 @@ LEG = """<mujoco><compiler angle="radian"/><option timestep="{step}"><flag warms
 <worldbody><body name="foot">
 <joint name="ankle" type="hinge" axis="0 1 0" range="-1.2 0.69" limited="true"/>
 <geom type="box" pos="0.06 0 -0.06" size="0.12 0.04 0.02" mass="1"/></body></worldbody></mujoco>"""
+WINDOWS_MUJOCO = "PPAFO_WINDOWS_MUJOCO"
+"""The environment variable that names a folder with an unpacked wheel of MuJoCo for Windows."""
 ROWS = {"mass_1": "state.mass_1", "mass_2": "state.mass_2", "supplied_mass": "state.supplied_mass"}
 
 
@@ -76,13 +81,18 @@ def solenoid(tmp_path_factory: pytest.TempPathFactory) -> Folder:
     return written(tmp_path_factory.mktemp("pair") / "plugin", "torque-task-solenoid", same)
 
 
-def model_of(folder: Folder, **given: Any) -> Any:
-    """A foot on a hinge with the device, compiled."""
+def spec_of(folder: Folder, **given: Any) -> Any:
+    """A foot on a hinge with the device."""
     from ppafo.worlds.mujoco import add_device
 
     spec = mujoco.MjSpec.from_string(LEG.format(step=STEP))
     add_device(spec, folder.plugin, "device", joint="ankle", **given)
-    return spec.compile()
+    return spec
+
+
+def model_of(folder: Folder, **given: Any) -> Any:
+    """A foot on a hinge with the device, compiled."""
+    return spec_of(folder, **given).compile()
 
 
 def driven(model: Any, data: Any, commands: np.ndarray, folder: Folder) -> tuple[np.ndarray, np.ndarray]:
@@ -103,18 +113,8 @@ def commands_of(folder: Folder) -> np.ndarray:
     return np.round(drawn) if folder.scenario.device.valve.kind != "proportional" else drawn
 
 
-@pytest.mark.parametrize("name", ["proportional", "solenoid"])
-def test_the_lanes_have_the_same_bits_on_the_angle_that_the_joint_took(
-    name: str, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("PPAFO_BACKEND", "c")
-    folder = request.getfixturevalue(name)
-    model, commands = model_of(folder), commands_of(folder)
-    data = mujoco.MjData(model)
-    data.qpos[0] = -0.2
-    angles, found = driven(model, data, commands, folder)
-    assert np.ptp(angles) > 0.5
-
+def check_against_lanes(folder: Folder, angles: np.ndarray, commands: np.ndarray, found: np.ndarray) -> None:
+    """Check that the lanes have the same gas, bit by bit, on the angles that a joint took under some commands."""
     parts = math.ceil(STEP / folder.plugin.attributes["run.step"] - 1e-9)
     step = STEP / parts
     chosen = replace(
@@ -135,6 +135,56 @@ def test_the_lanes_have_the_same_bits_on_the_angle_that_the_joint_took(
     rows, names = row_numbers(run.program.state_rows()), list(folder.plugin.outputs)
     for output, row in ROWS.items():
         assert np.array_equal(found[:, names.index(output)], record[:, rows[row]]), output
+
+
+@pytest.mark.parametrize("name", ["proportional", "solenoid"])
+def test_the_lanes_have_the_same_bits_on_the_angle_that_the_joint_took(
+    name: str, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PPAFO_BACKEND", "c")
+    folder = request.getfixturevalue(name)
+    model, commands = model_of(folder), commands_of(folder)
+    data = mujoco.MjData(model)
+    data.qpos[0] = -0.2
+    angles, found = driven(model, data, commands, folder)
+    assert np.ptp(angles) > 0.5
+    check_against_lanes(folder, angles, commands, found)
+
+
+@pytest.mark.parametrize("name", ["proportional", "solenoid"])
+def test_a_library_for_windows_has_the_bits_of_the_lanes(
+    name: str, request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    unpacked = Path(os.environ.get(WINDOWS_MUJOCO, "")).absolute()
+    if not os.environ.get(WINDOWS_MUJOCO):
+        pytest.skip(f"{WINDOWS_MUJOCO} names no unpacked wheel of MuJoCo for Windows")
+    if shutil.which("wine") is None:
+        pytest.skip("wine is not on this machine")
+    pytest.importorskip("ziglang", reason="needs the extra 'native'")
+    monkeypatch.setenv("PPAFO_BACKEND", "c")
+    folder = request.getfixturevalue(name)
+    headers = Headers(unpacked / "mujoco" / "include", mujoco.__version__)
+    for file, content in plugin_files(folder.scenario, ["win64"], headers).items():
+        (tmp_path / Path(file).name).write_bytes(content)
+    (tmp_path / "model.xml").write_text(spec_of(folder).to_xml(), encoding="utf-8")
+    driver, library = tmp_path / "drive.exe", next(tmp_path.glob("*.dll"))
+    written = ["-I", str(headers.include), str(Path(__file__).parent / "drive_plugin.c"), "-o", str(driver)]
+    subprocess.run([*compiler_for("win64"), *written], check=True)
+    given = [unpacked / "mujoco" / "mujoco.dll", library, tmp_path / "model.xml", "-0.2", len(folder.plugin.outputs)]
+    commands = commands_of(folder)
+    done = subprocess.run(
+        ["wine", str(driver), *map(str, given)],
+        input="".join(f"{float(command).hex()}\n" for command in commands),
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "WINEDEBUG": "-all"},
+    )
+    rows = [[float.fromhex(word) for word in line.split()] for line in done.stdout.splitlines()]
+    low, high = folder.plugin.joint["lowest_angle"], folder.plugin.joint["highest_angle"]
+    angles = np.clip(math.pi / 2 + np.array([row[0] for row in rows]), low, high)
+    assert np.ptp(angles) > 0.5
+    check_against_lanes(folder, angles, commands, np.array([row[1:] for row in rows[:-1]]))
 
 
 @pytest.mark.parametrize("name", ["proportional", "solenoid"])
