@@ -17,7 +17,7 @@ import numpy as np
 from ppafo.control.kind import PythonController
 
 _DEEPEST, _LONGEST, _DIGITS = 12, 64, 16
-"""Levels of settings that are looked into, items of a list that is kept, not hashed, and digits of a hash in a message."""
+"""Levels of settings that are looked into, items of a list that is kept and not hashed, and digits of a hash."""
 
 Inside = tuple[int, ...]
 """Identities of what a value is inside of, so that what holds itself comes to an end."""
