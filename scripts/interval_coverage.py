@@ -3,8 +3,8 @@
     python scripts/interval_coverage.py --draws 44 --seed 2026 --out out/coverage
 
 Finished fits are kept line by line in the folder, so that the same command resumes, also in a folder that
-``ppafo coverage`` began when it was a command of the package. Exit code 1 where a cell of the
-table is outside of what it should be.
+``ppafo coverage`` began when it was a command of the package. One that other code began is not continued. Exit code 1
+where a cell of the table is outside of what it should be.
 """
 
 import argparse
@@ -78,7 +78,7 @@ def run(parsed: argparse.Namespace) -> int:
         write_files(parsed, {fits: b""} | _files_to_keep(parsed.out))
     file = None if parsed.out is None else parsed.out / fits
     try:
-        lines = run_tasks(tasks, file, processes or os.cpu_count() or 1, tell)
+        lines = run_tasks(tasks, file, processes or os.cpu_count() or 1, tell, _warn)
     except KeyboardInterrupt:
         print("\ncoverage: interrupted; with --out finished fits are kept: run the same command again", file=sys.stderr)
         return EXIT_INTERRUPTED
@@ -93,6 +93,10 @@ def run(parsed: argparse.Namespace) -> int:
         write_files(parsed, contents | _files_to_keep(parsed.out))
     print_result(text, document, parsed.json)
     return EXIT_GOOD if is_good(lines, parsed.from_prior) else EXIT_CHECK_FAILED
+
+
+def _warn(text: str) -> None:
+    print(f"{COMMAND}: {text}", file=sys.stderr)
 
 
 def _files_to_keep(folder: Path) -> dict[str, bytes]:

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.intervals.made_by import check_code, code_now
 from benchmarks.intervals.noise_kinds import NOISE_KINDS, noise_kind
 from benchmarks.intervals.planted import Planted, planted_problem, two_step_responses
 from ppafo.errors import IdentificationError
@@ -47,6 +48,7 @@ DURATION = 0.4
 PRIOR = 0.1
 """Standard deviation of the prior over its mean, where truths are drawn."""
 
+_CODE = "code"
 _EXACT = 0.25 * FIT_TOLERANCE
 _AWAY = 0.01
 _STEP = 1.0e-3
@@ -94,19 +96,33 @@ def tasks_of(kinds: Sequence[str], repetitions: int, seed: int, is_drawn: bool) 
     return [Task(kind, number, seed, is_drawn) for number in range(repetitions) for kind in kinds]
 
 
+def _nobody(_text: str) -> None:
+    """Nobody listens."""
+
+
 def run_tasks(
-    tasks: Sequence[Task], file: Path | None, processes: int, tell: Callable[[str], None] = lambda _text: None
+    tasks: Sequence[Task],
+    file: Path | None,
+    processes: int,
+    tell: Callable[[str], None] = _nobody,
+    warn: Callable[[str], None] = _nobody,
 ) -> list[Line]:
-    """Return the lines of all tasks; those that ``file`` already has are not run again, the others are added to it."""
+    """Return the lines of all tasks; those that ``file`` already has are not run again, the others are added to it.
+
+    IdentificationError where others would be added to lines that other code made; ``warn`` hears of lines that do not
+    say what made them, which count.
+    """
     known = {} if file is None else _read(file)
     wanted = {(task.kind, task.number) for task in tasks}
-    lines = {key: line for key, line in known.items() if key in wanted}
+    lines = {key: line for key, (line, _) in known.items() if key in wanted}
     missing = [task for task in tasks if (task.kind, task.number) not in lines]
+    if file is not None:
+        check_code(file, [code for _, code in known.values()], len(missing), warn)
     for count, line in enumerate(_results(missing, processes), start=1):
         lines[line.kind, line.number] = line
         if file is not None:
             with file.open("a", encoding="utf-8") as stream:
-                stream.write(f"{json.dumps(_plain(line))}\n")
+                stream.write(f"{json.dumps(_plain(line) | {_CODE: code_now()})}\n")
         if count % 20 == 0:
             tell(f"{count} of {len(missing)} fits")
     return [lines[task.kind, task.number] for task in tasks]
@@ -261,19 +277,23 @@ def _plain(line: Line) -> dict[str, Any]:
     return {name: getattr(line, name) for name in Line.__slots__}
 
 
-def _read(file: Path) -> dict[tuple[str, int], Line]:
-    """Return the lines of a file; the last one is left out where the study was stopped while writing it."""
+def _read(file: Path) -> dict[tuple[str, int], tuple[Line, str]]:
+    """Return the lines of a file, each with the code that made it; an unfinished last one is left out.
+
+    Lines of before this was kept do not say which code that was: an empty text.
+    """
     if not file.exists():
         return {}
     text = file.read_text(encoding="utf-8")
     whole = text[: text.rfind("\n") + 1]
     if whole != text:
         file.write_text(whole, encoding="utf-8")
-    found: dict[tuple[str, int], Line] = {}
+    found: dict[tuple[str, int], tuple[Line, str]] = {}
     for one in whole.splitlines():
         document: Mapping[str, Any] = json.loads(one)
         parts: dict[str, Any] = {
             name: tuple(value) if isinstance(value, list) else value for name, value in document.items()
         }
-        found[parts["kind"], parts["number"]] = Line(**parts)
+        code = parts.pop(_CODE, "")
+        found[parts["kind"], parts["number"]] = Line(**parts), code
     return found

@@ -74,7 +74,9 @@ def test_a_mistyped_option_is_one_line_and_exit_code_2(main: Command, capsys: py
     assert said.count("\n") == 1
 
 
-def test_a_folder_that_the_command_of_the_package_left_goes_on(tmp_path: Path) -> None:
+def test_a_folder_that_the_command_of_the_package_left_goes_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "out"
     known = {"kind": "white", "number": 0, "below": [0.5] * 5, "width": [1.0] * 5, "verdicts": ["identified"] * 5}
     fit = known | {"alarm": False, "chance": 0.5, "noise": "angle white", "seconds": 0.25}
@@ -83,6 +85,8 @@ def test_a_folder_that_the_command_of_the_package_left_goes_on(tmp_path: Path) -
     (kind,) = json.loads((out / "coverage.json").read_text())["kinds"]
     assert kind["fits"] == 1
     assert "0.2 s a fit" in (out / "coverage.txt").read_text()  # of the old fit: none was made anew
+    warned = f"coverage: {out}/fits-fixed-2026.jsonl: which code made them is not said of 1 of 1 fits; they are counted"
+    assert warned in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ from benchmarks.intervals.calibration import (
     run_tasks,
     tasks_of,
 )
+from benchmarks.intervals.made_by import code_now
 from benchmarks.intervals.noise_kinds import NOISE_KINDS, noise_kind
 from benchmarks.intervals.planted import planted_problem
 from benchmarks.intervals.report import coverage_document, coverage_text, is_good, ranks_figure
@@ -61,7 +62,43 @@ def test_a_study_goes_on_where_it_was_stopped_and_gives_the_same(tmp_path: Path)
     assert both[0] == first
     again = [dataclasses.replace(one, seconds=0.0) for one in (both[1], repetition(tasks[1]))]
     assert again[0] == again[1]
-    assert [json.loads(one)["number"] for one in file.read_text().splitlines()] == [0, 1]
+    kept_lines = [json.loads(one) for one in file.read_text().splitlines()]
+    assert [(one["number"], one["code"]) for one in kept_lines] == [(0, code_now()), (1, code_now())]
+
+
+def kept(file: Path, lines: list[Line], code: str | None) -> None:
+    """Finished fits in a file, by some code or, where None, by code that did not say what it was."""
+    own = {} if code is None else {"code": code}
+    documents = [{name: getattr(one, name) for name in Line.__slots__} | own for one in lines]
+    file.write_text("".join(f"{json.dumps(document)}\n" for document in documents))
+
+
+def test_a_study_that_other_code_began_is_refused_by_what_differs_and_left_alone(tmp_path: Path) -> None:
+    file = tmp_path / "fits.jsonl"
+    kept(file, even(1), "ppafo 0.0.1, identification 0123456789ab")
+    before = file.read_bytes()
+    refused = (
+        r"fits.jsonl: has fits by ppafo 0\.0\.1, identification 0123456789ab \(1\), this is ppafo .*; 1 more would be"
+    )
+    with pytest.raises(IdentificationError, match=refused):
+        run_tasks(tasks_of(["white"], 2, 3, False), file, 1)
+    assert file.read_bytes() == before
+
+
+def test_finished_fits_of_other_code_or_of_none_are_counted_with_a_warning(tmp_path: Path) -> None:
+    file, heard = tmp_path / "fits.jsonl", list[str]()
+    kept(file, even(1), "ppafo 0.0.1, identification 0123456789ab")
+    tasks = tasks_of(["white"], 1, 3, False)
+    assert run_tasks(tasks, file, 1, warn=heard.append) == even(1)
+    assert [text.partition(", this is")[0] for text in heard] == [
+        f"{file}: has fits by ppafo 0.0.1, identification 0123456789ab (1)"
+    ]
+    kept(file, even(1), None)
+    assert run_tasks(tasks, file, 1, warn=heard.append) == even(1)
+    assert heard[1:] == [f"{file}: which code made them is not said of 1 of 1 fits; they are counted"]
+    kept(file, even(1), code_now())
+    assert run_tasks(tasks, file, 1, warn=heard.append) == even(1)
+    assert len(heard) == 2
 
 
 def test_a_truth_from_the_prior_lies_inside_the_posterior() -> None:

@@ -1,7 +1,7 @@
 """Runs of one scenario with many values: metrics, which runs failed and why."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import final
 
@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from ppafo.errors import ScenarioError, StudyError, UnitError, first_twice, nearest_name
 from ppafo.metrics import METRICS
+from ppafo.parameters.parameter_set import ATMOSPHERE_PATH
 from ppafo.progress import Progress, Report
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import OPEN_LOOP
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import MAXIMUM_DRAWS
-from ppafo.units import parse_quantity
+from ppafo.units import conversion, parse_quantity, split_quantity
 
 _LEVELS = {"Pa": "Pa_a", "-": ""}
 _DIFFERENCES = {"Pa": "Pa_d", "-": ""}
@@ -165,20 +166,38 @@ def _piece(scenario: Scenario, columns: Mapping[str, Floats], metrics: Sequence[
     return Outcomes(values, result.status != 0, reason)
 
 
-def level_of(text: str, metric: str, what: str) -> float:
-    """Return a value of a metric in SI; StudyError, whose message ``what`` begins, where the unit does not fit."""
+def atmosphere_of(scenario: Scenario, varied: Collection[str]) -> float | None:
+    """Return the pressure [Pa absolute] from which gauge pressures of a scenario count; None where it is varied."""
+    return None if ATMOSPHERE_PATH in varied else scenario.device.supply.atmospheric_pressure
+
+
+def level_of(text: str, metric: str, what: str, atmosphere: float | None) -> float:
+    """Return a value of a metric in SI; gauge pressure counts from ``atmosphere`` [Pa absolute].
+
+    StudyError, whose message ``what`` begins, where the unit does not fit, and for a gauge pressure where the runs have
+    no one atmosphere, which is None then.
+    """
     unit = METRICS[metric].unit
-    return _number(text, _LEVELS.get(unit, unit), what)
+    si_unit = _LEVELS.get(unit, unit)
+    if atmosphere is not None:
+        return _number(text, si_unit, what, atmosphere)
+    absolute = _number(text, si_unit, what, 0.0)
+    if conversion(split_quantity(text)[1], si_unit)[2]:
+        raise StudyError(
+            f"{what}: a gauge pressure counts from {ATMOSPHERE_PATH}, which varies here; give an absolute pressure, "
+            "for example '446 kPa_a'"
+        )
+    return absolute
 
 
 def difference_of(text: str, metric: str, what: str) -> float:
     """Return a difference of two values of a metric in SI; StudyError as in ``level_of``."""
     unit = METRICS[metric].unit
-    return _number(text, _DIFFERENCES.get(unit, unit), what)
+    return _number(text, _DIFFERENCES.get(unit, unit), what, 0.0)
 
 
-def _number(text: str, unit: str, what: str) -> float:
+def _number(text: str, unit: str, what: str, atmosphere: float) -> float:
     try:
-        return parse_quantity(text, unit)
+        return parse_quantity(text, unit, atmosphere)
     except UnitError as error:
         raise StudyError(f"{what}: {error}") from error

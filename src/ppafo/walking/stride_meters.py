@@ -1,7 +1,6 @@
 """Metrics of a walk stride by stride, without a recording: one meter that goes through the samples once.
 
-What is counted is that of ``walking/strides.py`` and ``walking/walk_metrics.py``; tests hold both together. Only
-a landing on the toes counts for the stride that it ends here, and there for the one that it begins.
+What is counted is that of ``walking/strides.py`` and ``walking/walk_metrics.py``; tests hold both together.
 """
 
 import math
@@ -33,10 +32,12 @@ class StrideTotals(NamedTuple):
 class StrideNow(NamedTuple):
     """The stride under way: totals at its strike, 1 where it lacked help; error in push-off [(N m)^2], samples of it.
 
-    ``is_whole`` is 1 of one that began with a strike, which the walk itself does not.
+    ``is_whole`` is 1 of one that began with a strike, which the walk itself does not, ``on_toes`` of one that began on
+    the toes: the totals at its strike have that landing already.
     """
 
     is_whole: float
+    on_toes: float
     begun: StrideTotals
     was_vented: float
     squares: float
@@ -80,14 +81,14 @@ def totals_at(sample: WalkSample) -> StrideTotals:
     )
 
 
-def sum_with(sums: StrideTotals, now: StrideTotals, begun: StrideTotals) -> StrideTotals:
-    """Sums with those of a stride that went from one to the other."""
+def sum_with(sums: StrideTotals, now: StrideTotals, begun: StrideTotals, on_toes: float) -> StrideTotals:
+    """Sums with those of a stride that went from one to the other; ``on_toes`` is 1 where it began on the toes."""
     return StrideTotals(
         gas=sums.gas + (now.gas - begun.gas),
         push_off_work=sums.push_off_work + (now.push_off_work - begun.push_off_work),
         slap_rate=sums.slap_rate + (now.slap_rate - begun.slap_rate),
         toe_clearance=sums.toe_clearance + (now.toe_clearance - begun.toe_clearance),
-        toe_landing=sums.toe_landing + (now.toe_landing - begun.toe_landing),
+        toe_landing=sums.toe_landing + on_toes,
     )
 
 
@@ -97,7 +98,7 @@ def _start(_course: Course, sample: WalkSample) -> Strides:
         strikes=sample.strides,
         first_gas=sample.supplied_mass,
         gas=sample.supplied_mass,
-        stride=StrideNow(is_whole=0.0, begun=nothing, was_vented=0.0, squares=0.0, samples=0.0),
+        stride=StrideNow(is_whole=0.0, on_toes=0.0, begun=totals_at(sample), was_vented=0.0, squares=0.0, samples=0.0),
         counted=Counted(whole=0.0, helped=0.0, counted=0.0, slaps=0.0, sums=nothing, squares=0.0, samples=0.0),
         safe_time=sample.time if sample.level > HELPS else NOT_YET,
     )
@@ -105,7 +106,8 @@ def _start(_course: Course, sample: WalkSample) -> Strides:
 
 def _update(strides: Strides, _course: Course, sample: WalkSample) -> Strides:
     strikes = sample.strides - strides.strikes > 0.5
-    begun = StrideNow(is_whole=1.0, begun=totals_at(sample), was_vented=0.0, squares=0.0, samples=0.0)
+    on_toes = sample.toe_landings - strides.stride.begun.toe_landing
+    begun = StrideNow(is_whole=1.0, on_toes=on_toes, begun=totals_at(sample), was_vented=0.0, squares=0.0, samples=0.0)
     stride = begun if strikes else strides.stride
     is_first = sample.level > HELPS and strides.safe_time < 0.0
     return Strides(
@@ -124,6 +126,7 @@ def go_on(stride: StrideNow, sample: WalkSample) -> StrideNow:
     pushes = sample.phase == PUSH_OFF
     return StrideNow(
         is_whole=stride.is_whole,
+        on_toes=stride.on_toes,
         begun=stride.begun,
         was_vented=1.0 if sample.level > HELPS else stride.was_vented,
         squares=stride.squares + (error * error if pushes else 0.0),
@@ -142,7 +145,7 @@ def count(counted: Counted, stride: StrideNow, sample: WalkSample) -> Counted:
         helped=counted.helped + (1.0 if helps else 0.0),
         counted=counted.counted + (1.0 if counts else 0.0),
         slaps=counted.slaps + (1.0 if slaps else 0.0),
-        sums=sum_with(counted.sums, now, stride.begun) if counts else counted.sums,
+        sums=sum_with(counted.sums, now, stride.begun, stride.on_toes) if counts else counted.sums,
         squares=counted.squares + (stride.squares if counts else 0.0),
         samples=counted.samples + (stride.samples if counts else 0.0),
     )

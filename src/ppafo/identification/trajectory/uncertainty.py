@@ -119,7 +119,8 @@ def _verdict(evidence: Evidence, index: int, fraction: float) -> Verdict:
 
 def _is_prior_alone(evidence: Evidence, index: int) -> bool:
     deviation = float(evidence.prior_deviation[index])
-    error = math.sqrt(float(evidence.covariance[index, index]) / evidence.inflation)
+    # Uncertain noise widens what the recordings say, never the prior: the error is that of the posterior as it is.
+    error = math.sqrt(float(evidence.covariance[index, index]))
     return math.isfinite(deviation) and error > FROM_PRIOR * deviation
 
 

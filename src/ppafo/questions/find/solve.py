@@ -16,7 +16,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.studies.configurations import with_overrides
 from ppafo.studies.draws import Uncertainty
 from ppafo.studies.noise import NOISE, with_noise
-from ppafo.studies.outcomes import Outcomes, Tally, check_metrics, level_of, scenario_model
+from ppafo.studies.outcomes import Outcomes, Tally, atmosphere_of, check_metrics, level_of, scenario_model
 from ppafo.studies.varying import VariedPath, varied_path
 from ppafo.units import split_quantity
 
@@ -115,7 +115,7 @@ def find(
     base = scenario_or_load(scenario)
     base = with_overrides(base, overrides)
     path, low, high = _range(vary, base)
-    condition = _condition(such_that, base)
+    condition = _condition(such_that, base, path.path)
     if not FEWEST <= grid <= MOST:
         raise StudyError(f"grid = {grid}: must be at least {FEWEST} and at most {MOST:,}")
     noise = Uncertainty(with_noise((), None, [base], [path.path])[0])
@@ -205,7 +205,7 @@ def _range(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
     return path, low, high
 
 
-def _condition(text: str, base: Scenario) -> Condition:
+def _condition(text: str, base: Scenario, varied: str) -> Condition:
     parts = _CONDITION.fullmatch(text)
     if parts is None:
         raise StudyError(
@@ -216,6 +216,6 @@ def _condition(text: str, base: Scenario) -> Condition:
     return Condition(
         parts[1],
         parts[2] == "<=",
-        level_of(parts[3], parts[1], f"'{one_line(text)}'"),
+        level_of(parts[3], parts[1], f"'{one_line(text)}'", atmosphere_of(base, [varied])),
         f"{parts[1]} {parts[2]} {parts[3]}",
     )

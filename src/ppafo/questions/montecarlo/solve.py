@@ -10,7 +10,7 @@ from ppafo.progress import Report
 from ppafo.questions.montecarlo.estimate import MonteCarlo, StoppingRule, draw_until
 from ppafo.questions.montecarlo.statistic import Probability, Statistic, parse_statistic
 from ppafo.studies.draws import choose_configuration, study_of, uncertainty_in
-from ppafo.studies.outcomes import Tally, check_metrics, difference_of, scenario_model
+from ppafo.studies.outcomes import Tally, atmosphere_of, check_metrics, difference_of, scenario_model
 from ppafo.studies.study import Study
 from ppafo.units import parse_quantity
 
@@ -45,7 +45,8 @@ def monte_carlo(
     base = choose_configuration(chosen, configuration)
     uncertainty = uncertainty_in(chosen, base).with_noise_of([base.scenario])
     check_metrics([metric], base.scenario)
-    what = parse_statistic(statistic, metric)
+    atmosphere = atmosphere_of(base.scenario, {*uncertainty.paths, *uncertainty.same})
+    what = parse_statistic(statistic, metric, atmosphere)
     asked = width or (PROBABILITY_WIDTH if isinstance(what, Probability) else DEFAULT_WIDTH)
     rule = stopping_rule(what, metric, asked, StoppingRule(1.0, False, first_draws, draws, confidence, maximum_failed))
     tally = Tally(rule.first, progress)

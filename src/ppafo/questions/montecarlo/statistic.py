@@ -129,8 +129,11 @@ class Probability:
         return float(np.count_nonzero(np.isfinite(values)))
 
 
-def parse_statistic(text: str, metric: str) -> Statistic:
-    """Return the statistic of a metric that a text names; StudyError where it names none."""
+def parse_statistic(text: str, metric: str, atmosphere: float | None) -> Statistic:
+    """Return the statistic of a metric that a text names; StudyError where it names none.
+
+    A gauge pressure counts from ``atmosphere`` [Pa absolute], as in ``studies.outcomes.level_of``.
+    """
     words, unit = text.strip(), METRICS[metric].unit
     if words == "mean":
         return Mean(unit)
@@ -139,7 +142,6 @@ def parse_statistic(text: str, metric: str) -> Statistic:
         return Quantile(unit, float(quantile[1]))
     probability = _PROBABILITY.fullmatch(words)
     if probability is not None:
-        return Probability(
-            level_of(probability[2], metric, f"statistic '{text}'"), probability[1] == "above", probability[2]
-        )
+        threshold = level_of(probability[2], metric, f"statistic '{text}'", atmosphere)
+        return Probability(threshold, probability[1] == "above", probability[2])
     raise StudyError(f"statistic '{text}' is not known; give {GRAMMAR}, with a fraction above 0 and below 1")

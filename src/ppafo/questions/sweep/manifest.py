@@ -14,7 +14,9 @@ from ppafo.errors import DataError, StudyError
 from ppafo.metrics import METRICS
 from ppafo.questions.sweep.bands import Bins
 from ppafo.questions.sweep.chunks import chunk_count, chunk_size
+from ppafo.questions.sweep.python_controller import controller_document
 from ppafo.simulation.document import plain, scenario_document
+from ppafo.simulation.scenario import Scenario
 from ppafo.storage.places import Place, read_document
 from ppafo.studies.study import Study
 from ppafo.version import __version__
@@ -124,10 +126,13 @@ def manifest_bytes(document: Mapping[str, Any]) -> bytes:
     return f"{json_text(document)}\n".encode()
 
 
-def _without_origin(scenario: Any) -> dict[str, Any]:
+def _without_origin(scenario: Scenario) -> dict[str, Any]:
     """Return a base scenario in SI units without the file it came from, which may lie elsewhere the next time."""
     document: dict[str, Any] = _plain(scenario_document(scenario))
     del document["origin"]
+    custom = scenario.control.custom
+    if custom is not None:
+        document["control"]["custom"] = controller_document(custom)
     return document
 
 

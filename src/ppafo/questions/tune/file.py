@@ -19,7 +19,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.studies.draws import Uncertainty, uncertainty_of
 from ppafo.studies.loading import list_studies, load_study
 from ppafo.studies.noise import NOISE
-from ppafo.studies.outcomes import check_metrics, difference_of, level_of
+from ppafo.studies.outcomes import atmosphere_of, check_metrics, difference_of, level_of
 from ppafo.studies.varying import varied_path
 
 LARGEST_SEED = 2**32 - 1
@@ -148,6 +148,9 @@ def _problem(document: dict[str, Any], file: str, folder: Path, overrides: Seque
     except (ScenarioError, ParameterError, StudyError) as error:
         raise refusal(error) from error
     searched = _search_variables(parsed, scenario, refusal)
+    spread = _spread(parsed, folder, [item.path for item in searched], scenario, refusal)
+    drawn = () if spread is None else (*spread.uncertainty.paths, *spread.uncertainty.same)
+    atmosphere = atmosphere_of(scenario, (*drawn, *(item.path for item in searched)))
     return Problem(
         name=parsed.name,
         description=" ".join(parsed.description.split()),
@@ -155,8 +158,8 @@ def _problem(document: dict[str, Any], file: str, folder: Path, overrides: Seque
         overrides=(*parsed.overrides, *overrides),
         searched=searched,
         goals=tuple(_goal(item, refusal) for item in parsed.objective),
-        constraints=tuple(_constraint(item, refusal) for item in parsed.constraints),
-        spread=_spread(parsed, folder, [item.path for item in searched], scenario, refusal),
+        constraints=tuple(_constraint(item, atmosphere, refusal) for item in parsed.constraints),
+        spread=spread,
         effort=values.Effort(**parsed.effort.model_dump()),
     )
 
@@ -209,14 +212,14 @@ def _goal(item: Goal, refusal: Refusal) -> values.Goal:
     return values.Goal(item.metric, item.weight, scale)
 
 
-def _constraint(item: Constraint, refusal: Refusal) -> values.Constraint:
+def _constraint(item: Constraint, atmosphere: float | None, refusal: Refusal) -> values.Constraint:
     given = [text for text in (item.at_most, item.at_least) if text is not None]
     if len(given) != 1:
         raise refusal(
             f"constraint '{item.metric}': needs either at_most or at_least, it has {'both' if given else 'none'}"
         )
     try:
-        limit = level_of(given[0], item.metric, f"constraint '{item.metric}' = '{given[0]}'")
+        limit = level_of(given[0], item.metric, f"constraint '{item.metric}' = '{given[0]}'", atmosphere)
     except StudyError as error:
         raise refusal(error) from error
     return values.Constraint(item.metric, limit, item.at_most is not None, given[0])

@@ -146,13 +146,13 @@ def test_failed_draws_are_left_out_and_counted_or_refused() -> None:
         (lambda: StoppingRule(1.0, False, first=4), "must be at least 32"),
         (lambda: StoppingRule(1.0, False, first=512, maximum=256), "not more than the maximum"),
         (lambda: StoppingRule(1.0, False, confidence=0.2), "confidence = 0.2"),
-        (lambda: parse_statistic("median", METRIC), "statistic 'median' is not known"),
-        (lambda: parse_statistic("quantile 1.5", METRIC), "a fraction above 0 and below 1"),
-        (lambda: parse_statistic("probability above 3 g", METRIC), "statistic 'probability above 3 g'"),
+        (lambda: parse_statistic("median", METRIC, None), "statistic 'median' is not known"),
+        (lambda: parse_statistic("quantile 1.5", METRIC, None), "a fraction above 0 and below 1"),
+        (lambda: parse_statistic("probability above 3 g", METRIC, None), "statistic 'probability above 3 g'"),
         (lambda: stopping_rule(Mean("N m"), METRIC, "3 g", StoppingRule(1.0, False)), "width = '3 g'"),
         (
             lambda: stopping_rule(
-                parse_statistic("probability above 1 N m", METRIC), METRIC, "1 %", StoppingRule(1.0, False)
+                parse_statistic("probability above 1 N m", METRIC, None), METRIC, "1 %", StoppingRule(1.0, False)
             ),
             "plain number, such as 0.01",
         ),

@@ -239,15 +239,17 @@ def _mid_stance(course: Course, part: slice, profile: TorqueProfile) -> float:
 
 
 def _toes(course: Course, timing: GaitTiming, strides: Sequence[slice]) -> tuple[float, float, float]:
-    """Mean lowest toes in mid-swing [m], fractions of strides with clear toes and with toes that struck first."""
-    lowest, struck = [], []
+    """Mean lowest toes in mid-swing [m], fractions of strides with clear toes and of those that begin on the toes."""
+    lowest, ends, begins = [], [], []
     for stride in strides:
         phase = course.phase[stride]
         watched = (phase >= timing.clearance_from) & (phase <= timing.clearance_to)
         lowest.append(float(np.min(course.toe_height[stride][watched])))
-        struck.append(_gain(course.toe_landings, stride) > 0.5)
-    clear = [height >= 0.0 and not first for height, first in zip(lowest, struck, strict=True)]
-    return float(np.mean(lowest)), float(np.mean(clear)), float(np.mean(struck))
+        # A strike counts at the first sample of the stride that it begins: the landing of a swing is that after it.
+        ends.append(_gain(course.toe_landings, stride) > 0.5)
+        begins.append(_gain(course.toe_landings, slice(max(stride.start - 1, 0), stride.start)) > 0.5)
+    clear = [height >= 0.0 and not first for height, first in zip(lowest, ends, strict=True)]
+    return float(np.mean(lowest)), float(np.mean(clear)), float(np.mean(begins))
 
 
 def _gain(total: Floats, part: slice) -> float:

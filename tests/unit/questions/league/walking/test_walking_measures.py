@@ -112,16 +112,26 @@ def test_a_push_off_that_would_outlast_the_stance_is_judged_up_to_toe_off() -> N
     assert found["torque_error"] == pytest.approx(0.0, abs=1e-3)
 
 
-def test_toes_are_judged_by_their_lowest_in_mid_swing_and_by_what_strikes_first() -> None:
+@pytest.mark.parametrize(
+    ("strike", "clear", "begins"),
+    [(300, 1.0, 0.5), (400, 0.5, 0.5), (500, 0.5, 0.0)],
+)
+def test_a_strike_of_the_toes_ends_the_swing_before_it_and_begins_the_stride_after_it(
+    strike: int, clear: float, begins: float
+) -> None:
+    course = walked()
+    struck = np.where(np.arange(course.phase.size) >= strike, 1.0, 0.0)
+    found = measured(replace(course, toe_landings=struck))
+    assert (found["toes_clear"], found["toe_strikes"]) == (clear, begins)
+
+
+def test_toes_are_judged_by_their_lowest_in_mid_swing() -> None:
     course = walked()
     height = course.toe_height.copy()
     height[300 + 80], height[400 + 65] = -0.01, -0.5
     found = measured(replace(course, toe_height=height))
     assert found["toe_height"] == pytest.approx(0.5 * (-0.01 + 0.02))
     assert found["toes_clear"] == 0.5
-    struck = np.where(np.arange(course.phase.size) >= 500, 1.0, 0.0)
-    found = measured(replace(course, toe_landings=struck))
-    assert (found["toes_clear"], found["toe_strikes"]) == (0.5, 0.5)
 
 
 def test_a_command_of_zero_between_two_ways_is_no_switching_but_venting_is() -> None:
