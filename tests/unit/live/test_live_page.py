@@ -122,7 +122,7 @@ def test_every_default_of_the_page_is_what_its_text_says() -> None:
             for key, text, said in (
                 ("valve.area", "five", "valve.area: 'five' does not start with a number"),
                 ("valve.area", "3 parsec", "'3 parsec' has a unit that does not fit here; allowed: mm^2, cm^2, m^2"),
-                ("valve.area", "-3 mm^2", "'-3 mm^2' is outside of its range, above 0"),
+                ("valve.area", "-3 mm^2", "'-3 mm^2' is outside of its range, from 0 up to 10000 mm^2"),
                 ("valve.area", "1e400", "is outside of its range"),
                 ("valve.area", "3 mm^2;valve.area=4 mm^2", "a semicolon or a line break"),
                 ("valve.switching_interval", "0 ms", "must stay above 0 on this page"),
