@@ -37,4 +37,9 @@ const ended = module.ensemble(place, runs, found, statuses, traced.channel, trac
 put(new Float64Array([ended, ...integers(statuses, runs)]));
 put(floats(found, metrics * runs));
 put(floats(traces, traced.places * runs));
+// All channels at once, of the same runs.
+const count = traced.places * runs * (channels - 1);
+const all = module.reserve(8 * Math.max(1, count));
+module.ensemble(place, runs, found, statuses, -2, traced.every, traced.places, all);
+put(floats(all, count));
 writeFileSync(out, Buffer.concat(pieces));

@@ -46,12 +46,16 @@ class Ran:
 
 @dataclass(frozen=True)
 class Given:
-    """What a module gave for many: each alone, and statuses, metrics and traces of all as an ensemble."""
+    """What a module gave for many: each alone, and statuses, metrics and traces of all as an ensemble.
+
+    ``traces`` are those of one channel (runs, places), ``every_trace`` those of all (runs, channels, places).
+    """
 
     runs: list[Ran]
     statuses: Floats
     metrics: Floats
     traces: Floats
+    every_trace: Floats
 
 
 def driven(module: WasmModule, settings: Floats, channel: int = 0, places: int = 100) -> Given:
@@ -83,8 +87,10 @@ def driven(module: WasmModule, settings: Floats, channel: int = 0, places: int =
     assert ended == COMPLETED
     metrics = take(counts["metrics"] * len(settings)).reshape(len(settings), -1)
     traces = take(places * len(settings)).reshape(len(settings), places)
+    channels = counts["channels"] - 1
+    every_trace = take(places * len(settings) * channels).reshape(len(settings), channels, places)
     assert taken == numbers.size
-    return Given(runs, np.array(statuses), metrics, traces)
+    return Given(runs, np.array(statuses), metrics, traces, every_trace)
 
 
 def drawn(module: WasmModule, draws: int, spread: tuple[float, float] = (0.7, 1.4), seed: int = 16) -> Floats:
@@ -249,8 +255,12 @@ def assert_alike(given: Given) -> None:
         if ran.status != COMPLETED:
             assert np.isnan(given.metrics[place]).all()
             assert np.isnan(given.traces[place]).all()
+            assert np.isnan(given.every_trace[place]).all()
             continue
         assert given.metrics[place].tobytes() == ran.metrics.tobytes()
         expected = ran.columns[1, ::EVERY][: given.traces.shape[1]]
         assert expected.tobytes() == given.traces[place, : expected.size].tobytes()
         assert np.isnan(given.traces[place, expected.size :]).all()
+        several = ran.columns[1:, ::EVERY][:, : given.every_trace.shape[2]]
+        assert several.tobytes() == given.every_trace[place, :, : expected.size].tobytes()
+        assert np.isnan(given.every_trace[place, :, expected.size :]).all()

@@ -1,12 +1,18 @@
 /** How far a run is from a recording, by the rules of `ppafo validate`: common delay, weights by time, full ranges. */
 
-import { ATMOSPHERE, type Values } from "./settings";
+import { ATMOSPHERE, atmosphereOf, type Values } from "./settings";
 import { InputError } from "./units";
 
 /** Samples over time; channels in SI. */
-export interface Overlay {
+export interface Samples {
   readonly time: Float64Array;
   readonly channels: ReadonlyMap<string, Float64Array>;
+}
+
+/** A recording. */
+export interface Overlay extends Samples {
+  /** Channels that were recorded in gauge, and are: beside each run they count from its atmosphere. */
+  readonly gauges: ReadonlySet<string>;
 }
 
 /** A column of a table, the channel that it is, and the way of its numbers to SI. */
@@ -15,6 +21,7 @@ export interface RecordedColumn {
   readonly channel: string;
   readonly factor: number;
   readonly offset: number;
+  readonly isGauge: boolean;
 }
 
 export interface ChannelError {
@@ -75,20 +82,20 @@ export function recordingOf(table: readonly Float64Array[], columns: readonly Re
     if (!((time[place] ?? 0) > (time[place - 1] ?? 0))) throw new InputError(`row ${place + 1}: the clock stands still or goes backwards`);
   }
   channels.delete("time");
-  return { time, channels };
+  return { time, channels, gauges: new Set(columns.filter(({ isGauge }) => isGauge).map(({ channel }) => channel)) };
 }
 
 /** As much of a recording as a plot can show. */
-export function drawnOf({ time, channels }: Overlay): Overlay {
+export function drawnOf({ time, channels, gauges }: Overlay): Overlay {
   const step = Math.max(1, Math.floor(time.length / MOST_DRAWN));
   const kept = (values: Float64Array) => Float64Array.from({ length: Math.ceil(values.length / step) }, (_, place) => values[place * step] ?? 0);
-  return { time: kept(time), channels: new Map([...channels].map(([name, values]) => [name, kept(values)])) };
+  return { time: kept(time), channels: new Map([...channels].map(([name, values]) => [name, kept(values)])), gauges };
 }
 
 /** Errors of one run against a recording, channel by channel. */
-export function compare(whole: Overlay, run: Overlay, values: Values, isHeld: boolean): ChannelError[] {
+export function compare(whole: Overlay, run: Samples, values: Values, isHeld: boolean): ChannelError[] {
   const end = run.time.at(-1) ?? 0;
-  const recorded = upTo(whole, end);
+  const recorded = absolute(upTo(whole, end), whole.gauges, atmosphereOf(values));
   if (run.time.length < 2 || recorded.time.length < 2) return [];
   const cutAt = recorded.time.length < whole.time.length ? end : null;
   const measured = withDifference(recorded.channels);
@@ -110,13 +117,18 @@ export function compare(whole: Overlay, run: Overlay, values: Values, isHeld: bo
 }
 
 /** A recording up to a time [s], with what rounding adds to it. */
-function upTo({ time, channels }: Overlay, end: number): Overlay {
+function upTo({ time, channels }: Samples, end: number): Samples {
   const after = time.findIndex((at) => at > end + 1e-9);
   if (after < 0) return { time, channels };
   return { time: time.subarray(0, after), channels: new Map([...channels].map(([name, values]) => [name, values.subarray(0, after)])) };
 }
 
-function fullRanges(recorded: Overlay, values: Values): Readonly<Record<string, number>> {
+/** Gauge pressures as absolute ones. */
+function absolute({ time, channels }: Samples, gauges: ReadonlySet<string>, atmosphere: number): Samples {
+  return { time, channels: new Map([...channels].map(([name, values]) => [name, gauges.has(name) ? values.map((value) => value + atmosphere) : values])) };
+}
+
+function fullRanges(recorded: Samples, values: Values): Readonly<Record<string, number>> {
   const value = (key: string) => values.get(key) ?? 0;
   const supply = recorded.channels.get("supply_pressure");
   const gauge = (supply === undefined ? Math.max(value("supply.pressure"), value("supply.dorsiflexion_pressure")) : median(supply)) - value(ATMOSPHERE);

@@ -1,6 +1,7 @@
 /** The page as a whole: its state, what is simulated again when it changes, and what shows it. */
 
 import type { Overlay } from "./agreement";
+import { Bands } from "./bands";
 import { type Content, programNamed, type Program, type Tab } from "./content";
 import { Controls } from "./controls";
 import { say, whenQuiet } from "./dom";
@@ -8,14 +9,13 @@ import { Engine, failedRun, type Run } from "./engine";
 import { Extras } from "./extras";
 import { Workers } from "./jobs";
 import { OutcomeTable } from "./outcome";
-import { type Band, Panels } from "./panels";
+import { Panels } from "./panels";
 import { changed, type Configuration, contradiction, normalText, settingsByKey, valuesOf } from "./settings";
 import { Stage } from "./stage";
 import { addressOf, firstState, History, MOST_CONFIGURATIONS, type State, stateOfAddress } from "./state";
 import { InputError, telling } from "./units";
 import { unpacked } from "./unpacking";
 import { makeFrame, type PageFrame } from "./frame";
-import { bandOf } from "./variation";
 
 const MOST_RUNS = 4 * MOST_CONFIGURATIONS;
 
@@ -33,9 +33,7 @@ export class App {
   private readonly engines = new Map<string, Engine>();
   private readonly bytes = new Map<string, Promise<ArrayBuffer>>();
   private readonly runs = new Map<Configuration, Run>();
-  private readonly bands = new WeakMap<Configuration, ReadonlyMap<string, Band>>();
-  /** The last bands, by the place of their configuration: those stand until the next ones are there. */
-  private readonly latest = new Map<number, ReadonlyMap<string, Band>>();
+  private readonly bands = new Bands(this);
   private readonly frame: PageFrame;
   private readonly controls: Controls;
   readonly panels: Panels;
@@ -44,7 +42,6 @@ export class App {
   readonly extras: Extras;
   private target: number | null = null;
   private isBeside = false;
-  private hasBand = false;
   private isDue = false;
   private dragged: State | null = null;
   private readonly settle = whenQuiet(250, () => this.settled());
@@ -63,8 +60,7 @@ export class App {
     this.workers = new Workers((program) => this.bytesOf(program));
     this.frame = makeFrame(host, content, this);
     this.controls = new Controls(this.frame.controls, content, { change: (key, text, isDragging) => this.change(key, text, isDragging) });
-    const atmosphere = () => valuesOf(content, this.bench[0]!).get("supply.atmospheric_pressure") ?? 101325;
-    this.panels = new Panels(this.frame.panels, content, atmosphere, (time) => time !== null && this.stage.goTo(time, false));
+    this.panels = new Panels(this.frame.panels, content, (time) => time !== null && this.stage.goTo(time, false));
     this.stage = new Stage(this.frame.stage, (time) => this.panels.point(time));
     this.outcome = new OutcomeTable(this.frame.outcome, content);
     this.extras = new Extras(this.frame, this);
@@ -142,7 +138,7 @@ export class App {
   /** Show a state; what belongs to another tab, or to a configuration that is gone, is forgotten. */
   private enter(state: State): void {
     const [before, after] = [this.bench.length, state.benches[state.tab]?.length ?? 0];
-    if (state.tab !== this.state.tab || after !== before) this.latest.clear();
+    if (state.tab !== this.state.tab || after !== before) this.bands.forget();
     if (state.tab !== this.state.tab || (this.target ?? 0) >= after) this.target = null;
     this.state = state;
     this.schedule();
@@ -215,7 +211,7 @@ export class App {
   }
 
   band(isWanted: boolean): void {
-    this.hasBand = isWanted;
+    this.bands.isShown = isWanted;
     this.schedule();
     this.settle();
   }
@@ -312,7 +308,7 @@ export class App {
     for (const part of [this.frame.stage, this.frame.panels]) part.classList.toggle("absent", shown.length === 0);
     if (shown.length > 0) {
       this.stage.show(shown);
-      this.panels.show(shown.map((item) => ({ ...item, band: this.hasBand ? (this.bands.get(item.configuration) ?? this.latest.get(item.place) ?? null) : null })), this.isBeside, this.overlay);
+      this.panels.show(shown.map((item) => ({ ...item, band: this.bands.of(item.configuration, item.place) })), this.isBeside, this.overlay);
     }
     this.frame.root.dataset["milliseconds"] = taken.toFixed(2);
     this.frame.root.dataset["ready"] = "true";
@@ -324,19 +320,8 @@ export class App {
       const address = addressOf(this.content, this.state);
       if (address !== location.hash.slice(1)) history.replaceState(null, "", `#${address}`);
     }
+    this.workers.rest();
     this.extras.settle();
-    if (this.hasBand) for (const { configuration, place } of this.named) void this.drawBand(configuration, place).catch(telling((words) => this.tell(words)));
-    else this.latest.clear();
-  }
-
-  private async drawBand(configuration: Configuration, place: number): Promise<void> {
-    const run = this.runOf(configuration);
-    if (run === null || run.time.length < 2 || this.bands.has(configuration)) return;
-    const isWanted = () => this.hasBand && this.bench[place] === configuration;
-    const band = await bandOf(this.content, this.workers, configuration, run, isWanted);
-    if (band === null || !isWanted()) return;
-    this.bands.set(configuration, band);
-    this.latest.set(place, band);
-    this.schedule();
+    void this.bands.settle().catch(telling((words) => this.tell(words)));
   }
 }

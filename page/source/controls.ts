@@ -2,7 +2,7 @@
 
 import { type Content, type Program, programNamed, type Setting } from "./content";
 import { element, say } from "./dom";
-import { ATMOSPHERE, type Configuration, rangeText, settingsByKey, shownNumber, valuesOf } from "./settings";
+import { atmosphereOf, type Configuration, rangeText, settingsByKey, shownNumber, valuesOf } from "./settings";
 import { readableUnit } from "./units";
 
 const GROUPS: Readonly<Record<string, string>> = {
@@ -68,6 +68,7 @@ export class Controls {
   }
 
   private build(programs: readonly Program[], first: readonly string[]): void {
+    const focused = this.host.contains(document.activeElement) ? document.activeElement : null;
     const all = new Map(programs.flatMap((program) => [...settingsByKey(program)]));
     const leading = first.filter((key) => all.has(key));
     const groups = new Map<string, Setting[]>();
@@ -81,6 +82,16 @@ export class Controls {
     this.groups = [{ isOpen: () => true, controls }];
     const open = element("div", { class: "group first" }, ...controls.map(({ row }) => row));
     this.host.replaceChildren(open, ...(this.content.form === "block" ? [] : order.map((name) => this.folded(name, groups.get(name) ?? []))));
+    if (focused !== null) this.focusAs(focused);
+  }
+
+  /** Put the focus where it was before the controls were made anew, else on the first of them. */
+  private focusAs(former: Element): void {
+    const row = former.closest("[data-key]");
+    const same = this.groups[0]?.controls.find(({ setting }) => setting.key === row?.getAttribute("data-key"));
+    const place = row === null ? -1 : [...row.children].indexOf(former);
+    const next = same?.row.children[place] ?? this.groups[0]?.controls[0]?.value;
+    if (next instanceof HTMLElement) next.focus();
   }
 
   private folded(name: string, settings: readonly Setting[]): HTMLElement {
@@ -101,7 +112,7 @@ export class Controls {
     const { key, label } = setting;
     const end = label.lastIndexOf(" ") + 1;
     const about = element("p", { class: "about", id: `about-${key}`, hidden: true });
-    const describe = () => (name.title ||= this.words(setting).join("\n"));
+    const describe = () => (name.title = this.words(setting).join("\n"));
     const name: HTMLButtonElement = element(
       "button",
       {
@@ -155,10 +166,11 @@ export class Controls {
 
   /** What is known of a setting, line by line. */
   private words(setting: Setting): string[] {
+    const having = this.configurations.map((one) => valuesOf(this.content, one)).find((values) => values.has(setting.key));
     const origin = setting.origin === "" ? [] : [`${capital(setting.origin)}${setting.source === "" ? "." : `: ${setting.source}.`}`];
     return [
       `${capital(setting.summary)}.`,
-      `${capital(rangeText(this.content, setting, 101325))}. ${setting.key}`,
+      `${capital(rangeText(this.content, setting, atmosphereOf(having ?? new Map())))}. ${setting.key}`,
       ...origin,
       ...(setting.note === "" ? [] : [setting.note]),
     ];
@@ -175,7 +187,7 @@ export class Controls {
       const having = configurations.map((_, place) => place).filter((place) => values[place]?.has(key));
       row.hidden = having.length === 0;
       if (row.hidden) continue;
-      const texts = having.map((place) => shownNumber(this.content, setting, values[place]?.get(key) ?? 0, values[place]?.get(ATMOSPHERE) ?? 101325));
+      const texts = having.map((place) => shownNumber(this.content, setting, values[place]?.get(key) ?? 0, atmosphereOf(values[place] ?? new Map())));
       const different = [...new Set(texts)];
       const unit = readableUnit(setting.shown);
       if (!control.isTyped && (fault.hidden || !isSame)) {

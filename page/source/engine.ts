@@ -42,11 +42,13 @@ export interface Ensemble {
   readonly metrics: Float64Array;
   /** 0 where a run was completed. */
   readonly ended: Int32Array;
-  /** Samples of one channel, run after run; empty where none was wanted. */
+  /** Samples of all channels, run after run, one channel after the other; empty where none were wanted. */
   readonly traces: Float64Array;
 }
 
 const NUMBER = 8;
+/** What a module takes in the place of a channel. */
+const [NO_CHANNEL, ALL_CHANNELS] = [-1, -2];
 /** What a module can be asked for at once. */
 const MOST_BYTES = 2 ** 31 - 1;
 /** Angle [rad] by which a vane may be beyond a stop, as in Python. */
@@ -103,24 +105,24 @@ export class Engine {
     });
   }
 
-  /** Many runs, settings run after run, with their metrics, and samples of one channel where one is named. */
-  runMany(rows: Float64Array, channel: string | null, every: number, places: number): Ensemble {
+  /** Many runs, settings run after run, with their metrics, and of each so many samples of all channels. */
+  runMany(rows: Float64Array, every: number, places: number): Ensemble {
     return this.aside(() => {
       const { exports, program } = this;
       const runs = rows.length / program.settings.length;
       const settings = this.written(rows);
-      const wanted = channel === null ? 0 : places;
+      const wanted = runs * program.channels.length * places;
       const metrics = exports.reserve(runs * program.metrics.length * NUMBER);
       const ended = exports.reserve(runs * 4);
-      const traces = exports.reserve(Math.max(1, runs * wanted) * NUMBER);
-      const place = channel === null ? -1 : program.channels.findIndex((item) => item.name === channel);
-      const isDone = traces !== 0 && exports.ensemble(settings, runs, metrics, ended, place, every, wanted, traces) === 0;
+      const traces = exports.reserve(Math.max(1, wanted) * NUMBER);
+      const channel = places > 0 ? ALL_CHANNELS : NO_CHANNEL;
+      const isDone = traces !== 0 && exports.ensemble(settings, runs, metrics, ended, channel, every, places, traces) === 0;
       if (!isDone) throw new RangeError("these runs need more memory than this page has");
       const { buffer } = exports.memory;
       return {
         metrics: new Float64Array(buffer, metrics, runs * program.metrics.length).slice(),
         ended: new Int32Array(buffer, ended, runs).slice(),
-        traces: new Float64Array(buffer, traces, runs * wanted).slice(),
+        traces: new Float64Array(buffer, traces, wanted).slice(),
       };
     });
   }

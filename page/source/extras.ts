@@ -9,7 +9,7 @@ import { MapView } from "./map";
 import { shownMetric } from "./outcome";
 import { agreementTable, askForColumns, columnsOf, type ColumnMap, mapOfHeader } from "./recording";
 import { scenarioFile } from "./scenario_file";
-import { type Configuration, shownNumber, valuesOf } from "./settings";
+import { atmosphereOf, type Configuration, shownNumber, valuesOf } from "./settings";
 import { samplesText, savePicture, saveState, saveText } from "./sharing";
 import { addressOf, stateOfFile } from "./state";
 import { InputError, plain, readableUnit, telling } from "./units";
@@ -25,8 +25,10 @@ export class Extras {
   private readonly effects = element("div");
   /** Configurations of which the effects of assumptions are shown. */
   private moved: readonly Configuration[] = [];
-  /** How many files were to be read: only the last one counts. */
+  /** How many recordings were to be read: only the last one counts. */
   private readings = 0;
+  /** How many states were to be loaded, of which the same holds. */
+  private loadings = 0;
   private readonly files = element("div", { class: "buttons files" });
 
   constructor(
@@ -99,13 +101,20 @@ export class Extras {
     });
   }
 
+  /** Load a state, unless another one is to be loaded, or the page was changed, before it is read. */
   private async loadState(file: Blob): Promise<void> {
+    const { app } = this;
+    this.loadings += 1;
+    const [mine, before] = [this.loadings, app.state];
     try {
-      this.app.become(stateOfFile(this.app.content, await file.text().catch(refuseFile)));
-      this.app.tell("");
+      const text = await file.text().catch(refuseFile);
+      if (mine !== this.loadings) return;
+      if (app.state !== before) throw new InputError("the page was changed before it was read; load it again");
+      app.become(stateOfFile(app.content, text));
+      app.tell("");
     } catch (error) {
       if (!(error instanceof InputError)) throw error;
-      this.app.tell(`The file could not be loaded: ${error.message}.`);
+      if (mine === this.loadings) app.tell(`The file could not be loaded: ${error.message}.`);
     }
   }
 
@@ -145,6 +154,7 @@ export class Extras {
   }
 
   private clear(): void {
+    this.readings += 1;
     this.asked.replaceChildren();
     this.errors.replaceChildren();
     this.app.tell("");
@@ -162,12 +172,12 @@ export class Extras {
       if (read === null || !isLast()) return;
       const { reading, heads } = read;
       const map = mapOfHeader(heads);
-      if (map !== null) await this.take(file.name, reading, map);
+      if (map !== null) await this.take(file.name, reading, map, isLast);
       else {
         this.app.tell(`${file.name}: say below what its columns are.`);
         const details = this.frame.recording.closest("details");
         if (details !== null) details.open = true;
-        this.asked.replaceChildren(askForColumns(heads, (given) => void this.take(file.name, reading, given)));
+        this.asked.replaceChildren(askForColumns(heads, (given) => void this.take(file.name, reading, given, isLast)));
       }
     } catch (error) {
       if (!(error instanceof InputError)) throw error;
@@ -175,10 +185,11 @@ export class Extras {
     }
   }
 
-  private async take(name: string, reading: number, map: readonly ColumnMap[]): Promise<void> {
+  private async take(name: string, reading: number, map: readonly ColumnMap[], isLast: () => boolean): Promise<void> {
     try {
-      const atmosphere = valuesOf(this.app.content, this.app.bench[0]!).get("supply.atmospheric_pressure") ?? 101325;
-      this.app.overlayWith(await this.app.workers.takeRecording(reading, columnsOf(this.app.content, map, atmosphere)));
+      const recorded = await this.app.workers.takeRecording(reading, columnsOf(this.app.content, map));
+      if (!isLast()) return;
+      this.app.overlayWith(recorded);
       this.asked.replaceChildren();
       this.app.tell(`${name} is overlaid on the runs; the errors are listed below.`);
       const details = this.frame.recording.closest("details");
@@ -213,8 +224,9 @@ export class Extras {
 
   private async showEffects(): Promise<void> {
     const { bench } = this.app;
-    const found = await Promise.all(this.app.named.map(async (item) => ({ item, effects: await effectsOf(this.app.content, this.app.workers, item.configuration) })));
-    if (this.app.bench !== bench) return;
+    const isWanted = () => this.app.bench === bench;
+    const found = await Promise.all(this.app.named.map(async (item) => ({ item, effects: await effectsOf(this.app.content, this.app.workers, item.configuration, isWanted) })));
+    if (!isWanted()) return;
     this.moved = bench;
     this.effects.replaceChildren(...found.flatMap(({ item, effects }) => this.effectsTable(item, effects)));
   }
@@ -232,8 +244,9 @@ export class Extras {
     const size = (effect: Effect) => Math.max(...metrics.flatMap((metric) => ([0, 1] as const).map((end) => Math.abs(change(effect, metric.name, end)) || 0)));
     const ranked = [...effects].sort((a, b) => size(b) - size(a)).slice(0, TOLD_EFFECTS);
     const signed = (percent: number) => (Number.isFinite(percent) ? `${percent < 0 ? "−" : "+"}${plain(Math.abs(percent), 2)} %` : "–");
+    const atmosphere = atmosphereOf(valuesOf(content, configuration));
     const rows = ranked.map((effect) => {
-      const text = (value: number) => plain(Number(shownNumber(content, effect.setting, value, 101325)), 3);
+      const text = (value: number) => plain(Number(shownNumber(content, effect.setting, value, atmosphere)), 3);
       const words = `${effect.setting.label}: ${text(effect.ends[0])} to ${text(effect.ends[1])} ${readableUnit(effect.setting.shown)}`;
       return element(
         "tr",

@@ -78,8 +78,10 @@ export function makeFrame(host: HTMLElement, content: Content, app: App): PageFr
     beside.box.checked = isBeside;
     fillTabs(tabs, content, state, app);
     summary.textContent = content.tabs[state.tab]?.summary ?? "";
+    const isChoosing = target.contains(document.activeElement);
     fillBench(bench, content, named, app);
     fillTarget(target, named, chosen, app);
+    if (isChoosing && !target.contains(document.activeElement)) (target.hidden ? bench : target).querySelector<HTMLElement>("input:checked, select")?.focus();
   };
   return { root, notice, fault, controls, panels, stage, outcome, share, map, recording, assumptions, follow };
 }
@@ -138,7 +140,17 @@ function fillBench(bench: HTMLElement, content: Content, named: readonly Named[]
     element("option", { value: "" }, "+ Add"),
     ...app.tab.programs.map((name) => element("option", { value: name, title: programNamed(content, name).description }, programNamed(content, name).label)),
   );
-  bench.replaceChildren(...chips, ...(named.length < MOST_CONFIGURATIONS ? [add] : []));
+  refill(bench, ...chips, ...(named.length < MOST_CONFIGURATIONS ? [add] : []));
+}
+
+/** Fill a place anew. The focus stays with the control that comes to be in the same place, or is the last one as it was. */
+function refill(host: HTMLElement, ...children: Node[]): void {
+  const controls = () => [...host.querySelectorAll<HTMLElement>("button, select")];
+  const before = controls();
+  const at = before.findIndex((one) => one === document.activeElement);
+  host.replaceChildren(...children);
+  const after = controls();
+  if (at >= 0) after[at === before.length - 1 ? after.length - 1 : Math.min(at, after.length - 1)]?.focus();
 }
 
 function fillTarget(target: HTMLElement, named: readonly Named[], chosen: number | null, app: App): void {

@@ -2,21 +2,28 @@
 
 import type { Program } from "./content";
 import type { Ensemble } from "./engine";
-import type { ChannelError, Overlay, RecordedColumn } from "./agreement";
+import type { ChannelError, Overlay, RecordedColumn, Samples } from "./agreement";
 import type { Values } from "./settings";
 import type { Heads } from "./table";
 import { InputError } from "./units";
 
 declare const WORKER_SCRIPT: string;
 
-/** Samples that are wanted of many runs: of one channel, or of none, each so many-th, and how many. */
+/** Samples that are wanted of many runs: of all channels each so many-th, and how many; 0 for none. */
 export interface Trace {
-  readonly channel: string | null;
   readonly every: number;
   readonly places: number;
 }
 
-export const NO_TRACE: Trace = { channel: null, every: 1, places: 0 };
+export const NO_TRACE: Trace = { every: 1, places: 0 };
+
+/** Whoever wants many runs, while they are made. */
+export interface Watch {
+  /** Told of the first runs, all of which are done, whenever there are more of them; false ends it, and only those are given. */
+  readonly goesOn: (first: readonly Ensemble[]) => boolean;
+  /** Whether they are wanted yet; asked when the page has come to rest. */
+  readonly isWanted: () => boolean;
+}
 
 export interface RunsJob extends Trace {
   readonly kind: "runs";
@@ -30,7 +37,7 @@ export type Job =
   | { readonly kind: "program"; readonly program: Program; readonly bytes: ArrayBuffer }
   | { readonly kind: "table"; readonly number: number; readonly reading: number; readonly bytes: ArrayBuffer; readonly isLast: boolean }
   | { readonly kind: "recording"; readonly number: number; readonly reading: number; readonly columns: readonly RecordedColumn[] }
-  | { readonly kind: "agreement"; readonly number: number; readonly run: Overlay; readonly values: Values; readonly isHeld: boolean }
+  | { readonly kind: "agreement"; readonly number: number; readonly run: Samples; readonly values: Values; readonly isHeld: boolean }
   | RunsJob;
 
 export interface Reply {
@@ -50,58 +57,82 @@ const PIECES = 16;
 /** Runs that a program does side by side. */
 const TOGETHER = 8;
 
+/** What a worker was asked and has not answered. */
+interface Asked {
+  readonly job: Job;
+  readonly isWanted: () => boolean;
+  readonly answer: (reply: Reply) => void;
+}
+
+/** A worker, the programs that it was given, and what it is at, oldest first. */
+interface Member {
+  worker: Worker;
+  readonly known: Map<string, Job>;
+  readonly asked: Map<number, Asked>;
+}
+
 /** A few workers that share work; they start when they are first wanted. */
 export class Workers {
-  private readonly crew: { worker: Worker; known: Set<string> }[] = [];
-  private readonly waiting = new Map<number, (reply: Reply) => void>();
+  private readonly crew: Member[] = [];
+  /** The one that keeps the recording, and is therefore never stopped. */
+  private keeper: Member | null = null;
+  private readonly address = URL.createObjectURL(new Blob([WORKER_SCRIPT], { type: "text/javascript" }));
   private next = 0;
 
   constructor(private readonly bytesOf: (program: Program) => Promise<ArrayBuffer>) {}
 
-  get count(): number {
-    this.start();
-    return this.crew.length;
-  }
-
-  /**
-   * Many runs of a program, settings run after run, shared out among the workers. `goesOn` is told of the first runs, all of
-   * which are done, whenever there are more of them, and may end it: then only those are given.
-   */
-  async runMany(program: Program, rows: Float64Array<ArrayBuffer>, trace: Trace = NO_TRACE, goesOn: (first: readonly Ensemble[]) => boolean = () => true): Promise<Ensemble> {
+  /** Many runs of a program, settings run after run, shared out among the workers. */
+  async runMany(program: Program, rows: Float64Array<ArrayBuffer>, trace: Trace, { goesOn, isWanted }: Watch): Promise<Ensemble> {
     this.start();
     const bytes = await this.bytesOf(program);
     const width = program.settings.length;
     const size = Math.ceil(rows.length / width / this.crew.length / PIECES / TOGETHER) * TOGETHER * width;
     const found: Ensemble[] = [];
-    let [next, done, isWanted] = [0, 0, true];
-    const work = async (place: number) => {
-      this.introduce(place, program, bytes);
-      while (isWanted && next * size < rows.length) {
+    let [next, done, isOn] = [0, 0, true];
+    const work = async (member: Member) => {
+      introduce(member, program, bytes);
+      while (isOn && next * size < rows.length) {
         const piece = next;
         next += 1;
         const part = rows.slice(piece * size, (piece + 1) * size);
-        const { runs } = await this.ask(place, (number) => ({ kind: "runs", number, program: program.name, rows: part, ...trace }), [part.buffer]);
-        if (runs !== undefined) found[piece] = runs;
+        const { runs } = await this.ask(member, (number) => ({ kind: "runs", number, program: program.name, rows: part, ...trace }), [], isWanted);
+        if (runs === undefined) isOn = false;
+        else found[piece] = runs;
         const before = done;
         while (found[done] !== undefined) done += 1;
-        if (done > before && isWanted) isWanted = goesOn(found.slice(0, done));
+        if (done > before && isOn) isOn = goesOn(found.slice(0, done));
       }
     };
     // Two pieces wait at each worker, so that it does not wait for a page that is drawing.
-    await Promise.all([...this.crew.keys(), ...this.crew.keys()].map(work));
+    await Promise.all([...this.crew, ...this.crew].map(work));
     return together(found.slice(0, done));
+  }
+
+  /** Stop workers at what nobody wants any more: a piece of long runs lasts minutes. What else they were asked they begin anew. */
+  rest(): void {
+    for (const member of this.crew) {
+      const unwanted = [...member.asked].filter(([, { isWanted }]) => !isWanted());
+      if (unwanted.length === 0) continue;
+      member.worker.terminate();
+      member.worker = this.begun(member.asked);
+      for (const [number, { answer }] of unwanted) {
+        member.asked.delete(number);
+        answer({ number });
+      }
+      const again = [...member.asked.values()].map(({ job }) => job);
+      for (const job of [...member.known.values(), ...again]) member.worker.postMessage(job);
+    }
   }
 
   /** Read the table in a file, which a worker keeps. The page reads it, piece by piece: in WebKit a worker of a page from a file may not. Null where no longer wanted. */
   async readTable(file: Blob, isWanted: () => boolean): Promise<{ readonly reading: number; readonly heads: Heads } | null> {
-    this.start();
     const reading = this.next;
     this.next += 1;
     for (let place = 0; ; place += PIECE) {
       const bytes = await file.slice(place, place + PIECE).arrayBuffer().catch(refuseFile);
       if (!isWanted()) return null;
       const isLast = place + PIECE >= file.size;
-      const { heads } = await this.ask(this.crew.length - 1, (number) => ({ kind: "table", number, reading, bytes, isLast }), [bytes]);
+      const { heads } = await this.ask(this.kept, (number) => ({ kind: "table", number, reading, bytes, isLast }), [bytes]);
       if (heads !== undefined) return { reading, heads };
       if (isLast) throw new InputError("the file could not be read");
     }
@@ -109,50 +140,63 @@ export class Workers {
 
   /** Make a recording of a table that was read; the worker keeps it, and gives as much of it as can be drawn. */
   async takeRecording(reading: number, columns: readonly RecordedColumn[]): Promise<Overlay> {
-    const { drawn } = await this.ask(this.crew.length - 1, (number) => ({ kind: "recording", number, reading, columns }));
+    const { drawn } = await this.ask(this.kept, (number) => ({ kind: "recording", number, reading, columns }));
     if (drawn === undefined) throw new RangeError("a worker gave no recording");
     return drawn;
   }
 
   /** Errors of a run against the recording, of which millions of samples may be compared. */
-  async agreement({ time, channels }: Overlay, values: Values, isHeld: boolean): Promise<readonly ChannelError[]> {
-    const { errors } = await this.ask(this.crew.length - 1, (number) => ({ kind: "agreement", number, run: { time, channels }, values, isHeld }));
+  async agreement({ time, channels }: Samples, values: Values, isHeld: boolean): Promise<readonly ChannelError[]> {
+    const { errors } = await this.ask(this.kept, (number) => ({ kind: "agreement", number, run: { time, channels }, values, isHeld }));
     return errors ?? [];
   }
 
   private start(): void {
-    if (this.crew.length > 0) return;
-    const address = URL.createObjectURL(new Blob([WORKER_SCRIPT], { type: "text/javascript" }));
     const count = Math.max(1, Math.min(MOST_WORKERS, navigator.hardwareConcurrency || 2));
-    for (let place = 0; place < count; place += 1) {
-      const worker = new Worker(address);
-      worker.onmessage = (event: MessageEvent<Reply>) => {
-        this.waiting.get(event.data.number)?.(event.data);
-        this.waiting.delete(event.data.number);
-      };
-      this.crew.push({ worker, known: new Set() });
-    }
+    while (this.crew.length < count) this.crew.push(this.member());
   }
 
-  private introduce(place: number, program: Program, bytes: ArrayBuffer): void {
-    const member = this.crew[place];
-    if (member === undefined || member.known.has(program.name)) return;
-    member.known.add(program.name);
-    const job: Job = { kind: "program", program: { ...program, module: "" }, bytes };
-    member.worker.postMessage(job);
+  private get kept(): Member {
+    this.keeper ??= this.member();
+    return this.keeper;
   }
 
-  private ask(place: number, job: (number: number) => Job, handed: ArrayBuffer[] = []): Promise<Reply> {
+  private member(): Member {
+    const asked = new Map<number, Asked>();
+    return { worker: this.begun(asked), known: new Map(), asked };
+  }
+
+  private begun(asked: Map<number, Asked>): Worker {
+    const worker = new Worker(this.address);
+    worker.onmessage = (event: MessageEvent<Reply>) => {
+      const { number } = event.data;
+      const found = asked.get(number);
+      asked.delete(number);
+      found?.answer(event.data);
+    };
+    return worker;
+  }
+
+  private ask(member: Member, jobOf: (number: number) => Job, handed: ArrayBuffer[] = [], isWanted = () => true): Promise<Reply> {
     const number = this.next;
     this.next += 1;
+    const job = jobOf(number);
     return new Promise((resolve, reject) => {
-      this.waiting.set(number, (reply) => {
+      const answer = (reply: Reply) => {
         if (reply.fault === undefined) resolve(reply);
         else reject(new InputError(reply.fault));
-      });
-      this.crew[place]?.worker.postMessage(job(number), handed);
+      };
+      member.asked.set(number, { job, isWanted, answer });
+      member.worker.postMessage(job, handed);
     });
   }
+}
+
+function introduce({ worker, known }: Member, program: Program, bytes: ArrayBuffer): void {
+  if (known.has(program.name)) return;
+  const job: Job = { kind: "program", program: { ...program, module: "" }, bytes };
+  known.set(program.name, job);
+  worker.postMessage(job);
 }
 
 /** What a browser says of a file that is gone, or is a folder. */

@@ -123,8 +123,9 @@ export class MapView {
       this.update();
     };
     const isWanted = () => {
-      if (this.isDue) this.wish = "";
-      return !this.isDue;
+      const isCurrent = this.isOpen && !this.isDue;
+      if (!isCurrent) this.wish = "";
+      return isCurrent;
     };
     const fail = telling((words) => {
       this.wish = "";

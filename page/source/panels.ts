@@ -1,12 +1,14 @@
 /** Plots over time with one cursor: torque, pressures, command, angle, gas, with bands and recordings behind the curves. */
 
 import uPlot from "../vendor/uplot/uPlot.esm.js";
-import { interpolated, type Overlay } from "./agreement";
+import type { Overlay } from "./agreement";
+import { clockOf, firstAfter, onClock } from "./clock";
 import { colour, colourOf, DASHES } from "./colours";
 import { type Content, scalesOf } from "./content";
 import { element, whenQuiet } from "./dom";
 import type { Run } from "./engine";
 import { lineOn, pathsOf } from "./paths";
+import { atmosphereOf, type Values } from "./settings";
 import { fromSi, plain, readableUnit, scaleOf } from "./units";
 
 export interface Panel {
@@ -33,6 +35,8 @@ export interface Shown {
   readonly name: string;
   readonly place: number;
   readonly run: Run;
+  /** Settings of the run: its gauge pressures count from its own atmosphere. */
+  readonly values: Values;
   readonly band: ReadonlyMap<string, Band> | null;
 }
 
@@ -53,6 +57,9 @@ interface Drawn {
   isInSight: boolean;
   isStale: boolean;
 }
+
+/** Factor and offset from SI to what is shown. */
+type Scaling = readonly [number, number];
 
 interface Line {
   readonly place: number;
@@ -84,7 +91,6 @@ export class Panels {
   constructor(
     private readonly host: HTMLElement,
     private readonly content: Content,
-    private readonly atmosphere: () => number,
     private readonly pointed: (time: number | null) => void,
   ) {
     this.watcher.observe(host);
@@ -208,7 +214,7 @@ export class Panels {
       ...sizeOf(width, panel === this.first),
       legend: { show: false },
       cursor: { sync: { key: "time" }, drag: { x: false, y: false }, points: { size: 7 } },
-      scales: { x: { time: false }, y: { range: () => [...this.rangeFor(panel)] as [number, number] } },
+      scales: { x: { time: false, range: () => [...this.span] as [number, number] }, y: { range: () => [...this.rangeFor(panel)] as [number, number] } },
       axes: [{ ...axis, size: 28, space: 80, values: (_, ticks) => ticks.map((tick) => `${plain(tick)}`) }, { ...axis, size: AXIS_SIZE, values: (_, ticks) => ticks.map((tick) => plain(tick)) }],
       series: [{}, ...series],
       hooks: {
@@ -217,6 +223,12 @@ export class Panels {
       },
     };
     return new uPlot(options, this.dataOf(panel, shown), host);
+  }
+
+  /** From the first to the last sample of all runs, so that plots beside each other have one axis. */
+  private get span(): readonly [number, number] {
+    const times = this.shown.map(({ run }) => run.time);
+    return [Math.min(...times.map((time) => time[0] ?? 0)), Math.max(...times.map((time) => time.at(-1) ?? 0))];
   }
 
   private moved(plot: uPlot): void {
@@ -231,11 +243,12 @@ export class Panels {
     this.time = time;
     for (const { panel, shown, readout } of this.drawn) {
       const values = this.linesOf(panel, shown).map((line) => {
-        const run = this.shown[line.place]?.run;
-        const values = run?.channels.get(line.channel);
-        if (run === undefined || values === undefined || time === null) return null;
-        const at = Math.min(values.length - 1, Math.max(0, firstAfter(run.time, time) - 1));
-        return { line, text: plain(this.display(line.channel, values[at] ?? NaN), 3) };
+        const item = this.shown[line.place];
+        const values = item?.run.channels.get(line.channel);
+        if (item === undefined || values === undefined || time === null) return null;
+        const at = Math.min(values.length - 1, Math.max(0, firstAfter(item.run.time, time) - 1));
+        const [factor, offset] = this.lineOf(line.channel, item);
+        return { line, text: plain((values[at] ?? NaN) * factor + offset, 3) };
       });
       readout.replaceChildren(
         ...values
@@ -254,21 +267,14 @@ export class Panels {
   }
 
   private dataOf(panel: Panel, shown: readonly number[]): uPlot.AlignedData {
-    const longest = shown.map((place) => this.shown[place]?.run.time ?? new Float64Array()).reduce((a, b) => (b.length > a.length ? b : a));
+    const clock = clockOf(shown.map((place) => this.shown[place]?.run.time ?? new Float64Array()));
     const columns = this.linesOf(panel, shown).map(({ place, channel }) => {
-      const run = this.shown[place]?.run;
-      const values = run?.channels.get(channel) ?? new Float64Array();
-      if (run === undefined || values.length === 0) return new Float64Array(longest.length).fill(NaN);
-      const onClock = sameClock(run.time, longest) ? values : this.moveTo(longest, run.time, values);
-      return this.displayed(channel, onClock);
+      const item = this.shown[place];
+      const values = item?.run.channels.get(channel) ?? new Float64Array();
+      if (item === undefined || values.length === 0) return new Float64Array(clock.length).fill(NaN);
+      return displayed(onClock(clock, item.run.time, values), this.lineOf(channel, item));
     });
-    return [longest, ...columns];
-  }
-
-  private moveTo(clock: Float64Array, time: Float64Array, values: Float64Array): Float64Array {
-    const found = interpolated(clock, 0, time, values);
-    const end = time.at(-1) ?? 0;
-    return found.map((value, place) => ((clock[place] ?? 0) > end + 1e-9 ? NaN : value));
+    return [clock, ...columns];
   }
 
   private unitOf(channel: string): { unit: string; shown: string } {
@@ -279,26 +285,18 @@ export class Panels {
     return { unit: "", shown: "" };
   }
 
-  /** Factor and offset from SI to what is shown. */
-  private lineOf(channel: string): readonly [number, number] {
+  /** Factor and offset from SI to what is shown of a run. */
+  private lineOf(channel: string, { values }: Shown): Scaling {
     const { unit, shown } = this.unitOf(channel);
     if (unit === shown) return [1, 0];
     const scale = scaleOf(shown, scalesOf(this.content, unit));
-    const zero = fromSi(0, scale, this.atmosphere());
-    return [1 / Number(scale.scale), zero];
+    return [1 / Number(scale.scale), fromSi(0, scale, atmosphereOf(values))];
   }
 
-  private display(channel: string, value: number): number {
-    const [factor, offset] = this.lineOf(channel);
-    return value * factor + offset;
-  }
-
-  private displayed(channel: string, values: Float64Array): Float64Array {
-    const [factor, offset] = this.lineOf(channel);
-    if (factor === 1 && offset === 0) return values;
-    const found = new Float64Array(values.length);
-    for (let place = 0; place < values.length; place += 1) found[place] = (values[place] ?? 0) * factor + offset;
-    return found;
+  /** The same of the recording beside a run: what was recorded in gauge is gauge beside every one. */
+  private lineOfRecorded(channel: string, item: Shown): Scaling {
+    const [factor, offset] = this.lineOf(channel, item);
+    return [factor, this.overlay?.gauges.has(channel) ? offset + factor * atmosphereOf(item.values) : offset];
   }
 
   private rangeFor(panel: Panel): readonly [number, number] {
@@ -310,9 +308,8 @@ export class Panels {
   /** From least to largest of a panel over all that is shown in it, so that plots beside each other can be compared. */
   private rangeOf(panel: Panel): readonly [number, number] {
     let [low, high] = [Infinity, -Infinity];
-    const include = (channel: string, values: Float64Array | undefined) => {
+    const include = (values: Float64Array | undefined, [factor, offset]: Scaling) => {
       if (values === undefined) return;
-      const [factor, offset] = this.lineOf(channel);
       let [least, most] = [Infinity, -Infinity];
       for (let place = 0; place < values.length; place += 1) {
         const value = values[place] ?? 0;
@@ -323,12 +320,13 @@ export class Panels {
       high = Math.max(high, most * factor + offset);
     };
     for (const channel of [...panel.channels, ...(panel.wanted === undefined ? [] : [panel.wanted])]) {
-      for (const { run, band } of this.shown) {
-        include(channel, run.channels.get(channel));
-        include(channel, band?.get(channel)?.low);
-        include(channel, band?.get(channel)?.high);
+      for (const item of this.shown) {
+        const line = this.lineOf(channel, item);
+        include(item.run.channels.get(channel), line);
+        include(item.band?.get(channel)?.low, line);
+        include(item.band?.get(channel)?.high, line);
+        include(this.overlay?.channels.get(channel), this.lineOfRecorded(channel, item));
       }
-      include(channel, this.overlay?.channels.get(channel));
     }
     if (!(high >= low)) return [0, 1];
     if (high - low < 1e-9 * Math.max(1, Math.abs(high))) return [low - 1, high + 1];
@@ -347,19 +345,21 @@ export class Panels {
       for (const place of shown) {
         const item = this.shown[place];
         const band = item?.band?.get(channel);
-        if (item !== undefined && band !== undefined) this.drawBand(plot, channel, band, colourOf(item.place));
+        if (item !== undefined && band !== undefined) this.drawBand(plot, band, this.lineOf(channel, item), colourOf(item.place));
       }
       const recorded = this.overlay?.channels.get(channel);
-      if (this.overlay !== null && recorded !== undefined) this.drawRecorded(plot, channel, this.overlay.time, recorded);
+      const first = this.shown[shown[0] ?? 0];
+      if (this.overlay === null || recorded === undefined || first === undefined) continue;
+      this.drawRecorded(plot, this.overlay.time, displayed(recorded, this.lineOfRecorded(channel, first)));
     }
     ctx.restore();
   }
 
-  private drawBand(plot: uPlot, channel: string, band: Band, fill: string): void {
+  private drawBand(plot: uPlot, band: Band, [factor, offset]: Scaling, fill: string): void {
     const { ctx } = plot;
     ctx.beginPath();
     const put = (place: number, value: number) =>
-      ctx.lineTo(plot.valToPos(band.time[place] ?? 0, "x", true), plot.valToPos(this.display(channel, value), "y", true));
+      ctx.lineTo(plot.valToPos(band.time[place] ?? 0, "x", true), plot.valToPos(value * factor + offset, "y", true));
     for (let place = 0; place < band.time.length; place += 1) put(place, band.low[place] ?? 0);
     for (let place = band.time.length - 1; place >= 0; place -= 1) put(place, band.high[place] ?? 0);
     ctx.globalAlpha = 0.22;
@@ -368,11 +368,11 @@ export class Panels {
     ctx.globalAlpha = 1;
   }
 
-  private drawRecorded(plot: uPlot, channel: string, time: Float64Array, values: Float64Array): void {
+  private drawRecorded(plot: uPlot, time: Float64Array, values: Float64Array): void {
     const { ctx } = plot;
     ctx.strokeStyle = colour("recorded");
     ctx.lineWidth = 1.5 * devicePixelRatio;
-    ctx.stroke(lineOn(plot, time, this.displayed(channel, values), false));
+    ctx.stroke(lineOn(plot, time, values, false));
   }
 
   private fit(): void {
@@ -389,16 +389,9 @@ function sizeOf(hostWidth: number, isFirst: boolean): { width: number; height: n
   return { width, height: isFirst ? Math.min(300, Math.max(190, width * 0.42)) : 170 };
 }
 
-function sameClock(a: Float64Array, b: Float64Array): boolean {
-  return a === b || (a.length === b.length && a[1] === b[1] && a.at(-1) === b.at(-1));
-}
-
-function firstAfter(times: Float64Array, time: number): number {
-  let [low, high] = [0, times.length];
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if ((times[middle] ?? 0) <= time) low = middle + 1;
-    else high = middle;
-  }
-  return low;
+function displayed(values: Float64Array, [factor, offset]: Scaling): Float64Array {
+  if (factor === 1 && offset === 0) return values;
+  const found = new Float64Array(values.length);
+  for (let place = 0; place < values.length; place += 1) found[place] = (values[place] ?? 0) * factor + offset;
+  return found;
 }

@@ -34,7 +34,7 @@ export function mapOfHeader(heads: Heads): readonly ColumnMap[] | null {
 }
 
 /** What is done with each column that is used. Throws InputError, with one line, where it cannot be. */
-export function columnsOf(content: Content, map: readonly ColumnMap[], atmosphere: number): RecordedColumn[] {
+export function columnsOf(content: Content, map: readonly ColumnMap[]): RecordedColumn[] {
   const used = map.filter(({ channel }) => channel !== "");
   const twice = used.find(({ channel }, place) => used.findIndex((other) => other.channel === channel) !== place);
   if (twice !== undefined) throw new InputError(`two columns are '${twice.channel}'`);
@@ -45,7 +45,7 @@ export function columnsOf(content: Content, map: readonly ColumnMap[], atmospher
     const si = RECORDED[channel];
     if (si === undefined) throw new InputError(`there is no channel '${channel}'${nearest(channel, Object.keys(RECORDED))}`);
     const scale = scaleOf(si === "Pa_a" && unit === "Pa" ? "Pa_a" : unit, scalesOf(content, si));
-    return [{ place, channel, factor: Number(scale.scale), offset: Number(scale.offset) + (scale.isGauge ? atmosphere : 0) }];
+    return [{ place, channel, factor: Number(scale.scale), offset: Number(scale.offset), isGauge: scale.isGauge }];
   });
 }
 

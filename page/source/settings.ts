@@ -7,6 +7,11 @@ export const ATMOSPHERE = "supply.atmospheric_pressure";
 const STANDARD_ATMOSPHERE = 101325;
 const RELATIVE = 1e-9;
 
+/** The pressure [Pa] from which the gauge pressures of a configuration count. */
+export function atmosphereOf(values: Values): number {
+  return values.get(ATMOSPHERE) ?? STANDARD_ATMOSPHERE;
+}
+
 export interface Configuration {
   readonly program: string;
   /** Texts by key, of what is not as the scenario has it. */

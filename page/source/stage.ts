@@ -117,11 +117,13 @@ export class Stage {
     if (this.key.childElementCount === 0) {
       this.key.append(...PHASES.map((name, place) => element("span", { class: `phase-${place}` }, name)));
     }
+    // As wide as its run is long beside the longest one, so that it goes with the slider below.
+    const share = this.end > 0 ? (walking.run.time.at(-1) ?? 0) / this.end : 1;
     let from = 0;
     for (let place = 1; context !== null && place <= phases.length; place += 1) {
       if (place < phases.length && phases[place] === phases[from]) continue;
       context.fillStyle = inks[phases[from] ?? 0] ?? "#888";
-      const [left, right] = [from, place].map((sample) => (sample / phases.length) * this.strip.width);
+      const [left, right] = [from, place].map((sample) => (sample / phases.length) * share * this.strip.width);
       context.fillRect(left ?? 0, 0, (right ?? 0) - (left ?? 0) + 1, this.strip.height);
       from = place;
     }

@@ -39,7 +39,7 @@ export interface Landscape extends Axes {
   readonly values: Float64Array;
 }
 
-/** Run a map; it is shown when a quarter of its runs is done, and if it is still wanted then, when all are. */
+/** Run a map; it is shown when a quarter of its runs is done, and if it is still wanted then, when all are. Once the page rests only one that is wanted goes on. */
 export async function landscapeOf(
   content: Content,
   workers: Workers,
@@ -57,12 +57,13 @@ export async function landscapeOf(
   const at = program.metrics.indexOf(axes.metric);
   const valuesOfRuns = (runs: Ensemble) => Float64Array.from(runs.ended, (ended, place) => (ended === 0 ? (runs.metrics[place * width + at] ?? NaN) : NaN));
   let isShown = false;
-  const all = await workers.runMany(program, rows, NO_TRACE, (first) => {
+  const goesOn = (first: readonly Ensemble[]) => {
     if (!isShown && first.reduce((count, { ended }) => count + ended.length, 0) < FIRST) return true;
     if (!isShown) show({ ...axes, side: SIDE / COARSE, values: valuesOfRuns(together(first)).slice(0, FIRST) });
     isShown = true;
     return isWanted();
-  });
+  };
+  const all = await workers.runMany(program, rows, NO_TRACE, { goesOn, isWanted });
   if (all.ended.length < ORDER.length) return;
   const values = new Float64Array(ORDER.length);
   valuesOfRuns(all).forEach((value, place) => (values[ORDER[place] ?? 0] = value));
@@ -151,19 +152,21 @@ export async function bandOf(
   const every = Math.max(1, Math.floor(run.time.length / BAND_PLACES));
   const places = Math.floor((run.time.length - 1) / every) + 1;
   const time = Float64Array.from({ length: places }, (_, place) => run.time[place * every] ?? 0);
-  const channels = BANDED.filter((name) => run.channels.has(name));
-  const found = await Promise.all(channels.map((channel) => workers.runMany(program, rows, { channel, every, places }, isWanted)));
-  if (found.some(({ ended }) => ended.length < DRAWS)) return null;
-  return new Map(found.map(({ traces, ended }, place) => [channels[place] ?? "", { time, ...ends(traces, ended, places) }]));
+  const found = await workers.runMany(program, rows, { every, places }, { goesOn: isWanted, isWanted });
+  if (found.ended.length < DRAWS) return null;
+  const all = program.channels.map(({ name }) => name);
+  const channels = BANDED.filter((name) => all.includes(name));
+  return new Map(channels.map((name) => [name, { time, ...ends(found, places, all.indexOf(name), all.length) }]));
 }
 
-function ends(traces: Float64Array, ended: Int32Array, places: number): { low: Float64Array; high: Float64Array } {
+/** Between which values most runs lie in one of so many channels, place by place. */
+function ends({ traces, ended }: Ensemble, places: number, channel: number, channels: number): { low: Float64Array; high: Float64Array } {
   const [low, high] = [new Float64Array(places), new Float64Array(places)];
   const good = [...ended.keys()].filter((run) => ended[run] === 0);
   const outside = Math.floor(good.length / ONE_OF);
   if (outside === 0) return { low: low.fill(NaN), high: high.fill(NaN) };
   for (let place = 0; place < places; place += 1) {
-    const column = Float64Array.from(good, (run) => traces[run * places + place] ?? 0).sort();
+    const column = Float64Array.from(good, (run) => traces[(run * channels + channel) * places + place] ?? 0).sort();
     low[place] = column[outside] ?? 0;
     high[place] = column[column.length - 1 - outside] ?? 0;
   }
@@ -194,8 +197,8 @@ function endsOf({ key, unit, interval }: Setting, base: Values): readonly [numbe
   return [value - size, value + size];
 }
 
-/** Effects of all settings of a program that are assumed: over their ends. */
-export async function effectsOf(content: Content, workers: Workers, configuration: Configuration): Promise<Effect[]> {
+/** Effects of all settings of a program that are assumed: over their ends. Of no use where no longer wanted. */
+export async function effectsOf(content: Content, workers: Workers, configuration: Configuration, isWanted: () => boolean): Promise<Effect[]> {
   const program = programNamed(content, configuration.program);
   const base = valuesOf(content, configuration);
   const found = [...settingsByKey(program).values()].map((setting): [Setting, readonly [number, number]] => [setting, endsOf(setting, base)]);
@@ -205,7 +208,7 @@ export async function effectsOf(content: Content, workers: Workers, configuratio
   const ends = moved.map(([, both]) => both);
   const differing = assumed.flatMap(({ key }, place) => (ends[place] ?? [0, 0]).map((end) => withFollowers(program, configuration, [[key, end]])));
   if (differing.length === 0) return [];
-  const runs = await workers.runMany(program, rowsOf(program, base, differing));
+  const runs = await workers.runMany(program, rowsOf(program, base, differing), NO_TRACE, { goesOn: isWanted, isWanted });
   const width = program.metrics.length;
   const metricsOf = (row: number) =>
     new Map(program.metrics.map((metric, place) => [metric.name, runs.ended[row] === 0 ? (runs.metrics[row * width + place] ?? NaN) : NaN]));

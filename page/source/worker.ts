@@ -58,7 +58,7 @@ function take({ reading, columns }: Job & { kind: "recording" }): Overlay {
 async function runMany(job: RunsJob): Promise<void> {
   const engine = await engines.get(job.program);
   if (engine === undefined) throw new RangeError(`there is no program '${job.program}'`);
-  const runs = engine.runMany(job.rows, job.channel, job.every, job.places);
+  const runs = engine.runMany(job.rows, job.every, job.places);
   answer({ number: job.number, runs }, [runs.metrics.buffer, runs.ended.buffer, runs.traces.buffer]);
 }
 

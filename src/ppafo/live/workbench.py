@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 
 from ppafo.answers import LivePart
-from ppafo.errors import PpafoError, ScenarioError, nearest_name
+from ppafo.errors import PpafoError, ScenarioError
 from ppafo.exports.loading import load_exportable
 from ppafo.exports.wasm import module_of
 from ppafo.live.content import Interval, Simulated, page_content, program_content, usual_changes, words
 from ppafo.live.page import block_of, packed, page_of, policy_of_block
+from ppafo.live.start import check_start
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.studies.loading import load_study
 from ppafo.walking.configuration import Configuration
@@ -21,7 +22,6 @@ Simulable = Scenario | Configuration
 TITLE = "The powered ankle-foot orthosis, live"
 DEFAULT = ("torque-task-solenoid", "torque-task-proportional", "step-response", "solenoid")
 MOST_SCENARIOS = 24
-_MOST_CONFIGURATIONS = 4
 _OPEN = 2
 """Configurations that a tab opens with."""
 _STUDY = "torque-task-uncertainty"
@@ -60,39 +60,12 @@ def workbench(
     program has to be built and cannot be.
     """
     content, modules = _content(list(scenarios), overrides, title, "page")
-    _check_start(start, content)
+    check_start(start, content)
     for tab in content["tabs"]:
         own = [dict(item) for item in start if item["program"] in tab["programs"]]
         tab["start"] = own or tab["start"]
         tab["summary"] = summary if summary and len(content["tabs"]) == 1 else tab["summary"]
     return page_of(title, content, modules)
-
-
-def _check_start(start: Sequence[Mapping[str, Any]], content: Mapping[str, Any]) -> None:
-    """Refuse what the script of the page could not open."""
-    known = {program["name"]: {one["key"] for one in program["settings"]} for program in content["programs"]}
-    for place, item in enumerate(start):
-        name, changes = (item.get("program"), item.get("changes")) if isinstance(item, Mapping) else (None, None)
-        if not isinstance(name, str) or not isinstance(changes, Mapping):
-            raise ScenarioError(f"start, configuration {place + 1}: must be a table of 'program' and 'changes'")
-        if name not in known:
-            raise ScenarioError(
-                f"start, configuration {place + 1}: '{name}' is not on this page{nearest_name(name, known)}; "
-                f"allowed: {', '.join(known)}"
-            )
-        for key, text in changes.items():
-            if key not in known[name]:
-                raise ScenarioError(
-                    f"start, '{name}': there is no setting '{key}'{nearest_name(str(key), known[name])}"
-                )
-            if not isinstance(text, str):
-                raise ScenarioError(f"start, '{name}', {key}: must be a text such as '50 psi_g', not {text!r}")
-    for tab in content["tabs"]:
-        count = sum(item["program"] in tab["programs"] for item in start)
-        if count > _MOST_CONFIGURATIONS:
-            raise ScenarioError(
-                f"start: {count} configurations in the tab '{tab['title']}', at most {_MOST_CONFIGURATIONS}"
-            )
 
 
 def live_part(scenarios: Sequence[str | Simulable]) -> LivePart | None:

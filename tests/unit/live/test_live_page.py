@@ -1,5 +1,6 @@
 """The page that simulates, in a headless browser: what it asks for, whether its bits are Python's, what damage does."""
 
+import json
 import os
 import random
 import re
@@ -14,15 +15,46 @@ import pytest
 from ppafo.errors import ScenarioError
 from ppafo.exports import wasm
 from ppafo.live import page as pages
+from ppafo.live.start import check_start
 from ppafo.live.workbench import DEFAULT, workbench
 from ppafo.simulation.loading import load_scenario
 from ppafo.units import parse_quantity
 from ppafo.walking import list_walks, load_walk
 from scripts.live_page import browser as headless
 from scripts.live_page import check_bits, check_damage, check_refusals, missing, opened, programs_by_tab
-from scripts.page_states import address_of
+from scripts.page_states import address_of, hard_states
 
 MOST_BYTES = 250_000
+HARD_TEXTS = (
+    *(
+        "",
+        " ",
+        "ambient",
+        "supply",
+        "1 mm²",
+        "1 mm**2",
+        "1 mm ^ 2",
+        "1mm^2 ",
+        "\u00a01\u00a0mm^2",
+        "1\u2028mm^2",
+        "1 m m",
+    ),
+    *(
+        "1 µs",
+        "1 us",
+        "1 μs",
+        "5 % ",
+        "1 \u00b0",
+        "1\tms",
+        "1\x1cms",
+        "1\x85ms",
+        "\ufeff1 ms",
+        "1 ms\n",
+        "1;2",
+        "1e5 Pa_g",
+    ),
+    *("5 psi_g", "5psi_g", "5 psi", "5 psi_d", "1_0 ms", "\u0661 ms", "1e-3 s", "1.e-3s", ".001 s", "+.001 s", "--1 s"),
+)
 SOURCES = Path(__file__).parents[3] / "page"
 TOOLS = SOURCES / "node_modules"
 has_browser = pytest.mark.skipif(bool(missing()), reason=missing() or "there is a browser")
@@ -85,11 +117,61 @@ def test_every_default_of_the_page_is_what_its_text_says() -> None:
         ({"program": "torque-task-selenoid", "changes": {}}, "did you mean 'torque-task-solenoid'?"),
         ({"program": "torque-task-solenoid", "changes": {"valve.aera": "3 mm^2"}}, "did you mean 'valve.area'?"),
         ({"program": "torque-task-solenoid", "changes": {"valve.area": 3}}, "must be a text"),
+        *(
+            ({"program": "torque-task-solenoid", "changes": {key: text}}, said)
+            for key, text, said in (
+                ("valve.area", "five", "valve.area: 'five' does not start with a number"),
+                ("valve.area", "3 parsec", "'3 parsec' has a unit that does not fit here; allowed: mm^2, cm^2, m^2"),
+                ("valve.area", "-3 mm^2", "'-3 mm^2' is outside of its range, from 0 up to 10000 mm^2"),
+                ("valve.area", "1e400", "is outside of its range"),
+                ("valve.area", "3 mm^2;valve.area=4 mm^2", "a semicolon or a line break"),
+                ("valve.switching_interval", "0 ms", "must stay above 0 on this page"),
+                ("sensors.pressure_noise", "1 psi_d", "must stay 0 on this page"),
+                ("sensors.seed", "1.5", "must be a whole number"),
+                ("supply.atmospheric_pressure", "-1 psi_a", "is outside of its range"),
+                ("supply.pressure", "half", "does not start with a number"),
+            )
+        ),
     ],
 )
 def test_a_start_that_the_page_does_not_have_is_refused_in_one_line(start: dict[str, Any], said: str) -> None:
     with pytest.raises(ScenarioError, match=re.escape(said)):
         workbench(["torque-task-solenoid"], start=[start])
+
+
+@has_browser
+def test_page_and_python_refuse_the_same_texts_of_a_start(chromium: Any, file: Path) -> None:
+    page, rng = opened(chromium, file), random.Random(12)
+    content = page.evaluate("workbench.content")
+    state = json.loads(page.evaluate("workbench.file()"))
+    given = []
+    for place, (tab, program) in enumerate(programs_by_tab(page)):
+        hard = [one for one in hard_states(program, content["units"], 60, rng) if one]
+        texts = [{key: text} for key in ("valve.area", "supply.pressure", "run.step") for text in HARD_TEXTS]
+        chosen = [*rng.sample(hard, min(400, len(hard))), *(texts if place == 0 else ())]
+        given += [(tab, {"program": program["name"], "changes": changes}) for changes in chosen]
+    files = [json.dumps({**state, "benches": _with(state["benches"], tab, one)}) for tab, one in given]
+    # None of them is run: the last state is the usual one again.
+    script = "files => { const said = files.map(text => workbench.openFile(text)); workbench.open(''); return said; }"
+    said = page.evaluate(script, files)
+    assert 0.1 < sum(map(bool, said)) / len(said) < 0.9
+    differing = [
+        (one, words) for (_, one), words in zip(given, said, strict=True) if _refusal(one, content) != bool(words)
+    ]
+    assert differing == []
+
+
+def _with(benches: list[Any], tab: int, one: dict[str, Any]) -> list[Any]:
+    return [[one] if place == tab else bench for place, bench in enumerate(benches, 1)]
+
+
+def _refusal(start: dict[str, Any], content: dict[str, Any]) -> bool:
+    try:
+        check_start([start], content)
+    except ScenarioError as error:
+        assert "\n" not in str(error)
+        return True
+    return False
 
 
 def test_a_pipe_is_no_page_and_is_not_waited_for(tmp_path: Path) -> None:

@@ -24,8 +24,9 @@ Many runs
     writes ``runs`` times M metrics and ``runs`` 32-bit statuses, and returns 0, or 4 where memory does not suffice.
     With ``channel`` -1 the last three are 0. Otherwise it also writes ``runs`` times ``places`` numbers: every
     ``every``-th sample of a channel, from the first on. Channels count as in the description without ``time``, so
-    that 0 is the first after it. Beyond the last sample of a run, and in runs that were not completed, there is NaN,
-    as in the metrics of the latter. Runs are quickest eight at a time with the same ``run``, delay and
+    that 0 is the first after it; with ``channel`` -2 it writes all of them, for each run ``places`` numbers of one
+    after those of the other. Beyond the last sample of a run, and in runs that were not completed, there is NaN, as
+    in the metrics of the latter. Runs are quickest eight at a time with the same ``run``, delay and
     ``controller.period``.
 
 Statuses: 0 completed, 1 diverged, 2 diverged in too many parts of a step, 3 refused by ``check``, 4 no memory.

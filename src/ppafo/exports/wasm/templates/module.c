@@ -265,7 +265,8 @@ typedef struct {
 typedef struct {
     double *metrics;
     int32_t *ended;
-    int32_t channel;
+    int32_t first_channel;
+    int32_t channels;
     int32_t every;
     int32_t places;
     double *traces;
@@ -315,8 +316,11 @@ static void judge_block(run_block *block, const run_clock *clock, const double *
             states[place] = block->states[place][lane];
         }
         read_metrics(&block->prepared[lane], states, clock->samples, &wanted->metrics[member * METRICS]);
-        for (int64_t place = 0; place < wanted->places && place * wanted->every < clock->samples; ++place) {
-            wanted->traces[member * wanted->places + place] = trace[(place * OUTPUTS + wanted->channel) * LANES + lane];
+        for (int64_t channel = 0; channel < wanted->channels; ++channel) {
+            double *own = &wanted->traces[(member * wanted->channels + channel) * wanted->places];
+            for (int64_t place = 0; place < wanted->places && place * wanted->every < clock->samples; ++place) {
+                own[place] = trace[(place * OUTPUTS + wanted->first_channel + channel) * LANES + lane];
+            }
         }
     }
 }
@@ -326,7 +330,7 @@ static bool run_block_of(run_block *block, const wanted_of_runs *wanted)
 {
     const size_t before = taken;
     const run_clock clock = clock_of(block->prepared[0].counts);
-    const bool traces = wanted->channel >= 0;
+    const bool traces = wanted->channels > 0;
     const int64_t places = traces ? (clock.samples - 1) / wanted->every + 1 : 1;
     double *history = reserve_numbers(values_of_history(&clock, LANES));
     double *trace = reserve_numbers(places * OUTPUTS * LANES);
@@ -353,14 +357,15 @@ static bool has_same_counts(const double *left, const double *right)
 int32_t SHOWN(ensemble)(const run_settings *settings, int32_t runs, double *found, int32_t *ended, int32_t channel,
     int32_t every, int32_t places, double *traces)
 {
-    enum { WAITING = -1 };
-    const wanted_of_runs wanted = {found, ended, channel, every, channel < 0 ? 0 : places, traces};
+    enum { WAITING = -1, NO_CHANNEL = -1, ALL_CHANNELS = -2 };
+    const int32_t channels = channel == ALL_CHANNELS ? OUTPUTS : channel == NO_CHANNEL ? 0 : 1;
+    const wanted_of_runs wanted = {found, ended, channel < 0 ? 0 : channel, channels, every, places, traces};
     const size_t before = taken;
     run_block *block = (run_block *)reserve(sizeof(run_block));
     double *counts = reserve_numbers((int64_t)runs * COUNTS);
     bool has_memory = block != NULL && counts != NULL;
     fill(found, (int64_t)runs * METRICS, (double)__builtin_nanf(""));
-    fill(traces, (int64_t)runs * wanted.places, (double)__builtin_nanf(""));
+    fill(traces, (int64_t)runs * channels * places, (double)__builtin_nanf(""));
     for (int32_t member = 0; member < runs && has_memory; ++member) {
         ended[member] = check(&settings[member]) < 0 ? WAITING : REFUSED;
         if (ended[member] == WAITING) {
