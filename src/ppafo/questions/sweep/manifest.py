@@ -10,12 +10,14 @@ from pydantic import BaseModel, Field
 from ppafo.documents.json_text import json_text
 from ppafo.documents.models import validate
 from ppafo.documents.problems import quote
+from ppafo.engine.lanes import write_source
 from ppafo.errors import DataError, StudyError
 from ppafo.metrics import METRICS
 from ppafo.questions.sweep.bands import Bins
 from ppafo.questions.sweep.chunks import chunk_count, chunk_size
 from ppafo.questions.sweep.python_controller import controller_document
 from ppafo.simulation.document import plain, scenario_document
+from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.places import Place, read_document
 from ppafo.studies.study import Study
@@ -26,7 +28,9 @@ STUDY_COPY = "study.toml"
 FORMAT = "ppafo study results"
 SCHEMA_VERSION = 1
 _NAMED = 4
-_COMPARED = ("ppafo", "study", "scenarios", "varied", "drawn")
+_COMPARED = ("ppafo", "study", "scenarios", "varied", "drawn", "programs")
+_DIGITS = 16
+"""Digits of the hash of a program."""
 
 BinsOf = Mapping[str, Mapping[str, Bins]]
 """Bins by configuration and channel."""
@@ -38,7 +42,13 @@ def manifest(study: Study, bins: BinsOf) -> dict[str, Any]:
     # What is drawn may come from a parameter set, or have been changed in Python, and the file says neither.
     parts = {name: getattr(study, name) for name in ("axes", "drawn", "same", "scores", "sample", "outputs")}
     drawn = _plain(plain(parts))
-    requested = {"ppafo": __version__, "study": _plain(study.document), "scenarios": scenarios, "drawn": drawn}
+    requested = {
+        "ppafo": __version__,
+        "study": _plain(study.document),
+        "scenarios": scenarios,
+        "drawn": drawn,
+        "programs": {item.name: _program_hash(item.scenario) for item in study.configurations},
+    }
     return {
         "format": FORMAT,
         "schema_version": SCHEMA_VERSION,
@@ -134,6 +144,14 @@ def _without_origin(scenario: Scenario) -> dict[str, Any]:
     if custom is not None:
         document["control"]["custom"] = controller_document(custom)
     return document
+
+
+def _program_hash(scenario: Scenario) -> str:
+    """Return a hash of what a scenario computes: a law or a valve from a module of the user is a name elsewhere."""
+    lines = write_source(plan_run(scenario).program, 1)[1].splitlines()
+    # A line of comment says where a function stands, which may be elsewhere the next time.
+    code = "\n".join(line for line in lines if not line.startswith("#"))
+    return hashlib.sha256(code.encode()).hexdigest()[:_DIGITS]
 
 
 def _plain(document: Any) -> Any:

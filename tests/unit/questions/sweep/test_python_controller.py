@@ -1,6 +1,7 @@
-"""A study with a controller written in Python resumes with that controller alone."""
+"""A study with a controller of one's own resumes with that controller alone."""
 
 import importlib.util
+import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -122,3 +123,30 @@ def test_a_law_without_a_file_is_known_by_its_code() -> None:
         names["Law"].__module__ = "nowhere"
         sources.append(controller_document(names["Law"]())["source"])
     assert sources[0] == sources[2] != sources[1]
+
+
+COMPOSED = """
+from dataclasses import replace
+from ppafo.control.controllers import on_off
+
+def update(parameters, state, reference, measurement, period):
+    return (1.0 if reference > 0.5 * measurement.torque else -1.0), state
+
+KIND = replace(on_off.KIND, update=update)
+"""
+
+
+def test_a_law_that_was_edited_in_its_module_makes_another_study(tmp_path: Path) -> None:
+    asked = f"""
+from ppafo.questions.sweep.manifest import manifest
+from ppafo.studies.loading import load_study
+document = {DOCUMENT!r}
+document["configurations"][0]["overrides"] += ["controller.kind=beside:KIND"]
+print(manifest(load_study(document), {{}})["programs"])
+"""
+    told = []
+    for text in (COMPOSED, f"# A remark.\n{COMPOSED}", COMPOSED.replace("0.5 *", "0.6 *")):
+        (tmp_path / "beside.py").write_text(text)
+        command = [sys.executable, "-B", "-c", asked]
+        told.append(subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True).stdout)
+    assert told[0] == told[1] != told[2]

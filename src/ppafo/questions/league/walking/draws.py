@@ -39,6 +39,8 @@ CHANGED = (
     "viscous_damping",
 )
 """What the uncertainties of ``questions.league.draws`` change of the plant."""
+_WEARERS = 2
+"""The stream of random numbers of the wearers beside those of devices and of noise."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +54,8 @@ class DrawnWearers:
 
 def draw_wearers(configuration: Configuration, run: Run, count: int, seed: int = SEED) -> DrawnWearers:
     """Wearers drawn around that of a configuration, who is the first; for every controller the same."""
-    generator = np.random.default_rng(seed)
+    # Not the stream of their devices, with which wearers would go hand in hand.
+    generator = np.random.default_rng([seed, _WEARERS])
     build = draw_builds(count, generator)
     gaits = draw_gaits(configuration.gait, build.stature, generator)
     return DrawnWearers(build, gaits, batch_of_many(configuration, run, build, gaits, generator))
