@@ -242,18 +242,10 @@ SECTIONS: Mapping[str, Mapping[str, Check]] = {
         "bits": bits,
         "c": tested("The library in C and C++", "gcc, clang", "tests/unit/exports/test_c_library.py"),
         "fmu": tested("FMUs, FMI 2.0 and 3.0", "FMPy and its checker", "tests/unit/exports/test_fmu.py"),
-        "platforms": tested(
-            "FMUs for Windows and 64-bit ARM", "Wine and QEMU", "tests/unit/exports/test_fmu_platforms.py"
-        ),
+        "platforms": tested("FMUs for other computers", "Wine, QEMU", "tests/unit/exports/test_fmu_platforms.py"),
         "wasm": tested("WebAssembly", "node and wasmtime", "tests/unit/exports/test_wasm.py"),
-        "page": tested(
-            "The page that simulates", "Chromium, Firefox and WebKit; axe-core; Python's own runs", "tests/unit/live"
-        ),
-        "firmware": tested(
-            "The controller on an MSP430 and on Cortex-M",
-            "simulators of the chips: mspdebug, QEMU",
-            "tests/unit/exports/test_firmware.py",
-        ),
+        "page": tested("The page that simulates", "Chromium, Firefox, WebKit; axe-core; Python", "tests/unit/live"),
+        "firmware": tested("The controller on chips", "mspdebug, QEMU", "tests/unit/exports/test_firmware.py"),
     },
     "Identification and statistics": {
         "real": tested(
@@ -267,15 +259,7 @@ SECTIONS: Mapping[str, Mapping[str, Check]] = {
     "Published studies": {"claims": claims},
     "Walking": {"alarms": alarms},
     "The worlds of others": {
-        "gym": tested(
-            "Environments of Gymnasium", "its checker; runs of the same commands", "tests/unit/worlds/test_gym.py"
-        ),
-        "mujoco": tested("The plugin of MuJoCo", "MuJoCo; the lanes", "tests/unit/worlds/test_mujoco.py"),
-        "opensim": tested(
-            "The device in OpenSim",
-            "its inverse dynamics and static optimisation",
-            "tests/unit/worlds/test_opensim.py",
-        ),
+        "worlds": tested("The device in Gymnasium, MuJoCo and OpenSim", "these; the lanes", "tests/unit/worlds"),
     },
 }
 
