@@ -182,6 +182,8 @@ def _parse_unit(unit: str) -> "tuple[pint.Unit, str]":
         raise _unknown_unit(unknown if isinstance(unknown, str) else next(iter(unknown))) from error
     except ValueError as error:  # pint takes 'nan' and 'inf' for numbers
         raise _unknown_unit(bare) from error
+    except pint.OffsetUnitCalculusError as error:  # milli of a temperature that has another zero
+        raise UnitError(f"'{unit}': degC takes no prefix; give degC or K") from error
     if kind and parsed.dimensionality != _registry().parse_units("Pa").dimensionality:
         raise UnitError(f"'{unit}': {_KIND_BELONGS}")
     return parsed, kind

@@ -1,6 +1,7 @@
 """Units at the edge."""
 
 import math
+import re
 import subprocess
 import sys
 
@@ -131,6 +132,12 @@ def test_what_a_parser_may_take_for_a_number_is_no_unit(unit: str) -> None:
         check_unit(unit)
 
 
+@pytest.mark.parametrize("unit", ["mdegC", "kdegC s", "J/(kg udegC)", "millidegC", "kdegC_g"])
+def test_a_temperature_with_a_zero_of_its_own_takes_no_prefix(unit: str) -> None:
+    with pytest.raises(UnitError, match=f"'{re.escape(unit)}': degC takes no prefix"):
+        to_si(20.0, unit, "K")
+
+
 def test_a_value_of_any_dimension_has_a_value_in_base_units() -> None:
     assert base_value(113.0, "ms/m") == pytest.approx(0.113)
     assert base_value(2.0, "kPa_a") == pytest.approx(2000.0)
@@ -173,7 +180,7 @@ def test_unit_to_the_power_of_zero_is_no_unit(unit: str, si_unit: str) -> None:
         parse_quantity(f"1 {unit}", si_unit)
 
 
-FACTORS = ["m", "mm", "s", "K", "degC", "deg", "psi", "psi_g", "%", "N", "1", "", "kkg", "lbf", "Pa_d"]
+FACTORS = ["m", "mm", "s", "K", "degC", "mdegC", "deg", "psi", "psi_g", "%", "N", "1", "", "kkg", "lbf", "Pa_d"]
 unit_texts = st.lists(
     st.tuples(
         st.sampled_from(FACTORS),

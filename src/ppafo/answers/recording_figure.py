@@ -1,9 +1,9 @@
 """The figure of a recording: one panel a quantity over a common time, each in the unit that the field uses."""
 
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,10 +22,11 @@ from ppafo.answers.style import (
     render_figure,
 )
 from ppafo.constants import GRAMS_PER_KILOGRAM, PASCALS_PER_PSI, STANDARD_ATMOSPHERE
-from ppafo.errors import DataError
+from ppafo.errors import DataError, one_line
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.storage import StoredResult
+from ppafo.storage.result_folder import RUN_FILE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,6 +41,10 @@ _PANEL, _GAP, _TOP, _BOTTOM, _REMARK_LINE = 1.15, 0.42, 0.75, 0.55, 0.17
 _REMARK_WIDTH = 100
 _HEADROOM = 0.06
 _MAXIMUM_TICKS = 5
+_NO_ATMOSPHERE = 1e9
+"""Pa absolute."""
+
+_LONGEST_SHOWN = 60
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,13 +142,39 @@ def recording_figure(
 
 
 def draw_stored_result(stored: StoredResult) -> "Figure":
-    """Return the figure of a saved result: the same that ``Result.plot`` gave."""
-    status = stored.document.get("status", {})
-    scenario = stored.document.get("scenario", {})
-    remark = "" if status.get("kind") == "completed" else str(status.get("message", ""))
-    supply = scenario.get("device", {}).get("supply", {})
-    atmosphere = float(supply.get("atmospheric_pressure", STANDARD_ATMOSPHERE))
-    return recording_figure(stored.recording, str(scenario.get("name", "")), remark, atmosphere)
+    """Return the figure of a saved result: the same that ``Result.plot`` gave.
+
+    DataError names the key of ``run.json`` that is of another form.
+    """
+    status, name = _under(stored, "status"), _under(stored, "scenario").get("name", "")
+    remark = "" if status.get("kind") == "completed" else one_line(status.get("message", ""))
+    if not isinstance(name, str):
+        raise _other_form(stored, "scenario.name", name, "a text")
+    return recording_figure(stored.recording, one_line(name), remark, _atmosphere_of(stored))
+
+
+def _atmosphere_of(stored: StoredResult) -> float:
+    """Return the pressure [Pa absolute] from which a result counts gauge; that of standard where it does not say."""
+    given = _under(stored, "scenario", "device", "supply").get("atmospheric_pressure", STANDARD_ATMOSPHERE)
+    if isinstance(given, bool) or not isinstance(given, int | float) or not 0.0 < given < _NO_ATMOSPHERE:
+        raise _other_form(stored, "scenario.device.supply.atmospheric_pressure", given, "a pressure in Pa")
+    return float(given)
+
+
+def _under(stored: StoredResult, *keys: str) -> Mapping[str, Any]:
+    """Return a table of ``run.json``, an empty one where there is none."""
+    table: Mapping[str, Any] = stored.document
+    for depth, key in enumerate(keys, start=1):
+        below = table.get(key, {})
+        if not isinstance(below, Mapping):
+            raise _other_form(stored, ".".join(keys[:depth]), below, "a table")
+        table = below
+    return table
+
+
+def _other_form(stored: StoredResult, path: str, given: object, wanted: str) -> DataError:
+    shown = one_line(repr(given))[:_LONGEST_SHOWN]
+    return DataError(f"{stored.folder / RUN_FILE}: {path} = {shown} must be {wanted}")
 
 
 def figure_files(figure: "Figure") -> dict[str, bytes]:
@@ -157,8 +188,10 @@ def _grid(count: int, title: str, remark: str) -> "tuple[Figure, list[Axes]]":
     bottom = _BOTTOM + _REMARK_LINE * len(remarks)
     height = _TOP + count * _PANEL + (count - 1) * _GAP + bottom
     figure, rows = figure_of_panels((_WIDTH, height), Margins(_LEFT, _RIGHT, _TOP, bottom, _GAP), count)
-    figure.text(0.12 / _WIDTH, 1.0 - 0.12 / height, title, ha="left", va="top", fontsize=13, fontweight="bold")
-    figure.text(0.12 / _WIDTH, 0.1 / height, "\n".join(remarks), ha="left", va="bottom", fontsize=9, color=VERMILION)
+    # Names and messages come from files: a dollar sign in them begins no formula.
+    shown: dict[str, Any] = {"ha": "left", "parse_math": False}
+    figure.text(0.12 / _WIDTH, 1.0 - 0.12 / height, title, va="top", fontsize=13, fontweight="bold", **shown)
+    figure.text(0.12 / _WIDTH, 0.1 / height, "\n".join(remarks), va="bottom", fontsize=9, color=VERMILION, **shown)
     return figure, [axes for (axes,) in rows]
 
 

@@ -45,6 +45,11 @@ def run(parsed: argparse.Namespace) -> int:
     drawn = _draw_folder(parsed.folder, names)
     if not drawn:
         return _say_what_is_there(parsed, names)
+    if parsed.out is not None and len(drawn) > 1:
+        raise DataError(
+            f"--out {parsed.out}: {parsed.folder} has {len(drawn)} figures, {', '.join(drawn)}; without --out each is "
+            "written beside its recording"
+        )
     if parsed.out is not None:
         (content,) = render_figure(next(iter(drawn.values())), [parsed.out.suffix.removeprefix(".")]).values()
         written = [str(write_file(parsed.out, content))]

@@ -106,6 +106,14 @@ def _unknown_kind(spot: _Spot, detail: ErrorDetails) -> str:
     )
 
 
+def _wrong_name(spot: _Spot, detail: ErrorDetails) -> str:
+    """Say what a name may consist of; pydantic marks one that is the key of a table."""
+    if detail["loc"][-1] == "[key]":
+        table = one_line(".".join(map(str, detail["loc"][:-2])))
+        return f"{table}: the name {quote(detail['input'])} must consist of letters, digits, '-' and '_'"
+    return f"{spot.path} = {quote(detail['input'])} must consist of lower-case letters, digits, '-' and '_'"
+
+
 def _not_a_table(spot: _Spot, detail: ErrorDetails) -> str:
     fields = spot.wanted.model_fields if _is_model(spot.wanted) else {}
     required = [name for name, field in fields.items() if field.is_required()]
@@ -127,11 +135,11 @@ _TEMPLATES = {
     "missing": "'{path}' is missing",
     "union_tag_not_found": "'{path}.kind' is missing",
     "string_type": "{path} = {value} must be a text in quotation marks",
-    "string_pattern_mismatch": "{path} = {value} must consist of lower-case letters, digits, '-' and '_'",
 }
 _SENTENCES: dict[str, Callable[[_Spot, ErrorDetails], str]] = {
     "extra_forbidden": _unknown_key,
     "literal_error": _unknown_choice,
+    "string_pattern_mismatch": _wrong_name,
     "union_tag_invalid": _unknown_kind,
     "model_type": _not_a_table,
     "model_attributes_type": _not_a_table,

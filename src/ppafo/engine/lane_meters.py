@@ -129,7 +129,7 @@ def _trace_lines(rows: LaneRows, moment: str) -> list[str]:
     # A trace with less room than samples keeps the last ones.
     place = "next_record // trace_every % trace.shape[0]"
     paths = TRACED | walk_traces(rows.program) | (TRUE_MASSES if rows.program.is_thermal else {})
-    keep = [f"trace[{place}, {row}, lane] = {paths[name]}" for row, name in enumerate(traced)]
+    keep = [f"trace[{place}, {row}, lane] = {paths.get(name, name)}" for row, name in enumerate(traced)]
     return [
         "if next_record % trace_every == 0:",
         *indent(over_lanes([*sample_lines(rows, moment), *keep])),

@@ -77,8 +77,9 @@ class Program:
     walking stride after equal stride. ``has_lines`` True feeds the device from lines behind regulators instead of
     constant pressures. ``is_adaptive`` True divides each step as its error asks, ``samples_inside`` True where recorded
     samples lie between the steps. ``meters`` are updated at every sample that a recording would have, ``traced`` names
-    channels that are kept at some of them. ``starts_apart`` True lets the run of each lane begin at a step of its own,
-    while others of the block are under way. ``actuator`` is what stands between the chambers and the joint.
+    channels, or paths of the state, that are kept at some of them. ``starts_apart`` True lets the run of each lane
+    begin at a step of its own, while others of the block are under way. ``actuator`` is what stands between the
+    chambers and the joint.
     """
 
     valve: ValveModel

@@ -3,11 +3,15 @@
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from typing import Any
+
+import numpy as np
 
 from ppafo.errors import ParameterError, UnitError, nearest_name
 from ppafo.model.actuators.catalog import ACTUATORS
 from ppafo.model.actuators.kind import Range
 from ppafo.model.actuators.table import Table
+from ppafo.model.columns import Problem, at, larger
 from ppafo.model.declaration import Quantity
 from ppafo.model.gas import SPECIES
 from ppafo.model.valves.catalog import VALVES
@@ -35,7 +39,7 @@ from ppafo.parameters.parameter_set import (
     number_text,
     with_second_pressure,
 )
-from ppafo.parameters.plant import plant_parameters
+from ppafo.parameters.plant import shape_and_growth
 
 _SAME = 1.0e-9
 """Angles [rad] this near are one, written in two ways."""
@@ -67,12 +71,20 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None) -> Devic
 
 def _with_means(device: Device) -> Device:
     """Return the device with what a vane of its mean size would have."""
-    growth = plant_parameters(device).volume_per_angle
-    if not growth > 0.0:
-        raise ParameterError(
-            f"{device.name}: chamber 1 must grow with the angle, and grows by {growth:.4g} m^3/rad at supply pressure"
-        )
+    growth, (is_bad, line) = growth_and_problem(device)
+    if is_bad:
+        raise ParameterError(f"{device.name}: {line(0)}")
     return replace(device, actuator=replace(device.actuator, torque_constant=growth, volume_per_angle=growth))
+
+
+def growth_and_problem(device: Device) -> tuple[Any, Problem]:
+    """Return how chamber 1 of an actuator that is no vane grows [m^3/rad], and where it does not; in columns too."""
+    _, growth = shape_and_growth(device)
+
+    def line(run: int) -> str:
+        return f"chamber 1 must grow with the angle, and grows by {at(growth, run):.4g} m^3/rad at supply pressure"
+
+    return growth, (np.logical_not(growth > 0.0), line)
 
 
 def _actuator(parameter_set: ParameterSet, read: Callable[[str], float]) -> Actuator:
@@ -120,14 +132,16 @@ def _outside(table: Table | None, stops: Range) -> str:
     return f"its file was measured from {measured}, and the stops are at {wanted}"
 
 
-def _beyond_pressures(device: Device) -> str:
-    """Return what is wrong where the supply is above the pressures at which a table was measured."""
+def beyond_pressures(device: Device) -> Problem:
+    """Return where the supply is above the pressures at which a table was measured, in columns too."""
     table, supply = device.actuator.table, device.supply
     highest = math.inf if table is None else highest_pressure(table)
-    gauge = max(supply.pressure, supply.dorsiflexion_pressure) - supply.atmospheric_pressure
-    if gauge <= _COVERED * highest:
-        return ""
-    return f"its file was measured up to {highest / 1e3:.4g} kPa_g, and the supply has {gauge / 1e3:.4g}"
+    gauge = larger(supply.pressure, supply.dorsiflexion_pressure) - supply.atmospheric_pressure
+
+    def line(run: int) -> str:
+        return f"its file was measured up to {highest / 1e3:.4g} kPa_g, and the supply has {at(gauge, run) / 1e3:.4g}"
+
+    return gauge > _COVERED * highest, line
 
 
 def _given_or_default(
@@ -260,8 +274,9 @@ def consistency(device: Device) -> tuple[tuple[str, str, str, bool], ...]:
 
 
 def _check_consistent(parameter_set: ParameterSet, device: Device) -> None:
-    if problem := _beyond_pressures(device):
-        raise ParameterError(f"{parameter_set.file}: actuator: {problem}")
+    is_beyond, line = beyond_pressures(device)
+    if is_beyond:
+        raise ParameterError(f"{parameter_set.file}: actuator: {line(0)}")
     for path, relation, other, holds in consistency(device):
         if not holds:
             given, limit = number_text(parameter_set.numbers[path]), number_text(parameter_set.numbers[other])

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from importlib import resources
 from pathlib import Path
 from types import GenericAlias
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
@@ -27,9 +27,13 @@ from ppafo.parameters.parameter_set import ParameterSet, chosen_valve
 from ppafo.parameters.provenance import Accepted, Citation, Entry, FlagEntry, TextEntry
 from ppafo.units import check_unit
 
+# A dotted path names a valve: a dot or a blank in its name would make it another path.
+_VALVE_NAME = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
+
 
 def _by_name(model: Any) -> Any:
-    return GenericAlias(dict, (str, model))
+    named = Field(json_schema_extra={"additionalProperties": False})
+    return Annotated[GenericAlias(dict, (_VALVE_NAME, model)), named]
 
 
 def _fields(quantities: tuple[Quantity, ...]) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple, cast
 
 from ppafo.model.actuators.catalog import ACTUATORS
-from ppafo.model.actuators.kind import ActuatorModel, Range, mean_growth, plant_in_shape
+from ppafo.model.actuators.kind import Range, mean_growth, plant_in_shape
 from ppafo.model.columns import over_runs
 from ppafo.model.orifice import FlowCurve
 from ppafo.model.orifice_curves import area_conductance, isentropic_curve, iso6358_curve, sonic_conductance_mass
@@ -53,25 +53,27 @@ def plant_parameters(device: Device, external_torque: float = 0.0) -> PlantParam
     ratio = device.flow.linear_ratio
     valve = restriction(device.valve.orifice, device.gas, ratio)
     plant = plant_with(device, valve, restriction(device.actuator.leak, device.gas, ratio), external_torque)
-    kind = ACTUATORS[device.actuator.kind]
-    return plant if kind.model.shape is None else _in_shape(plant, device, kind.model)
+    if ACTUATORS[device.actuator.kind].model.shape is None:
+        return plant
+    return cast(PlantParameters, plant_in_shape(plant, *shape_and_growth(device)))
 
 
-def _in_shape(plant: PlantParameters, device: Device, model: ActuatorModel) -> PlantParameters:
-    """The plant with the shape of its actuator; it has all that a vane's has, and stands in its place."""
-    names, settings = tuple(device.actuator.settings), device.actuator.settings.values()
-    gauge = device.supply.pressure - device.supply.atmospheric_pressure
+def shape_and_growth(device: Device) -> tuple[Any, Any]:
+    """Shape of an actuator that is no vane, and how chamber 1 grows with the angle on average [m^3/rad]."""
+    actuator, supply = device.actuator, device.supply
+    names, model = tuple(actuator.settings), ACTUATORS[actuator.kind].model
 
-    def shape_of(low: float, high: float, dead_1: float, dead_2: float, pressed: float, *values: float) -> Any:
+    def prepared(low: float, high: float, dead_1: float, dead_2: float, pressed: float, *values: float) -> Any:
         stops = Range(angle_min=low, angle_max=high, dead_volume_1=dead_1, dead_volume_2=dead_2)
         given = dict(zip(names, values, strict=True))
-        table = device.actuator.table
+        table = actuator.table
         shape = model.prepare(given, stops) if table is None else model.prepare(given, stops, table)
         return shape, mean_growth(shape, stops, pressed, model.chambers)
 
-    ends = plant.angle_min, plant.angle_max, plant.dead_volume_1, plant.dead_volume_2
-    shape, growth = over_runs(shape_of, *ends, gauge, *settings)
-    return cast(PlantParameters, plant_in_shape(plant, shape, growth))
+    ends = actuator.angle_min, actuator.angle_max, actuator.dead_volume_1, actuator.dead_volume_2
+    gauge = supply.pressure - supply.atmospheric_pressure
+    shape, growth = over_runs(prepared, *ends, gauge, *actuator.settings.values())
+    return shape, growth
 
 
 def plant_with(device: Device, valve: Restriction, leak: Restriction, external_torque: float) -> PlantParameters:

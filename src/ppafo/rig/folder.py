@@ -7,7 +7,7 @@ from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError, reason
 from ppafo.rig.record import NOTICE, RigRecording
 from ppafo.storage.comma_separated import marked_csv_bytes
-from ppafo.storage.files import add_files, check_files_can_be_added
+from ppafo.storage.files import LEFT_ASIDE, add_files, check_files_can_be_added
 from ppafo.storage.owned_folder import read_json
 
 RIG_FILE = "rig.json"
@@ -39,18 +39,19 @@ def write_rig_recording(folder: Path, made: RigRecording) -> tuple[str, ...]:
         "notice": NOTICE,
         "recordings": {key: recordings[key] for key in sorted(recordings)},
     }
-    contents = {name: marked_csv_bytes(made.recording), RIG_FILE: f"{json_text(document)}\n".encode()}
-    add_files(folder, contents)
-    return tuple(contents)
+    # By rig.json a folder is known to be the rig's: it is there first, whenever the process is killed.
+    add_files(folder, {RIG_FILE: f"{json_text(document)}\n".encode(), name: marked_csv_bytes(made.recording)})
+    return name, RIG_FILE
 
 
 def _check_own(folder: Path, name: str) -> None:
     """Refuse a folder of others, and a file of others that a recording would replace."""
     earlier = _earlier(folder)
     try:
-        present = {entry.name for entry in folder.iterdir()} if folder.is_dir() else set()
+        there = {entry.name for entry in folder.iterdir()} if folder.is_dir() else set()
     except OSError as error:
         raise DataError(f"{folder}: cannot be read: {reason(error)}") from error
+    present = {entry for entry in there if LEFT_ASIDE not in entry}
     if present and RIG_FILE not in present:
         raise DataError(f"{folder}: is not empty and has no recordings of the rig ({RIG_FILE}); choose another folder")
     if name in present and name not in earlier:

@@ -21,6 +21,10 @@ from ppafo.storage.files import read_bytes
 _DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t"}
 _MARKS = {"point": ".", "comma": ",", "apostrophe": "'", "blank": " "}
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_GROUPED = {
+    name: re.compile(rf"[+-]?\d{{1,3}}(?:{re.escape(mark)}\d{{3}})+(?![\d{mark}])", re.ASCII)
+    for name, mark in _MARKS.items()
+}
 _LONGEST_SHOWN = 40
 _COMMENT = "#"
 
@@ -136,13 +140,17 @@ def _index(name: str, item: MappedChannel, names: list[str], width: int) -> int:
         shown = ", ".join(one_line(known)[:_LONGEST_SHOWN] for known in names)
         hint = nearest_name(str(item.column), names)
         raise DataError(f"channel '{name}': there is no column {item.column!r}{hint}; the file has {shown}")
-    return names.index(str(item.column))
+    places = [place for place, known in enumerate(names, start=1) if known == item.column]
+    if len(places) > 1:
+        shown = " and ".join(map(str, places))
+        raise DataError(f"channel '{name}': columns {shown} are both called {item.column!r}; give the number of one")
+    return places[0] - 1
 
 
 def _number(cell: str, thousands: str | None, decimal: str, column: str, line: int) -> float:
     text = cell.strip()
     if thousands is not None:
-        text = text.replace(_MARKS[thousands], "")
+        text = _without_groups(text, thousands, column, line)
     if decimal != "point":
         # A point that is left is no mark of this file; what no number has in it makes the text none.
         text = text.replace(".", "?").replace(_MARKS[decimal], ".")
@@ -151,6 +159,20 @@ def _number(cell: str, thousands: str | None, decimal: str, column: str, line: i
         shown = one_line(cell)[:_LONGEST_SHOWN]
         raise DataError(f"line {line}, column {column!r}: {shown!r} is not a finite number")
     return value
+
+
+def _without_groups(text: str, thousands: str, column: str, line: int) -> str:
+    """Return the text of a number without the marks between its groups of digits."""
+    mark = _MARKS[thousands]
+    if mark not in text:
+        return text
+    grouped = _GROUPED[thousands].match(text)
+    if grouped is None:
+        # Without its mark 1.5 would be 15.
+        shown = one_line(text)[:_LONGEST_SHOWN]
+        wanted = f'does not have groups of three digits, as thousands = "{thousands}" says'
+        raise DataError(f"line {line}, column {column!r}: {shown!r} {wanted}")
+    return grouped.group().replace(mark, "") + text[grouped.end() :]
 
 
 def _convert(name: str, item: MappedChannel, numbers: Floats, atmosphere: float) -> Channel:

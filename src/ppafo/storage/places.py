@@ -7,6 +7,7 @@ import contextlib
 import io
 import shutil
 import stat
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -17,6 +18,8 @@ from ppafo.storage.files import LEFT_ASIDE, write_file
 
 _ADDRESS_MARK = "://"
 _MAXIMUM_BYTES_OF_DOCUMENT = 100_000_000
+_LONGEST_WRITING = 86400.0
+"""Nobody writes a file for longer [s]."""
 
 
 class Place(Protocol):
@@ -51,7 +54,7 @@ class Place(Protocol):
         ...
 
     def tidy(self) -> None:
-        """Remove what a killed process has left half written beside its place."""
+        """Remove what a killed process has left half written beside its place, once no other can be writing it."""
         ...
 
 
@@ -112,10 +115,12 @@ class DiskFolder:
         return shutil.disk_usage(there).free
 
     def tidy(self) -> None:
-        """Remove files that were being written when a process was killed."""
+        """Remove files that were being written when a process was killed: a younger one may be that of another."""
+        latest = time.time() - _LONGEST_WRITING
         for path in self.folder.rglob(f"*{LEFT_ASIDE}*"):
             with contextlib.suppress(OSError):
-                path.unlink()
+                if path.lstat().st_mtime < latest:
+                    path.unlink()
 
 
 @dataclass(frozen=True, slots=True)

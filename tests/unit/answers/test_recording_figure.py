@@ -1,18 +1,20 @@
 """Figures and tables of a result."""
 
 import re
+from pathlib import Path
 
 import matplotlib
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from ppafo.answers.recording_figure import figure_files, recording_figure
+from ppafo.answers.recording_figure import draw_stored_result, figure_files, recording_figure
 from ppafo.answers.shown_metrics import metrics_lines
 from ppafo.answers.style import house_style, render_figure
 from ppafo.errors import DataError
 from ppafo.metrics import Metric
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
+from ppafo.storage import StoredResult
 
 TIME = np.linspace(0.0, 1.0, 11)
 
@@ -129,3 +131,39 @@ def test_a_table_shows_metrics_in_the_units_of_the_field() -> None:
     assert rows[1][:3] == ["angle_range", "180", "deg"]
     assert rows[2][:3] == ["largest_pressure", "50", "psi_g"]
     assert rows[3] == ["switchings", "10", "switchings"]
+
+
+def stored(**document: object) -> StoredResult:
+    return StoredResult(Path("run-7"), recording(pressure_1=90e3 + 50.0 * 6894.757293168361), document)
+
+
+def test_a_saved_result_is_drawn_with_its_name_its_status_and_its_atmosphere() -> None:
+    scenario = {"name": "$\\foo$", "device": {"supply": {"atmospheric_pressure": 90e3}}}
+    figure = draw_stored_result(stored(status={"kind": "diverged", "message": "at $1$ s"}, scenario=scenario))
+    assert drawn(figure, 0)[0][0] == pytest.approx(50.0)
+    render_figure(figure, ["png"])
+    assert texts(figure)[:2] == ["$\\foo$", "at $1$ s"]
+
+
+@pytest.mark.parametrize(
+    ("document", "said"),
+    [
+        ({"status": [1]}, "status = [1] must be a table"),
+        ({"scenario": None}, "scenario = None must be a table"),
+        ({"scenario": {"name": 3}}, "scenario.name = 3 must be a text"),
+        ({"scenario": {"device": 3}}, "scenario.device = 3 must be a table"),
+        ({"scenario": {"device": {"supply": "x"}}}, "scenario.device.supply = 'x' must be a table"),
+    ],
+)
+def test_a_key_of_another_form_in_a_saved_result_is_named(document: dict[str, object], said: str) -> None:
+    with pytest.raises(DataError, match=re.escape(f"{Path('run-7') / 'run.json'}: {said}")):
+        draw_stored_result(stored(**document))
+
+
+@pytest.mark.parametrize("given", ["x", True, None, -1.0, float("nan"), 10**400])
+def test_an_atmosphere_that_is_no_pressure_is_refused(given: object) -> None:
+    scenario = {"device": {"supply": {"atmospheric_pressure": given}}}
+    with pytest.raises(
+        DataError, match=r"scenario\.device\.supply\.atmospheric_pressure = .* must be a pressure in Pa"
+    ):
+        draw_stored_result(stored(scenario=scenario))

@@ -173,11 +173,15 @@ def test_the_end_of_a_walk_is_drawn_and_the_folder_stays_that_of_the_walk(tmp_pa
     assert names(tmp_path / "foreign") == ["recording.nc"]
 
 
-def test_recordings_of_the_rig_are_drawn_each_on_its_own(tmp_path: Path) -> None:
+def test_recordings_of_the_rig_are_drawn_each_on_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     recording = Recording("bench", np.array([0.0, 1.0]), {"angle": Channel(np.array([1.0, 1.1]), "rad")}, "synthetic")
     for name in ("free-decay", "step-response"):
         (tmp_path / f"{name}.csv").write_bytes(marked_csv_bytes(recording))
     (tmp_path / "rig.json").write_text('{"format": "ppafo rig", "recordings": {}}')
+    before = names(tmp_path)
+    assert main(["plot", str(tmp_path), "--out", str(tmp_path / "one.png")]) == 2
+    assert f"{tmp_path} has 2 figures, free-decay, step-response; without --out" in capsys.readouterr().err
+    assert names(tmp_path) == before
     assert main(["plot", str(tmp_path)]) == 0
     assert {"free-decay.png", "free-decay.svg", "step-response.png", "step-response.svg"} <= set(names(tmp_path))
 

@@ -23,6 +23,10 @@ EXAMPLE = Path(str(resources.files("ppafo") / "examples" / "actuators"))
 HEADER = "angle [deg],pressure [kPa_g],volume_1 [mL]"
 GOOD = ["20,0,100", "20,50,130", "60,0,120", "60,50,160", "100,0,150", "100,50,200"]
 
+GOOD_TO_110 = ("20,0,100", "20,66,130", "110,0,150", "110,66,200")
+SHRINKING = ("20,0,1000", "20,500,1100", "110,0,500", "110,500,1600")
+"""Chamber 1 shrinks with the angle at low pressure, and grows at a high one."""
+
 
 def measured(folder: Path, *lines: str) -> Path:
     """A file of a measured actuator."""
@@ -137,6 +141,30 @@ def test_a_table_must_hold_at_supply_pressure(tmp_path: Path, lines: tuple[str, 
     (tmp_path / "set.toml").write_bytes((EXAMPLE / "measured-bladder.toml").read_bytes())
     with pytest.raises(ParameterError, match=said):
         load_device(tmp_path / "set.toml")
+
+
+@pytest.mark.parametrize(
+    ("lines", "pressures", "said"),
+    [
+        (GOOD_TO_110, (60.0, 900.0), "actuator: its file was measured up to 66 kPa_g, and the supply has 900"),
+        (SHRINKING, (490.0, 65.0), "chamber 1 must grow with the angle, and grows by -"),
+    ],
+)
+def test_a_run_of_a_study_that_the_table_does_not_hold_for_is_refused_as_alone(
+    tmp_path: Path, lines: tuple[str, ...], pressures: tuple[float, float], said: str
+) -> None:
+    measured(tmp_path, HEADER, *lines).rename(tmp_path / "measured-bladder.csv")
+    for name in ("measured-bladder.toml", "step-response-measured-bladder.toml"):
+        (tmp_path / name).write_bytes((EXAMPLE / name).read_bytes())
+    file = tmp_path / "step-response-measured-bladder.toml"
+    good, bad = (f"supply.pressure={pressure} kPa_g" for pressure in pressures)
+    with pytest.raises(PpafoError) as alone:
+        load_scenario(file, [bad])
+    columns = {"supply.pressure": 101325.0 + 1e3 * np.array(pressures)}
+    screen = screen_columns(check_columns(load_scenario(file, [good]), columns))
+    assert (screen.members.tolist(), list(screen.reasons)) == ([0], [1])
+    assert said in screen.reasons[1]
+    assert str(alone.value).endswith(screen.reasons[1])
 
 
 def test_of_another_actuator_no_torque_ceiling_and_no_lower_bound_is_known() -> None:

@@ -10,6 +10,7 @@ import pytest
 from ppafo.errors import ParameterError
 from ppafo.parameters import list_sets, load_device, load_parameter_set
 from ppafo.parameters.loading import parse_parameter_set
+from ppafo.parameters.writing import parameter_set_toml
 
 SMALL = """
 schema_version = 1
@@ -95,6 +96,21 @@ def test_a_value_in_the_place_of_a_table_names_the_keys_of_the_table() -> None:
 
 def test_a_name_of_another_form_says_which_form() -> None:
     assert "name = 'My Bench' must consist of lower-case letters" in problem_of(changed('"bench"', '"My Bench"'))
+
+
+@pytest.mark.parametrize("name", ["mhj.10", "MHJ 10", "", "Ventil-größer"])
+def test_a_name_of_a_valve_that_no_path_can_hold_is_refused(name: str) -> None:
+    said = f"the name {name!r} must consist of letters, digits, '-' and '_'"
+    assert f"valves: {said}" in problem_of(changed("[valves.main]", f'[valves."{name}"]'))
+    reported = '{ value = 1, unit = "g", origin = "publication", source = "page 2" }'
+    report = f'\n[reported.valves."{name}"]\nsingle_fill_gas = {reported}\n'
+    assert f"reported.valves: {said}" in problem_of(SMALL + report)
+
+
+def test_a_name_of_a_valve_may_have_capitals() -> None:
+    text = changed('"main"', '"MHJ_10-b"').replace("[valves.main]", "[valves.MHJ_10-b]")
+    before = parse_parameter_set(text.encode(), "bench.toml")
+    assert parse_parameter_set(parameter_set_toml(before).encode(), before.file) == before
 
 
 def test_a_mistake_inside_a_list_is_found_by_its_number() -> None:

@@ -1,5 +1,7 @@
 """The published schema says the same as the loader."""
 
+import functools
+import operator
 import tomllib
 from importlib import resources
 from typing import Any
@@ -28,6 +30,16 @@ def test_every_set_of_the_package_fits_the_schema(name: str) -> None:
 
 def test_the_schema_refuses_an_unknown_key() -> None:
     document = document_of("ppafo2011") | {"colour": "blue"}
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(document, json_schema())
+
+
+@pytest.mark.parametrize("of", [("valves",), ("reported", "valves")])
+def test_the_schema_refuses_a_name_of_a_valve_that_no_path_can_hold(of: tuple[str, ...]) -> None:
+    document = document_of("ppafo2011-printed")
+    jsonschema.validate(document, json_schema())
+    valves = functools.reduce(operator.getitem, of, document)
+    valves["mhj.10"] = valves.pop("solenoid")
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(document, json_schema())
 

@@ -238,6 +238,31 @@ def test_a_foreign_rig_file_is_not_overwritten(tmp_path: Path) -> None:
         write_rig_recording(tmp_path, record("static-torque"))
 
 
+@pytest.mark.parametrize("renamed", [0, 1])
+def test_a_folder_is_the_rig_s_again_whenever_a_writer_is_killed(
+    renamed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made, rename, done = record("static-torque"), Path.replace, list[Path]()
+
+    def killed(path: Path, target: Path) -> Path:
+        if len(done) == renamed:
+            raise KeyboardInterrupt
+        done.append(path)
+        return rename(path, target)
+
+    def not_tidied(path: Path, ignore_errors: bool) -> None:
+        pass
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "replace", killed)
+        patched.setattr("shutil.rmtree", not_tidied)
+        with pytest.raises(KeyboardInterrupt):
+            write_rig_recording(tmp_path, made)
+    assert not (tmp_path / "static-torque.csv").exists()
+    write_rig_recording(tmp_path, made)
+    assert read_csv(tmp_path / "static-torque.csv").kind == "synthetic"
+
+
 def test_an_empty_preset_points_to_the_schema(tmp_path: Path) -> None:
     for text in ("", "# nothing yet\n"):
         (tmp_path / "mine.toml").write_text(text)

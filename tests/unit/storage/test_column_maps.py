@@ -65,6 +65,56 @@ def test_groups_of_digits_in_one_column_leave_the_decimal_point_of_another(tmp_p
     assert np.allclose(recording["torque"], [7.5, 7.6])
 
 
+@pytest.mark.parametrize(
+    ("decimal", "thousands", "cell", "value"),
+    [
+        ("point", "comma", "-1,234,567.25", -1234567.25),
+        ("comma", "point", "1.234,5", 1234.5),
+        ("point", "blank", "12 345", 12345.0),
+        ("comma", "apostrophe", "1'000,5e1", 10005.0),
+        ("comma", "comma", "12,345", 12345.0),
+        ("point", "comma", "1234.5", 1234.5),
+    ],
+)
+def test_groups_of_three_digits_are_read(tmp_path: Path, decimal: str, thousands: str, cell: str, value: float) -> None:
+    torque = {"column": 2, "unit": "N m", "thousands": thousands}
+    columns = mapped(delimiter="semicolon", decimal=decimal, channels={"torque": torque})
+    assert read_foreign(written(tmp_path, f"0;{cell}\n10;1\n"), columns)["torque"][0] == value
+
+
+@pytest.mark.parametrize(
+    ("decimal", "thousands", "cell"),
+    [
+        ("point", "point", "1.5"),
+        ("comma", "comma", "1,5"),
+        ("point", "comma", "1,5"),
+        ("comma", "point", "1.5"),
+        ("point", "point", "1.234.5"),
+        ("point", "comma", "1234,567"),
+        ("point", "blank", "1 2"),
+        ("point", "comma", "1.234,567"),
+        ("point", "comma", ",123"),
+    ],
+)
+def test_a_mark_that_stands_between_no_groups_is_refused(
+    tmp_path: Path, decimal: str, thousands: str, cell: str
+) -> None:
+    torque = {"column": 2, "unit": "N m", "thousands": thousands}
+    columns = mapped(delimiter="semicolon", decimal=decimal, channels={"torque": torque})
+    with pytest.raises(DataError, match=f"line 2, column '2': '{cell}' does not have groups of three digits"):
+        read_foreign(written(tmp_path, f"0;1\n10;{cell}\n"), columns)
+
+
+def test_a_name_that_two_columns_have_is_refused_where_it_is_asked_for(tmp_path: Path) -> None:
+    text = "time,p,p,force\n0,1,2,3\n1,1,2,4\n"
+    time, force = {"column": "time", "unit": "s"}, {"column": "force", "unit": "N m"}
+    columns = mapped(header=True, channels={"time": time, "torque": force})
+    assert list(read_foreign(written(tmp_path, text), columns)["torque"]) == [3.0, 4.0]
+    columns = mapped(header=True, channels={"time": time, "torque": {"column": "p", "unit": "N m"}})
+    with pytest.raises(DataError, match="channel 'torque': columns 2 and 3 are both called 'p'; give the number of"):
+        read_foreign(written(tmp_path, text), columns)
+
+
 def test_direction_and_sweeps_follow_from_the_rate_of_a_channel(tmp_path: Path) -> None:
     time = np.arange(0.0, 4000.0, 10.0)
     position = 40.0 * np.abs(1.0 - (time / 1000.0) % 2.0)

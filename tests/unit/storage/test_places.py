@@ -1,5 +1,6 @@
 """Folders on a disk and at addresses behave alike."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -36,6 +37,17 @@ def test_files_are_written_listed_read_replaced_and_removed(place: Place) -> Non
 def test_an_address_opens_the_same_folder_again(place: Place) -> None:
     place.write("one.json", b"1")
     assert place_at(place.address).names() == {"one.json"}
+
+
+def test_what_another_process_may_be_writing_stays_and_what_is_left_from_days_ago_goes(tmp_path: Path) -> None:
+    left, now_written = (tmp_path / f".study.json.writing-{mark}" for mark in ("0badcafe", "0badbeef"))
+    for path in (left, now_written):
+        path.write_bytes(b"{")
+    os.utime(left, (0.0, 0.0))
+    place = place_at(tmp_path)
+    place.tidy()
+    assert list(tmp_path.iterdir()) == [now_written]
+    assert place.names() == frozenset()
 
 
 def test_a_disk_says_how_much_is_free(tmp_path: Path) -> None:

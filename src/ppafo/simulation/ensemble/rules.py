@@ -9,7 +9,7 @@ import numpy as np
 
 from ppafo.engine.lanes import Floats
 from ppafo.model.columns import Problem, at
-from ppafo.parameters.building import actuator_problem, consistency
+from ppafo.parameters.building import actuator_problem, beyond_pressures, consistency, growth_and_problem
 from ppafo.parameters.device import VANE
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY
 from ppafo.simulation.motion import TOLERANCE, profile_problem
@@ -57,6 +57,17 @@ def _misshapen(scenario: Scenario) -> tuple[Problem, ...]:
 
     found = [words(run) for run in range(varied[0].size)]
     return ((np.array([bool(line) for line in found]), lambda run: found[run]),)
+
+
+def _beyond_the_table(scenario: Scenario) -> tuple[Problem, ...]:
+    """A supply above the pressures at which an actuator was measured."""
+    is_beyond, line = beyond_pressures(scenario.device)
+    return ((is_beyond, lambda run: f"actuator: {line(run)}"),)
+
+
+def _without_growth(scenario: Scenario) -> tuple[Problem, ...]:
+    """An actuator that is no vane, whose chamber 1 does not grow with the angle."""
+    return () if scenario.device.actuator.kind == VANE else (growth_and_problem(scenario.device)[1],)
 
 
 def _beyond_the_stops(scenario: Scenario) -> tuple[Problem, ...]:
@@ -127,4 +138,12 @@ def _second_regulator_above_the_first(scenario: Scenario) -> tuple[Problem, ...]
     return ((np.atleast_1d(supply.dorsiflexion_pressure > supply.pressure), line),)
 
 
-RULES: tuple[Rule, ...] = (_inconsistent, _misshapen, _beyond_the_stops, _too_late, _second_regulator_above_the_first)
+RULES: tuple[Rule, ...] = (
+    _inconsistent,
+    _misshapen,
+    _beyond_the_table,
+    _without_growth,
+    _beyond_the_stops,
+    _too_late,
+    _second_regulator_above_the_first,
+)

@@ -7,9 +7,11 @@ from typing import NamedTuple, final
 import numpy as np
 
 from ppafo.control.kind import PythonController
+from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import Batch, BatchResult, Floats, run_blocks
 from ppafo.engine.metering import add_meters, group_of, meters_of
 from ppafo.engine.program import Program
+from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.errors import ScenarioError
 from ppafo.metrics.gas import ENERGIES
@@ -46,6 +48,11 @@ class ThermalTotals(NamedTuple):
     vented_enthalpy: float
     wall_heat: float
     gas_work: float
+
+
+_OF_STATE = tuple(f"state.{name}" for name in Totals._fields)
+_OF_MASSES = tuple(f"masses.{name}" for name in ThermalState._fields)
+"""Paths of the numbers that totals are made of; those of the true masses with an energy balance only."""
 
 
 def totals(state: PlantState) -> Totals:
@@ -115,12 +122,13 @@ class Outcome:
         task = _meter_batch(plain, self.request)
         batch = task.batch
         states = np.empty_like(batch.states)
+        ends = np.empty_like(states) if task.late_totals else states
         read_from_traces = {name: np.full(members.size, np.nan) for name, kind in task.metrics.items() if kind.traced}
 
         def take(runs: slice, result: BatchResult) -> None:
-            states[:, runs] = result.states
+            states[:, runs], ends[:, runs] = result.states, task.at_last_sample(result)
             for name, values in read_from_traces.items():
-                values[runs] = _read(task, name, task.readings(result.states, runs, result.record))
+                values[runs] = _read(task, name, task.readings(ends[:, runs], runs, result.record))
             for name in self.request.bands:
                 trace = result.record[:: task.band_stride, batch.program.traced.index(name)]
                 self.traces[name][: len(trace), members[runs]] = trace
@@ -130,7 +138,7 @@ class Outcome:
         else:
             run_in_turn(batch, self.request.custom, take)
         self._judge(task, members, states, plain.states.shape[0])
-        readings = task.readings(states, slice(None), None)
+        readings = task.readings(ends, slice(None), None)
         for name in task.metrics:
             values = read_from_traces[name] if name in read_from_traces else _read(task, name, readings)
             self.metrics[name][members] = np.where(self.is_completed[members], values, np.nan)
@@ -152,16 +160,30 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class _MeteredBatch:
-    """A batch with its meters, the metrics that it can have, and the interval of its samples."""
+    """A batch with its meters, the metrics that it can have, and the interval of its samples.
+
+    ``late_totals`` are paths of the state, traced where the last step goes on after the last sample.
+    """
 
     batch: Batch
     metrics: Mapping[str, MetricKind]
     interval: Floats
     samples: int
     band_stride: int
+    late_totals: tuple[str, ...]
+
+    def at_last_sample(self, result: BatchResult) -> Floats:
+        """The last states of some runs, with the gas that there was at the last sample."""
+        if not self.late_totals:
+            return result.states
+        program, states = self.batch.program, result.states.copy()
+        rows = row_numbers(program.state_rows())
+        for path in self.late_totals:
+            states[rows[path]] = result.record[-1, program.traced.index(path)]
+        return states
 
     def readings(self, states: Floats, runs: slice, record: Floats | None) -> Readings:
-        """The readings of some runs from their last states and, if there are, their traces."""
+        """The readings of some runs from their states at the last sample and, if there are, their traces."""
         program = self.batch.program
         groups = program.state_rows()
         parameters = self.batch.parameters[:, runs]
@@ -203,10 +225,22 @@ def _meter_batch(plain: Batch, request: Request) -> _MeteredBatch:
     read_from_traces = dict.fromkeys(channel for kind in available.values() for channel in kind.traced)
     interval = intervals(plain)
     stride = _stride(interval, request) if request.bands else 1
-    traced = sorted({*read_from_traces, *request.bands})
-    trace_every = 0 if not traced else 1 if read_from_traces else stride
-    batch = add_meters(plain, [meter for _, meter in meters], traced, trace_every)
-    return _MeteredBatch(batch, available, interval, samples_of(plain), stride if read_from_traces else 1)
+    late = _late_totals(plain, available)
+    traced = sorted({*read_from_traces, *request.bands, *late})
+    every_sample = bool(read_from_traces or (late and request.bands))
+    trace_every = 1 if every_sample else stride if request.bands else max(1, samples_of(plain) - 1)
+    batch = add_meters(plain, [meter for _, meter in meters], traced, trace_every if traced else 0)
+    return _MeteredBatch(batch, available, interval, samples_of(plain), stride if every_sample else 1, late)
+
+
+def _late_totals(plain: Batch, metrics: Mapping[str, MetricKind]) -> tuple[str, ...]:
+    """Paths of what totals are made of, where metrics need them and the last step goes on after the last sample."""
+    clock, program = plain.clock, plain.program
+    ends_there = clock.record_every * (clock.samples - 1) >= clock.step_count - SAME_MOMENT
+    needed = {channel for kind in metrics.values() for channel in kind.channels}
+    if ends_there or needed.isdisjoint(ThermalTotals._fields):
+        return ()
+    return (*_OF_STATE, *_OF_MASSES) if program.is_thermal else _OF_STATE
 
 
 def intervals(batch: Batch) -> Floats:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -182,6 +183,8 @@ def test_what_a_killed_process_left_half_written_goes_away(
     (out / "runs").mkdir(parents=True)
     (out / ".study.json.writing-0badcafe").write_bytes(b"{")
     (out / "runs" / ".chunk-0000001.parquet.writing-0badcafe").write_bytes(b"PAR1")
+    for path in out.rglob("*.writing-*"):
+        os.utime(path, (0.0, 0.0))
     sweep(small, out)
     assert contents(out) == contents(small_results.place.address)
 

@@ -92,6 +92,29 @@ def test_meters_give_the_metrics_of_the_recording(draws: ModuleType, name: str, 
         assert_same_metrics(result, run, single)
 
 
+GAS = tuple(name for name in METRICS if name.startswith("gas_") or name in ("energy_imbalance", "work_per_gas"))
+
+
+@pytest.mark.parametrize(("further", "bands"), [((), ()), (WARM, ("torque",))], ids=["plain", "thermal, with a trace"])
+def test_gas_is_counted_to_the_last_sample_where_the_steps_go_on_after_it(
+    further: tuple[str, ...], bands: tuple[str, ...]
+) -> None:
+    times = ("controller.period=7 ms", "run.step=7 ms", "run.output_interval=20 ms", "run.duration=0.3 s")
+    overrides = (*times, "reference.ramp_time=0.2 s", *further)
+    columns = {"supply.pressure": np.array([4e5, 4.5e5])}
+    result = run_ensemble(load_scenario(TASK, overrides), columns, GAS, bands, 0.1)
+    for run in range(2):
+        single = alone(TASK, overrides, columns, run)
+        assert single.recording.duration == pytest.approx(0.3)
+        assert_same_metrics(result, run, single)
+        for name in ("gas_supplied", "gas_vented", "gas_leaked", "gas_imbalance"):
+            assert result.metrics[name][run] == single.metrics[name].value, name
+        for name in bands:
+            assert np.allclose(
+                result.traces[name][:, run], np.interp(result.times, single.recording.time, single.recording[name])
+            )
+
+
 SINE = ("reference.kind=sine", "reference.level=1 N m", "reference.frequency=1 Hz")
 
 
