@@ -25,7 +25,7 @@ static bool is_begun; /* a sample with LINK_BEGIN came, and nothing has ended th
 static bool is_sound;
 static uint16_t run;
 static uint32_t newest;
-static uint32_t decided; /* number of the controller's last sample period */
+static uint32_t decided; /* when the controller's last sample period began, us of the plant */
 static int32_t command;  /* in millionths */
 
 /* What a converter would show of a value. */
@@ -45,25 +45,33 @@ static void decide(const link_sample *sample)
     command = is_sound ? steps * 1000 : 0;
 }
 
+/* Decide once for each sample period that has begun. Lost samples leave a gap in the numbers; where more periods went by
+ * than samples were sent, the plant is slower than the controller, which would act with the gains of another rate. */
+static void go_on(const link_sample *sample)
+{
+    const uint32_t periods = (sample->time - decided) / PLANT_PERIOD_US;
+    is_sound = is_sound && periods <= sample->sequence - newest;
+    newest = sample->sequence;
+    if (periods > 0) {
+        decided += periods * PLANT_PERIOD_US;
+        decide(sample);
+    }
+}
+
 /* Answer a sample. One that comes twice or late is answered with the command that stands, one of another run with none. */
 static void answer(const link_sample *sample, uint32_t now, uint8_t bytes[LINK_ANSWER_BYTES])
 {
-    const uint32_t period = sample->time / PLANT_PERIOD_US;
     bool is_good;
     if ((sample->flags & LINK_BEGIN) != 0) {
         is_begun = true;
         is_sound = true;
         run = sample->run;
         newest = sample->sequence;
-        decided = period;
+        decided = sample->time;
         controller_begin();
         decide(sample);
     } else if (is_begun && sample->run == run && sample->sequence > newest) {
-        newest = sample->sequence;
-        if (period != decided) {
-            decided = period;
-            decide(sample);
-        }
+        go_on(sample);
     }
     if ((sample->flags & (LINK_VENTED | LINK_OVER)) != 0) {
         is_begun = false;

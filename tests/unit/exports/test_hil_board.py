@@ -1,0 +1,104 @@
+"""What the example board does with what reaches it, and when it vents."""
+
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from ppafo.cli.main import main
+from tests.example_board import COMPILER, WHOLE, built, plug, running
+from tests.virtual_wire import free_port
+
+TASK = "torque-task-proportional"
+needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no compiler of C is here")
+
+
+@pytest.fixture(scope="module")
+def controllers(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """The example controller of a scenario, built once."""
+    made: dict[tuple[str, ...], Path] = {}
+
+    def of(*words: str) -> Path:
+        if words not in made:
+            made[words] = built(tmp_path_factory.mktemp("board"), *words)
+        return made[words]
+
+    return of
+
+
+@needs_compiler
+def test_the_example_takes_one_step_for_a_sample_however_it_comes(controllers: Callable[..., Path]) -> None:
+    with plug(controllers(TASK), "0") as wire:
+        calm = [wire.ask(0, flags=1), *map(wire.ask, range(1, 6))]
+        again = [wire.ask(0, flags=1), *map(wire.ask, (1, 2, 2, 3, 1, 4, 5))]
+    commands = [answer.command for answer in calm]
+    # The error changes from sample to sample, so that a step too many would show in its slope.
+    assert len(set(commands)) == len(commands)
+    seen = [answer.command for answer in again]
+    assert seen == [*commands[:3], commands[2], commands[3], commands[3], *commands[4:]]
+    assert not any(answer.flags for answer in (*calm, *again))
+
+
+@needs_compiler
+@pytest.mark.parametrize("flags", [2, 4])
+def test_the_example_vents_once_the_plant_is_vented_or_over_until_it_begins_anew(
+    flags: int, controllers: Callable[..., Path]
+) -> None:
+    with plug(controllers(TASK), "0") as wire:
+        assert wire.ask(3).flags == 1  # before any beginning
+        assert wire.ask(0, flags=1).flags == 0
+        assert wire.ask(1, run=8).flags == 1
+        wire.ask(2, flags=flags)
+        assert wire.ask(3).flags == 1
+        assert wire.ask(0, flags=1).flags == 0
+        bad = wire.ask(1, pressure=0)  # a broken wire of a sensor
+        assert (bad.flags, bad.command) == (1, 0)
+        assert wire.ask(2).flags == 1
+
+
+@needs_compiler
+def test_the_example_vents_when_the_samples_stop(controllers: Callable[..., Path]) -> None:
+    with plug(controllers(TASK), "20") as wire:
+        wire.ask(0, flags=1)
+        time.sleep(0.3)
+        assert wire.ask(1).flags == 1
+
+
+@needs_compiler
+@pytest.mark.parametrize("apart", [5000, 1667])
+def test_the_example_vents_where_the_plant_is_slower_than_its_controller(
+    apart: int, controllers: Callable[..., Path]
+) -> None:
+    with plug(controllers(TASK), "0") as wire:
+        assert wire.ask(0, flags=1, apart=apart).flags == 0
+        found = [wire.ask(number, apart=apart) for number in range(1, 4)]
+        assert [answer.flags for answer in found][-2:] == [1, 1]
+        assert found[-1].command == 0
+
+
+@needs_compiler
+@pytest.mark.parametrize("apart", [1000, 500, 333])
+def test_lost_samples_are_no_slow_plant(apart: int, controllers: Callable[..., Path]) -> None:
+    with plug(controllers(TASK), "0") as wire:
+        arrived = [*range(1, 20), 39, 40, 41, 60, 61, 79, 81]
+        assert wire.ask(0, flags=1, apart=apart).flags == 0
+        assert not any(wire.ask(number, apart=apart, pressure=150_000).flags for number in arrived)
+
+
+@needs_compiler
+def test_a_plant_at_the_rate_of_a_slow_line_asks_for_a_controller_of_that_rate(
+    controllers: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["hil", TASK, "--rate", "200", "--lock-step", "--set", WHOLE[1], "--set", "run.duration=0.3 s"]
+    said = {}
+    for rate, overrides in (("1 kHz", ()), ("200 Hz", ("--set", "controller.rate=200Hz"))):
+        port = free_port()
+        with running(str(controllers(TASK, f"controller.rate={rate}")), "udp", str(port), "0"):
+            out = ["--out", str(tmp_path / rate), "--port", f"udp:127.0.0.1:{port}"]
+            code = main([*words, *overrides, *out])
+        vented = json.loads((tmp_path / rate / "link.json").read_text(encoding="utf-8"))["vented"]
+        said[rate] = (code, vented, "controller.rate=200Hz" in capsys.readouterr().err)
+    assert said["1 kHz"] == (1, "the controller says that it is not sound", True)
+    assert said["200 Hz"] == (0, None, False)
