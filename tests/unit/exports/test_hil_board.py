@@ -8,10 +8,13 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
-from tests.example_board import COMPILER, WHOLE, built, plug, running
+from ppafo.exports.hil.packets import Sample, sample_bytes
+from tests.example_board import COMPILER, SENT, WHOLE, built, plug, running
 from tests.virtual_wire import free_port
 
 TASK = "torque-task-proportional"
+SECOND = Sample(0, 7, 1, 1000, dict.fromkeys(SENT, 150_000))
+"""Sample 1 of the run that is under way."""
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no compiler of C is here")
 
 
@@ -102,3 +105,37 @@ def test_a_plant_at_the_rate_of_a_slow_line_asks_for_a_controller_of_that_rate(
         said[rate] = (code, vented, "controller.rate=200Hz" in capsys.readouterr().err)
     assert said["1 kHz"] == (1, "the controller says that it is not sound", True)
     assert said["200 Hz"] == (0, None, False)
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("data", "is_answered"),
+    [
+        (b"hello", False),
+        (sample_bytes(SECOND)[:-1] + b"\x00", False),
+        (sample_bytes(SECOND), True),
+        (sample_bytes(SECOND._replace(run=8, sequence=2)), True),
+    ],
+    ids=["garbage", "wrong checksum", "repeated", "of another run"],
+)
+def test_nothing_but_new_samples_of_the_run_keeps_the_example_from_venting(
+    data: bytes, is_answered: bool, controllers: Callable[..., Path]
+) -> None:
+    with plug(controllers(TASK), "20") as wire:
+        wire.ask(0, flags=1)
+        wire.ask(1)
+        for _ in range(150):
+            wire.send(data)
+            if is_answered:
+                wire.own.recv(256)
+            time.sleep(0.002)
+        assert wire.ask(2).flags == 1
+
+
+@needs_compiler
+def test_new_samples_keep_the_example_from_venting(controllers: Callable[..., Path]) -> None:
+    with plug(controllers(TASK), "2000") as wire:
+        assert wire.ask(0, flags=1).flags == 0
+        for number in range(1, 6):
+            time.sleep(0.6)
+            assert wire.ask(number).flags == 0

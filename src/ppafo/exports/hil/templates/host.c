@@ -21,10 +21,13 @@
 #include "link.h"
 #include "plant.h"
 
+enum { LONGEST_SILENCE = 3600000 }; /* ms */
+
 static bool is_begun; /* a sample with LINK_BEGIN came, and nothing has ended the run since */
 static bool is_sound;
 static uint16_t run;
 static uint32_t newest;
+static uint32_t heard;   /* when the newest sample of the run came, us of this computer */
 static uint32_t decided; /* when the controller's last sample period began, us of the plant */
 static int32_t command;  /* in millionths */
 
@@ -47,9 +50,10 @@ static void decide(const link_sample *sample)
 
 /* Decide once for each sample period that has begun. Lost samples leave a gap in the numbers; where more periods went by
  * than samples were sent, the plant is slower than the controller, which would act with the gains of another rate. */
-static void go_on(const link_sample *sample)
+static void go_on(const link_sample *sample, uint32_t now)
 {
     const uint32_t periods = (sample->time - decided) / PLANT_PERIOD_US;
+    heard = now;
     is_sound = is_sound && periods <= sample->sequence - newest;
     newest = sample->sequence;
     if (periods > 0) {
@@ -67,11 +71,12 @@ static void answer(const link_sample *sample, uint32_t now, uint8_t bytes[LINK_A
         is_sound = true;
         run = sample->run;
         newest = sample->sequence;
+        heard = now;
         decided = sample->time;
         controller_begin();
         decide(sample);
     } else if (is_begun && sample->run == run && sample->sequence > newest) {
-        go_on(sample);
+        go_on(sample, now);
     }
     if ((sample->flags & (LINK_VENTED | LINK_OVER)) != 0) {
         is_begun = false;
@@ -85,6 +90,17 @@ static uint32_t microseconds(void)
     struct timespec now;
     (void)clock_gettime(CLOCK_MONOTONIC, &now);
     return (uint32_t)((uint64_t)now.tv_sec * 1000000u + (uint64_t)now.tv_nsec / 1000u);
+}
+
+/* How long the plant may still be silent, in ms; 0 where it is gone, -1 where nothing is waited for. Only new samples of
+ * the run show that it is there: a line that carries garbage, or one sample again and again, is silent. */
+static int left(uint32_t silence)
+{
+    const uint32_t gone = microseconds() - heard;
+    if (silence == 0 || !is_begun) {
+        return -1;
+    }
+    return gone < silence ? (int)((silence - gone + 999u) / 1000u) : 0;
 }
 
 static int opened(const char *kind, const char *place)
@@ -110,7 +126,8 @@ int main(int count, char **words)
 {
     link_reader reader = {{0}, 0};
     const bool is_udp = count > 1 && strcmp(words[1], "udp") == 0;
-    const int silence = count > 3 ? (int)strtol(words[3], NULL, 10) : 20;
+    const long given = count > 3 ? strtol(words[3], NULL, 10) : 20;
+    const uint32_t silence = given <= 0 ? 0 : (uint32_t)(given < LONGEST_SILENCE ? given : LONGEST_SILENCE) * 1000u;
     int port;
     if (count < 3 || (!is_udp && strcmp(words[1], "serial") != 0)) {
         fprintf(stderr, "controller udp PORT [SILENCE], or controller serial DEVICE [SILENCE]\n");
@@ -132,8 +149,11 @@ int main(int count, char **words)
         link_sample sample;
         ssize_t found;
         ssize_t at;
-        if (poll(&waiting, 1, silence > 0 && is_begun ? silence : -1) == 0) {
-            is_begun = false; /* the plant is gone: a board vents here */
+        const int came = poll(&waiting, 1, left(silence));
+        if (left(silence) == 0) {
+            is_begun = false; /* the plant is gone: a board vents here, and what comes too late changes nothing */
+        }
+        if (came == 0) {
             continue;
         }
         found = is_udp ? recvfrom(port, bytes, sizeof bytes, 0, (struct sockaddr *)&plant, &size)
