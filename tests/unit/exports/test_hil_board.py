@@ -1,6 +1,9 @@
 """What the example board does with what reaches it, and when it vents."""
 
 import json
+import re
+import shutil
+import subprocess
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -8,7 +11,9 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
+from ppafo.exports.hil.example import example_controller
 from ppafo.exports.hil.packets import Sample, sample_bytes
+from ppafo.simulation.loading import load_scenario
 from tests.example_board import COMPILER, SENT, WHOLE, built, plug, running
 from tests.virtual_wire import free_port
 
@@ -35,7 +40,7 @@ def controllers(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]
 def test_the_example_takes_one_step_for_a_sample_however_it_comes(controllers: Callable[..., Path]) -> None:
     with plug(controllers(TASK), "0") as wire:
         calm = [wire.ask(0, flags=1), *map(wire.ask, range(1, 6))]
-        again = [wire.ask(0, flags=1), *map(wire.ask, (1, 2, 2, 3, 1, 4, 5))]
+        again = [wire.ask(0, flags=1, run=8), *(wire.ask(number, run=8) for number in (1, 2, 2, 3, 1, 4, 5))]
     commands = [answer.command for answer in calm]
     # The error changes from sample to sample, so that a step too many would show in its slope.
     assert len(set(commands)) == len(commands)
@@ -55,10 +60,10 @@ def test_the_example_vents_once_the_plant_is_vented_or_over_until_it_begins_anew
         assert wire.ask(1, run=8).flags == 1
         wire.ask(2, flags=flags)
         assert wire.ask(3).flags == 1
-        assert wire.ask(0, flags=1).flags == 0
-        bad = wire.ask(1, pressure=0)  # a broken wire of a sensor
+        assert wire.ask(0, flags=1, run=9).flags == 0
+        bad = wire.ask(1, run=9, pressure=0)  # a broken wire of a sensor
         assert (bad.flags, bad.command) == (1, 0)
-        assert wire.ask(2).flags == 1
+        assert wire.ask(2, run=9).flags == 1
 
 
 @needs_compiler
@@ -139,3 +144,47 @@ def test_new_samples_keep_the_example_from_venting(controllers: Callable[..., Pa
         for number in range(1, 6):
             time.sleep(0.6)
             assert wire.ask(number).flags == 0
+
+
+@needs_compiler
+def test_a_beginning_that_comes_late_or_once_more_is_an_old_sample(controllers: Callable[..., Path]) -> None:
+    with plug(controllers(TASK), "0") as wire:
+        calm = [wire.ask(0, flags=1), *map(wire.ask, range(1, 5))]
+        wire.ask(0, flags=1, run=8)
+        again = [wire.ask(0, flags=1, run=8)]  # called once more, before anything else
+        for number in range(1, 5):
+            again.append(wire.ask(number, run=8))
+            late = wire.ask(0, flags=1, run=8)
+            assert (late.flags, late.command) == (0, again[-1].command)
+    assert [answer.command for answer in again] == [answer.command for answer in calm]
+
+
+@needs_compiler
+@pytest.mark.parametrize("end", ["vented", "over", "not sound", "not sound at once", "silent"])
+def test_a_late_beginning_does_not_bring_back_a_run_that_is_over(end: str, controllers: Callable[..., Path]) -> None:
+    with plug(controllers(TASK), "20" if end == "silent" else "0") as wire:
+        wire.ask(0, flags=1, pressure=0 if end == "not sound at once" else None)
+        if end == "silent":
+            time.sleep(0.3)
+        elif end != "not sound at once":
+            wire.ask(1, flags={"vented": 2, "over": 4, "not sound": 0}[end], pressure=0 if end == "not sound" else None)
+        for _ in range(2):
+            late = wire.ask(0, flags=1)
+            assert (late.flags, late.command) == (1, 0)
+        assert wire.ask(2).flags == 1
+        assert wire.ask(0, flags=1, run=8).flags == 0
+
+
+@pytest.mark.skipif(shutil.which("clang") is None, reason="clang is not here")
+def test_a_board_whose_int_has_16_bits_multiplies_in_32(tmp_path: Path) -> None:
+    contents = example_controller(load_scenario(TASK, WHOLE))
+    host = contents["host.c"].decode()
+    used = "void used(const link_sample *sample, uint8_t *bytes) { answer(sample, 0, bytes); }\n"
+    board = host[host.index('#include "controller.h"') : host.index("static uint32_t microseconds")]
+    for name, content in {**contents, "board.c": (board + used).encode()}.items():
+        (tmp_path / name).write_bytes(content)
+    words = ["clang", "--target=msp430", "-ffreestanding", "-S", "-emit-llvm", "-o", "-"]
+    for name in ("board.c", "link.c"):
+        found = subprocess.run([*words, name], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
+        assert "define" in found
+        assert not re.findall(r"mul nsw i16.*", found), name

@@ -24,6 +24,7 @@
 enum { LONGEST_SILENCE = 3600000 }; /* ms */
 
 static bool is_begun; /* a sample with LINK_BEGIN came, and nothing has ended the run since */
+static bool is_known; /* the number of a run is known: that of the last one that began */
 static bool is_sound;
 static uint16_t run;
 static uint32_t newest;
@@ -45,7 +46,7 @@ static void decide(const link_sample *sample)
     const int16_t steps = controller_sample(shown(reference, PLANT_TORQUE_STEP),
         shown(sample->pressure_1, PLANT_PRESSURE_STEP), shown(sample->pressure_2, PLANT_PRESSURE_STEP));
     is_sound = is_sound && controller_is_sound();
-    command = is_sound ? steps * 1000 : 0;
+    command = is_sound ? (int32_t)steps * 1000 : 0;
 }
 
 /* Decide once for each sample period that has begun. Lost samples leave a gap in the numbers; where more periods went by
@@ -62,12 +63,21 @@ static void go_on(const link_sample *sample, uint32_t now)
     }
 }
 
+/* True where a run begins. What calls once more is heard before anything else came of its run; later it is an old sample,
+ * which neither sets back a controller that has gone on nor brings back a run that has ended. */
+static bool begins(const link_sample *sample)
+{
+    const bool is_new = !is_known || sample->run != run;
+    return (sample->flags & LINK_BEGIN) != 0 && (is_new || (is_begun && is_sound && sample->sequence == newest));
+}
+
 /* Answer a sample. One that comes twice or late is answered with the command that stands, one of another run with none. */
 static void answer(const link_sample *sample, uint32_t now, uint8_t bytes[LINK_ANSWER_BYTES])
 {
     bool is_good;
-    if ((sample->flags & LINK_BEGIN) != 0) {
+    if (begins(sample)) {
         is_begun = true;
+        is_known = true;
         is_sound = true;
         run = sample->run;
         newest = sample->sequence;
