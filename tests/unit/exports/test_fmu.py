@@ -2,6 +2,9 @@
 
 import importlib
 import importlib.util
+import math
+import shutil
+import struct
 import subprocess
 import sys
 import zipfile
@@ -136,6 +139,54 @@ def test_a_state_of_something_else_is_refused_and_changes_nothing(instance: Inst
     other.go_to(0.1)
     assert other.course(0.1, 0.2) == instance.course(0.1, 0.2)
     other.close()
+
+
+STEPS_DONE, STEPS_PER_SAMPLE, SAMPLE_COUNT, TAKEN, SHOWN = range(2, 7)
+"""Words of a state behind that with the bytes of its run; the one before it is the interval, steps are the next."""
+
+
+def changed(kept: bytes, word: int, value: bytes) -> bytes:
+    """A state with another value in a word of its run."""
+    size = kept[40:48]
+    at = kept.index(size, len(kept) - int.from_bytes(size, "little")) + 8 * word
+    return kept[:at] + value + kept[at + 8 :]
+
+
+def test_a_state_whose_counts_cannot_be_is_refused(instance: Instance, unit: str) -> None:
+    instance.go_to(0.1)
+    given = instance.kept()
+    assert int.from_bytes(changed(given, SHOWN, given[:8])[48:56], "little") == 2  # the phase: it runs
+    whole = {
+        STEPS_DONE: (-1,),
+        STEPS_PER_SAMPLE: (0, -1),
+        SAMPLE_COUNT: (0, 2**60),
+        TAKEN: (-1, 99, 2**60),
+        SHOWN: (-1, 2**60),
+        1: (-1, 2**60),
+    }
+    bad = [changed(given, word, struct.pack("<q", value)) for word, values in whole.items() for value in values]
+    bad += [changed(given, -1, struct.pack("<d", value)) for value in (0.0, -1.0, math.nan, math.inf)]
+    bad += [given[:48] + struct.pack("<q", phase) + given[56:] for phase in (-1, 4)]
+    begun = Instance(unit)
+    early = begun.slave
+    early.reset()
+    fresh = begun.kept()
+    bad.append(fresh[:56] + bytes(8) + fresh[64:])  # nothing is stale, and there is no run
+    for wrong in bad:
+        with pytest.raises(Exception, match=r"De[sS]erializeFMU[sS]tate"):
+            instance.restored(wrong)
+    instance.drop(instance.restored(given))
+    shutil.rmtree(begun.files)
+
+
+def test_a_tool_that_adds_up_its_time_has_the_sample_that_is_due(instance: Instance) -> None:
+    recording = simulate("torque-task-proportional", SHORT).recording
+    for sample in (100, 101, 150):
+        instance.go_to(sample * 1e-3 - 5e-7)
+        assert instance.get("torque") == recording["torque"][sample]
+    instance.go_to(0.15)
+    instance.go_to(0.15098)
+    assert instance.get("torque") == recording["torque"][150]
 
 
 def test_the_clock_of_fmi_3_ticks_when_the_controller_decides(tmp_path: Path) -> None:
