@@ -2,19 +2,23 @@
 
 import importlib
 import importlib.util
+import io
 import math
+import re
 import shutil
 import struct
 import subprocess
 import sys
 import zipfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from ppafo.errors import ScenarioError
+from ppafo.exports.c_library import c_library
 from ppafo.exports.fmu import closed_loop, functional_unit
 from ppafo.exports.fmu.binaries import host_platform
 from ppafo.exports.fmu.variables import FIXED_NAMES
@@ -285,3 +289,28 @@ def test_what_nobody_has_run_is_asked_for_by_name_and_marked() -> None:
         functional_unit(closed_loop(load_scenario("step-response")), 2, ["linux46"])
     with pytest.raises(ScenarioError, match="no name in FMI 2"):
         functional_unit(closed_loop(load_scenario("step-response")), 2, ["linux-aarch64"])
+
+
+def test_no_name_of_a_scenario_meets_another_name_of_its_unit(tmp_path: Path) -> None:
+    """A name is taken where one of its own, as ``NAME_run``, is something else in the C of a library or a unit."""
+    scenario = replace(load_scenario("step-response"), name="zzz")
+    loop = closed_loop(scenario)
+    ((_, content),) = functional_unit(loop, 3, ["linux64"]).items()
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        code = {
+            Path(name).name: archive.read(name).decode() for name in archive.namelist() if name.endswith((".c", ".h"))
+        }
+    code["main.c"] = c_library(scenario)["main.c"].decode()
+    found = set(re.findall(r"[A-Za-z]\w*", "\n".join(code.values())))
+    ends = {name[3:] for name in found if name.lower().startswith("zzz_")}
+    fronts = {name.removesuffix(end).lower() for name in found for end in ends if name.endswith(end)} - {"zzz"}
+    assert {"prepare", "prepared", "is"} <= fronts
+    for front in sorted(fronts):
+        name = replace(loop.library, title=front).name
+        for file, text in code.items():
+            renamed = text.replace("zzz", name).replace("ZZZ", name.upper())
+            (tmp_path / file.replace("zzz", name)).write_text(renamed, encoding="utf-8")
+        for file in (f"{name}.c", "main.c", "fmi3.c"):
+            words = ["gcc", "-std=c99", "-fsyntax-only", file]
+            done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+            assert done.returncode == 0, (front, done.stderr)
