@@ -133,12 +133,13 @@ def free_port() -> int:
 
 
 @contextmanager
-def sending_bench(port: int) -> Iterator[None]:
-    """A bench that sends five samples and says that it is over, again and again."""
+def sending_bench(port: int, after: float = 0.0) -> Iterator[None]:
+    """A bench that sends five samples and says that it is over, again and again, ``after`` some time [s]."""
     stop = threading.Event()
 
     def send() -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bench:
+            stop.wait(after)
             while not stop.wait(0.01):
                 for number in range(5):
                     sample = Sample(OVER * (number == 4), 1, number, 1000 * number, {"angle": number, "command": 5})

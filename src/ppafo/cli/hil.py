@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 EXIT_INTERRUPTED = 130
 _LONGEST_PATIENCE = 3600.0
 _DEFAULT_PATIENCE = 10.0
+_PER_THOUSAND = 1.0e3
+_SAME = 1.0e-9
 PORT_HELP = f"{FORMS} (extra 'hil')"
 
 
@@ -117,6 +119,8 @@ def _run(parsed: argparse.Namespace, scenario: "Scenario", is_stopped: Any) -> "
         if port.is_stream:
             check_baud(parsed.baud, parsed.rate)
         plant = plant_of(scenario, parsed.rate)
+        if plant.period > scenario.control.period * (1.0 + _SAME):
+            print(f"ppafo: {_slower(plant.period, scenario.control.period, parsed.rate)}", file=sys.stderr, flush=True)
         tell(f"calling the controller at {parsed.port}")
         return run_plant(
             plant,
@@ -127,6 +131,14 @@ def _run(parsed: argparse.Namespace, scenario: "Scenario", is_stopped: Any) -> "
         )
     finally:
         port.close()
+
+
+def _slower(apart: float, period: float, rate: int) -> str:
+    return (
+        f"--rate {rate}: a sample every {apart * _PER_THOUSAND:.4g} ms, for a controller of the scenario that decides "
+        f"every {period * _PER_THOUSAND:.4g} ms; it has the wrong gains unless it was exported for this rate: give "
+        f"--set controller.rate={rate}Hz here and to 'ppafo export controller'"
+    )
 
 
 def _save(found: "HardwareRun", folder: Path) -> None:

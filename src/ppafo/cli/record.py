@@ -7,7 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ppafo.cli.hil import EXIT_INTERRUPTED, PORT_HELP, add_baud_argument, check_patience
-from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, add_json_argument, check_new_file, print_result, tell
+from ppafo.cli.output import (
+    EXIT_CHECK_FAILED,
+    EXIT_GOOD,
+    add_json_argument,
+    blame_out_option,
+    check_new_file,
+    print_result,
+    tell,
+)
 from ppafo.errors import DataError, UnitError
 
 if TYPE_CHECKING:
@@ -41,6 +49,10 @@ def run(parsed: argparse.Namespace) -> int:
     check_new_file(parsed.out)
     if parsed.out.suffix != ".csv":
         raise DataError(f"--out {parsed.out}: must end in .csv")
+    from ppafo.storage.files import check_files_can_be_added
+
+    with blame_out_option():
+        check_files_can_be_added(parsed.out.parent, [parsed.out.name])
     from ppafo.exports.hil.pace import stop_by_interrupt
     from ppafo.exports.hil.ports import open_port
     from ppafo.exports.hil.recording import record

@@ -258,7 +258,7 @@ def test_the_reference_has_its_bits_at_samples_between_the_steps(tmp_path: Path)
     assert found == simulate("torque-task-proportional", overrides).recording["reference"].tolist()
 
 
-@pytest.mark.parametrize("taken", ["main", "unit", "fmi2", "check", "string"])
+@pytest.mark.parametrize("taken", ["main", "unit", "fmi2", "check", "string", "board", "install"])
 def test_a_scenario_with_the_name_of_another_file_or_target_is_called_otherwise(taken: str) -> None:
     contents = c_library(replace(load_scenario("step-response"), name=taken))
     assert {f"run_{taken}.c", f"run_{taken}.h", "main.c"} <= set(contents)

@@ -2,16 +2,23 @@
 
 import importlib
 import importlib.util
+import io
+import math
+import re
+import shutil
+import struct
 import subprocess
 import sys
 import zipfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from ppafo.errors import ScenarioError
+from ppafo.exports.c_library import c_library
 from ppafo.exports.fmu import closed_loop, functional_unit
 from ppafo.exports.fmu.binaries import host_platform
 from ppafo.exports.fmu.variables import FIXED_NAMES
@@ -138,6 +145,54 @@ def test_a_state_of_something_else_is_refused_and_changes_nothing(instance: Inst
     other.close()
 
 
+STEPS_DONE, STEPS_PER_SAMPLE, SAMPLE_COUNT, TAKEN, SHOWN = range(2, 7)
+"""Words of a state behind that with the bytes of its run; the one before it is the interval, steps are the next."""
+
+
+def changed(kept: bytes, word: int, value: bytes) -> bytes:
+    """A state with another value in a word of its run."""
+    size = kept[40:48]
+    at = kept.index(size, len(kept) - int.from_bytes(size, "little")) + 8 * word
+    return kept[:at] + value + kept[at + 8 :]
+
+
+def test_a_state_whose_counts_cannot_be_is_refused(instance: Instance, unit: str) -> None:
+    instance.go_to(0.1)
+    given = instance.kept()
+    assert int.from_bytes(changed(given, SHOWN, given[:8])[48:56], "little") == 2  # the phase: it runs
+    whole = {
+        STEPS_DONE: (-1,),
+        STEPS_PER_SAMPLE: (0, -1),
+        SAMPLE_COUNT: (0, 2**60),
+        TAKEN: (-1, 99, 2**60),
+        SHOWN: (-1, 2**60),
+        1: (-1, 2**60),
+    }
+    bad = [changed(given, word, struct.pack("<q", value)) for word, values in whole.items() for value in values]
+    bad += [changed(given, -1, struct.pack("<d", value)) for value in (0.0, -1.0, math.nan, math.inf)]
+    bad += [given[:48] + struct.pack("<q", phase) + given[56:] for phase in (-1, 4)]
+    begun = Instance(unit)
+    early = begun.slave
+    early.reset()
+    fresh = begun.kept()
+    bad.append(fresh[:56] + bytes(8) + fresh[64:])  # nothing is stale, and there is no run
+    for wrong in bad:
+        with pytest.raises(Exception, match=r"De[sS]erializeFMU[sS]tate"):
+            instance.restored(wrong)
+    instance.drop(instance.restored(given))
+    shutil.rmtree(begun.files)
+
+
+def test_a_tool_that_adds_up_its_time_has_the_sample_that_is_due(instance: Instance) -> None:
+    recording = simulate("torque-task-proportional", SHORT).recording
+    for sample in (100, 101, 150):
+        instance.go_to(sample * 1e-3 - 5e-7)
+        assert instance.get("torque") == recording["torque"][sample]
+    instance.go_to(0.15)
+    instance.go_to(0.15098)
+    assert instance.get("torque") == recording["torque"][150]
+
+
 def test_the_clock_of_fmi_3_ticks_when_the_controller_decides(tmp_path: Path) -> None:
     slow = (*SHORT, "controller.period=5 ms")
     unit = written(tmp_path, "torque-task-proportional", slow, fmi=3)
@@ -234,3 +289,28 @@ def test_what_nobody_has_run_is_asked_for_by_name_and_marked() -> None:
         functional_unit(closed_loop(load_scenario("step-response")), 2, ["linux46"])
     with pytest.raises(ScenarioError, match="no name in FMI 2"):
         functional_unit(closed_loop(load_scenario("step-response")), 2, ["linux-aarch64"])
+
+
+def test_no_name_of_a_scenario_meets_another_name_of_its_unit(tmp_path: Path) -> None:
+    """A name is taken where one of its own, as ``NAME_run``, is something else in the C of a library or a unit."""
+    scenario = replace(load_scenario("step-response"), name="zzz")
+    loop = closed_loop(scenario)
+    ((_, content),) = functional_unit(loop, 3, ["linux64"]).items()
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        code = {
+            Path(name).name: archive.read(name).decode() for name in archive.namelist() if name.endswith((".c", ".h"))
+        }
+    code["main.c"] = c_library(scenario)["main.c"].decode()
+    found = set(re.findall(r"[A-Za-z]\w*", "\n".join(code.values())))
+    ends = {name[3:] for name in found if name.lower().startswith("zzz_")}
+    fronts = {name.removesuffix(end).lower() for name in found for end in ends if name.endswith(end)} - {"zzz"}
+    assert {"prepare", "prepared", "is"} <= fronts
+    for front in sorted(fronts):
+        name = replace(loop.library, title=front).name
+        for file, text in code.items():
+            renamed = text.replace("zzz", name).replace("ZZZ", name.upper())
+            (tmp_path / file.replace("zzz", name)).write_text(renamed, encoding="utf-8")
+        for file in (f"{name}.c", "main.c", "fmi3.c"):
+            words = ["gcc", "-std=c99", "-fsyntax-only", file]
+            done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+            assert done.returncode == 0, (front, done.stderr)

@@ -2,6 +2,7 @@
 
 import ctypes
 import importlib
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -167,6 +168,17 @@ def test_an_angle_at_the_start_that_cannot_be_is_refused_as_an_input(
     with pytest.raises(Exception, match="ExitInitializationMode"):
         Instance(moved, {"angle": 50.0})
     assert "an input is out of range" in capfd.readouterr().out
+
+
+def test_a_parameter_changes_while_the_ankle_moves_fast(moved: str) -> None:
+    instance = Instance(moved, {"angle": 1.9, "angular_velocity": 5.0})
+    instance.go_to(0.001)
+    instance.set("supply.pressure", 500_000.0)
+    for name, value in (("angle", 1.905), ("angular_velocity", -60.0), ("command", 1.0)):
+        instance.set(name, value)
+    instance.go_to(0.002)
+    assert math.isfinite(instance.get("torque"))
+    instance.close()
 
 
 def test_a_tunable_parameter_is_taken_at_the_next_step(free: str) -> None:

@@ -278,6 +278,22 @@ def test_in_lock_step_an_answer_may_take_any_time_below_the_patience() -> None:
     assert "link.png" not in found.files()
 
 
+def test_in_lock_step_nobody_is_waited_for_once_the_plant_is_vented() -> None:
+    wire = VirtualWire(ProportionalPartner(silent_from=60).answers)
+    start = wire.time
+    found = run_plant(plant(), wire, lambda _: LockStep(clock=wire.clock), run=RUN)
+    assert found.exchange.vented == SILENT
+    assert len(rows_of(found)) == 200
+    assert wire.time - start == pytest.approx(20.0, abs=1.0)  # a second for each sample up to there
+
+
+def test_in_lock_step_a_vented_controller_that_answers_is_listened_to() -> None:
+    wire = VirtualWire(ProportionalPartner(unsound_from=40).answers)
+    found = run_plant(plant(), wire, lambda _: LockStep(clock=wire.clock), run=RUN)
+    assert found.exchange.vented == NOT_SOUND
+    assert rows_of(found)[40].answered_after is not None
+
+
 class BreakingWire(VirtualWire):
     """A wire that is pulled out after some samples."""
 

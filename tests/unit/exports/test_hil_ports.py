@@ -5,13 +5,11 @@ import ctypes
 import json
 import os
 import select
-import shutil
 import signal
 import socket
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -29,21 +27,13 @@ from ppafo.exports.hil.ports import open_port
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate
 from ppafo.storage import read_recording
+from tests.example_board import COMPILER, SENT, WHOLE, built, running
 from tests.virtual_wire import ProportionalPartner, free_port
 
-COMPILER = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
-WHOLE = ("controller.arithmetic=fixed", "sensors.pressure_resolution=1 Pa_d")
 TASK = "torque-task-proportional"
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no compiler of C is here")
 needs_terminals = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals here")
 SHORT = "run.duration=0.3 s"
-
-
-def built(folder: Path, name: str) -> Path:
-    for file, content in example_controller(load_scenario(name, WHOLE)).items():
-        (folder / file).write_bytes(content)
-    subprocess.run(["make", "-C", str(folder), f"CC={COMPILER}"], check=True, capture_output=True)
-    return folder / "controller"
 
 
 @pytest.fixture(scope="module")
@@ -51,18 +41,6 @@ def controllers(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Pat
     """The example controller of a scenario, built once."""
     made: dict[str, Path] = {}
     return lambda name: made.get(name) or made.setdefault(name, built(tmp_path_factory.mktemp(name), name))
-
-
-@contextlib.contextmanager
-def running(*words: str) -> Iterator["subprocess.Popen[str]"]:
-    """A controller process that has said that it is ready."""
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            assert process.stdout is not None
-            assert process.stdout.readline() == "ready\n"
-            yield process
-        finally:
-            process.kill()
 
 
 @contextlib.contextmanager
@@ -193,7 +171,6 @@ class CSample(ctypes.Structure):
     )
 
 
-SENT = ("reference", "angle", "pressure_1", "pressure_2", "torque")
 WORDS = st.integers(0, 2**32 - 1)
 COUNTS = st.tuples(*[st.integers(-(2**31), 2**31 - 1)] * 5)
 SAMPLES = st.builds(
@@ -268,69 +245,6 @@ def test_where_nobody_answers_nothing_is_written(tmp_path: Path, capsys: pytest.
     last = capsys.readouterr().err.splitlines()[-1]
     assert last == "ppafo: no controller answers within 0.05 s; came in: nothing"
     assert not list(tmp_path.iterdir())
-
-
-class Plug:
-    """A plant's end of a wire to the example in C: a sample goes out, its answer comes back."""
-
-    def __init__(self, own: socket.socket, port: int) -> None:
-        self.own, self.port = own, port
-
-    def ask(self, sequence: int, flags: int = 0, run: int = 7, pressure: int | None = None) -> Answer:
-        shown = 150_000 + 700 * sequence * sequence if pressure is None else pressure
-        counts = dict(zip(SENT, (1_000_000, 0, shown, 150_000, 0), strict=True))
-        sample = Sample(flags, run, sequence, 1000 * sequence, counts)
-        self.own.sendto(sample_bytes(sample), ("127.0.0.1", self.port))
-        (answer,) = Reader(is_stream=False).take(self.own.recv(256))
-        assert isinstance(answer, Answer)
-        assert (answer.run, answer.sequence) == (run, sequence)
-        return answer
-
-
-@contextlib.contextmanager
-def plug(controller: Path, silence: str) -> Iterator[Plug]:
-    port = free_port()
-    with running(str(controller), "udp", str(port), silence), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as own:
-        own.settimeout(30.0)
-        yield Plug(own, port)
-
-
-@needs_compiler
-def test_the_example_takes_one_step_for_a_sample_however_it_comes(controllers: Callable[[str], Path]) -> None:
-    with plug(controllers(TASK), "0") as wire:
-        calm = [wire.ask(0, flags=1), *map(wire.ask, range(1, 6))]
-        again = [wire.ask(0, flags=1), *map(wire.ask, (1, 2, 2, 3, 1, 4, 5))]
-    commands = [answer.command for answer in calm]
-    # The error changes from sample to sample, so that a step too many would show in its slope.
-    assert len(set(commands)) == len(commands)
-    seen = [answer.command for answer in again]
-    assert seen == [*commands[:3], commands[2], commands[3], commands[3], *commands[4:]]
-    assert not any(answer.flags for answer in (*calm, *again))
-
-
-@needs_compiler
-@pytest.mark.parametrize("flags", [2, 4])
-def test_the_example_vents_once_the_plant_is_vented_or_over_until_it_begins_anew(
-    flags: int, controllers: Callable[[str], Path]
-) -> None:
-    with plug(controllers(TASK), "0") as wire:
-        assert wire.ask(3).flags == 1  # before any beginning
-        assert wire.ask(0, flags=1).flags == 0
-        assert wire.ask(1, run=8).flags == 1
-        wire.ask(2, flags=flags)
-        assert wire.ask(3).flags == 1
-        assert wire.ask(0, flags=1).flags == 0
-        bad = wire.ask(1, pressure=0)  # a broken wire of a sensor
-        assert (bad.flags, bad.command) == (1, 0)
-        assert wire.ask(2).flags == 1
-
-
-@needs_compiler
-def test_the_example_vents_when_the_samples_stop(controllers: Callable[[str], Path]) -> None:
-    with plug(controllers(TASK), "20") as wire:
-        wire.ask(0, flags=1)
-        time.sleep(0.3)
-        assert wire.ask(1).flags == 1
 
 
 def test_packets_of_somebody_else_are_counted_and_do_nothing() -> None:

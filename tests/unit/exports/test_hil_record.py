@@ -17,7 +17,7 @@ from ppafo.exports.hil.packets import COMPUTED, OVER, WRAP, Answer, Sample, answ
 from ppafo.exports.hil.recording import Recorded, record
 from ppafo.storage import read_recording
 from ppafo.storage.comma_separated import write_csv
-from tests.virtual_wire import free_port
+from tests.virtual_wire import free_port, sending_bench
 
 START = WRAP - 50_000
 """A time stamp [us] that goes on from 0 soon."""
@@ -97,6 +97,14 @@ def test_what_a_wire_does_is_mended_or_counted(draw: random.Random, is_stream: b
 def test_a_duration_is_that_of_the_bench() -> None:
     found = played([packet(number) for number in range(100)], duration=0.025)
     assert len(found.recording) == 26
+    assert found.ended == "its duration"
+
+
+def test_a_duration_is_counted_past_half_of_what_a_time_stamp_holds() -> None:
+    # Ten minutes from sample to sample; a time stamp goes back to 0 after 71.
+    packets = [packet(number, time=600_000_000 * number % WRAP) for number in range(20)]
+    found = played(packets, duration=9000.0)
+    assert found.recording.duration == pytest.approx(9000.0)
     assert found.ended == "its duration"
 
 
@@ -195,6 +203,48 @@ def test_a_recording_goes_straight_into_identify(
     text = (tmp_path / "identified" / "identify.txt").read_text(encoding="utf-8")
     found = float(next(line.split()[1] for line in text.splitlines() if line.startswith("actuator.torque_constant")))
     assert found == pytest.approx(1.45e-5, rel=0.02)
+
+
+def test_whoever_sends_first_is_not_the_bench_unless_it_sends_a_packet(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    port, stop = free_port(), threading.Event()
+
+    def send_garbage() -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            while not stop.wait(0.002):
+                stranger.sendto(b"hello", ("127.0.0.1", port))
+
+    stranger = threading.Thread(target=send_garbage)
+    stranger.start()
+    time.sleep(0.05)
+    words = ["record", "--port", f"udp:127.0.0.1:{port}", "--patience", "20", "--out", str(tmp_path / "bench.csv")]
+    try:
+        with sending_bench(port, 0.5):
+            assert main(words) == 0
+    finally:
+        stop.set()
+        stranger.join()
+    assert "stray bytes" in capsys.readouterr().out
+    assert read_recording(tmp_path / "bench.csv").names == ("angle", "command")
+
+
+def test_where_the_bench_fell_silent_before_its_first_sample_strangers_are_named() -> None:
+    tape = Tape([answer_bytes(Answer(0, 7, 5, 5, 5))])
+    tape.strangers = 3
+    with pytest.raises(DataError, match=r"1 no sample, 3 of somebody else$"):
+        record(tape, "bench", None, 1.0, clock=tape.clock)
+
+
+def test_a_place_that_cannot_be_written_is_refused_before_anything_is_recorded(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    port = free_port()
+    with sending_bench(port):
+        assert main(["record", "--port", f"udp:127.0.0.1:{port}", "--out", "/dev/null/x.csv"]) == 2
+    said = capsys.readouterr().err
+    assert "/dev/null" in said
+    assert len(said.splitlines()) == 1  # it has not even listened
 
 
 def test_a_file_that_is_there_is_not_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -65,12 +65,17 @@ _FILES = {
 }
 
 
-_OWN_FILES = {"main", "unit", "fmi2", "fmi3", "makefile", "readme", "license"}
-_OWN_TARGETS = {"all", "check", "clean", "test", "prepared"}
+_OWN_FILES = {"main", "unit", "plugin", "fmi2", "fmi3", "makefile", "readme", "license"}
+_OWN_TARGETS = {"all", "check", "clean", "test"}
+_OF_BOARDS = {"board", "board_simulated", "start_cortex"}
+_OF_CMAKE = {"help", "install", "package", "m"}
+_WITH_ANOTHER_END = {"prepare", "prepared", "is", "ppafo_whole", "at_result", "at_step_aside_result"}
+"""Names that become another function or type with ``_run``, ``_size`` or ``_TOO_MANY_PARTS`` behind them."""
 _OF_WINDOWS = {"con", "aux", "nul", "prn"}
 _HEADERS_1 = {"assert", "complex", "ctype", "errno", "fenv", "float", "inttypes", "iso646", "limits", "locale", "math"}
 _HEADERS_2 = {"setjmp", "signal", "stdarg", "stdbool", "stddef", "stdint", "stdio", "stdlib", "string", "tgmath"}
-_TAKEN = _OWN_FILES | _OWN_TARGETS | _OF_WINDOWS | _HEADERS_1 | _HEADERS_2 | {"time", "wchar", "wctype"}
+_OF_C = _HEADERS_1 | _HEADERS_2 | {"time", "wchar", "wctype"}
+_TAKEN = _OWN_FILES | _OWN_TARGETS | _OF_BOARDS | _OF_CMAKE | _OF_WINDOWS | _OF_C | _WITH_ANOTHER_END
 """Names that a library cannot have: of its other files and types, of targets in make files, of headers of C."""
 
 

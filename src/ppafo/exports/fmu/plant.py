@@ -32,9 +32,9 @@ TUNING = "They are taken at the next communication step."
 
 _FOLLOW_ANGLE = """\
     settings->motion_profile_start_level = inputs[1];
-    settings->motion_profile_level = inputs[1] + 2.0 * inputs[2];
+    settings->motion_profile_level = inputs[1] + inputs[2] * 0.0078125;
     settings->motion_profile_ramp_start = 0.0;
-    settings->motion_profile_ramp_time = 2.0;"""
+    settings->motion_profile_ramp_time = 0.0078125; /* short: a fast ankle stays in the range of a level */"""
 _LEAD_ANGLE = """\
     rows[PARAMETER_PATH_START_LEVEL] = inputs[1];
     rows[PARAMETER_PATH_LEVEL] = inputs[1] + inputs[2] * (2.0 * length);

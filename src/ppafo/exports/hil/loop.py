@@ -211,7 +211,7 @@ class Bench:
         """Wait for the answer to the sample that was sent [s], go on under it, and wait until the next one is due."""
         sequence = self.plant.taken
         next_due = (sequence + 1) * self.period
-        if not self.judge.is_answered:
+        if not self.judge.is_answered and (self.pace.is_real or not self._is_given_up):
             self.pace.listen(next_due, self.port, self._take)
         answered = self._answered_at - sent if self.judge.is_answered else None
         if self.port.failure:
@@ -242,6 +242,11 @@ class Bench:
                 self.taken += 1
                 self._answered_at = self.pace.now()
         return self.judge.is_answered
+
+    @property
+    def _is_given_up(self) -> bool:
+        """True where nothing is to come: the port broke, or the plant is vented and the last sample had no answer."""
+        return bool(self.port.failure) or (bool(self.judge.vented) and self.judge.sent - self.judge.answered > 1)
 
     @property
     def _is_going_on(self) -> bool:

@@ -7,6 +7,7 @@ import time
 from typing import Any, Protocol, final
 
 from ppafo.errors import ScenarioError, one_line, reason
+from ppafo.exports.hil.packets import Reader
 
 FORMS = "udp:HOST:PORT or serial:DEVICE"
 DEFAULT_BAUD = 921_600
@@ -47,7 +48,7 @@ class Port(Protocol):
 
 @final
 class UdpPort:
-    """A UDP socket that talks to one other: the one that it was given, or the first that it hears."""
+    """A UDP socket that talks to one other: the one that it was given, or the first that sends it a good packet."""
 
     is_stream = False
 
@@ -78,6 +79,8 @@ class UdpPort:
             except OSError:
                 continue
             if self._other is None:
+                if not Reader(is_stream=False).take(data):
+                    return data  # it is counted, and tells nothing of who the other side is
                 self._other = sender
             if sender[:2] == self._other[:2]:
                 return data
@@ -136,7 +139,7 @@ class SerialPort:
 
 
 def open_port(text: str, baud: int = DEFAULT_BAUD, listens: bool = False) -> Port:
-    """Open a port of a text; one that ``listens`` waits at a UDP address for whoever sends there first.
+    """Open a port of a text; one that ``listens`` waits at a UDP address for whoever first sends a good packet there.
 
     ScenarioError, in one line, for a text that is none, and for a port that is not there.
     """

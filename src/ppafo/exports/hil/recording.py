@@ -55,6 +55,7 @@ class Collector:
         self.is_over = False
         self._first: Sample | None = None
         self._newest = 0
+        self._elapsed = 0
 
     def take(self, packet: Packet) -> bool:
         """Look at a good packet; true where it is a new sample."""
@@ -79,16 +80,17 @@ class Collector:
         if number in self.samples:
             self.ignored["doubled"] += 1
             return False
-        self._newest = max(self._newest, number)
+        if number > self._newest:
+            # From sample to sample: half of what a time stamp holds is 36 minutes, and a recording may be longer.
+            self._elapsed += _difference(packet.time, self.samples[self._newest].time)
+            self._newest = number
         self.samples[number] = packet
         return True
 
     @property
     def duration(self) -> float:
         """Time of the bench from its first sample to the newest [s]."""
-        if not self.samples or self._first is None:
-            return 0.0
-        return max(0, _difference(self.samples[self._newest].time, self._first.time)) / MICROSECONDS
+        return max(0, self._elapsed) / MICROSECONDS
 
     def recording(self, label: str) -> tuple[Recording, int]:
         """The samples in order as a recording, and how many between the first and the last never came.
@@ -144,7 +146,7 @@ def record(
             raise KeyboardInterrupt("interrupted before a sample came; nothing is written")
         raise DataError(
             f"no sample came within {patience:g} s; what came in: "
-            f"{described_refusals(reader.refused, collector.ignored.items())}"
+            f"{described_refusals(reader.refused, [*collector.ignored.items(), ('of somebody else', port.strangers)])}"
         )
     recording, lost = collector.recording(label)
     return Recorded(recording, lost, reader.refused, collector.ignored, port.strangers, ended, is_stopped())

@@ -26,20 +26,21 @@ static bool take_first_sample(unit *item)
     return go_to_sample(item, 0);
 }
 
-/* Go on to a time since the start; every sample that is due by then, to a millionth of their interval, is taken. */
+/* Go on to a time since the start; every sample that is due by then, to a thousandth of their interval, is taken: a tool
+ * that adds up its steps comes a little early. */
 static bool go_to(unit *item, double time)
 {
     const double period = item->run->parameters[PARAMETER_TIMING_PERIOD];
-    if (!(time >= item->now.time - 1.0e-6 * time_of(item->run, 1) && time < 1.0e15 * time_of(item->run, 1))) {
+    if (!(time >= item->now.time - 1.0e-3 * time_of(item->run, 1) && time < 1.0e15 * time_of(item->run, 1))) {
         return refuse(item, "time %g s cannot be reached from %g s", time, item->now.time);
     }
     if (item->now.is_stale && !renew(item)) {
         return false;
     }
-    if (!go_to_sample(item, (int64_t)(time / time_of(item->run, 1) + 1.0e-6))) {
+    if (!go_to_sample(item, (int64_t)(time / time_of(item->run, 1) + 1.0e-3))) {
         return false;
     }
     item->now.time = time;
-    item->now.ticks = (int64_t)(time / period + 1.0e-6);
+    item->now.ticks = (int64_t)(time / period + 1.0e-3);
     return true;
 }

@@ -246,7 +246,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     }
     if (@has_clock@ && given->uses_events && given->may_return_early) {
         const double tick = time_of_tick(item, ticks + 1);
-        *earlyReturn = tick < time - 1.0e-6 * time_of_tick(item, 1);
+        *earlyReturn = tick < time - 1.0e-3 * time_of_tick(item, 1);
         time = *earlyReturn ? tick : time;
     }
     if (!go_to(item, time)) {

@@ -236,6 +236,16 @@ static void write_state(const unit *item, void *to)
     }
 }
 
+/* True where the counts of a run fit each other: they divide, and say where is written and how far is gone. */
+static bool are_counts(const @name@_run *run)
+{
+    const int64_t most = run->sample_count > 2 ? run->sample_count : 2; /* the plant alone has the last two */
+    return run->interval >= 1.0 && run->interval <= 1.0e15 && run->steps >= 0 && run->steps <= 1000000000
+        && run->sample_count == (int64_t)(((double)run->steps + SAME_MOMENT) / run->interval) + 1
+        && run->steps_per_sample > 0 && run->steps_per_sample <= 1000000000 && run->steps_done >= 0
+        && run->samples_shown >= 0 && run->samples_shown <= run->samples_taken && run->samples_taken <= most;
+}
+
 /* True where the bytes behind a state are a run that this unit could have written. */
 static bool is_run(const void *bytes, size_t size)
 {
@@ -244,9 +254,16 @@ static bool is_run(const void *bytes, size_t size)
         return false;
     }
     memcpy(&run, bytes, sizeof(run));
-    return run.bytes == (int64_t)size && run.signal_delay >= 0 && run.command_delay >= 0
+    return are_counts(&run) && run.bytes == (int64_t)size && run.signal_delay >= 0 && run.command_delay >= 0
         && run.signal_delay < run.bytes && run.command_delay < run.bytes
         && size == sizeof(run) + sizeof(double) * (size_t)values_of_history(run.signal_delay, run.command_delay);
+}
+
+/* True where a state can be without a run, or with one. */
+static bool is_phase(const unit_state *state, bool has_run)
+{
+    return state->phase >= UNIT_NEW && state->phase <= UNIT_ENDED
+        && (has_run || (state->phase < UNIT_RUNNING && state->is_stale != 0));
 }
 
 /* Become what was written; bytes that are none of this unit's leave it as it was. */
@@ -260,7 +277,7 @@ static bool read_state(unit *item, const void *from, size_t size)
     memcpy(&state, from, sizeof(state));
     size -= sizeof(state);
     if (memcmp(state.token, "@token@", sizeof("@token@")) != 0 || state.run_bytes != (int64_t)size
-        || (size > 0 && !is_run((const char *)from + sizeof(state), size)) || (size == 0 && state.phase >= UNIT_RUNNING)) {
+        || (size > 0 && !is_run((const char *)from + sizeof(state), size)) || !is_phase(&state, size > 0)) {
         return refuse(item, "this is no state of this unit");
     }
     if (size > 0) {

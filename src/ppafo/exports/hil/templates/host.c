@@ -21,11 +21,15 @@
 #include "link.h"
 #include "plant.h"
 
+enum { LONGEST_SILENCE = 3600000 }; /* ms */
+
 static bool is_begun; /* a sample with LINK_BEGIN came, and nothing has ended the run since */
+static bool is_known; /* the number of a run is known: that of the last one that began */
 static bool is_sound;
 static uint16_t run;
 static uint32_t newest;
-static uint32_t decided; /* number of the controller's last sample period */
+static uint32_t heard;   /* when the newest sample of the run came, us of this computer */
+static uint32_t decided; /* when the controller's last sample period began, us of the plant */
 static int32_t command;  /* in millionths */
 
 /* What a converter would show of a value. */
@@ -42,28 +46,47 @@ static void decide(const link_sample *sample)
     const int16_t steps = controller_sample(shown(reference, PLANT_TORQUE_STEP),
         shown(sample->pressure_1, PLANT_PRESSURE_STEP), shown(sample->pressure_2, PLANT_PRESSURE_STEP));
     is_sound = is_sound && controller_is_sound();
-    command = is_sound ? steps * 1000 : 0;
+    command = is_sound ? (int32_t)steps * 1000 : 0;
+}
+
+/* Decide once for each sample period that has begun. Lost samples leave a gap in the numbers; where more periods went by
+ * than samples were sent, the plant is slower than the controller, which would act with the gains of another rate. */
+static void go_on(const link_sample *sample, uint32_t now)
+{
+    const uint32_t periods = (sample->time - decided) / PLANT_PERIOD_US;
+    heard = now;
+    is_sound = is_sound && periods <= sample->sequence - newest;
+    newest = sample->sequence;
+    if (periods > 0) {
+        decided += periods * PLANT_PERIOD_US;
+        decide(sample);
+    }
+}
+
+/* True where a run begins. What calls once more is heard before anything else came of its run; later it is an old sample,
+ * which neither sets back a controller that has gone on nor brings back a run that has ended. */
+static bool begins(const link_sample *sample)
+{
+    const bool is_new = !is_known || sample->run != run;
+    return (sample->flags & LINK_BEGIN) != 0 && (is_new || (is_begun && is_sound && sample->sequence == newest));
 }
 
 /* Answer a sample. One that comes twice or late is answered with the command that stands, one of another run with none. */
 static void answer(const link_sample *sample, uint32_t now, uint8_t bytes[LINK_ANSWER_BYTES])
 {
-    const uint32_t period = sample->time / PLANT_PERIOD_US;
     bool is_good;
-    if ((sample->flags & LINK_BEGIN) != 0) {
+    if (begins(sample)) {
         is_begun = true;
+        is_known = true;
         is_sound = true;
         run = sample->run;
         newest = sample->sequence;
-        decided = period;
+        heard = now;
+        decided = sample->time;
         controller_begin();
         decide(sample);
     } else if (is_begun && sample->run == run && sample->sequence > newest) {
-        newest = sample->sequence;
-        if (period != decided) {
-            decided = period;
-            decide(sample);
-        }
+        go_on(sample, now);
     }
     if ((sample->flags & (LINK_VENTED | LINK_OVER)) != 0) {
         is_begun = false;
@@ -77,6 +100,17 @@ static uint32_t microseconds(void)
     struct timespec now;
     (void)clock_gettime(CLOCK_MONOTONIC, &now);
     return (uint32_t)((uint64_t)now.tv_sec * 1000000u + (uint64_t)now.tv_nsec / 1000u);
+}
+
+/* How long the plant may still be silent, in ms; 0 where it is gone, -1 where nothing is waited for. Only new samples of
+ * the run show that it is there: a line that carries garbage, or one sample again and again, is silent. */
+static int left(uint32_t silence)
+{
+    const uint32_t gone = microseconds() - heard;
+    if (silence == 0 || !is_begun) {
+        return -1;
+    }
+    return gone < silence ? (int)((silence - gone + 999u) / 1000u) : 0;
 }
 
 static int opened(const char *kind, const char *place)
@@ -102,7 +136,8 @@ int main(int count, char **words)
 {
     link_reader reader = {{0}, 0};
     const bool is_udp = count > 1 && strcmp(words[1], "udp") == 0;
-    const int silence = count > 3 ? (int)strtol(words[3], NULL, 10) : 20;
+    const long given = count > 3 ? strtol(words[3], NULL, 10) : 20;
+    const uint32_t silence = given <= 0 ? 0 : (uint32_t)(given < LONGEST_SILENCE ? given : LONGEST_SILENCE) * 1000u;
     int port;
     if (count < 3 || (!is_udp && strcmp(words[1], "serial") != 0)) {
         fprintf(stderr, "controller udp PORT [SILENCE], or controller serial DEVICE [SILENCE]\n");
@@ -124,8 +159,11 @@ int main(int count, char **words)
         link_sample sample;
         ssize_t found;
         ssize_t at;
-        if (poll(&waiting, 1, silence > 0 && is_begun ? silence : -1) == 0) {
-            is_begun = false; /* the plant is gone: a board vents here */
+        const int came = poll(&waiting, 1, left(silence));
+        if (left(silence) == 0) {
+            is_begun = false; /* the plant is gone: a board vents here, and what comes too late changes nothing */
+        }
+        if (came == 0) {
             continue;
         }
         found = is_udp ? recvfrom(port, bytes, sizeof bytes, 0, (struct sockaddr *)&plant, &size)

@@ -7,7 +7,7 @@
 #include <stdint.h>
 
 enum {
-    LINK_BEGIN = 1,  /* of a sample: forget everything, then answer */
+    LINK_BEGIN = 1,  /* of a sample: its run begins, where it has not yet */
     LINK_VENTED = 2, /* of a sample: the plant is vented, for good */
     LINK_OVER = 4,   /* of a sample: the run is over */
     LINK_UNSOUND = 1 /* of an answer: vent both chambers, for good */
