@@ -205,6 +205,19 @@ def test_gauge_pressure_of_a_bench_and_of_a_walk_counts_from_the_atmosphere_of_t
     assert main(["plot", str(tmp_path / "walk")]) == 2
 
 
+def test_a_pressure_is_shown_above_the_atmosphere_of_the_device(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["supply.atmospheric_pressure=83 kPa_a", "supply.pressure=55 psi_g", "run.duration=0.2 s"]
+    sets = [part for word in words for part in ("--set", word)]
+    assert main(["simulate", "step-response", *sets, "--check", "--out", str(tmp_path / "high")]) == 0
+    shown = [line.split()[:3] for line in capsys.readouterr().out.splitlines() if "largest_pressure" in line]
+    assert [row[0] for row in shown[:2]] == ["largest_pressure", "largest_pressure"]
+    assert {tuple(row[1:]) for row in shown[:2]} == {("55", "psi_g")}
+    page = (tmp_path / "high" / "report.html").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
+    assert "55 psi_g" in page
+
+
 def test_a_folder_that_has_its_figures_or_none_says_so_and_what_to_open(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
