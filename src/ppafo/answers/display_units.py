@@ -6,6 +6,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.units import from_si
 
 Floats = NDArray[np.float64]
@@ -69,10 +70,10 @@ def axis_unit(quantity: str) -> str:
     return words.get(unit, unit.replace("m^2", "m$^2$").replace("m^3", "m$^3$").replace("s^2", "s$^2$"))
 
 
-def display_value(value: float, quantity: str) -> float:
-    """Return a value in SI in the unit in which it is shown."""
+def display_value(value: float, quantity: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
+    """Return a value in SI in the unit in which it is shown; gauge counts from ``atmosphere`` [Pa absolute]."""
     si, unit = QUANTITIES.get(quantity, ("", ""))
-    return float(value) if si == unit or not math.isfinite(value) else from_si(float(value), unit, si)
+    return float(value) if si == unit or not math.isfinite(value) else from_si(float(value), unit, si, atmosphere)
 
 
 def display_difference(value: float, quantity: str) -> float:

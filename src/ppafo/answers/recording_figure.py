@@ -3,6 +3,7 @@
 import textwrap
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -146,35 +147,39 @@ def draw_stored_result(stored: StoredResult) -> "Figure":
 
     DataError names the key of ``run.json`` that is of another form.
     """
-    status, name = _under(stored, "status"), _under(stored, "scenario").get("name", "")
+    file, document = stored.folder / RUN_FILE, stored.document
+    status, name = _under(file, document, "status"), _under(file, document, "scenario").get("name", "")
     remark = "" if status.get("kind") == "completed" else one_line(status.get("message", ""))
     if not isinstance(name, str):
-        raise _other_form(stored, "scenario.name", name, "a text")
-    return recording_figure(stored.recording, one_line(name), remark, _atmosphere_of(stored))
+        raise _other_form(file, "scenario.name", name, "a text")
+    atmosphere = stated_atmosphere(file, document, "scenario", "device")
+    return recording_figure(stored.recording, one_line(name), remark, atmosphere)
 
 
-def _atmosphere_of(stored: StoredResult) -> float:
-    """Return the pressure [Pa absolute] from which a result counts gauge; that of standard where it does not say."""
-    given = _under(stored, "scenario", "device", "supply").get("atmospheric_pressure", STANDARD_ATMOSPHERE)
+def stated_atmosphere(file: Path, document: Mapping[str, Any], *device: str) -> float:
+    """Return the atmosphere [Pa absolute] of the device at some keys of a file's document, else the standard one.
+
+    DataError names the key that is of another form.
+    """
+    keys = (*device, "supply")
+    given = _under(file, document, *keys).get("atmospheric_pressure", STANDARD_ATMOSPHERE)
     if isinstance(given, bool) or not isinstance(given, int | float) or not 0.0 < given < _NO_ATMOSPHERE:
-        raise _other_form(stored, "scenario.device.supply.atmospheric_pressure", given, "a pressure in Pa")
+        raise _other_form(file, ".".join((*keys, "atmospheric_pressure")), given, "a pressure in Pa")
     return float(given)
 
 
-def _under(stored: StoredResult, *keys: str) -> Mapping[str, Any]:
-    """Return a table of ``run.json``, an empty one where there is none."""
-    table: Mapping[str, Any] = stored.document
+def _under(file: Path, document: Mapping[str, Any], *keys: str) -> Mapping[str, Any]:
+    """Return a table of a document, an empty one where there is none."""
     for depth, key in enumerate(keys, start=1):
-        below = table.get(key, {})
+        below = document.get(key, {})
         if not isinstance(below, Mapping):
-            raise _other_form(stored, ".".join(keys[:depth]), below, "a table")
-        table = below
-    return table
+            raise _other_form(file, ".".join(keys[:depth]), below, "a table")
+        document = below
+    return document
 
 
-def _other_form(stored: StoredResult, path: str, given: object, wanted: str) -> DataError:
-    shown = one_line(repr(given))[:_LONGEST_SHOWN]
-    return DataError(f"{stored.folder / RUN_FILE}: {path} = {shown} must be {wanted}")
+def _other_form(file: Path, path: str, given: object, wanted: str) -> DataError:
+    return DataError(f"{file}: {path} = {one_line(repr(given))[:_LONGEST_SHOWN]} must be {wanted}")
 
 
 def figure_files(figure: "Figure") -> dict[str, bytes]:

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from ppafo.answers.answer import Column
 from ppafo.answers.display_units import display_difference, display_unit, display_value, quantity_of_unit
+from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.metrics import METRICS, Metric
 
 _OF_GAS = {"kg": "gas mass", "kg/J": "gas mass per energy"}
@@ -38,20 +39,26 @@ def metric_column(name: str, form: str = ".4g") -> Column:
     return Column(metric_words(name), metric_quantity(name), form)
 
 
-def metrics_lines(metrics: Mapping[str, Metric]) -> list[str]:
-    """Return a line of text for each metric: name, value and unit as people are shown it, meaning."""
+def metrics_lines(metrics: Mapping[str, Metric], atmosphere: float = STANDARD_ATMOSPHERE) -> list[str]:
+    """Return a line of text for each metric: name, value and unit as people are shown it, meaning.
+
+    Pressures count from ``atmosphere`` [Pa absolute].
+    """
     rows = []
     for name, metric in metrics.items():
-        value, unit = metric_level(metric.value, metric.unit)
+        value, unit = metric_level(metric.value, metric.unit, atmosphere)
         rows.append((name, f"{value:.4g}", unit, metric.summary))
     widths = [max((len(row[column]) for row in rows), default=0) for column in range(3)]
     return [f"{row[0]:<{widths[0]}}  {row[1]:>{widths[1]}} {row[2]:<{widths[2]}}  {row[3]}" for row in rows]
 
 
-def metric_level(value: float, si_unit: str) -> tuple[float, str]:
-    """Return a value of a metric or channel, and its unit, as people are shown them; pressures are gauge ones."""
+def metric_level(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> tuple[float, str]:
+    """Return a value of a metric or channel, and its unit, as people are shown them.
+
+    Pressures are gauge ones and count from ``atmosphere`` [Pa absolute].
+    """
     quantity = _quantity(si_unit)
-    return display_value(value, quantity), display_unit(quantity) or si_unit.removeprefix("-")
+    return display_value(value, quantity, atmosphere), display_unit(quantity) or si_unit.removeprefix("-")
 
 
 def metric_change(value: float, si_unit: str) -> tuple[float, str]:

@@ -152,6 +152,7 @@ def _text(found: "HardwareRun", port: str, folder: Path) -> str:
     from ppafo.answers.shown_metrics import metrics_lines
 
     result = found.result
+    lines = metrics_lines(result.metrics, result.scenario.device.supply.atmospheric_pressure)
     ended = "stopped" if found.exchange.is_stopped else "vented" if found.exchange.vented else result.status.kind
     return "\n".join(
         [
@@ -159,7 +160,7 @@ def _text(found: "HardwareRun", port: str, folder: Path) -> str:
             "",
             found.text(),
             "",
-            *metrics_lines(result.metrics),
+            *lines,
             "",
             f"written: {folder} (recording.nc, recording.csv, log.csv, link.json, run.json, figures)",
         ]

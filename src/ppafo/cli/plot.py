@@ -77,11 +77,11 @@ def _names(folder: Path) -> list[str]:
 
 def _draw_folder(folder: Path, names: list[str]) -> "dict[str, Figure]":
     """Return figures by the stem of their files: of a run, a walk, a study or recordings of the rig; none of others."""
-    from ppafo.answers.recording_figure import draw_stored_result, recording_figure
+    from ppafo.answers.recording_figure import draw_stored_result
     from ppafo.questions.sweep.manifest import MANIFEST
     from ppafo.questions.sweep.results import load_study_results
     from ppafo.rig.folder import RIG_FILE
-    from ppafo.storage import read_recording, read_result
+    from ppafo.storage import read_result
     from ppafo.storage.owned_folder import MARK
     from ppafo.storage.result_folder import NETCDF_FILE, RUN_FILE
 
@@ -90,14 +90,52 @@ def _draw_folder(folder: Path, names: list[str]) -> "dict[str, Figure]":
     if MANIFEST in names:
         return {_FIGURE: load_study_results(folder).plot()}
     if RIG_FILE in names:
-        tables = [name for name in names if name.endswith(".csv")]
-        return {name.removesuffix(".csv"): recording_figure(read_recording(folder / name)) for name in tables}
+        return _draw_rig(folder, names)
     if NETCDF_FILE in names and MARK in names:
-        recording = read_recording(folder / NETCDF_FILE)
-        end = float(recording.time[-1])
-        remark = f"the last {_END:g} s of {end:.4g} s" if recording.duration > _END else ""
-        return {_FIGURE: recording_figure(recording.between(end - _END, end), recording.label, remark)}
+        return {_FIGURE: _draw_end(folder, names)}
     return {}
+
+
+def _draw_rig(folder: Path, names: list[str]) -> "dict[str, Figure]":
+    """Return a figure of each recording of the rig; gauge pressure counts from the atmosphere of its device."""
+    from ppafo.answers.recording_figure import recording_figure
+    from ppafo.rig.folder import RIG_FILE
+    from ppafo.storage import read_recording
+
+    tables = [name for name in names if name.endswith(".csv")]
+    zeros = {name: _atmosphere(folder / RIG_FILE, "recordings", name, "device") for name in tables}
+    recordings = {name: read_recording(folder / name) for name in tables}
+    return {
+        name.removesuffix(".csv"): recording_figure(recording, atmosphere=zeros[name])
+        for name, recording in recordings.items()
+    }
+
+
+def _draw_end(folder: Path, names: list[str]) -> "Figure":
+    """Return the figure of the end of a walk."""
+    from ppafo.answers.recording_figure import recording_figure
+    from ppafo.constants import STANDARD_ATMOSPHERE
+    from ppafo.questions.endurance.draw import WALK_FILE
+    from ppafo.storage import read_recording
+    from ppafo.storage.result_folder import NETCDF_FILE
+
+    recording = read_recording(folder / NETCDF_FILE)
+    end = float(recording.time[-1])
+    remark = f"the last {_END:g} s of {end:.4g} s" if recording.duration > _END else ""
+    is_walk = WALK_FILE in names
+    zero = _atmosphere(folder / WALK_FILE, "configuration", "device") if is_walk else STANDARD_ATMOSPHERE
+    return recording_figure(recording.between(end - _END, end), recording.label, remark, zero)
+
+
+def _atmosphere(file: Path, *device: str) -> float:
+    """Return the atmosphere [Pa absolute] of the device that a JSON file has at some keys."""
+    from ppafo.answers.recording_figure import stated_atmosphere
+    from ppafo.storage.owned_folder import read_json
+
+    document = read_json(file)
+    if not isinstance(document, dict):
+        raise DataError(f"{file}: is not a table of names and values")
+    return stated_atmosphere(file, document, *device)
 
 
 def _say_what_is_there(parsed: argparse.Namespace, names: list[str]) -> int:

@@ -115,7 +115,8 @@ def _metrics_table(result: "Result") -> "Table":
     from ppafo.answers import Column, Table
     from ppafo.answers.shown_metrics import metric_level, metric_words
 
-    shown = {name: metric_level(metric.value, metric.unit) for name, metric in result.metrics.items()}
+    zero = result.scenario.device.supply.atmospheric_pressure
+    shown = {name: metric_level(metric.value, metric.unit, zero) for name, metric in result.metrics.items()}
     rows = [
         (metric_words(name), f"{value:.4g} {unit}".strip(), result.metrics[name].summary)
         for name, (value, unit) in shown.items()
@@ -141,7 +142,8 @@ def _text(result: "Result", check: "Check | None", folder: Path) -> str:
     checked = [] if check is None else [repr(check), ""]
     files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", "report.html"]
     written = ", ".join(files if check is None else [*files, CHECK_FILE])
-    return "\n".join([head, "", *metrics_lines(result.metrics), "", *checked, f"written: {folder} ({written})"])
+    lines = metrics_lines(result.metrics, result.scenario.device.supply.atmospheric_pressure)
+    return "\n".join([head, "", *lines, "", *checked, f"written: {folder} ({written})"])
 
 
 def _document(result: "Result", check: "Check | None", folder: Path) -> dict[str, Any]:

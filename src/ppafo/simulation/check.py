@@ -6,10 +6,12 @@ Then its metrics are those of one run among many, and a check says so.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from ppafo.answers.shown_metrics import metric_change, metric_level
 from ppafo.answers.text import align_columns
+from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.simulation.document import plain
 
 MOVE = 1.0e-7
@@ -51,7 +53,7 @@ class Check:
     """What of a run is determined: its metrics, and its angle and pressures over time.
 
     ``parts_at`` is the first time [s] at which a repeat is elsewhere by more than 1e-2 of a range, None where none is;
-    ``failed`` names the repeats that diverged.
+    ``failed`` names the repeats that diverged. Pressures are shown above ``atmosphere`` [Pa absolute].
     """
 
     scenario: str
@@ -59,6 +61,7 @@ class Check:
     courses: tuple[NumberCheck, ...]
     parts_at: float | None
     failed: tuple[str, ...]
+    atmosphere: float = STANDARD_ATMOSPHERE
 
     @property
     def is_determined(self) -> bool:
@@ -96,7 +99,7 @@ class Check:
     def __repr__(self) -> str:
         """Return the table of all changes in the units that people are shown, and the sentence."""
         names = list(self.metrics[0].changes) if self.metrics else []
-        rows = [_cells(row, names, metric_level) for row in self.metrics]
+        rows = [_cells(row, names, partial(metric_level, atmosphere=self.atmosphere)) for row in self.metrics]
         rows += [_cells(row, names, metric_change) for row in self.courses]
         head = f"Check of '{self.scenario}': what changes in runs that should be the same"
         return "\n".join([head, *align_columns([["", "value", *names, ""], *rows]), "", self.sentence])

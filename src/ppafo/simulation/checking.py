@@ -43,6 +43,7 @@ def check_result(result: Result) -> Check:
         courses=courses,
         parts_at=_time_of_parting([repeated for _, repeated in found], result, courses),
         failed=tuple(dict.fromkeys(name for name, repeated in found if not repeated.status.is_completed)),
+        atmosphere=scenario.device.supply.atmospheric_pressure,
     )
 
 

@@ -3,7 +3,10 @@
 import csv
 import math
 import re
-from collections.abc import Iterator
+from array import array
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +29,8 @@ _GROUPED = {
     for name, mark in _MARKS.items()
 }
 _LONGEST_SHOWN = 40
+Rows = Iterator[tuple[int, list[str]]]
+"""Rows of text, each with its line in the file."""
 _COMMENT = "#"
 
 
@@ -38,39 +43,64 @@ def read_foreign(
     """
     try:
         lines = _lines(path, columns.encoding)
-        names, rows = _rows(lines, columns)
         if TIME not in columns.channels:
             raise DataError(f"the column map has no channel '{TIME}'")
+        table = _read_table(lines, columns)
         channels = {
-            name: _channel(name, item, columns.decimal, names, rows, atmosphere)
+            name: _constant(name, item.constant, len(table.lines), atmosphere)
+            if item.constant is not None
+            else _convert(name, item, np.array(table.numbers[name]), atmosphere)
             for name, item in columns.channels.items()
         }
         time = channels.pop(TIME).values
-        check_clock(time, [line for line, _ in rows])
+        check_clock(time, table.lines)
         recording = Recording(label or one_line(Path(path).stem), time, channels, kind_of_comments(_comments(lines)))
         return recording if columns.direction is None else _with_direction(recording, columns.direction)
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
 
 
-Rows = list[tuple[int, list[str]]]
+@dataclass(frozen=True, slots=True)
+class _Table:
+    """The columns that a map asks for, as numbers by channel, and the line of each row in the file.
+
+    Row by row, so that of a large file no cell is kept as a text.
+    """
+
+    lines: "array[int]"
+    numbers: dict[str, "array[float]"]
 
 
-def _rows(lines_of_file: list[str], columns: ColumnMap) -> tuple[list[str], Rows]:
-    """Return the names of the columns (none without a header) and the rows of text, each with its line in the file."""
-    lines = list(enumerate(lines_of_file, start=1))[columns.skip_lines :]
-    cells = [(number, row) for number, row in _split(lines, columns.delimiter) if row]
-    if not cells:
-        raise DataError("has no rows" if columns.skip_lines == 0 else f"has no rows after {columns.skip_lines} lines")
-    names = [name.strip() for name in cells[0][1]] if columns.header else []
-    rows = cells[1 if columns.header else 0 :][columns.skip_rows :]
-    if not rows:
-        raise DataError("has no rows of numbers")
-    width = len(names) or len(rows[0][1])
-    for number, row in rows:
+def _read_table(lines: list[str], columns: ColumnMap) -> _Table:
+    names, width, rows = _rows(lines, columns)
+    places = {
+        name: place for name, item in columns.channels.items() if (place := _place(name, item, names, width)) >= 0
+    }
+    titles = {name: names[place] if names else str(place + 1) for name, place in places.items()}
+    table = _Table(array("q"), {name: array("d") for name in places})
+    for line, row in rows:
         if len(row) != width:
-            raise DataError(f"line {number} has {len(row)} values for {width} columns")
-    return names, rows
+            raise DataError(f"line {line} has {len(row)} values for {width} columns")
+        table.lines.append(line)
+        for name, place in places.items():
+            thousands = columns.channels[name].thousands
+            table.numbers[name].append(_number(row[place], thousands, columns.decimal, titles[name], line))
+    return table
+
+
+def _rows(lines: list[str], columns: ColumnMap) -> tuple[list[str], int, Rows]:
+    """Return the names of the columns (none without a header), how many there are, and the rows of text."""
+    numbered = islice(enumerate(lines, start=1), columns.skip_lines, None)
+    cells = ((number, row) for number, row in _split(numbered, columns.delimiter) if row)
+    head = next(cells, None)
+    if head is None:
+        raise DataError("has no rows" if columns.skip_lines == 0 else f"has no rows after {columns.skip_lines} lines")
+    names = [name.strip() for name in head[1]] if columns.header else []
+    rows = islice(cells if columns.header else chain([head], cells), columns.skip_rows, None)
+    first = next(rows, None)
+    if first is None:
+        raise DataError("has no rows of numbers")
+    return names, len(names) or len(first[1]), chain([first], rows)
 
 
 def _lines(path: str | Path, encoding: str) -> list[str]:
@@ -91,7 +121,7 @@ def _comments(lines: list[str]) -> list[str]:
     return [line for line in lines if line.startswith(_COMMENT)]
 
 
-def _split(lines: list[tuple[int, str]], delimiter: str) -> Iterator[tuple[int, list[str]]]:
+def _split(lines: Iterable[tuple[int, str]], delimiter: str) -> Rows:
     for number, line in lines:
         if not line.strip() or line.startswith(_COMMENT):
             continue
@@ -104,18 +134,14 @@ def _split(lines: list[tuple[int, str]], delimiter: str) -> Iterator[tuple[int, 
             raise DataError(f"line {number} cannot be read: {error}") from error
 
 
-def _channel(name: str, item: MappedChannel, decimal: str, names: list[str], rows: Rows, atmosphere: float) -> Channel:
+def _place(name: str, item: MappedChannel, names: list[str], width: int) -> int:
+    """Return the place of the column of a channel from 0, -1 for a constant."""
     if (item.column is None) == (item.constant is None):
         raise DataError(
             f"the column map gives channel '{name}' {'neither' if item.column is None else 'both'} "
             f"a column {'nor' if item.column is None else 'and'} a constant; give one of them"
         )
-    if item.constant is not None:
-        return _constant(name, item.constant, len(rows), atmosphere)
-    index = _index(name, item, names, len(rows[0][1]))
-    column = names[index] if names else str(index + 1)
-    numbers = np.array([_number(row[index], item.thousands, decimal, column, line) for line, row in rows])
-    return _convert(name, item, numbers, atmosphere)
+    return -1 if item.column is None else _index(name, item, names, width)
 
 
 def _constant(name: str, text: str, count: int, atmosphere: float) -> Channel:

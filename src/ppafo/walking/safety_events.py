@@ -28,7 +28,8 @@ class SafetyEvent:
     """Less help, a pause, a stop or a return of help at a time [s] of the recording.
 
     ``readings`` are what the sensors showed then and ``settings`` what they were compared with, by name, in SI units;
-    empty where help came back. ``units`` are those of the settings.
+    empty where help came back. ``units`` are those of the settings. Gauge pressures count from ``atmosphere`` [Pa
+    absolute].
     """
 
     time: float
@@ -37,6 +38,7 @@ class SafetyEvent:
     readings: Mapping[str, float] = field(default_factory=dict)
     settings: Mapping[str, float] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
+    atmosphere: float = STANDARD_ATMOSPHERE
 
     @property
     def message(self) -> str:
@@ -44,8 +46,9 @@ class SafetyEvent:
         if self.sign is None:
             return f"{_RETURNS[self.level]} at {self.time:.2f} s"
         head = f"{_WORDS[self.level]} {self.time:.2f} s"
-        shown = [f"{_word(name)} {_text(value, _UNITS[name])}" for name, value in self.readings.items()]
-        limits = [f"{name} {_text(value, self.units[name])}" for name, value in self.settings.items()]
+        zero = self.atmosphere
+        shown = [f"{_word(name)} {_text(value, _UNITS[name], zero)}" for name, value in self.readings.items()]
+        limits = [f"{name} {_text(value, self.units[name], zero)}" for name, value in self.settings.items()]
         return f"{head}: {self.sign.summary}; {'; '.join(', '.join(part) for part in (shown, limits) if part)}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -88,6 +91,7 @@ def _venting(
         readings={name: float(record[f"{FINDING_ROW}.{name}"][place]) for name in sign.readings},
         settings={name: configuration.settings[name] for name in sign.settings},
         units={name: quantities[name].unit for name in sign.settings},
+        atmosphere=configuration.device.supply.atmospheric_pressure,
     )
 
 
@@ -95,10 +99,10 @@ def _word(name: str) -> str:
     return name.replace("_force", "").replace("_", " ")
 
 
-def _text(value: float, si_unit: str) -> str:
-    """Return a value in SI as people write it, with three digits."""
+def _text(value: float, si_unit: str, atmosphere: float) -> str:
+    """Return a value in SI as people write it, with three digits; gauge counts from ``atmosphere`` [Pa absolute]."""
     unit = WRITTEN_UNITS.get(si_unit, "" if si_unit in PLAIN else si_unit)
-    return f"{from_si(value, unit, si_unit, STANDARD_ATMOSPHERE):.3g} {unit}".rstrip()
+    return f"{from_si(value, unit, si_unit, atmosphere):.3g} {unit}".rstrip()
 
 
 def event_lines(events: Sequence[SafetyEvent]) -> list[str]:

@@ -131,6 +131,8 @@ def test_a_table_shows_metrics_in_the_units_of_the_field() -> None:
     assert rows[1][:3] == ["angle_range", "180", "deg"]
     assert rows[2][:3] == ["largest_pressure", "50", "psi_g"]
     assert rows[3] == ["switchings", "10", "switchings"]
+    high = [line.split() for line in metrics_lines(metrics, atmosphere=446063.0 - 55.0 * 6894.757293168361)]
+    assert high[2][:3] == ["largest_pressure", "55", "psi_g"]
 
 
 def stored(**document: object) -> StoredResult:

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ppafo.answers.recording_figure import figure_files, recording_figure
 from ppafo.cli.main import main
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.result import Result, Status
@@ -184,6 +185,37 @@ def test_recordings_of_the_rig_are_drawn_each_on_its_own(tmp_path: Path, capsys:
     assert names(tmp_path) == before
     assert main(["plot", str(tmp_path)]) == 0
     assert {"free-decay.png", "free-decay.svg", "step-response.png", "step-response.svg"} <= set(names(tmp_path))
+
+
+def test_gauge_pressure_of_a_bench_and_of_a_walk_counts_from_the_atmosphere_of_the_device(tmp_path: Path) -> None:
+    time, level = 0.1 * np.arange(11), np.full(11, 83e3 + 1e5)
+    recording = Recording("high", time, {"pressure_1": Channel(level, "Pa")}, "simulated")
+    device = {"supply": {"atmospheric_pressure": 83e3}}
+    (tmp_path / "rig").mkdir()
+    (tmp_path / "rig" / "high.csv").write_bytes(marked_csv_bytes(recording))
+    (tmp_path / "rig" / "rig.json").write_text(json.dumps({"recordings": {"high.csv": {"device": device}}}))
+    walked = {"recording.nc": netcdf_bytes(recording, None)}
+    walked["walk.json"] = json.dumps({"configuration": {"device": device}}).encode()
+    write_marked_folder(tmp_path / "walk", walked, "walk")
+    drawn = figure_files(recording_figure(recording, atmosphere=83e3))["figure.png"]
+    for figure in (tmp_path / "rig" / "high.png", tmp_path / "walk" / "figure.png"):
+        assert main(["plot", str(figure.parent)]) == 0
+        assert figure.read_bytes() == drawn
+    (tmp_path / "walk" / "walk.json").write_text('{"configuration": {"device": [3]}}')
+    assert main(["plot", str(tmp_path / "walk")]) == 2
+
+
+def test_a_pressure_is_shown_above_the_atmosphere_of_the_device(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["supply.atmospheric_pressure=83 kPa_a", "supply.pressure=55 psi_g", "run.duration=0.2 s"]
+    sets = [part for word in words for part in ("--set", word)]
+    assert main(["simulate", "step-response", *sets, "--check", "--out", str(tmp_path / "high")]) == 0
+    shown = [line.split()[:3] for line in capsys.readouterr().out.splitlines() if "largest_pressure" in line]
+    assert [row[0] for row in shown[:2]] == ["largest_pressure", "largest_pressure"]
+    assert {tuple(row[1:]) for row in shown[:2]} == {("55", "psi_g")}
+    page = (tmp_path / "high" / "report.html").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
+    assert "55 psi_g" in page
 
 
 def test_a_folder_that_has_its_figures_or_none_says_so_and_what_to_open(

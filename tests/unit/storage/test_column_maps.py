@@ -1,6 +1,7 @@
 """Files from elsewhere: units, signs, marks and constants; and what is wrong is named with line and column."""
 
 import tomllib
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -124,6 +125,19 @@ def test_direction_and_sweeps_follow_from_the_rate_of_a_channel(tmp_path: Path) 
     recording = read_foreign(written(tmp_path, text), columns)
     assert [recording["direction"][index] for index in (50, 150, 250, 350)] == [-1.0, 1.0, -1.0, 1.0]
     assert [recording["repetition"][index] for index in (50, 150, 250, 350)] == [1.0, 2.0, 3.0, 4.0]
+
+
+def test_a_large_table_is_read_row_by_row(tmp_path: Path) -> None:
+    path = written(tmp_path, "".join(f"{row},{',1.25' * 20}\n".replace(",,", ",") for row in range(5000)))
+    columns = mapped(channels={"torque": {"column": 21, "unit": "N m"}})
+    read_foreign(path, columns)
+    tracemalloc.start()
+    recording = read_foreign(path, columns)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert recording["torque"].tolist() == [1.25] * 5000
+    # Twice the text, as bytes and as characters, and its lines; each cell as a text was another twelve times as much.
+    assert peak < 6 * path.stat().st_size
 
 
 def test_a_synthetic_recording_stays_one_through_a_column_map(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from ppafo.documents.models import NAME, STRICT, Text, Texts, make_schema, read_
 from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import StudyError, UnitError, first_twice, nearest_name
 from ppafo.metrics.catalog import METRICS
+from ppafo.parameters.parameter_set import ATMOSPHERE_PATH
 from ppafo.parameters.parts import Catalogue, Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
 from ppafo.questions.design.search import SearchSettings
@@ -199,7 +200,7 @@ def load_design(name_or_path: str | Path, seed: int | None = None) -> DesignProb
         carried=_carried_parts(document.parts, catalogue),
         other_mass=_mass(document.parts.other_mass, f"{file}: parts.other_mass"),
         variables=read_variables(document.variables, by_kind, valves, file),
-        constraints=_constraints(document, file),
+        constraints=_constraints(document, _atmospheres(document, tasks), file),
         search=SearchSettings(
             search.screening,
             search.population,
@@ -285,7 +286,14 @@ def _mass(text: str, place: str) -> float:
     return value
 
 
-def _constraints(document: DesignFile, file: str) -> tuple[Constraint, ...]:
+def _atmospheres(document: DesignFile, tasks: Sequence[Task]) -> frozenset[float]:
+    """Return the pressures [Pa absolute] from which gauge pressures of designs count; 0 too where it is searched."""
+    scenarios = [scenario for task in tasks for scenario in task.scenarios.values()]
+    searched = [0.0] if ATMOSPHERE_PATH in document.variables else []
+    return frozenset([*searched, *(scenario.device.supply.atmospheric_pressure for scenario in scenarios)])
+
+
+def _constraints(document: DesignFile, atmospheres: frozenset[float], file: str) -> tuple[Constraint, ...]:
     known = [name for name in document.constraints if name in METRICS]
     units = OBJECTIVES | {name: METRICS[name].unit for name in dict.fromkeys([*METRICS, *known])}
     found = []
@@ -295,7 +303,7 @@ def _constraints(document: DesignFile, file: str) -> tuple[Constraint, ...]:
             hint = nearest_name(name, units)
             raise StudyError(f"{place}: there is no such metric{hint}; available: {', '.join(units)}")
         least, most = (
-            None if text is None else _limit(text, units[name], f"{place}.{key}")
+            None if text is None else _limit(text, units[name], f"{place}.{key}", atmospheres)
             for key, text in (("least", table.least), ("most", table.most))
         )
         if least is None and most is None:
@@ -308,9 +316,12 @@ def _constraints(document: DesignFile, file: str) -> tuple[Constraint, ...]:
     return tuple(found)
 
 
-def _limit(text: str, unit: str, place: str) -> float:
+def _limit(text: str, unit: str, place: str, atmospheres: frozenset[float]) -> float:
     wanted = {"Pa": "Pa_a", "-": ""}.get(unit, unit)
     try:
-        return parse_quantity(text, wanted)
+        found = {parse_quantity(text, wanted, atmosphere) for atmosphere in atmospheres}
     except UnitError as error:
         raise StudyError(f"{place} = '{text}': {error}") from error
+    if len(found) > 1:
+        raise StudyError(f"{place} = '{text}': the designs have several atmospheres; give an absolute pressure")
+    return found.pop()

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.constants import GRAMS_PER_KILOGRAM
+from ppafo.constants import GRAMS_PER_KILOGRAM, STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, ParameterError
 from ppafo.model.chambers import chamber_1_volume, chamber_2_volume
 from ppafo.signals import Recording
@@ -141,7 +141,8 @@ class WalkGas:
 
     ``gas_per_stride`` is that of the strides with help, 0 where the walk took none. ``others`` is the gas use of the
     same walk with other readings of the paper's chambers, by their names. A walk on a ``course``, "" without one, is
-    repeated as a whole: gas and time are then those of the course, which takes ``course_time`` [s].
+    repeated as a whole: gas and time are then those of the course, which takes ``course_time`` [s]. The device lets gas
+    out into ``atmospheric_pressure`` [Pa absolute].
     """
 
     name: str
@@ -152,6 +153,7 @@ class WalkGas:
     others: Mapping[str, "OtherGas"] = field(default_factory=dict)
     course: str = ""
     course_time: float = 0.0
+    atmospheric_pressure: float = STANDARD_ATMOSPHERE
 
     @property
     def is_whole(self) -> bool:
@@ -191,6 +193,7 @@ def walk_gas(result: WalkResult) -> WalkGas:
         Actuator(**{name: getattr(actuator, name) for name in Actuator.__slots__}),
         course="" if course is None else course.name,
         course_time=0.0 if course is None else result.metrics["course_planned_time"].value,
+        atmospheric_pressure=configuration.device.supply.atmospheric_pressure,
     )
 
 
@@ -227,6 +230,7 @@ def read_walk_gas(folder: Path) -> WalkGas:
         _others(document, actuator, path, keys[1:]),
         "" if course is None else str(_table({"course": course}, "course", path).get("name", "course")),
         0.0 if course is None else _number(document, "metrics.course_planned_time.value", path, 0.0),
+        _number(document, "configuration.device.supply.atmospheric_pressure", path, 0.0),
     )
 
 

@@ -70,23 +70,29 @@ def reuse(plan: ReusePlan, mass_per_step: float) -> Reuse:
     return Reuse(cycle, balance, plan.origins)
 
 
-def parse_reuse(texts: Iterable[str], bottle: Bottle, chambers: FullChambers | None = None) -> ReusePlan:
+def parse_reuse(
+    texts: Iterable[str],
+    bottle: Bottle,
+    chambers: FullChambers | None = None,
+    atmosphere: float = STANDARD_ATMOSPHERE,
+) -> ReusePlan:
     """Return the cycle of texts such as ``reservoir_volume=50 cm^3``; the reservoir must be given.
 
     What is not given of the chambers is that of ``chambers``, of a walk. Without a walk pressures are the regulator's
-    and volumes those of the paper's device at toe-off and in neutral.
+    and volumes those of the paper's device at toe-off and in neutral. The device lets gas out into ``atmosphere`` [Pa
+    absolute], from which gauge pressures count.
     """
-    values = _parse_pairs(texts)
+    values = _parse_pairs(texts, atmosphere)
     found, origin = (_defaults(bottle), _DEFAULT) if chambers is None else _chamber_values(chambers)
     cycle = ReuseCycle(
         **(found | values),
-        atmospheric_pressure=STANDARD_ATMOSPHERE,
+        atmospheric_pressure=atmosphere,
         gas_product=bottle.fluid.table.gas_constant * bottle.room_temperature,
     )
     return ReusePlan(cycle, {item.name: GIVEN if item.name in values else origin for item in REUSE})
 
 
-def _parse_pairs(texts: Iterable[str]) -> dict[str, float]:
+def _parse_pairs(texts: Iterable[str], atmosphere: float) -> dict[str, float]:
     values: dict[str, float] = {}
     for text in texts:
         name, separator, quantity = (part.strip() for part in one_line(text).partition("="))
@@ -97,7 +103,7 @@ def _parse_pairs(texts: Iterable[str]) -> dict[str, float]:
             )
         if name in values:
             raise ParameterError(f"--reuse {name}: given twice; give it once")
-        values[name] = _value(_BY_NAME[name], quantity)
+        values[name] = _value(_BY_NAME[name], quantity, atmosphere)
     if "reservoir_volume" not in values:
         raise ParameterError(
             "--reuse: give at least the volume of the reservoir, for example --reuse 'reservoir_volume=50 cm^3'"
@@ -105,9 +111,9 @@ def _parse_pairs(texts: Iterable[str]) -> dict[str, float]:
     return values
 
 
-def _value(quantity: Quantity, text: str) -> float:
+def _value(quantity: Quantity, text: str, atmosphere: float) -> float:
     try:
-        value = parse_quantity(text, quantity.unit)
+        value = parse_quantity(text, quantity.unit, atmosphere)
     except UnitError as error:
         raise ParameterError(f"--reuse {quantity.name}={text}: {error}") from error
     if not is_within(value, quantity):

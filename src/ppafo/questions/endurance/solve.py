@@ -121,18 +121,19 @@ def endurance_of_walk(
 def endurance_of_walk_gas(gas: WalkGas, bottle: Bottle, schedule: Schedule, reuse: Iterable[str] = ()) -> Endurance:
     """Return how long a bottle lasts when a walk continues; DataError where it took no gas."""
     changes, draw = tuple(reuse), draw_of_walk(gas)
-    plan = parse_reuse(changes, bottle, full_chambers(gas)) if changes else None
-    others = {name: _other(bottle, other, schedule, changes) for name, other in gas.others.items()}
+    zero = gas.atmospheric_pressure
+    plan = parse_reuse(changes, bottle, full_chambers(gas), zero) if changes else None
+    others = {name: _other(bottle, other, schedule, changes, zero) for name, other in gas.others.items()}
     return replace(
         follow_bottle(bottle, draw, schedule, plan), others=others, is_of_course=bool(gas.course), is_whole=gas.is_whole
     )
 
 
-def _other(bottle: Bottle, other: OtherGas, schedule: Schedule, changes: tuple[str, ...]) -> Endurance:
+def _other(bottle: Bottle, other: OtherGas, schedule: Schedule, changes: tuple[str, ...], zero: float) -> Endurance:
     """Return how long the bottle lasts with other chambers; without reuse where theirs is not known or not possible."""
     if changes and other.chambers is not None:
         try:
-            return follow_bottle(bottle, other.draw, schedule, parse_reuse(changes, bottle, other.chambers))
+            return follow_bottle(bottle, other.draw, schedule, parse_reuse(changes, bottle, other.chambers, zero))
         except ParameterError:
             pass
     return follow_bottle(bottle, other.draw, schedule)

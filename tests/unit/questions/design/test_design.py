@@ -267,6 +267,23 @@ def test_every_mistake_in_a_file_is_one_line(tmp_path: Path, before: str, after:
     assert "\n" not in str(caught.value)
 
 
+def test_a_limit_in_gauge_pressure_counts_from_the_atmosphere_of_the_tasks(tmp_path: Path) -> None:
+    path, high = tmp_path / "high.toml", '"supply.atmospheric_pressure=83 kPa_a", '
+    limited = FILE.replace("[search]", '[constraints.largest_pressure]\nmost = "40 psi_g"\n\n[search]')
+    path.write_text(limited.replace("overrides = [", f"overrides = [{high}"))
+    assert load_design(path).constraints[-1].most == pytest.approx(83e3 + 40.0 * 6894.757293168361)
+    searched = '[variables."supply.atmospheric_pressure"]\nlowest = "80 kPa_a"\nhighest = "101 kPa_a"\n\n[search]'
+    for ambiguous in (
+        limited.replace("overrides = [", f"overrides = [{high}", 1),
+        limited.replace("[search]", searched),
+    ):
+        path.write_text(ambiguous)
+        with pytest.raises(PpafoError, match="most = '40 psi_g': the designs have several atmospheres"):
+            load_design(path)
+    path.write_text(ambiguous.replace("40 psi_g", "350 kPa_a"))
+    assert load_design(path).constraints[-1].most == 350e3
+
+
 def test_a_design_is_drawn_and_told_as_data_like_any_answer(study: Design) -> None:
     labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in study.plot().axes]
     assert labels[0] == ("Error (N m)", "Gas per task (g)")

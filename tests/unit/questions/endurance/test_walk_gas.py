@@ -57,7 +57,8 @@ def folder_of(walk: WalkGas, path: Path) -> Path:
     """What ``ppafo walk`` writes, as far as the gas goes."""
     path.mkdir(parents=True)
     actuator = {name: getattr(walk.actuator, name) for name in Actuator.__slots__}
-    configuration = {"name": walk.name, "gait": {"stride_time": walk.stride_time}, "device": {"actuator": actuator}}
+    device = {"actuator": actuator, "supply": {"atmospheric_pressure": walk.atmospheric_pressure}}
+    configuration = {"name": walk.name, "gait": {"stride_time": walk.stride_time}, "device": device}
     metrics = {"gas": {"value": walk.gas_per_stride, "unit": "kg"}}
     document = {"format": FORMAT, "configuration": configuration, "metrics": metrics}
     (path / "walk.json").write_text(json.dumps(document))
@@ -72,6 +73,15 @@ def test_chambers_are_taken_where_they_are_fullest_without_the_first_strides() -
     assert full.fill_pressure == pytest.approx(4e5, rel=1e-3)
     assert full.exhaust_volume == pytest.approx(chamber_1_volume(1.8, 0.35, 5.1e-5, 2e-6), rel=1e-3)
     assert full.fill_volume == pytest.approx(chamber_2_volume(1.5, 2.27, 5.1e-5, 2e-6), rel=1e-3)
+
+
+def test_a_walk_high_above_the_sea_lets_gas_out_into_its_own_atmosphere(tmp_path: Path) -> None:
+    read = read_walk_gas(folder_of(replace(pulses(5.0), atmospheric_pressure=83e3), tmp_path / "walk"))
+    given = ["reservoir_volume=5 cm^3", "fill_pressure=1 bar_g"]
+    reuse = endurance_of_walk_gas(read, load_bottle(PAPER_BOTTLE), LONG, given).reuse
+    assert reuse is not None
+    assert reuse.cycle.atmospheric_pressure == 83e3
+    assert reuse.cycle.fill_pressure == pytest.approx(183e3)
 
 
 def test_a_stride_that_differs_moves_the_mean() -> None:
