@@ -32,6 +32,12 @@ def test_controller_and_plant_on_two_boards_have_the_bits_of_the_lanes(
     assert 1000 < found.stack < 8192
 
 
+def test_a_run_of_one_sample_is_refused_before_anything_is_built() -> None:
+    said = r"run.duration = 0.001 s: must be at least 0.002 s on two boards, 2 samples of the controller$"
+    with pytest.raises(ScenarioError, match=said):
+        run_on_two_boards(scenario_of("pid", "run.duration=1 ms"), "cortex-m0", "cortex-m4")
+
+
 @with_boards
 def test_a_plant_with_another_supply_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
     duration = "run.duration=0.02 s"

@@ -196,10 +196,11 @@ def test_a_tool_that_adds_up_its_time_has_the_sample_that_is_due(instance: Insta
 def test_the_clock_of_fmi_3_ticks_when_the_controller_decides(tmp_path: Path) -> None:
     slow = (*SHORT, "controller.period=5 ms")
     unit = written(tmp_path, "torque-task-proportional", slow, fmi=3)
-    command = simulate("torque-task-proportional", slow).recording["command"]
+    recording = simulate("torque-task-proportional", slow).recording
+    command, reference = recording["command"], recording["reference"]
     instance = Instance(unit, events=True)
     slave, clock = instance.slave, [instance.numbers["controller.clock"]]
-    ticks, time, seen = [], 0.0, [instance.get("command")]
+    ticks, time, before, seen = [], 0.0, [], [instance.get("command")]
     assert slave.getClock(clock) == [True]
     slave.updateDiscreteStates()
     assert slave.getClock(clock) == [False]
@@ -210,13 +211,17 @@ def test_the_clock_of_fmi_3_ticks_when_the_controller_decides(tmp_path: Path) ->
             assert is_early == (time < end)
             if needs_event:
                 ticks.append(round(time, 9))
-                seen.append(instance.get("command"))
+                before.append((instance.get("command"), instance.get("reference")))
                 slave.enterEventMode()
+                seen.append(instance.get("command"))
                 assert slave.getClock(clock) == [True]
                 slave.updateDiscreteStates()
                 slave.enterStepMode()
     assert ticks == [round(0.005 * number, 9) for number in range(1, 21)]
     assert seen == list(command[:101:5])
+    # Between two events a discrete output is what it was in the first of them.
+    assert before == list(zip(command[:96:5], reference[:96:5], strict=True))
+    assert np.ptp(reference[:100]) > 0.0
     instance.close()
 
 

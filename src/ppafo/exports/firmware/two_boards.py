@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 from ppafo.control.fixed.converter import COMMAND_STEPS
-from ppafo.errors import SimulationError
+from ppafo.errors import ScenarioError, SimulationError
 from ppafo.exports.firmware import firmware
 from ppafo.exports.firmware.catalog import target_of
 from ppafo.exports.firmware.plant import plant_firmware, plant_library, plant_values
@@ -12,6 +12,8 @@ from ppafo.exports.firmware.simulator import built_image, check_tools, chip_simu
 from ppafo.exports.firmware.target import ChipSimulator, Sizes, Target
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
+
+FEWEST_SAMPLES = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,16 +39,17 @@ class BoardsRun:
 def run_on_two_boards(scenario: Scenario, target: str, plant: str) -> BoardsRun:
     """Run a scenario with its controller on one board and its plant on another, in virtual time, and in the lanes.
 
-    ScenarioError where either has no firmware, SimulationError where a tool is missing or the plant cannot go on.
+    ScenarioError where either has no firmware or the run has less than two samples, SimulationError where a tool is
+    missing or the plant cannot go on.
     """
-    chosen = target_of(plant)
+    chosen, samples = target_of(plant), _samples(scenario)
     check_tools(chosen)
     files, controller = plant_firmware(scenario, plant), firmware(scenario, target)
     names = plant_values(plant_library(scenario))
     with chip_simulator(controller, target_of(target)) as (chip, _), built_image(files, chosen) as image:
         board = QemuPlant(chosen, image, len(names))
         try:
-            run = _coupled(scenario, chip, board)
+            run = _coupled(samples, chip, board)
             stack = board.stack()
         finally:
             board.close()
@@ -74,10 +77,21 @@ def run_on_two_boards(scenario: Scenario, target: str, plant: str) -> BoardsRun:
     )
 
 
-def _coupled(scenario: Scenario, chip: ChipSimulator, board: QemuPlant) -> list[tuple[PlantSample, int]]:
+def _samples(scenario: Scenario) -> int:
+    """Samples of the controller in a run; what a plant takes is counted from each to the next."""
+    samples = int(scenario.duration / scenario.control.period + 1.0e-9)
+    if samples < FEWEST_SAMPLES:
+        raise ScenarioError(
+            f"{scenario.name}: run.duration = {scenario.duration:g} s: must be at least "
+            f"{FEWEST_SAMPLES * scenario.control.period:g} s on two boards, {FEWEST_SAMPLES} samples of the controller"
+        )
+    return samples
+
+
+def _coupled(samples: int, chip: ChipSimulator, board: QemuPlant) -> list[tuple[PlantSample, int]]:
     """What the plant shows at every sample, and the command that the controller gives for it."""
     found: list[tuple[PlantSample, int]] = []
-    for number in range(int(scenario.duration / scenario.control.period + 1.0e-9)):
+    for number in range(samples):
         if number:
             board.go_on(found[-1][1])
         shown = board.shown()

@@ -14,7 +14,7 @@ from ppafo.exports.c_library.files import library_files
 from ppafo.exports.fmu import component
 from ppafo.exports.fmu.binaries import FLAGS, PLATFORMS, Platform, build
 from ppafo.exports.fmu.description import build_description_of_fmi3, description_of_fmi2, description_of_fmi3
-from ppafo.exports.fmu.variables import Interface, change_of
+from ppafo.exports.fmu.variables import Interface, change_of, variability_of
 from ppafo.simulation.scenario import Scenario
 from ppafo.version import __version__
 from ppafo.walking.configuration import Configuration
@@ -113,6 +113,7 @@ def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
         "paths": paths,
         "changes": "".join(change_of(interface, item) for item in library.settings),
         "first_inputs": ", ".join([*(repr(item.start) for item in interface.inputs), "0.0"]),
+        "output_changes": "".join(variability_of(name)[0] for name in library.program.outputs),
         "token": "@token@",
         "has_clock": "true" if interface.clock else "false",
         **interface.words,

@@ -85,12 +85,12 @@ def variables_of(interface: Interface) -> tuple[Variable, ...]:
     return (
         *_parameters(interface),
         *(
-            Variable(name, len(library.settings) + place, *OUTPUTS[name], "output", _variability(name))
+            Variable(name, len(library.settings) + place, *OUTPUTS[name], "output", variability_of(name))
             for place, name in enumerate(library.program.outputs)
             if name in interface.outputs
         ),
         *(
-            Variable(f"metrics.{kind.name}", first_metric + place, kind.unit, kind.summary, "local", "discrete")
+            Variable(f"metrics.{kind.name}", first_metric + place, kind.unit, kind.summary, "local", "continuous")
             for place, kind in enumerate(library.program.metrics if interface.shows_metrics else ())
         ),
         *(
@@ -100,7 +100,8 @@ def variables_of(interface: Interface) -> tuple[Variable, ...]:
     )
 
 
-def _variability(name: str) -> str:
+def variability_of(name: str) -> str:
+    """Whether an output jumps, ``discrete``, or goes on, ``continuous``."""
     return "discrete" if name in STEPPED else "continuous"
 
 

@@ -39,6 +39,23 @@ static bool has_none(fmi3Instance instance, size_t count)
     return count == 0 || refuse(item, "this unit has no such variables, derivatives or modes");
 }
 
+/* Whether an output is discrete (d) or continuous (c). */
+static const char CHANGE_OF_OUTPUT[OUTPUTS + 1] = "@output_changes@";
+
+/* True where the event mode is used, in which alone a discrete output may change: between two events it is held. */
+static bool is_held(const unit_instance *given, uint32_t variable)
+{
+    return @has_clock@ && given->uses_events && given->item.now.phase >= UNIT_RUNNING && !given->item.now.is_event
+        && variable >= FIRST_OUTPUT && variable < FIRST_METRIC && CHANGE_OF_OUTPUT[variable - FIRST_OUTPUT] == 'd';
+}
+
+static void hold_what_is_shown(unit *item)
+{
+    @name@_outputs outputs;
+    @name@_read_outputs(item->run, &outputs);
+    memcpy(item->now.held, (const double *)&outputs + 1, sizeof(item->now.held));
+}
+
 /* When the controller decides, counted from 0, since the start. */
 static double time_of_tick(const unit *item, int64_t tick)
 {
@@ -147,6 +164,9 @@ fmi3Status fmi3EnterStepMode(fmi3Instance instance)
     if (!is_in(instance, UNIT_RUNNING, UNIT_RUNNING)) {
         return done(instance, false);
     }
+    if (given->item.now.is_event) {
+        hold_what_is_shown(&given->item);
+    }
     given->item.now.is_event = 0;
     given->item.now.is_tick = 0;
     return fmi3OK;
@@ -195,6 +215,9 @@ fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
     for (place = 0; place < nValueReferences && place < nValues; ++place) {
         if (!get_value(&given->item, valueReferences[place], &values[place])) {
             return done(instance, false);
+        }
+        if (is_held(given, valueReferences[place])) {
+            values[place] = given->item.now.held[valueReferences[place] - FIRST_OUTPUT];
         }
     }
     return fmi3OK;

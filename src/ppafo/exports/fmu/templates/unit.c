@@ -37,6 +37,7 @@ typedef struct {
     double start;     /* the time of the tool at which the run begins */
     double time;      /* since then */
     double inputs[INPUTS + 1];
+    double held[OUTPUTS]; /* the outputs in the last event of FMI 3 */
     @name@_settings settings;
 } unit_state;
 

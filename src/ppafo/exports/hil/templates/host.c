@@ -4,7 +4,8 @@
  *     controller serial DEVICE [SILENCE]   a serial device that is set up already (see stty), or a pseudo-terminal
  *
  * SILENCE is the time in ms after which the controller takes the plant for gone and vents; 20 unless given, 0 never.
- * On a board: keep decide() and answer(), and hand them the bytes that its UART or USB port receives. */
+ * On a board: keep all down to left(), hand link_take() the bytes that its UART or USB port receives, and vent where
+ * left() is 0. */
 #define _POSIX_C_SOURCE 200809L
 #include <arpa/inet.h>
 #include <fcntl.h>
