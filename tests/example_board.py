@@ -46,12 +46,18 @@ class Plug:
         self.own.sendto(data, ("127.0.0.1", self.port))
 
     def ask(
-        self, sequence: int, flags: int = 0, run: int = 7, pressure: int | None = None, apart: int = 1000
+        self,
+        sequence: int,
+        flags: int = 0,
+        run: int = 7,
+        pressure: int | None = None,
+        apart: int = 1000,
+        stamp: int | None = None,
     ) -> Answer:
-        """The answer to a sample of a plant whose samples are some time [us] apart."""
+        """The answer to a sample of a plant whose samples are some time [us] apart, or which has a stamp of its own."""
         shown = 150_000 + 700 * sequence * sequence if pressure is None else pressure
         counts = dict(zip(SENT, (1_000_000, 0, shown, 150_000, 0), strict=True))
-        self.send(sample_bytes(Sample(flags, run, sequence, apart * sequence, counts)))
+        self.send(sample_bytes(Sample(flags, run, sequence, apart * sequence if stamp is None else stamp, counts)))
         (answer,) = Reader(is_stream=False).take(self.own.recv(256))
         assert isinstance(answer, Answer)
         assert (answer.run, answer.sequence) == (run, sequence)

@@ -28,7 +28,9 @@ static bool is_begun; /* a sample with LINK_BEGIN came, and nothing has ended th
 static bool is_known; /* the number of a run is known: that of the last one that began */
 static bool is_sound;
 static uint16_t run;
+static uint32_t first; /* numbers of the first and of the newest sample of the run */
 static uint32_t newest;
+static uint32_t passed;  /* periods of the controller since the run began */
 static uint32_t heard;   /* when the newest sample of the run came, us of this computer */
 static uint32_t decided; /* when the controller's last sample period began, us of the plant */
 static int32_t command;  /* in millionths */
@@ -50,13 +52,20 @@ static void decide(const link_sample *sample)
     command = is_sound ? (int32_t)steps * 1000 : 0;
 }
 
-/* Decide once for each sample period that has begun. Lost samples leave a gap in the numbers; where more periods went by
- * than samples were sent, the plant is slower than the controller, which would act with the gains of another rate. */
+/* True where more periods of the controller went by than samples were sent, lost ones too: a slower plant, for which the
+ * controller has the gains of another rate. Time stamps may jitter by a period, and clocks differ a little. */
+static bool is_slow(uint32_t samples)
+{
+    return passed > samples + samples / 16u + 1u;
+}
+
+/* Decide once for each sample period that has begun. Lost samples leave a gap in the numbers. */
 static void go_on(const link_sample *sample, uint32_t now)
 {
     const uint32_t periods = (sample->time - decided) / PLANT_PERIOD_US;
     heard = now;
-    is_sound = is_sound && periods <= sample->sequence - newest;
+    passed += periods;
+    is_sound = is_sound && !is_slow(sample->sequence - first);
     newest = sample->sequence;
     if (periods > 0) {
         decided += periods * PLANT_PERIOD_US;
@@ -81,7 +90,9 @@ static void answer(const link_sample *sample, uint32_t now, uint8_t bytes[LINK_A
         is_known = true;
         is_sound = true;
         run = sample->run;
+        first = sample->sequence;
         newest = sample->sequence;
+        passed = 0;
         heard = now;
         decided = sample->time;
         controller_begin();
