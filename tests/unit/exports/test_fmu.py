@@ -222,6 +222,11 @@ def test_the_clock_of_fmi_3_ticks_when_the_controller_decides(tmp_path: Path) ->
     # Between two events a discrete output is what it was in the first of them.
     assert before == list(zip(command[:96:5], reference[:96:5], strict=True))
     assert np.ptp(reference[:100]) > 0.0
+    plain = Instance(unit)
+    plain.go_to(0.052)
+    instance.drop(instance.restored(plain.kept()))
+    assert instance.get("command") == command[52] != 0.0
+    plain.close()
     instance.close()
 
 

@@ -142,6 +142,7 @@ fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
     }
     given->item.now.phase = UNIT_RUNNING;
     given->item.now.is_event = given->uses_events ? 1 : 0;
+    hold_what_is_shown(&given->item);
     return fmi3OK;
 }
 
@@ -274,6 +275,9 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     }
     if (!go_to(item, time)) {
         return done(instance, false);
+    }
+    if (!given->uses_events) {
+        hold_what_is_shown(item); /* for an instance with events that goes on from this state */
     }
     item->now.is_tick = item->now.ticks > ticks ? 1 : 0;
     *eventHandlingNeeded = @has_clock@ && given->uses_events && item->now.is_tick;
