@@ -31,6 +31,7 @@ from ppafo.live.workbench import DEFAULT, workbench
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.result import Result
 from ppafo.simulation.simulate import simulate
+from ppafo.units import parse_quantity
 from ppafo.walking.loading import load_walk
 from ppafo.walking.walk import WalkResult, walk
 from scripts.page_states import address_of, disagreements, hard_states, mutated, random_changes
@@ -100,7 +101,9 @@ def differences(
     file = folder / "state.toml"
     file.write_text(told["scenario"], encoding="utf-8")
     try:
-        result = _run_in_python(program, file, told["time"])
+        # The record of a run that fails is shorter than the run that was asked for.
+        length = told["time"][-1] if told["ending"] == "completed" else parse_quantity(changes["run.duration"], "s")
+        result = _run_in_python(program, file, length)
     except PpafoError as error:
         return None if told["ending"] == "refused" else f"Python refuses what the page runs: {error}"
     if told["ending"] == "refused":
@@ -108,12 +111,12 @@ def differences(
     return _departure(told, result)
 
 
-def _run_in_python(program: Mapping[str, Any], file: Path, times: Sequence[float]) -> Result | WalkResult:
-    """Run what the page wrote; a walk, whose file says nothing of its length, as long as the page did."""
+def _run_in_python(program: Mapping[str, Any], file: Path, length: float) -> Result | WalkResult:
+    """Run what the page wrote; a walk, whose file says nothing of its length, for as long [s] as the page did."""
     if program["kind"] == "scenario":
         return simulate(load_scenario(str(file)))
     configuration = load_walk(file)
-    return walk(configuration, minutes=times[-1] / 60.0 if len(times) else None)
+    return walk(configuration, minutes=length / 60.0)
 
 
 def _departure(told: Mapping[str, Any], result: Result | WalkResult) -> str:
