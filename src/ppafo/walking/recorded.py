@@ -141,7 +141,9 @@ def swing_knee_torque(run: Run, time: Floats, record: Mapping[str, Any]) -> Floa
     leg = run.walk.leg
     theta, phi = record["state.angle"], record["walk.now.shank"]
     alpha = phi - theta + 0.5 * np.pi
-    ankle_acceleration = np.gradient(record["state.angular_velocity"], time)
+    rate = record["state.angular_velocity"]
+    # A walk that fails at once has one sample, and no acceleration is known of it.
+    ankle_acceleration = np.gradient(rate, time) if len(time) > 1 else np.zeros_like(rate)
     matrix = mass_matrix(leg, np.cos(theta))
     turning = centrifugal_torques(leg, np.sin(theta), record["walk.now.shank_rate"], record["state.angular_velocity"])
     forward, up = record["walk.now.knee_forward"], record["walk.now.knee_up"]

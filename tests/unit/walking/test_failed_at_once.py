@@ -1,0 +1,19 @@
+"""A walk that fails within its first sample says so, as every other failure."""
+
+from ppafo.walking.loading import load_walk
+from ppafo.walking.walk import walk
+
+# The ankle begins beyond the stop of a device whose chambers can neither hold nor vent their gas.
+BEYOND = (
+    "actuator.angle_max=81.7 deg",
+    "actuator.volume_per_angle=100.8 cm^3/rad",
+    "valve.discharge_coefficient=0.0116",
+)
+
+
+def test_a_walk_that_fails_at_once_has_a_status_and_one_sample() -> None:
+    result = walk(load_walk("off", BEYOND), minutes=0.09)
+    assert result.status.kind == "diverged"
+    assert "try a smaller run.step, and check the wearer" in result.status.message
+    assert len(result.recording.time) == 1
+    assert result.recording["swing_knee_torque"].shape == (1,)
