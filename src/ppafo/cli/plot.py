@@ -2,7 +2,7 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ppafo.cli.output import EXIT_GOOD, add_json_argument, check_new_file, print_result
 from ppafo.cli.quick_imports import load_drawing
@@ -98,22 +98,22 @@ def _draw_folder(folder: Path, names: list[str]) -> "dict[str, Figure]":
 
 def _draw_rig(folder: Path, names: list[str]) -> "dict[str, Figure]":
     """Return a figure of each recording of the rig; gauge pressure counts from the atmosphere of its device."""
-    from ppafo.answers.recording_figure import recording_figure
+    from ppafo.answers.recording_figure import recording_figure, stated_atmosphere
     from ppafo.rig.folder import RIG_FILE
     from ppafo.storage import read_recording
 
-    tables = [name for name in names if name.endswith(".csv")]
-    zeros = {name: _atmosphere(folder / RIG_FILE, "recordings", name, "device") for name in tables}
-    recordings = {name: read_recording(folder / name) for name in tables}
+    file = folder / RIG_FILE
+    document, tables = _document(file), [name for name in names if name.endswith(".csv")]
+    zeros = {name: stated_atmosphere(file, document, "recordings", name, "device") for name in tables}
     return {
-        name.removesuffix(".csv"): recording_figure(recording, atmosphere=zeros[name])
-        for name, recording in recordings.items()
+        name.removesuffix(".csv"): recording_figure(read_recording(folder / name), atmosphere=zero)
+        for name, zero in zeros.items()
     }
 
 
 def _draw_end(folder: Path, names: list[str]) -> "Figure":
     """Return the figure of the end of a walk."""
-    from ppafo.answers.recording_figure import recording_figure
+    from ppafo.answers.recording_figure import recording_figure, stated_atmosphere
     from ppafo.constants import STANDARD_ATMOSPHERE
     from ppafo.questions.endurance.draw import WALK_FILE
     from ppafo.storage import read_recording
@@ -122,20 +122,20 @@ def _draw_end(folder: Path, names: list[str]) -> "Figure":
     recording = read_recording(folder / NETCDF_FILE)
     end = float(recording.time[-1])
     remark = f"the last {_END:g} s of {end:.4g} s" if recording.duration > _END else ""
-    is_walk = WALK_FILE in names
-    zero = _atmosphere(folder / WALK_FILE, "configuration", "device") if is_walk else STANDARD_ATMOSPHERE
+    zero, file = STANDARD_ATMOSPHERE, folder / WALK_FILE
+    if WALK_FILE in names:
+        zero = stated_atmosphere(file, _document(file), "configuration", "device")
     return recording_figure(recording.between(end - _END, end), recording.label, remark, zero)
 
 
-def _atmosphere(file: Path, *device: str) -> float:
-    """Return the atmosphere [Pa absolute] of the device that a JSON file has at some keys."""
-    from ppafo.answers.recording_figure import stated_atmosphere
+def _document(file: Path) -> dict[str, Any]:
+    """Return the names and values of a JSON file."""
     from ppafo.storage.owned_folder import read_json
 
     document = read_json(file)
     if not isinstance(document, dict):
         raise DataError(f"{file}: is not a table of names and values")
-    return stated_atmosphere(file, document, *device)
+    return document
 
 
 def _say_what_is_there(parsed: argparse.Namespace, names: list[str]) -> int:

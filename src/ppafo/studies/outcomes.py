@@ -8,6 +8,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import ScenarioError, StudyError, UnitError, first_twice, nearest_name
 from ppafo.metrics import METRICS
 from ppafo.parameters.parameter_set import ATMOSPHERE_PATH
@@ -17,7 +18,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import OPEN_LOOP
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import MAXIMUM_DRAWS
-from ppafo.units import conversion, parse_quantity, split_quantity
+from ppafo.units import parse_quantity
 
 _LEVELS = {"Pa": "Pa_a", "-": ""}
 _DIFFERENCES = {"Pa": "Pa_d", "-": ""}
@@ -177,17 +178,23 @@ def level_of(text: str, metric: str, what: str, atmosphere: float | None) -> flo
     StudyError, whose message ``what`` begins, where the unit does not fit, and for a gauge pressure where the runs have
     no one atmosphere, which is None then.
     """
-    unit = METRICS[metric].unit
-    si_unit = _LEVELS.get(unit, unit)
-    if atmosphere is not None:
-        return _number(text, si_unit, what, atmosphere)
-    absolute = _number(text, si_unit, what, 0.0)
-    if conversion(split_quantity(text)[1], si_unit)[2]:
+    atmospheres = (0.0, STANDARD_ATMOSPHERE) if atmosphere is None else (atmosphere,)
+    found = common_level(text, METRICS[metric].unit, what, atmospheres)
+    if found is None:
         raise StudyError(
             f"{what}: a gauge pressure counts from {ATMOSPHERE_PATH}, which varies here; give an absolute pressure, "
             "for example '446 kPa_a'"
         )
-    return absolute
+    return found
+
+
+def common_level(text: str, unit: str, what: str, atmospheres: Collection[float]) -> float | None:
+    """Return a level in a unit of metrics; None for a gauge pressure under several atmospheres [Pa absolute].
+
+    StudyError, whose message ``what`` begins, where the unit does not fit.
+    """
+    found = {_number(text, _LEVELS.get(unit, unit), what, atmosphere) for atmosphere in atmospheres}
+    return found.pop() if len(found) == 1 else None
 
 
 def difference_of(text: str, metric: str, what: str) -> float:

@@ -60,8 +60,8 @@ class WalkResult:
 
     ``averages`` and ``metrics`` are those of the strides with help, without the first ones, in which the controller
     learns; ``vented_metrics`` those of the strides with less help (lifted only, paused or stopped), {} without such.
-    ``starts`` are the samples of the recording right after each heel strike, ``helped`` tells of each stride whether
-    it had help throughout, and ``events`` are the pauses, the stop and the returns of help. ``segments`` are those of a
+    ``starts`` are the samples of the recording right after each heel strike, ``helped`` is True for each stride with
+    help throughout, and ``events`` are the pauses, the stop and the returns of help. ``segments`` are those of a
     course, none without one; means are then over its strides at an even speed on level ground.
     ``supply`` is the bottle over the walk, None where the device hangs on none.
     """

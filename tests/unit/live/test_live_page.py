@@ -6,7 +6,6 @@ import random
 import re
 import shutil
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,6 @@ from ppafo.live.workbench import DEFAULT, workbench
 from ppafo.simulation.loading import load_scenario
 from ppafo.units import parse_quantity
 from ppafo.walking import list_walks, load_walk
-from scripts.live_page import browser as headless
 from scripts.live_page import check_bits, check_damage, check_refusals, missing, opened, programs_by_tab
 from scripts.page_states import address_of, hard_states
 
@@ -62,19 +60,6 @@ has_tools = pytest.mark.skipif(
     shutil.which("node") is None or not (TOOLS / "esbuild").is_dir(),
     reason="node or the tools in page/node_modules are not there",
 )
-
-
-@pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = tmp_path_factory.mktemp("page") / "workbench.html"
-    made.write_bytes(workbench())
-    return made
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    with headless() as found:
-        yield found
 
 
 def test_the_page_is_one_file_of_at_most_250_kilobytes_that_names_no_other(file: Path) -> None:

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.live.workbench import workbench
 from scripts.browsers import NAMES, DrivenPage, driven, missing
 from scripts.live_page import check_bits, check_damage
 
@@ -20,13 +19,6 @@ LOAD = """text => {
     chooser.files = chosen.files;
     chooser.dispatchEvent(new Event("change"));
 }"""
-
-
-@pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = tmp_path_factory.mktemp("page") / "workbench.html"
-    made.write_bytes(workbench())
-    return made
 
 
 @pytest.fixture(scope="module", params=NAMES)

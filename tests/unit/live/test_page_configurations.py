@@ -1,15 +1,12 @@
 """Several configurations on the page that simulates, in a headless browser: axes, gauge pressures, focus, late work."""
 
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from ppafo.constants import PASCALS_PER_PSI
-from ppafo.live.workbench import workbench
-from scripts.live_page import browser as headless
 from scripts.live_page import missing, opened
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=missing() or "there is a browser")
@@ -52,19 +49,6 @@ _LOAD = """files => {
     }
 }"""
 """Choose files of states one after the other; one called slow.json is read slowly."""
-
-
-@pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = tmp_path_factory.mktemp("page") / "workbench.html"
-    made.write_bytes(workbench())
-    return made
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    with headless() as found:
-        yield found
 
 
 def wait_until(page: Any, expression: str, seconds: float = 60.0) -> None:

@@ -155,9 +155,9 @@ def test_the_lanes_have_the_same_bits_on_the_angle_that_the_joint_took(
 def test_a_library_for_windows_has_the_bits_of_the_lanes(
     name: str, request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    unpacked = Path(os.environ.get(WINDOWS_MUJOCO, "")).absolute()
-    if not os.environ.get(WINDOWS_MUJOCO):
+    if not (named := os.environ.get(WINDOWS_MUJOCO)):
         pytest.skip(f"{WINDOWS_MUJOCO} names no unpacked wheel of MuJoCo for Windows")
+    unpacked = Path(named).absolute()
     if shutil.which("wine") is None:
         pytest.skip("wine is not on this machine")
     pytest.importorskip("ziglang", reason="needs the extra 'native'")

@@ -80,7 +80,7 @@ class UdpPort:
                 continue
             if self._other is None:
                 if not Reader(is_stream=False).take(data):
-                    return data  # it is counted, and tells nothing of who the other side is
+                    return data  # counted as refused; its sender is not accepted as the peer
                 self._other = sender
             if sender[:2] == self._other[:2]:
                 return data

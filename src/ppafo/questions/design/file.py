@@ -22,6 +22,7 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import OPEN_LOOP
 from ppafo.studies.noise import NOISE
+from ppafo.studies.outcomes import common_level
 from ppafo.units import parse_quantity
 
 FILE = TomlKind("design", "design", resources.files("ppafo.questions.design") / "library", StudyError)
@@ -317,11 +318,8 @@ def _constraints(document: DesignFile, atmospheres: frozenset[float], file: str)
 
 
 def _limit(text: str, unit: str, place: str, atmospheres: frozenset[float]) -> float:
-    wanted = {"Pa": "Pa_a", "-": ""}.get(unit, unit)
-    try:
-        found = {parse_quantity(text, wanted, atmosphere) for atmosphere in atmospheres}
-    except UnitError as error:
-        raise StudyError(f"{place} = '{text}': {error}") from error
-    if len(found) > 1:
-        raise StudyError(f"{place} = '{text}': the designs have several atmospheres; give an absolute pressure")
-    return found.pop()
+    what = f"{place} = '{text}'"
+    found = common_level(text, unit, what, atmospheres)
+    if found is None:
+        raise StudyError(f"{what}: the designs have several atmospheres; give an absolute pressure")
+    return found
