@@ -4,7 +4,6 @@ import dataclasses
 import os
 import sys
 from collections.abc import Callable, Iterator
-from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NoReturn
@@ -12,24 +11,18 @@ from typing import Any, NoReturn
 import pytest
 
 from ppafo.engine import cache
-from ppafo.engine.compilers import BACKEND_VARIABLE
+from ppafo.engine.loading import BACKEND_VARIABLE, NUMBA
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 
 TESTS = Path(__file__).parent
 BY_NUMBA = (
-    "unit/engine/test_cache",
     "unit/engine/test_compile",
-    "unit/engine/test_lane",
-    "unit/engine/test_private_cache",
     "unit/engine/test_source_text",
-    "unit/engine/test_strict_arithmetic",
-    "unit/questions/bits",
     "unit/cli/test_start_up.py",
     "contract/test_compiled_kinds.py",
-    "acceptance/test_reproduce_command.py",
 )
-"""Tests of the lanes as users have them. zig compiles for the others, with the same bits in a fraction of the time."""
+"""Tests of what Numba does. The first compiler of this computer compiles for the others, with the same bits."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -39,7 +32,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Let no model be compiled where the tests are to be quick, and none be watched by coverage while it is."""
-    cache._run = _unwatched(cache._run)
+    cache._execute = _unwatched(cache._execute)
     if config.getoption("--quick"):
         cache._import_program = _skip_test
 
@@ -64,11 +57,11 @@ def _skip_test(name: str, source: str) -> NoReturn:
 
 @pytest.fixture(scope="module", autouse=True)
 def compiler_of_models(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Let zig compile what is not BY_NUMBA, if it is here and no other compiler is asked for."""
+    """Let Numba compile what is BY_NUMBA."""
     place = Path(request.node.path).relative_to(TESTS).as_posix()
     with pytest.MonkeyPatch.context() as patch:
-        if not place.startswith(BY_NUMBA) and find_spec("ziglang") and BACKEND_VARIABLE not in os.environ:
-            patch.setenv(BACKEND_VARIABLE, "zig")
+        if place.startswith(BY_NUMBA):
+            patch.setenv(BACKEND_VARIABLE, NUMBA)
         yield
 
 

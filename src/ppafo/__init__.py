@@ -225,13 +225,13 @@ def _compiler_of_c(name: str) -> Compiler:
     return made
 
 
-def _warp_compiler() -> Compiler:
-    """Return NVIDIA Warp, for a graphics card where there is one."""
-    made: Compiler = importlib.import_module("ppafo.translation.warp").compiler()
+def _numba() -> Compiler:
+    """Return Numba."""
+    made: Compiler = importlib.import_module("ppafo.engine.numba_compiler").numba_compiler()
     return made
 
 
-offer({**{name: partial(_compiler_of_c, name) for name in ("c", "gcc", "clang", "zig")}, "warp": _warp_compiler})
+offer({**{name: partial(_compiler_of_c, name) for name in ("clang", "gcc", "zig")}, "numba": _numba})
 
 
 def __getattr__(name: str) -> Any:

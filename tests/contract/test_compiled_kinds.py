@@ -13,6 +13,7 @@ import pytest
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.cache import load_generated
+from ppafo.engine.numba_compiler import NumbaCompiler
 from ppafo.engine.reference.source import HEADER
 from ppafo.engine.rows import numbers, rebuild
 from ppafo.engine.source_text import SourceCollector
@@ -187,7 +188,7 @@ def compiled() -> Any:
         lines += [f"    if which == {number}:", f"        {result} = {collector.add(entry.function)}({given})"]
         lines += [f"        y[{place}] = {path}" for place, path in enumerate(paths)]
     loop = '@njit("void(int64, float64[::1], float64[::1])", cache=True, error_model="numpy")\ndef run(which, x, y):'
-    return load_generated("contract", "\n".join([HEADER, collector.text(), loop, *lines]) + "\n")
+    return load_generated("\n".join([HEADER, collector.text(), loop, *lines]) + "\n", NumbaCompiler())
 
 
 @pytest.mark.parametrize("name", ENTRIES)

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from types import ModuleType
 from typing import Any
 
-from ppafo.engine.compilers import chosen_compiler
+from ppafo.engine.loading import NUMBA, chosen_compiler
 
 _LINEAR_ALGEBRA = "scipy.linalg"
 
@@ -19,7 +19,7 @@ def load_compiler() -> None:
 
     SimulationError where ``PPAFO_BACKEND`` names what is no compiler, or one that is not here.
     """
-    if chosen_compiler() is not None:
+    if chosen_compiler().name != NUMBA:
         return
     if "numba" in sys.modules or _LINEAR_ALGEBRA in sys.modules:
         return

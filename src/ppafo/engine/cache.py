@@ -18,17 +18,14 @@ import threading
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from types import ModuleType
 
 from ppafo.documents.regular_file import read_regular_file
-from ppafo.engine.compile_errors import mistake
-from ppafo.engine.compile_times import SECONDS_FILE, SECONDS_PER_BYTE, announce, estimate_seconds, number_models
+from ppafo.engine.compile_times import SECONDS_FILE, announce, estimate_seconds, number_models
 from ppafo.engine.compilers import Compiler
 from ppafo.engine.private_folder import WRITTEN_BY_OTHERS, refusal
 from ppafo.engine.program_lock import LOCK, one_process
-from ppafo.engine.shared_functions import check_numba_can_write, compile_text, numba_files_beside_source, run_text
 from ppafo.engine.source_text import without_origins
 from ppafo.errors import reason
 
@@ -44,10 +41,10 @@ MAXIMUM_BYTES = 500_000_000
 _PROGRAM = re.compile(r"ppafo_[a-z]+_[0-9a-f]{24}(-[0-9a-f]{12}|\..+)?")
 """What the name of a program looks like; beside it, one of an earlier release, which lay in several files."""
 
-_ASIDE = re.compile(rf"\.writing-[0-9a-f]{{16}}|{re.escape(LOCK)}{_PROGRAM.pattern}")
+NOTE = "not-working-"
+_ASIDE = re.compile(rf"\.writing-[0-9a-f]{{16}}|{re.escape(LOCK)}{_PROGRAM.pattern}|{NOTE}[a-z]+-[0-9a-f]{{12}}")
 _LONGEST_ASIDE = 86400.0
 _CHECKSUMS = "checksums.json"
-_KEPT, _NOT_KEPT = "cache=True", "cache=False"
 _LOADING = threading.RLock()
 
 
@@ -75,68 +72,65 @@ def cache_folder() -> Path | None:
 
 @dataclass(frozen=True, slots=True)
 class _Wanted:
-    """A program: of which kind, its text, and what compiles it where that is not Numba."""
+    """A program: its text, and what compiles it."""
 
-    kind: str
     source: str
-    compiler: Compiler | None
+    compiler: Compiler
 
     @property
     def name(self) -> str:
         """Name of its module."""
-        kind = self.kind if self.compiler is None else self.compiler.name
-        return f"ppafo_{kind}_{hashlib.sha256(without_origins(self.source).encode()).hexdigest()[:24]}"
+        return f"ppafo_{self.compiler.name}_{hashlib.sha256(without_origins(self.source).encode()).hexdigest()[:24]}"
 
     def place(self, folder: Path) -> Path:
         """Where it is kept."""
-        compiled_by = _machine() if self.compiler is None else _short_hash(self.compiler.identity())
-        return folder / f"{self.name}-{compiled_by}"
+        return folder / f"{self.name}-{_short_hash(self.compiler.identity())}"
 
     def compile(self, path: Path) -> ModuleType:
         """Compile it, beside ``path`` where that is a place."""
-        if self.compiler is not None:
-            return _execute(self.name, self.source, path, self.compiler.compile_text)
-        source = self.source if path.is_absolute() else self.source.replace(_KEPT, _NOT_KEPT)
-        return _run(self.name, source, path, compile_text)
+        return _execute(self.name, self.source, path, self.compiler.compile_text)
 
     def load(self, path: Path) -> ModuleType:
         """Load what was compiled beside ``path``."""
-        if self.compiler is not None:
-            return _execute(self.name, self.source, path, self.compiler.run_text)
-        return _run(self.name, self.source, path, run_text)
+        return _execute(self.name, self.source, path, self.compiler.run_text)
 
     def estimate(self, kept: Iterable[Path]) -> float:
         """About how long it takes to compile [s]."""
         kind = self.name.rpartition("_")[0]
         alike = [place for place in kept if place.name.startswith(f"{kind}_")]
-        usual = SECONDS_PER_BYTE if self.compiler is None else self.compiler.seconds_per_byte
-        return estimate_seconds(self.source, alike, usual)
+        return estimate_seconds(self.source, alike, self.compiler.seconds_per_byte)
 
 
-def load_generated(kind: str, source: str, compiler: Compiler | None = None) -> ModuleType:
-    """Import the module with this source, from the cache where it is there and whole; Numba or ``compiler`` compiles.
+def load_generated(source: str, compiler: Compiler) -> ModuleType:
+    """Import the module with this source, from the cache where it is there and whole; else it is compiled.
 
-    ProgramError where it cannot be compiled, in terms of the file that the function at fault was written in.
+    ProgramError where it cannot be compiled, in terms of the file that the function at fault was written in;
+    CompilerError where the compiler does not work.
     """
-    wanted = _Wanted(kind, source, compiler)
+    wanted = _Wanted(source, compiler)
     # A second thread must not get a module of which only the beginning has run.
     with _LOADING:
         return sys.modules[wanted.name] if wanted.name in sys.modules else _import_program(wanted)
 
 
-def load_all(kind: str, sources: Iterable[str], compiler: Compiler | None = None) -> None:
-    """Import the modules with these sources; what is said of those that are compiled counts them."""
+def load_all(sources: Iterable[str], compiler: Compiler, load: Callable[[str], ModuleType]) -> None:
+    """Import the modules with these sources by ``load``; messages about those that are compiled count them."""
     with _LOADING:
-        folder = cache_folder()
-        programs = [_Wanted(kind, source, compiler) for source in dict.fromkeys(sources)]
-        missing = [wanted.source for wanted in programs if not _is_there(wanted, folder)]
+        missing = [source for source in dict.fromkeys(sources) if not is_kept(source, compiler)]
         for number, source in enumerate(missing, 1):
             with number_models(number, len(missing)):
-                load_generated(kind, source, compiler)
+                load(source)
 
 
-def _is_there(wanted: _Wanted, folder: Path | None) -> bool:
+def is_kept(source: str, compiler: Compiler) -> bool:
+    """True where a program was loaded by this compiler already, or lies in the cache."""
+    wanted, folder = _Wanted(source, compiler), cache_folder()
     return wanted.name in sys.modules or (folder is not None and os.path.lexists(wanted.place(folder)))
+
+
+def note_name(compiler: Compiler) -> str:
+    """Name of the file in the cache that says why a compiler does not work on this computer."""
+    return f"{NOTE}{compiler.name}-{_short_hash(compiler.identity())}"
 
 
 def list_programs(folder: Path) -> list[CachedProgram]:
@@ -231,19 +225,6 @@ def _compile_in_memory(wanted: _Wanted) -> ModuleType:
         return wanted.compile(Path(f"<{wanted.name}>"))
 
 
-def _run(name: str, source: str, path: Path, execute: Callable[[str, str, ModuleType], None]) -> ModuleType:
-    """Return the module that Numba makes by running its source."""
-    from numba.core.errors import NumbaError
-
-    try:
-        with numba_files_beside_source():
-            if path.is_absolute():
-                check_numba_can_write(path.parent / "__pycache__")
-            return _execute(name, source, path, execute)
-    except NumbaError as error:
-        raise mistake(str(error), source) from None
-
-
 def _execute(name: str, source: str, path: Path, execute: Callable[[str, str, ModuleType], None]) -> ModuleType:
     """Return the module that ``execute`` fills; Python's own compiled file, which may be damaged, is not asked."""
     module = ModuleType(name)
@@ -255,17 +236,6 @@ def _execute(name: str, source: str, path: Path, execute: Callable[[str, str, Mo
         del sys.modules[name]
         raise
     return module
-
-
-@cache
-def _machine() -> str:
-    """Return a short hash of the processor and of the compiler: programs of others must not be taken for damaged."""
-    import numba
-    from numba.core.registry import cpu_target
-
-    processor = cpu_target.target_context.codegen().magic_tuple()
-    described = repr((processor, numba.__version__, sys.implementation.cache_tag))
-    return _short_hash(described)
 
 
 def _short_hash(described: str) -> str:

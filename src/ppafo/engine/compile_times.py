@@ -16,8 +16,6 @@ QUIET = 2.0
 """Seconds of compiling that nobody has to hear of."""
 SECONDS_FILE = "seconds.txt"
 """The file of a kept program that says how long it took to compile [s]."""
-SECONDS_PER_BYTE = 2.5e-4
-"""Of source text; what a common computer takes, until this one has compiled something."""
 _MAXIMUM_ASKED = 20
 
 _place = (1, 1)
@@ -58,7 +56,7 @@ def announce(expected: float, where: str) -> Iterator[None]:
         logger.warning("ppafo: compiled in %.1f s and %s", seconds, where)
 
 
-def estimate_seconds(source: str, kept: Iterable[Path], usual: float = SECONDS_PER_BYTE) -> float:
+def estimate_seconds(source: str, kept: Iterable[Path], usual: float) -> float:
     """Return about how long [s] a source takes to compile, from how long the kept programs of this computer took."""
     rates = []
     for folder in kept:

@@ -1,25 +1,29 @@
-"""Which compiler makes a program of its text: Numba, or one of C or of kernels, which is handed over from above.
+"""What a compiler of programs is to the engine, and which of them there are.
 
-The engine writes the text of a program and knows no other language. What compiles it through another one is offered by
-the package as a whole, where it is imported, and taken where ``PPAFO_BACKEND`` asks for it.
+The engine writes the text of a program and knows no other language than Python. What compiles it through C lies above
+and is offered by the package as a whole, where it is imported.
 """
 
-import os
 from collections.abc import Callable, Mapping
 from types import ModuleType
 from typing import Protocol
 
-from ppafo.errors import SimulationError, nearest_name, one_line
+from ppafo.errors import SimulationError
 
-BACKEND_VARIABLE = "PPAFO_BACKEND"
-NUMBA = "numba"
-"""What compiles where nothing else is asked for."""
+
+class CompilerError(SimulationError):
+    """A compiler does not work on this computer, whatever the program; ``names`` are all that fail for this reason."""
+
+    def __init__(self, problem: str, *names: str) -> None:
+        super().__init__(problem)
+        self.names = names
 
 
 class Compiler(Protocol):
-    """Makes a module that does what the composed text says; both ways fill ``module``, and raise ProgramError.
+    """Makes a module that does what the composed text says; both ways fill ``module``.
 
-    ``path`` is where the text lies, alone in its folder, or no place at all where nothing is kept.
+    They raise ProgramError where the text cannot be compiled, and CompilerError where the compiler does not work.
+    ``path`` is where the text lies, alone in its folder, or no absolute path where nothing is kept.
     """
 
     @property
@@ -29,10 +33,6 @@ class Compiler(Protocol):
     @property
     def seconds_per_byte(self) -> float:
         """What a common computer takes for a byte of the text, until this one has compiled something [s]."""
-
-    @property
-    def runs_at_once(self) -> int:
-        """Most runs of a call where the text is that of one lane, run for each column; 0 for a block of lanes."""
 
     def __hash__(self) -> int:
         """Tells compilers apart."""
@@ -50,21 +50,10 @@ class Compiler(Protocol):
         """Load what was kept beside ``path``."""
 
 
-_OFFERED: dict[str, Callable[[], Compiler]] = {}
+OFFERED: dict[str, Callable[[], Compiler]] = {}
+"""Compilers by name, the one to prefer first; each raises SimulationError where it is not on this computer."""
 
 
 def offer(compilers: Mapping[str, Callable[[], Compiler]]) -> None:
-    """Let ``PPAFO_BACKEND`` name compilers; each is made when it is first asked for."""
-    _OFFERED.update(compilers)
-
-
-def chosen_compiler() -> Compiler | None:
-    """Return the compiler that ``PPAFO_BACKEND`` names, None for Numba; SimulationError for a name that is none."""
-    name = os.environ.get(BACKEND_VARIABLE) or NUMBA
-    if name == NUMBA:
-        return None
-    if name not in _OFFERED:
-        allowed = (NUMBA, *_OFFERED)
-        hint = nearest_name(name, allowed)
-        raise SimulationError(f"{BACKEND_VARIABLE}: '{one_line(name)}' is none of {', '.join(allowed)}{hint}")
-    return _OFFERED[name]()
+    """Let programs be compiled by these, each made when it is first needed, and preferred in this order."""
+    OFFERED.update(compilers)

@@ -1,7 +1,5 @@
 """Runs many devices at once: blocks of up to 32 lanes, spread over threads, the same numbers in any order.
 
-Where a graphics card runs them, a block is as many runs as it takes at once.
-
 A run's result does not depend on its block, its place in it or the number of threads, because every lane goes
 through the same instructions and no lane sees another.
 """
@@ -18,10 +16,9 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.cache import load_all, load_generated
-from ppafo.engine.compilers import Compiler, chosen_compiler
 from ppafo.engine.lane_rows import VECTOR, lanes_of
 from ppafo.engine.lane_source import INLINE, SAME_MOMENT, write_lanes
+from ppafo.engine.loading import load_source, load_sources
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
 
@@ -89,34 +86,23 @@ def load_program(program: Program) -> ModuleType:
 
     A program is written anew where a number or function that it was made from stands for something else by now.
     """
-    return load_program_by(program, chosen_compiler())
-
-
-def load_program_by(program: Program, compiler: Compiler | None) -> ModuleType:
-    """The same by a compiler, None for Numba."""
-    return load_source(_current_source(program, _lanes_for(compiler)), compiler)
+    return load_source(_current_source(program))
 
 
 def load_programs(programs: Iterable[Program]) -> None:
     """Load the compiled modules of programs that are all needed, so that what is compiled can be counted."""
     chosen = dict.fromkeys(programs)
     if len(chosen) > 1:
-        compiler = chosen_compiler()
-        load_all("lanes", [_current_source(program, _lanes_for(compiler)) for program in chosen], compiler)
+        load_sources([_current_source(program) for program in chosen])
 
 
-def _lanes_for(compiler: Compiler | None) -> int:
-    """Lanes in the text that a compiler takes, 0 for as many as fit."""
-    return 1 if compiler is not None and compiler.runs_at_once else 0
-
-
-def _current_source(program: Program, lanes: int) -> str:
+def _current_source(program: Program) -> str:
     """The source of a program, written anew where it is out of date."""
-    collector, source = write_source(program, lanes)
+    collector, source = write_source(program)
     if collector.is_current():
         return source
     write_source.cache_clear()
-    return write_source(program, lanes)[1]
+    return write_source(program)[1]
 
 
 @lru_cache(maxsize=64)
@@ -124,12 +110,6 @@ def write_source(program: Program, lanes: int = 0) -> tuple[SourceCollector, str
     """What a program is made from, and its source for some lanes, 0 for as many as fit."""
     collector = SourceCollector(INLINE)
     return collector, write_lanes(program, collector, lanes)
-
-
-@lru_cache(maxsize=64)
-def load_source(source: str, compiler: Compiler | None = None) -> ModuleType:
-    """The module of a source."""
-    return load_generated("lanes", source, compiler)
 
 
 def run_batch(batch: Batch, threads: int | None = None) -> BatchResult:
@@ -147,8 +127,7 @@ def run_blocks(batch: Batch, take: Callable[[slice, BatchResult], None], threads
     """Run a batch block by block, and give each result away at once: ``take(runs, result)``, from several threads."""
     module = load_program(batch.program)
     runs = batch.states.shape[1]
-    compiler = chosen_compiler()
-    lanes = (compiler.runs_at_once if compiler else 0) or lanes_of(batch.program)
+    lanes = lanes_of(batch.program)
     starts = range(0, runs, lanes)
     workers = min(len(starts), threads or os.cpu_count() or 1)
 

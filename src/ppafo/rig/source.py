@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from ppafo.engine.cache import load_generated
+from ppafo.engine.numba_compiler import NumbaCompiler
 from ppafo.engine.reference.derivative import ExactOrifice
 from ppafo.engine.reference.source import HEADER, INLINE
 from ppafo.engine.rows import leaf_paths, row_expression
@@ -47,7 +48,7 @@ class RigProgram(NamedTuple):
 
 def load_rig_program() -> RigProgram:
     """Return the compiled right-hand side and observables of the rig."""
-    module = load_generated("rig", rig_source())
+    module = load_generated(rig_source(), NumbaCompiler())
     return RigProgram(module.fill, module.show)
 
 

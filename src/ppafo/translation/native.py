@@ -3,6 +3,7 @@
 import ctypes
 import hashlib
 import importlib.util
+import os
 import platform
 import subprocess
 import sys
@@ -17,9 +18,11 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.engine.compilers import CompilerError
 from ppafo.engine.lane_rows import lanes_of
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, join_results
-from ppafo.errors import ProgramError, SimulationError, one_line, reason
+from ppafo.engine.loading import HOW_TO_INSTALL, WITHOUT_C
+from ppafo.errors import SimulationError, one_line, reason
 from ppafo.translation.c99 import FLAGS, c_source
 from ppafo.translation.walk import walk_module
 
@@ -28,10 +31,8 @@ FOR_GCC = ("-fno-thread-jumps", "-fno-ssa-phiopt", "-fno-tree-pre", "--param", "
 _THIS_PROCESSOR = "-march=native" if platform.machine().lower() in ("x86_64", "amd64", "i686") else "-mcpu=native"
 _WIDEST_VECTORS = ("-mprefer-vector-width=512",) if _THIS_PROCESSOR.startswith("-march") else ()
 _LIBRARY = {"win32": "program.dll", "darwin": "program.dylib"}.get(sys.platform, "program.so")
-_HOW_TO_INSTALL = (
-    "install gcc or clang, or 'pip install ppafo[native]', which brings zig; PPAFO_BACKEND=numba needs none"
-)
-_OTHERWISE = "PPAFO_BACKEND=numba needs no compiler"
+COMPILERS = ("clang", "gcc", "zig")
+"""In the order of preference: lanes are about as quick by each."""
 _TITLE = "Generated from the functions of ppafo. Not to be edited."
 
 
@@ -52,22 +53,17 @@ class CCompiler:
         return 2.0e-5
 
     @property
-    def runs_at_once(self) -> int:
-        """None: a call takes a block of lanes."""
-        return 0
-
-    @property
     def flags(self) -> tuple[str, ...]:
         """Those for the bits, and those for this processor."""
         return (*FLAGS, _THIS_PROCESSOR, *_WIDEST_VECTORS, *(FOR_GCC if self.name == "gcc" else ()))
 
     def identity(self) -> str:
-        """Version of the compiler, flags, what the processor can do, and the translator itself."""
-        return repr((_version(self.command), self.flags, described_processor(), translator_hash()))
+        """The compiler's own file, flags, what the processor can do, and the translator itself."""
+        return repr((_file_identity(self.command[0]), self.flags, described_processor(), translator_hash()))
 
     def described(self) -> str:
         """Its name and version, as it says them."""
-        said = next(iter(_version(self.command).splitlines()), "")
+        said = next(iter(asked([*self.command, "--version"]).stdout.splitlines()), "")
         return f"C by {self.name}: {said}" if said else f"C by {self.name}"
 
     def compile_text(self, source: str, path: str, module: ModuleType) -> None:
@@ -81,7 +77,7 @@ class CCompiler:
             with tempfile.TemporaryDirectory(prefix="ppafo-", ignore_cleanup_errors=True) as folder:
                 _fill(module, self._build(translated, Path(folder)))
         except OSError as error:
-            raise SimulationError(f"what {self.name} makes cannot be used: {reason(error)}; {_OTHERWISE}") from error
+            raise CompilerError(f"what {self.name} makes cannot be kept for an instant: {reason(error)}") from error
 
     def run_text(self, _source: str, path: str, module: ModuleType) -> None:
         """Load the library beside ``path``."""
@@ -92,20 +88,13 @@ class CCompiler:
 
 
 def compiler(name: str) -> CCompiler:
-    """Return a compiler by name, gcc, clang or zig; for ``c`` the first that is here, the one with quick lanes first.
-
-    SimulationError where it is not on this machine.
-    """
-    wanted = ("clang", "zig", "gcc") if name == "c" else (name,)
-    for candidate in wanted:
-        command = _command(candidate)
-        if command:
-            return CCompiler(candidate, command)
-    missing = "no compiler of C" if name == "c" else f"'{name}' is not"
-    raise SimulationError(f"PPAFO_BACKEND={name}: {missing} on this computer: {_HOW_TO_INSTALL}")
+    """Return a compiler of C by name, one of ``COMPILERS``; SimulationError where it is not on this computer."""
+    command = _command(name)
+    if not command:
+        raise SimulationError(f"PPAFO_BACKEND={name}: '{name}' is not on this computer: {HOW_TO_INSTALL}; {WITHOUT_C}")
+    return CCompiler(name, command)
 
 
-@cache
 def _command(name: str) -> tuple[str, ...]:
     """The command of a compiler; empty where it is not on this machine."""
     if name != "zig":
@@ -119,16 +108,22 @@ def _command(name: str) -> tuple[str, ...]:
 
 
 @cache
-def _version(command: tuple[str, ...]) -> str:
-    return asked([*command, "--version"], _OTHERWISE).stdout
+def _file_identity(command: str) -> tuple[str, int, int]:
+    """Where a compiler's file is, its size and its time: an update changes them, and no process need be started."""
+    place = Path(command).resolve()
+    try:
+        found = place.stat()
+    except OSError:
+        return str(place), 0, 0
+    return str(place), found.st_size, found.st_mtime_ns
 
 
-def asked(line: Sequence[str], remedy: str, folder: str | None = None) -> "subprocess.CompletedProcess[str]":
-    """What a compiler says and how it ends, run in ``folder``; SimulationError with a remedy where it cannot be run."""
+def asked(line: Sequence[str], remedy: str = "", folder: str | None = None) -> "subprocess.CompletedProcess[str]":
+    """What a compiler says and how it ends, run in ``folder``; CompilerError, with a remedy, if it cannot be run."""
     try:
         return subprocess.run(line, cwd=folder, capture_output=True, encoding="utf-8", errors="replace", check=False)
     except OSError as error:
-        raise SimulationError(f"{line[0]} cannot be run: {reason(error)}; {remedy}") from error
+        raise CompilerError(f"{line[0]} cannot be run: {reason(error)}{remedy and '; '}{remedy}") from error
 
 
 def complaint(done: "subprocess.CompletedProcess[str]") -> str:
@@ -159,15 +154,12 @@ def translator_hash() -> str:
 
 
 def translated_text(source: str) -> str:
-    """The C of a composed text; ProgramError, with the way to run it, for what has none."""
-    try:
-        return c_source(walk_module(source), {}, _TITLE)
-    except ProgramError as error:
-        raise ProgramError(f"{error}; PPAFO_BACKEND=numba can run it") from None
+    """The C of a composed text; ProgramError for what has none."""
+    return c_source(walk_module(source), {}, _TITLE)
 
 
 def build(source: str, folder: Path, command: Sequence[str] = ("gcc",), flags: Sequence[str] = FLAGS) -> ModuleType:
-    """Compile C into a library in ``folder`` and load it; ProgramError where the compiler refuses it."""
+    """Compile C into a library in ``folder`` and load it; CompilerError where the compiler refuses it."""
     library = _compiled(source, folder, command, flags)
     module = ModuleType(library.stem)
     _fill(module, library)
@@ -176,24 +168,32 @@ def build(source: str, folder: Path, command: Sequence[str] = ("gcc",), flags: S
 
 def _compiled(source: str, folder: Path, command: Sequence[str], flags: Sequence[str]) -> Path:
     """The library that a compiler makes of C, in a folder."""
+    if _is_mounted_without_execution(folder):
+        raise CompilerError(f"libraries in {folder.parent} cannot be loaded (it is mounted noexec)", *COMPILERS)
     written, library = folder / "program.c", folder / _LIBRARY
     written.write_text(source, encoding="utf-8")
     position = () if sys.platform == "win32" else ("-fPIC",)
     line = [*command, *flags, "-shared", *position, str(written), "-o", str(library), "-lm"]
-    done, name = asked(line, _OTHERWISE), Path(command[0]).name
+    done, name = asked(line), Path(command[0]).name
     if done.returncode != 0:
-        raise ProgramError(f"{name} refuses the program: {complaint(done)}; {_OTHERWISE}")
+        raise CompilerError(f"{name} does not compile a model: {complaint(done)}")
     if not library.is_file():
-        raise SimulationError(f"{name} says that all is well, but made no library; {_OTHERWISE}")
+        raise CompilerError(f"{name} ended without an error, but made no library")
     return library
+
+
+def _is_mounted_without_execution(folder: Path) -> bool:
+    return hasattr(os, "ST_NOEXEC") and bool(os.statvfs(folder).f_flag & os.ST_NOEXEC)
 
 
 def _fill(module: ModuleType, library: Path) -> None:
     """Give a module the ``advance`` of a library."""
     try:
         entry = ctypes.CDLL(str(library)).advance
+    except OSError as error:
+        raise CompilerError(f"the library of a compiled model cannot be loaded: {one_line(error)}") from error
     except AttributeError:
-        raise SimulationError(f"the library that was made of the program lacks what is in it; {_OTHERWISE}") from None
+        raise CompilerError("the library of a compiled model lacks its functions") from None
     entry.restype = None
     module.__dict__["advance"] = lambda *given: entry(*map(_handed, given))
 

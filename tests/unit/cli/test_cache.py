@@ -6,19 +6,20 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.engine.cache import load_generated
+from ppafo.engine.cache import list_programs, load_generated
+from ppafo.engine.numba_compiler import NumbaCompiler
 from ppafo.simulation import simulate
 
 SOURCE = 'from numba import njit\n\n\n@njit("float64(float64)", cache=True)\ndef thrice(x):\n    return 3.0 * x\n'
 
 
 def test_cache_is_shown_and_cleared(fresh_cache: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    load_generated("test", SOURCE)
+    load_generated(SOURCE, NumbaCompiler())
     assert main(["cache", "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)
     assert shown["folder"] == str(fresh_cache)
     assert shown["not_used"] is None
-    assert [item["name"].startswith("ppafo_test_") for item in shown["programs"]] == [True]
+    assert [item["name"].startswith("ppafo_numba_") for item in shown["programs"]] == [True]
     assert shown["size"] == shown["programs"][0]["size"] > 1000
     assert main(["cache", "--clear", "--json"]) == 0
     cleared = json.loads(capsys.readouterr().out)
@@ -49,10 +50,8 @@ def test_warming_compiles_every_scenario_of_the_package(
 
 
 def test_model_that_was_compiled_for_later_is_the_one_that_a_run_uses(fresh_cache: Path) -> None:
-    from ppafo.engine.lanes import load_source
-
-    load_source.cache_clear()
     simulate.compile_models(["torque-task-proportional"])
-    asked = load_source.cache_info().misses
+    compiled = [program.place for program in list_programs(fresh_cache)]
     simulate.simulate("torque-task-proportional", ["run.duration=10 ms"])
-    assert load_source.cache_info().misses == asked == 1
+    assert [program.place for program in list_programs(fresh_cache)] == compiled
+    assert len(compiled) == 1

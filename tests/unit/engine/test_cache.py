@@ -12,6 +12,7 @@ import pytest
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.engine.cache import load_generated
 from ppafo.engine.lane_source import lane_source
+from ppafo.engine.numba_compiler import NumbaCompiler
 from ppafo.engine.program import Program
 from ppafo.engine.reference.source import right_hand_side_source
 from ppafo.engine.source_text import SourceCollector
@@ -71,7 +72,7 @@ def test_threads_that_load_one_module_at_once_all_get_the_whole_of_it(
     monkeypatch.setenv("PPAFO_CACHE_DIR", str(tmp_path))
     source = "import time\ntime.sleep(0.2)\nlast_line = 1\n"
     with ThreadPoolExecutor(4) as pool:
-        modules = list(pool.map(lambda _: load_generated("test", source), range(4)))
+        modules = list(pool.map(lambda _: load_generated(source, NumbaCompiler()), range(4)))
         assert [module.last_line for module in modules] == [1] * 4
     assert len({id(module) for module in modules}) == 1
     del sys.modules[modules[0].__name__]

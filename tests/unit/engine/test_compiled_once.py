@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.engine import program_lock, shared_functions
+from ppafo.engine import numba_compiler, program_lock
 from ppafo.engine.cache import load_generated
+from ppafo.engine.numba_compiler import NumbaCompiler
 from ppafo.engine.program_lock import LOCK, one_process
 from ppafo.errors import ProgramError
 
@@ -22,17 +23,19 @@ LOOP = "@njit('float64(float64)', cache=True)\ndef run(x):\n    return outer(Pai
 
 START = """
 import sys
-from ppafo.engine import cache, shared_functions
+from ppafo.engine import cache, numba_compiler
+from ppafo.engine.numba_compiler import NumbaCompiler
 
-compile_text = cache.compile_text
+compile_text = numba_compiler._compile_text
 
 def compile_and_say_so(*given):
     sys.stderr.write("compiling")
     compile_text(*given)
 
-cache.compile_text = compile_and_say_so
+numba_compiler._compile_text = compile_and_say_so
 """
 """A process that says on the side when it compiles."""
+LOAD = "print(cache.load_generated(sys.stdin.read(), NumbaCompiler())"
 
 
 def text(inner: str = "2.0 * x", added: str = "1.0", fast: str = "False") -> str:
@@ -41,30 +44,30 @@ def text(inner: str = "2.0 * x", added: str = "1.0", fast: str = "False") -> str
 
 @pytest.mark.usefixtures("fresh_cache")
 def test_two_programs_share_a_function_that_is_the_same_with_all_it_calls_and_no_other() -> None:
-    first, second = load_generated("test", text()), load_generated("test", text(added="3.0"))
+    first, second = load_generated(text(), NumbaCompiler()), load_generated(text(added="3.0"), NumbaCompiler())
     assert (first.run(5.0), second.run(5.0)) == (11.0, 13.0)
     assert first.outer is second.outer
     assert first.Pair is second.Pair
-    changed = load_generated("test", text(inner="4.0 * x"))
+    changed = load_generated(text(inner="4.0 * x"), NumbaCompiler())
     assert changed.run(5.0) == 21.0
     assert changed.outer is not first.outer
-    assert load_generated("test", text(fast="True")).inner is not first.inner
+    assert load_generated(text(fast="True"), NumbaCompiler()).inner is not first.inner
     assert first.run(5.0) == 11.0
 
 
 @pytest.mark.usefixtures("fresh_cache")
 def test_mistake_in_a_second_program_is_reported_with_its_own_lines_though_the_function_was_shared() -> None:
-    load_generated("test", text())
+    load_generated(text(), NumbaCompiler())
     wrong = "# a line more\n" + text().replace("Pair(x, 1.0)", "(x, 1.0)")
     with pytest.raises(ProgramError, match=r"pair has no 'a'|pair is a tuple and has no 'a'"):
-        load_generated("test", wrong)
-    assert load_generated("test", text(added="7.0")).run(5.0) == 17.0
+        load_generated(wrong, NumbaCompiler())
+    assert load_generated(text(added="7.0"), NumbaCompiler()).run(5.0) == 17.0
 
 
 def test_program_with_shared_functions_is_loaded_by_a_process_that_has_none(fresh_cache: Path) -> None:
     for added in ("1.5", "2.5"):
-        load_generated("test", text(added=added))
-    start = f"{START}shared_functions._SHARED = None\nprint(cache.load_generated('test', sys.stdin.read()).run(5.0))"
+        load_generated(text(added=added), NumbaCompiler())
+    start = f"{START}numba_compiler._SHARED = None\n{LOAD}.run(5.0))"
     found = subprocess.run(
         [sys.executable, "-c", start], input=text(added="2.5"), capture_output=True, text=True, check=True
     )
@@ -73,13 +76,13 @@ def test_program_with_shared_functions_is_loaded_by_a_process_that_has_none(fres
 
 
 SLOWLY = "import os, time\nopen(os.environ['SEEN'], 'a').write('x')\ntime.sleep(1.5)\nlast_line = 1\n"
-LOAD = f"{START}print(cache.load_generated('test', sys.stdin.read()))"
+LOAD_ONE = f"{START}{LOAD})"
 
 
 def start(source: str, seen: Path) -> "subprocess.Popen[str]":
     environment = {**os.environ, "SEEN": str(seen)}
     process = subprocess.Popen(
-        [sys.executable, "-c", LOAD], env=environment, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-c", LOAD_ONE], env=environment, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     assert process.stdin
     process.stdin.write(source)
@@ -113,7 +116,7 @@ def test_killed_process_holds_no_lock(fresh_cache: Path, tmp_path: Path) -> None
     os.environ["SEEN"] = str(tmp_path / "seen")
     begin = time.monotonic()
     try:
-        assert load_generated("test", source).last_line == 1
+        assert load_generated(source, NumbaCompiler()).last_line == 1
     finally:
         del os.environ["SEEN"]
     assert time.monotonic() - begin < 30.0
@@ -141,6 +144,6 @@ def test_garbage_collection_is_as_it_was_after_compiling(fresh_cache: Path) -> N
     import gc
 
     assert gc.isenabled()
-    load_generated("test", text(added="9.0"))
+    load_generated(text(added="9.0"), NumbaCompiler())
     assert gc.isenabled()
-    assert shared_functions._SHARED
+    assert numba_compiler._SHARED

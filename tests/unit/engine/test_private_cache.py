@@ -12,6 +12,7 @@ import pytest
 
 from ppafo.engine import cache
 from ppafo.engine.cache import cache_folder, clear, evict, list_programs, load_generated
+from ppafo.engine.numba_compiler import NumbaCompiler
 from ppafo.engine.private_folder import refusal
 
 SOURCE = 'from numba import njit\n\n\n@njit("float64(float64)", cache=True)\ndef twice(x):\n    return 2.0 * x\n'
@@ -19,7 +20,8 @@ SOURCE = 'from numba import njit\n\n\n@njit("float64(float64)", cache=True)\ndef
 RUN = f"""
 import sys
 from ppafo.engine.cache import load_generated
-print(load_generated("test", {SOURCE!r}).twice(21.0))
+from ppafo.engine.numba_compiler import NumbaCompiler
+print(load_generated({SOURCE!r}, NumbaCompiler()).twice(21.0))
 """
 
 
@@ -33,7 +35,7 @@ def compiled(fresh_cache: Path) -> Path:
 
 def loaded() -> float:
     """What the program says when it is loaded as a new process loads it."""
-    module = load_generated("test", SOURCE)
+    module = load_generated(SOURCE, NumbaCompiler())
     value = float(module.twice(21.0))
     del sys.modules[module.__name__]
     return value
@@ -185,7 +187,7 @@ def test_two_processes_that_compile_the_same_program_leave_it_whole(tmp_path: Pa
 
 
 def test_program_that_no_one_used_for_long_is_removed_and_a_used_one_stays(compiled: Path) -> None:
-    old = compiled.with_name(compiled.name.replace("ppafo_test", "ppafo_old"))
+    old = compiled.with_name(compiled.name.replace("ppafo_numba", "ppafo_old"))
     left = compiled.with_name(".writing-0123456789abcdef")
     for place in (old, left):
         place.mkdir()
@@ -197,7 +199,7 @@ def test_program_that_no_one_used_for_long_is_removed_and_a_used_one_stays(compi
 def test_programs_beyond_the_largest_size_are_removed_oldest_first(
     compiled: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    older = compiled.with_name(compiled.name.replace("ppafo_test", "ppafo_older"))
+    older = compiled.with_name(compiled.name.replace("ppafo_numba", "ppafo_older"))
     older.mkdir()
     (older / "large").write_bytes(bytes(1000))
     used = compiled.stat().st_mtime

@@ -17,6 +17,7 @@ from typing import Any
 import pytest
 
 from ppafo.engine.cache import load_generated
+from ppafo.engine.numba_compiler import NumbaCompiler
 from ppafo.engine.plain_python import parse_module
 from ppafo.engine.source_text import SourceCollector, without_origins
 from ppafo.errors import PpafoError, ProgramError
@@ -354,7 +355,7 @@ def compiled_law(module: types.ModuleType, call: str = "law(measurement, x[0])")
     row, law = collector.add(module.Measurement), collector.add(module.law)
     call = call.replace("law", law)
     loop = f'@njit("void(float64[::1])")\ndef advance(x):\n    measurement = {row}(x[0], x[1])\n    x[0] = {call}\n'
-    load_generated("test", f"{HEADER}{collector.text()}\n\n\n{loop}")
+    load_generated(f"{HEADER}{collector.text()}\n\n\n{loop}", NumbaCompiler())
 
 
 MEASUREMENT = (

@@ -2,23 +2,21 @@
 
 import ctypes
 import itertools
-import os
 import re
 import shutil
 import subprocess
 from collections.abc import Iterator
 from dataclasses import replace
 from importlib import resources
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from ppafo.engine.compilers import BACKEND_VARIABLE
 from ppafo.engine.lane_meters import walk_traces
 from ppafo.engine.lanes import Batch, run_batch
+from ppafo.engine.loading import BACKEND_VARIABLE, NUMBA
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
@@ -60,14 +58,14 @@ VARIED: tuple[tuple[str, tuple[str, ...]], ...] = (
 )
 """Every shipped walk, one with every further feature (sensors with faults, thermal gas, slow valve), and a course."""
 
-BY_NUMBA = {("solenoid", ()), ("proportional", ()), ("proportional-regulators", EVERYTHING)}
-"""Walks that Numba compiles for the comparison; zig, where it is here, takes the others in a fourth of the time."""
+BY_NUMBA = ("proportional-regulators", EVERYTHING)
+"""The walk whose lanes Numba compiles, so that no translator stands on both sides; it takes a minute."""
 
 
 def choose_compiler(name: str, overrides: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let zig compile the lanes of a walk that is none of ``BY_NUMBA``."""
-    if (name, overrides) not in BY_NUMBA and find_spec("ziglang") and BACKEND_VARIABLE not in os.environ:
-        monkeypatch.setenv(BACKEND_VARIABLE, "zig")
+    """Let Numba compile the lanes of ``BY_NUMBA``."""
+    if (name, overrides) == BY_NUMBA:
+        monkeypatch.setenv(BACKEND_VARIABLE, NUMBA)
 
 
 def written(walked: Configuration, folder: Path) -> str:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ppafo.engine.actuator_values import driving_torque_of
 from ppafo.engine.cache import load_generated
 from ppafo.engine.lanes import samples_in
+from ppafo.engine.numba_compiler import NumbaCompiler
 from ppafo.engine.program import NoParameters
 from ppafo.engine.reference import vane_mode
 from ppafo.engine.reference.sampling import SAME_TIME, SampledControl, Signals, solve_segment
@@ -46,7 +47,7 @@ class ReferenceResult:
 
 def load_right_hand_side(run: Run) -> Callable[..., None]:
     """The compiled right-hand side ``fill(t, y, slopes, parameters, command, way)`` of a run's program."""
-    fill: Callable[..., None] = load_generated("slopes", right_hand_side_source(run.program)).fill
+    fill: Callable[..., None] = load_generated(right_hand_side_source(run.program), NumbaCompiler()).fill
     return fill
 
 

@@ -1,23 +1,21 @@
-"""A scenario's plant: the lanes of one run, compiled from C where that can be, whose command comes from outside.
+"""A scenario's plant: the lanes of one run, whose command comes from outside.
 
 Why in this process and not in one of its own: docs/decisions/0023-hardware-in-the-loop.md.
 """
 
-import os
 from dataclasses import dataclass, replace
 from types import ModuleType
 
-from ppafo.engine.compilers import BACKEND_VARIABLE, Compiler, chosen_compiler
-from ppafo.engine.lanes import load_program_by
+from ppafo.engine.lanes import load_program
+from ppafo.engine.loading import chosen_compiler
 from ppafo.engine.run import Run, batch_of
-from ppafo.errors import ScenarioError, SimulationError
+from ppafo.errors import ScenarioError
 from ppafo.exports.hil.packets import HIGHEST_RATE, LOWEST_RATE, RATE, sample_length
 from ppafo.exports.hil.ports import BITS_OF_A_BYTE
 from ppafo.model.valves import dump
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.sampled import SampledRun
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario
-from ppafo.translation.native import compiler
 
 CHANNELS_SENT = 5
 
@@ -38,10 +36,7 @@ class Plant:
 
 
 def plant_of(scenario: Scenario, rate: int = RATE) -> Plant:
-    """The plant of a scenario, whose command is given ``rate`` times a second; a proportional valve can be dumped.
-
-    A compiler of C makes it where there is one and ``PPAFO_BACKEND`` asks for no other.
-    """
+    """The plant of a scenario, whose command is given ``rate`` times a second; a proportional valve can be dumped."""
     if not LOWEST_RATE <= rate <= HIGHEST_RATE:
         raise ScenarioError(f"--rate {rate}: must be {LOWEST_RATE} to {HIGHEST_RATE} samples per second")
     period = 1.0 / rate
@@ -54,19 +49,8 @@ def plant_of(scenario: Scenario, rate: int = RATE) -> Plant:
     valve = chosen.device.valve
     if valve.kind == "proportional":
         run = replace(run, program=replace(run.program, valve=dump.choose(valve.settings)))
-    made_by = _compiler()
-    module = load_program_by(batch_of(run).program, made_by)
-    return Plant(chosen, run, module, "Numba" if made_by is None else made_by.described(), period)
-
-
-def _compiler() -> Compiler | None:
-    chosen = chosen_compiler()
-    if chosen is not None or os.environ.get(BACKEND_VARIABLE):
-        return chosen
-    try:
-        return compiler("c")
-    except SimulationError:
-        return None
+    module = load_program(batch_of(run).program)
+    return Plant(chosen, run, module, chosen_compiler().described(), period)
 
 
 def check_baud(baud: int, rate: int) -> None:

@@ -8,8 +8,8 @@ from functools import partial
 from importlib.resources import files
 
 from ppafo.answers import Solved
-from ppafo.engine.compilers import chosen_compiler
 from ppafo.engine.lanes import load_programs, run_batch
+from ppafo.engine.loading import chosen_compiler
 from ppafo.errors import SimulationError, nearest_name, one_line
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.bits.runs import hashes_of, names, plain_batch
@@ -80,7 +80,7 @@ def bits(
     for number, name in enumerate(chosen):
         progress(Progress("comparing bits", number, len(chosen), noun="models"))
         found[name] = hashes_of(name, lambda _batch: partial(run_batch, threads=threads))
-    return Bits(found, golden, _platform(), _processor(), _compiler())
+    return Bits(found, golden, _platform(), _processor(), chosen_compiler().described())
 
 
 def new_golden_hashes() -> Hashes:
@@ -99,14 +99,3 @@ def _processor() -> str:
             return next(told, "") or platform.processor()
     except OSError:
         return platform.processor() or "unknown"
-
-
-def _compiler() -> str:
-    compiler = chosen_compiler()
-    if compiler is not None:
-        return compiler.described()
-    import llvmlite.binding
-    import numba
-
-    version = ".".join(map(str, llvmlite.binding.llvm_version_info))
-    return f"Numba {numba.__version__} with LLVM {version}"

@@ -11,10 +11,12 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.engine.cache import load_generated
 from ppafo.engine.lane_control import SIGNALS, current_readings, pressures_of, sense, sense_gait
 from ppafo.engine.lane_rows import VECTOR, LaneRows, indent, lanes_of, over_lanes
 from ppafo.engine.lane_source import HEADER, INLINE, lane_loop
-from ppafo.engine.lanes import SIGNAL_ROWS, Batch, Clock, Floats, load_source
+from ppafo.engine.lanes import SIGNAL_ROWS, Batch, Clock, Floats
+from ppafo.engine.numba_compiler import NumbaCompiler
 from ppafo.engine.program import LaneStart, Program
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers
@@ -202,7 +204,7 @@ class Environments:
     def __init__(self, program: Program, clock: Clock, task: Task, count: int, judging: Judging) -> None:
         self.count = count
         self._clock, self._judging = clock, judging
-        self._go_on = load_source(kernel_source(program, task)).go_on
+        self._go_on = load_generated(kernel_source(program, task), NumbaCompiler()).go_on
         width = min(lanes_of(program), -(-count // VECTOR) * VECTOR)
         blocks = -(-count // width)
         state_rows = [path for name, row in program.state_rows().items() for path in leaf_paths(row, name)]

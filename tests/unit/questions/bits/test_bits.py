@@ -28,13 +28,18 @@ def test_every_scenario_and_walk_has_golden_hashes_and_the_quick_ones_are_among_
     assert len({hashes["draws"] for hashes in golden.values()}) == len(golden)
 
 
-@pytest.mark.parametrize("name", [CHEAP, "solenoid", "proportional"])
-def test_numba_finds_the_golden_bits_on_this_computer(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("backend", "name"), [("", CHEAP), ("", "solenoid"), ("", "proportional"), ("numba", CHEAP), ("numba", "off")]
+)
+def test_the_golden_bits_are_found_on_this_computer(
+    backend: str, name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PPAFO_BACKEND", backend)
     assert main(["bits", name, "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["differs"] == {}
     assert document["hashes"][name] == solve.golden_hashes()[name]
-    assert document["compiler"].startswith("Numba ")
+    assert backend != "numba" or document["compiler"].startswith("Numba ")
 
 
 @pytest.mark.parametrize("name", [CHEAP, "solenoid"])

@@ -1,4 +1,4 @@
-"""Functions of generated programs that are compiled once in a process, however many programs call them.
+"""Numba as a compiler of programs; their functions are compiled once in a process, however many programs call them.
 
 Most of a program's functions are those of other programs too. Each is known by a hash of its text and of all that it
 calls, so that what is shared is the same to the last bit; the hash is in its symbol, so that nothing else has its name.
@@ -8,26 +8,96 @@ import ast
 import contextlib
 import gc
 import hashlib
+import importlib.util
+import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from ppafo.engine.compile_errors import mistake
 from ppafo.engine.plain_python import parse_module
 from ppafo.engine.source_text import without_origins
+from ppafo.errors import SimulationError
 
 _LENGTH = 24
 _SHARED: dict[str, Any] = {}
 
 
-def run_text(source: str, path: str, module: ModuleType) -> None:
-    """Run the text of a module, which was generated here."""
+_KEPT, _NOT_KEPT = "cache=True", "cache=False"
+
+
+@dataclass(frozen=True, slots=True)
+class NumbaCompiler:
+    """Numba as the engine takes a compiler: it needs no other program on this computer."""
+
+    name: str = "numba"
+
+    @property
+    def seconds_per_byte(self) -> float:
+        """What a common computer takes for a byte of the composed text [s]."""
+        return 2.5e-4
+
+    def identity(self) -> str:
+        """The processor, and the versions of Numba and of Python's own code."""
+        return _identity()
+
+    def described(self) -> str:
+        """Its version, and that of LLVM."""
+        import llvmlite.binding
+        import numba
+
+        version = ".".join(map(str, llvmlite.binding.llvm_version_info))
+        return f"Numba {numba.__version__} with LLVM {version}"
+
+    def compile_text(self, source: str, path: str, module: ModuleType) -> None:
+        """Run the text of a module that is to be compiled."""
+        text = source if Path(path).is_absolute() else source.replace(_KEPT, _NOT_KEPT)
+        _run_by_numba(text, path, module, _compile_text)
+
+    def run_text(self, source: str, path: str, module: ModuleType) -> None:
+        """Run the text of a module whose functions are found compiled beside it."""
+        _run_by_numba(source, path, module, _run_text)
+
+
+def numba_compiler() -> NumbaCompiler:
+    """Return Numba; SimulationError where it is not installed."""
+    if importlib.util.find_spec("numba") is None:
+        raise SimulationError("Numba is not installed: pip install numba")
+    return NumbaCompiler()
+
+
+@cache
+def _identity() -> str:
+    # Programs of another processor or version must not be taken for damaged ones.
+    import numba
+    from numba.core.registry import cpu_target
+
+    processor = cpu_target.target_context.codegen().magic_tuple()
+    return repr((processor, numba.__version__, sys.implementation.cache_tag))
+
+
+def _run_by_numba(source: str, path: str, module: ModuleType, run: Callable[[str, str, ModuleType], None]) -> None:
+    """Let Numba define what a text has, with its own files beside it; ProgramError for what it refuses."""
+    from numba.core.errors import NumbaError
+
+    try:
+        with _numba_files_beside_source():
+            if Path(path).is_absolute():
+                _check_numba_can_write(Path(path).parent / "__pycache__")
+            run(source, path, module)
+    except NumbaError as error:
+        raise mistake(str(error), source) from None
+
+
+def _run_text(source: str, path: str, module: ModuleType) -> None:
     exec(compile(source, path, "exec"), module.__dict__)
 
 
-def compile_text(source: str, path: str, module: ModuleType) -> None:
-    """Run the text of a module that is to be compiled; raises what the compiler raises."""
+def _compile_text(source: str, path: str, module: ModuleType) -> None:
     from numba.core.errors import NumbaError
 
     before = dict(module.__dict__)
@@ -40,7 +110,7 @@ def compile_text(source: str, path: str, module: ModuleType) -> None:
         _SHARED.clear()
         module.__dict__.clear()
         module.__dict__.update(before)
-        run_text(source, path, module)
+        _run_text(source, path, module)
     finally:
         if is_collecting:
             gc.enable()
@@ -100,7 +170,7 @@ def _define(node: ast.stmt, path: str, name: str, key: str, used: dict[str, Any]
 
 
 @contextlib.contextmanager
-def numba_files_beside_source() -> Iterator[None]:
+def _numba_files_beside_source() -> Iterator[None]:
     """Let Numba keep its files in the program's folder: those of ``NUMBA_CACHE_DIR`` are checked by nobody."""
     from numba.core import config
 
@@ -114,7 +184,7 @@ def numba_files_beside_source() -> Iterator[None]:
             setattr(config, name, value)
 
 
-def check_numba_can_write(folder: Path) -> None:
+def _check_numba_can_write(folder: Path) -> None:
     """Raise OSError where Numba would take another folder, of which nobody knows what is in it."""
     folder.mkdir(mode=0o700, exist_ok=True)
     tempfile.TemporaryFile(dir=folder).close()

@@ -1,0 +1,186 @@
+"""Which compiler makes a model: the first that works, and one line about each that does not."""
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.engine import loading
+from ppafo.engine.cache import list_programs
+from ppafo.engine.compilers import OFFERED
+from ppafo.engine.loading import BACKEND_VARIABLE, chosen_compiler, compilers_to_try, load_source
+from ppafo.errors import ProgramError, SimulationError
+from ppafo.translation import native
+
+HEADER = "import math\nfrom numba import njit\n\n\n"
+ADVANCE = '@njit("void(float64[:, ::1])", cache=True)\ndef advance(x):\n    x[0, 0] = '
+WITHOUT_HEADERS = "#!/bin/sh\necho 'program.c:1:10: fatal error: math.h: No such file or directory' >&2\nexit 1\n"
+needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
+on_unix = pytest.mark.skipif(sys.platform == "win32", reason="the compilers that fail are shell scripts")
+
+
+@pytest.fixture(autouse=True)
+def _no_choice_yet(fresh_cache: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Nothing is chosen, kept or known to fail."""
+    monkeypatch.delenv(BACKEND_VARIABLE, raising=False)
+    monkeypatch.setattr(loading, "_FAILED", set())
+    forget()
+    yield
+    forget()
+
+
+def forget() -> None:
+    """As in a new process, but for what is known to fail."""
+    loading._compilers.cache_clear()
+    loading._load_by.cache_clear()
+    native._file_identity.cache_clear()
+    for name in [item for item in sys.modules if item.startswith("ppafo_")]:
+        del sys.modules[name]
+
+
+def text(value: str) -> str:
+    return f"{HEADER}{ADVANCE}{value}\n"
+
+
+def result_of(source: str) -> float:
+    x = np.array([[2.0]])
+    load_source(source).advance(x)
+    return float(x[0, 0])
+
+
+def compiler_that_fails(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A compiler of this name that finds no headers, the first on the path."""
+    folder.mkdir(exist_ok=True)
+    file = folder / name
+    file.write_text(WITHOUT_HEADERS, encoding="utf-8")
+    file.chmod(0o755)
+    monkeypatch.setenv("PATH", str(folder), prepend=":")
+    forget()
+    return file
+
+
+def only(names: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the computer have only these compilers."""
+    monkeypatch.setattr("ppafo.engine.loading.OFFERED", {name: OFFERED[name] for name in names})
+    forget()
+
+
+def test_compilers_are_tried_in_a_fixed_order_and_numba_last() -> None:
+    assert list(OFFERED) == ["clang", "gcc", "zig", "numba"]
+    here = [compiler.name for compiler in compilers_to_try()]
+    assert here == [name for name in OFFERED if name in here]
+    assert here[-1] == "numba"
+
+
+def test_a_computer_without_a_compiler_of_c_takes_numba(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(native, "_command", lambda _: ())
+    assert [compiler.name for compiler in compilers_to_try()] == ["numba"]
+    assert result_of(text("x[0, 0] + 1.5")) == 3.5
+
+
+@on_unix
+@needs_gcc
+def test_a_compiler_without_headers_is_reported_once_and_the_next_one_compiles(
+    fresh_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    real = str(shutil.which("gcc"))
+    only(("clang", "gcc"), monkeypatch)
+    compiler_that_fails("clang", tmp_path / "bin", monkeypatch)
+    monkeypatch.setattr(native, "_command", lambda name: (str(tmp_path / "bin" / name) if name == "clang" else real,))
+    assert result_of(text("x[0, 0] * 3.0")) == 6.0
+    assert caplog.messages == [
+        "ppafo: clang does not compile a model: program.c:1:10: fatal error: math.h: No such file or directory; "
+        "models are compiled by gcc instead"
+    ]
+    assert chosen_compiler().name == "gcc"
+    caplog.clear()
+    assert result_of(text("x[0, 0] * 4.0")) == 8.0
+    # Another process finds the note beside the programs.
+    monkeypatch.setattr(loading, "_FAILED", set())
+    forget()
+    assert chosen_compiler().name == "gcc"
+    assert result_of(text("x[0, 0] * 5.0")) == 10.0
+    assert caplog.messages == []
+    assert {item.place.name.split("_")[1] for item in list_programs(fresh_cache)} == {"gcc"}
+
+
+@on_unix
+@needs_gcc
+def test_a_compiler_that_did_not_work_is_tried_again_after_a_day_or_when_it_is_another(
+    fresh_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    only(("gcc", "numba"), monkeypatch)
+    file = compiler_that_fails("gcc", tmp_path / "bin", monkeypatch)
+    assert result_of(text("x[0, 0] - 1.0")) == 1.0
+    assert chosen_compiler().name == "numba"
+    monkeypatch.setattr(loading, "_FAILED", set())
+    (note,) = fresh_cache.glob("not-working-gcc-*")
+    old = time.time() - 2.0 * loading.LEFT_OUT_FOR
+    os.utime(note, (old, old))
+    forget()
+    assert chosen_compiler().name == "gcc"
+    os.utime(note)
+    forget()
+    assert chosen_compiler().name == "numba"
+    file.write_text(f"{WITHOUT_HEADERS}# installed anew\n", encoding="utf-8")
+    forget()
+    assert chosen_compiler().name == "gcc"
+
+
+@on_unix
+@needs_gcc
+def test_a_folder_whose_libraries_cannot_be_loaded_is_reported_once_for_all_compilers_of_c(
+    fresh_cache: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(native, "_is_mounted_without_execution", lambda _: True)
+    assert result_of(text("x[0, 0] - 0.5")) == 1.5
+    (said,) = caplog.messages
+    assert said == (
+        f"ppafo: libraries in {fresh_cache} cannot be loaded (it is mounted noexec); "
+        "models are compiled by numba instead"
+    )
+
+
+@needs_gcc
+def test_what_only_numba_can_compile_is_compiled_by_numba_with_one_line(caplog: pytest.LogCaptureFixture) -> None:
+    source = text("math.exp(x[0, 0])")
+    assert result_of(source) == np.exp(2.0)
+    (said,) = caplog.messages
+    assert "cannot be translated; Numba compiles this model" in said
+    caplog.clear()
+    forget()
+    assert result_of(source) == np.exp(2.0)
+    assert caplog.messages == []
+
+
+@needs_gcc
+def test_what_a_named_compiler_cannot_compile_is_an_error_that_names_the_other(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv(BACKEND_VARIABLE, "gcc")
+    with pytest.raises(ProgramError, match="cannot be translated; PPAFO_BACKEND=numba may compile it"):
+        load_source(text("math.exp(x[0, 0])"))
+
+
+@on_unix
+def test_a_named_compiler_that_fails_is_an_error_and_no_other_is_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compiler_that_fails("gcc", tmp_path / "bin", monkeypatch)
+    monkeypatch.setenv(BACKEND_VARIABLE, "gcc")
+    with pytest.raises(SimulationError, match=r"math\.h.*; PPAFO_BACKEND=numba needs no compiler of C"):
+        load_source(text("x[0, 0] - 2.0"))
+
+
+@needs_gcc
+def test_a_run_by_a_compiler_of_c_does_not_load_numba(tmp_path: Path) -> None:
+    code = "import sys, ppafo; ppafo.simulate('torque-task-proportional', ['run.duration=20 ms']);"
+    code += "print('numba' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"
