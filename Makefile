@@ -2,14 +2,15 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+LEAN := $(VENV)/.ready-to-run
 READY := $(VENV)/.ready
 CORES := $(shell nproc 2>/dev/null || echo 2)
 QUICK_TESTS := tests/architecture tests/contract/test_command_words.py tests/contract/test_catalogs.py $(addprefix tests/unit/,\
 	test_public_interface.py test_units.py control documents gait metrics model parameters signals storage)
 
-.PHONY: reproduce gallery validation test coverage quick check format bench bits dist page site lock clean
+.PHONY: reproduce gallery validation test coverage quick check format bench bits dist page site opensim lock clean
 
-reproduce: $(READY)
+reproduce: $(LEAN)
 	$(BIN)/ppafo reproduce --out out/reproduce
 
 # Ready workbenches, each one file that simulates in a browser: out/gallery/*.html.
@@ -44,7 +45,7 @@ format: $(READY)
 
 # The benchmark also needs JAX, which is large; it goes into the same environment, from its own lock file.
 bench: $(READY)
-	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements-bench.lock
+	$(call install,requirements-bench.lock)
 	$(BIN)/python -m benchmarks --out out/bench
 
 # Whether every run has its golden bits on several processors, by several compilers and on emulated machines: an hour or more.
@@ -54,12 +55,12 @@ bits: $(READY)
 
 # Wheel and source archive in dist/, built twice, checked, and tried in an empty environment.
 dist: $(READY)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements-release.lock
+	$(call install,requirements-release.lock)
 	$(BIN)/python scripts/dist.py
 
 # The documents as a site that opens from its folder: out/site/index.html; warnings are errors, links are checked.
 site: $(READY)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements-docs.lock
+	$(call install,requirements-docs.lock)
 	$(BIN)/python -m scripts.website out/site
 
 # Script and style of the page that simulates, from page/ into the package; needs node, which nobody else does.
@@ -68,20 +69,37 @@ page:
 	npm run --prefix page check
 	npm run --prefix page build
 
-$(READY): requirements.lock pyproject.toml
+# The environment of `make reproduce`: what a run needs, and the reference solver.
+$(LEAN): requirements.lock requirements-uv.lock pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "ppafo needs Python 3.11 or newer; try: make PYTHON=python3.12")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	command -v uv >/dev/null || $(PIP) --require-hashes --requirement requirements-uv.lock || echo "uv could not be installed: pip takes its place"
+	$(call install,requirements.lock)
+	$(call install_with,--no-deps --no-build-isolation --editable .)
+	touch $(LEAN)
+
+# And what checks, tests and documents need beside it.
+$(READY): $(LEAN) requirements-dev.lock
+	$(call install,requirements-dev.lock)
 	touch $(READY)
 
-# Writes the lock files anew (needs uv); everybody else only reads them.
+# OpenSim takes 280 MB, and a few tests skip without it.
+opensim: $(READY)
+	$(call install,requirements-opensim.lock)
+
+# uv installs in seconds what takes pip most of a minute; where it fails, for instance behind a proxy that only pip knows, pip tries too.
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+install_with = PATH="$$PATH:$(BIN)" uv pip install --quiet --python $(BIN)/python $(1) || $(PIP) $(1)
+install = $(call install_with,--require-hashes --requirement $(1))
+
+# Writes the lock files anew (needs uv); everybody else only reads them. Each of the last four holds one extra, in versions that go with the others.
+COMPILE := uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header
 lock:
-	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --extra dev --output-file requirements.lock pyproject.toml
-	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --extra dev --extra bench --constraint requirements.lock --output-file requirements-bench.lock pyproject.toml
-	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --extra dev --extra release --constraint requirements.lock --output-file requirements-release.lock pyproject.toml
-	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --extra dev --extra docs --constraint requirements.lock --output-file requirements-docs.lock pyproject.toml
-	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --extra dev --extra opensim --constraint requirements.lock --output-file requirements-opensim.lock pyproject.toml
+	$(COMPILE) --extra checkout --output-file requirements.lock pyproject.toml
+	$(COMPILE) --extra checkout --extra dev --constraint requirements.lock --output-file requirements-dev.lock pyproject.toml
+	echo uv | $(COMPILE) --output-file requirements-uv.lock -
+	for extra in bench docs opensim release; do \
+		$(COMPILE) --extra $$extra --constraint requirements-dev.lock --output-file requirements-$$extra.lock pyproject.toml || exit 1; done
 
 clean:
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .coverage
