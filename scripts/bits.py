@@ -1,4 +1,4 @@
-"""Whether every run has its golden bits: by Numba for several processors, by C and by Warp, on other machines.
+"""Whether every run has its golden bits: by Numba for several processors, by compilers of C, on other machines.
 
     python scripts/bits.py
     python scripts/bits.py --names torque-task-solenoid --targets numba:generic "gcc -O1 -fsanitize=address,undefined"
@@ -27,16 +27,15 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from ppafo.engine.compilers import BACKEND_VARIABLE, offer
 from ppafo.engine.lane_source import INLINE, write_lanes
 from ppafo.engine.lanes import Batch, run_batch
+from ppafo.engine.loading import BACKEND_VARIABLE, NUMBA
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import SimulationError
 from ppafo.questions.bits.runs import Runner, digest, drawn_batch, failures, hashes_of, names, plain_batch
 from ppafo.questions.bits.solve import GOLDEN, Hashes, golden_hashes, new_golden_hashes
 from ppafo.translation.c99 import FLAGS, program_source, translated
 from ppafo.translation.native import build, compiler, run_native
-from ppafo.translation.warp import RUNS_ON_A_CARD, WarpCompiler, has_card, has_warp
 from scripts.other_machines import MACHINES, on_other_machine
 from tests.composed_programs import drawn_programs
 
@@ -47,16 +46,10 @@ PROCESSORS = ("generic", "haswell", "skylake-avx512", "host")
 INSTRUCTIONS = {"haswell": "avx2", "skylake-avx512": "avx512f"}
 """What a processor must have to run what is compiled for another."""
 LEVELS = ("-O0", "-O1", "-O2", "-O3", "-O3 -march=native")
-WARP = {
-    "warp:cpu": ("Warp on this processor", WarpCompiler("cpu", 0)),
-    "warp:runs": ("Warp on this processor, each run a thread as on a graphics card", WarpCompiler("cpu", 64)),
-    "warp:cuda": ("Warp on a graphics card", WarpCompiler("cuda:0", RUNS_ON_A_CARD)),
-}
 TARGETS = (
     *(f"numba:{processor}" for processor in PROCESSORS),
     *(f"{command} {level}" for command in ("gcc", "clang") for level in LEVELS),
     "zig -O3",
-    *WARP,
     *MACHINES,
 )
 
@@ -65,8 +58,6 @@ def title_of(target: str) -> str:
     """Return a target in words."""
     if target in MACHINES:
         return f"C by zig, {MACHINES[target].title}"
-    if target in WARP:
-        return WARP[target][0]
     kind, _, processor = target.partition(":")
     return f"Numba for {'this processor' if processor == 'host' else processor}" if processor else f"C by {kind}"
 
@@ -75,9 +66,6 @@ def missing_for(target: str) -> str:
     """Return what a target needs that is not here; empty where all is."""
     if target in MACHINES:
         return MACHINES[target].missing()
-    if target in WARP:
-        is_there = has_card() if "cuda" in target else has_warp()
-        return "" if is_there else "a graphics card of NVIDIA" if has_warp() else "Warp (pip install ppafo[warp])"
     kind, _, processor = target.partition(":")
     if processor:
         told = Path("/proc/cpuinfo")
@@ -98,9 +86,6 @@ def runner_of(target: str, batch: Batch) -> Runner:
     """Return what runs batches of the program of one for a target."""
     if target in MACHINES:
         return on_other_machine(target, batch)
-    if target in WARP:
-        offer({"warp": lambda: WARP[target][1]})
-        return run_batch
     return _from_c(batch, target) if " " in target else run_batch
 
 
@@ -118,9 +103,9 @@ def _from_c(batch: Batch, target: str) -> Runner:
 def hashes_on(target: str, chosen: Sequence[str]) -> Hashes:
     """Return the hashes of a target, found in a process of its own."""
     processor = target.partition(":")[2]
-    # Without a list of features Numba would add those of this machine.
-    env = {BACKEND_VARIABLE: "warp" if target in WARP else ""}
-    if target not in WARP and processor not in ("", "host"):
+    env = {BACKEND_VARIABLE: NUMBA}
+    if processor not in ("", "host"):
+        # Without a list of features Numba would add those of this machine.
         env |= {"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}
     if "address" in target:
         sanitizer = subprocess.run(["gcc", "-print-file-name=libasan.so"], capture_output=True, text=True, check=True)
@@ -177,9 +162,9 @@ def main() -> int:
         "--targets",
         nargs="+",
         default=list(TARGETS),
-        help=f"numba:PROCESSOR, 'COMPILER FLAGS', {', '.join((*WARP, *MACHINES))}",
+        help=f"numba:PROCESSOR, 'COMPILER FLAGS', {', '.join(MACHINES)}",
     )
-    parser.add_argument("--renew", action="store_true", help="write the golden hashes anew, by Numba")
+    parser.add_argument("--renew", action="store_true", help="write the golden hashes anew")
     parser.add_argument("--translate", metavar="COUNT", type=int, default=0, help="only translate drawn programs")
     parser.add_argument("--print-hashes", metavar="TARGET", help=argparse.SUPPRESS)
     parsed = parser.parse_args()

@@ -199,7 +199,7 @@ def tested(what: str, judge: str, *paths: str) -> Check:
 
 def bits(_long: Path) -> list[Line]:
     """Golden bits by the compilers that are here."""
-    return [_bits_of(backend) for backend in ("numba", "gcc", "clang", "zig")]
+    return [_bits_of(backend) for backend in ("numba", "clang", "gcc", "zig")]
 
 
 def _bits_of(backend: str) -> Line:

@@ -16,7 +16,6 @@ import sys
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html.parser import HTMLParser
-from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -326,10 +325,8 @@ def main() -> int:
     for name, text in KERNEL.items():
         _write(profile / name, text)
     os.environ["IPYTHONDIR"] = str(profile.parent)
-    # Its kernel finds the command, and zig compiles the models where it is here: the same bits, sooner.
+    # Its kernel finds the command.
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    if find_spec("ziglang"):
-        os.environ.setdefault("PPAFO_BACKEND", "zig")
     start = time.monotonic()
     failed = build(site)
     files = [file for file in site.rglob("*") if file.is_file()]

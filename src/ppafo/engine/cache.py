@@ -18,11 +18,12 @@ import threading
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 
 from ppafo.documents.regular_file import read_regular_file
-from ppafo.engine.compile_times import SECONDS_FILE, announce, estimate_seconds, number_models
+from ppafo.engine.compile_times import SECONDS_FILE, announce, compile_side_by_side, estimate_seconds
 from ppafo.engine.compilers import Compiler
 from ppafo.engine.private_folder import WRITTEN_BY_OTHERS, refusal
 from ppafo.engine.program_lock import LOCK, one_process
@@ -45,7 +46,7 @@ NOTE = "not-working-"
 _ASIDE = re.compile(rf"\.writing-[0-9a-f]{{16}}|{re.escape(LOCK)}{_PROGRAM.pattern}|{NOTE}[a-z]+-[0-9a-f]{{12}}")
 _LONGEST_ASIDE = 86400.0
 _CHECKSUMS = "checksums.json"
-_LOADING = threading.RLock()
+_LOADING: dict[str, threading.RLock] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,17 +110,20 @@ def load_generated(source: str, compiler: Compiler) -> ModuleType:
     """
     wanted = _Wanted(source, compiler)
     # A second thread must not get a module of which only the beginning has run.
-    with _LOADING:
+    with _LOADING.setdefault(wanted.name, threading.RLock()):
         return sys.modules[wanted.name] if wanted.name in sys.modules else _import_program(wanted)
 
 
 def load_all(sources: Iterable[str], compiler: Compiler, load: Callable[[str], ModuleType]) -> None:
-    """Import the modules with these sources by ``load``; messages about those that are compiled count them."""
-    with _LOADING:
-        missing = [source for source in dict.fromkeys(sources) if not is_kept(source, compiler)]
-        for number, source in enumerate(missing, 1):
-            with number_models(number, len(missing)):
-                load(source)
+    """Import the modules with these sources by ``load``; several that ``compiler`` must make are made side by side."""
+    missing = [source for source in dict.fromkeys(sources) if not is_kept(source, compiler)]
+    if len(missing) < 2:
+        return
+    folder = cache_folder()
+    kept = [] if folder is None else _entries_named(folder, _PROGRAM)
+    expected = sum(_Wanted(source, compiler).estimate(kept) for source in missing)
+    where = "not kept" if folder is None or refusal(folder) else f"kept in {folder}"
+    compile_side_by_side([partial(load, source) for source in missing], expected, where)
 
 
 def is_kept(source: str, compiler: Compiler) -> bool:

@@ -1,11 +1,14 @@
-"""What is said while models are compiled: which of how many, and about how long it takes."""
+"""The messages while models are compiled: how many, and about how long it takes."""
 
 import contextlib
 import logging
+import os
 import statistics
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextvars import ContextVar, copy_context
 from pathlib import Path
 
 from ppafo.progress import time_text
@@ -18,30 +21,33 @@ SECONDS_FILE = "seconds.txt"
 """The file of a kept program that says how long it took to compile [s]."""
 _MAXIMUM_ASKED = 20
 
-_place = (1, 1)
-"""Which model is compiled, and of how many; whoever compiles holds the lock of the cache."""
+_models: ContextVar[int] = ContextVar("models that are compiled together", default=0)
+
+
+def compile_side_by_side(tasks: Sequence[Callable[[], object]], expected: float, where: str) -> None:
+    """Compile several models on all cores, with one message about all; ``expected`` [s] is the time on one core."""
+    workers = min(len(tasks), os.cpu_count() or 1)
+    with announce(expected / workers, where, len(tasks)), ThreadPoolExecutor(workers) as pool:
+        known = _models.set(len(tasks))
+        try:
+            started = [pool.submit(copy_context().run, task) for task in tasks]
+        finally:
+            _models.reset(known)
+        for task in started:
+            task.result()
 
 
 @contextlib.contextmanager
-def number_models(number: int, total: int) -> Iterator[None]:
-    """Say of what is compiled inside a ``with`` block that it is one of so many models."""
-    global _place  # noqa: PLW0603  # like the lock beside which it is used, there is one for the process
-    before, _place = _place, (number, total)
-    try:
-        yield
-    finally:
-        _place = before
-
-
-@contextlib.contextmanager
-def announce(expected: float, where: str) -> Iterator[None]:
+def announce(expected: float, where: str, models: int = 1) -> Iterator[None]:
     """Say, once it takes longer than ``QUIET``, what is compiled and about how long [s] that takes, and how it ended.
 
-    Nothing is said of what is quick.
+    Nothing is said of what is quick, and of one of several models that are announced together.
     """
-    number, total = _place
-    model = f"model {number} of {total}" if total > 1 else "a model"
-    text = f"ppafo: compiling {model} for this computer, about {time_text(max(expected, QUIET))} ..."
+    if _models.get():
+        yield
+        return
+    what = "a model" if models == 1 else f"{models} models"
+    text = f"ppafo: compiling {what} for this computer, about {time_text(max(expected, QUIET))} ..."
     timer = threading.Timer(QUIET, logger.warning, (text,))
     timer.daemon = True
     start = time.perf_counter()

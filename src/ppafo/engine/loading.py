@@ -8,6 +8,7 @@ and left out for a day.
 import contextlib
 import logging
 import os
+import threading
 import time
 from collections.abc import Iterable
 from functools import lru_cache
@@ -32,6 +33,7 @@ LEFT_OUT_FOR = 86400.0
 
 _FAILED: set[str] = set()
 """Identities of compilers that failed in this process."""
+_LEAVING_OUT = threading.Lock()
 
 
 def compilers_to_try() -> tuple[Compiler, ...]:
@@ -90,8 +92,10 @@ def _load_by(source: str, compilers: tuple[Compiler, ...]) -> ModuleType:
         if not left:
             remedy = HOW_TO_INSTALL if compiler.name == NUMBA else WITHOUT_C
             raise SimulationError(f"{failure}; {remedy}") from failure
-        _leave_out(failed, str(failure))
-        logger.warning("ppafo: %s; models are compiled by %s instead", failure, left[0].name)
+        with _LEAVING_OUT:
+            if compiler.identity() not in _FAILED:  # another thread may have found it at the same time
+                logger.warning("ppafo: %s; models are compiled by %s instead", failure, left[0].name)
+            _leave_out(failed, str(failure))
         return _load_by(source, left)
     except ProgramError as refused:
         if compiler.name == NUMBA:

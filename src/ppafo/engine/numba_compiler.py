@@ -11,6 +11,7 @@ import hashlib
 import importlib.util
 import sys
 import tempfile
+import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -25,7 +26,8 @@ from ppafo.errors import SimulationError
 
 _LENGTH = 24
 _SHARED: dict[str, Any] = {}
-
+_ONE_AT_A_TIME = threading.RLock()
+"""What is shared, and the settings of Numba, are those of the process."""
 
 _KEPT, _NOT_KEPT = "cache=True", "cache=False"
 
@@ -85,7 +87,7 @@ def _run_by_numba(source: str, path: str, module: ModuleType, run: Callable[[str
     from numba.core.errors import NumbaError
 
     try:
-        with _numba_files_beside_source():
+        with _ONE_AT_A_TIME, _numba_files_beside_source():
             if Path(path).is_absolute():
                 _check_numba_can_write(Path(path).parent / "__pycache__")
             run(source, path, module)

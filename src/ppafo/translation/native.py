@@ -5,6 +5,7 @@ import hashlib
 import importlib.util
 import os
 import platform
+import signal
 import subprocess
 import sys
 import tempfile
@@ -33,6 +34,7 @@ _WIDEST_VECTORS = ("-mprefer-vector-width=512",) if _THIS_PROCESSOR.startswith("
 _LIBRARY = {"win32": "program.dll", "darwin": "program.dylib"}.get(sys.platform, "program.so")
 COMPILERS = ("clang", "gcc", "zig")
 """In the order of preference: lanes are about as quick by each."""
+_INTERRUPTED = (-signal.SIGINT, -signal.SIGTERM)
 _TITLE = "Generated from the functions of ppafo. Not to be edited."
 
 
@@ -175,6 +177,8 @@ def _compiled(source: str, folder: Path, command: Sequence[str], flags: Sequence
     position = () if sys.platform == "win32" else ("-fPIC",)
     line = [*command, *flags, "-shared", *position, str(written), "-o", str(library), "-lm"]
     done, name = asked(line), Path(command[0]).name
+    if done.returncode in _INTERRUPTED:
+        raise SimulationError(f"{name} was interrupted")  # by the same key as this process: it works all the same
     if done.returncode != 0:
         raise CompilerError(f"{name} does not compile a model: {complaint(done)}")
     if not library.is_file():

@@ -1,17 +1,17 @@
-"""What is said while models are compiled."""
+"""The messages while models are compiled, and several at once."""
 
-import logging
+import threading
 import time
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import pytest
 
 from ppafo.engine import cache, compile_times
 from ppafo.engine.cache import load_generated
-from ppafo.engine.compile_times import announce, estimate_seconds, number_models
+from ppafo.engine.compile_times import announce, compile_side_by_side, estimate_seconds
 from ppafo.engine.numba_compiler import NumbaCompiler
+from ppafo.errors import ProgramError
 
 QUICK = "answer = {}\n"
 
@@ -28,18 +28,13 @@ def test_nothing_is_said_of_what_is_quick(caplog: pytest.LogCaptureFixture) -> N
     assert caplog.messages == []
 
 
-def test_what_takes_longer_is_said_while_it_runs_with_its_number_and_about_how_long(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    with number_models(1, 2), announce(12.3, "kept in a folder"):
+def test_what_takes_longer_is_said_while_it_runs_and_about_how_long(caplog: pytest.LogCaptureFixture) -> None:
+    with announce(12.3, "kept in a folder"):
         time.sleep(0.2)
-        assert caplog.messages == ["ppafo: compiling model 1 of 2 for this computer, about 12 s ..."]
+        assert caplog.messages == ["ppafo: compiling a model for this computer, about 12 s ..."]
     assert len(caplog.messages) == 2
     assert caplog.messages[1].startswith("ppafo: compiled in 0.")
     assert caplog.messages[1].endswith(" s and kept in a folder")
-    with announce(12.3, "not kept"):
-        time.sleep(0.2)
-    assert caplog.messages[2] == "ppafo: compiling a model for this computer, about 12 s ..."
 
 
 def test_what_fails_is_no_longer_announced(caplog: pytest.LogCaptureFixture) -> None:
@@ -59,23 +54,35 @@ def test_the_time_expected_is_that_of_what_this_computer_has_compiled_by_length(
     assert 5.0 < estimate_seconds("y" * 40_000, [], 2.5e-4) < 20.0
 
 
-def test_models_that_are_needed_together_are_counted_and_those_that_are_there_are_not(
-    fresh_cache: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+def test_models_that_are_needed_together_are_compiled_side_by_side_with_one_message(
+    fresh_cache: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    heard: list[tuple[int, int]] = []
-    execute = cache._execute
-
-    def heard_execute(*given: Any) -> ModuleType:
-        heard.append(compile_times._place)
-        return execute(*given)
-
-    monkeypatch.setattr(cache, "_execute", heard_execute)
-    caplog.set_level(logging.ERROR)
+    numba, together = NumbaCompiler(), threading.Barrier(2, timeout=60.0)
     sources = [QUICK.format(number) for number in (time.time(), 2.5, 3.5)]
-    numba = NumbaCompiler()
     load_generated(sources[1], numba)
-    cache.load_all([*sources, sources[0]], numba, lambda source: load_generated(source, numba))
-    assert heard == [(1, 1), (1, 2), (2, 2)]
+    loaded = []
+
+    def load(source: str) -> ModuleType:
+        with announce(1.0, "kept"):
+            together.wait()
+            time.sleep(0.2)
+        loaded.append(source)
+        return load_generated(source, numba)
+
+    cache.load_all([*sources, sources[0]], numba, load)
+    assert set(loaded) == {sources[0], sources[2]}
+    assert [message.partition(", about")[0] for message in caplog.messages[:1]] == [
+        "ppafo: compiling 2 models for this computer"
+    ]
+    assert len(caplog.messages) == 2
     kept = [item.place / "seconds.txt" for item in cache.list_programs(fresh_cache)]
     assert len(kept) == 3
     assert all(float(file.read_text()) >= 0.0 for file in kept)
+
+
+def test_a_model_that_cannot_be_compiled_beside_others_is_an_error() -> None:
+    def fail() -> None:
+        raise ProgramError("no")
+
+    with pytest.raises(ProgramError, match="no"):
+        compile_side_by_side([fail, lambda: None], 1.0, "not kept")
