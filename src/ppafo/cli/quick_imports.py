@@ -9,8 +9,6 @@ from contextlib import contextmanager
 from types import ModuleType
 from typing import Any
 
-from ppafo.engine.loading import NUMBA, chosen_compiler
-
 _LINEAR_ALGEBRA = "scipy.linalg"
 
 
@@ -19,6 +17,8 @@ def load_compiler() -> None:
 
     SimulationError where ``PPAFO_BACKEND`` names what is no compiler, or one that is not here.
     """
+    from ppafo.engine.loading import NUMBA, chosen_compiler
+
     if chosen_compiler().name != NUMBA:
         return
     if "numba" in sys.modules or _LINEAR_ALGEBRA in sys.modules:
