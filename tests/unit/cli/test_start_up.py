@@ -45,7 +45,8 @@ def test_the_drawing_library_is_left_as_it_was() -> None:
 @pytest.mark.parametrize(("library", "loader"), [("numba", "load_compiler"), ("matplotlib.figure", "load_drawing")])
 def test_a_library_that_is_there_already_is_not_touched(library: str, loader: str) -> None:
     code = (
-        f"import sys, {library}\nfrom ppafo.cli import quick_imports\nbefore = dict(sys.modules)\n"
+        f"import sys, {library}, ppafo.engine.loading\nfrom ppafo.cli import quick_imports\n"
+        "before = dict(sys.modules)\n"
         f"quick_imports.{loader}()\nprint(sys.modules == before)"
     )
     assert printed_by(code) == "True"
