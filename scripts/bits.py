@@ -5,9 +5,9 @@
     python scripts/bits.py --renew
     python scripts/bits.py --translate 200
 
-Prints the table of the README, a row for each target: the golden hashes that it found, and what it did not find. A
-target that cannot be run here says what is missing. The rows of the runs come from plans on this machine: only the time
-stepping is compared elsewhere. ``--renew`` writes the golden hashes anew.
+Prints the table of ``docs/accuracy-and-speed.md``, a row for each target: the golden hashes that it found, and what it
+did not find. A target that cannot be run here says what is missing. The rows of the runs come from plans on this
+machine: only the time stepping is compared elsewhere. ``--renew`` writes the golden hashes anew.
 
 ``--translate`` draws programs from the catalogues, takes each to C, and lets gcc compile it with warnings as errors.
 """

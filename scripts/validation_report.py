@@ -129,7 +129,7 @@ def claims(_long: Path) -> list[Line]:
             f"{sum(counts.values())} claims of five publications",
             "their printed numbers; most rest on values that are not printed",
             words,
-            "the table in the README",
+            "the tables in docs/how-to/repeat-a-published-study.md",
             OPEN,
             command,
         )

@@ -1,7 +1,8 @@
-"""What the README and the two pages that go on from it show runs as printed; their numbers are those of a run."""
+"""What the README and the pages that took over its tables show runs as printed; their numbers are those of a run."""
 
 import re
 import shlex
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -10,32 +11,39 @@ from ppafo.answers.text import text_of
 from ppafo.cli.catalog import COMMANDS
 from ppafo.cli.main import build_parser, main
 from ppafo.engine.reference.agreement import compare_with_reference
+from ppafo.questions.bits.solve import golden_hashes
 from ppafo.questions.reproduce.solve import Reproduction, Studies, reproduce
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
+from scripts.bits import TARGETS, title_of
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-ASKED, MEASURED_PAGE = (
-    (ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("what-you-can-ask.md", "accuracy-and-speed.md")
+ASKED, MEASURED_PAGE, STUDIES_PAGE = (
+    (ROOT / "docs" / name).read_text(encoding="utf-8")
+    for name in ("what-you-can-ask.md", "accuracy-and-speed.md", "how-to/repeat-a-published-study.md")
 )
 TEXT = "\n".join((README, ASKED, MEASURED_PAGE))
+MOST_LINES, MOST_WORDS = 120, 1100
+"""What the README may have: five minutes to read."""
 CHECK_FAILED = 1
+HEADLINES = ("torque_rms_improvement", "co2_solenoid", "co2_proportional", "co2_saving")
+"""Claims of the README's own table, row by row."""
 MEASURED = {
     "step response (figure 7)": "step-response",
     "torque task, solenoid pair": "torque-task-solenoid",
     "torque task, proportional valve": "torque-task-proportional",
 }
-"""Rows of the README's table of accuracy and their scenarios."""
+"""Rows of the table of accuracy and their scenarios."""
 
 
 def blocks(language: str) -> list[str]:
-    """The code blocks of the README in one language."""
+    """The code blocks of README, questions and measurements in one language."""
     return re.findall(rf"^```{language}\n(.*?)^```", TEXT, re.DOTALL | re.MULTILINE)
 
 
 def commands() -> list[list[str]]:
-    """The words of every command that the README shows, without the name of the program."""
+    """The words of every command that these pages show, without the name of the program."""
     lines = [line for block in blocks("sh") for line in block.splitlines()]
     words = [shlex.split(line) for line in lines]
     assert all(line[0] == "ppafo" for line in words)
@@ -43,8 +51,8 @@ def commands() -> list[list[str]]:
 
 
 def shown_claims() -> dict[str, list[str]]:
-    """The cells of the README's table of claims by claim: paper, here, verdict."""
-    rows = re.findall(r"^\| [^|]+ \| `(\w+)` \| ([^|]+) \| ([^|]+) \| ([^|]+) \|$", TEXT, re.MULTILINE)
+    """The cells of the tables of claims by claim: published, here, verdict."""
+    rows = re.findall(r"^\| [^|]+ \| `(\w+)` \| ([^|]+) \| ([^|]+) \| ([^|]+) \|$", STUDIES_PAGE, re.MULTILINE)
     return {name: cells for name, *cells in rows}
 
 
@@ -71,9 +79,16 @@ def test_the_python_of_the_readme_runs_as_printed(block: str, tmp_path: Path, mo
     assert [name for name in pictures if (tmp_path / name).stat().st_size < 10_000] == []
 
 
-def test_the_first_picture_comes_within_two_screens() -> None:
-    before = README.partition("![")[0].splitlines()
-    assert len(before) <= 50
+def test_the_readme_is_short() -> None:
+    assert len(README.splitlines()) <= MOST_LINES
+    assert len(README.split()) <= MOST_WORDS
+
+
+def test_installation_three_lines_of_python_and_a_picture_are_on_the_first_screen() -> None:
+    before = README.partition("![")[0]
+    assert len(before.splitlines()) <= 20
+    assert "pip install" in before
+    assert blocks("python")[0] in before
 
 
 def test_there_are_three_lines_of_python() -> None:
@@ -83,12 +98,12 @@ def test_there_are_three_lines_of_python() -> None:
 
 
 @pytest.mark.parametrize("words", commands(), ids=" ".join)
-def test_a_command_of_the_readme_is_understood(words: list[str]) -> None:
+def test_a_command_of_the_pages_is_understood(words: list[str]) -> None:
     parsed = build_parser(words[0]).parse_args(words)
     assert callable(parsed.run)
 
 
-def test_the_commands_of_the_readme_run_one_after_the_other_with_the_exit_codes_it_says(
+def test_the_commands_of_the_pages_run_one_after_the_other_with_the_exit_codes_they_say(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -96,6 +111,8 @@ def test_the_commands_of_the_readme_run_one_after_the_other_with_the_exit_codes_
     assert capsys.readouterr().out
     failed = {command: code for command, code in codes.items() if code}
     assert failed == {"audit ppafo2011-printed": CHECK_FAILED}
+    assert (tmp_path / "out" / "first" / "report.html").is_file()
+    assert (tmp_path / "out" / "my-task" / "report.html").is_file()
     assert (tmp_path / "out" / "solenoid" / "figure.png").is_file()
     assert (tmp_path / "out" / "reproduce" / "report.html").is_file()
 
@@ -111,6 +128,32 @@ def test_the_make_targets_of_the_readme_exist() -> None:
     assert [target for target in targets if f"\n{target}:" not in makefile] == []
 
 
+def test_every_command_is_once_in_the_table_of_questions() -> None:
+    rows = re.findall(r"^\| [^|]+ \| ((?:`\w+`(?:, )?)+) \| .+ \|$", ASKED.partition("## ")[0], re.MULTILINE)
+    assert sorted(name for row in rows for name in re.findall(r"\w+", row)) == sorted(COMMANDS)
+
+
+def test_the_table_of_bits_has_every_golden_hash_and_the_rows_that_the_script_prints() -> None:
+    rows = re.findall(r"^\| (.+) \| (\d+) of (\d+) \|$", MEASURED_PAGE, re.MULTILINE)
+    hashes = str(2 * len(golden_hashes()))
+    assert [title for title, _, _ in rows] == [title_of(target) for target in TARGETS]
+    assert {tuple(found) for _, *found in rows} == {(hashes, hashes)}
+    assert f"each of {len(golden_hashes())} scenarios, walks and" in MEASURED_PAGE
+
+
+def test_the_numbers_of_the_readme_are_those_of_a_run(reproduction: Reproduction) -> None:
+    rows = re.findall(r"^\| [^|]+ \| ([\d.]+ \S+) \| ([\d.]+ \S+) \|$", README, re.MULTILINE)
+    claims = shown_claims()
+    assert rows == [tuple(claims[name][:2]) for name in HEADLINES]
+    verdicts = Counter(claims[claim.id][-1] for claim in reproduction.claims if claim.id in claims)
+    names = ("reproduced", "reproduced with assumptions", "shown on synthetic data", "contradicted")
+    assert set(verdicts) == set(names)
+    sentence = README.partition("Of the ")[2].partition(":")[0]
+    assert re.findall(r"\b\d+\b", sentence) == [
+        str(count) for count in (sum(verdicts.values()), *map(verdicts.get, names))
+    ]
+
+
 def test_the_table_of_claims_is_that_of_a_run(studies: Studies) -> None:
     lines = [re.split(r" {2,}", line) for line in text_of(studies.answer()).splitlines()[1:-2]]
     testable = {name: cells for study, name, *cells in lines if (study, cells[-1]) != ("ppafo-2011", "not testable")}
@@ -118,8 +161,7 @@ def test_the_table_of_claims_is_that_of_a_run(studies: Studies) -> None:
 
 
 def test_the_page_on_studies_shows_what_a_study_prints(studies: Studies) -> None:
-    page = (ROOT / "docs" / "how-to" / "repeat-a-published-study.md").read_text(encoding="utf-8")
-    shown = [line.strip() for line in page.splitlines() if line.startswith("    jrrd-2011")]
+    shown = [line.strip() for line in STUDIES_PAGE.splitlines() if line.startswith("    jrrd-2011")]
     printed = [line for line in text_of(studies.answer()).splitlines() if line.startswith("jrrd-2011")]
     assert [line.split() for line in shown] == [line.split() for line in printed]
     assert shown
@@ -130,7 +172,7 @@ def test_every_claim_on_a_synthetic_measurement_is_named_in_the_text_below_the_t
 ) -> None:
     synthetic = [claim.id for claim in reproduction.claims if claim.is_synthetic]
     assert synthetic
-    below = TEXT.partition('"Shown on synthetic data" is no reproduction')[2]
+    below = STUDIES_PAGE.partition('"Shown on synthetic data" is no reproduction')[2]
     assert [name for name in synthetic if f"`{name}`" not in below] == []
 
 
@@ -142,16 +184,16 @@ def test_the_limits_of_accuracy_are_those_of_the_tests() -> None:
     assert [float(cell) for cell in row] == held
 
 
-def test_the_steps_that_the_readme_says_were_taken_are_those_of_the_plan() -> None:
+def test_the_steps_that_the_page_says_were_taken_are_those_of_the_plan() -> None:
     runs = {scenario: plan_run(load_scenario(scenario)) for scenario in MEASURED.values()}
-    section = " ".join(TEXT.partition("## Accuracy")[2].partition("## Speed")[0].split())
+    section = " ".join(MEASURED_PAGE.partition("## Accuracy")[2].partition("## Speed")[0].split())
     assert "All runs ask for steps of at most 1 ms. The torque tasks take them;" in section
     assert {run.step for run in runs.values()} == {1e-3}
     assert {name for name, run in runs.items() if run.needs_parts} == {"step-response"}
 
 
 @pytest.mark.parametrize("row", MEASURED)
-def test_the_accuracy_that_the_readme_shows_is_about_what_is_measured(row: str) -> None:
+def test_the_accuracy_that_the_page_shows_is_about_what_is_measured(row: str) -> None:
     (cells,) = re.findall(rf"^\| {re.escape(row)} \| \S+ \| (\S+) \| (\S+) \|$", TEXT, re.MULTILINE)
     agreement = compare_with_reference(plan_run(load_scenario(MEASURED[row])))
     for shown, measured in zip(cells, (agreement.worst_pressure, agreement.worst_rms), strict=True):

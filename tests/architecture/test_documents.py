@@ -177,10 +177,19 @@ def test_units_of_the_nomenclature_are_the_declared_ones() -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_every_relative_link_leads_to_a_file(page: Path) -> None:
+def test_every_relative_link_leads_to_a_file_and_to_a_heading_of_it(page: Path) -> None:
     text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
     targets = [target for target in re.findall(r"\]\(([^)\s]+)\)", text) if "://" not in target]
-    assert [target for target in targets if not (page.parent / target.partition("#")[0]).is_file()] == []
+    assert [target for target in targets if not _leads_somewhere(page, *target.partition("#")[::2])] == []
+
+
+def _leads_somewhere(page: Path, place: str, anchor: str) -> bool:
+    """True for a file that is there, and for an anchor that is the heading of a page."""
+    file = page.parent / place if place else page
+    if not file.is_file() or file.suffix != ".md" or not anchor:
+        return file.is_file()
+    headings = re.findall(r"^#+ (.+)$", file.read_text(encoding="utf-8"), re.MULTILINE)
+    return anchor in {re.sub(r"[^\w -]", "", heading).lower().replace(" ", "-") for heading in headings}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))

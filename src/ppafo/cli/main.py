@@ -95,7 +95,9 @@ def _parse(words: list[str]) -> argparse.Namespace:
     check_options(words, parser)
     parsed = parser.parse_args(words)
     if parsed.command is None:
-        raise UsageError(f"no command was given; available: {', '.join(COMMANDS)}; 'ppafo --help' says what each does")
+        raise UsageError(
+            "no command was given; 'ppafo --help' lists them; try 'ppafo simulate torque-task-proportional' first"
+        )
     return parsed
 
 

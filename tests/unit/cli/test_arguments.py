@@ -16,7 +16,7 @@ FULL = Path("/dev/full")
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        ([], "no command was given; available: reproduce, simulate"),
+        ([], "no command was given; 'ppafo --help' lists them; try 'ppafo simulate torque-task-proportional'"),
         (["simulat"], "there is no command 'simulat', did you mean 'simulate'?"),
         (["--bogus"], "there is no option '--bogus'; available: --help, --version, -h"),
         (["--bogus", "simulate", "step-response"], "there is no option '--bogus'"),

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from ppafo import load_device, load_parameter_set, load_scenario, load_study, load_walk
+from ppafo import load_device, load_parameter_set, load_scenario, load_study, load_walk, simulate
 from ppafo.cli.main import build_parser, main
 from ppafo.cli.new import KINDS
 from ppafo.parameters.audit import audit
@@ -46,6 +46,23 @@ def test_the_set_of_the_template_passes_the_audit() -> None:
     main(["new", "set", "bench"])
     assert {finding.severity for finding in audit(load_parameter_set("bench.toml"))} == {"note"}
     assert load_device("bench.toml").valve.kind == "proportional"
+
+
+@pytest.mark.parametrize("device", ["ppafo2011", "my-device.toml"])
+def test_the_task_of_the_template_is_followed_smoothly_by_the_device_of_the_paper_and_by_that_of_the_template(
+    device: str,
+) -> None:
+    main(["new", "set", "my-device"])
+    main(["new", "scenario", "my-task"])
+    metrics = simulate("my-task.toml", [f"device.set={device}"]).metrics
+    assert metrics["rms_error"].value < 0.1
+    assert metrics["switchings"].value <= 2
+
+
+def test_the_walk_of_the_template_takes_the_device_of_the_template() -> None:
+    main(["new", "set", "my-device"])
+    main(["new", "walk", "my-walk"])
+    assert load_walk("my-walk.toml", ["device.set=my-device.toml"]).device.valve_name == "main"
 
 
 @pytest.mark.parametrize(("kind", "source"), SHIPPED)
@@ -96,7 +113,7 @@ def test_a_file_that_is_there_is_not_overwritten(capsys: pytest.CaptureFixture[s
 def test_a_copy_that_does_not_load_is_not_left(capsys: pytest.CaptureFixture[str]) -> None:
     main(["new", "set", "bench"])
     main(["new", "scenario", "task"])
-    text = Path("task.toml").read_text().replace('"ppafo2011"', '"bench.toml"').replace('"proportional"', '"main"')
+    text = Path("task.toml").read_text().replace('"ppafo2011"', '"bench.toml"')
     Path("task.toml").write_text(text)
     assert main(["new", "scenario", "task", "--from", "task.toml", "--out", "other/task.toml"]) == 2
     assert "bench.toml" in capsys.readouterr().err
