@@ -9,7 +9,7 @@ from importlib.util import find_spec
 import numpy as np
 
 from ppafo.engine.lanes import Floats
-from ppafo.engine.reference.solver import load_right_hand_side, right_hand_side_parameters
+from ppafo.engine.reference.solver import load_right_hand_side
 from ppafo.engine.rows import numbers
 from ppafo.engine.run import Run
 from ppafo.model.plant import chamber_pressures
@@ -40,13 +40,13 @@ def lsoda_interval(run: Run, tolerance: float) -> Interval:
     """One sample period with ``scipy.integrate.solve_ivp(method="LSODA")`` at a relative tolerance."""
     from scipy.integrate import solve_ivp
 
-    fill, parameters = load_right_hand_side(run), right_hand_side_parameters(run)
+    given, found, fill = load_right_hand_side(run)
     absolute = tolerance * np.array(TYPICAL_SIZES)
 
     def slopes(time: float, unknowns: Floats, command: float) -> Floats:
-        out = np.empty_like(unknowns)
-        fill(time, unknowns, out, parameters, command, 0.0)
-        return out
+        given[:] = unknowns
+        fill(time, command, 0.0)
+        return found.copy()
 
     def advance(unknowns: Floats, begin: float, end: float, command: float) -> Floats:
         solution = solve_ivp(
@@ -61,11 +61,13 @@ def cvode_interval(run: Run, tolerance: float) -> Interval:
     """One sample period with SUNDIALS CVODE at a relative tolerance; one solver object for the whole run."""
     from sksundae.cvode import CVODE
 
-    fill, parameters = load_right_hand_side(run), right_hand_side_parameters(run)
+    given, found, fill = load_right_hand_side(run)
     current = [0.0]
 
     def slopes(time: float, unknowns: Floats, out: Floats) -> None:
-        fill(time, unknowns, out, parameters, current[0], 0.0)
+        given[:] = unknowns
+        fill(time, current[0], 0.0)
+        out[:] = found
 
     solver = CVODE(slopes, rtol=tolerance, atol=tolerance * np.array(TYPICAL_SIZES))
 

@@ -13,8 +13,8 @@ import pytest
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.cache import load_generated
+from ppafo.engine.entries import HEADER
 from ppafo.engine.numba_compiler import NumbaCompiler
-from ppafo.engine.reference.source import HEADER
 from ppafo.engine.rows import numbers, rebuild
 from ppafo.engine.source_text import SourceCollector
 from ppafo.metrics import METRICS

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.engine.entries import with_arrays
 from ppafo.engine.reference import vane_mode
 from ppafo.engine.reference.sampling import SAME_TIME, solve_segment
 from ppafo.engine.rows import numbers, rebuild
@@ -69,8 +70,6 @@ class _Rig:
         self.run = rig_run.run
         self.plant = rig_run.run.plant
         self.is_free = rig_run.run.program.angle is None
-        functions = load_rig_program()
-        self.fill, self.show = functions.fill, functions.show
         run = rig_run.run
         groups = (
             run.plant,
@@ -79,9 +78,13 @@ class _Rig:
             run.leak_orifice,
             rig_run.line_orifice,
         )
-        self.parameters = np.array([number for group in groups for number in numbers(group)])
+        parameters = np.array([number for group in groups for number in numbers(group)])
         self.y = np.array([*rig_run.initial, *numbers(run.program.valve.initial())], dtype=np.float64)
         self.outputs, self.inputs = np.empty(OUTPUTS), np.zeros(INPUTS)
+        self.present, self.rates = np.empty(UNKNOWNS), np.empty(UNKNOWNS)
+        functions = load_rig_program()
+        self.fill = with_arrays(functions.fill, self.present, self.rates, parameters, self.inputs)
+        self.show = with_arrays(functions.show, self.present, self.outputs, parameters, self.inputs)
         self.valve_moves = True
         state = run.program.valve.initial()
         self.has_flat_valve = not any(isinstance(value, tuple) for value in state)
@@ -107,7 +110,9 @@ class _Rig:
         """Right-hand side; the valve is asked anew only while it moves."""
         slopes[UNKNOWNS:] = self.ask_valve(y) if self.valve_moves else 0.0
         self.place_vane(t, y)
-        self.fill(y, slopes, self.parameters, self.inputs, self.direction)
+        self.present[:] = y[:UNKNOWNS]
+        self.fill(self.direction)
+        slopes[:UNKNOWNS] = self.rates
 
     def ask_valve(self, y: Floats) -> list[float]:
         """Put the valve's openings into the inputs and return the slopes of its state."""
@@ -143,7 +148,8 @@ class _Rig:
     def observe(self, t: float, y: Floats) -> Floats:
         """Pressures, driving torque and static limit of a state."""
         self.place_vane(t, y)
-        self.show(y, self.outputs, self.parameters, self.inputs, self.direction)
+        self.present[:] = y[:UNKNOWNS]
+        self.show(self.direction)
         return self.outputs
 
     def torque_and_limit(self, t: float, y: Floats) -> tuple[float, float]:
@@ -240,7 +246,7 @@ class _Rig:
             moment, index = float(times[self.recorded]), self.recorded
             state = self.y if solution is None else solution.y[np.argmin(np.abs(solution.t - moment))]
             self.result.states[index] = self.prescribe_angle(state, moment)
-            self.result.pressures[index] = self.observe(moment, np.ascontiguousarray(state))[:2]
+            self.result.pressures[index] = self.observe(moment, state)[:2]
             self.result.commands[index] = self.decided
             self.recorded += 1
 

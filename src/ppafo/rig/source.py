@@ -8,10 +8,9 @@ import functools
 from collections.abc import Callable
 from typing import NamedTuple
 
-from ppafo.engine.cache import load_generated
-from ppafo.engine.numba_compiler import NumbaCompiler
+from ppafo.engine.entries import ARRAY, FLOAT, HEADER, INLINE, entry_text
+from ppafo.engine.loading import load_source
 from ppafo.engine.reference.derivative import ExactOrifice
-from ppafo.engine.reference.source import HEADER, INLINE
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import SourceCollector
 from ppafo.model.plant import Openings, PlantParameters
@@ -35,12 +34,12 @@ PARAMETER_GROUPS = {
 }
 """Groups of numbers that both functions need, in order."""
 
-_READ = 'types.Array(float64, 1, "C", readonly=True)'
-_COMPILED = f'@njit(void({_READ}, float64[::1], float64[::1], float64[::1], float64), cache=True, error_model="numpy")'
-
 
 class RigProgram(NamedTuple):
-    """``fill(y, slopes, parameters, inputs, direction)`` and ``show(y, outputs, parameters, inputs, direction)``."""
+    """``fill(y, slopes, parameters, inputs, direction)`` and ``show(y, outputs, parameters, inputs, direction)``.
+
+    ``y`` and ``slopes`` are those of the unknowns of ``RigState``.
+    """
 
     fill: Callable[..., None]
     show: Callable[..., None]
@@ -48,13 +47,13 @@ class RigProgram(NamedTuple):
 
 def load_rig_program() -> RigProgram:
     """Return the compiled right-hand side and observables of the rig."""
-    module = load_generated(rig_source(), NumbaCompiler())
+    module = load_source(rig_source())
     return RigProgram(module.fill, module.show)
 
 
 @functools.cache
 def rig_source() -> str:
-    """Source of the module; ``y`` begins with the unknowns of ``RigState``."""
+    """Source of the module."""
     collector = SourceCollector(INLINE)
     add = collector.add
     cells: dict[str, str] = {}
@@ -77,5 +76,5 @@ def rig_source() -> str:
 
 
 def _function(name: str, output: str, lines: list[str]) -> str:
-    body = "\n".join(f"    {line}" for line in lines)
-    return f"{_COMPILED}\ndef {name}(y, {output}, parameters, inputs, direction):\n{body}\n"
+    arrays = dict.fromkeys(("y", output, "parameters", "inputs"), ARRAY)
+    return entry_text(name, arrays | {"direction": FLOAT}, lines)

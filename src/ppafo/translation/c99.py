@@ -2,7 +2,7 @@
 
 One C function for each of Python's, with its docstring and its names; rows become structs that are handed over by
 value. There is no heap, no global that changes, no recursion, and no library function but ``sqrt`` and ``fabs``, which
-are exact. Built as ``FLAGS`` say, it gives the bits of the lanes.
+are exact, unless the walk was told to take others. Built as ``FLAGS`` say, it gives the bits of the lanes.
 """
 
 import inspect
@@ -15,7 +15,7 @@ from ppafo.engine.lane_source import INLINE, write_lanes
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
 from ppafo.translation import typed
-from ppafo.translation.c_terms import CTerms, c_name, member_name
+from ppafo.translation.c_terms import PART, CTerms, c_name, member_name
 from ppafo.translation.scopes import Scopes, scopes_of
 from ppafo.translation.typed import (
     Array,
@@ -37,6 +37,15 @@ TIED = "\N{NO-BREAK SPACE}"
 """Stands between two words that stay on one line."""
 
 _SCALARS = {"bool": "bool", "int": "int64_t", "float": "double", "int16": "int16_t", "int32": "int32_t"}
+_PART = f"""
+/* The numbers of an array from one first place up to another; size is what each first place has. */
+PPAFO_INLINE ppafo_array {PART}(ppafo_array whole, int64_t first, int64_t beyond, int64_t size)
+{{
+    whole.values += first * size;
+    whole.extent[0] = beyond - first;
+    return whole;
+}}
+"""
 LANE = "lane"
 """Loops over this name see no other turn of themselves, which the compiler is told."""
 
@@ -86,7 +95,8 @@ def c_source(
     for place, item in enumerate(functions):
         if writer.locals[item.name] & structs:
             bodies[place] = writer.function(item)
-    return "\n".join([_comment(title), before, *writer.structs, *bodies])
+    parts = [_PART] if any(f"{PART}(" in body for body in bodies) else []
+    return "\n".join([_comment(title), before, *parts, *writer.structs, *bodies])
 
 
 def _comment(text: str, further: Iterable[str] = ()) -> str:
@@ -177,11 +187,11 @@ class _Writer:
         self.locals[item.name] = writer.used
         returns = "void" if item.returns is None else self.type_name(item.returns)
         given = ", ".join(f"{self.type_name(kind)}{TIED}{writer.name(name)}" for name, kind in item.parameters)
-        linkage = "PPAFO_ENTRY void" if item.returns is None else f"PPAFO_INLINE {returns}"
+        linkage = f"{'PPAFO_ENTRY' if item.is_entry else 'PPAFO_INLINE'} {returns}"
         head = _wrapped(f"{linkage} {item.name}({given or 'void'})")
         bound = [f"Here {text}." for text in item.bound]
         said = _comment(self.documents.get(item.source, ""), bound)
-        prototype = [*head[:-1], f"{head[-1]};", ""] if item.returns is None else []
+        prototype = [*head[:-1], f"{head[-1]};", ""] if item.is_entry else []
         return "\n".join([*prototype, *([said] if said else []), *head, "{", *body, "}", ""])
 
 
@@ -241,6 +251,9 @@ class _Body:
 
     def write_store(self, item: typed.Store, level: int) -> Iterator[str]:
         yield from self.line(f"{self.terms.term(item.element)} = {self.terms.term(item.value)};", level)
+
+    def write_perform(self, item: typed.Perform, level: int) -> Iterator[str]:
+        yield from self.line(f"{item.function}({', '.join(map(self.terms.term, item.given))});", level)
 
     def write_return(self, item: typed.Return, level: int) -> Iterator[str]:
         yield from self.line(f"return {self.terms.term(item.value)};", level)

@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from ppafo.translation.typed import BOOL, FLOAT, INT, INT16, INT32, Array, Items, Row, Term, Type, is_empty
+from ppafo.translation.typed import BOOL, FLOAT, INT, INT16, INT32, LIBRARY, Array, Items, Row, Term, Type, is_empty
 
 _RESERVED = frozenset(
     word
@@ -17,8 +17,8 @@ _RESERVED = frozenset(
         "namespace new noexcept not not_eq nullptr operator or or_eq private protected public reinterpret_cast",
         "requires static_assert static_cast template this thread_local throw try typeid typename typeof",
         "typeof_unqual using virtual wchar_t char8_t char16_t char32_t alignas alignof xor xor_eq unix linux i386",
-        "gamma main fabs sqrt advance int8_t int16_t int32_t int64_t uint8_t uint16_t uint32_t uint64_t size_t",
-        "intptr_t uintptr_t NAN INFINITY HUGE_VAL HUGE_VALF HUGE_VALL DECIMAL_DIG NULL math_errhandling",
+        "gamma main fabs sqrt exp log pow advance int8_t int16_t int32_t int64_t uint8_t uint16_t uint32_t uint64_t",
+        "size_t intptr_t uintptr_t NAN INFINITY HUGE_VAL HUGE_VALF HUGE_VALL DECIMAL_DIG NULL math_errhandling",
     )
     for word in line.split()
 )
@@ -28,6 +28,8 @@ _MACRO = re.compile(
 """How names begin that headers or compilers keep for themselves."""
 _WORDS = {"and": "&&", "or": "||"}
 _LEVELS = {"or": 2, "and": 3, **dict.fromkeys(("<", "<=", ">", ">=", "==", "!="), 5), "+": 8, "-": 8, "*": 9, "/": 9}
+PART = "ppafo_part"
+"""A part of an array along its first places."""
 _CHOICE, _SIGN, _ATOM = 1, 10, 11
 _WORKED_OUT = frozenset({"+", "-", "*", "&", "|", "^", ">>", "min", "max", "choice", "negative"})
 _HELPERS = {
@@ -37,6 +39,7 @@ _HELPERS = {
     "//": "ppafo_floor_quotient",
     "%": "ppafo_floor_remainder",
 }
+_OF_C = {"sqrt": "sqrt", "abs": "fabs", **{name: name for name in LIBRARY}}
 
 
 def c_name(name: str, others: Collection[str] = (), outer: Collection[str] = ()) -> str:
@@ -82,8 +85,8 @@ class CTerms:
             return writer(item)
         if item.kind in _HELPERS and (item.type == INT or item.kind != "abs"):
             return self.helper(item), _ATOM
-        if item.kind in ("sqrt", "abs"):
-            return f"{'sqrt' if item.kind == 'sqrt' else 'fabs'}({self.term(item.parts[0])})", _ATOM
+        if item.kind in _OF_C:
+            return f"{_OF_C[item.kind]}({', '.join(map(self.term, item.parts))})", _ATOM
         if item.kind == "*" and item.type == INT:
             return f"ppafo_wrapped_product({self.term(item.parts[0])}, {self.term(item.parts[1])})", _ATOM
         # Signs that many misread get brackets around what they join, those of sums and products as they need them.
@@ -150,6 +153,13 @@ class CTerms:
         """The first place in an array, by its name where it has one."""
         names = self.places.get(owner.detail, ())
         return names[place.detail] if names and place.kind == "number" else self.term(place, least)
+
+    def _of_part(self, item: Term) -> tuple[str, int]:
+        owner, first, beyond = item.parts
+        assert isinstance(owner.type, Array)
+        name = self.name(owner.detail)
+        size = " * ".join(f"{name}.extent[{at}]" for at in range(1, owner.type.dimensions)) or "1"
+        return f"{PART}({name}, {self.term(first)}, {self.term(beyond)}, {size})", _ATOM
 
     def _of_extent(self, item: Term) -> tuple[str, int]:
         return f"{self.name(item.parts[0].detail)}.extent[{item.detail}]", _ATOM

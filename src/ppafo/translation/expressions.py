@@ -13,6 +13,7 @@ from ppafo.translation.typed import (
     FLOAT,
     FUNCTIONS,
     INT,
+    LIBRARY,
     Array,
     Function,
     Handed,
@@ -43,13 +44,15 @@ WHOLE_ONLY = frozenset({"&", "|", "^", ">>"})
 class Expressions:
     """Expressions of one function: its names with their types, those that only count up from 0, rows and functions.
 
-    ``made`` gives a function for types of its parameters, ``refused`` the error for a place.
+    ``library`` has the functions of the C library that it may call. ``made`` gives a function for types of its
+    parameters, ``refused`` the error for a place.
     """
 
     types: Mapping[str, Type]
     counters: Collection[str]
     rows: Mapping[str, Sequence[str]]
     definitions: Mapping[str, ast.FunctionDef]
+    library: frozenset[str]
     made: Callable[[str, tuple[Type, ...]], Function]
     refused: Callable[[ast.AST, str], ProgramError]
 
@@ -150,7 +153,11 @@ class Expressions:
         return Term("item", owner.type.types[0], (owner, self.from_start(place, Term("number", INT, (), count))))
 
     def element(self, owner: Term, kind: Array, node: ast.Subscript) -> Term:
-        """An element of an array, which has all its places."""
+        """An element of an array, which has all its places, or a part of it from one first place up to another."""
+        if owner.kind != "name":
+            raise self.refused(node, f"'{ast.unparse(node)}' is taken of an array without a name")
+        if isinstance(node.slice, ast.Slice):
+            return self.part_of_array(owner, kind, node.slice)
         places = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
         extents = kind.shape or (None,) * kind.dimensions
         if len(places) != len(extents):
@@ -160,6 +167,14 @@ class Expressions:
             count = Term("extent", INT, (owner,), at) if extent is None else Term("number", INT, (), extent)
             given.append(self.from_start(self.whole(place), count))
         return Term("element", FLOAT, (owner, *given))
+
+    def part_of_array(self, owner: Term, kind: Array, node: ast.Slice) -> Term:
+        """The places of an array from one up to another, which are in it: what is beyond is not looked for."""
+        if node.lower is None or node.upper is None or node.step is not None or kind.shape:
+            raise self.refused(node, f"'{ast.unparse(node)}' is not from one place of an array up to another")
+        count = Term("extent", INT, (owner,), 0)
+        first, beyond = (self.from_start(self.whole(item), count) for item in (node.lower, node.upper))
+        return Term("part", Array(kind.dimensions), (owner, first, beyond))
 
     def from_start(self, place: Term, count: Term) -> Term:
         """A place counted from the start, where Python counts a negative one from the end."""
@@ -204,6 +219,8 @@ class Expressions:
         return Term("negative", value.type, (value,))
 
     def _of_binop(self, node: ast.BinOp) -> Term:
+        if isinstance(node.op, ast.Pow) and "pow" in self.library:
+            return self.power(node)
         sign = SIGN_OF.get(type(node.op), "")
         left, right = self.scalar(node.left, INT), self.scalar(node.right, INT)
         is_whole = left.type == right.type == INT
@@ -213,6 +230,13 @@ class Expressions:
             raise self.refused(node, f"'{ast.unparse(node)}' shifts by what is not written out as 0 to 63")
         kind = INT if is_whole and sign != "/" else FLOAT
         return Term(sign, kind, (converted(left, kind), converted(right, kind)))
+
+    def power(self, node: ast.BinOp) -> Term:
+        """A power of floats; compilers make something else of one whose base or exponent they see."""
+        parts = tuple(self.scalar(item, FLOAT) for item in (node.left, node.right))
+        if any((part.parts[0] if part.kind == "negative" else part).kind == "number" for part in parts):
+            raise self.refused(node, f"'{ast.unparse(node)}', a power of a number or by a number that is written out")
+        return Term("pow", FLOAT, parts)
 
     def _of_boolop(self, node: ast.BoolOp) -> Term:
         parts = [self.term(item) for item in node.values]
@@ -252,16 +276,23 @@ class Expressions:
             raise self.refused(node, f"'{ast.unparse(node)}', a choice between a whole number and a float")
         return Term("choice", kind, (test, converted(yes, kind), converted(no, kind)))
 
-    def _of_call(self, node: ast.Call) -> Term:
+    def name_called(self, node: ast.Call) -> str:
+        """The name of what is called; that of the function itself where it was handed over."""
         name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
         if any(isinstance(item, ast.Starred) for item in node.args):
             raise self.refused(node, f"'{ast.unparse(node)}' hands over a tuple as arguments")
         handed = self.types.get(name)
-        name = handed.name if isinstance(handed, Handed) else name
+        return handed.name if isinstance(handed, Handed) else name
+
+    def _of_call(self, node: ast.Call) -> Term:
+        name = self.name_called(node)
         if name in self.rows:
             return self.build(name, node)
         if name in self.definitions:
-            return self.call(name, node)
+            function, given = self.called(name, node)
+            if function.returns is None:
+                raise self.refused(node, f"'{name}' returns nothing")
+            return Term("call", function.returns, given, function.name)
         return self.built_in(name, node)
 
     def build(self, name: str, node: ast.Call) -> Term:
@@ -274,8 +305,8 @@ class Expressions:
         parts = tuple(given[item] for item in fields)
         return Term("build", Row(name, tuple((item, given[item].type) for item in fields)), parts)
 
-    def call(self, name: str, node: ast.Call) -> Term:
-        """A call of another function of the module."""
+    def called(self, name: str, node: ast.Call) -> tuple[Function, tuple[Term, ...]]:
+        """Another function of the module that is called, and what it is handed."""
         takes = self.definitions[name].args
         names = [item.arg for item in (*takes.posonlyargs, *takes.args, *takes.kwonlyargs)]
         placed = [item.arg for item in (*takes.posonlyargs, *takes.args)]
@@ -286,17 +317,17 @@ class Expressions:
         given |= {str(item.arg): self.term(item.value) for item in node.keywords}
         if set(given) != set(names):
             raise self.refused(node, f"'{ast.unparse(node)}' does not give every argument")
-        function = self.made(name, tuple(given[item].type for item in names))
-        if function.returns is None:
-            raise self.refused(node, f"'{name}' returns nothing")
-        parts = tuple(given[item] for item in names if not is_empty(given[item].type))
-        return Term("call", function.returns, parts, function.name)
+        types = tuple(given[item].type for item in names)
+        if any(isinstance(kind, Array) and kind.shape for kind in types):
+            raise self.refused(node, f"'{ast.unparse(node)}' hands over an array of its own")
+        return self.made(name, types), tuple(given[item] for item in names if not is_empty(given[item].type))
 
     def built_in(self, name: str, node: ast.Call) -> Term:
         """A call of a function that every language has."""
         own = name.removeprefix("math.")
-        least = FLOAT if own in ("sqrt", "float") else INT
-        if own not in FUNCTIONS | {"float", "int", "bool", "len"} or node.keywords:
+        least = FLOAT if own in LIBRARY | {"sqrt", "float"} else INT
+        known = FUNCTIONS | {"float", "int", "bool", "len"} | (self.library - {"pow"})
+        if own not in known or node.keywords:
             raise self.refused(node, f"'{name}' is a function of a library")
         if len(node.args) < 1 or (own in ("min", "max")) != (len(node.args) > 1):
             raise self.refused(node, f"'{ast.unparse(node)}' with {len(node.args)} arguments")

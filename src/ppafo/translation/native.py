@@ -6,29 +6,35 @@ import importlib.util
 import os
 import platform
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from shutil import which
 from types import ModuleType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.engine.compilers import CompilerError
 from ppafo.engine.lane_rows import lanes_of
+from ppafo.engine.lane_source import COMPILED
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, join_results
 from ppafo.engine.loading import HOW_TO_INSTALL, WITHOUT_C
 from ppafo.errors import SimulationError, one_line, reason
 from ppafo.translation.c99 import FLAGS, c_source
-from ppafo.translation.walk import walk_module
+from ppafo.translation.typed import FLOAT, INT, LIBRARY, Array, Type
+from ppafo.translation.walk import entries_of, walk_module
 
 FOR_GCC = ("-fno-thread-jumps", "-fno-ssa-phiopt", "-fno-tree-pre", "--param", "sra-max-scalarization-size-Ospeed=4096")
 """What lets gcc take lanes side by side: without them it makes jumps of choices first. The bits stay as they are."""
+_LIBRARY_AS_IT_RUNS = tuple(f"-fno-builtin-{name}" for name in sorted(LIBRARY))
+"""Else a compiler works out what it can by itself, to other last bits than those of the library, which Numba calls."""
 _THIS_PROCESSOR = "-march=native" if platform.machine().lower() in ("x86_64", "amd64", "i686") else "-mcpu=native"
 _WIDEST_VECTORS = ("-mprefer-vector-width=512",) if _THIS_PROCESSOR.startswith("-march") else ()
 _LIBRARY = {"win32": "program.dll", "darwin": "program.dylib"}.get(sys.platform, "program.so")
@@ -38,8 +44,69 @@ _INTERRUPTED = (-signal.SIGINT, -signal.SIGTERM)
 _TITLE = "Generated from the functions of ppafo. Not to be edited."
 
 
-class _Array(ctypes.Structure):
-    _fields_ = (("values", ctypes.c_void_p), ("extent", ctypes.c_int64 * 3))
+_PLACE, _FLOATS = ctypes.c_double * 0, np.dtype(np.float64)
+_NUMBERS = {FLOAT: ctypes.c_double, INT: ctypes.c_int64}
+PACKED = "_packed"
+"""Stands behind the name of an entry that takes its arrays one after another in memory: a call is quicker so."""
+
+
+@dataclass(frozen=True, slots=True)
+class NativeEntry:
+    """An entry of a library, called as that of a module by Numba.
+
+    ``function`` takes its arrays, of these dimensions, one after another as ``layout`` writes each ``ppafo_array``.
+    """
+
+    function: Any
+    dimensions: tuple[int, ...]
+    layout: struct.Struct
+
+    def __call__(self, *given: Any) -> None:
+        """Call it with arrays, and the numbers that follow them."""
+        count = len(self.dimensions)
+        self.function(self.packed(given[:count]), *given[count:])
+
+    def with_arrays(self, *arrays: NDArray[np.float64]) -> Callable[..., None]:
+        """The entry as a function of what follows these arrays, which it keeps."""
+        called: Any = partial(self.function, self.packed(arrays))
+        called.arrays = arrays
+        return called
+
+    def packed(self, arrays: Sequence[NDArray[np.float64]]) -> bytes:
+        """Where arrays are, as C takes them.
+
+        TypeError for what C would misread: arrays of other numbers or dimensions, or that lie otherwise in memory.
+        """
+        numbers: list[int] = []
+        for array, dimensions in zip(arrays, self.dimensions, strict=True):
+            if array.dtype != _FLOATS or array.ndim != dimensions:
+                raise TypeError(
+                    f"an array of floats in {dimensions} dimensions is needed, not {array.dtype} {array.shape}"
+                )
+            # Refuses what is read-only, or does not lie row after row.
+            numbers.append(ctypes.addressof(_PLACE.from_buffer(array)))
+            numbers += array.shape
+        return self.layout.pack(*numbers)
+
+
+def with_packed_entries(source: str, entries: Mapping[str, tuple[Type, ...]]) -> str:
+    """A translation unit that shows nothing but its entries, which take their arrays one after another.
+
+    Else a call of ``advance`` would be one of the function of that name in the C library of GNU.
+    """
+    texts = ["#define PPAFO_ENTRY static", source]
+    for name, types in entries.items():
+        arrays = [place for place, kind in enumerate(types) if isinstance(kind, Array)]
+        numbers = "".join(
+            f", {'double' if kind == FLOAT else 'int64_t'} number_{place}"
+            for place, kind in enumerate(types)
+            if place not in arrays
+        )
+        given = ", ".join(
+            f"arrays[{arrays.index(place)}]" if place in arrays else f"number_{place}" for place in range(len(types))
+        )
+        texts.append(f"void {name}{PACKED}(const ppafo_array *arrays{numbers})\n{{\n    {name}({given});\n}}\n")
+    return "\n".join(texts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +124,13 @@ class CCompiler:
     @property
     def flags(self) -> tuple[str, ...]:
         """Those for the bits, and those for this processor."""
-        return (*FLAGS, _THIS_PROCESSOR, *_WIDEST_VECTORS, *(FOR_GCC if self.name == "gcc" else ()))
+        return (
+            *FLAGS,
+            *_LIBRARY_AS_IT_RUNS,
+            _THIS_PROCESSOR,
+            *_WIDEST_VECTORS,
+            *(FOR_GCC if self.name == "gcc" else ()),
+        )
 
     def identity(self) -> str:
         """The compiler's own file, flags, what the processor can do, and the translator itself."""
@@ -77,13 +150,13 @@ class CCompiler:
             return
         try:
             with tempfile.TemporaryDirectory(prefix="ppafo-", ignore_cleanup_errors=True) as folder:
-                _fill(module, self._build(translated, Path(folder)))
+                _fill(module, self._build(translated, Path(folder)), entries_of(source))
         except OSError as error:
             raise CompilerError(f"what {self.name} makes cannot be kept for an instant: {reason(error)}") from error
 
-    def run_text(self, _source: str, path: str, module: ModuleType) -> None:
+    def run_text(self, source: str, path: str, module: ModuleType) -> None:
         """Load the library beside ``path``."""
-        _fill(module, Path(path).with_name(_LIBRARY))
+        _fill(module, Path(path).with_name(_LIBRARY), entries_of(source))
 
     def _build(self, source: str, folder: Path) -> Path:
         return _compiled(source, folder, self.command, self.flags)
@@ -157,14 +230,26 @@ def translator_hash() -> str:
 
 def translated_text(source: str) -> str:
     """The C of a composed text; ProgramError for what has none."""
-    return c_source(walk_module(source), {}, _TITLE)
+    return with_packed_entries(c_source(walk_module(source, library=LIBRARY), {}, _TITLE), entries_of(source))
 
 
-def build(source: str, folder: Path, command: Sequence[str] = ("gcc",), flags: Sequence[str] = FLAGS) -> ModuleType:
-    """Compile C into a library in ``folder`` and load it; CompilerError where the compiler refuses it."""
-    library = _compiled(source, folder, command, flags)
+_LANES = entries_of(f"{COMPILED}\ndef advance(")
+
+
+def build(
+    source: str,
+    folder: Path,
+    command: Sequence[str] = ("gcc",),
+    flags: Sequence[str] = FLAGS,
+    entries: Mapping[str, tuple[Type, ...]] = _LANES,
+) -> ModuleType:
+    """Compile C into a library in ``folder`` and load its entries, by themselves the ``advance`` of a lane loop.
+
+    CompilerError where the compiler refuses it.
+    """
+    library = _compiled(with_packed_entries(source, entries), folder, command, flags)
     module = ModuleType(library.stem)
-    _fill(module, library)
+    _fill(module, library, entries)
     return module
 
 
@@ -190,16 +275,21 @@ def _is_mounted_without_execution(folder: Path) -> bool:
     return hasattr(os, "ST_NOEXEC") and bool(os.statvfs(folder).f_flag & os.ST_NOEXEC)
 
 
-def _fill(module: ModuleType, library: Path) -> None:
-    """Give a module the ``advance`` of a library."""
+def _fill(module: ModuleType, library: Path, entries: Mapping[str, tuple[Type, ...]]) -> None:
+    """Give a module the entries of a library."""
     try:
-        entry = ctypes.CDLL(str(library)).advance
+        loaded = ctypes.CDLL(str(library))
+        functions = [loaded[f"{name}{PACKED}"] for name in entries]
     except OSError as error:
         raise CompilerError(f"the library of a compiled model cannot be loaded: {one_line(error)}") from error
     except AttributeError:
         raise CompilerError("the library of a compiled model lacks its functions") from None
-    entry.restype = None
-    module.__dict__["advance"] = lambda *given: entry(*map(_handed, given))
+    for function, (name, types) in zip(functions, entries.items(), strict=True):
+        function.restype = None
+        function.argtypes = [ctypes.c_void_p, *(_NUMBERS[kind] for kind in types if kind in _NUMBERS)]
+        dimensions = tuple(kind.dimensions for kind in types if isinstance(kind, Array))
+        layout = struct.Struct("".join(f"P{count}q{8 * (3 - count)}x" for count in dimensions))
+        module.__dict__[name] = NativeEntry(function, dimensions, layout)
 
 
 def run_native(program: ModuleType, batch: Batch) -> BatchResult:
@@ -213,11 +303,3 @@ def run_native(program: ModuleType, batch: Batch) -> BatchResult:
         block.advance(batch.clock.step_count)
         results.append(block.result())
     return join_results(results)
-
-
-def _handed(value: Any) -> Any:
-    """An argument as C takes it."""
-    if isinstance(value, np.ndarray):
-        extent = (ctypes.c_int64 * 3)(*value.shape, *(0,) * (3 - value.ndim))
-        return _Array(value.ctypes.data, extent)
-    return ctypes.c_double(value) if isinstance(value, float) else ctypes.c_int64(value)

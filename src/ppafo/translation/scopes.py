@@ -178,6 +178,8 @@ def _terms(statement: Statement) -> list[Term]:
         return [statement.value]
     if isinstance(statement, typed.Store):
         return [statement.element, statement.value]
+    if isinstance(statement, typed.Perform):
+        return list(statement.given)
     if isinstance(statement, typed.Count):
         return [statement.start, statement.stop]
     return [statement.test] if isinstance(statement, typed.If | typed.While) else []

@@ -62,8 +62,8 @@ _NONE: frozenset[str] = frozenset()
 class Term:
     """A value: what makes it, its type, the terms that it is made of, and a name or number where it has one.
 
-    Kinds: number, name, field, item, build, call, choice, convert, negative, not, element (of an array), extent,
-    and the signs and functions of ``SIGNS`` and ``FUNCTIONS``.
+    Kinds: number, name, field, item, build, call, choice, convert, negative, not, element (of an array), extent, part
+    (of an array, along its first places), and the signs and functions of ``SIGNS``, ``FUNCTIONS`` and ``LIBRARY``.
     """
 
     kind: str
@@ -80,6 +80,8 @@ class Term:
 
 SIGNS = frozenset({"+", "-", "*", "/", "//", "%", "&", "|", "^", ">>", "<", "<=", ">", ">=", "==", "!=", "and", "or"})
 FUNCTIONS = frozenset({"abs", "min", "max", "sqrt"})
+LIBRARY = frozenset({"exp", "log", "pow"})
+"""Functions that every C library has, with last bits of its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +150,15 @@ class Return:
     value: Term
 
 
-Statement: TypeAlias = Assign | Reserve | Store | If | Count | While | Leave | Return
+@dataclass(frozen=True, slots=True)
+class Perform:
+    """A call of a function that returns nothing and writes into arrays which it is handed."""
+
+    function: str
+    given: tuple[Term, ...]
+
+
+Statement: TypeAlias = Assign | Reserve | Store | If | Count | While | Leave | Return | Perform
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,6 +166,7 @@ class Function:
     """One function for one choice of types; ``source`` is its name in the composed module.
 
     ``bound`` lists the functions that were handed over. What is empty is no parameter. ``returns`` None is nothing.
+    ``is_entry`` is true for one that returns nothing and is called from outside.
     """
 
     name: str
@@ -164,6 +175,7 @@ class Function:
     returns: Type | None
     body: tuple[Statement, ...]
     bound: tuple[str, ...] = ()
+    is_entry: bool = False
 
 
 @dataclass(slots=True)

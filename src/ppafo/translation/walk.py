@@ -5,13 +5,13 @@ type, so that it is bound here. What is outside the subset is refused with the f
 """
 
 import ast
-import re
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from typing import Any
 
 from ppafo.engine.compile_errors import place_in
+from ppafo.engine.entries import entry_types
 from ppafo.engine.plain_python import parse_module, refusal
 from ppafo.errors import ProgramError
 from ppafo.translation import typed
@@ -36,41 +36,41 @@ from ppafo.translation.typed import (
     joined,
 )
 
-_ARRAY = re.compile(r"float64\[(.*?)\]|int64|float64")
 
-
-def walk_module(source: str, entries: Mapping[str, tuple[Type, ...]] | None = None) -> Module:
+def walk_module(
+    source: str, entries: Mapping[str, tuple[Type, ...]] | None = None, library: frozenset[str] = frozenset()
+) -> Module:
     """All functions of a composed module that its entries need. ProgramError for what is outside the subset.
 
     Entries are functions with types of their parameters, by name; without any those that state them in a decorator.
+    ``library`` has those of ``LIBRARY`` that may be called.
     """
-    walk = _ModuleWalk(source.split("\n"))
+    walk = _ModuleWalk(source.split("\n"), entries_of(source) if entries is None else entries, library)
     for node in parse_module(source).body:
         if isinstance(node, ast.Assign) and isinstance(node.value, ast.Call) and isinstance(node.targets[0], ast.Name):
             walk.rows[node.targets[0].id] = ast.literal_eval(node.value.args[1])
         elif isinstance(node, ast.FunctionDef):
             walk.definitions[node.name] = node
-    for name, node in walk.definitions.items():
-        types = _entry_types(node) if entries is None else entries.get(name)
-        if types is not None:
-            walk.function(name, types)
+    for name in walk.definitions:
+        if name in walk.entries:
+            walk.function(name, walk.entries[name])
     return walk.module
 
 
-def _entry_types(node: ast.FunctionDef) -> tuple[Type, ...] | None:
-    """Types of the parameters that an entry states in its decorator; None for what only others call."""
-    stated = [item.args[0] for item in node.decorator_list if isinstance(item, ast.Call) and item.args]
-    if not stated:
-        return None
-    written = ast.literal_eval(stated[0]).partition("(")[2].rpartition(")")[0]
-    found = _ARRAY.finditer(written)
+def entries_of(source: str) -> dict[str, tuple[Type, ...]]:
+    """Functions of a composed module that are called from outside, with the types of their parameters."""
     plain: dict[str, Type] = {"int64": INT, "float64": FLOAT}
-    return tuple(plain.get(item[0]) or Array(item[1].count(":") - 1) for item in found)
+    return {
+        name: tuple(plain.get(word) or Array(word.count(":") - 1) for word in words)
+        for name, words in entry_types(source).items()
+    }
 
 
 @dataclass(slots=True)
 class _ModuleWalk:
     lines: list[str]
+    entries: Mapping[str, tuple[Type, ...]]
+    library: frozenset[str]
     rows: dict[str, list[str]] = field(default_factory=dict)
     definitions: dict[str, ast.FunctionDef] = field(default_factory=dict)
     done: dict[tuple[str, tuple[Type, ...]], Function] = field(default_factory=dict)
@@ -123,6 +123,7 @@ class _FunctionWalk:
             found.counters,
             module.rows,
             module.definitions,
+            module.library,
             made=module.function,
             refused=module.refused,
         )
@@ -130,6 +131,7 @@ class _FunctionWalk:
         self.has_widened = False
         self.flags = 0
         self.flag = ""
+        self.writes: ast.AST | None = None
 
     def walked(self, name: str, types: tuple[Type, ...]) -> Function:
         """The function as typed statements."""
@@ -146,11 +148,14 @@ class _FunctionWalk:
             if self.types[parameter] != kind:
                 problem = f"'{parameter}' is given as one type and becomes another; give the second a name of its own"
                 raise self.refused(self.definition, problem)
+        if self.writes is not None and self.returns is not None:
+            raise self.refused(self.writes, f"'{self.definition.name}' returns a value and writes into an array")
         kept = tuple((item, self.types[item]) for item in names if not is_empty(self.types[item]))
         bound = tuple(
             f"{item} is {kind.name}" for item, kind in zip(names, types, strict=True) if isinstance(kind, Handed)
         )
-        return Function(name, self.definition.name, kept, self.returns, needed(body, frozenset())[0], bound)
+        is_entry = self.returns is None and self.module.entries.get(self.definition.name) == types
+        return Function(name, self.definition.name, kept, self.returns, needed(body, frozenset())[0], bound, is_entry)
 
     def refused(self, where: ast.AST, problem: str) -> ProgramError:
         """The error for a place in this function."""
@@ -169,8 +174,17 @@ class _FunctionWalk:
     def do_pass(self, _node: ast.Pass) -> list[Statement]:
         return []
 
-    def do_expr(self, _node: ast.Expr) -> list[Statement]:
-        return []
+    def do_expr(self, node: ast.Expr) -> list[Statement]:
+        if isinstance(node.value, ast.Constant):
+            return []
+        name = self.values.name_called(node.value) if isinstance(node.value, ast.Call) else ""
+        if not isinstance(node.value, ast.Call) or name not in self.module.definitions:
+            raise self.refused(node, f"'{ast.unparse(node)}' is no statement of the subset")
+        function, given = self.values.called(name, node.value)
+        if function.returns is not None:
+            raise self.refused(node, f"'{ast.unparse(node)}' throws away what it returns")
+        self.writes = node
+        return [typed.Perform(function.name, given)]
 
     def do_break(self, node: ast.Break) -> list[Statement]:
         marks = [self.assign(self.flag, Term("number", BOOL, (), True), node)] if self.flag else []
@@ -269,16 +283,21 @@ class _FunctionWalk:
         if isinstance(target, ast.Name) and isinstance(node.value, ast.Call) and _is_empty_array(node.value):
             return [self.reserve(target.id, node.value)]
         value = self.values.term(node.value)
+        return (
+            self.assign_items(target, value, node) if isinstance(target, ast.Tuple) else self.put(target, value, node)
+        )
+
+    def put(self, target: ast.expr, value: Term, node: ast.AST) -> list[Statement]:
+        """A name or an element of an array gets a value."""
         if isinstance(target, ast.Name):
             return [self.assign(target.id, value, node)]
-        if isinstance(target, ast.Subscript):
-            element = self.values.term(target)
-            if element.kind != "element" or not isinstance(value.type, Scalar):
-                raise self.refused(node, f"'{ast.unparse(target)}' on the left")
-            return [typed.Store(element, converted(value, FLOAT))]
-        if not isinstance(target, ast.Tuple):
+        element = self.values.term(target) if isinstance(target, ast.Subscript) else value
+        if not isinstance(target, ast.Subscript) or element.kind != "element" or not isinstance(value.type, Scalar):
             raise self.refused(node, f"'{ast.unparse(target)}' on the left")
-        return self.assign_items(target, value, node)
+        owner = element.parts[0].type
+        if isinstance(owner, Array) and not owner.shape:
+            self.writes = node
+        return [typed.Store(element, converted(value, FLOAT))]
 
     def reserve(self, name: str, node: ast.Call) -> Statement:
         """A local array, whose shape is a literal."""
@@ -310,20 +329,23 @@ class _FunctionWalk:
         self.types[name] = found
 
     def assign_items(self, target: ast.Tuple, value: Term, node: ast.Assign) -> list[Statement]:
-        """Several names get the items of a tuple; what is on the right has its value before any name changes."""
+        """Several names or elements get the items of a tuple, which has its value before any of them changes."""
         names = [item.id for item in target.elts if isinstance(item, ast.Name)]
+        is_stored = len(names) < len(target.elts)
         kind = value.type
         length = len(kind.types) if isinstance(kind, Items) else len(kind.fields) if isinstance(kind, Row) else -1
-        if len(names) != len(target.elts) or length != len(names):
+        if length != len(target.elts):
             raise self.refused(node, f"'{ast.unparse(target)}' does not fit what is on the right")
         before: list[Statement] = []
-        if value.kind != "build" or value.reads & set(names):
+        if value.kind != "build" or value.reads & set(names) or (is_stored and value.reads):
             whole = self.fresh("_and_".join(name for name in names if name != "_") or "items", kind)
             before = [self.assign(whole, value, node)]
             value = Term("name", self.types[whole], (), whole)
-        return [
-            *before,
-            *(self.assign(name, typed.item_of(value, at), node) for at, name in enumerate(names) if name in self.read),
+        return before + [
+            statement
+            for at, item in enumerate(target.elts)
+            if not isinstance(item, ast.Name) or item.id in self.read
+            for statement in self.put(item, typed.item_of(value, at), node)
         ]
 
 

@@ -16,7 +16,7 @@ from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.translation.c99 import c_source, program_source
 from ppafo.translation.native import build, run_native
-from ppafo.translation.walk import walk_module
+from ppafo.translation.walk import entries_of, walk_module
 from ppafo.walking.loading import load_walk
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.walk import plan_of
@@ -42,12 +42,16 @@ def module_of(function: Callable[..., Any], given: str, results: int) -> str:
 
 def in_c(function: Callable[..., Any], given: str, results: int, columns: Any, folder: Path) -> Any:
     """Results (results, runs) of a function in C for the columns (numbers, runs)."""
-    source = c_source(walk_module(module_of(function, given, results)), {}, "A test.")
     found = np.zeros((results, columns.shape[1]))
-    build(source, folder, flags=("-std=c99", "-O2", "-fsanitize=undefined", "-fno-sanitize-recover=all")).advance(
-        np.ascontiguousarray(columns), found
-    )
+    built(module_of(function, given, results), folder).advance(np.ascontiguousarray(columns), found)
     return found
+
+
+def built(composed: str, folder: Path) -> Any:
+    """A composed module by gcc, which stops where the C does what is not defined."""
+    source = c_source(walk_module(composed), {}, "A test.")
+    strict = ("-std=c99", "-O2", "-fsanitize=undefined", "-fno-sanitize-recover=all", "-Wall", "-Wextra", "-Werror")
+    return build(source, folder, flags=strict, entries=entries_of(composed))
 
 
 def whole_numbers(left: float, right: float) -> tuple[float, float, float, float, float]:
@@ -217,9 +221,59 @@ def test_c_has_the_bits_of_python_where_its_own_names_numbers_and_places_are_oth
     assert found.T.tobytes() == np.array([all_of_them(*column) for column in columns.T.tolist()]).tobytes()
 
 
+ROWS_OF_BLOCKS = f"""
+@njit
+def note(x, y, first, lane):
+    y[first, lane], y[first + 1, lane] = y[first + 1, lane], y[first, lane]
+    y[first, lane], kept = swapped(x[first, lane], x[first + 1, lane])
+    y[first + 1, lane] += kept
+
+@njit
+def swapped(left, right):
+    return right, left
+
+{ENTRY}
+def advance(x, y):
+    \"\"\"Two rows of each block.\"\"\"
+    for block in range(x.shape[0] // 2):
+        rows = y[2 * block : 2 * (block + 1)]
+        for lane in range(rows.shape[1]):
+            note(x, y, 2 * block, lane)
+            rows[rows.shape[0] - 1, lane] *= 2.0
+"""
+
+
+@needs_gcc
+def test_a_call_that_returns_nothing_is_done_and_parts_of_arrays_are_written_in_place(tmp_path: Path) -> None:
+    scope: dict[str, Any] = {"njit": lambda given: given if callable(given) else lambda function: function}
+    exec(ROWS_OF_BLOCKS, scope)
+    columns, found, expected = np.arange(1.0, 13.0).reshape(4, 3), np.ones((4, 3)), np.ones((4, 3))
+    scope["advance"](columns, expected)
+    built(ROWS_OF_BLOCKS, tmp_path).advance(columns, found)
+    assert found.tolist() == expected.tolist() != np.ones((4, 3)).tolist()
+
+
 def exponential(value: float) -> float:
     """Needs a library."""
     return math.exp(value)
+
+
+def bare_call(value: float) -> float:
+    """A function of Python, called for nothing."""
+    abs(value)
+    return value
+
+
+def bare_comparison(value: float) -> float:
+    """Nothing happens."""
+    value == 1.0  # noqa: B015
+    return value
+
+
+def thrown_away(value: float) -> float:
+    """What another function returns is not taken."""
+    twice(value)
+    return value
 
 
 def remainder(value: float) -> float:
@@ -321,6 +375,9 @@ TYPES = "a whole number in one place and a float in another"
     ("function", "line", "said"),
     [
         (exponential, 2, "'math.exp' is a function of a library"),
+        (bare_call, 2, r"'abs\(value\)' is no statement"),
+        (bare_comparison, 2, "'value == 1.0' is no statement"),
+        (thrown_away, 2, "throws away what it returns"),
         (remainder, 2, "needs a library function"),
         (two_forms, 3, "'held' holds values of different forms"),
         (value_of_or, 2, "the value of 'value or 3.0'"),

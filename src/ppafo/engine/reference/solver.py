@@ -1,16 +1,16 @@
 """Integrates one run with CVODE from event to event: samples, valve switchings, breakaway, reversal, stops."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.actuator_values import driving_torque_of
-from ppafo.engine.cache import load_generated
+from ppafo.engine.entries import with_arrays
 from ppafo.engine.lanes import samples_in
-from ppafo.engine.numba_compiler import NumbaCompiler
+from ppafo.engine.loading import load_source
 from ppafo.engine.program import NoParameters
 from ppafo.engine.reference import vane_mode
 from ppafo.engine.reference.sampling import SAME_TIME, SampledControl, Signals, solve_segment
@@ -45,16 +45,27 @@ class ReferenceResult:
     evaluations: int = 0
 
 
-def load_right_hand_side(run: Run) -> Callable[..., None]:
-    """The compiled right-hand side ``fill(t, y, slopes, parameters, command, way)`` of a run's program."""
-    fill: Callable[..., None] = load_generated(right_hand_side_source(run.program), NumbaCompiler()).fill
-    return fill
+class RightHandSide(NamedTuple):
+    """The compiled right-hand side of a run: ``fill(time, command, way)`` writes the ``slopes`` of the unknowns ``y``.
+
+    Both stay where they are: to copy some numbers there is quicker than to hand over new arrays. ``way`` is that of the
+    vane, 0 where it is held.
+    """
+
+    y: Floats
+    slopes: Floats
+    fill: Callable[[float, float, float], None]
 
 
-def right_hand_side_parameters(run: Run) -> Floats:
-    """The numbers [SI] that ``fill`` needs, in its order."""
+def load_right_hand_side(run: Run) -> RightHandSide:
+    """Return the right-hand side of a run, whose unknowns are those of ``right_hand_side_source``."""
+    program = run.program
     groups = (run.plant, run.thermal, run.valve_orifice, run.leak_orifice, run.valve, run.path, run.sensor_rates)
-    return np.array([number for group in groups for number in numbers(group)])
+    parameters = np.array([number for group in groups for number in numbers(group)])
+    y = np.empty(unknowns_before_valve(program) + len(numbers(program.valve.initial())))
+    slopes = np.empty_like(y)
+    compiled = load_source(right_hand_side_source(program)).fill
+    return RightHandSide(y, slopes, with_arrays(compiled, y, slopes, parameters))
 
 
 def solve_reference(run: Run, tolerance: float = 1e-10) -> ReferenceResult:
@@ -74,8 +85,6 @@ class _Solution:
 
     def __init__(self, run: Run, tolerance: float) -> None:
         self.run = run
-        self.fill = load_right_hand_side(run)
-        self.parameters = right_hand_side_parameters(run)
         masses = [run.initial.mass_1, run.initial.mass_2] if run.program.is_thermal else []
         shown = numbers(initial_sensors(run))[:3]
         self.y = np.array([*numbers(run.initial), *masses, *shown, *numbers(run.program.valve.initial())])
@@ -99,12 +108,16 @@ class _Solution:
         except ImportError as error:
             raise SimulationError("the reference solver needs scikit-sundae: pip install 'ppafo[reference]'") from error
 
+        given, found, fill = load_right_hand_side(self.run)
+
         def slopes(t: float, y: Floats, yp: Floats) -> None:
             self.result.evaluations += 1
-            self.fill(t, y, yp, self.parameters, self.command, self.way)
+            given[:] = y
+            fill(t, self.command, self.way)
+            yp[:] = found
 
         def write_roots(_t: float, y: Floats, events: Floats) -> None:
-            events[:] = self.roots(y)
+            events[:] = self.roots(y.tolist())
 
         roots: Any = write_roots
         roots.terminal = [True, True]
@@ -122,8 +135,8 @@ class _Solution:
             max_num_steps=MAXIMUM_STEPS,
         )
 
-    def roots(self, y: Floats) -> vane_mode.Roots:
-        """Root functions of the present mode."""
+    def roots(self, y: Sequence[float]) -> vane_mode.Roots:
+        """Root functions of the present mode; Python's floats are several times quicker here than NumPy's."""
         plant = self.run.plant
         if self.way == 0.0:
             return vane_mode.roots_at_rest(plant, y[0], self.torque(y))
@@ -132,15 +145,15 @@ class _Solution:
     def rest_mode(self) -> float:
         """Mode of the vane at rest with the present gas."""
         plant = self.run.plant
-        return vane_mode.mode_at_rest(plant, self.y[0], self.torque(self.y))
+        return vane_mode.mode_at_rest(plant, self.y[0], self.torque(self.y.tolist()))
 
-    def torque(self, y: Floats) -> float:
+    def torque(self, y: Sequence[float]) -> float:
         """Driving torque [N m] with unknowns."""
         return driving_torque_of(self.run.program.actuator, self.run.plant, y[0], y[2], y[3])
 
     def is_thrown_at_its_stop(self) -> bool:
         """True for a vane on a stop with an angular velocity into it; a root that is 0 at the start is no event."""
-        roots = self.roots(self.y)
+        roots = self.roots(self.y.tolist())
         return self.way != 0.0 and roots.second <= 0.0 < roots.first
 
     def solve(self) -> ReferenceResult:
@@ -236,10 +249,10 @@ class _Solution:
         plant = self.run.plant
         if self.way == 0.0:
             # The torque equals the static limit to rounding here, so its sign alone says which way the vane goes.
-            self.way = 1.0 if self.torque(self.y) > 0.0 else -1.0
+            self.way = 1.0 if self.torque(self.y.tolist()) > 0.0 else -1.0
             self.result.breakaways.append(self.time)
             return
-        roots = self.roots(self.y)
+        roots = self.roots(self.y.tolist())
         if abs(roots.second) < abs(roots.first):
             self.result.impacts.append(self.time)
             self.y[0] = plant.angle_max if self.way > 0.0 else plant.angle_min

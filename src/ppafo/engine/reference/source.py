@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from ppafo.engine.entries import ARRAY, FLOAT, HEADER, INLINE, entry_text
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.reference.derivative import (
     ExactOrifice,
@@ -30,16 +31,8 @@ def unknowns_before_valve(program: Program) -> int:
     return gas_unknowns(program) + (3 if program.slow_sensors else 0)
 
 
-HEADER = '''"""Generated from the functions of ppafo; their hash is in the file name. Not to be edited."""
-
-import math
-from collections import namedtuple
-
-from numba import float64, njit, types, void
-'''
-INLINE = '@njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)'
-SIGNATURE = 'void(float64, types.Array(float64, 1, "C", readonly=True), float64[::1], float64[::1], float64, float64)'
-COMPILED = f'@njit({SIGNATURE}, cache=True, error_model="numpy")'
+ARRAYS, NUMBERS = ("y", "slopes", "parameters"), ("t", "command", "way")
+"""Parameters of the right-hand side."""
 
 
 def parameter_groups(program: Program) -> dict[str, type]:
@@ -56,7 +49,7 @@ def parameter_groups(program: Program) -> dict[str, type]:
 
 
 def right_hand_side_source(program: Program) -> str:
-    """Source of the module whose ``fill(t, y, slopes, parameters, command, way)`` writes the slopes of all unknowns.
+    """Source of the module whose ``fill(y, slopes, parameters, t, command, way)`` writes the slopes of all unknowns.
 
     The unknowns are angle, angular velocity, both masses, the three gas totals, the true masses of gas with an energy
     balance, what slow sensors show of angle and pressures, and the state of the valve.
@@ -99,9 +92,8 @@ def right_hand_side_source(program: Program) -> str:
             f"slopes[{place}] = sensor_rates.{sensor} * ({truth} - y[{place}])"
             for place, (sensor, truth) in enumerate(truths, gas_unknowns(program))
         ]
-    body = "\n".join(f"    {line}" for line in lines)
-    function = f"{COMPILED}\ndef fill(t, y, slopes, parameters, command, way):\n{body}\n"
-    return f"{HEADER}\n\n{collector.text()}\n\n\n{function}"
+    fill = entry_text("fill", dict.fromkeys(ARRAYS, ARRAY) | dict.fromkeys(NUMBERS, FLOAT), lines)
+    return "\n\n\n".join([HEADER, collector.text(), fill])
 
 
 def gas_lines(program: Program, add: Callable[..., str]) -> list[str]:

@@ -5,13 +5,12 @@ All matrices are those of the coordinates of ``Range``: logarithms, or numbers o
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ppafo.identification.trajectory.preparation import Floats
 from ppafo.identification.trajectory.residuals import Mask, Neighbourhood, Residuals, prior_coordinates
-from ppafo.identification.trajectory.whitening import compiled
+from ppafo.identification.trajectory.sample_loops import sample_loops
 
 ROBUST_SCALE = 1.345
 """Residual, in standard deviations, beyond which a robust loss counts less: 95 % efficient for normal noise."""
@@ -205,33 +204,9 @@ def likelihood_without_columns(whole: Floats) -> float:
 
     ``whole`` has the products of the columns with each other, priors in them, and with the residuals, which come last.
     """
-    found = float(_likelihood_left(whole, _SMALLEST_PIVOT))
-    return _likelihood_along_axes(whole) if math.isnan(found) else found
-
-
-@compiled
-def _likelihood_left(whole: Any, smallest: float) -> Any:
-    """Return the same from the factor of Cholesky, NaN where columns, or the residuals, are nearly those of others.
-
-    The last pivot is what is left of the residuals when the columns have taken their part.
-    """
-    count, logs = len(whole), 0.0
-    root = np.zeros((count, count))
-    for row in range(count):
-        for column in range(row):
-            total = whole[row, column]
-            for before in range(column):
-                total -= root[row, before] * root[column, before]
-            root[row, column] = total / root[column, column]
-        pivot = whole[row, row]
-        for before in range(row):
-            pivot -= root[row, before] * root[row, before]
-        if not pivot > smallest * smallest * whole[row, row]:
-            return np.nan
-        root[row, row] = np.sqrt(pivot)
-        if row < count - 1:
-            logs += np.log(root[row, row])
-    return -0.5 * root[-1, -1] ** 2 - logs
+    found = np.full(1, math.nan)
+    sample_loops().likelihood_left(np.ascontiguousarray(whole), np.empty(whole.shape), found, _SMALLEST_PIVOT)
+    return _likelihood_along_axes(whole) if math.isnan(found[0]) else float(found[0])
 
 
 def _likelihood_along_axes(whole: Floats) -> float:

@@ -7,16 +7,15 @@ Ornstein-Uhlenbeck drift compete; each may have innovations with a t distributio
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ppafo.identification.trajectory.preparation import Floats
+from ppafo.identification.trajectory.sample_loops import sample_loops
 from ppafo.identification.trajectory.whitening import (
     AutoRegression,
     Drift,
     Shape,
-    compiled,
     from_coefficients,
     from_reflections,
     reflections_of,
@@ -222,39 +221,19 @@ def _fit_scaled_t(errors: Floats) -> tuple[Floats, Floats]:
     from scipy.special import gammaln
 
     squares, count = np.square(errors), len(errors)
-    variances, logs = _scales_of_t(squares, FREEDOMS, float(np.median(squares)) / 0.45 + _LEAST)
+    variances = np.full(len(FREEDOMS), float(np.median(squares)) / 0.45 + _LEAST)
+    sample_loops().scales_of_t(squares, FREEDOMS, variances, _ROUNDS_OF_T)
+    logs = _sums_of_logs(squares, FREEDOMS * variances)
     half = 0.5 * FREEDOMS
     constant = gammaln(half + 0.5) - gammaln(half) - 0.5 * np.log(FREEDOMS * np.pi)
     likelihoods = count * (constant - 0.5 * np.log(variances)) - (half + 0.5) * logs
     return np.asarray(likelihoods), np.sqrt(variances)
 
 
-@compiled
-def _scales_of_t(squares: Any, freedoms: Any, start: float) -> Any:
-    """Return the best variance for each of the degrees of freedom, and the sum of log(1 + square / variance / them)."""
-    variances = np.full(len(freedoms), start)
-    for place in range(len(freedoms)):
-        freedom = freedoms[place]
-        for _ in range(_ROUNDS_OF_T):
-            inverse, total = 1.0 / variances[place], 0.0
-            for square in squares:
-                total += square / (freedom + square * inverse)
-            variances[place] = total * (freedom + 1.0) / len(squares)
-    return variances, _sums_of_logs(squares, freedoms * variances)
-
-
-@compiled
-def _sums_of_logs(squares: Any, scales: Any) -> Any:
-    """Return the sum of log(1 + square / scale) for each scale; products of many need one logarithm."""
-    totals = np.zeros(len(scales))
-    for place in range(len(scales)):
-        inverse, product = 1.0 / scales[place], 1.0
-        for square in squares:
-            product *= 1.0 + square * inverse
-            if product > _LARGE_PRODUCT:
-                totals[place] += np.log(product)
-                product = 1.0
-        totals[place] += np.log(product)
+def _sums_of_logs(squares: Floats, scales: Floats) -> Floats:
+    """Return the sum of log(1 + square / scale) for each scale."""
+    totals = np.empty(len(scales))
+    sample_loops().sums_of_logs(squares, scales, totals, _LARGE_PRODUCT)
     return totals
 
 

@@ -139,7 +139,7 @@ class Whitening:
         found = np.zeros_like(values)
         for sensor in self.sensors:
             for place, level, weight in zip(sensor.places, sensor.noise.levels, sensor.weights, strict=True):
-                rows = sensor.noise.shape.rows(np.ascontiguousarray(values[place]), weight)[0] / level
+                rows = sensor.noise.shape.rows(values[place], weight)[0] / level
                 if sensor.hum:
                     columns = hum_columns(len(weight), [one * sensor.interval for one in sensor.hum])
                     basis = np.linalg.qr(sensor.noise.shape.rows(columns, weight)[0])[0]

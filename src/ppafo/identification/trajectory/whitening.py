@@ -7,12 +7,11 @@ normal noise), which is how heavy tails enter: a t distribution is a normal one 
 import math
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
-from numba import njit
 
 from ppafo.identification.trajectory.preparation import Floats
+from ppafo.identification.trajectory.sample_loops import sample_loops
 
 _QUADRATURE = 12
 _TABLE = (1.0, 200.0, 60)
@@ -37,8 +36,10 @@ class AutoRegression:
 
     def rows(self, values: Floats, weights: Floats) -> tuple[Floats, float]:
         """Return whitened columns [-] (samples, columns) and the logarithm of the product of the samples' spreads."""
-        found: tuple[Floats, float] = _prediction_errors(values, weights, self.predictors, self.spreads)
-        return found
+        errors, found = np.empty(values.shape), np.empty(1)
+        given = np.ascontiguousarray(values), weights, self.predictors, self.spreads
+        sample_loops().prediction_errors(*given, errors, found)
+        return errors, float(found[0])
 
     def square(self, segment: Floats, weights: Floats) -> tuple[float, float]:
         """Return the sum of the squares of the whitened samples, and what ``rows`` returns of the spreads."""
@@ -76,24 +77,31 @@ class Drift:
 
     def rows(self, values: Floats, weights: Floats) -> tuple[Floats, float]:
         """Return whitened columns [-] (samples, columns) and the logarithm of the product of the samples' spreads."""
-        found: tuple[Floats, float] = _innovations(values, weights, self.memory, self.ratio, self.first)
-        return found
+        errors, expected, found = np.empty(values.shape), np.zeros(values.shape[1]), np.empty(1)
+        numbers = self.memory, self.ratio, self.first
+        sample_loops().innovations(np.ascontiguousarray(values), weights, expected, errors, found, *numbers)
+        return errors, float(found[0])
 
     def square(self, segment: Floats, weights: Floats) -> tuple[float, float]:
         """Return the sum of the squares of the whitened samples, and what ``rows`` returns of the spreads."""
-        found: tuple[float, float] = _sum_of_innovations(segment, weights, self.memory, self.ratio, self.first)
-        return found
+        found = np.empty(2)
+        numbers = self.memory, self.ratio, self.first
+        sample_loops().sum_of_innovations(np.ascontiguousarray(segment), weights, found, *numbers)
+        return float(found[0]), float(found[1])
 
     def path(self, values: Floats, weights: Floats, normals: Floats) -> tuple[Floats, Floats]:
         """Return the drift [unit of values], drawn given the samples, and its variance; normals of 0 give its mean."""
-        drawn: tuple[Floats, Floats] = _smooth(values, 1.0 / weights, self.memory, self.ratio, self.first, normals)
-        return drawn
+        path, spread = np.empty(len(values)), np.empty(len(values))
+        numbers = self.memory, self.ratio, self.first
+        sample_loops().smooth(values, 1.0 / weights, normals, path, spread, *numbers)
+        return path, spread
 
     def heavy_likelihood(self, values: Floats, level: float, freedom: float) -> float:
         """Return the log likelihood [-] of samples whose white part has a t distribution, by a sum of normal ones."""
         weights, nodes = t_nodes(freedom)
-        total: float = _mixture_likelihood(values / level, self.memory, self.ratio, self.first, weights, nodes)
-        return total - len(values) * math.log(level)
+        found, numbers = np.empty(1), (self.memory, self.ratio, self.first)
+        sample_loops().mixture_likelihood(values / level, weights, nodes, found, *numbers)
+        return float(found[0]) - len(values) * math.log(level)
 
 
 Shape = AutoRegression | Drift
@@ -151,117 +159,13 @@ def reflections_of(segments: list[Floats], most: int) -> tuple[Floats, Floats]:
     return reflections, np.maximum(left, _LEAST)
 
 
-def compiled(function: Any) -> Any:
-    """Return a function compiled once for this computer."""
-    return njit(cache=True, error_model="numpy")(function)
-
-
-@compiled
-def _prediction_errors(values: Any, weights: Any, predictors: Any, spreads: Any) -> Any:
-    count, width = values.shape
-    order = len(spreads) - 1
-    out, total = np.empty((count, width)), 0.0
-    for sample in range(count):
-        stage = min(sample, order)
-        root = np.sqrt(weights[sample]) / spreads[stage]
-        total -= np.log(root)
-        for column in range(width):
-            out[sample, column] = values[sample, column]
-        for back in range(stage):
-            coefficient = predictors[stage, back]
-            for column in range(width):
-                out[sample, column] -= coefficient * values[sample - 1 - back, column]
-        for column in range(width):
-            out[sample, column] *= root
-    return out, total
-
-
-@compiled
-def _step_down(coefficients: Any) -> Any:
-    order = len(coefficients)
-    found = np.zeros(order)
-    for stage in range(order - 1, -1, -1):
-        last = coefficients[stage]
-        found[stage] = last
+def _step_down(coefficients: Floats) -> Floats:
+    """Return reflection coefficients [-], up to the first that is 1 or more (Levinson's recursion backwards)."""
+    found = np.zeros(len(coefficients))
+    for stage in range(len(coefficients) - 1, -1, -1):
+        last = found[stage] = coefficients[stage]
         if abs(last) >= 1.0:
             break
-        scaled = 1.0 - last * last
-        shorter = np.empty(stage)
-        for index in range(stage):
-            shorter[index] = (coefficients[index] + last * coefficients[stage - 1 - index]) / scaled
-        coefficients = shorter
+        before = coefficients[:stage]
+        coefficients = (before + last * before[::-1]) / (1.0 - last * last)
     return found
-
-
-@compiled
-def _innovations(values: Any, weights: Any, memory: float, change: float, first: float) -> Any:
-    count, width = values.shape
-    out, expected = np.empty((count, width)), np.zeros(width)
-    unknown, logs = first, 0.0
-    for sample in range(count):
-        total = unknown + 1.0 / weights[sample]
-        gain, spread = unknown / total, np.sqrt(total)
-        logs += np.log(spread)
-        for column in range(width):
-            new = values[sample, column] - expected[column]
-            out[sample, column] = new / spread
-            expected[column] = memory * (expected[column] + gain * new)
-        unknown = memory * memory * unknown * (1.0 - gain) + change
-    return out, logs
-
-
-@compiled
-def _sum_of_innovations(segment: Any, weights: Any, memory: float, change: float, first: float) -> Any:
-    expected, unknown, squares, logs = 0.0, first, 0.0, 0.0
-    for sample in range(len(segment)):
-        total = unknown + 1.0 / weights[sample]
-        gain, new = unknown / total, segment[sample] - expected
-        squares += new * new / total
-        logs += 0.5 * np.log(total)
-        expected = memory * (expected + gain * new)
-        unknown = memory * memory * unknown * (1.0 - gain) + change
-    return squares, logs
-
-
-@compiled
-def _smooth(values: Any, variances: Any, memory: float, change: float, first: float, normals: Any) -> Any:
-    count = len(values)
-    mean, left = np.empty(count), np.empty(count)
-    expected, unknown = 0.0, first
-    for sample in range(count):
-        gain = unknown / (unknown + variances[sample])
-        mean[sample] = expected + gain * (values[sample] - expected)
-        left[sample] = unknown * (1.0 - gain)
-        expected = memory * mean[sample]
-        unknown = memory * memory * left[sample] + change
-    path, spread = np.empty(count), np.empty(count)
-    path[-1] = mean[-1] + np.sqrt(left[-1]) * normals[-1]
-    spread[-1] = left[-1]
-    for sample in range(count - 2, -1, -1):
-        ahead = memory * memory * left[sample] + change
-        back = memory * left[sample] / ahead
-        own = left[sample] * change / ahead
-        path[sample] = mean[sample] + back * (path[sample + 1] - memory * mean[sample]) + np.sqrt(own) * normals[sample]
-        spread[sample] = own + back * back * spread[sample + 1]
-    return path, spread
-
-
-@compiled
-def _mixture_likelihood(values: Any, memory: float, change: float, first: float, weights: Any, nodes: Any) -> float:
-    expected, unknown, total = 0.0, first, 0.0
-    for sample in range(len(values)):
-        new = values[sample] - expected
-        density, mean, square = 0.0, 0.0, 0.0
-        for part in range(len(nodes)):
-            spread = unknown + 1.0 / nodes[part]
-            chance = weights[part] * np.exp(-0.5 * new * new / spread) / np.sqrt(2.0 * np.pi * spread) + 1.0e-300
-            gain = unknown / spread
-            density += chance
-            mean += chance * gain * new
-            square += chance * (unknown * (1.0 - gain) + (gain * new) ** 2)
-        mean /= density
-        left = max(square / density - mean * mean, 1.0e-12 * unknown)
-        total += np.log(density)
-        expected = memory * (expected + mean)
-        unknown = memory * memory * left + change
-    return total

@@ -11,12 +11,12 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.cache import load_generated
+from ppafo.engine.entries import ARRAY, ARRAY_2D, ARRAY_3D, FLOAT, INT, entry_text, with_arrays
 from ppafo.engine.lane_control import SIGNALS, current_readings, pressures_of, sense, sense_gait
 from ppafo.engine.lane_rows import VECTOR, LaneRows, indent, lanes_of, over_lanes
 from ppafo.engine.lane_source import HEADER, INLINE, lane_loop
 from ppafo.engine.lanes import SIGNAL_ROWS, Batch, Clock, Floats
-from ppafo.engine.numba_compiler import NumbaCompiler
+from ppafo.engine.loading import load_source
 from ppafo.engine.program import LaneStart, Program
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers
@@ -41,21 +41,18 @@ Places = NDArray[np.intp]
 OWN = {"goal": Goal, "memory": Memory}
 """Rows of an environment beside those of its run."""
 OWN_PATHS = [path for name, row in OWN.items() for path in leaf_paths(row, name)]
-REWARD, ERROR, SUPPLIED = range(3)
-"""Rows of the outcomes: reward, error, gas since the episode began [kg]."""
+OUTCOMES = 5
+REWARD, ERROR, SUPPLIED, FAILED, THROUGH = range(OUTCOMES)
+"""Rows of the outcomes: reward, error, gas since the episode began [kg], 1 where it fails or is through, else 0."""
 
-_CUBE, _TABLE = "float64[:, :, ::1]", "float64[:, ::1]"
-_SIGNATURE = ", ".join(
-    [
-        *(_CUBE, _CUBE, "float64[:, :, :, ::1]", _CUBE, _CUBE, _CUBE, _CUBE, _TABLE, _TABLE, "boolean[::1]"),
-        *("float32[:, ::1]", _TABLE, "boolean[:, ::1]", "float64", "float64", *["int64"] * 6),
-    ]
-)
-ARGUMENTS = (
-    "all_states, all_parameters, all_signals, all_commands, record, trace, all_own, actions, bounds, chosen, "
-    "observations, outcomes, ends, error_weight, gas_weight, "
-    "now, steps, steps_in_all, steps_per_sample, signal_delay, command_delay"
-)
+_PARAMETERS = {
+    **dict.fromkeys(("all_states", "all_parameters"), ARRAY_2D),
+    **{"all_signals": ARRAY_3D, "all_commands": ARRAY_2D, "record": ARRAY_3D, "trace": ARRAY_3D, "all_own": ARRAY_2D},
+    **{"actions": ARRAY_2D, "bounds": ARRAY_2D, "chosen": ARRAY, "observations": ARRAY_2D, "outcomes": ARRAY_2D},
+    **dict.fromkeys(("error_weight", "gas_weight"), FLOAT),
+    **dict.fromkeys(("now", "steps", "steps_in_all", "steps_per_sample", "signal_delay", "command_delay"), INT),
+}
+"""Of ``go_on``; what begins with ``all`` has the rows of all blocks, one block after another."""
 
 
 @lru_cache(maxsize=16)
@@ -63,12 +60,12 @@ def kernel_source(program: Program, task: Task) -> str:
     """Source text of the module whose ``go_on`` takes all environments of a program a step further."""
     collector = SourceCollector(INLINE)
     loop = lane_loop(program, collector, "advance")
-    step = "\n".join(_step(LaneRows(program, collector), task))
-    return f"{HEADER}\n\n{collector.text()}\n\n\n{loop}\n\n\n{step}\n"
+    step = _step(LaneRows(program, collector), task)
+    return "\n\n\n".join([HEADER, collector.text(), loop, entry_text("go_on", _PARAMETERS, step)])
 
 
 def _step(rows: LaneRows, task: Task) -> list[str]:
-    """The function ``go_on``: block by block the commands, the lane loop, and what is observed at its end."""
+    """Lines of ``go_on``: block by block the commands, the lane loop, and what is observed at its end."""
     _name_cells(rows)
     command = rows.add(valve_or_dump if task.walks else valve_command)
     given = f"{command}(actions[place, 0], actions[place, actions.shape[1] - 1])"
@@ -76,25 +73,31 @@ def _step(rows: LaneRows, task: Task) -> list[str]:
         "advance(states, parameters, signal_history, command_history, record, trace, "
         "now - steps, steps, -1, steps_per_sample, 1.0, -1, 0, 0, signal_delay, command_delay)"
     )
-    return [
-        f'@njit("void({_SIGNATURE})", cache=True, nogil=True, error_model="numpy")',
-        f"def go_on({ARGUMENTS}):",
-        *indent(
-            [
-                "for block in range(all_states.shape[0]):",
-                "    states, parameters, own = all_states[block], all_parameters[block], all_own[block]",
-                "    signal_history, command_history = all_signals[block], all_commands[block]",
-                "    first = block * states.shape[1]",
-                "    width = min(states.shape[1], actions.shape[0] - first)",
-                "    if steps > 0:",
-                "        for lane in range(states.shape[1]):",
-                "            place = min(first + lane, actions.shape[0] - 1)",
-                f"            {rows.cells['result.command']} = {given}",
-                f"        {call}",
-                *indent(_places(rows) + over_lanes(_observed(rows, task))),
-            ]
-        ),
+    heights = {
+        "states": str(len(rows.state_at)),
+        "parameters": str(len(rows.parameter_at)),
+        "own": str(len(OWN_PATHS)),
+        "signal_history": str(SIGNAL_ROWS),
+        "command_history": "(command_delay + 2)",
+    }
+    whole = {"signal_history": "all_signals", "command_history": "all_commands"}
+    parts = [
+        f"{name} = {whole.get(name, f'all_{name}')}[block * {height}:(block + 1) * {height}]"
+        for name, height in heights.items()
     ]
+    body = [
+        *parts,
+        "first = block * states.shape[1]",
+        "width = min(states.shape[1], actions.shape[0] - first)",
+        "if steps > 0:",
+        "    for lane in range(states.shape[1]):",
+        "        place = min(first + lane, actions.shape[0] - 1)",
+        f"        {rows.cells['result.command']} = {given}",
+        f"    {call}",
+        *_places(rows),
+        *over_lanes(_observed(rows, task)),
+    ]
+    return [f"for block in range(all_states.shape[0] // {heights['states']}):", *indent(body)]
 
 
 def _name_cells(rows: LaneRows) -> None:
@@ -123,7 +126,7 @@ def _observed(rows: LaneRows, task: Task) -> list[str]:
     pressures = f"true_1, true_2 = {pressures_of(rows, 'state')}"
     weights = "error_weight, gas_weight, timing.period"
     return [
-        "if not chosen[first + lane]:",
+        "if chosen[first + lane] == 0.0:",
         "    continue",
         *[rows.load(group) for group in groups],
         *[f"{name} = {row_expression(row, name, rows.cells, add)}" for name, row in OWN.items()],
@@ -146,8 +149,8 @@ def _observed(rows: LaneRows, task: Task) -> list[str]:
         f"outcomes[{REWARD}, first + lane] = {add(finite)}({add(reward_of)}(error, gas, {weights}))",
         f"outcomes[{ERROR}, first + lane] = {add(finite)}(error)",
         f"outcomes[{SUPPLIED}, first + lane] = {add(finite)}(state.supplied_mass)",
-        "ends[0, first + lane] = result.failure_time <= time",
-        "ends[1, first + lane] = step_index >= steps_in_all",
+        f"outcomes[{FAILED}, first + lane] = 1.0 if result.failure_time <= time else 0.0",
+        f"outcomes[{THROUGH}, first + lane] = 1.0 if step_index >= steps_in_all else 0.0",
     ]
 
 
@@ -204,7 +207,6 @@ class Environments:
     def __init__(self, program: Program, clock: Clock, task: Task, count: int, judging: Judging) -> None:
         self.count = count
         self._clock, self._judging = clock, judging
-        self._go_on = load_generated(kernel_source(program, task), NumbaCompiler()).go_on
         width = min(lanes_of(program), -(-count // VECTOR) * VECTOR)
         blocks = -(-count // width)
         state_rows = [path for name, row in program.state_rows().items() for path in leaf_paths(row, name)]
@@ -213,14 +215,28 @@ class Environments:
         self._start = self.rows[leaf_paths(LaneStart, "start")[0]]
         self._states = np.zeros((blocks, len(state_rows), width))
         self._parameters = np.zeros((blocks, len(parameter_rows), width))
-        self._signals = np.zeros((blocks, SIGNAL_ROWS, clock.signal_delay + 2, width))
         self._commands = np.zeros((blocks, clock.command_delay + 2, width))
         self._own = np.zeros((blocks, len(OWN_PATHS), width))
-        self._nothing = np.empty((0, len(state_rows), width)), np.empty((0, 0, width))
         self._actions = np.zeros((count, 1 + task.walks))
-        self._everyone = np.ones(count, dtype=np.bool_)
+        self._chosen = np.zeros(count)
+        self._observations = np.zeros((count, len(task.observed_paths)))
+        self._outcomes = np.zeros((OUTCOMES, count))
         self._now = 0
-        self._observed = len(task.observed_paths)
+        self._go_on = with_arrays(
+            load_source(kernel_source(program, task)).go_on,
+            self._states.reshape(-1, width),
+            self._parameters.reshape(-1, width),
+            np.zeros((blocks * SIGNAL_ROWS, clock.signal_delay + 2, width)),
+            self._commands.reshape(-1, width),
+            np.empty((0, len(state_rows), width)),
+            np.empty((0, 0, width)),
+            self._own.reshape(-1, width),
+            self._actions,
+            np.ascontiguousarray(judging.bounds),
+            self._chosen,
+            self._observations,
+            self._outcomes,
+        )
 
     @property
     def actions(self) -> Floats:
@@ -241,37 +257,24 @@ class Environments:
         self._own[blocks, :, own] = 0.0
         self._own[blocks, : columns.goals.shape[0], own] = columns.goals.T[every]
         self._commands[blocks, :, own] = 0.0
-        chosen = np.zeros(self.count, dtype=np.bool_)
-        chosen[places] = True
-        return self._call(0, chosen)
+        self._chosen[:] = 0.0
+        self._chosen[places] = 1.0
+        return self._call(0)
 
     def step(self) -> Seen:
         """Take ``actions`` for a sample period, and show what follows."""
-        return self._call(self._clock.steps_per_sample, self._everyone)
+        self._chosen[:] = 1.0
+        return self._call(self._clock.steps_per_sample)
 
     def numbers(self, place: int) -> dict[str, float]:
         """The state of one environment as the engine has it, in SI units, by path such as ``state.angle``."""
         block, lane = divmod(place, self._states.shape[2])
         return {path: float(self._states[block, row, lane]) for path, row in self.rows.items()}
 
-    def _call(self, steps: int, chosen: Flags) -> Seen:
+    def _call(self, steps: int) -> Seen:
         clock = self._clock
         self._now += steps
-        observations = np.zeros((self.count, self._observed), dtype=np.float32)
-        outcomes, ends = np.zeros((3, self.count)), np.zeros((2, self.count), dtype=np.bool_)
         self._go_on(
-            self._states,
-            self._parameters,
-            self._signals,
-            self._commands,
-            *self._nothing,
-            self._own,
-            self._actions,
-            self._judging.bounds,
-            chosen,
-            observations,
-            outcomes,
-            ends,
             self._judging.error_weight,
             self._judging.gas_weight,
             self._now,
@@ -281,5 +284,6 @@ class Environments:
             clock.signal_delay,
             clock.command_delay,
         )
-        rewards, errors, supplied = outcomes
-        return Seen(observations, rewards, errors, supplied, ends[0], ends[1])
+        rewards, errors, supplied = self._outcomes[:FAILED].copy()
+        failed, through = self._outcomes[FAILED:] != 0.0
+        return Seen(self._observations.astype(np.float32), rewards, errors, supplied, failed, through)
