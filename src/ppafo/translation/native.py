@@ -1,25 +1,19 @@
 """A program built from its C by a compiler of this machine; it does what the compiled module of the lanes does."""
 
-import ctypes
 import hashlib
 import importlib.util
 import os
 import platform
 import signal
-import struct
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from shutil import which
 from types import ModuleType
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from ppafo.engine.compilers import CompilerError
 from ppafo.engine.lane_rows import lanes_of
@@ -28,7 +22,8 @@ from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, join_results
 from ppafo.engine.loading import HOW_TO_INSTALL, WITHOUT_C
 from ppafo.errors import SimulationError, one_line, reason
 from ppafo.translation.c99 import FLAGS, c_source
-from ppafo.translation.typed import FLOAT, INT, LIBRARY, Array, Type
+from ppafo.translation.native_entries import Entries, load_entries, with_packed_entries
+from ppafo.translation.typed import LIBRARY
 from ppafo.translation.walk import entries_of, walk_module
 
 FOR_GCC = ("-fno-thread-jumps", "-fno-ssa-phiopt", "-fno-tree-pre", "--param", "sra-max-scalarization-size-Ospeed=4096")
@@ -41,72 +36,8 @@ _LIBRARY = {"win32": "program.dll", "darwin": "program.dylib"}.get(sys.platform,
 COMPILERS = ("clang", "gcc", "zig")
 """In the order of preference: lanes are about as quick by each."""
 _INTERRUPTED = (-signal.SIGINT, -signal.SIGTERM)
+_LANE_LOOP = entries_of(f"{COMPILED}\ndef advance(")
 _TITLE = "Generated from the functions of ppafo. Not to be edited."
-
-
-_PLACE, _FLOATS = ctypes.c_double * 0, np.dtype(np.float64)
-_NUMBERS = {FLOAT: ctypes.c_double, INT: ctypes.c_int64}
-PACKED = "_packed"
-"""Stands behind the name of an entry that takes its arrays one after another in memory: a call is quicker so."""
-
-
-@dataclass(frozen=True, slots=True)
-class NativeEntry:
-    """An entry of a library, called as that of a module by Numba.
-
-    ``function`` takes its arrays, of these dimensions, one after another as ``layout`` writes each ``ppafo_array``.
-    """
-
-    function: Any
-    dimensions: tuple[int, ...]
-    layout: struct.Struct
-
-    def __call__(self, *given: Any) -> None:
-        """Call it with arrays, and the numbers that follow them."""
-        count = len(self.dimensions)
-        self.function(self.packed(given[:count]), *given[count:])
-
-    def with_arrays(self, *arrays: NDArray[np.float64]) -> Callable[..., None]:
-        """The entry as a function of what follows these arrays, which it keeps."""
-        called: Any = partial(self.function, self.packed(arrays))
-        called.arrays = arrays
-        return called
-
-    def packed(self, arrays: Sequence[NDArray[np.float64]]) -> bytes:
-        """Where arrays are, as C takes them.
-
-        TypeError for what C would misread: arrays of other numbers or dimensions, or that lie otherwise in memory.
-        """
-        numbers: list[int] = []
-        for array, dimensions in zip(arrays, self.dimensions, strict=True):
-            if array.dtype != _FLOATS or array.ndim != dimensions:
-                raise TypeError(
-                    f"an array of floats in {dimensions} dimensions is needed, not {array.dtype} {array.shape}"
-                )
-            # Refuses what is read-only, or does not lie row after row.
-            numbers.append(ctypes.addressof(_PLACE.from_buffer(array)))
-            numbers += array.shape
-        return self.layout.pack(*numbers)
-
-
-def with_packed_entries(source: str, entries: Mapping[str, tuple[Type, ...]]) -> str:
-    """A translation unit that shows nothing but its entries, which take their arrays one after another.
-
-    Else a call of ``advance`` would be one of the function of that name in the C library of GNU.
-    """
-    texts = ["#define PPAFO_ENTRY static", source]
-    for name, types in entries.items():
-        arrays = [place for place, kind in enumerate(types) if isinstance(kind, Array)]
-        numbers = "".join(
-            f", {'double' if kind == FLOAT else 'int64_t'} number_{place}"
-            for place, kind in enumerate(types)
-            if place not in arrays
-        )
-        given = ", ".join(
-            f"arrays[{arrays.index(place)}]" if place in arrays else f"number_{place}" for place in range(len(types))
-        )
-        texts.append(f"void {name}{PACKED}(const ppafo_array *arrays{numbers})\n{{\n    {name}({given});\n}}\n")
-    return "\n".join(texts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,15 +164,12 @@ def translated_text(source: str) -> str:
     return with_packed_entries(c_source(walk_module(source, library=LIBRARY), {}, _TITLE), entries_of(source))
 
 
-_LANES = entries_of(f"{COMPILED}\ndef advance(")
-
-
 def build(
     source: str,
     folder: Path,
     command: Sequence[str] = ("gcc",),
     flags: Sequence[str] = FLAGS,
-    entries: Mapping[str, tuple[Type, ...]] = _LANES,
+    entries: Entries = _LANE_LOOP,
 ) -> ModuleType:
     """Compile C into a library in ``folder`` and load its entries, by themselves the ``advance`` of a lane loop.
 
@@ -275,21 +203,14 @@ def _is_mounted_without_execution(folder: Path) -> bool:
     return hasattr(os, "ST_NOEXEC") and bool(os.statvfs(folder).f_flag & os.ST_NOEXEC)
 
 
-def _fill(module: ModuleType, library: Path, entries: Mapping[str, tuple[Type, ...]]) -> None:
+def _fill(module: ModuleType, library: Path, entries: Entries) -> None:
     """Give a module the entries of a library."""
     try:
-        loaded = ctypes.CDLL(str(library))
-        functions = [loaded[f"{name}{PACKED}"] for name in entries]
+        module.__dict__.update(load_entries(library, entries))
     except OSError as error:
         raise CompilerError(f"the library of a compiled model cannot be loaded: {one_line(error)}") from error
     except AttributeError:
         raise CompilerError("the library of a compiled model lacks its functions") from None
-    for function, (name, types) in zip(functions, entries.items(), strict=True):
-        function.restype = None
-        function.argtypes = [ctypes.c_void_p, *(_NUMBERS[kind] for kind in types if kind in _NUMBERS)]
-        dimensions = tuple(kind.dimensions for kind in types if isinstance(kind, Array))
-        layout = struct.Struct("".join(f"P{count}q{8 * (3 - count)}x" for count in dimensions))
-        module.__dict__[name] = NativeEntry(function, dimensions, layout)
 
 
 def run_native(program: ModuleType, batch: Batch) -> BatchResult:
