@@ -8,7 +8,7 @@ CORES := $(shell nproc 2>/dev/null || echo 2)
 QUICK_TESTS := tests/architecture tests/contract/test_command_words.py tests/contract/test_catalogs.py $(addprefix tests/unit/,\
 	test_public_interface.py test_units.py control documents gait metrics model parameters signals storage)
 
-.PHONY: reproduce gallery validation test coverage quick check format bench bits dist page site opensim lock clean
+.PHONY: reproduce gallery validation test test-all coverage quick check format bench bits dist page site opensim lock clean
 
 reproduce: $(LEAN)
 	$(BIN)/ppafo reproduce --out out/reproduce
@@ -21,17 +21,26 @@ gallery: $(READY)
 validation: $(READY)
 	$(BIN)/python scripts/validation_report.py --out out/validation
 
+# What users meet and what everything rests on, in minutes; costly tests are marked as long, and tests/costs.toml has what files cost.
 test: check
-	$(BIN)/python -m pytest -n $(CORES) --dist loadfile
+	$(TESTS) -m "not long"
+
+# Everything there is.
+test-all: check
+	$(TESTS)
+
+# Kept as bytecode, tests and libraries begin at once in the next run, whatever the surroundings say of it.
+test test-all quick coverage: export PYTHONDONTWRITEBYTECODE =
+TESTS := $(BIN)/python -m pytest -n $(CORES) --dist loadfile --no-loadscope-reorder --costs show
 
 # The last line is branch coverage of the package in percent; `coverage report --sort=miss` says where it is not. Compiled code is not seen.
 coverage: $(READY)
 	$(BIN)/python -m pytest -n $(CORES) --dist loadfile --cov --cov-report=
 	$(BIN)/coverage report --format=total
 
-# What needs no compiled model, of the tests whose process costs little: well under a minute where the caches of the tools are warm.
+# The checks, and the tests of what everything rests on: less than a minute.
 quick: check
-	$(BIN)/python -m pytest -n $(CORES) --quick $(QUICK_TESTS)
+	$(TESTS) -m "not long" $(QUICK_TESTS)
 
 check: $(READY)
 	$(BIN)/ruff format --check src tests benchmarks scripts

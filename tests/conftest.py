@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
-from typing import Any, NoReturn
+from typing import Any
 
 import pytest
 
@@ -15,6 +15,7 @@ from ppafo.engine.loading import BACKEND_VARIABLE, NUMBA
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 
+pytest_plugins = ("tests.costs", "tests.repeatable")
 TESTS = Path(__file__).parent
 BY_NUMBA = (
     "unit/engine/test_compile",
@@ -25,16 +26,9 @@ BY_NUMBA = (
 """Tests of what Numba does. The first compiler of this computer compiles for the others, with the same bits."""
 
 
-def pytest_addoption(parser: pytest.Parser) -> None:
-    """The option of ``make quick``."""
-    parser.addoption("--quick", action="store_true", help="skip a test as soon as it asks for a compiled model")
-
-
-def pytest_configure(config: pytest.Config) -> None:
-    """Let no model be compiled where the tests are to be quick, and none be watched by coverage while it is."""
+def pytest_configure() -> None:
+    """Let no model be watched by coverage while it is compiled."""
     cache._execute = _unwatched(cache._execute)
-    if config.getoption("--quick"):
-        cache._import_program = _skip_test
 
 
 def _unwatched(run: Callable[..., ModuleType]) -> Callable[..., ModuleType]:
@@ -49,10 +43,6 @@ def _unwatched(run: Callable[..., ModuleType]) -> Callable[..., ModuleType]:
             sys.settrace(tracer)
 
     return call
-
-
-def _skip_test(name: str, source: str) -> NoReturn:
-    pytest.skip("needs a compiled model, and the tests are to be quick")
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -4,7 +4,6 @@ import re
 import tomllib
 from pathlib import Path
 
-import pandas
 import pytest
 
 from ppafo.questions.sweep.solve import sweep
@@ -35,6 +34,8 @@ def test_the_table_of_the_page_has_every_kind_with_its_keys() -> None:
 
 
 def test_the_python_of_the_page_reads_what_the_study_wrote(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import pandas
+
     monkeypatch.chdir(tmp_path)
     document = tomllib.loads(blocks("toml")[0])
     sweep(document, "out/my-study", overrides=["run.duration=0.2 s"], draws=8)

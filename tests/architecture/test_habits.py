@@ -2,14 +2,19 @@
 
 import ast
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-TREES = {path: ast.parse(path.read_text(encoding="utf-8")) for path in sorted((ROOT / "src").rglob("*.py"))}
 MOST_BY_POSITION = 3
 CHECKERS = ("assert", "check", "raises", "warns", "fail")
 
 Rows = Mapping[tuple[str, str], int]
+
+
+@cache
+def trees() -> Mapping[Path, ast.Module]:
+    return {path: ast.parse(path.read_text(encoding="utf-8")) for path in sorted((ROOT / "src").rglob("*.py"))}
 
 
 def module_of(path: Path) -> str:
@@ -20,7 +25,7 @@ def rows() -> Rows:
     """Number of fields of every NamedTuple, by module and name."""
     return {
         (module_of(path), node.name): sum(isinstance(item, ast.AnnAssign) for item in node.body)
-        for path, tree in TREES.items()
+        for path, tree in trees().items()
         for node in ast.walk(tree)
         if isinstance(node, ast.ClassDef) and any(ast.unparse(base) == "NamedTuple" for base in node.bases)
     }
@@ -64,7 +69,7 @@ def silent_tests(tree: ast.Module) -> Iterator[str]:
 def test_rows_of_more_than_three_fields_are_built_by_keyword() -> None:
     known = rows()
     assert len(known) > 80
-    assert [line for path, tree in TREES.items() for line in built_by_position(tree, module_of(path), known)] == []
+    assert [line for path, tree in trees().items() for line in built_by_position(tree, module_of(path), known)] == []
 
 
 def test_a_row_built_by_position_is_found() -> None:

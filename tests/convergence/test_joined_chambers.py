@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from ppafo.engine.reference.agreement import compare_with_reference
 from ppafo.engine.reference.derivative import ExactOrifice, joined_thermal_rates, thermal_gas_rates
@@ -94,6 +93,8 @@ def flow(up: float, down: float) -> float:
 
 def independent(times: np.ndarray) -> np.ndarray:
     """Both pressures [Pa], integrated by SciPy from phase to phase: filling, joint, lifting."""
+
+    from scipy.integrate import solve_ivp
 
     def slopes(time: float, pressures: np.ndarray) -> list[float]:
         first, second = pressures

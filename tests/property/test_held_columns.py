@@ -18,7 +18,7 @@ def moving(seed: int, step: float) -> np.ndarray:
     return np.asarray(values if step == 0.0 else step * np.round(values / step))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(seed=st.integers(0, 10**6), start=st.floats(0.0, 7.0), length=st.floats(0.02, 1.5))
 def test_a_filled_drop_out_is_found_where_it_covers_the_strides(seed: int, start: float, length: float) -> None:
     values = moving(seed, 0.0)
@@ -29,7 +29,7 @@ def test_a_filled_drop_out_is_found_where_it_covers_the_strides(seed: int, start
     assert constant_stretch(TIME, values, SPANS) == ((first, last) if covered > LONGEST_HELD else None)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(seed=st.integers(0, 10**6), step=st.sampled_from([0.0, 0.02, 0.05, 0.1]))
 def test_a_sensor_that_only_has_coarse_steps_is_let_pass(seed: int, step: float) -> None:
     assert constant_stretch(TIME, moving(seed, step), SPANS) is None

@@ -118,7 +118,7 @@ def test_damaged_file_is_refused_in_one_line_or_can_be_used(name: str, tmp_path:
     originals = [item.read_text(encoding="utf-8") for item in folder.iterdir() if item.name.endswith(".toml")]
     path = tmp_path / "damaged.toml"
 
-    @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=60, suppress_health_check=list(HealthCheck))
     @given(text=st.sampled_from(originals), wanted=changes)
     def check(text: str, wanted: list[tuple[str, int, str]]) -> None:
         path.write_text(damaged(text, wanted), encoding="utf-8")

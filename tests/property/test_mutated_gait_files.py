@@ -27,7 +27,7 @@ PIECES = [
 ]
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.data())
 def test_a_gait_file_with_pieces_put_in_cut_out_or_changed(data: st.DataObject) -> None:
     content = GOOD

@@ -42,7 +42,7 @@ def damaged(changes: list[tuple[str, int, str]]) -> bytes:
     return "\n".join(lines).encode("utf-8", "surrogatepass")
 
 
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=500)
 @given(st.lists(mutations, min_size=1, max_size=4))
 def test_a_damaged_file_gives_a_clear_error_or_a_usable_set(changes: list[tuple[str, int, str]]) -> None:
     try:
@@ -55,7 +55,7 @@ def test_a_damaged_file_gives_a_clear_error_or_a_usable_set(changes: list[tuple[
         assert "\n" not in str(error)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(content=st.binary(max_size=200))
 @example(b"")
 @example(b"\xef\xbb\xbf")

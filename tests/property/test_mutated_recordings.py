@@ -12,6 +12,7 @@ from ppafo.storage.column_map import ColumnMap
 from ppafo.validation.agreement import ReplaySettings, compare_recording
 from ppafo.validation.measured import read_measured
 from ppafo.validation.replay import MOTIONS
+from tests.repeatable import TOO_SLOW
 
 DEVICE = load_device("ppafo2011")
 HEADER = "time [s],command [-],supply_pressure [psi_g],angle [deg],pressure_1 [psi_g],pressure_2 [psi_g]"
@@ -26,7 +27,7 @@ CELLS = st.sampled_from(["", "nan", "inf", "-1", "1e300", "-1e-300", "0", "130",
 
 @given(st.integers(0, len(TEXT) - 1), st.integers(0, 40), CELLS, st.sampled_from(MOTIONS), st.booleans())
 @example(len(HEADER) + 1, 5, "-1e300", "free", False)
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture, TOO_SLOW])
 def test_a_damaged_recording_is_compared_or_refused_in_one_line(
     tmp_path: Path, start: int, length: int, cell: str, motion: str, through_map: bool
 ) -> None:

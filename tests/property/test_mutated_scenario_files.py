@@ -140,7 +140,7 @@ def start_angle(scenario: Scenario) -> float:
     return angle
 
 
-@settings(max_examples=1500, deadline=None)
+@settings(max_examples=1500)
 @given(text=st.sampled_from(BARE), changes=st.lists(mutations, min_size=1, max_size=4))
 def test_damaged_lines_give_a_clear_error_or_a_scenario_that_can_be_run(
     text: str, changes: list[tuple[str, int, str]]
@@ -150,7 +150,7 @@ def test_damaged_lines_give_a_clear_error_or_a_scenario_that_can_be_run(
         assert_can_be_run(scenario)
 
 
-@settings(max_examples=700, deadline=None)
+@settings(max_examples=700)
 @given(
     text=st.sampled_from(ORIGINALS),
     flips=st.lists(st.tuples(st.integers(0, 10_000), st.integers(0, 255)), min_size=1, max_size=6),
@@ -166,7 +166,7 @@ def test_flipped_bytes_give_a_clear_error_or_a_scenario_that_can_be_run(
         assert_can_be_run(scenario)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(text=st.sampled_from(BARE), removed=st.lists(sections, max_size=2), other=st.sampled_from(BARE), name=sections)
 def test_sections_removed_doubled_or_from_elsewhere_give_a_clear_error_or_a_scenario_that_can_be_run(
     text: str, removed: list[str], other: str, name: str
@@ -178,7 +178,7 @@ def test_sections_removed_doubled_or_from_elsewhere_give_a_clear_error_or_a_scen
         assert_can_be_run(scenario)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(text=st.sampled_from(ORIGINALS), end=st.integers(0, 5000))
 def test_a_file_that_was_cut_off_gives_a_clear_error_or_a_scenario_that_can_be_run(text: str, end: int) -> None:
     scenario = outcome_of(text.encode()[:end])
@@ -186,7 +186,7 @@ def test_a_file_that_was_cut_off_gives_a_clear_error_or_a_scenario_that_can_be_r
         assert_can_be_run(scenario)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(content=st.binary(max_size=200))
 @example(b"")
 @example(b"\xef\xbb\xbf")

@@ -2,11 +2,10 @@
 
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import matplotlib
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from ppafo.answers.recording_figure import draw_stored_result, figure_files, recording_figure
 from ppafo.answers.shown_metrics import metrics_lines
@@ -16,6 +15,9 @@ from ppafo.metrics import Metric
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.storage import StoredResult
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 TIME = np.linspace(0.0, 1.0, 11)
 
 
@@ -24,15 +26,15 @@ def recording(kind: RecordingKind = "measured", **channels: float) -> Recording:
     return Recording("task", TIME, made, kind)
 
 
-def titles(figure: Figure) -> list[str]:
+def titles(figure: "Figure") -> list[str]:
     return [axes.get_title(loc="left") for axes in figure.axes]
 
 
-def texts(figure: Figure) -> list[str]:
+def texts(figure: "Figure") -> list[str]:
     return [text.get_text() for text in figure.texts]
 
 
-def drawn(figure: Figure, panel: int) -> list[list[float]]:
+def drawn(figure: "Figure", panel: int) -> list[list[float]]:
     return [list(map(float, line.get_ydata())) for line in figure.axes[panel].lines]
 
 
@@ -108,6 +110,8 @@ def test_every_format_is_written_and_the_same_recording_gives_the_same_bytes() -
 
 
 def test_the_style_of_the_surrounding_program_is_neither_used_nor_changed() -> None:
+    import matplotlib
+
     matplotlib.rcParams["font.size"] = 31.0
     try:
         figure = recording_figure(recording(angle=1.0))

@@ -267,8 +267,10 @@ def test_a_diverged_run_is_written_and_told_on_the_side_with_exit_code_1(
 
 
 HELD_UP = """
-import sys, time
+import signal, sys, time
 from pathlib import Path
+# Whoever runs the tests in the background lets them ignore interrupts, and a child would inherit that.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 write = Path.write_bytes
 def slow(self, content):
     written = write(self, content)

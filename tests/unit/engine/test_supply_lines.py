@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import Run, batch_of
@@ -100,6 +99,8 @@ def regulator_flow(set_pressure: float, line_pressure: float, droop: float, larg
 @cache
 def solved(dorsiflexion: float, lines: SupplyLines) -> tuple[float, ...]:
     """Masses of both chambers and both lines and what came through the bottle's regulator, from an ODE solver."""
+    from scipy.integrate import solve_ivp
+
     plant = device(dorsiflexion)
     volume_1, volume_2 = chamber_volumes(plant, ANGLE)
 

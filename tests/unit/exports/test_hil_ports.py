@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ppafo.cli.main import main
@@ -187,7 +187,6 @@ PIECES = st.one_of(
 
 
 @needs_compiler
-@settings(deadline=None)
 @given(pieces=st.lists(PIECES, max_size=6), last=SAMPLES)
 def test_a_board_finds_the_samples_that_python_finds(library: Any, pieces: list[bytes], last: Sample) -> None:
     stream = b"".join([*pieces, bytes(100), sample_bytes(last)])

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ppafo.cli.main import main
@@ -68,7 +68,6 @@ def test_samples_become_channels_over_the_time_of_the_bench() -> None:
     assert (recording.kind, found.lost, found.ended) == ("measured", 0, "silence of the bench")
 
 
-@settings(deadline=None)
 @given(st.randoms(use_true_random=False), st.booleans())
 def test_what_a_wire_does_is_mended_or_counted(draw: random.Random, is_stream: bool) -> None:
     sent, lost, garbled = [packet(0)], set(), 0

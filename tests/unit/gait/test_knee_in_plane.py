@@ -4,8 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.io import loadmat
-from scipy.spatial.transform import Rotation
 
 from ppafo.gait import Gait
 from ppafo.gait.recorded.knee import acceleration_of, knee_position
@@ -20,6 +18,8 @@ CHAIN = ("pelvis_tilt", "pelvis_list", "pelvis_rotation"), ("hip_flexion_r", "hi
 
 def knee_in_space(columns: dict[str, Floats]) -> Floats:
     """Where the knee is [m] with every angle of pelvis and hip, each turned about z, x and y."""
+    from scipy.spatial.transform import Rotation
+
     pelvis, hip = (
         Rotation.from_euler("ZXY", np.stack([columns[n] for n in names], 1), degrees=True) for names in CHAIN
     )
@@ -28,6 +28,8 @@ def knee_in_space(columns: dict[str, Floats]) -> Floats:
 
 
 def test_the_plane_gives_the_accelerations_of_the_leg_in_space(normative: Gait, shared_data: Path) -> None:
+    from scipy.io import loadmat
+
     file = loadmat(shared_data / "gait" / "falisse2019_subject1" / "IK_average_walking_FGC.mat", squeeze_me=True)
     table = file["Qsall"]
     columns = {str(name): table["data"].item()[:, i] for i, name in enumerate(table["colheaders"].item())}

@@ -138,7 +138,7 @@ def test_an_override_is_split_at_its_first_equals_sign() -> None:
 PATHS = [*scenario_paths(load_scenario(TASK).origin.content), *device_paths()]
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(
     path=st.sampled_from(PATHS), text=st.one_of(st.text(max_size=20), st.sampled_from(["1 s", "1e300 N m", "0", "-1"]))
 )

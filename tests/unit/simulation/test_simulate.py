@@ -228,6 +228,8 @@ def test_run_with_too_many_steps_is_refused_before_it_starts(step_response: Scen
 
 def test_interrupt_is_seen_in_the_middle_of_a_long_run() -> None:
     code = (
+        # Whoever runs the tests in the background lets them ignore interrupts, and a child would inherit that.
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
         "import ppafo, sys; scenario = ppafo.load_scenario('step-response', ['run.duration=20000 s', "
         "'run.output_interval=1 s']); ppafo.simulate('step-response'); print('ready', flush=True); "
         "ppafo.simulate(scenario)"

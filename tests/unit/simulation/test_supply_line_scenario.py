@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from ppafo.engine.reference.agreement import compare_with_reference
 from ppafo.errors import ScenarioError, SimulationError
@@ -89,6 +88,8 @@ def test_a_task_behind_lines_keeps_mass_and_energy(name: str, gas: tuple[str, ..
 
 
 def test_a_filling_behind_lines_is_that_of_an_ode_solver() -> None:
+    from scipy.integrate import solve_ivp
+
     given = ["controller.kind=constant", "controller.command=1", "run.duration=0.2 s", *LINES]
     result = simulate("torque-task-proportional", given)
     run, time = plan_run(result.scenario), result.recording.time

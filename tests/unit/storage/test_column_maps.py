@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from ppafo.errors import DataError
 from ppafo.storage.column_map import ColumnMap, json_schema, load_column_map
 from ppafo.storage.foreign import read_foreign
+from tests.repeatable import TOO_SLOW
 
 TIME = {"column": 1, "unit": "ms"}
 
@@ -197,7 +198,7 @@ def test_a_misspelt_column_gets_the_nearest_name(tmp_path: Path) -> None:
     delimiter=st.sampled_from(["comma", "semicolon", "tab", "whitespace"]),
     header=st.booleans(),
 )
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=150, deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture, TOO_SLOW], max_examples=150)
 def test_any_bytes_are_read_or_refused_in_one_line(
     tmp_path: Path, content: bytes, delimiter: str, header: bool
 ) -> None:

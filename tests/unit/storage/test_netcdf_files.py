@@ -6,7 +6,6 @@ from pathlib import Path
 import h5netcdf
 import numpy as np
 import pytest
-import xarray
 
 from ppafo.errors import DataError
 from ppafo.signals import Channel, Recording, RecordingKind
@@ -28,6 +27,8 @@ def test_the_same_recording_gives_the_same_bytes() -> None:
 
 
 def test_xarray_opens_the_file_as_the_dataset_that_python_gets(tmp_path: Path) -> None:
+    import xarray
+
     path = write_netcdf(tmp_path / "bench.nc", recording(), {"name": "task", "note": "x" * 200_000})
     with xarray.open_dataset(path, engine="h5netcdf") as opened:
         xarray.testing.assert_identical(opened.load(), dataset_of(recording(), {"name": "task", "note": "x" * 200_000}))
@@ -102,6 +103,8 @@ def test_a_wrong_unit_is_refused_by_file_and_channel(tmp_path: Path) -> None:
 
 
 def test_a_dataset_of_something_else_is_refused(tmp_path: Path) -> None:
+    import xarray
+
     path = tmp_path / "map.nc"
     xarray.Dataset({"height": (("x", "y"), np.zeros((2, 3)))}).to_netcdf(path, engine="h5netcdf")
     with pytest.raises(DataError, match="there is no variable 'time'"):
@@ -109,6 +112,8 @@ def test_a_dataset_of_something_else_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_channel_of_two_dimensions_is_refused(tmp_path: Path) -> None:
+    import xarray
+
     path = tmp_path / "two.nc"
     made = xarray.Dataset({"angle": (("time", "y"), np.zeros((2, 3)))}, {"time": ("time", [0.0, 1.0], {"units": "s"})})
     made.to_netcdf(path, engine="h5netcdf")

@@ -3,7 +3,6 @@
 import io
 
 import numpy as np
-import pyarrow.parquet
 import pytest
 
 from ppafo.errors import DataError
@@ -55,6 +54,8 @@ def test_a_file_that_is_not_whole_is_refused(damage: object) -> None:
 
 
 def test_a_changed_bit_in_the_data_is_found_by_the_checksum_of_its_page() -> None:
+    import pyarrow.parquet
+
     whole = content()
     column = pyarrow.parquet.ParquetFile(io.BytesIO(whole)).metadata.row_group(0).column(1)
     place = column.data_page_offset + column.total_compressed_size // 2

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from ppafo.studies.intervals import (
     effective_sample_size,
@@ -15,6 +14,8 @@ from ppafo.studies.intervals import (
 
 
 def test_the_interval_of_a_mean_is_the_one_of_student_over_replicates() -> None:
+    from scipy import stats
+
     values = np.random.default_rng(1).normal(3.0, 2.0, 64)
     interval = replicates_interval(values, 4, 0.9)
     known = stats.ttest_1samp([values[number::4].mean() for number in range(4)], 0.0).confidence_interval(0.9)
@@ -33,6 +34,8 @@ def test_one_large_draw_carries_a_mean_alone_and_normal_draws_all_do() -> None:
 
 @pytest.mark.parametrize(("hits", "draws"), [(0, 40), (3, 40), (40, 40), (250, 1000)])
 def test_the_interval_of_a_share_is_the_exact_one(hits: int, draws: int) -> None:
+    from scipy import stats
+
     interval = fraction_interval(hits, draws, 0.95)
     known = stats.binomtest(hits, draws).proportion_ci(0.95, "exact")
     assert (interval.low, interval.high) == pytest.approx((known.low, known.high), abs=1e-12)
@@ -40,6 +43,8 @@ def test_the_interval_of_a_share_is_the_exact_one(hits: int, draws: int) -> None
 
 @pytest.mark.parametrize("share", [0.05, 0.5, 0.9])
 def test_the_interval_of_a_quantile_holds_it_often_enough_and_not_by_much(share: float) -> None:
+    from scipy import stats
+
     random = np.random.default_rng(2)
     truth = stats.expon.ppf(share)
     intervals = [quantile_interval(random.exponential(size=200), share, 0.9) for _ in range(2000)]

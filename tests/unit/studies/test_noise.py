@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy import stats
 
 import ppafo
 from ppafo.errors import StudyError
@@ -66,6 +65,8 @@ def test_without_noise_nothing_is_drawn_for_it() -> None:
 
 
 def test_the_noise_is_independent_of_what_is_correlated_and_leaves_its_correlation() -> None:
+    from scipy import stats
+
     document = changed()
     document["vary"].append({"path": "valve.area", "kind": "uniform", "minimum": "10 mm^2", "maximum": "12 mm^2"})
     document["correlations"] = [{"between": ["supply.pressure", "valve.area"], "coefficient": 0.8}]
@@ -129,6 +130,8 @@ def test_a_share_of_noise_and_both_ends_are_between_nothing_and_all() -> None:
 
 @pytest.mark.parametrize("statistic", [Mean("N m"), Quantile("N m", 0.5)])
 def test_monte_carlo_says_how_much_is_noise(statistic: Mean | Quantile) -> None:
+    from scipy import stats
+
     def model(columns: Mapping[str, Floats]) -> Outcomes:
         noise = stats.norm.ppf((columns[NOISE] + 0.5) / 2.0**32)
         return Outcomes({"rms_error": columns["x"] + 0.5 * noise}, np.zeros(noise.size, bool), "")

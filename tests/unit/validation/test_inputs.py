@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from ppafo.engine.replay import Segment, segment_value
 from ppafo.parameters import load_device
@@ -27,6 +26,8 @@ def choked_or_not(upstream: float, downstream: float, ratio: float) -> float:
 
 def independent(device: Device, supply: Callable[[float], float], angle: Callable[[float], float]) -> np.ndarray:
     """Both pressures [Pa] at ``TIMES`` with the valve open at 0.1 to chamber 1, from a general solver."""
+    from scipy.integrate import solve_ivp
+
     gas, actuator = device.gas, device.actuator
     heat_ratio, product = gas.heat_capacity_ratio, gas.specific_gas_constant * gas.temperature
     factor = np.sqrt(heat_ratio / product) * (2 / (heat_ratio + 1)) ** ((heat_ratio + 1) / (2 * (heat_ratio - 1)))
@@ -104,6 +105,8 @@ def test_a_held_vane_is_filled_as_an_independent_solver_has_it(agree: Agree) -> 
 def test_a_fixed_volume_without_a_vane_is_filled_and_vented_as_an_independent_solver_has_it(
     agree: Agree, command: float
 ) -> None:
+    from scipy.integrate import solve_ivp
+
     device, volume = load_device("ppafo2011"), 60e-6
     gas, valve = device.gas, device.valve.orifice
     assert isinstance(valve, Orifice)

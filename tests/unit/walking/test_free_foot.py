@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import Run, batch_of
@@ -99,6 +98,8 @@ def angles_of(run: Run) -> np.ndarray:
 
 @pytest.mark.parametrize("share", [0.0, 0.4])
 def test_the_free_foot_agrees_with_an_independent_solution(walk_plan: Callable[[str], Any], share: float) -> None:
+    from scipy.integrate import solve_ivp
+
     plan = replace(walk_plan("off"), wearer=replace(paper_subject(), residual_share=share))
     swing = swing_of(plan_walk(plan), plan.gait.stance_share, 300)
     assert swing.walk is not None

@@ -2,10 +2,10 @@
 
 import io
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from ppafo.answers.text import text_of
 from ppafo.questions.walk.answer import comparison_table
@@ -18,6 +18,9 @@ from ppafo.walking.figures.over_time import over_time_figure
 from ppafo.walking.figures.phases import strip_figure
 from ppafo.walking.figures.wearers import population_figure
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 CONFIGURATIONS = ("solenoid", "proportional")
 
 
@@ -26,7 +29,7 @@ def compared(name: str) -> Comparison:
     return compare_walks(load_walk(name), 0.15)
 
 
-def texts(figure: Figure) -> list[str]:
+def texts(figure: "Figure") -> list[str]:
     found = [text.get_text() for text in figure.texts]
     for axes in figure.axes:
         found += [text.get_text() for part in (axes, *axes.child_axes) for text in part.texts]

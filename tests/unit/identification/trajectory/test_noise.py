@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
 from benchmarks.intervals.calibration import FIVE_PARAMETERS, Task, repetition
 from benchmarks.intervals.noise_kinds import NOISE_KINDS, noise_kind
@@ -34,6 +33,8 @@ def whitener(noise: SensorNoise, count: int) -> Floats:
 
 
 def test_an_autoregression_whitens_like_the_root_of_its_covariance() -> None:
+    from scipy.signal import lfilter
+
     shape = from_coefficients(np.array([1.2, -0.5, 0.1]))
     assert shape is not None
     count = 40

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from ppafo.errors import StudyError
 from ppafo.questions.sensitivity.analyse import Settings, analyse
@@ -24,7 +23,7 @@ from ppafo.studies.draws import Uncertainty
 from ppafo.studies.outcomes import Model, Outcomes
 from ppafo.studies.study import Drawn
 
-pytest.importorskip("SALib")
+pytestmark = pytest.mark.skipif(not importlib.util.find_spec("SALib"), reason="needs the extra 'studies'")
 
 METRIC = "rms_error"
 A, B = 7.0, 0.1
@@ -203,6 +202,8 @@ def linear_in(slopes: Mapping[str, float]) -> Model:
 
 
 def test_the_mean_effect_of_morris_is_the_change_over_the_range_whatever_the_distribution() -> None:
+    from scipy import stats
+
     mixed = Uncertainty(
         (
             Drawn("x1", NormalAround(0.0, 2.0)),

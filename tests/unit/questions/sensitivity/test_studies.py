@@ -1,5 +1,7 @@
 """Sensitivity over the distributions of a study file."""
 
+from importlib.util import find_spec
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from ppafo.errors import StudyError
 from ppafo.questions.sensitivity.answer import remarks
 from ppafo.questions.sensitivity.solve import sensitivity
 
-pytest.importorskip("SALib")
+pytestmark = pytest.mark.skipif(not find_spec("SALib"), reason="needs the extra 'studies'")
 
 STUDY = "torque-task-uncertainty"
 

@@ -5,6 +5,7 @@ import signal
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from ppafo.questions.sweep import cluster
 from ppafo.questions.sweep.compute import Finished, Task, work_on_chunk
 from ppafo.questions.sweep.solve import LOG, sweep
 
-distributed = pytest.importorskip("distributed")
+pytestmark = pytest.mark.skipif(not find_spec("distributed"), reason="needs the extra 'cluster'")
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -28,7 +29,9 @@ def contents(folder: Path) -> dict[str, bytes]:
 @pytest.fixture
 def two_workers(tmp_path: Path) -> Iterator[Any]:
     """A scheduler with two worker processes on this machine."""
-    with distributed.LocalCluster(
+    from distributed import LocalCluster
+
+    with LocalCluster(
         n_workers=2,
         threads_per_worker=1,
         processes=True,

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow.dataset
 import pytest
 
 import ppafo
@@ -86,6 +85,8 @@ def test_both_configurations_get_the_same_draws(small_results: StudyResults) -> 
 
 
 def test_the_folder_opens_as_it_is_with_units_in_the_columns(small_results: StudyResults) -> None:
+    import pyarrow.dataset
+
     folder = small_results.place.address
     table = pyarrow.dataset.dataset(f"{folder}/runs").to_table()
     assert table.num_rows == 32

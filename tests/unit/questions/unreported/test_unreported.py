@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.stats import t as student
 
 from ppafo.answers.text import text_of
 from ppafo.cli.main import main
@@ -142,6 +141,8 @@ def test_every_setting_gets_a_verdict(family: Family) -> None:
 
 
 def test_every_share_has_the_error_between_searches_that_know_nothing_of_each_other(family: Family) -> None:
+    from scipy.stats import t as student
+
     assert set(family.replicate) == set(range(REPLICATES))
     others = family.without_each()
     assert [set(other.replicate) for other in others] == [set(range(REPLICATES - 1))] * REPLICATES
