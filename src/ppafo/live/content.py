@@ -15,7 +15,7 @@ from typing import Any
 
 from ppafo.errors import UnitError
 from ppafo.exports.wasm import WasmModule
-from ppafo.parameters.parameter_set import ATMOSPHERE_PATH
+from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.simulation.declaration import PRESSURE_WORDS
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.overriding import apply_overrides, is_of_device, split_override

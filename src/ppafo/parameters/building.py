@@ -30,8 +30,8 @@ from ppafo.parameters.device import (
     Supply,
     Valve,
 )
+from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.parameter_set import (
-    ATMOSPHERE_PATH,
     ParameterSet,
     atmospheric_pressure,
     chosen_valve,

@@ -13,7 +13,8 @@ UNITS = "SI: kg, m, s, K, mol; angles in rad, pressures in Pa absolute, torques 
 
 def scenario_document(scenario: Scenario) -> dict[str, Any]:
     """Return the whole scenario with every number of the device, in SI units, as data that JSON can hold."""
-    document: dict[str, Any] = plain(scenario)
+    document: dict[str, Any] = plain(dataclasses.replace(scenario, links={}))
+    del document["links"]
     lines = scenario.supply_lines
     document["supply_lines"] = None if lines is None else plain(lines._asdict())
     return {"units": UNITS, **document}

@@ -34,14 +34,9 @@ from ppafo.errors import PpafoError
 from ppafo.exports.c_library.files import OUTPUTS, Library, Setting, c_identifier
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
 from ppafo.parameters.device import Device
+from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.parameters.overrides import SOURCE
-from ppafo.parameters.parameter_set import (
-    ATMOSPHERE_PATH,
-    PRESSURE_PATH,
-    SECOND_PRESSURE_PATH,
-    atmospheric_pressure,
-    entry_in_si,
-)
+from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si
 from ppafo.parameters.provenance import Entry
 from ppafo.simulation.building import set_name
 from ppafo.simulation.declaration import INITIAL, PRESSURE_WORDS, SEED, value_at

@@ -7,7 +7,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.parameters.parameter_set import PRESSURE_PATH, SECOND_PRESSURE_PATH
+from ppafo.parameters.graph import PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.parameters.parts import Part
 from ppafo.questions.design.file import GAS, OBJECTIVES, DesignProblem, Task
 from ppafo.questions.design.front import Candidates, Floats, Worth
