@@ -66,7 +66,8 @@ def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
     """
     given = {chosen_path(path, scenario): number for path, number in numbers.items()}
     chosen = moving_together(scenario, given)
-    scenario = replace(scenario, links=left(scenario.links, given))
+    if given:
+        scenario = replace(scenario, links=left(scenario.links, given))
     for section, place in _ORIFICES.items():
         form = other_form(scenario.device, section)
         if any(f"{section}.{name}" in chosen for name in form):

@@ -11,7 +11,9 @@ from ppafo.simulation.numbers import TIMES, declared_numbers, number_at, other_f
 
 @pytest.mark.parametrize("name", list_scenarios())
 def test_a_replaced_number_is_the_single_run_with_it(name: str) -> None:
-    scenario = load_scenario(name)
+    held = "motion.angle" in declared_numbers(load_scenario(name))
+    given = ("motion.angle=75 deg",) if held else ()
+    scenario = load_scenario(name, given)
     absent = {
         f"{section}.{form}" for section in ("valve", "actuator.leak") for form in other_form(scenario.device, section)
     }
@@ -24,7 +26,7 @@ def test_a_replaced_number_is_the_single_run_with_it(name: str) -> None:
         text = "3" if path == "sensors.seed" else f"{value!r} {quantity.unit}".removesuffix(" 1")
         changed = with_numbers(scenario, {path: 3.0 if path == "sensors.seed" else value})
         same_place = path == "motion.profile.level" and "motion.angle" in paths
-        alone = load_scenario(name, [f"{'motion.angle' if same_place else path}={text}"])
+        alone = load_scenario(name, [*given, f"{'motion.angle' if same_place else path}={text}"])
         assert {other: number_at(changed, other) for other in paths} == {
             other: number_at(alone, other) for other in paths
         }
