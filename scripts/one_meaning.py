@@ -10,10 +10,13 @@ Prints a line for each item and door, and settings that differ; the status is 1 
 """
 
 import argparse
+import ctypes
 import random
+import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,8 +26,13 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from ppafo.engine.lanes import Batch
 from ppafo.engine.run import batch_of
 from ppafo.errors import PpafoError
+from ppafo.exports.c_library import library_of
+from ppafo.exports.c_library.files import library_files
+from ppafo.exports.c_library.program import COUNTS
+from ppafo.exports.c_library.walk_preparation import settings_of_walk
+from ppafo.exports.loading import load_exportable
 from ppafo.model.declaration import Quantity
-from ppafo.parameters.graph import ATMOSPHERE_PATH
+from ppafo.parameters.graph import ATMOSPHERE_PATH, counts_from
 from ppafo.questions.sweep.chunks import drawn_values, varied_columns
 from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import plan_ensemble
@@ -34,7 +42,11 @@ from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.loading import load_study
 from ppafo.studies.varying import varied_path
-from ppafo.units import from_si
+from ppafo.units import from_si, parse_quantity
+from ppafo.walking import list_walks, load_walk
+from ppafo.walking.configuration import Configuration
+from ppafo.walking.planning import plan_walk
+from ppafo.walking.walk import plan_of, walk_duration
 
 UNITS: Mapping[str, Sequence[str]] = {
     "s": ("s", "ms"),
@@ -110,18 +122,26 @@ def numbers_of(scenario: Scenario) -> dict[str, tuple[Quantity, float]]:
     }
 
 
+def numbers_of_walk(walk: Configuration) -> dict[str, tuple[Quantity, float]]:
+    """The same of a walk; its length is given in minutes and its record follows from that."""
+    apart = ("run.duration", "run.output_interval")
+    return {item.path: (item.quantity, item.value) for item in settings_of_walk(walk) if item.path not in apart}
+
+
 @dataclass
 class Judged:
     """What came of the settings of one item at one door."""
 
     same: int = 0
     refused: int = 0
+    other: int = 0
     differing: list[str] = field(default_factory=list)
 
     @property
     def line(self) -> str:
         """Counts in words."""
-        return f"{self.same:6} the same, {self.refused:5} refused by both, {len(self.differing):4} differ"
+        counted = f"{self.same:6} the same, {self.refused:5} refused by both, {len(self.differing):4} differ"
+        return f"{counted}, {self.other:4} refused for another program" if self.other else counted
 
     def compare(self, words: Words, alone: "Planned | str", door: "Planned | str") -> None:
         """Count one setting: its single run, and what the door made of it; a text is why it was refused."""
@@ -162,7 +182,10 @@ class Planned:
 
 def planned(batch: Batch, place: int = 0) -> Planned:
     """What the lanes run of one place of a batch."""
-    clock, names = batch.clock, tuple(batch.program.parameter_paths) if hasattr(batch.program, "parameter_paths") else ()
+    clock, names = (
+        batch.clock,
+        tuple(batch.program.parameter_paths) if hasattr(batch.program, "parameter_paths") else (),
+    )
     counts = (clock.record_every, clock.step_count, clock.steps_per_sample, clock.signal_delay, clock.command_delay)
     return Planned(
         np.ascontiguousarray(batch.parameters[:, place]),
@@ -173,9 +196,13 @@ def planned(batch: Batch, place: int = 0) -> Planned:
 
 
 def single(name: str, words: Words) -> "Planned | str":
-    """What `ppafo simulate --set` runs; the line with which it refuses."""
+    """What `ppafo simulate --set` or `ppafo walk --set` runs; the line with which it refuses."""
+    texts = [f"{path}={text}" for path, text in words.items()]
     try:
-        return planned(batch_of(plan_run(load_scenario(name, [f"{path}={text}" for path, text in words.items()]))))
+        if name in list_walks():
+            walk = load_walk(name, texts)
+            return planned(batch_of(plan_walk(plan_of(walk, walk_duration(walk)))))
+        return planned(batch_of(plan_run(load_scenario(name, texts))))
     except PpafoError as error:
         return str(error)
 
@@ -183,8 +210,8 @@ def single(name: str, words: Words) -> "Planned | str":
 def settings_of(name: str, count: int, seed: int) -> Iterator[dict[str, str]]:
     """Settings of a scenario, the same for every door."""
     draw = random.Random(f"{name} {seed}")
-    scenario = load_scenario(name)
-    known = numbers_of(scenario)
+    scenario = load_exportable(name)
+    known = numbers_of(scenario) if isinstance(scenario, Scenario) else numbers_of_walk(scenario)
     for _ in range(count):
         paths = drawn_paths(list(known), draw)
         yield {path: words_of(path, *known[path], draw, scenario.device.supply.atmospheric_pressure) for path in paths}
@@ -250,8 +277,6 @@ def in_si(scenario: Scenario, words: Words) -> dict[str, float]:
     given = {path: place.level(words[path]) for path, place in places.items() if path == ATMOSPHERE_PATH}
     zero = given.get(ATMOSPHERE_PATH, scenario.device.supply.atmospheric_pressure)
     linked = ("supply.", "initial.")
-    from dataclasses import replace
-
     return {
         path: (replace(place, atmosphere=zero) if path.startswith(linked) else place).level(
             int(words[path]) if path == "sensors.seed" else words[path]
@@ -278,10 +303,87 @@ def at_numbers(name: str, count: int, seed: int) -> Judged:
     return found
 
 
+OTHER_PROGRAM = "needs another program"
+
+
+class _Handed(ctypes.Structure):
+    """An array as the C of a library takes it."""
+
+    _fields_ = (("values", ctypes.POINTER(ctypes.c_double)), ("extent", ctypes.c_int64 * 3))
+
+
+def _handed(values: np.ndarray) -> _Handed:
+    return _Handed(values.ctypes.data_as(ctypes.POINTER(ctypes.c_double)), (ctypes.c_int64 * 3)(values.size, 0, 0))
+
+
+class BuiltLibrary:
+    """The exported library of a scenario or walk, whose functions are called from here."""
+
+    def __init__(self, item: Scenario | Configuration, folder: Path) -> None:
+        self.library = library_of(item)
+        for file, content in library_files(self.library).items():
+            (folder / file).write_bytes(content)
+        made, name = folder / "library.so", self.library.name
+        flags = ["-std=c99", "-O0", "-ffp-contract=off", "-DPPAFO_ENTRY=extern", "-shared", "-fPIC", "-w"]
+        subprocess.run(["gcc", *flags, str(folder / f"{name}.c"), "-o", str(made), "-lm"], check=True)
+        self.c = ctypes.CDLL(str(made))
+        self.bad_setting, self.size = getattr(self.c, f"{name}_bad_setting"), getattr(self.c, f"{name}_size")
+        self.bad_setting.restype, self.size.restype = ctypes.c_char_p, ctypes.c_size_t
+        self.places = {setting.path: place for place, setting in enumerate(self.library.settings)}
+
+    def planned(self, numbers: Mapping[str, float], alone: "Planned") -> "Planned | str":
+        """What the library runs with some settings changed; ``alone`` says how many numbers there are."""
+        settings = np.array([setting.value for setting in self.library.settings])
+        for path, number in numbers.items():
+            is_rate = path == "controller.rate"
+            settings[self.places["controller.period" if is_rate else path]] = 1.0 / number if is_rate else number
+        pointer = settings.ctypes.data_as(ctypes.c_void_p)
+        bad = self.bad_setting(pointer)
+        if bad is not None:
+            return f"{bad.decode()} is out of range or contradicts another"
+        if not self.size(pointer):
+            return OTHER_PROGRAM
+        every = settings.copy()
+        if self.library.following is not None:
+            self.c.follow(_handed(settings), _handed(every))
+        parameters, states, counts = np.zeros(alone.parameters.size), np.zeros(alone.states.size), np.zeros(len(COUNTS))
+        self.c.prepare(*map(_handed, (every, parameters, states, counts)))
+        return Planned(parameters, states, (*counts.tolist()[:5], alone.clock[5]))
+
+
+def at_library(name: str, count: int, seed: int) -> Judged:
+    """Settings of an exported library in C, as FMU and plugin have them: SI units, all others as they are."""
+    found, base = Judged(), load_exportable(name)
+    with tempfile.TemporaryDirectory() as folder:
+        built = BuiltLibrary(base, Path(folder))
+        for words in settings_of(name, count, seed):
+            alone = single(name, words)
+            if isinstance(alone, str):
+                found.refused += 1
+                continue
+            door = built.planned(_numbers_in_si(base, words), alone)
+            if door == OTHER_PROGRAM:
+                found.other += 1
+            else:
+                found.compare(words, alone, door)
+    return found
+
+
+def _numbers_in_si(base: Scenario | Configuration, words: Words) -> dict[str, float]:
+    if isinstance(base, Scenario):
+        return in_si(base, words)
+    declared = {path: quantity for path, (quantity, _) in numbers_of_walk(base).items()}
+    zero = base.device.supply.atmospheric_pressure
+    if ATMOSPHERE_PATH in words:
+        zero = parse_quantity(words[ATMOSPHERE_PATH], "Pa_a")
+    return {path: parse_quantity(text, declared[path].unit, counts_from(path, zero)) for path, text in words.items()}
+
+
 Door = Callable[[str, int, int], Judged]
 DOORS: Mapping[str, tuple[Door, Sequence[str]]] = {
     "study": (at_study, list_scenarios()),
     "numbers": (at_numbers, list_scenarios()),
+    "library": (at_library, (*list_scenarios(), *list_walks())),
 }
 """Doors by name, and the items that can be taken through them."""
 

@@ -26,22 +26,48 @@ def itself(number: Any) -> Any:
 
 
 @dataclass(frozen=True, slots=True)
-class Follows:
-    """How a number is made of others, in SI units, as long as it is not given itself: ``rule(*sources) + gap``.
+class Term:
+    """A function of other numbers, floats or arrays (runs,), that can be translated to C.
 
-    ``when_set``: only where the first source is given itself, not where that one only follows another in its turn.
-    ``rule`` takes floats, or arrays (runs,), and can be translated to C.
+    With ``names`` it takes its sources as one mapping under these names, else one by one.
     """
 
     sources: tuple[str, ...]
-    gap: float = 0.0
-    when_set: bool = False
-    rule: Callable[..., Any] = itself
+    function: Callable[..., Any] = itself
+    names: tuple[str, ...] = ()
 
     def number(self, present: Callable[[str], Any]) -> Any:
-        """Return the number that follows from what the sources are at ``present``."""
-        found = self.rule(*map(present, self.sources))
+        """Return what the function makes of what the sources are at ``present``."""
+        given = [present(source) for source in self.sources]
+        return self.function(dict(zip(self.names, given, strict=True))) if self.names else self.function(*given)
+
+
+@dataclass(frozen=True, slots=True)
+class Follows:
+    """How a number is made of others, in SI units, as long as it is not given itself: the sum of terms and a gap.
+
+    ``when_set``: only where the first source is given itself, not where that one only follows another in its turn.
+    """
+
+    terms: tuple[Term, ...]
+    gap: float = 0.0
+    when_set: bool = False
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """What is followed."""
+        return tuple(source for term in self.terms for source in term.sources)
+
+    def number(self, present: Callable[[str], Any]) -> Any:
+        """Return what follows from what the sources are at ``present``."""
+        first, *others = (term.number(present) for term in self.terms)
+        found = sum(others, first)
         return found + self.gap if self.gap else found
+
+
+def follows(source: str, gap: float = 0.0, when_set: bool = False) -> Follows:
+    """Return the link to one number, with what is added to it."""
+    return Follows((Term((source,)),), gap, when_set)
 
 
 Graph = Mapping[str, tuple[Follows, ...]]
@@ -61,7 +87,7 @@ def gauge_link(path: str, value: float, unit: str) -> tuple[Follows, ...]:
     """Return the link of a pressure level that is given in gauge to the atmosphere; none for any other number."""
     if not unit.endswith(_GAUGE) or path == ATMOSPHERE_PATH or not path.startswith(_COUNTS_FROM_ATMOSPHERE):
         return ()
-    return (Follows((ATMOSPHERE_PATH,), to_si(value, unit, _LEVEL, 0.0)),)
+    return (follows(ATMOSPHERE_PATH, to_si(value, unit, _LEVEL, 0.0)),)
 
 
 def acting(graph: Graph, given: Collection[str]) -> dict[str, Follows]:

@@ -10,7 +10,7 @@ from ppafo.model.actuators.table import Table
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import alternatives, quantities
 from ppafo.parameters.device import SAME_PRESSURE
-from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH, Follows, gauge_link
+from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH, Follows, follows, gauge_link
 from ppafo.parameters.provenance import Citation, Entry, FlagEntry, TextEntry
 from ppafo.units import base_value, format_quantity, to_si
 
@@ -99,11 +99,11 @@ def links_of_set(
         if path in numbers
     }
     if SECOND_PRESSURE_PATH not in numbers:
-        found[SECOND_PRESSURE_PATH] = (Follows((PRESSURE_PATH,)),)
+        found[SECOND_PRESSURE_PATH] = (follows(PRESSURE_PATH),)
     elif has_one_pressure(parameter_set, atmosphere) and not (
         SECOND_PRESSURE_PATH in given and PRESSURE_PATH not in given
     ):
-        found[SECOND_PRESSURE_PATH] = (Follows((PRESSURE_PATH,), when_set=True), *found[SECOND_PRESSURE_PATH])
+        found[SECOND_PRESSURE_PATH] = (follows(PRESSURE_PATH, when_set=True), *found[SECOND_PRESSURE_PATH])
     return {path: links for path, links in found.items() if links}
 
 

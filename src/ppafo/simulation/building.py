@@ -13,7 +13,7 @@ from ppafo.parameters import ParameterSet, build_device, list_sets, load_paramet
 from ppafo.parameters import apply_overrides as apply_device_overrides
 from ppafo.parameters.declaration import RELIEVING_PATH
 from ppafo.parameters.device import Device, Supply
-from ppafo.parameters.graph import Follows, Graph, gauge_link
+from ppafo.parameters.graph import Follows, Graph, follows, gauge_link
 from ppafo.parameters.parameter_set import atmospheric_pressure, chosen_valve, entry_text, links_of_set
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock, read_clock
 from ppafo.simulation.declaration import (
@@ -168,7 +168,7 @@ def _initial_pressure(reading: Reading, chamber: int, supply: Supply) -> float:
 
 def _link_of_word(word: str) -> Follows:
     """Return which pressure of the supply a word such as ``atmosphere`` stands for."""
-    return Follows((f"supply.{PRESSURE_WORDS[word.strip()]}",))
+    return follows(f"supply.{PRESSURE_WORDS[word.strip()]}")
 
 
 def _links_at_start(reading: Reading) -> Graph:

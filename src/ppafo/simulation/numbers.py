@@ -13,7 +13,7 @@ from ppafo.model.regulator import SupplyLines
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, members
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
-from ppafo.parameters.graph import holding, left, resolved
+from ppafo.parameters.graph import Graph, holding, left, resolved
 from ppafo.simulation import declaration
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
 from ppafo.simulation.supply_line import LINES, SECTION
@@ -84,11 +84,12 @@ def moving_together(scenario: Scenario, given: Mapping[str, Any]) -> dict[str, A
 
     What was changed since the scenario was loaded follows nothing any more.
     """
+    return resolved(links_that_hold(scenario), given, lambda path: _number(scenario, _place(path, scenario)))
 
-    def present(path: str) -> Any:
-        return _number(scenario, _place(path, scenario))
 
-    return resolved(holding(scenario.links, present), given, present)
+def links_that_hold(scenario: Scenario) -> Graph:
+    """Return the links of a scenario without those of numbers that were changed since it was loaded."""
+    return holding(scenario.links, lambda path: _number(scenario, _place(path, scenario)))
 
 
 def number_at(scenario: Scenario, path: str) -> float:
