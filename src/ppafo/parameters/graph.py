@@ -58,6 +58,11 @@ class Follows:
         """What is followed."""
         return tuple(source for term in self.terms for source in term.sources)
 
+    @property
+    def is_same(self) -> bool:
+        """Whether the number is that of its source."""
+        return not self.gap and [term.function for term in self.terms] == [itself]
+
     def number(self, present: Callable[[str], Any]) -> Any:
         """Return what follows from what the sources are at ``present``."""
         first, *others = (term.number(present) for term in self.terms)
