@@ -11,6 +11,7 @@ Prints a line for each item and door, and settings that differ; the status is 1 
 
 import argparse
 import ctypes
+import json
 import random
 import subprocess
 import sys
@@ -18,6 +19,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -31,6 +33,8 @@ from ppafo.exports.c_library.files import library_files
 from ppafo.exports.c_library.program import COUNTS
 from ppafo.exports.c_library.walk_preparation import settings_of_walk
 from ppafo.exports.loading import load_exportable
+from ppafo.exports.wasm.description import description_of
+from ppafo.live.content import page_content, program_content
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.graph import ATMOSPHERE_PATH, counts_from
 from ppafo.questions.sweep.chunks import drawn_values, varied_columns
@@ -331,12 +335,16 @@ class BuiltLibrary:
         self.bad_setting.restype, self.size.restype = ctypes.c_char_p, ctypes.c_size_t
         self.places = {setting.path: place for place, setting in enumerate(self.library.settings)}
 
-    def planned(self, numbers: Mapping[str, float], alone: "Planned") -> "Planned | str":
-        """What the library runs with some settings changed; ``alone`` says how many numbers there are."""
+    def changed(self, numbers: Mapping[str, float]) -> np.ndarray:
+        """The settings with some of them changed."""
         settings = np.array([setting.value for setting in self.library.settings])
         for path, number in numbers.items():
             is_rate = path == "controller.rate"
             settings[self.places["controller.period" if is_rate else path]] = 1.0 / number if is_rate else number
+        return settings
+
+    def planned(self, settings: np.ndarray, alone: "Planned", follows: bool = True) -> "Planned | str":
+        """What the library runs with some settings; ``alone`` says how many numbers there are."""
         pointer = settings.ctypes.data_as(ctypes.c_void_p)
         bad = self.bad_setting(pointer)
         if bad is not None:
@@ -344,7 +352,7 @@ class BuiltLibrary:
         if not self.size(pointer):
             return OTHER_PROGRAM
         every = settings.copy()
-        if self.library.following is not None:
+        if follows and self.library.following is not None:
             self.c.follow(_handed(settings), _handed(every))
         parameters, states, counts = np.zeros(alone.parameters.size), np.zeros(alone.states.size), np.zeros(len(COUNTS))
         self.c.prepare(*map(_handed, (every, parameters, states, counts)))
@@ -361,7 +369,7 @@ def at_library(name: str, count: int, seed: int) -> Judged:
             if isinstance(alone, str):
                 found.refused += 1
                 continue
-            door = built.planned(_numbers_in_si(base, words), alone)
+            door = built.planned(built.changed(_numbers_in_si(base, words)), alone)
             if door == OTHER_PROGRAM:
                 found.other += 1
             else:
@@ -379,10 +387,51 @@ def _numbers_in_si(base: Scenario | Configuration, words: Words) -> dict[str, fl
     return {path: parse_quantity(text, declared[path].unit, counts_from(path, zero)) for path, text in words.items()}
 
 
+def at_page(name: str, count: int, seed: int) -> Judged:
+    """Texts typed on the page that simulates: its script makes numbers of them, which a program is given."""
+    found, base = Judged(), load_exportable(name)
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        built = BuiltLibrary(base, folder)
+        told = description_of(base, built.library)
+        simulated = SimpleNamespace(module=SimpleNamespace(description=told), scenario=base, label=name)
+        content = page_content(name, "page", (), [{**program_content(simulated, "", {}), "usual": {}}])  # type: ignore[arg-type]
+        every = [
+            {path: text for path, text in words.items() if path in built.places}
+            for words in settings_of(name, count, seed)
+        ]
+        (folder / "content.json").write_text(json.dumps(content))
+        (folder / "configurations.json").write_text(json.dumps(every))
+        for words, line in zip(every, _page_values(folder), strict=True):
+            alone = single(name, words)
+            if isinstance(alone, str):
+                found.refused += 1
+            elif line.startswith("refused") and ("must stay" in line or "does not fit here" in line):
+                found.other += 1
+            elif line.startswith("refused"):
+                found.compare(words, alone, line)
+            else:
+                numbers = np.frombuffer(bytes.fromhex(line), dtype=np.float64).copy()
+                found.compare(words, alone, built.planned(numbers, alone, follows=False))
+    return found
+
+
+def _page_values(folder: Path) -> list[str]:
+    """Lines of ``page_values.mjs``; the script of the page is bundled first."""
+    page, here = Path(__file__).parents[1] / "page", Path(__file__).parent
+    options = "{entryPoints: ['source/settings.ts'], bundle: true, format: 'esm', outfile: process.argv[1]}"
+    build = f"require('esbuild').buildSync({options})"
+    subprocess.run(["node", "-e", build, str(folder / "settings.mjs")], cwd=page, check=True)
+    files = [str(folder / name) for name in ("settings.mjs", "content.json", "configurations.json")]
+    done = subprocess.run(["node", str(here / "page_values.mjs"), *files], check=True, capture_output=True, text=True)
+    return done.stdout.splitlines()
+
+
 Door = Callable[[str, int, int], Judged]
 DOORS: Mapping[str, tuple[Door, Sequence[str]]] = {
     "study": (at_study, list_scenarios()),
     "numbers": (at_numbers, list_scenarios()),
+    "page": (at_page, (*list_scenarios(), *list_walks())),
     "library": (at_library, (*list_scenarios(), *list_walks())),
 }
 """Doors by name, and the items that can be taken through them."""

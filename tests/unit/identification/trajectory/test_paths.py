@@ -12,7 +12,6 @@ from ppafo.identification.trajectory.experiment import (
 )
 from ppafo.simulation.scenario import Scenario
 
-
 _SECOND = ("supply.dorsiflexion_pressure", "initial.pressure_2")
 FOLLOWERS = {
     "supply.pressure": _SECOND,
