@@ -261,7 +261,7 @@ def _gauge_texts(item: Scenario | Configuration, settings: Iterable[Mapping[str,
     """Texts of the pressures that count from the atmosphere: they move with it, as they do in Python."""
     following = {entry["key"] for entry in settings if entry["follows"]}
     gaps = {
-        path: link.gap for path, links in item.links.items() for link in links if link.sources == (ATMOSPHERE_PATH,)
+        path: link.gap for path, links in item.graph.items() for link in links if link.sources == (ATMOSPHERE_PATH,)
     }
     return {path: _gauge_text(gap, 0.0) for path, gap in gaps.items() if path not in following}
 

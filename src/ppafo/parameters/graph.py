@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.parameters.device import SAME_PRESSURE
 from ppafo.units import to_si
 
 ATMOSPHERE_PATH = "supply.atmospheric_pressure"
 PRESSURE_PATH, SECOND_PRESSURE_PATH = "supply.pressure", "supply.dorsiflexion_pressure"
+SAME_PRESSURE = 1.0e-6
+"""Relative difference below which two pressures are one that was written in two units."""
 _LEVEL, _GAUGE = "Pa_a", "_g"
 _COUNTS_FROM_ATMOSPHERE = ("supply.", "initial.")
 

@@ -9,8 +9,15 @@ from ppafo.errors import ParameterError, UnitError, nearest_name
 from ppafo.model.actuators.table import Table
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import alternatives, quantities
-from ppafo.parameters.device import SAME_PRESSURE
-from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH, Follows, follows, gauge_link
+from ppafo.parameters.graph import (
+    ATMOSPHERE_PATH,
+    PRESSURE_PATH,
+    SAME_PRESSURE,
+    SECOND_PRESSURE_PATH,
+    Follows,
+    follows,
+    gauge_link,
+)
 from ppafo.parameters.provenance import Citation, Entry, FlagEntry, TextEntry
 from ppafo.units import base_value, format_quantity, to_si
 

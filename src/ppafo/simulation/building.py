@@ -100,7 +100,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         origin=Origin(request.path, document["device"]["set"], hardware.valve, request.overrides, request.content),
         thermal=read_thermal(reading),
         supply_lines=read_supply_lines(reading, device),
-        links={**hardware.links, **_links_at_start(reading)},
+        links=_links_at_start(reading),
     )
     _check_actuator(reading, scenario)
     return scenario
@@ -141,7 +141,7 @@ def set_name(name: str, folder: Path) -> str:
 
 def _device(reading: Reading, hardware: Hardware) -> Device:
     try:
-        return build_device(hardware.parameter_set, hardware.valve)
+        return build_device(hardware.parameter_set, hardware.valve, hardware.links)
     except ParameterError as error:
         raise _of_device(reading, error) from error
 

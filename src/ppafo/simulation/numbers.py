@@ -67,7 +67,8 @@ def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
     given = {chosen_path(path, scenario): number for path, number in numbers.items()}
     chosen = moving_together(scenario, given)
     if given:
-        scenario = replace(scenario, links=left(scenario.links, given))
+        device = replace(scenario.device, links={})
+        scenario = replace(scenario, device=device, links=left(scenario.graph, given))
     for section, place in _ORIFICES.items():
         form = other_form(scenario.device, section)
         if any(f"{section}.{name}" in chosen for name in form):
@@ -89,7 +90,7 @@ def moving_together(scenario: Scenario, given: Mapping[str, Any]) -> dict[str, A
 
 def links_that_hold(scenario: Scenario) -> Graph:
     """Return the links of a scenario without those of numbers that were changed since it was loaded."""
-    return holding(scenario.links, lambda path: _number(scenario, _place(path, scenario)))
+    return holding(scenario.graph, lambda path: _number(scenario, _place(path, scenario)))
 
 
 def number_at(scenario: Scenario, path: str) -> float:

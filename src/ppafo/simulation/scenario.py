@@ -155,7 +155,8 @@ class Scenario:
     Times [s]: ``time_step`` is the largest step (the engine divides it where a chamber is faster) and divides
     ``duration``, ``output_interval`` and the sample period of ``control``. Initial pressures [Pa absolute]; the
     reference is a torque [N m]. Without ``thermal`` the gas keeps its temperature, without ``supply_lines`` the supply
-    pressures are constant, both as in the paper. ``links`` say which numbers follow others that are varied.
+    pressures are constant, both as in the paper. ``links`` say which numbers follow others that are varied, beside
+    those of the device.
     """
 
     name: str
@@ -185,6 +186,11 @@ class Scenario:
             f"  controller  {self.control.label}\n"
             f"  duration    {self.duration:g} s, in steps of at most {self.time_step:g} s"
         )
+
+    @property
+    def graph(self) -> Graph:
+        """All links, those of the device first."""
+        return {**self.device.links, **self.links}
 
     def controlled_by(self, controller: PythonController) -> "Scenario":
         """Return the scenario with any object that has ``reset`` and ``update``, at the same sample period.

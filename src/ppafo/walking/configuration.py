@@ -27,7 +27,7 @@ class Configuration:
     ``bottle`` is the one that the device hangs on, None where its supply does not end.
     ``converter`` has the settings of the converter of a controller on whole numbers, None where it has floats.
     ``sensor_settings`` are what ``gait_sensors`` were made from, None where they were not read from a file.
-    ``links`` say which numbers follow others that are set.
+    ``links`` say which numbers follow others that are set, beside those of the device.
     ``wearer_origin`` says in words whose body mass it is.
     ``assumed`` has the values that no source gives, by path, with the reason for each.
     """
@@ -54,6 +54,11 @@ class Configuration:
     sensor_settings: SensorSettings | None = None
     converter: Mapping[str, float] | None = None
     links: Graph = field(default_factory=dict, compare=False)
+
+    @property
+    def graph(self) -> Graph:
+        """All links, those of the device first."""
+        return {**self.device.links, **self.links}
 
     @property
     def has_ideal_sensors(self) -> bool:

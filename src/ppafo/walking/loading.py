@@ -96,7 +96,7 @@ def load_walk(
     reading = Reading(file, document, frozenset(split_override(text)[0] for text in given))
     folder = Path(name_or_path).parent
     law = walking_controllers()[kind_at(document, "controller")]
-    device, of_device = _device(document, [text for text in given if is_of_device(split_override(text)[0])], file)
+    device = _device(document, [text for text in given if is_of_device(split_override(text)[0])], file)
     walked = _gait(gait or document.get("gait", NORMATIVE), folder, gait is None)
     is_named = gait is not None or "gait" in document
     carried = read_bottle(reading, device, folder if bottle is None else Path())
@@ -126,7 +126,7 @@ def load_walk(
         wearer_origin=wearer_origin(reading, walked, is_named),
         bottle=carried,
         converter=_converter(reading, law),
-        links={**of_device, **links},
+        links=links,
     )
     check_walk(configuration, reading)
     course_of_walk(configuration)
@@ -237,19 +237,19 @@ def _set(document: dict[str, Any], path: str, text: str) -> None:
     table[name] = int(text) if path == "sensors.seed" and text.isdecimal() and len(text) < 20 else text
 
 
-def _device(document: dict[str, Any], overrides: list[str], file: str) -> tuple[Device, Graph]:
-    """Return the device of a walk, and which of its pressures follow others."""
+def _device(document: dict[str, Any], overrides: list[str], file: str) -> Device:
     section = document["device"]
     valve = section.get("valve")
     try:
         parameters = apply_overrides(load_parameter_set(section["set"]), section.get("overrides", ()), valve)
         before = atmospheric_pressure(parameters) if overrides else None
         parameters = apply_overrides(parameters, overrides, valve)
-        device = build_device(parameters, valve)
+        given = {split_override(text)[0] for text in overrides}
+        device = build_device(parameters, valve, links_of_set(parameters, given, before))
         device.check_vane("a walk")
     except ParameterError as error:
         raise ParameterError(f"{file}: [device]: {one_line(error)}") from error
-    return device, links_of_set(parameters, {split_override(text)[0] for text in overrides}, before)
+    return device
 
 
 def _lines(

@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from ppafo.parameters import load_device
 from ppafo.parameters.device import Orifice, SonicOrifice
+from ppafo.simulation.document import scenario_document
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.numbers import TIMES, declared_numbers, number_at, other_form, with_numbers
 
@@ -62,3 +64,15 @@ def test_a_constant_command_has_no_reference_to_vary() -> None:
     paths = declared_numbers(load_scenario("step-response"))
     assert not [path for path in paths if path.startswith("reference.")]
     assert "controller.command" in paths
+
+
+def test_a_scenario_made_from_a_device_alone_has_the_links_of_the_device() -> None:
+    scenario = replace(load_scenario("step-response"), device=load_device("ppafo2011"), links={})
+    supply = with_numbers(scenario, {"supply.pressure": 5.0e5}).device.supply
+    assert (supply.pressure, supply.dorsiflexion_pressure) == (5.0e5, 5.0e5)
+
+
+def test_links_are_no_part_of_the_document_of_a_scenario() -> None:
+    document = scenario_document(load_scenario("step-response"))
+    assert "links" not in document
+    assert "links" not in document["device"]

@@ -152,7 +152,7 @@ def links_of_walk(configuration: Configuration) -> Graph:
     """What follows other settings of a walk as long as nobody changes it."""
     known = _numbers(configuration)
     recorded = {"run.output_interval": (Follows((Term(("run.duration",), record_interval),)),)}
-    links = {path: links for path, links in {**configuration.links, **recorded}.items() if path in known}
+    links = {path: links for path, links in {**configuration.graph, **recorded}.items() if path in known}
     return holding(links, lambda path: known[path][1])
 
 

@@ -67,7 +67,7 @@ def description_of(item: Scenario | Configuration, library: Library) -> dict[str
     """The description of the module of a scenario or a walk, as the beginning of this file has it."""
     file = _file_of_walk(item) if isinstance(item, Configuration) else _file_of_scenario(item)
     keys = {setting.name: setting.path for setting in library.settings}
-    origins, follows, kept = _origins(file, item.device, library), _follows(item.links), _kept(library)
+    origins, follows, kept = _origins(file, item.device, library), _follows(item.graph), _kept(library)
     program, atmosphere = library.program, item.device.supply.atmospheric_pressure
     channels = {"time": ("s", "since the start"), **{name: OUTPUTS[name] for name in program.outputs}}
     return {
