@@ -124,8 +124,9 @@ def in_its_unit(place: VariedPath, texts: Iterable[object]) -> VariedPath:
     if place.quantity.unit != "Pa_a" or not any(gauge):
         return place
     if not all(gauge):
+        other = units[gauge.index(not gauge[0])]
         raise UnitError(
-            f"'{units[0]}' and '{units[gauge.index(not gauge[0])]}' together: the atmosphere varies; give one"
+            f"the atmosphere varies, so '{units[0]}' and '{other}' do not go together; give gauge or absolute pressures"
         )
     return replace(place, is_gauge=True)
 
