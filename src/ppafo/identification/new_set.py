@@ -8,14 +8,8 @@ from ppafo.identification.estimate import Estimate, half_width_for
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.building import build_device
 from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, alternatives, is_within
-from ppafo.parameters.parameter_set import (
-    PRESSURE_PATH,
-    SECOND_PRESSURE_PATH,
-    ParameterSet,
-    atmospheric_pressure,
-    has_one_pressure,
-    number_text,
-)
+from ppafo.parameters.graph import acting
+from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, links_of_set, number_text
 from ppafo.parameters.provenance import CONFIDENCE, Entry
 from ppafo.units import from_si
 
@@ -78,9 +72,9 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate) -> Parameter
         uncertainty=half_width_for(CONFIDENCE, max(high - value, value - low), estimate.confidence),
     )
     kept = {path: old for path, old in parameter_set.numbers.items() if path not in _other_form(estimate.path)}
-    found = {estimate.path: entry}
-    if estimate.path == PRESSURE_PATH and has_one_pressure(parameter_set):
-        found[SECOND_PRESSURE_PATH] = entry  # what was fitted is the pressure of both regulators
+    # What was fitted as the pressure of both regulators is that of both.
+    links = acting(links_of_set(parameter_set), {estimate.path})
+    found = {path: entry for path in (estimate.path, *(path for path, link in links.items() if link.when_set))}
     return replace(parameter_set, numbers={**kept, **found})
 
 

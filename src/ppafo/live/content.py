@@ -15,16 +15,14 @@ from typing import Any
 
 from ppafo.errors import UnitError
 from ppafo.exports.wasm import WasmModule
-from ppafo.parameters.parameter_set import ATMOSPHERE_PATH
+from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.simulation.declaration import PRESSURE_WORDS
-from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.overriding import apply_overrides, is_of_device, split_override
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import conversion, from_si, to_si
 from ppafo.version import __version__
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.contradictions import COMPRESSION
-from ppafo.walking.loading import load_walk
 from ppafo.walking.walk import LONGEST_MINUTES, SHORTEST_STRIDES
 
 Interval = tuple[float, float]
@@ -261,29 +259,11 @@ def _shown(entry: Mapping[str, Any]) -> dict[str, str]:
 
 def _gauge_texts(item: Scenario | Configuration, settings: Iterable[Mapping[str, Any]]) -> dict[str, str]:
     """Texts of the pressures that count from the atmosphere: they move with it, as they do in Python."""
-    found = zip(_pressures(item), _pressures(_with_other_atmosphere(item)), strict=True)
     following = {entry["key"] for entry in settings if entry["follows"]}
-    atmosphere = item.device.supply.atmospheric_pressure
-    return {
-        key: _gauge_text(value, atmosphere)
-        for (key, value), (_, other) in found
-        if key not in following and value != other
+    gaps = {
+        path: link.gap for path, links in item.graph.items() for link in links if link.sources == (ATMOSPHERE_PATH,)
     }
-
-
-def _pressures(item: Scenario | Configuration) -> list[tuple[str, float]]:
-    supply = item.device.supply
-    found = [("supply.pressure", supply.pressure), ("supply.dorsiflexion_pressure", supply.dorsiflexion_pressure)]
-    if isinstance(item, Scenario):
-        found += [("initial.pressure_1", item.initial_pressure_1), ("initial.pressure_2", item.initial_pressure_2)]
-    return [(key, float(value)) for key, value in found]
-
-
-def _with_other_atmosphere(item: Scenario | Configuration) -> Scenario | Configuration:
-    change = f"{ATMOSPHERE_PATH}={_OTHER_ATMOSPHERE!r} Pa_a"
-    if isinstance(item, Scenario):
-        return load_scenario(item.origin.file or item.name, [*item.origin.overrides, change])
-    return load_walk(item.file or item.name, [*item.overrides, change])
+    return {path: _gauge_text(gap, 0.0) for path, gap in gaps.items() if path not in following}
 
 
 def _gauge_text(value: float, atmosphere: float) -> str:

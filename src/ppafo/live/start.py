@@ -8,7 +8,7 @@ from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import ScenarioError, nearest_name
-from ppafo.parameters.parameter_set import ATMOSPHERE_PATH
+from ppafo.parameters.graph import ATMOSPHERE_PATH
 
 MOST_CONFIGURATIONS = 4
 _WHITE = "\t\n\v\f\r \u00a0\u1680\u2000-\u200a\u2028\u2029\u202f\u205f\u3000\ufeff"

@@ -30,12 +30,13 @@ from ppafo.parameters.device import (
     Supply,
     Valve,
 )
+from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph
 from ppafo.parameters.parameter_set import (
-    ATMOSPHERE_PATH,
     ParameterSet,
     atmospheric_pressure,
     chosen_valve,
     entry_in_si,
+    links_of_set,
     number_text,
     with_second_pressure,
 )
@@ -48,9 +49,13 @@ _COVERED = 1.01
 _FLAT_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 
 
-def build_device(parameter_set: ParameterSet, valve: str | None = None) -> Device:
-    """Return the device with one of the set's valves (default: the set's own choice), in SI units."""
+def build_device(parameter_set: ParameterSet, valve: str | None = None, links: Graph | None = None) -> Device:
+    """Return the device with one of the set's valves (default: the set's own choice), in SI units.
+
+    ``links`` are those of the set unless given.
+    """
     name = chosen_valve(parameter_set, valve)
+    links = links_of_set(parameter_set) if links is None else links
     parameter_set = with_second_pressure(parameter_set)
     _check_complete(parameter_set, name)
     reader = _reader(parameter_set)
@@ -64,6 +69,7 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None) -> Devic
         valve=_valve(parameter_set, reader, name),
         flow=Flow(**_section(reader, "flow", declaration.FLOW)),
         valve_name=name,
+        links=links,
     )
     _check_consistent(parameter_set, device)
     return device if device.actuator.kind == VANE else _with_means(device)

@@ -8,11 +8,10 @@ from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import ParameterError
 from ppafo.model.actuators.table import Table
 from ppafo.model.gas import specific_gas_constant
+from ppafo.parameters.graph import SAME_PRESSURE, Graph
 
 VANE = "vane"
 """The kind of actuator that is the paper's; see the catalogue of actuators."""
-SAME_PRESSURE = 1.0e-6
-"""Relative difference below which two pressures are one that was written in two units."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +121,10 @@ class Flow:
 
 @dataclass(frozen=True, slots=True)
 class Device:
-    """A complete device with the one valve that was chosen; everything that a run needs to know of the hardware."""
+    """A complete device with the one valve that was chosen; everything that a run needs to know of the hardware.
+
+    ``links`` say which of its numbers follow others that are varied.
+    """
 
     name: str
     gas: Gas
@@ -133,6 +135,7 @@ class Device:
     valve: Valve
     flow: Flow
     valve_name: str
+    links: Graph = field(default_factory=dict, compare=False, repr=False)
 
     def check_vane(self, what: str) -> None:
         """Raise ParameterError where the actuator is no vane, for ``what`` is made for a vane alone."""

@@ -6,15 +6,14 @@ from dataclasses import dataclass, replace
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.declaration import AREA_FORM, RELIEVING_PATH, SONIC_FORM, SPECIES_PATH
+from ppafo.parameters.graph import acting
 from ppafo.parameters.parameter_set import (
-    PRESSURE_PATH,
-    SECOND_PRESSURE_PATH,
     ParameterSet,
     atmospheric_pressure,
     chosen_valve,
     entry_in_si,
     entry_text,
-    has_one_pressure,
+    links_of_set,
 )
 from ppafo.parameters.provenance import Entry, FlagEntry, TextEntry
 from ppafo.units import split_quantity
@@ -56,12 +55,11 @@ def apply_overrides(parameter_set: ParameterSet, overrides: Iterable[str], valve
 
     ``valve.X`` means the valve that is chosen (``valve``, else the set's default), ``valves.NAME.X`` one by name.
     Naming another gas brings that gas's molar mass and heat capacity ratio; giving an orifice in the form of ISO 6358
-    drops its area and discharge coefficient, and the reverse. ``supply.pressure`` is that of both regulators where both
-    have one, unless ``supply.dorsiflexion_pressure`` is given apart. ParameterError for an override that does not fit
-    the set.
+    drops its area and discharge coefficient, and the reverse. What follows a number (``links_of_set``) is set with it,
+    unless it is given too. ParameterError for an override that does not fit the set.
     """
-    chosen = chosen_valve(parameter_set, valve)
-    orders = list(overrides)
+    chosen, orders = chosen_valve(parameter_set, valve), list(overrides)
+    atmosphere = atmospheric_pressure(parameter_set) if orders else None
     given = [override.partition("=")[0].strip() for override in orders]
     for number, override in enumerate(orders):
         on_one_line = one_line(override)
@@ -71,19 +69,11 @@ def apply_overrides(parameter_set: ParameterSet, overrides: Iterable[str], valve
                 f"override '{on_one_line}' is not of the form PATH=VALUE, for example valve.area=12.6mm^2"
             )
         change = _CHANGES.get(path, _with_number)
-        is_for_both = path == PRESSURE_PATH and has_one_pressure(parameter_set) and not _is_apart(given, number)
+        links = acting(links_of_set(parameter_set, given[:number], atmosphere), {path, *given[number + 1 :]})
         parameter_set = change(parameter_set, _Order(path, chosen, text))
-        if is_for_both:
-            parameter_set = _with_number(parameter_set, _Order(SECOND_PRESSURE_PATH, chosen, text))
+        for follower in (follower for follower, link in links.items() if link.when_set and link.sources == (path,)):
+            parameter_set = _with_number(parameter_set, _Order(follower, chosen, text))
     return parameter_set
-
-
-def _is_apart(given: list[str], number: int) -> bool:
-    """Tell whether these overrides give the second pressure beside the first one, which stands at ``number``.
-
-    A pair of both that comes earlier, as in a file, is one that a later override of the first changes.
-    """
-    return SECOND_PRESSURE_PATH in given and not {PRESSURE_PATH, SECOND_PRESSURE_PATH} <= set(given[:number])
 
 
 def overridden_paths(parameter_set: ParameterSet) -> frozenset[str]:

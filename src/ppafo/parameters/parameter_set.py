@@ -1,7 +1,7 @@
 """A parameter set in memory: every value by its dotted path, as it was given."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 from ppafo.constants import STANDARD_ATMOSPHERE
@@ -9,12 +9,17 @@ from ppafo.errors import ParameterError, UnitError, nearest_name
 from ppafo.model.actuators.table import Table
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import alternatives, quantities
-from ppafo.parameters.device import SAME_PRESSURE
+from ppafo.parameters.graph import (
+    ATMOSPHERE_PATH,
+    PRESSURE_PATH,
+    SAME_PRESSURE,
+    SECOND_PRESSURE_PATH,
+    Follows,
+    follows,
+    gauge_link,
+)
 from ppafo.parameters.provenance import Citation, Entry, FlagEntry, TextEntry
 from ppafo.units import base_value, format_quantity, to_si
-
-ATMOSPHERE_PATH = "supply.atmospheric_pressure"
-PRESSURE_PATH, SECOND_PRESSURE_PATH = "supply.pressure", "supply.dorsiflexion_pressure"
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -86,14 +91,36 @@ def atmospheric_pressure(parameter_set: ParameterSet) -> float:
     return entry_in_si(entry, parameter_set.declarations()[ATMOSPHERE_PATH], STANDARD_ATMOSPHERE)
 
 
-def has_one_pressure(parameter_set: ParameterSet) -> bool:
-    """Tell whether both regulators are set to one pressure, so that a change of the first is one of both."""
+def links_of_set(
+    parameter_set: ParameterSet, given: Collection[str] = (), atmosphere: float | None = None
+) -> dict[str, tuple[Follows, ...]]:
+    """Return how pressures of a set follow others: gauge ones the atmosphere, the second regulator the first.
+
+    It does where the set has one pressure for both, unless it was ``given`` by an override and the first was not. With
+    an ``atmosphere`` [Pa absolute] it is that at which they are compared, else that of the set.
+    """
+    numbers = parameter_set.numbers
+    found = {
+        path: gauge_link(path, numbers[path].value, numbers[path].unit)
+        for path in (PRESSURE_PATH, SECOND_PRESSURE_PATH)
+        if path in numbers
+    }
+    if SECOND_PRESSURE_PATH not in numbers:
+        found[SECOND_PRESSURE_PATH] = (follows(PRESSURE_PATH),)
+    elif has_one_pressure(parameter_set, atmosphere) and not (
+        SECOND_PRESSURE_PATH in given and PRESSURE_PATH not in given
+    ):
+        found[SECOND_PRESSURE_PATH] = (follows(PRESSURE_PATH, when_set=True), *found[SECOND_PRESSURE_PATH])
+    return {path: links for path, links in found.items() if links}
+
+
+def has_one_pressure(parameter_set: ParameterSet, atmosphere: float | None = None) -> bool:
+    """Tell whether both regulators are set to one pressure, at the set's atmosphere or another [Pa absolute]."""
     entries = [parameter_set.numbers.get(path) for path in (PRESSURE_PATH, SECOND_PRESSURE_PATH)]
-    declared, atmosphere = parameter_set.declarations(), atmospheric_pressure(parameter_set)
+    declared = parameter_set.declarations()
+    zero = atmospheric_pressure(parameter_set) if atmosphere is None else atmosphere
     try:
-        first, second = (
-            entry_in_si(entry, declared[PRESSURE_PATH], atmosphere) for entry in entries if entry is not None
-        )
+        first, second = (entry_in_si(entry, declared[PRESSURE_PATH], zero) for entry in entries if entry is not None)
     except (UnitError, ValueError):  # one of them is missing, or is no pressure
         return False
     return math.isclose(first, second, rel_tol=SAME_PRESSURE)

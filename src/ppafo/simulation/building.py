@@ -13,7 +13,8 @@ from ppafo.parameters import ParameterSet, build_device, list_sets, load_paramet
 from ppafo.parameters import apply_overrides as apply_device_overrides
 from ppafo.parameters.declaration import RELIEVING_PATH
 from ppafo.parameters.device import Device, Supply
-from ppafo.parameters.parameter_set import chosen_valve, entry_text
+from ppafo.parameters.graph import Follows, Graph, follows, gauge_link
+from ppafo.parameters.parameter_set import atmospheric_pressure, chosen_valve, entry_text, links_of_set
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock, read_clock
 from ppafo.simulation.declaration import (
     ARITHMETIC,
@@ -40,6 +41,7 @@ from ppafo.simulation.scenario import (
     Scenario,
     Sensors,
 )
+from ppafo.units import split_quantity
 
 _SECTION = "assumed"
 _NOTHING_TO_FOLLOW = ProfileChoice("constant", {"level": 0.0})
@@ -63,10 +65,11 @@ class ScenarioRequest:
 
 @dataclass(frozen=True, slots=True)
 class Hardware:
-    """The parameter set with all overrides in it and the name of its valve that is used."""
+    """The parameter set with all overrides in it, the name of its valve that is used, and what follows what in it."""
 
     parameter_set: ParameterSet
     valve: str
+    links: Graph
 
 
 def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Scenario:
@@ -97,6 +100,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         origin=Origin(request.path, document["device"]["set"], hardware.valve, request.overrides, request.content),
         thermal=read_thermal(reading),
         supply_lines=read_supply_lines(reading, device),
+        links=_links_at_start(reading),
     )
     _check_actuator(reading, scenario)
     return scenario
@@ -123,7 +127,10 @@ def _hardware(reading: Reading, request: ScenarioRequest, overrides: tuple[str, 
         parameter_set = apply_device_overrides(parameter_set, section.get("overrides", ()), valve)
     except ParameterError as error:
         raise _of_device(reading, error) from error
-    return Hardware(apply_device_overrides(parameter_set, overrides, valve), name)
+    before = atmospheric_pressure(parameter_set) if overrides else None
+    changed = apply_device_overrides(parameter_set, overrides, valve)
+    given = {split_override(text)[0] for text in overrides}
+    return Hardware(changed, name, links_of_set(changed, given, before))
 
 
 def set_name(name: str, folder: Path) -> str:
@@ -134,7 +141,7 @@ def set_name(name: str, folder: Path) -> str:
 
 def _device(reading: Reading, hardware: Hardware) -> Device:
     try:
-        return build_device(hardware.parameter_set, hardware.valve)
+        return build_device(hardware.parameter_set, hardware.valve, hardware.links)
     except ParameterError as error:
         raise _of_device(reading, error) from error
 
@@ -151,12 +158,29 @@ def _initial_pressure(reading: Reading, chamber: int, supply: Supply) -> float:
     value = value_at(reading.document, path)
     word = AT_REST if value is None else value
     if isinstance(word, str) and word.strip() in PRESSURE_WORDS:
-        return float(getattr(supply, PRESSURE_WORDS[word.strip()]))
+        return float(_link_of_word(word).number(lambda source: getattr(supply, source.removeprefix("supply."))))
     if isinstance(word, str) and not any(character.isdigit() for character in word):
         words = ", ".join(PRESSURE_WORDS)
         hint = nearest_name(word, PRESSURE_WORDS)
         raise reading.refusal(path, f"is neither a pressure such as '50 psi_g' nor one of {words}{hint}")
     return reading.number(path, quantity, supply.atmospheric_pressure)
+
+
+def _link_of_word(word: str) -> Follows:
+    """Return which pressure of the supply a word such as ``atmosphere`` stands for."""
+    return follows(f"supply.{PRESSURE_WORDS[word.strip()]}")
+
+
+def _links_at_start(reading: Reading) -> Graph:
+    """Return which pressures of the supply those at the start follow: those of a word, or in gauge."""
+    found = {}
+    for item in INITIAL:
+        path = f"initial.{item.name}"
+        value = value_at(reading.document, path)
+        word = AT_REST if value is None else str(value)
+        is_word = word.strip() in PRESSURE_WORDS
+        found[path] = (_link_of_word(word),) if is_word else gauge_link(path, *split_quantity(word))
+    return {path: links for path, links in found.items() if links}
 
 
 def _control(reading: Reading, period: float) -> Control:

@@ -1,9 +1,12 @@
 """Times of a run: one step that divides the sample period; recorded samples may lie between steps."""
 
-import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from ppafo.errors import ScenarioError
+from ppafo.model.columns import Number, choose, larger, rounded_up, smaller, truncated
+from ppafo.parameters.graph import Follows, Graph, Term
 from ppafo.simulation.declaration import PERIOD, RATE, RUN, value_at
 from ppafo.simulation.reading import Reading, quantity_text
 
@@ -13,6 +16,7 @@ MAXIMUM_STEPS_OF_DELAY = 1.0e5
 
 _RELATIVE = 1.0e-9
 _DURATION, _STEP, _OUTPUT = RUN
+_LONGEST_STEP = 1.0e-3
 _DURATION_PATH, _STEP_PATH, _OUTPUT_PATH = (f"run.{item.name}" for item in RUN)
 _RATE_PATH, _PERIOD_PATH = "controller.rate", "controller.period"
 
@@ -36,11 +40,55 @@ def read_clock(reading: Reading) -> Clock:
     duration = reading.number(_DURATION_PATH, _DURATION)
     period = _read_period(reading)
     step = _read_step(reading, duration, period)
-    used = period / max(1, math.ceil(period / step * (1.0 - _RELATIVE)))
-    output = _read_output(reading, duration, step) or duration / max(1, round(duration / used))
-    clock = Clock(duration, used, output, period)
+    output = _read_output(reading, duration, step) or output_unless_given(duration, period, step)
+    clock = Clock(duration, dividing_step(period, step), output, period)
     _check_size(reading, clock)
     return clock
+
+
+def links_of_times(document: Mapping[str, Any]) -> Graph:
+    """Return which times of a document follow others because it does not give them: step and output interval."""
+    step, output = (value_at(document, path) is not None for path in (_STEP_PATH, _OUTPUT_PATH))
+    found: dict[str, tuple[Follows, ...]] = {}
+    if not step:
+        sources = (_DURATION_PATH, _PERIOD_PATH)
+        term = Term((*sources, _OUTPUT_PATH), step_with_output) if output else Term(sources, step_unless_given)
+        found[_STEP_PATH] = (Follows((term,)),)
+    if not output:
+        found[_OUTPUT_PATH] = (Follows((Term((_DURATION_PATH, _PERIOD_PATH, _STEP_PATH), output_unless_given),)),)
+    return found
+
+
+def step_unless_given(duration: Number, period: Number) -> Number:
+    """The largest step [s] of a run where its file has none: no longer than the run or a sample of the controller."""
+    found: Number = smaller(smaller(duration, period), _LONGEST_STEP)
+    return found
+
+
+def step_with_output(duration: Number, period: Number, output_interval: Number) -> Number:
+    """The same where the time between two recorded samples [s] is given."""
+    found: Number = smaller(step_unless_given(duration, period), output_interval)
+    return found
+
+
+def dividing_step(period: Number, step: Number) -> Number:
+    """The largest step [s], up to one that is given, that divides the sample period."""
+    found: Number = period / larger(1.0, rounded_up(period / step * (1.0 - _RELATIVE)))
+    return found
+
+
+def output_unless_given(duration: Number, period: Number, step: Number) -> Number:
+    """The time [s] between two recorded samples where nobody says it: every step, or nearly so."""
+    found: Number = duration / larger(1.0, nearest_whole(duration / dividing_step(period, step)))
+    return found
+
+
+def nearest_whole(number: Number) -> Number:
+    """The nearest whole number, the even one of two that are as near."""
+    up = truncated(number + 0.5)
+    is_odd_tie = (up - number == 0.5) & (0.5 * up != truncated(0.5 * up))
+    found: Number = choose(is_odd_tie, up - 1.0, up)
+    return found
 
 
 def _check_size(reading: Reading, clock: Clock) -> None:
@@ -73,9 +121,9 @@ def _read_period(reading: Reading) -> float:
 
 def _read_step(reading: Reading, duration: float, period: float) -> float:
     if value_at(reading.document, _STEP_PATH) is None:
-        output = value_at(reading.document, _OUTPUT_PATH)
-        shortest = min(duration, period, _STEP.default or duration)
-        return shortest if output is None else min(shortest, reading.number(_OUTPUT_PATH, _OUTPUT))
+        if value_at(reading.document, _OUTPUT_PATH) is None:
+            return step_unless_given(duration, period)
+        return step_with_output(duration, period, reading.number(_OUTPUT_PATH, _OUTPUT))
     step = reading.number(_STEP_PATH, _STEP)
     _not_above(reading, _STEP_PATH, step, _rate_or_period(reading), period)
     _not_above(reading, _STEP_PATH, step, _DURATION_PATH, duration)

@@ -22,7 +22,8 @@ def scenario_document(scenario: Scenario) -> dict[str, Any]:
 def plain(value: Any) -> Any:
     """Return dicts, lists, texts and finite numbers; an infinite number becomes None, a controller its type's name."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+        # Links are no part of what is run: what is not compared is not shown.
+        return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value) if field.compare}
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, tuple | list):

@@ -13,7 +13,7 @@ from ppafo.model.regulator import SupplyLines
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, members
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
-from ppafo.parameters.parameter_set import PRESSURE_PATH, SECOND_PRESSURE_PATH
+from ppafo.parameters.graph import Graph, holding, left, resolved
 from ppafo.simulation import declaration
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
 from ppafo.simulation.supply_line import LINES, SECTION
@@ -55,18 +55,20 @@ def device_numbers(device: Device) -> dict[str, Quantity]:
 
 def device_number_at(device: Device, path: str) -> float:
     """Return the number at a path of ``device_numbers``, in SI units; not of the form in which an orifice is not."""
-    return _number(device, _place_in_device(path, device))
+    return float(_number(device, _place_in_device(path, device)))
 
 
 def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
     """Return the scenario with numbers replaced, by the paths of ``declared_numbers`` that are not in ``TIMES``.
 
-    An orifice given in the other form takes that form; both numbers of it must be there. The supply's pressure is that
-    of both regulators where the scenario has one pressure for both and the second is not given apart.
+    What follows a number that is replaced moves with it. An orifice given in the other form takes that form; both
+    numbers of it must be there.
     """
-    chosen = {chosen_path(path, scenario): number for path, number in numbers.items()}
-    if PRESSURE_PATH in chosen and SECOND_PRESSURE_PATH not in chosen and scenario.device.supply.has_one_pressure:
-        chosen[SECOND_PRESSURE_PATH] = chosen[PRESSURE_PATH]
+    given = {chosen_path(path, scenario): number for path, number in numbers.items()}
+    chosen = moving_together(scenario, given)
+    if given:
+        device = replace(scenario.device, links={})
+        scenario = replace(scenario, device=device, links=left(scenario.graph, given))
     for section, place in _ORIFICES.items():
         form = other_form(scenario.device, section)
         if any(f"{section}.{name}" in chosen for name in form):
@@ -78,15 +80,28 @@ def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
     return scenario
 
 
+def moving_together(scenario: Scenario, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return numbers by path with all that follow them as in a file with these numbers; those of ``TIMES`` do not.
+
+    What was changed since the scenario was loaded follows nothing any more.
+    """
+    return resolved(links_that_hold(scenario), given, lambda path: _number(scenario, _place(path, scenario)))
+
+
+def links_that_hold(scenario: Scenario) -> Graph:
+    """Return the links of a scenario without those of numbers that were changed since it was loaded."""
+    return holding(scenario.graph, lambda path: _number(scenario, _place(path, scenario)))
+
+
 def number_at(scenario: Scenario, path: str) -> float:
     """Return the number at a path of ``declared_numbers`` that is not in ``TIMES``, in SI units."""
-    return _number(scenario, _place(chosen_path(path, scenario), scenario))
+    return float(_number(scenario, _place(chosen_path(path, scenario), scenario)))
 
 
-def _number(node: Any, place: tuple[str, ...]) -> float:
+def _number(node: Any, place: tuple[str, ...]) -> Any:
     for part in place:
         node = node[part] if isinstance(node, Mapping) else getattr(node, part)
-    return float(node)
+    return node
 
 
 def other_form(device: Device, section: str) -> tuple[str, ...]:

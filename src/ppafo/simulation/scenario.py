@@ -6,7 +6,7 @@ an object of your own in charge of the valve.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ppafo.control.fixed.kind import FIXED, FLOAT
@@ -14,6 +14,7 @@ from ppafo.control.kind import PythonController
 from ppafo.errors import ScenarioError
 from ppafo.model.regulator import SupplyLines
 from ppafo.parameters.device import Device
+from ppafo.parameters.graph import Graph
 
 PYTHON_CONTROLLER = "python"
 
@@ -154,7 +155,8 @@ class Scenario:
     Times [s]: ``time_step`` is the largest step (the engine divides it where a chamber is faster) and divides
     ``duration``, ``output_interval`` and the sample period of ``control``. Initial pressures [Pa absolute]; the
     reference is a torque [N m]. Without ``thermal`` the gas keeps its temperature, without ``supply_lines`` the supply
-    pressures are constant, both as in the paper.
+    pressures are constant, both as in the paper. ``links`` say which numbers follow others that are varied, beside
+    those of the device.
     """
 
     name: str
@@ -173,6 +175,7 @@ class Scenario:
     origin: Origin
     thermal: Thermal | None = None
     supply_lines: SupplyLines | None = None
+    links: Graph = field(default_factory=dict, compare=False)
 
     def __repr__(self) -> str:
         """Return name, device, valve, motion, controller and duration, a line each."""
@@ -183,6 +186,11 @@ class Scenario:
             f"  controller  {self.control.label}\n"
             f"  duration    {self.duration:g} s, in steps of at most {self.time_step:g} s"
         )
+
+    @property
+    def graph(self) -> Graph:
+        """All links, those of the device first."""
+        return {**self.device.links, **self.links}
 
     def controlled_by(self, controller: PythonController) -> "Scenario":
         """Return the scenario with any object that has ``reset`` and ``update``, at the same sample period.

@@ -96,6 +96,18 @@ class LogNormalAround:
 
 
 @dataclass(frozen=True, slots=True)
+class Above:
+    """Another distribution less a number, as an absolute pressure less the atmosphere."""
+
+    other: Distribution
+    zero: float
+
+    def values(self, uniform: Floats) -> Floats:
+        """Return the quantile [SI] at each probability."""
+        return self.other.values(uniform) - self.zero
+
+
+@dataclass(frozen=True, slots=True)
 class TriangularBetween:
     """A density that rises to the mode and falls from it."""
 

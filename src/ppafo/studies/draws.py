@@ -26,12 +26,14 @@ Columns = dict[str, Floats]
 class Uncertainty:
     """Distributions of some paths, and the Cholesky factor of the correlation of their normal scores (None: none).
 
-    ``same`` has the path that a path follows, by path.
+    ``same`` has the path that a path follows, by path. Values of the paths in ``gauge`` count from the atmosphere of
+    their run.
     """
 
     drawn: tuple[Drawn, ...]
     scores: tuple[tuple[float, ...], ...] | None = None
     same: Mapping[str, str] = field(default_factory=dict)
+    gauge: frozenset[str] = frozenset()
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -105,7 +107,7 @@ def uncertainty_of(study: Study) -> Uncertainty:
         )
     if not study.drawn:
         raise StudyError(f"study '{study.name}': nothing in it has a distribution; give it a [[vary]] of kind 'normal'")
-    return Uncertainty(study.drawn, study.scores, study.same)
+    return Uncertainty(study.drawn, study.scores, study.same, study.gauge)
 
 
 def uncertainty_in(study: Study, configuration: Configuration) -> Uncertainty:
@@ -119,7 +121,7 @@ def uncertainty_in(study: Study, configuration: Configuration) -> Uncertainty:
     same = study.same_in(configuration.name)
     if len(kept) == len(whole.drawn):
         return replace(whole, same=same)
-    return Uncertainty(tuple(whole.drawn[row] for row in kept), _factor_of_some(whole.scores, kept), same)
+    return Uncertainty(tuple(whole.drawn[row] for row in kept), _factor_of_some(whole.scores, kept), same, study.gauge)
 
 
 def choose_configuration(study: Study, name: str | None) -> Configuration:

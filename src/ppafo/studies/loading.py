@@ -11,13 +11,15 @@ from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice, nearest_name
 from ppafo.metrics import METRICS
+from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.studies import declaration as declared
+from ppafo.studies.distributions import Above
 from ppafo.studies.noise import with_noise
 from ppafo.studies.outputs import valid_outputs
 from ppafo.studies.sampling import MAXIMUM_SOBOL_DIMENSIONS, Factor, cholesky_factor, correlation_matrix
 from ppafo.studies.study import Axis, Configuration, Drawn, Sample, Study
-from ppafo.studies.varying import VariedPath, axis_or_distribution, stated_normal, varied_path
+from ppafo.studies.varying import VariedPath, axis_or_distribution, in_its_unit, stated_normal, texts_of, varied_path
 
 STUDY_FILES = TomlKind("study", "study", resources.files("ppafo") / "studies" / "library", StudyError)
 
@@ -98,7 +100,7 @@ def _build(document: dict[str, Any], source: _Source) -> Study:
     configurations = _configurations(parsed, source)
     _check_requests(parsed, source)
     _check_set_or_varied(parsed, source)
-    places = {item.path: _place(item, configurations, source) for item in parsed.vary}
+    places = {item.path: _place(item, configurations, parsed, source) for item in parsed.vary}
     moving = [item for item in parsed.vary if not isinstance(item, declared.SameAs)]
     varied = [_axis_or_drawn(item, places[item.path], configurations, source) for item in moving]
     own = tuple(item for item in varied if isinstance(item, Drawn))
@@ -119,6 +121,7 @@ def _build(document: dict[str, Any], source: _Source) -> Study:
         outputs=valid_outputs(parsed.outputs, [item.scenario for item in configurations], source.refusal),
         runs_of_chunk=parsed.runs_of_chunk,
         units=units | {item.path: "-" for item in drawn if item.path not in units},
+        gauge=_in_gauge(parsed, places),
         only={item.path: item.only for item in parsed.vary if item.only},
         document=document,
         text=source.text,
@@ -168,7 +171,17 @@ def _check_requests(parsed: declared.StudyFile, source: _Source) -> None:
         raise source.refusal(f"'{repeated}' is varied twice; give it only one [[vary]]")
 
 
-def _place(item: declared.Varied, configurations: Sequence[Configuration], source: _Source) -> VariedPath:
+def _in_gauge(parsed: declared.StudyFile, places: Mapping[str, VariedPath]) -> frozenset[str]:
+    """Return the paths whose values count from the atmosphere of their run, with those that follow one."""
+    own = {path for path, place in places.items() if place.is_gauge}
+    return frozenset(
+        own | {item.path for item in parsed.vary if isinstance(item, declared.SameAs) and item.same_as in own}
+    )
+
+
+def _place(
+    item: declared.Varied, configurations: Sequence[Configuration], parsed: declared.StudyFile, source: _Source
+) -> VariedPath:
     """Return the path with its declaration, which must be the same in all configurations that vary it."""
     names = [configuration.name for configuration in configurations]
     for name in item.only:
@@ -183,7 +196,15 @@ def _place(item: declared.Varied, configurations: Sequence[Configuration], sourc
         raise source.refusal(
             f"vary '{item.path}': has different units, limits or atmospheres in different configurations"
         )
-    return places[0]
+    if isinstance(item, declared.SameAs) or ATMOSPHERE_PATH not in {other.path for other in parsed.vary}:
+        return places[0]
+    try:
+        first = _varying(item, configurations)[0].scenario
+        is_stated = isinstance(item, declared.Stated)
+        texts = [f"0 {stated_normal(places[0], first)[1]}"] if is_stated else texts_of(item)
+        return in_its_unit(places[0], texts)
+    except UnitError as error:
+        raise source.refusal(f"vary '{item.path}': {error}") from error
 
 
 def _axis_or_drawn(
@@ -198,12 +219,13 @@ def _axis_or_drawn(
 
 
 def _stated_distribution(item: declared.Stated, place: VariedPath, configurations: Iterable[Configuration]) -> Drawn:
-    found = {stated_normal(place, each.scenario) for each in configurations}
+    found = {stated_normal(place, each.scenario)[0] for each in configurations}
     if len(found) > 1:
         raise UnitError(
             "the parameter sets of the configurations state different values; use 'only', or give the values"
         )
-    return Drawn(item.path, found.pop())
+    stated = found.pop()
+    return Drawn(item.path, Above(stated, place.atmosphere) if place.is_gauge else stated)
 
 
 def _followers(parsed: declared.StudyFile, places: Mapping[str, VariedPath], source: _Source) -> dict[str, str]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import ScenarioError, StudyError, UnitError, first_twice, nearest_name
 from ppafo.metrics import METRICS
-from ppafo.parameters.parameter_set import ATMOSPHERE_PATH
+from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.progress import Progress, Report
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.scenario import Scenario
@@ -59,9 +59,11 @@ def scenario_model(
     metrics: Sequence[str],
     threads: int | None = None,
     on_piece: Callable[[int, int], None] | None = None,
+    gauge: Collection[str] = (),
 ) -> Model:
     """Return the model that runs a scenario on the lanes; ``on_piece(runs, failed)`` is called after every piece.
 
+    Columns of the paths in ``gauge`` count from the atmosphere of their run.
     StudyError for a metric that does not exist or that the scenario cannot have.
     """
     check_metrics(metrics, scenario)
@@ -73,7 +75,7 @@ def scenario_model(
         pieces = []
         for first in range(0, runs, at_once):
             part = {path: values[first : first + at_once] for path, values in columns.items()}
-            pieces.append(_piece(scenario, part, metrics, threads))
+            pieces.append(_piece(scenario, part, metrics, threads, gauge))
             if on_piece is not None:
                 on_piece(pieces[-1].runs, pieces[-1].failures)
         return join(pieces)
@@ -156,9 +158,15 @@ class Tally:
             self._report(Progress("", self.done, self._runs, self.failed, self._first, elapsed))
 
 
-def _piece(scenario: Scenario, columns: Mapping[str, Floats], metrics: Sequence[str], threads: int | None) -> Outcomes:
+def _piece(
+    scenario: Scenario,
+    columns: Mapping[str, Floats],
+    metrics: Sequence[str],
+    threads: int | None,
+    gauge: Collection[str],
+) -> Outcomes:
     try:
-        result = run_ensemble(scenario, columns, metrics, threads=threads)
+        result = run_ensemble(scenario, columns, metrics, threads=threads, gauge=gauge)
     except ScenarioError as error:
         raise StudyError(f"scenario '{scenario.name}': {error}") from error
     runs = result.status.size

@@ -49,7 +49,8 @@ class Study:
     """Configurations, each run at every grid point with every draw.
 
     ``same`` has the path that a path follows, by path; ``units`` the SI unit of every varied path, ``only`` the
-    configurations of those that do not vary in all; ``scores`` is the lower Cholesky factor of the correlation of the
+    configurations of those that do not vary in all; values of the paths in ``gauge`` count from the atmosphere of their
+    run [Pa], all others are absolute; ``scores`` is the lower Cholesky factor of the correlation of the
     normal scores, None where there is none; ``runs_of_chunk`` is how many runs are computed together, None for a
     choice that keeps memory small; ``document`` is the study file as plain data, with what was changed on the command
     line; ``text`` the bytes of the file, none where the study came as data.
@@ -69,6 +70,7 @@ class Study:
     only: Mapping[str, tuple[str, ...]]
     document: Mapping[str, Any]
     text: bytes
+    gauge: frozenset[str] = frozenset()
 
     def __repr__(self) -> str:
         """Return name, number of runs, configurations and varied paths."""

@@ -1,7 +1,7 @@
 """What a study varies: paths with units and limits, tables ``[[vary]]`` as axes and distributions in SI units."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from ppafo.errors import ScenarioError, UnitError, nearest_name
 from ppafo.model.declaration import Quantity
 from ppafo.parameters import apply_overrides, load_parameter_set
 from ppafo.parameters.declaration import alternatives, is_within
+from ppafo.parameters.graph import counts_from, gauge_link
 from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si
 from ppafo.parameters.provenance import Entry
 from ppafo.simulation import declaration
@@ -22,6 +23,7 @@ from ppafo.simulation.reading import WRITTEN_UNITS
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import (
+    Above,
     Distribution,
     LogNormalAround,
     LogUniformBetween,
@@ -46,18 +48,22 @@ _STATED_DIFFERENCES = {"psi_g": "psi_d", "psi_a": "psi_d", "degC": "K", "°C": "
 
 @dataclass(frozen=True, slots=True)
 class VariedPath:
-    """A path with its declaration, and the pressure [Pa absolute] from which gauge pressures count."""
+    """A path with its declaration, and the pressure [Pa absolute] from which gauge pressures count.
+
+    Values of one that ``is_gauge`` are counted from the atmosphere of their run, which varies; others are absolute.
+    """
 
     path: str
     quantity: Quantity
     atmosphere: float
+    is_gauge: bool = False
 
     def level(self, value: str | float) -> float:
         """Return a value of the path in SI; UnitError where the unit does not fit or the path does not allow it."""
         number = self._in_si(value, self.quantity)
         if not is_within(number, self.quantity):
             raise UnitError(f"{self.path} must be {self._limits()}")
-        return number
+        return _parse(str(value), self.quantity, 0.0) if self.is_gauge else number
 
     def distance(self, value: str | float) -> float:
         """Return a difference of two values of the path in SI, such as a standard deviation."""
@@ -69,7 +75,8 @@ class VariedPath:
     def quote(self, value: float) -> str:
         """Return a value of the path as messages write it."""
         unit = WRITTEN_UNITS.get(self.quantity.unit, self.quantity.unit) if self.quantity.unit != "Pa_a" else "Pa_a"
-        return f"{from_si(value, unit, self.quantity.unit, self.atmosphere):.6g} {unit}".rstrip()
+        unit, zero = ("Pa_g", 0.0) if self.is_gauge else (unit, self.atmosphere)
+        return f"{from_si(value, unit, self.quantity.unit, zero):.6g} {unit}".rstrip()
 
     def _in_si(self, value: str | float, quantity: Quantity) -> float:
         if isinstance(value, str):
@@ -80,9 +87,9 @@ class VariedPath:
 
     def _limits(self) -> str:
         lowest, highest = self.quantity.minimum, self.quantity.maximum
-        word = "at least" if self.quantity.minimum_allowed else "more than"
-        parts = [f"{word} {self.quote(lowest)}"] if math.isfinite(lowest) else []
-        return " and ".join([*parts, f"at most {self.quote(highest)}"] if math.isfinite(highest) else parts)
+        word, quote = "at least" if self.quantity.minimum_allowed else "more than", replace(self, is_gauge=False).quote
+        parts = [f"{word} {quote(lowest)}"] if math.isfinite(lowest) else []
+        return " and ".join([*parts, f"at most {quote(highest)}"] if math.isfinite(highest) else parts)
 
 
 def _parse(text: str, quantity: Quantity, atmosphere: float) -> float:
@@ -104,7 +111,30 @@ def varied_path(path: str, scenario: Scenario) -> VariedPath:
         near = [name for name in known if name.startswith(f"{section}.")]
         hint = nearest_name(path, known) or f"; for example {', '.join(near[:6] or list(known)[:6])}"
         raise ScenarioError(f"scenario '{scenario.name}' has no number '{path}'{hint}")
-    return VariedPath(path, known[path], scenario.device.supply.atmospheric_pressure)
+    return VariedPath(path, known[path], counts_from(path, scenario.device.supply.atmospheric_pressure))
+
+
+def in_its_unit(place: VariedPath, texts: Iterable[object]) -> VariedPath:
+    """Return the place of values that vary together with the atmosphere, for texts with units such as ``50 psi_g``.
+
+    Gauge pressures then count from the atmosphere of their run. UnitError for gauge and absolute pressures together.
+    """
+    units = [split_quantity(text)[1] for text in texts if isinstance(text, str)]
+    gauge = [bool(gauge_link(place.path, 0.0, unit)) for unit in units]
+    if place.quantity.unit != "Pa_a" or not any(gauge):
+        return place
+    if not all(gauge):
+        other = units[gauge.index(not gauge[0])]
+        raise UnitError(
+            f"the atmosphere varies, so '{units[0]}' and '{other}' do not go together; give gauge or absolute pressures"
+        )
+    return replace(place, is_gauge=True)
+
+
+def texts_of(item: declared.Varied) -> list[object]:
+    """Return the values of a table in the order of its keys, without differences and shares."""
+    keys = ("first", "last", "minimum", "maximum", "mean", "median", "mode")
+    return [*(getattr(item, key) for key in keys if hasattr(item, key)), *getattr(item, "values", ())]
 
 
 def axis_or_distribution(item: declared.Varied, place: VariedPath) -> Axis | Drawn:
@@ -150,10 +180,15 @@ def _uniform(item: declared.Uniform, place: VariedPath) -> Distribution:
 
 
 def _log_uniform(item: declared.LogUniform, place: VariedPath) -> Distribution:
-    minimum, maximum = _bounds(item, place)
+    minimum, maximum = _bounds(item, replace(place, is_gauge=False))
     if minimum <= 0.0:
         raise UnitError(f"minimum = {item.minimum!r}: a log-uniform distribution needs both bounds above 0")
-    return LogUniformBetween(minimum, maximum)
+    return _above(LogUniformBetween(minimum, maximum), place)
+
+
+def _above(absolute: Distribution, place: VariedPath) -> Distribution:
+    """Return a distribution whose logarithms are of absolute pressures as that of the values of a place."""
+    return Above(absolute, place.atmosphere) if place.is_gauge else absolute
 
 
 def _normal(item: declared.Normal, place: VariedPath) -> Distribution:
@@ -166,10 +201,10 @@ def _truncated_normal(item: declared.TruncatedNormal, place: VariedPath) -> Dist
 
 
 def _log_normal(item: declared.LogNormal, place: VariedPath) -> Distribution:
-    median = _key(item, "median", place)
+    median = _key(item, "median", replace(place, is_gauge=False))
     if median <= 0.0:
         raise UnitError(f"median = {item.median!r} must be above 0")
-    return LogNormalAround(median, item.factor)
+    return _above(LogNormalAround(median, item.factor), place)
 
 
 def _triangular(item: declared.Triangular, place: VariedPath) -> Distribution:
@@ -238,8 +273,8 @@ def _level(key: str, value: str | float, place: VariedPath) -> float:
         raise UnitError(f"{key} = {value!r}: {error}") from error
 
 
-def stated_normal(place: VariedPath, scenario: Scenario) -> NormalAround:
-    """Return the distribution of a path; UnitError where the set of the scenario states no uncertainty for it."""
+def stated_normal(place: VariedPath, scenario: Scenario) -> tuple[NormalAround, str]:
+    """Return the distribution of a path, and its unit in the set; UnitError where that states no uncertainty for it."""
     entry, mean = _stated_entry(place.path, scenario)
     if entry is None or not entry.uncertainty:
         why = "was changed by an override" if entry is not None and entry.source == "override" else "has none"
@@ -250,7 +285,7 @@ def stated_normal(place: VariedPath, scenario: Scenario) -> NormalAround:
     if unit.endswith(("_g", "_a")):
         unit = f"{unit[:-2]}_d"
     half_width = place.distance(f"{entry.uncertainty!r} {unit}".strip())
-    return NormalAround(mean, half_width / DEVIATIONS_IN_HALF_WIDTH)
+    return NormalAround(mean, half_width / DEVIATIONS_IN_HALF_WIDTH), entry.unit
 
 
 def _stated_entry(path: str, scenario: Scenario) -> tuple[Entry | None, float]:

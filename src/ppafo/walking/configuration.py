@@ -1,7 +1,7 @@
 """A walk file: device, controller, wearer, sensors and faults, as frozen values in SI units."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ppafo.control.kind import ControllerKind
 from ppafo.gait import Gait
@@ -9,6 +9,7 @@ from ppafo.model.gait_sensors import Fault, GaitSensors
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.sensors import SensorParameters
 from ppafo.parameters.device import Device
+from ppafo.parameters.graph import Graph
 from ppafo.simulation.scenario import Thermal
 from ppafo.walking.bottle_supply import BottleSupply
 from ppafo.walking.course import WalkingCourse
@@ -26,6 +27,7 @@ class Configuration:
     ``bottle`` is the one that the device hangs on, None where its supply does not end.
     ``converter`` has the settings of the converter of a controller on whole numbers, None where it has floats.
     ``sensor_settings`` are what ``gait_sensors`` were made from, None where they were not read from a file.
+    ``links`` say which numbers follow others that are set, beside those of the device.
     ``wearer_origin`` says in words whose body mass it is.
     ``assumed`` has the values that no source gives, by path, with the reason for each.
     """
@@ -51,6 +53,12 @@ class Configuration:
     bottle: BottleSupply | None = None
     sensor_settings: SensorSettings | None = None
     converter: Mapping[str, float] | None = None
+    links: Graph = field(default_factory=dict, compare=False)
+
+    @property
+    def graph(self) -> Graph:
+        """All links, those of the device first."""
+        return {**self.device.links, **self.links}
 
     @property
     def has_ideal_sensors(self) -> bool:

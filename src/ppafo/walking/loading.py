@@ -3,7 +3,6 @@
 import copy
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -16,11 +15,12 @@ from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
 from ppafo.gait import NORMATIVE, Gait, load_gait
-from ppafo.model.gait_sensors import GaitSensors
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.sensors import SensorParameters
 from ppafo.parameters import apply_overrides, build_device, load_parameter_set
 from ppafo.parameters.device import Device
+from ppafo.parameters.graph import Graph
+from ppafo.parameters.parameter_set import atmospheric_pressure, links_of_set
 from ppafo.simulation.declaration import ISOTHERMAL, PERIOD, RATE, kind_at, value_at
 from ppafo.simulation.gas_sections import assumed_lines, read_supply_lines, read_thermal
 from ppafo.simulation.overriding import device_paths, is_of_device, split_override
@@ -35,7 +35,6 @@ from ppafo.walking.declaration import (
     ARITHMETIC,
     BANDWIDTHS,
     FAULTY,
-    PRESSURE_BANDWIDTH,
     SEED,
     STEP,
     THRESHOLDS,
@@ -46,8 +45,9 @@ from ppafo.walking.declaration import (
     quantities,
     timing_settings,
 )
+from ppafo.walking.following import links_of_defaults, with_default
 from ppafo.walking.gait_subject import read_wearer, wearer_origin
-from ppafo.walking.planning import course_of_walk, walking_valve
+from ppafo.walking.planning import course_of_walk
 from ppafo.walking.schema import walk_file
 from ppafo.walking.sensor_settings import FaultSettings, SensorSettings, sensors_of
 
@@ -103,6 +103,7 @@ def load_walk(
     lines = _lines(reading, document, device, carried)
     sensor_settings = _sensor_settings(reading)
     gait_sensors = sensors_of(sensor_settings, _period(reading))
+    links = _links(reading, law, device)
     configuration = Configuration(
         name=document["name"],
         description=document.get("description", ""),
@@ -110,7 +111,7 @@ def load_walk(
         gait=walked,
         wearer=read_wearer(reading, walked, is_named),
         controller=_timed(law, reading),
-        settings=_controller_settings(reading, law, device) | _timing_settings(reading, device, gait_sensors),
+        settings=_settings(reading, law, device, sensor_settings, links),
         sensors=_sensors(reading),
         gait_sensors=gait_sensors,
         sensor_settings=sensor_settings,
@@ -125,6 +126,7 @@ def load_walk(
         wearer_origin=wearer_origin(reading, walked, is_named),
         bottle=carried,
         converter=_converter(reading, law),
+        links=links,
     )
     check_walk(configuration, reading)
     course_of_walk(configuration)
@@ -181,22 +183,26 @@ def _timed(law: ControllerKind, reading: Reading) -> ControllerKind:
         raise ScenarioError(f"{reading.file}: {error}") from error
 
 
-def _controller_settings(reading: Reading, law: ControllerKind, device: Device) -> dict[str, float]:
-    """Return the settings of the controller [SI]; the lags of valve and pressure sensors add to ``follow_time``."""
-    valve = device.valve.settings
-    lag = walking_valve(device.valve).command_delay(valve)
-    lag += valve.get("closing_delay", 0.0) + valve.get("switching_interval", 0.0)
-    if valve.get("spool_frequency", 0.0) > 0.0:
-        lag += 2.0 * valve["spool_damping_ratio"] / (_TURN * valve["spool_frequency"])
-    if valve.get("slew_limit", 0.0) > 0.0:
-        lag += 1.0 / valve["slew_limit"]
-    if value_at(reading.document, f"sensors.{PRESSURE_BANDWIDTH.name}") is not None:
-        lag += 1.0 / (_TURN * reading.number(f"sensors.{PRESSURE_BANDWIDTH.name}", PRESSURE_BANDWIDTH))
-    known = (
-        replace(item, default=(item.default or 0.0) + lag) if item.name == "follow_time" else item
-        for item in law.quantities
-    )
-    return reading.section("controller", tuple(known))
+def _links(reading: Reading, law: ControllerKind, device: Device) -> Graph:
+    """Return which settings of controller and timing follow others because the file does not give them."""
+    timing = timing_settings(_timing_kind(dict(reading.document)))
+    found = links_of_defaults({"controller": law.quantities, "timing": timing}, device)
+    return {path: links for path, links in found.items() if value_at(reading.document, path) is None}
+
+
+def _settings(
+    reading: Reading, law: ControllerKind, device: Device, sensors: SensorSettings, links: Graph
+) -> dict[str, float]:
+    """Return the settings of controller and timing [SI]; what is not given may follow valve and sensors."""
+    present = {f"valve.{name}": number for name, number in device.valve.settings.items()}
+    present |= {f"sensors.{name}": number for name, number in sensors.numbers.items()}
+    sections = {"controller": law.quantities, "timing": timing_settings(_timing_kind(dict(reading.document)))}
+    found: dict[str, float] = {}
+    for section, items in sections.items():
+        paths = {f"{section}.{item.name}": item for item in items}
+        known = (with_default(item, path, links, present.__getitem__) for path, item in paths.items())
+        found |= reading.section(section, tuple(known))
+    return found
 
 
 def _converter(reading: Reading, law: ControllerKind) -> dict[str, float] | None:
@@ -210,15 +216,6 @@ def _converter(reading: Reading, law: ControllerKind) -> dict[str, float] | None
         if value_at(reading.document, f"controller.{item.name}") is not None:
             raise reading.refusal(f"controller.{item.name}", f'needs {ARITHMETIC} = "{FIXED}"')
     return None
-
-
-def _timing_settings(reading: Reading, device: Device, sensors: GaitSensors) -> dict[str, float]:
-    """Return the settings of the timing [SI]; lags that are not given are those of the sensors and of the valve."""
-    valve = walking_valve(device.valve)
-    known = {"sensor_lag": 1.0 / sensors.follow_rate, "valve_delay": valve.command_delay(device.valve.settings)}
-    items = timing_settings(_timing_kind(dict(reading.document)))
-    given = tuple(replace(item, default=known.get(item.name, item.default)) for item in items)
-    return reading.section("timing", given)
 
 
 def _set(document: dict[str, Any], path: str, text: str) -> None:
@@ -245,7 +242,10 @@ def _device(document: dict[str, Any], overrides: list[str], file: str) -> Device
     valve = section.get("valve")
     try:
         parameters = apply_overrides(load_parameter_set(section["set"]), section.get("overrides", ()), valve)
-        device = build_device(apply_overrides(parameters, overrides, valve), valve)
+        before = atmospheric_pressure(parameters) if overrides else None
+        parameters = apply_overrides(parameters, overrides, valve)
+        given = {split_override(text)[0] for text in overrides}
+        device = build_device(parameters, valve, links_of_set(parameters, given, before))
         device.check_vane("a walk")
     except ParameterError as error:
         raise ParameterError(f"{file}: [device]: {one_line(error)}") from error

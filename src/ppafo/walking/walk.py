@@ -41,9 +41,6 @@ BOTTLE_MINUTES = 10.0
 """Minutes of a walk on a bottle, unless given or ended by the bottle before."""
 
 LONGEST_MINUTES = 60.0
-RECORD_INTERVALS = ((61.0, 1.0e-3), (601.0, 5.0e-3), (60.0 * LONGEST_MINUTES, 2.0e-2))
-"""Up to which length of a walk [s] the record has which interval [s]: an hour of milliseconds would not fit."""
-
 REMEDY = "the step may be too long, or a value unrealistic: try a smaller run.step, and check the wearer"
 
 
@@ -185,8 +182,8 @@ def _run_in_parts(batch: Batch, step: float, progress: Progress) -> BatchResult:
 
 
 def record_interval(seconds: float) -> float:
-    """Time [s] between two samples of the record of a walk of this length [s]."""
-    return next(interval for longest, interval in RECORD_INTERVALS if seconds <= longest)
+    """Time [s] between two samples of the record of a walk of this length [s]; an hour of milliseconds does not fit."""
+    return 1.0e-3 if seconds <= 61.0 else (5.0e-3 if seconds <= 601.0 else 2.0e-2)
 
 
 def plan_of(configuration: Configuration, seconds: float) -> WalkPlan:

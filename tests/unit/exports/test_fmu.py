@@ -75,6 +75,24 @@ def test_fmpy_finds_no_fault_and_every_output_is_that_of_the_lanes_to_the_last_b
     assert set(largest_difference(unit, "torque-task-proportional", SHORT).values()) == {0.0}
 
 
+@pytest.mark.parametrize(
+    "texts",
+    [
+        ("supply.pressure=430000 Pa_a",),
+        ("supply.atmospheric_pressure=90000 Pa_a",),
+        ("supply.atmospheric_pressure=90000 Pa_a", "supply.dorsiflexion_pressure=410000 Pa_a"),
+    ],
+)
+def test_a_parameter_of_a_unit_moves_what_follows_it_as_set_does(unit: str, texts: tuple[str, ...]) -> None:
+    recording = simulate(load_scenario("torque-task-proportional", (*SHORT, *texts))).recording
+    given = {path: float(text.split()[0]) for path, text in (text.split("=") for text in texts)}
+    names = outputs_of(unit)
+    found = fmpy.simulate_fmu(
+        unit, output=names, output_interval=0.001, stop_time=0.3, step_size=0.001, start_values=given
+    )
+    assert {item: float(np.abs(found[item] - recording[item]).max()) for item in names} == dict.fromkeys(names, 0.0)
+
+
 def test_a_free_vane_with_an_open_loop_has_the_bits_of_the_lanes_too(tmp_path: Path) -> None:
     unit = written(tmp_path, "step-response", ())
     assert set(largest_difference(unit, "step-response", ()).values()) == {0.0}

@@ -1,28 +1,55 @@
 """Numbers of a scenario by dotted path."""
 
+from dataclasses import replace
+
 import pytest
 
+from ppafo.parameters import load_device
 from ppafo.parameters.device import Orifice, SonicOrifice
+from ppafo.simulation.document import scenario_document
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.numbers import TIMES, declared_numbers, number_at, other_form, with_numbers
 
 
 @pytest.mark.parametrize("name", list_scenarios())
-def test_every_declared_number_can_be_read_and_replaced_alone(name: str) -> None:
-    scenario = load_scenario(name)
+def test_a_replaced_number_is_the_single_run_with_it(name: str) -> None:
+    held = "motion.angle" in declared_numbers(load_scenario(name))
+    given = ("motion.angle=75 deg",) if held else ()
+    scenario = load_scenario(name, given)
     absent = {
         f"{section}.{form}" for section in ("valve", "actuator.leak") for form in other_form(scenario.device, section)
     }
-    paths = [path for path in declared_numbers(scenario) if path not in {*TIMES, *absent}]
+    declared = declared_numbers(scenario)
+    paths = [path for path in declared if path not in {*TIMES, *absent}]
     assert len(paths) > 35
-    same_place = {"motion.angle", "motion.profile.level"}
-    both = {"supply.pressure", "supply.dorsiflexion_pressure"}
     for path in paths:
-        changed = with_numbers(scenario, {path: number_at(scenario, path) + 0.125})
-        assert number_at(changed, path) == number_at(scenario, path) + 0.125
-        others = {other for other in paths if number_at(changed, other) != number_at(scenario, other)}
-        together = {"supply.pressure": both, **dict.fromkeys(same_place, same_place & set(paths))}
-        assert others == together.get(path, {path})
+        before, quantity = number_at(scenario, path), declared[path]
+        value = before * 0.999 if before else min(0.125, quantity.maximum)
+        text = "3" if path == "sensors.seed" else f"{value!r} {quantity.unit}".removesuffix(" 1")
+        changed = with_numbers(scenario, {path: 3.0 if path == "sensors.seed" else value})
+        same_place = path == "motion.profile.level" and "motion.angle" in paths
+        alone = load_scenario(name, [*given, f"{'motion.angle' if same_place else path}={text}"])
+        assert {other: number_at(changed, other) for other in paths} == {
+            other: number_at(alone, other) for other in paths
+        }
+        assert number_at(changed, path) == (3.0 if path == "sensors.seed" else value)
+
+
+def test_what_follows_a_number_moves_with_it_and_what_is_given_does_not() -> None:
+    scenario = load_scenario("torque-task-solenoid", ["initial.pressure_2=dorsiflexion_supply"])
+    thin = with_numbers(scenario, {"supply.atmospheric_pressure": 8.0e4})
+    gauge = scenario.device.supply.pressure - scenario.device.supply.atmospheric_pressure
+    assert thin.device.supply.pressure == pytest.approx(8.0e4 + gauge, rel=1e-12)
+    assert (thin.initial_pressure_1, thin.initial_pressure_2) == (8.0e4, thin.device.supply.dorsiflexion_pressure)
+    apart = with_numbers(thin, {"supply.dorsiflexion_pressure": 3.0e5})
+    assert (apart.initial_pressure_2, apart.device.supply.pressure) == (3.0e5, thin.device.supply.pressure)
+    higher = with_numbers(apart, {"supply.pressure": 5.0e5})
+    assert (higher.device.supply.pressure, higher.device.supply.dorsiflexion_pressure) == (5.0e5, 3.0e5)
+
+
+def test_a_number_that_was_changed_since_the_scenario_was_loaded_follows_nothing_any_more() -> None:
+    scenario = replace(load_scenario("torque-task-solenoid"), initial_pressure_1=2.0e5)
+    assert with_numbers(scenario, {"supply.atmospheric_pressure": 8.0e4}).initial_pressure_1 == 2.0e5
 
 
 def test_an_orifice_in_the_other_form_takes_that_form() -> None:
@@ -37,3 +64,15 @@ def test_a_constant_command_has_no_reference_to_vary() -> None:
     paths = declared_numbers(load_scenario("step-response"))
     assert not [path for path in paths if path.startswith("reference.")]
     assert "controller.command" in paths
+
+
+def test_a_scenario_made_from_a_device_alone_has_the_links_of_the_device() -> None:
+    scenario = replace(load_scenario("step-response"), device=load_device("ppafo2011"), links={})
+    supply = with_numbers(scenario, {"supply.pressure": 5.0e5}).device.supply
+    assert (supply.pressure, supply.dorsiflexion_pressure) == (5.0e5, 5.0e5)
+
+
+def test_links_are_no_part_of_the_document_of_a_scenario() -> None:
+    document = scenario_document(load_scenario("step-response"))
+    assert "links" not in document
+    assert "links" not in document["device"]

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import PRESSURE_LAG, VALVE_LAG, Quantity
 
 PHASE_QUANTITIES = (
     Quantity("load_threshold", "N", "a force sensor counts as loaded above this", 60.0, 1.0, 5.0e3),
@@ -47,6 +47,7 @@ SAFETY_QUANTITIES = (
         8.0e-3,
         0.0,
         1.0,
+        follows=(VALVE_LAG, PRESSURE_LAG),
     ),
     Quantity("highest_toe_off_angle", "rad", "no ankle has more while its toes still carry", 2.06, -10.0, 10.0),
 )

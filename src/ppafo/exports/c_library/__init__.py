@@ -6,18 +6,21 @@ from dataclasses import replace
 from ppafo.engine.program import Program
 from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError
-from ppafo.exports.c_library.files import Library, Setting, Switch, library_files
+from ppafo.exports.c_library.files import Library, Setting, Switch, c_identifier, library_files
 from ppafo.exports.c_library.page import choosing, words_of, words_of_walk
-from ppafo.exports.c_library.preparation import preparation_of, relations_of, settings_of
-from ppafo.exports.c_library.program import exported
+from ppafo.exports.c_library.preparation import links_of, preparation_of, relations_of, settings_of
+from ppafo.exports.c_library.program import Further, exported
 from ppafo.exports.c_library.walk_preparation import (
     check_can_leave,
+    links_of_walk,
     preparation_of_walk,
     relations_of_walk,
     sensors_that_fail,
     settings_of_walk,
 )
+from ppafo.exports.c_library.writing import following_text
 from ppafo.parameters.device import Device
+from ppafo.parameters.graph import Graph
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.preparation import step_counts
 from ppafo.simulation.scenario import Control, Scenario, Sensors
@@ -60,7 +63,7 @@ def scenario_library(scenario: Scenario) -> Library:
             f"{scenario.name}: a controller on whole numbers has no library yet; 'ppafo firmware' writes it"
         )
     program = exported(batch_of(plan_run(scenario)).program)
-    settings = settings_of(scenario)
+    settings, links = settings_of(scenario), links_of(scenario)
     return Library(
         title=scenario.name,
         description=" ".join(scenario.description.split()),
@@ -70,8 +73,9 @@ def scenario_library(scenario: Scenario) -> Library:
         preparation=_preparing(settings),
         switches=_switches(scenario.device, _of_sensors(program.program)),
         other_program=(_samples_elsewhere(program.program),),
-        words=words_of(scenario),
+        words=words_of(scenario, links),
         further=lambda collector: preparation_of(scenario, program.program, collector),
+        following=_following(settings, links),
     )
 
 
@@ -98,7 +102,7 @@ def walk_library(configuration: Configuration) -> Library:
         )
     run = plan_walk(plan_of(configuration, walk_duration(configuration)))
     program = exported(batch_of(run).program)
-    settings = settings_of_walk(configuration)
+    settings, links = settings_of_walk(configuration), links_of_walk(configuration)
     return Library(
         title=configuration.name,
         description=" ".join(configuration.description.split()),
@@ -108,9 +112,16 @@ def walk_library(configuration: Configuration) -> Library:
         preparation=_preparing(settings),
         switches=_switches(configuration.device, _of_readings(configuration, program.program)),
         other_program=(f"(prepared->counts[COUNT_SIGNAL_DELAY] > 0.0) != {_truth(program.program.late_readings)}",),
-        words=words_of_walk(configuration),
+        words=words_of_walk(configuration, links),
         further=lambda collector: preparation_of_walk(configuration, program.program, collector),
+        following=_following(settings, links),
+        defaults=frozenset(c_identifier(path) for path in links if not path.startswith("supply.")),
     )
+
+
+def _following(settings: Sequence[Setting], links: Graph) -> Further | None:
+    """What writes the function that lets settings follow others, None where none does."""
+    return (lambda collector: following_text(settings, links, collector)) if links else None
 
 
 def _preparing(settings: Sequence[Setting]) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from importlib.resources import files
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import SIGNAL_ROWS
 from ppafo.engine.run import NEVER_FAILED
+from ppafo.engine.source_text import SourceCollector
 from ppafo.exports.c_library.program import COUNTS, IN_PARTS, WHOLE, ExportedProgram, Further, c_text
 from ppafo.model.declaration import Quantity
 from ppafo.version import __version__
@@ -117,7 +118,8 @@ class Library:
 
     ``further`` adds the function that makes the numbers of a run from the settings, ``preparation`` has the lines of C
     around it. ``switches`` choose the program, ``other_program`` has further conditions in C under which another would
-    be needed. ``words`` fill the page.
+    be needed. ``following`` adds the function that lets settings follow others, None where none does, and ``defaults``
+    names those whose default does so, which has no range. ``words`` fill the page.
     """
 
     title: str
@@ -130,6 +132,8 @@ class Library:
     other_program: tuple[str, ...]
     words: Mapping[str, str]
     further: Further | None = None
+    following: Further | None = None
+    defaults: frozenset[str] = frozenset()
 
     @property
     def name(self) -> str:
@@ -152,7 +156,12 @@ def library_files(library: Library) -> dict[str, bytes]:
     texts["LICENSE"] = _filled("LICENSE", {})
     head = f'#include "{name}.h"\n\n#include <string.h>\n\n{_ALONE}'
     title = f"{library.title}: the functions of ppafo {__version__} that a run is made of. Not to be edited."
-    functions = c_text(program, title, [item.name for item in library.settings], library.further)
+    written = [add for add in (library.further, library.following) if add is not None]
+
+    def further(collector: SourceCollector) -> str:
+        return "\n\n".join(add(collector) for add in written)
+
+    functions = c_text(program, title, [item.name for item in library.settings], further if written else None)
     texts[f"{name}.c"] = f"{head}{functions}\n{_filled('interface.c', words)}"
     return {file: text.encode() for file, text in sorted(texts.items())}
 
@@ -198,12 +207,14 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "description": "\n * ".join(textwrap.wrap(_in_comment(library.description), 110)),
         "version": __version__,
         "advance": _advance(program),
+        "follow": "" if library.following is None else f"    follow({', '.join(map(_all_of, ('before', 'all')))});",
         "settings": _members((item.name, item.quantity.unit, _said(item.quantity)) for item in library.settings),
         "outputs": _members((("time", "s", "since the start"), *((item, *OUTPUTS[item]) for item in program.outputs))),
         "metrics": _members((kind.name, kind.unit, kind.summary) for kind in program.metrics),
         "defaults": "\n".join(f"    settings->{item.name} = {item.value!r};" for item in library.settings),
         "ranges": "\n".join(
-            f'    if (!({holds})) {{\n        return "{name}";\n    }}' for holds, name in conditions_of(library)
+            f'    if (!({holds})) {{\n        return "{name}";\n    }}'
+            for holds, name in conditions_of(library, "chosen")
         ),
         "read_outputs": "\n".join(
             f"    outputs->{item} = values[{place}];" for place, item in enumerate(program.outputs)
@@ -223,6 +234,11 @@ def _words(library: Library, name: str) -> dict[str, str]:
         ),
         **library.words,
     }
+
+
+def _all_of(settings: str) -> str:
+    """Settings as an array in C."""
+    return f"array_of((double *)&{settings}, SETTINGS, 0, 0)"
 
 
 def _advance(program: ExportedProgram) -> str:
@@ -268,9 +284,13 @@ def other_program_of(library: Library) -> str:
     return "".join(f"\n        || {item}" for item in (*switched, *library.other_program))
 
 
-def conditions_of(library: Library) -> list[tuple[str, str]]:
-    """What settings must keep, as text in C, with the setting that is named where it is not kept, as by no number."""
-    return [*map(_range, library.settings), *map(_related, library.relations)]
+def conditions_of(library: Library, given: str = "settings") -> list[tuple[str, str]]:
+    """What settings must keep, as text in C, with the setting that is named where it is not kept, as by no number.
+
+    ``given`` is what C calls them before they follow others.
+    """
+    ranges = [_range(item, given if item.name in library.defaults else "settings") for item in library.settings]
+    return [*ranges, *map(_related, library.relations)]
 
 
 def _related(item: Relation) -> tuple[str, str]:
@@ -281,9 +301,9 @@ def _related(item: Relation) -> tuple[str, str]:
     return f"settings->{item.name} {_SIGNS[item.relation]} {other}", item.name
 
 
-def _range(item: Setting) -> tuple[str, str]:
+def _range(item: Setting, settings: str) -> tuple[str, str]:
     """That a setting is a number that the declaration allows."""
-    quantity, value = item.quantity, f"settings->{item.name}"
+    quantity, value = item.quantity, f"{settings}->{item.name}"
     sign = ">=" if quantity.minimum_allowed else ">"
     low = max(quantity.minimum, -sys.float_info.max)
     high = min(quantity.maximum, sys.float_info.max)

@@ -3,10 +3,12 @@
 import itertools
 from collections.abc import Sequence
 
+from ppafo.exports.c_library.files import c_identifier
 from ppafo.exports.c_library.walk_preparation import sensors_that_fail
 from ppafo.metrics.catalog import METRICS
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
+from ppafo.parameters.graph import Graph
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
 from ppafo.walking.configuration import Configuration
 
@@ -19,20 +21,17 @@ They are means over the strides with help, from the third on, and counts; on a c
 same are computed from the recording, whose sums are rounded in another order: they agree to about 15 digits. Not here,
 since they need the mean stride or the healthy one: `healthy_positive_work`, `push_off_share`, `lowest_toes`,
 `angle_difference`, `dorsiflexor_moment`; nor safety events and the segments of a course."""
-_TRAPS_OF_SCENARIO = """\
-- `initial_pressure_1` and `_2` are numbers here. Where the file says "atmosphere" or "supply" they do not follow that
-  pressure."""
+_FOLLOWS = """\
+- As in ppafo, these follow others as long as they have their default, also where that is given: {followers}."""
 _TRAPS_OF_WALK = """\
-- What a walk file takes from other settings unless it is given is a number here, which does not follow them:
-  `controller_follow_time`, and `timing_sensor_lag` and `timing_valve_delay` where there are any.
 - `sensors_angle_bandwidth` and `sensors_pressure_bandwidth` 0 are sensors that follow at once.
 - `run_duration` is what `ppafo walk` calls `--minutes`, here in seconds and up to 10^6.
 - `..._bad_setting` looks at ranges and at contradictions of two settings. A walk file is also refused where a setting
   contradicts the gait, or several others at once."""
 
 
-def words_of(scenario: Scenario) -> dict[str, str]:
-    """What the page of the library says of this scenario."""
+def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
+    """What the page of the library says of this scenario, in which settings follow others by ``links``."""
     motion = scenario.motion
     moves = f"prescribed, `{motion.profile.kind}`" if isinstance(motion, PrescribedMotion) else "free"
     fixed = [
@@ -46,13 +45,23 @@ def words_of(scenario: Scenario) -> dict[str, str]:
     return {
         "fixed": _listed(fixed),
         "precomputed": "nothing",
-        "traps": _TRAPS_OF_SCENARIO,
+        "traps": _followers(links),
         "metrics_said": _METRICS_OF_SCENARIO.format(left_out=", ".join(f"`{name}`" for name in left_out)),
     }
 
 
-def words_of_walk(configuration: Configuration) -> dict[str, str]:
-    """What the page of the library says of this walk."""
+def _followers(links: Graph) -> str:
+    """The line on what follows what."""
+    pairs = {path: dict.fromkeys(source for link in found for source in link.sources) for path, found in links.items()}
+    said = (
+        f"`{c_identifier(path)}` ({', '.join(f'`{c_identifier(source)}`' for source in sources)})"
+        for path, sources in pairs.items()
+    )
+    return _FOLLOWS.format(followers=", ".join(said) or "none")
+
+
+def words_of_walk(configuration: Configuration, links: Graph) -> dict[str, str]:
+    """What the page of the library says of this walk, in which settings follow others by ``links``."""
     faults = [f"{sensor} `{item.kind}`" for sensor, item in sensors_that_fail(configuration).items()]
     course = configuration.course
     way = "stride after equal stride" if course is None else f"the course `{course.name}`, which stays as it is"
@@ -70,7 +79,7 @@ def words_of_walk(configuration: Configuration) -> dict[str, str]:
     return {
         "fixed": _listed(fixed),
         "precomputed": "the gait alone" if course is None else "the gait and its course alone",
-        "traps": _TRAPS_OF_WALK,
+        "traps": f"{_followers(links)}\n{_TRAPS_OF_WALK}",
         "metrics_said": _METRICS_OF_WALK,
     }
 

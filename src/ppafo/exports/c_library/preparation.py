@@ -14,10 +14,15 @@ from ppafo.exports.c_library.writing import Writing
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.building import consistency
 from ppafo.parameters.device import Device
+from ppafo.parameters.graph import Graph
+from ppafo.simulation.clock import links_of_times, step_unless_given, step_with_output
+from ppafo.simulation.declaration import value_at
+from ppafo.simulation.ensemble.columns import time_texts
 from ppafo.simulation.motion import TOLERANCE
-from ppafo.simulation.numbers import HELD_ANGLE, TIMES, declared_numbers, number_at, other_form
+from ppafo.simulation.numbers import HELD_ANGLE, TIMES, declared_numbers, links_that_hold, number_at, other_form
 from ppafo.simulation.preparation import is_slow_held, rates_of_sensors, state_at_start, state_with_volumes, step_counts
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
+from ppafo.units import parse_quantity
 
 SAID = {
     "run.step": "longest step of the engine",
@@ -30,12 +35,7 @@ _LEVEL_OF_HELD = "motion.profile.level"
 
 def settings_of(scenario: Scenario) -> tuple[Setting, ...]:
     """Every number of a scenario in SI units, under the path that overrides know it by."""
-    times = {
-        "run.duration": scenario.duration,
-        "run.step": scenario.time_step,
-        "run.output_interval": scenario.output_interval,
-        "controller.period": scenario.control.period,
-    }
+    times = _times(scenario)
     return tuple(
         Setting(
             c_identifier(path),
@@ -45,6 +45,30 @@ def settings_of(scenario: Scenario) -> tuple[Setting, ...]:
         )
         for path, item in _declared(scenario).items()
     )
+
+
+def links_of(scenario: Scenario) -> Graph:
+    """What follows other settings as long as nobody changes it."""
+    return {**links_that_hold(scenario), **links_of_times(time_texts(scenario))}
+
+
+def _times(scenario: Scenario) -> dict[str, float]:
+    """Times of a run by path [s]; the step is that of the file, of which the engine takes one that divides a sample."""
+    texts = time_texts(scenario)
+    duration, period = scenario.duration, scenario.control.period
+    step, output = (value_at(texts, f"run.{name}") for name in ("step", "output_interval"))
+    if step is not None:
+        longest = parse_quantity(str(step), "s")
+    elif output is None:
+        longest = step_unless_given(duration, period)
+    else:
+        longest = step_with_output(duration, period, scenario.output_interval)
+    return {
+        "run.duration": duration,
+        "run.step": longest,
+        "run.output_interval": scenario.output_interval,
+        "controller.period": period,
+    }
 
 
 def relations_of(scenario: Scenario) -> tuple[Relation, ...]:

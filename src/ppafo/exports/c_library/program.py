@@ -154,6 +154,7 @@ def c_text(
         "parameters": alone,
         "counts": [f"COUNT_{name.upper()}" for name in COUNTS],
         "settings": [f"SETTING_{name.upper()}" for name in settings],
+        "followed": [f"SETTING_{name.upper()}" for name in settings],
         "found": [f"METRIC_{kind.name.upper()}" for kind in item.metrics],
     }
     counted = [

@@ -17,6 +17,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.model.gait import gait_at
 from ppafo.model.gait_sensors import NOTHING_SEEN
 from ppafo.parameters.building import consistency
+from ppafo.parameters.graph import Follows, Graph, Term, holding
 from ppafo.simulation.declaration import PERIOD, RUN, THERMAL_GAS
 from ppafo.simulation.numbers import device_number_at, device_numbers
 from ppafo.simulation.plan import profile_parameters
@@ -145,6 +146,14 @@ def _control(configuration: Configuration) -> dict[str, Quantity]:
     law = walking_controllers().get(control.name, control)
     own = {item.name for item in law.quantities}
     return {f"{'controller' if item.name in own else 'timing'}.{item.name}": item for item in control.quantities}
+
+
+def links_of_walk(configuration: Configuration) -> Graph:
+    """What follows other settings of a walk as long as nobody changes it."""
+    known = _numbers(configuration)
+    recorded = {"run.output_interval": (Follows((Term(("run.duration",), record_interval),)),)}
+    links = {path: links for path, links in {**configuration.graph, **recorded}.items() if path in known}
+    return holding(links, lambda path: known[path][1])
 
 
 def relations_of_walk(configuration: Configuration) -> tuple[Relation, ...]:

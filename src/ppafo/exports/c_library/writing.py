@@ -19,6 +19,7 @@ from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.declaration import members
 from ppafo.parameters.device import Device, SonicOrifice
+from ppafo.parameters.graph import Graph, Term
 from ppafo.parameters.plant import area_restriction, plant_with, sonic_restriction
 from ppafo.simulation.preparation import lines_at_start, thermal_gas
 from ppafo.simulation.supply_line import LINES, SECTION
@@ -27,6 +28,38 @@ ENTRY = '@njit("void(float64[::1], float64[::1], float64[::1], float64[::1])")'
 _SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply")
 FLAWS = ("angle_noise", "pressure_noise", "angle_resolution", "pressure_resolution")
 """Settings of noise and rounding, in the order of ``SensorParameters``."""
+
+
+FOLLOWING = '@njit("void(float64[::1], float64[::1])")'
+
+
+def following_text(settings: Sequence[Setting], links: Graph, collector: SourceCollector) -> str:
+    """The composed function ``follow``: settings that still have their default follow others; see ``Graph``."""
+    places = {item.path: place for place, item in enumerate(settings)}
+    used = {source for found in links.values() for link in found for source in link.sources}
+    rows: list[str] = []
+    lines = [f"{c_identifier(path)} = settings[{places[path]}]" for path in places if path in used - set(links)]
+    for path, found in links.items():
+        name, own = c_identifier(path), f"settings[{places[path]}]"
+        text = own
+        for link in reversed(found):
+            number = " + ".join([*(_term(term, rows, collector) for term in link.terms), repr(link.gap)])
+            source = places[link.sources[0]]
+            is_set = f"settings[{source}] != {settings[source].value!r}"
+            text = f"(({number}) if {is_set} else {text})" if link.when_set else f"({number})"
+        lines.append(f"{name} = {text} if {own} == {settings[places[path]].value!r} else {own}")
+        lines.append(f"followed[{places[path]}] = {name}")
+    return "\n".join([*rows, FOLLOWING, "def follow(settings, followed):", *indent(lines)])
+
+
+def _term(term: Term, rows: list[str], collector: SourceCollector) -> str:
+    """A term of what is followed; rows that only it has are added to ``rows``."""
+    given = ", ".join(map(c_identifier, term.sources))
+    if term.names:
+        row = f"Followed{len(rows)}"
+        rows.append(f"{row} = namedtuple({row!r}, {list(term.names)!r})")
+        given = f"{row}({given})"
+    return f"{collector.add(term.function)}({given})"
 
 
 @final

@@ -34,17 +34,12 @@ from ppafo.errors import PpafoError
 from ppafo.exports.c_library.files import OUTPUTS, Library, Setting, c_identifier
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
 from ppafo.parameters.device import Device
+from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph
 from ppafo.parameters.overrides import SOURCE
-from ppafo.parameters.parameter_set import (
-    ATMOSPHERE_PATH,
-    PRESSURE_PATH,
-    SECOND_PRESSURE_PATH,
-    atmospheric_pressure,
-    entry_in_si,
-)
+from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si
 from ppafo.parameters.provenance import Entry
 from ppafo.simulation.building import set_name
-from ppafo.simulation.declaration import INITIAL, PRESSURE_WORDS, SEED, value_at
+from ppafo.simulation.declaration import SEED, value_at
 from ppafo.simulation.numbers import HELD_ANGLE, TIMES
 from ppafo.simulation.overriding import is_of_device, split_override
 from ppafo.simulation.scenario import Scenario
@@ -72,7 +67,7 @@ def description_of(item: Scenario | Configuration, library: Library) -> dict[str
     """The description of the module of a scenario or a walk, as the beginning of this file has it."""
     file = _file_of_walk(item) if isinstance(item, Configuration) else _file_of_scenario(item)
     keys = {setting.name: setting.path for setting in library.settings}
-    origins, follows, kept = _origins(file, item.device, library), _follows(file, item.device), _kept(library)
+    origins, follows, kept = _origins(file, item.device, library), _follows(item.graph), _kept(library)
     program, atmosphere = library.program, item.device.supply.atmospheric_pressure
     channels = {"time": ("s", "since the start"), **{name: OUTPUTS[name] for name in program.outputs}}
     return {
@@ -241,12 +236,6 @@ def _parameter_set(file: _File, device: Device) -> ParameterSet | None:
         return None
 
 
-def _follows(file: _File, device: Device) -> dict[str, str]:
-    """Settings that follow others until they are changed by themselves."""
-    found = {SECOND_PRESSURE_PATH: PRESSURE_PATH} if device.supply.has_one_pressure else {}
-    for quantity in INITIAL:
-        path = f"initial.{quantity.name}"
-        word = value_at(file.document, path)
-        if isinstance(word, str) and word.strip() in PRESSURE_WORDS:
-            found[path] = f"supply.{PRESSURE_WORDS[word.strip()]}"
-    return found
+def _follows(links: Graph) -> dict[str, str]:
+    """Settings that have the number of another until they are changed by themselves."""
+    return {path: found[0].sources[0] for path, found in links.items() if found[0].is_same}

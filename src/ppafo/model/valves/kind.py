@@ -62,6 +62,8 @@ class ValveModel:
 class ValveKind:
     """A valve as the catalogue knows it: name, what it is, its parameters beside the orifice's own, and its models.
 
+    ``lag(settings)`` is the time [s] after which its flow has followed a command, None for the dead time alone.
+
     ``choose(settings)`` returns the simplest model that is exact for the settings. It may look only at which of them
     are 0: runs of an ensemble with zeros in the same settings share one model.
     """
@@ -70,3 +72,4 @@ class ValveKind:
     summary: str
     quantities: tuple[Quantity, ...]
     choose: Callable[[Mapping[str, float]], ValveModel]
+    lag: Callable[[Mapping[str, float]], float] | None = None

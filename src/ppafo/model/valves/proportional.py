@@ -267,6 +267,14 @@ def dead_time(settings: Mapping[str, float]) -> float:
     return settings["delay"]
 
 
+def lag(settings: Mapping[str, float]) -> float:
+    """Time [s] until the opening has followed a command: dead time, spool, and the way at the slew limit."""
+    frequency, slew_limit = settings["spool_frequency"], settings["slew_limit"]
+    spool = 2.0 * settings["spool_damping_ratio"] / (2.0 * math.pi * frequency) if frequency > 0.0 else 0.0
+    slew = 1.0 / slew_limit if slew_limit > 0.0 else 0.0
+    return settings["delay"] + spool + slew
+
+
 IDEAL = ValveModel(
     parameters=IdealProportional,
     state=NoValveState,
@@ -321,4 +329,5 @@ KIND = ValveKind(
         Quantity("slew_limit", "1/s", "largest rate of the opening, 0 for none", 0.0, 0.0, 1.0e5),
     ),
     choose=choose,
+    lag=lag,
 )

@@ -208,6 +208,11 @@ def no_dead_time(settings: Mapping[str, float]) -> float:
     return 0.0
 
 
+def lag(settings: Mapping[str, float]) -> float:
+    """Time [s] until a valve has let go: its delay, and how long a coil waits for the next switching."""
+    return settings["closing_delay"] + settings["switching_interval"]
+
+
 IDEAL = ValveModel(
     parameters=IdealSolenoid,
     state=PairPositions,
@@ -259,4 +264,5 @@ KIND = ValveKind(
         Quantity("switching_interval", "s", "shortest time between two switchings of one valve", 0.0, 0.0, 1.0),
     ),
     choose=choose,
+    lag=lag,
 )

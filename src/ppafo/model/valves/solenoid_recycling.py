@@ -182,4 +182,5 @@ KIND = ValveKind(
         Quantity("holding_time", "s", "time for which chamber 2 then keeps its gas, without the source", 0.0, 0.0, 1.0),
     ),
     choose=choose,
+    lag=solenoid.lag,
 )

@@ -13,7 +13,8 @@ from ppafo.model.gas import specific_gas_constant
 from ppafo.parameters.audit.finding import NamedValue
 from ppafo.parameters.declaration import alternatives, is_within
 from ppafo.parameters.device import Gas
-from ppafo.parameters.parameter_set import ATMOSPHERE_PATH, ParameterSet, atmospheric_pressure, number_in_si
+from ppafo.parameters.graph import ATMOSPHERE_PATH
+from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, number_in_si
 from ppafo.parameters.provenance import Entry
 from ppafo.units import from_si
 

@@ -272,7 +272,7 @@ def _outcomes(
     found: list[tuple[Outcomes, Outcomes | None]] = []
     for place in placed:
         name = place.configuration
-        model = scenario_model(place.scenario, metrics, threads, tally.add)
+        model = scenario_model(place.scenario, metrics, threads, tally.add, drawing.uncertainty.gauge)
         own = {path: column for path, column in columns.items() if drawing.varies(path, name)}
         unchanged = {"supply.pressure": np.full(drawing.draws, place.scenario.device.supply.pressure)}
         outcomes = model(own or unchanged)

@@ -7,13 +7,13 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.parameters.parameter_set import PRESSURE_PATH, SECOND_PRESSURE_PATH
+from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.parameters.parts import Part
 from ppafo.questions.design.file import GAS, OBJECTIVES, DesignProblem, Task
 from ppafo.questions.design.front import Candidates, Floats, Worth
 from ppafo.questions.design.variables import DEAD_VOLUME, OWN, SIZE
 from ppafo.simulation.ensemble import COMPLETED, run_ensemble
-from ppafo.simulation.numbers import TIMES, declared_numbers
+from ppafo.simulation.numbers import TIMES, declared_numbers, moving_together, number_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.draws import Uncertainty
 from ppafo.studies.noise import NOISE, with_noise
@@ -22,6 +22,8 @@ Members = NDArray[np.intp]
 
 SEARCHED_STREAMS, FRESH_STREAMS = 16, 64
 """Noise streams over which every candidate of a noisy task is judged, and those, all new, over which a front is."""
+SUPPLIES = (PRESSURE_PATH, SECOND_PRESSURE_PATH, ATMOSPHERE_PATH)
+"""What decides about the pressures that parts must stand."""
 _MAXIMUM_REASONS = 20
 _CHUNK = 16_384
 """Runs handed to the lanes at once: enough to fill them, little enough memory."""
@@ -151,12 +153,9 @@ class Evaluation:
         highest = np.zeros(len(candidates))
         for task in problem.tasks:
             for scenario in task.scenarios.values():
-                supply = scenario.device.supply
-                first = chosen.get(PRESSURE_PATH, supply.pressure)
-                second = chosen.get(
-                    SECOND_PRESSURE_PATH, first if supply.has_one_pressure else supply.dorsiflexion_pressure
-                )
-                highest = np.maximum(highest, np.maximum(first, second))
+                found = moving_together(scenario, {path: chosen[path] for path in SUPPLIES if path in chosen})
+                for path in SUPPLIES[:2]:
+                    highest = np.maximum(highest, found.get(path, number_at(scenario, path)))
         return np.asarray(np.maximum(0.0, highest / ratings - 1.0))
 
 

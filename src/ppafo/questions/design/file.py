@@ -13,7 +13,7 @@ from ppafo.documents.models import NAME, STRICT, Text, Texts, make_schema, read_
 from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import StudyError, UnitError, first_twice, nearest_name
 from ppafo.metrics.catalog import METRICS
-from ppafo.parameters.parameter_set import ATMOSPHERE_PATH
+from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.parts import Catalogue, Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
 from ppafo.questions.design.search import SearchSettings

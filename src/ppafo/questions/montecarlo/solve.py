@@ -50,7 +50,7 @@ def monte_carlo(
     asked = width or (PROBABILITY_WIDTH if isinstance(what, Probability) else DEFAULT_WIDTH)
     rule = stopping_rule(what, metric, asked, StoppingRule(1.0, False, first_draws, draws, confidence, maximum_failed))
     tally = Tally(rule.first, progress)
-    model = scenario_model(base.scenario, [metric], threads, tally.add)
+    model = scenario_model(base.scenario, [metric], threads, tally.add, uncertainty.gauge)
     return draw_until(model, uncertainty, metric, what, rule, chosen.sample.seed if seed is None else seed)
 
 

@@ -53,5 +53,5 @@ def sensitivity(
     count = DEFAULT_SAMPLES[by.name] if samples is None else samples
     settings = Settings(count, chosen.sample.seed if seed is None else seed, confidence, maximum_failed)
     tally = Tally(count * by.block_rows(len(used.drawn)), progress)
-    model = scenario_model(base.scenario, requested, threads, tally.add)
+    model = scenario_model(base.scenario, requested, threads, tally.add, used.gauge)
     return replace(analyse(model, used, requested, by, settings), name=f"{chosen.name}, {base.name}")

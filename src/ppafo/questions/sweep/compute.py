@@ -16,6 +16,7 @@ from ppafo.questions.sweep.chunks import Chunk, chunk, chunk_count, drawn_values
 from ppafo.questions.sweep.manifest import BinsOf
 from ppafo.signals.channels import CHANNELS
 from ppafo.simulation.ensemble import EnsembleResult, run_ensemble
+from ppafo.simulation.ensemble.columns import absolute
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.parquet import TableColumn, encode_texts, lists_of, parquet_bytes, table_of, texts_of_some
 from ppafo.storage.places import Place, place_at, read_document
@@ -147,7 +148,9 @@ def _result(study: Study, part: Chunk, values: dict[str, Floats], threads: int |
     columns = varied_columns(study, configuration, values) or _base_values(configuration.scenario, part)
     every = outputs.every if outputs.traces else 0.0
     try:
-        return run_ensemble(configuration.scenario, columns, outputs.metrics, outputs.traces, every, threads)
+        return run_ensemble(
+            configuration.scenario, columns, outputs.metrics, outputs.traces, every, threads, study.gauge
+        )
     except ScenarioError as error:
         raise StudyError(f"configuration '{configuration.name}': {error}") from error
 
@@ -167,7 +170,9 @@ def stored_unit(unit: str) -> str:
 
 def runs_table(study: Study, chunk: Chunk, values: Mapping[str, Floats], result: EnsembleResult) -> "pa.Table":
     """Return a row for every run: number, configuration, varied values, status, metrics; SI units, nan where none."""
-    name = study.configurations[chunk.configuration].name
+    configuration = study.configurations[chunk.configuration]
+    name = configuration.name
+    own = absolute(configuration.scenario, varied_columns(study, configuration, dict(values)), study.gauge)
     names = [item.name for item in study.configurations]
     columns = {
         "run": TableColumn(_numbers(study, chunk), _PLAIN, "number of the run in the study"),
@@ -176,7 +181,7 @@ def runs_table(study: Study, chunk: Chunk, values: Mapping[str, Floats], result:
         ),
     }
     for path, column in values.items():
-        given = column if study.varies(path, name) else np.full(chunk.runs, np.nan)
+        given = own.get(path, column) if study.varies(path, name) else np.full(chunk.runs, np.nan)
         columns[path] = TableColumn(given, study.units[path], "varied value")
     columns["status"] = TableColumn(encode_texts(result.status, STATUSES), _PLAIN, "how the run ended")
     columns["failure_time"] = TableColumn(result.failure_time, "s", "time at which the run diverged")

@@ -11,6 +11,7 @@ from pydantic import BaseModel, Field
 from ppafo.documents.models import NAME, STRICT, Text, Texts, make_schema, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice
+from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.questions.tune import problem as values
 from ppafo.questions.tune.problem import Problem, Spread
 from ppafo.simulation.loading import list_scenarios, load_scenario
@@ -20,7 +21,7 @@ from ppafo.studies.draws import Uncertainty, uncertainty_of
 from ppafo.studies.loading import list_studies, load_study
 from ppafo.studies.noise import NOISE
 from ppafo.studies.outcomes import atmosphere_of, check_metrics, difference_of, level_of
-from ppafo.studies.varying import varied_path
+from ppafo.studies.varying import in_its_unit, varied_path
 
 LARGEST_SEED = 2**32 - 1
 MAXIMUM_DRAWS = 4096
@@ -147,9 +148,9 @@ def _problem(document: dict[str, Any], file: str, folder: Path, overrides: Seque
         check_metrics(_once([*parsed.objective, *parsed.constraints]), scenario)
     except (ScenarioError, ParameterError, StudyError) as error:
         raise refusal(error) from error
-    searched = _search_variables(parsed, scenario, refusal)
-    spread = _spread(parsed, folder, [item.path for item in searched], scenario, refusal)
+    spread = _spread(parsed, folder, [item.path for item in parsed.search], scenario, refusal)
     drawn = () if spread is None else (*spread.uncertainty.paths, *spread.uncertainty.same)
+    searched = _search_variables(parsed, scenario, drawn, refusal)
     atmosphere = atmosphere_of(scenario, (*drawn, *(item.path for item in searched)))
     return Problem(
         name=parsed.name,
@@ -173,19 +174,25 @@ def _once(items: Sequence[Goal | Constraint]) -> list[str]:
     return list(dict.fromkeys(item.metric for item in items))
 
 
-def _search_variables(parsed: TuningFile, scenario: Scenario, refusal: Refusal) -> tuple[values.SearchRange, ...]:
+def _search_variables(
+    parsed: TuningFile, scenario: Scenario, drawn: Sequence[str], refusal: Refusal
+) -> tuple[values.SearchRange, ...]:
     paths = [item.path for item in parsed.search]
     repeated = first_twice(paths)
     if repeated is not None:
         raise refusal(f"'{repeated}' is searched twice; give it only one [[search]]")
-    return tuple(_search_variable(item, scenario, refusal) for item in parsed.search)
+    varies = ATMOSPHERE_PATH in (*paths, *drawn)
+    return tuple(_search_variable(item, scenario, varies, refusal) for item in parsed.search)
 
 
-def _search_variable(item: SearchRange, scenario: Scenario, refusal: Refusal) -> values.SearchRange:
+def _search_variable(
+    item: SearchRange, scenario: Scenario, atmosphere_varies: bool, refusal: Refusal
+) -> values.SearchRange:
     try:
         place = varied_path(item.path, scenario)
+        place = in_its_unit(place, (item.minimum, item.maximum)) if atmosphere_varies else place
         minimum, maximum = place.level(item.minimum), place.level(item.maximum)
-        before = present_value(item.path, scenario)
+        before = present_value(item.path, scenario) - (place.atmosphere if place.is_gauge else 0.0)
     except (UnitError, ScenarioError) as error:
         raise refusal(f"search '{item.path}': {error}") from error
     if item.path == NOISE:

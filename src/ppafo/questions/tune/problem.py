@@ -142,6 +142,12 @@ class Problem:
         """The values before tuning [SI]."""
         return {item.path: item.before for item in self.searched}
 
+    @property
+    def gauge(self) -> frozenset[str]:
+        """The paths, searched and drawn, whose values count from the atmosphere of their run."""
+        drawn = frozenset[str]() if self.spread is None else self.spread.uncertainty.gauge
+        return drawn | {item.path for item in self.searched if item.place.is_gauge}
+
     def gains(self, fractions: Sequence[float]) -> Gains:
         """Return the values [SI] at fractions of the way, rounded as written: what is pasted is what was run."""
         values = {

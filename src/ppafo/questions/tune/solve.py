@@ -14,6 +14,7 @@ from ppafo.progress import Report
 from ppafo.questions.tune.file import load_tuning
 from ppafo.questions.tune.problem import Constraint, Gains, Problem, Spread
 from ppafo.questions.tune.search import Judgement, Runs, Start, bad_ends, judge, keeps, search, shortfall
+from ppafo.simulation.ensemble.columns import absolute
 from ppafo.simulation.numbers import TIMES, with_numbers
 from ppafo.simulation.result import Result
 from ppafo.simulation.scenario import Scenario
@@ -119,7 +120,7 @@ def tune(
         if problem.spread is not None and not problem.spread.study:
             problem = replace(problem, spread=replace(problem.spread, seed=seed))
     tally = Tally(_most_runs(problem), progress)
-    model = scenario_model(problem.scenario, problem.metrics, threads, tally.add)
+    model = scenario_model(problem.scenario, problem.metrics, threads, tally.add, problem.gauge)
     fixed = _draws(problem, 0, 1 if problem.spread is None else problem.spread.draws)
     scales = _scales(problem, _runs(model, problem, [problem.before], fixed))
 
@@ -226,8 +227,9 @@ def _noise(runs: Runs, other: Runs) -> dict[str, Interval]:
 
 def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: Runs) -> Ceiling:
     """Return in how many draws the supply cannot hold the reference, and which violated constraints that explains."""
-    given = {path: column for path, column in draws.items() if path not in TIMES}
-    scenario = with_numbers(scenario_with(problem, gains), given)
+    base = scenario_with(problem, gains)
+    given = {path: column for path, column in absolute(base, draws, problem.gauge).items() if path not in TIMES}
+    scenario = with_numbers(base, given)
     if scenario.control.kind == OPEN_LOOP:
         return Ceiling(0.0, ())
     known = runs.metrics

@@ -1,6 +1,6 @@
 """Many variants of one scenario, with metrics computed inside the lanes and no trajectory stored."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,11 +47,13 @@ def run_ensemble(
     bands: Sequence[str] = (),
     every: float = 0.0,
     threads: int | None = None,
+    gauge: Collection[str] = (),
 ) -> EnsembleResult:
     """Run ``base`` once for each row of values; each run gives exactly what it gives alone.
 
     ``columns`` maps dotted paths, as in overrides (``supply.pressure``, ``valve.area``, ``reference.level``), to values
-    in SI units, shape (runs,), pressures absolute. ``meters`` names metrics of ``ppafo.metrics``; ``bands`` names
+    in SI units, shape (runs,), pressures absolute but for those of the paths in ``gauge``, which count from the
+    atmosphere of their run. ``meters`` names metrics of ``ppafo.metrics``; ``bands`` names
     channels whose traces are kept every ``every`` [s] (the output interval unless given) to the end of the longest run.
     ScenarioError for unknown paths, metrics and channels, or for columns of different lengths; a run whose values are
     out of range is REFUSED and the others go on. Memory grows with the number of runs: give chunks of some ten
@@ -59,8 +61,8 @@ def run_ensemble(
 
     Where a Python object controls ``base``, the runs are made one after the other: some 30 ms each.
 
-    A pressure at the start that the scenario gives as a word follows the column of the pressure that it names. All
-    other pressures of ``base`` are absolute, whatever ``supply.atmospheric_pressure`` is.
+    What follows a number that varies moves with it, as it does in a file: a gauge pressure with the atmosphere, a
+    pressure at the start with that of the supply which it names, the second regulator with the first.
     """
     metrics = {name: _metric(base, name) for name in meters}
     for name in bands:
@@ -68,7 +70,7 @@ def run_ensemble(
     interval = every or base.output_interval
     if not interval > 0.0:
         raise ScenarioError(f"{base.name}: traces need a time above 0 between two samples, not {interval:g} s")
-    checked = check_columns(base, columns)
+    checked = check_columns(base, columns, gauge)
     plan = plan_ensemble(checked)
     times = _times(plan, interval if bands else 0.0)
     request = Request(metrics, tuple(dict.fromkeys(bands)), interval, times, base.control.custom)

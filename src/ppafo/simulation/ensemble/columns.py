@@ -1,6 +1,6 @@
 """The columns of an ensemble: what may vary, checked as a whole, and the scenario that represents all runs."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,9 +9,10 @@ import numpy as np
 from ppafo.engine.lanes import Floats
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.model.declaration import Quantity
+from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.simulation import declaration
 from ppafo.simulation.clock import Clock, read_clock
-from ppafo.simulation.numbers import TIMES, chosen_path, declared_numbers, other_form, with_numbers
+from ppafo.simulation.numbers import TIMES, chosen_path, declared_numbers, moving_together, other_form, with_numbers
 from ppafo.simulation.overriding import apply_overrides
 from ppafo.simulation.reading import Reading
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
@@ -31,7 +32,7 @@ _UNIT_OF_TIMES = {"controller.rate": "Hz"}
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """A scenario and what varies in it: values (runs,) in SI units by path, with their declarations."""
+    """A scenario and what varies in it, followers included: values (runs,) in SI by path, with their declarations."""
 
     base: Scenario
     values: Mapping[str, Floats]
@@ -47,8 +48,11 @@ class Columns:
         return replace(self, values={path: column[kept] for path, column in self.values.items()})
 
 
-def check_columns(base: Scenario, columns: Mapping[str, Any]) -> Columns:
-    """Return the columns with the chosen valve as ``valve``; ScenarioError for what no single run is to blame for."""
+def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[str] = ()) -> Columns:
+    """Return the columns with the chosen valve as ``valve``; ScenarioError for what no single run is to blame for.
+
+    Those of the paths in ``gauge`` count from the atmosphere of their run.
+    """
     if base.control.kind == PYTHON_CONTROLLER and base.control.custom is None:
         raise ScenarioError(f"{base.name}: nothing controls the valve; give a controller (controlled_by)")
     declared = declared_numbers(base)
@@ -65,7 +69,14 @@ def check_columns(base: Scenario, columns: Mapping[str, Any]) -> Columns:
             f"{base.name}: an ensemble needs columns of one length, one value for each run, not {shapes or 'none'}"
         )
     _check_together(base, values)
-    return Columns(base, values, {path: declared[path] for path in values})
+    every = moving_together(base, absolute(base, values, gauge))
+    return Columns(base, every, {path: declared[path] for path in every})
+
+
+def absolute(base: Scenario, columns: Mapping[str, Floats], gauge: Collection[str]) -> dict[str, Floats]:
+    """Return the columns with absolute pressures in place of those that count from the atmosphere of their run."""
+    atmosphere = columns.get(ATMOSPHERE_PATH, base.device.supply.atmospheric_pressure)
+    return {path: column + atmosphere if path in gauge else column for path, column in columns.items()}
 
 
 def _check_path(base: Scenario, given: str, path: str, declared: Mapping[str, Quantity]) -> None:
@@ -101,25 +112,15 @@ def _check_together(base: Scenario, values: Mapping[str, Floats]) -> None:
 
 
 def varied_scenario(columns: Columns, clock: Clock) -> Scenario:
-    """Return the scenario that represents all runs; numbers of ``clock`` may be arrays too.
-
-    A pressure at the start that was given as a word follows the pressure that the word names.
-    """
-    base = columns.base
+    """Return the scenario that represents all runs; numbers of ``clock`` may be arrays too."""
     numbers = {path: column for path, column in columns.values.items() if path not in TIMES}
-    scenario = with_numbers(base, numbers)
-    followed = {
-        f"initial_{name}": getattr(scenario.device.supply, pressure)
-        for name, pressure in _pressures_by_word(base).items()
-        if f"initial.{name}" not in numbers
-    }
+    scenario = with_numbers(columns.base, numbers)
     return replace(
         scenario,
         duration=clock.duration,
         time_step=clock.step,
         output_interval=clock.output_interval,
         control=replace(scenario.control, period=clock.period),
-        **followed,
     )
 
 
@@ -160,17 +161,6 @@ def time_texts(base: Scenario) -> TimeTexts:
 def clock_of(base: Scenario) -> Clock:
     """Return the clock that a scenario has."""
     return Clock(base.duration, base.time_step, base.output_interval, base.control.period)
-
-
-def _pressures_by_word(base: Scenario) -> dict[str, str]:
-    """Return which pressures at the start were given as a word, and the pressure of the supply that it names."""
-    given = {}
-    for item in declaration.INITIAL:
-        word = declaration.value_at(_document(base), f"initial.{item.name}")
-        pressure = declaration.PRESSURE_WORDS.get(declaration.AT_REST if word is None else str(word).strip())
-        if pressure and getattr(base, f"initial_{item.name}") == getattr(base.device.supply, pressure):
-            given[item.name] = pressure
-    return given
 
 
 def _document(base: Scenario) -> dict[str, Any]:

@@ -16,15 +16,16 @@ from ppafo.errors import ScenarioError, UnitError
 from ppafo.model.sensors import Measurement
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.device import Device
+from ppafo.parameters.graph import ATMOSPHERE_PATH, gauge_link
 from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si
 from ppafo.simulation.building import set_name
 from ppafo.simulation.declaration import LARGEST_SEED
-from ppafo.simulation.ensemble.columns import check_columns
+from ppafo.simulation.ensemble.columns import absolute, check_columns
 from ppafo.simulation.ensemble.planning import plan_ensemble
 from ppafo.simulation.numbers import chosen_path, declared_numbers, number_at, with_numbers
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
-from ppafo.studies.varying import varied_path
+from ppafo.studies.varying import VariedPath, in_its_unit, varied_path
 from ppafo.units import parse_quantity
 from ppafo.walking.anthropometry import draw_builds
 from ppafo.walking.configuration import Configuration
@@ -82,7 +83,8 @@ class FromOutside:
 class ScenarioEpisodes:
     """Episodes of a scenario; ``ranges`` in SI by path are drawn evenly, and so is the angle to turn to, ``targets``.
 
-    Without ``ranges`` each is the scenario as it stands, noise included, and turns to the middle of ``targets``.
+    Without ``ranges`` each is the scenario as it stands, noise included, and turns to the middle of ``targets``. Values
+    of the paths in ``gauge`` count from the atmosphere of their episode.
     """
 
     base: Scenario
@@ -91,6 +93,7 @@ class ScenarioEpisodes:
     ranges: Mapping[str, tuple[float, float]]
     targets: tuple[float, float]
     plain: Columns
+    gauge: frozenset[str] = frozenset()
 
     @property
     def device(self) -> Device:
@@ -118,7 +121,8 @@ class ScenarioEpisodes:
 
     def shown(self, drawn: Floats) -> Scenario:
         """Return the scenario of what was drawn of one episode (numbers,) in SI."""
-        return with_numbers(self.base, dict(zip(self.ranges, drawn.tolist(), strict=True)))
+        given = dict(zip(self.ranges, drawn.tolist(), strict=True))
+        return with_numbers(self.base, absolute(self.base, given, self.gauge))
 
     def _one(self, generator: np.random.Generator) -> tuple[list[float], float]:
         drawn = [
@@ -130,7 +134,7 @@ class ScenarioEpisodes:
     def _plan(self, columns: Columns, values: Floats, left: Any) -> tuple[Any, str]:
         """Write the columns of some episodes; return the places of those that do not fit, and why one does not."""
         given = dict(zip(self.ranges, values[:, left], strict=True))
-        plan = plan_ensemble(check_columns(self.base, given))
+        plan = plan_ensemble(check_columns(self.base, given, self.gauge))
         reason = next(iter(plan.reasons.values()), "another program, step or delay")
         for members, batch in plan.batches:
             if episode_program(batch) == (self.program, self.clock):
@@ -148,23 +152,34 @@ def scenario_episodes(base: Scenario, randomise: bool, vary: Ranges, targets: tu
     base = base.controlled_by(FromOutside())
     lowest, highest = (parse_quantity(text, "rad", base.device.supply.atmospheric_pressure) for text in targets)
     ranges: dict[str, tuple[float, float]] = {}
+    gauge: set[str] = set()
     if randomise:
-        ranges = intervals_of(base) | {path: _range(base, path, ends) for path, ends in vary.items()}
+        ranges, gauge = intervals_of(base)
+        varies = ATMOSPHERE_PATH in {*ranges, *vary}
+        atmosphere = base.device.supply.atmospheric_pressure
+        gauge = gauge - set(vary) if varies else set()
+        ranges |= {path: (ranges[path][0] - atmosphere, ranges[path][1] - atmosphere) for path in gauge}
+        for path, ends in vary.items():
+            place, ranges[path] = _range(base, path, ends, varies)
+            gauge |= {path} if place.is_gauge else set()
         ranges[_SEED] = (0.0, float(LARGEST_SEED))
     batch = batch_of(plan_run(base))
     program, clock = episode_program(batch)
     middle = Goal(angle=0.5 * (lowest + highest), profile=NO_PROFILE)
     plain = Columns(batch.parameters, batch.states, np.array([numbers(middle)]).T)
-    return ScenarioEpisodes(base, program, clock, ranges, (lowest, highest), plain)
+    return ScenarioEpisodes(base, program, clock, ranges, (lowest, highest), plain, frozenset(gauge))
 
 
-def intervals_of(base: Scenario) -> dict[str, tuple[float, float]]:
-    """Return the ends of each interval of the scenario's parameter set, about the scenario's value, in SI by path."""
+def intervals_of(base: Scenario) -> tuple[dict[str, tuple[float, float]], set[str]]:
+    """Return the ends of each interval of the scenario's parameter set, about the scenario's value, in SI by path.
+
+    And the paths of those that are given in gauge.
+    """
     origin = base.origin
     folder = Path() if origin.file is None else Path(origin.file).parent
     parameter_set = load_parameter_set(set_name(origin.parameter_set, folder))
     atmosphere, declared = atmospheric_pressure(parameter_set), parameter_set.declarations()
-    known, found = declared_numbers(base), {}
+    known, found, gauge = declared_numbers(base), {}, set()
     for path, entry in parameter_set.numbers.items():
         own = chosen_path(path, base)
         if entry.uncertainty and own in known:
@@ -172,18 +187,22 @@ def intervals_of(base: Scenario) -> dict[str, tuple[float, float]]:
             ends = [entry_in_si(item, declared[path], atmosphere) for item in (entry, above)]
             value, half = number_at(base, own), ends[1] - ends[0]
             found[own] = (value - half, value + half)
-    return found
+            gauge |= {own} if gauge_link(own, entry.value, entry.unit) else set()
+    return found, gauge
 
 
-def _range(base: Scenario, path: str, ends: tuple[str | float, str | float]) -> tuple[float, float]:
+def _range(
+    base: Scenario, path: str, ends: tuple[str | float, str | float], atmosphere_varies: bool
+) -> tuple[VariedPath, tuple[float, float]]:
     place = varied_path(path, base)
     try:
+        place = in_its_unit(place, ends) if atmosphere_varies else place
         lowest, highest = (place.level(end) for end in ends)
     except (UnitError, ValueError) as error:
         raise ScenarioError(f"vary: {path} = {ends!r}: {error}; give the lowest and the highest value") from error
     if lowest > highest:
         raise ScenarioError(f"vary: {path} = {ends!r}: give the lowest value before the highest")
-    return lowest, highest
+    return place, (lowest, highest)
 
 
 def _repeated(columns: Columns, count: int) -> Columns:

@@ -12,6 +12,14 @@ from ppafo.identification.trajectory.experiment import (
 )
 from ppafo.simulation.scenario import Scenario
 
+_SECOND = ("supply.dorsiflexion_pressure", "initial.pressure_2")
+FOLLOWERS = {
+    "supply.pressure": _SECOND,
+    "supply.dorsiflexion_pressure": ("initial.pressure_2",),
+    "supply.atmospheric_pressure": ("supply.pressure", *_SECOND, "initial.pressure_1"),
+}
+"""One pressure is that of both regulators, gauge ones count from the atmosphere, and chambers begin at a word."""
+
 
 def test_every_declared_number_can_be_read_and_replaced(step: Scenario) -> None:
     paths = [path for path in declared_numbers(step) if path != TIME_OFFSET]
@@ -20,8 +28,7 @@ def test_every_declared_number_can_be_read_and_replaced(step: Scenario) -> None:
         changed = with_numbers(step, {path: number_at(step, path) + 0.125})
         assert number_at(changed, path) == number_at(step, path) + 0.125
         others = [other for other in paths if number_at(changed, other) != number_at(step, other)]
-        # One pressure is that of both regulators.
-        assert others == [path, *(["supply.dorsiflexion_pressure"] if path == "supply.pressure" else [])]
+        assert others == [other for other in paths if other == path or other in FOLLOWERS.get(path, ())]
 
 
 def test_a_time_offset_belongs_to_the_recording_and_leaves_the_scenario_alone(step: Scenario) -> None:

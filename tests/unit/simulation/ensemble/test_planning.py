@@ -18,9 +18,6 @@ from ppafo.simulation.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-ABSOLUTE = ("supply.pressure=450000 Pa_a", "supply.dorsiflexion_pressure=440000 Pa_a")
-"""A gauge pressure follows the atmosphere; a column is absolute and does not."""
-
 
 def overrides(scenario: Scenario, columns: dict[str, Floats], run: int) -> list[str]:
     declared = declared_numbers(scenario)
@@ -36,13 +33,13 @@ def places(plan: EnsemblePlan) -> dict[int, tuple[Batch, int]]:
 
 
 def single_batch(name: str, texts: list[str]) -> Batch:
-    return batch_of(plan_run(load_scenario(name, [*ABSOLUTE, *texts])))
+    return batch_of(plan_run(load_scenario(name, texts)))
 
 
 @pytest.mark.parametrize("draw", range(6))
 @pytest.mark.parametrize("name", list_scenarios())
 def test_rows_of_an_ensemble_are_those_of_single_runs_bit_for_bit(draws: ModuleType, name: str, draw: int) -> None:
-    base = load_scenario(name, ABSOLUTE)
+    base = load_scenario(name)
     columns = draws.drawn_columns(base, np.random.default_rng([draw, *name.encode()]), 12)
     plan = plan_ensemble(check_columns(base, columns))
     found = places(plan)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from ppafo.control.walking import phases
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.timing.kind import GaitTime
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import FORCE_LAG, VALVE_DELAY, Quantity
 
 WAITS = 0.05
 """Fraction of the stride by which the clock runs past an event that was not detected, before it waits."""
@@ -319,6 +319,22 @@ DELAY_QUANTITIES = (
     Quantity("toe_loading_rate", "N/s", "how fast the toes are loaded as they come down", 4.0e4, 100.0, 1.0e6),
     Quantity("heel_unloading_rate", "N/s", "how fast the load of the heel fades before it rises", 1.3e3, 100.0, 1.0e6),
     Quantity("toe_unloading_rate", "N/s", "how fast the load of the toes fades before they rise", 7.0e3, 100.0, 1.0e6),
-    Quantity("sensor_lag", "s", "how late the force sensors follow; from their bandwidth unless given", None, 0.0, 0.2),
-    Quantity("valve_delay", "s", "how late the valve follows; its dead time unless given", None, 0.0, 0.2),
+    Quantity(
+        "sensor_lag",
+        "s",
+        "how late the force sensors follow; from their bandwidth unless given",
+        None,
+        0.0,
+        0.2,
+        follows=(FORCE_LAG,),
+    ),
+    Quantity(
+        "valve_delay",
+        "s",
+        "how late the valve follows; its dead time unless given",
+        None,
+        0.0,
+        0.2,
+        follows=(VALVE_DELAY,),
+    ),
 )

@@ -21,8 +21,20 @@ struct @name@_run {
     /* Late signals and commands follow in memory. */
 };
 
-static void prepare_run(const @name@_settings *settings, prepared_run *prepared)
+/* Settings with those that follow others in what these make of them; see README.md. */
+static @name@_settings with_followers(const @name@_settings *chosen)
 {
+    @name@_settings before = *chosen;
+    @name@_settings all = *chosen;
+@follow@
+    (void)before;
+    return all;
+}
+
+static void prepare_run(const @name@_settings *chosen, prepared_run *prepared)
+{
+    const @name@_settings all = with_followers(chosen);
+    const @name@_settings *settings = &all;
     memset(prepared, 0, sizeof(*prepared));
 @prepare@
 }
@@ -37,8 +49,10 @@ void @name@_defaults(@name@_settings *settings)
 @defaults@
 }
 
-const char *@name@_bad_setting(const @name@_settings *settings)
+const char *@name@_bad_setting(const @name@_settings *chosen)
 {
+    const @name@_settings all = with_followers(chosen);
+    const @name@_settings *settings = &all;
 @ranges@
     return NULL;
 }

@@ -175,7 +175,8 @@ static bool is_input(uint32_t variable)
 static bool get_value(unit *item, uint32_t variable, double *value)
 {
     if (variable < SETTINGS) {
-        *value = ((const double *)&item->now.settings)[variable];
+        const @name@_settings all = with_followers(&item->now.settings);
+        *value = ((const double *)&all)[variable];
         return true;
     }
     if (is_input(variable)) {

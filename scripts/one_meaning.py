@@ -1,0 +1,305 @@
+"""Whether a setting means the same at every door: random words of a user, at each door and as `--set` of a single run.
+
+    python scripts/one_meaning.py --settings 1000 --seed 1
+    python scripts/one_meaning.py --settings 200 --doors study library --items torque-task-solenoid
+
+Draws settings as texts with units (`supply.pressure=57.3 psi_g`), one to four paths at once over all numbers of every
+scenario and walk of the package, and compares what each door makes of them, bit for bit, with what `ppafo simulate
+--set` and `ppafo walk --set` run: program, clock, parameters and start. What a single run refuses a door must refuse.
+Prints a line for each item and door, and settings that differ; the status is 1 where one does.
+"""
+
+import argparse
+import ctypes
+import json
+import random
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from ppafo.engine.run import batch_of
+from ppafo.errors import PpafoError
+from ppafo.exports.c_library import library_of
+from ppafo.exports.c_library.files import library_files
+from ppafo.exports.c_library.program import COUNTS
+from ppafo.exports.loading import load_exportable
+from ppafo.exports.wasm.description import description_of
+from ppafo.live.content import page_content, program_content
+from ppafo.parameters.graph import ATMOSPHERE_PATH, counts_from
+from ppafo.questions.sweep.chunks import drawn_values, varied_columns
+from ppafo.simulation.ensemble.columns import check_columns
+from ppafo.simulation.ensemble.planning import plan_ensemble
+from ppafo.simulation.loading import list_scenarios, load_scenario
+from ppafo.simulation.numbers import TIMES, with_numbers
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.scenario import Scenario
+from ppafo.studies.loading import load_study
+from ppafo.studies.varying import varied_path
+from ppafo.units import parse_quantity
+from ppafo.walking import list_walks
+from ppafo.walking.configuration import Configuration
+from scripts.typed_words import (
+    ROWS,
+    Judged,
+    Planned,
+    Words,
+    drawn_paths,
+    numbers_of,
+    numbers_of_walk,
+    planned,
+    settings_of,
+    single,
+    words_of,
+)
+
+
+def at_study(name: str, count: int, seed: int) -> Judged:
+    """Columns of a study file: a list of texts for each path, all of them crossed."""
+    found = Judged()
+    draw = random.Random(f"study {name} {seed}")
+    base = load_scenario(name)
+    known, atmosphere = numbers_of(base), base.device.supply.atmospheric_pressure
+    while found.same + found.refused + len(found.differing) < count:
+        paths = drawn_paths(list(known), draw)[:3]
+        texts = {path: [words_of(path, *known[path], draw, atmosphere) for _ in range(ROWS)] for path in paths}
+        for path, given in texts.items():
+            units = {text.rpartition("_")[2] for text in given}
+            if units == {"g", "a"}:  # together they are refused where the atmosphere varies
+                texts[path] = [text for text in given if text.rpartition("_")[2] == given[0].rpartition("_")[2]]
+        _compare_study(found, name, texts)
+    return found
+
+
+def _compare_study(found: Judged, name: str, texts: Mapping[str, Sequence[str]]) -> None:
+    whole = {path: [int(text) if path == "sensors.seed" else text for text in given] for path, given in texts.items()}
+    document = {
+        "schema_version": 1,
+        "name": "words",
+        "configurations": [{"name": "one", "scenario": name}],
+        "vary": [{"path": path, "kind": "list", "values": given} for path, given in whole.items()],
+        "outputs": {"metrics": ["gas_supplied"]},
+    }
+    try:
+        study = load_study(document)
+    except PpafoError as error:
+        # A value out of range refuses the whole study: one of its single runs must be refused too.
+        alone = [single(name, words) for words in crossed(texts)]
+        first = next((line for line in alone if isinstance(line, str)), alone[0])
+        found.compare(next(crossed(texts)), first, str(error))
+        return
+    values = drawn_values(study, np.arange(study.runs))
+    base = study.configurations[0].scenario
+    columns = varied_columns(study, study.configurations[0], values)
+    plan = plan_ensemble(check_columns(base, columns, study.gauge))
+    rows: dict[int, Planned | str] = dict(plan.reasons)
+    rows |= {int(run): planned(batch, place) for runs, batch in plan.batches for place, run in enumerate(runs)}
+    for run, words in enumerate(crossed(texts)):
+        found.compare(words, single(name, words), rows[run])
+
+
+def crossed(texts: Mapping[str, Sequence[str]]) -> Iterator[dict[str, str]]:
+    """The settings of a grid in the order of its runs: the last path changes first."""
+    if not texts:
+        yield {}
+        return
+    *before, last = texts
+    for words in crossed({path: texts[path] for path in before}):
+        yield from ({**words, last: text} for text in texts[last])
+
+
+def in_si(scenario: Scenario, words: Words) -> dict[str, float]:
+    """Words in SI units as who hands over numbers converts them: gauge pressures from the atmosphere of that run."""
+    places = {path: varied_path(path, scenario) for path in words}
+    given = {path: place.level(words[path]) for path, place in places.items() if path == ATMOSPHERE_PATH}
+    zero = given.get(ATMOSPHERE_PATH, scenario.device.supply.atmospheric_pressure)
+    linked = ("supply.", "initial.")
+    return {
+        path: (replace(place, atmosphere=zero) if path.startswith(linked) else place).level(
+            int(words[path]) if path == "sensors.seed" else words[path]
+        )
+        for path, place in places.items()
+    }
+
+
+def at_numbers(name: str, count: int, seed: int) -> Judged:
+    """Numbers of a scenario replaced in Python, as tuned and fitted ones are."""
+    found, base = Judged(), load_scenario(name)
+    for words in settings_of(name, count, seed):
+        timeless = {path: text for path, text in words.items() if path not in TIMES}
+        try:
+            door: Planned | str = planned(batch_of(plan_run(with_numbers(base, in_si(base, timeless)))))
+        except PpafoError as error:
+            door = str(error)
+        alone = single(name, timeless)
+        # What contradicts itself is for the caller to check here.
+        if isinstance(alone, str):
+            found.refused += 1
+        else:
+            found.compare(timeless, alone, door)
+    return found
+
+
+OTHER_PROGRAM = "needs another program"
+
+
+class _Handed(ctypes.Structure):
+    """An array as the C of a library takes it."""
+
+    _fields_ = (("values", ctypes.POINTER(ctypes.c_double)), ("extent", ctypes.c_int64 * 3))
+
+
+def _handed(values: np.ndarray) -> _Handed:
+    return _Handed(values.ctypes.data_as(ctypes.POINTER(ctypes.c_double)), (ctypes.c_int64 * 3)(values.size, 0, 0))
+
+
+class BuiltLibrary:
+    """The exported library of a scenario or walk, whose functions are called from here."""
+
+    def __init__(self, item: Scenario | Configuration, folder: Path) -> None:
+        self.library = library_of(item)
+        for file, content in library_files(self.library).items():
+            (folder / file).write_bytes(content)
+        made, name = folder / "library.so", self.library.name
+        flags = ["-std=c99", "-O0", "-ffp-contract=off", "-DPPAFO_ENTRY=extern", "-shared", "-fPIC", "-w"]
+        subprocess.run(["gcc", *flags, str(folder / f"{name}.c"), "-o", str(made), "-lm"], check=True)
+        self.c = ctypes.CDLL(str(made))
+        self.bad_setting, self.size = getattr(self.c, f"{name}_bad_setting"), getattr(self.c, f"{name}_size")
+        self.bad_setting.restype, self.size.restype = ctypes.c_char_p, ctypes.c_size_t
+        self.places = {setting.path: place for place, setting in enumerate(self.library.settings)}
+
+    def changed(self, numbers: Mapping[str, float]) -> np.ndarray:
+        """The settings with some of them changed."""
+        settings = np.array([setting.value for setting in self.library.settings])
+        for path, number in numbers.items():
+            is_rate = path == "controller.rate"
+            settings[self.places["controller.period" if is_rate else path]] = 1.0 / number if is_rate else number
+        return settings
+
+    def planned(self, settings: np.ndarray, alone: "Planned", follows: bool = True) -> "Planned | str":
+        """What the library runs with some settings; ``alone`` says how many numbers there are."""
+        pointer = settings.ctypes.data_as(ctypes.c_void_p)
+        bad = self.bad_setting(pointer)
+        if bad is not None:
+            return f"{bad.decode()} is out of range or contradicts another"
+        if not self.size(pointer):
+            return OTHER_PROGRAM
+        every = settings.copy()
+        if follows and self.library.following is not None:
+            self.c.follow(_handed(settings), _handed(every))
+        parameters, states, counts = np.zeros(alone.parameters.size), np.zeros(alone.states.size), np.zeros(len(COUNTS))
+        self.c.prepare(*map(_handed, (every, parameters, states, counts)))
+        return Planned(parameters, states, (*counts.tolist()[:5], alone.clock[5]))
+
+
+def at_library(name: str, count: int, seed: int) -> Judged:
+    """Settings of an exported library in C, as FMU and plugin have them: SI units, all others as they are."""
+    found, base = Judged(), load_exportable(name)
+    with tempfile.TemporaryDirectory() as folder:
+        built = BuiltLibrary(base, Path(folder))
+        for words in settings_of(name, count, seed):
+            alone = single(name, words)
+            if isinstance(alone, str):
+                found.refused += 1
+                continue
+            door = built.planned(built.changed(_numbers_in_si(base, words)), alone)
+            if door == OTHER_PROGRAM:
+                found.other += 1
+            else:
+                found.compare(words, alone, door)
+    return found
+
+
+def _numbers_in_si(base: Scenario | Configuration, words: Words) -> dict[str, float]:
+    if isinstance(base, Scenario):
+        return in_si(base, words)
+    declared = {path: quantity for path, (quantity, _) in numbers_of_walk(base).items()}
+    zero = base.device.supply.atmospheric_pressure
+    if ATMOSPHERE_PATH in words:
+        zero = parse_quantity(words[ATMOSPHERE_PATH], "Pa_a")
+    return {path: parse_quantity(text, declared[path].unit, counts_from(path, zero)) for path, text in words.items()}
+
+
+def at_page(name: str, count: int, seed: int) -> Judged:
+    """Texts typed on the page that simulates: its script makes numbers of them, which a program is given."""
+    found, base = Judged(), load_exportable(name)
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        built = BuiltLibrary(base, folder)
+        told = description_of(base, built.library)
+        simulated = SimpleNamespace(module=SimpleNamespace(description=told), scenario=base, label=name)
+        content = page_content(name, "page", (), [{**program_content(simulated, "", {}), "usual": {}}])  # type: ignore[arg-type]
+        every = [
+            {path: text for path, text in words.items() if path in built.places}
+            for words in settings_of(name, count, seed)
+        ]
+        (folder / "content.json").write_text(json.dumps(content))
+        (folder / "configurations.json").write_text(json.dumps(every))
+        for words, line in zip(every, _page_values(folder), strict=True):
+            alone = single(name, words)
+            if isinstance(alone, str):
+                found.refused += 1
+            elif line.startswith("refused") and ("must stay" in line or "does not fit here" in line):
+                found.other += 1
+            elif line.startswith("refused"):
+                found.compare(words, alone, line)
+            else:
+                numbers = np.frombuffer(bytes.fromhex(line), dtype=np.float64).copy()
+                door = built.planned(numbers, alone, follows=False)
+                if door == OTHER_PROGRAM:
+                    found.other += 1
+                else:
+                    found.compare(words, alone, door)
+    return found
+
+
+def _page_values(folder: Path) -> list[str]:
+    """Lines of ``page_values.mjs``; the script of the page is bundled first."""
+    page, here = Path(__file__).parents[1] / "page", Path(__file__).parent
+    options = "{entryPoints: ['source/settings.ts'], bundle: true, format: 'esm', outfile: process.argv[1]}"
+    build = f"require('esbuild').buildSync({options})"
+    subprocess.run(["node", "-e", build, str(folder / "settings.mjs")], cwd=page, check=True)
+    files = [str(folder / name) for name in ("settings.mjs", "content.json", "configurations.json")]
+    done = subprocess.run(["node", str(here / "page_values.mjs"), *files], check=True, capture_output=True, text=True)
+    return done.stdout.splitlines()
+
+
+Door = Callable[[str, int, int], Judged]
+DOORS: Mapping[str, tuple[Door, Sequence[str]]] = {
+    "study": (at_study, list_scenarios()),
+    "numbers": (at_numbers, list_scenarios()),
+    "page": (at_page, (*list_scenarios(), *list_walks())),
+    "library": (at_library, (*list_scenarios(), *list_walks())),
+}
+"""Doors by name, and the items that can be taken through them."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Judge and print; 1 where a setting differs."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--settings", type=int, default=100, help="settings of each item at each door")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--doors", nargs="*", default=list(DOORS), choices=list(DOORS))
+    parser.add_argument("--items", nargs="*", default=None, help="names of scenarios and walks; all of the package")
+    given = parser.parse_args(arguments)
+    wrong = 0
+    for name in given.doors:
+        door, items = DOORS[name]
+        for item in items if given.items is None else [item for item in items if item in given.items]:
+            found = door(item, given.settings, given.seed)
+            wrong += len(found.differing)
+            print(f"{name:8} {item:28} {found.line}", flush=True)
+            for text in found.differing[:5]:
+                print(f"    differs: {text}", flush=True)
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

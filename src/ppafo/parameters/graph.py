@@ -1,0 +1,150 @@
+"""Settings are a graph: a number that nobody gives follows others. Links are declared once, one function resolves them.
+
+Every door takes its settings through here: overrides, columns of studies, tuned and fitted values, exported libraries
+and units, episodes of agents. So a setting means the same at all of them.
+"""
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.units import to_si
+
+ATMOSPHERE_PATH = "supply.atmospheric_pressure"
+PRESSURE_PATH, SECOND_PRESSURE_PATH = "supply.pressure", "supply.dorsiflexion_pressure"
+SAME_PRESSURE = 1.0e-6
+"""Relative difference below which two pressures are one that was written in two units."""
+_LEVEL, _GAUGE = "Pa_a", "_g"
+_COUNTS_FROM_ATMOSPHERE = ("supply.", "initial.")
+
+
+def itself(number: Any) -> Any:
+    """The number that is followed."""
+    return number
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """A function of other numbers, floats or arrays (runs,), that can be translated to C.
+
+    With ``names`` it takes its sources as one mapping under these names, else one by one.
+    """
+
+    sources: tuple[str, ...]
+    function: Callable[..., Any] = itself
+    names: tuple[str, ...] = ()
+
+    def number(self, present: Callable[[str], Any]) -> Any:
+        """Return what the function makes of what the sources are at ``present``."""
+        given = [present(source) for source in self.sources]
+        return self.function(dict(zip(self.names, given, strict=True))) if self.names else self.function(*given)
+
+
+@dataclass(frozen=True, slots=True)
+class Follows:
+    """How a number is made of others, in SI units, as long as it is not given itself: the sum of terms and a gap.
+
+    ``when_set``: only where the first source is given itself, not where that one only follows another in its turn.
+    """
+
+    terms: tuple[Term, ...]
+    gap: float = 0.0
+    when_set: bool = False
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """What is followed."""
+        return tuple(source for term in self.terms for source in term.sources)
+
+    @property
+    def is_same(self) -> bool:
+        """Whether the number is that of its source."""
+        return not self.gap and [term.function for term in self.terms] == [itself]
+
+    def number(self, present: Callable[[str], Any]) -> Any:
+        """Return what follows from what the sources are at ``present``."""
+        first, *others = (term.number(present) for term in self.terms)
+        found = sum(others, first)
+        return found + self.gap if self.gap else found
+
+
+def follows(source: str, gap: float = 0.0, when_set: bool = False) -> Follows:
+    """Return the link to one number, with what is added to it."""
+    return Follows((Term((source,)),), gap, when_set)
+
+
+Graph = Mapping[str, tuple[Follows, ...]]
+"""Links by the path of what follows; of several the first whose sources change counts. Sources stand before those."""
+
+
+def counts_from(path: str, atmosphere: float) -> float:
+    """Return from which pressure [Pa absolute] a gauge pressure at a path counts.
+
+    Pressures of the supply and of the start count from the atmosphere of the device; what a controller or a sensor is
+    set to knows no weather and counts from the standard atmosphere.
+    """
+    return atmosphere if path.startswith(_COUNTS_FROM_ATMOSPHERE) else STANDARD_ATMOSPHERE
+
+
+def gauge_link(path: str, value: float, unit: str) -> tuple[Follows, ...]:
+    """Return the link of a pressure level that is given in gauge to the atmosphere; none for any other number."""
+    if not unit.endswith(_GAUGE) or path == ATMOSPHERE_PATH or not path.startswith(_COUNTS_FROM_ATMOSPHERE):
+        return ()
+    return (follows(ATMOSPHERE_PATH, to_si(value, unit, _LEVEL, 0.0)),)
+
+
+def acting(graph: Graph, given: Collection[str]) -> dict[str, Follows]:
+    """Return the links by which numbers change where those at some paths are given, in the order to resolve them."""
+    found: dict[str, Follows] = {}
+    for path, links in graph.items():
+        if path in given:
+            continue
+        for link in links:
+            if link.sources[0] in given or (
+                not link.when_set and any(source in given or source in found for source in link.sources)
+            ):
+                found[path] = link
+                break
+    return found
+
+
+def resolved(graph: Graph, given: Mapping[str, Any], present: Callable[[str], Any]) -> dict[str, Any]:
+    """Return all numbers that are given, and all that follow them; what stays is looked up at ``present``."""
+    found = dict(given)
+    for path, link in acting(graph, given).items():
+        found[path] = link.number(lambda source: found[source] if source in found else present(source))
+    return found
+
+
+def left(graph: Graph, given: Collection[str]) -> dict[str, tuple[Follows, ...]]:
+    """Return the links that remain once numbers are given: those of what is given go, as do those that it replaces."""
+    changed = acting(graph, given)
+    return {
+        path: (changed[path],) if path in changed and changed[path].when_set else links
+        for path, links in graph.items()
+        if path not in given
+    }
+
+
+def holding(graph: Graph, present: Callable[[str], Any]) -> dict[str, tuple[Follows, ...]]:
+    """Return the links that are still true of numbers which may have been changed by other means since."""
+    found = {path: tuple(link for link in links if _holds(path, link, present)) for path, links in graph.items()}
+    return {path: links for path, links in found.items() if links}
+
+
+def _holds(path: str, link: Follows, present: Callable[[str], Any]) -> bool:
+    number, followed = present(path), link.number(present)
+    if link.when_set:
+        return bool(np.all(np.isclose(number, followed, rtol=SAME_PRESSURE, atol=0.0)))
+    return bool(np.all(number == followed))
+
+
+def joined(parts: Iterable[Graph]) -> dict[str, tuple[Follows, ...]]:
+    """Return several graphs as one; those of sources come first."""
+    found: dict[str, tuple[Follows, ...]] = {}
+    for part in parts:
+        found |= part
+    return found

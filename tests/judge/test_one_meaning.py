@@ -1,0 +1,50 @@
+"""A setting means the same at every door: words of a user, drawn, against the single run with them."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from ppafo.simulation import numbers
+from ppafo.simulation.loading import list_scenarios
+from scripts.one_meaning import at_library, at_numbers, at_page, at_study
+
+PAGE = Path(__file__).parents[2] / "page" / "node_modules" / "esbuild"
+needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
+needs_node = pytest.mark.skipif(shutil.which("node") is None or not PAGE.exists(), reason="no script of the page")
+
+
+@pytest.mark.parametrize("name", list_scenarios())
+def test_columns_of_a_study_are_single_runs_with_the_same_words(name: str) -> None:
+    found = at_study(name, 60, seed=11)
+    assert found.differing == []
+    assert found.same > 30
+
+
+@pytest.mark.parametrize("name", list_scenarios())
+def test_replaced_numbers_are_single_runs_with_the_same_words(name: str) -> None:
+    found = at_numbers(name, 15, seed=12)
+    assert found.differing == []
+    assert found.same > 8
+
+
+@needs_gcc
+@pytest.mark.parametrize("name", ["torque-task-slow-valve", "proportional-learning"])
+def test_settings_of_a_library_are_single_runs_with_the_same_words(name: str) -> None:
+    found = at_library(name, 20, seed=13)
+    assert found.differing == []
+    assert found.same > 8
+
+
+@needs_gcc
+@needs_node
+@pytest.mark.parametrize("name", ["torque-task-proportional", "solenoid-regulators"])
+def test_texts_on_a_page_are_single_runs_with_the_same_words(name: str) -> None:
+    found = at_page(name, 20, seed=14)
+    assert found.differing == []
+    assert found.same > 8
+
+
+def test_a_door_at_which_nothing_follows_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(numbers, "links_that_hold", lambda _: {})
+    assert len(at_study("torque-task-solenoid", 60, seed=11).differing) > 5
