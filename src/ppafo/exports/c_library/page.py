@@ -1,14 +1,17 @@
 """What the page of an exported library says of the scenario or walk that it was made from."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
-from ppafo.exports.c_library.walk_preparation import sensors_that_fail
 from ppafo.metrics.catalog import METRICS
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
-from ppafo.walking.configuration import Configuration
+
+if TYPE_CHECKING:
+    from ppafo.walking.configuration import Configuration
+    from ppafo.walking.sensor_settings import FaultSettings
 
 _METRICS_OF_SCENARIO = """\
 They are those of a study (`ppafo sweep`), to the bit. In `ppafo simulate` the same are computed from the recording,
@@ -51,9 +54,9 @@ def words_of(scenario: Scenario) -> dict[str, str]:
     }
 
 
-def words_of_walk(configuration: Configuration) -> dict[str, str]:
-    """What the page of the library says of this walk."""
-    faults = [f"{sensor} `{item.kind}`" for sensor, item in sensors_that_fail(configuration).items()]
+def words_of_walk(configuration: "Configuration", failing: "Mapping[str, FaultSettings]") -> dict[str, str]:
+    """What the page of the library says of this walk, some of whose sensors are ``failing``."""
+    faults = [f"{sensor} `{item.kind}`" for sensor, item in failing.items()]
     course = configuration.course
     way = "stride after equal stride" if course is None else f"the course `{course.name}`, which stays as it is"
     fixed = [

@@ -9,7 +9,7 @@ from ppafo.engine.program import LaneResult, LaneTiming, Program
 from ppafo.engine.rows import leaf_paths, numbers, row_expression
 from ppafo.engine.run import NEVER_FAILED, initial_masses, whole_and_rest
 from ppafo.engine.scheme.parts import Pace
-from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.source_text import Collector
 from ppafo.exports.c_library.files import Setting, c_identifier
 from ppafo.exports.c_library.program import COUNTS
 from ppafo.model.actuators.kind import Range, mean_growth, plant_in_shape
@@ -33,7 +33,7 @@ FLAWS = ("angle_noise", "pressure_noise", "angle_resolution", "pressure_resoluti
 class Writing:
     """Writes lines for one device and program; what they call is gathered by ``add``."""
 
-    def __init__(self, device: Device, lines: SupplyLines | None, program: Program, collector: SourceCollector) -> None:
+    def __init__(self, device: Device, lines: SupplyLines | None, program: Program, collector: Collector) -> None:
         self.device = device
         self.lines = lines
         self.program = program
