@@ -62,7 +62,7 @@ def workbench(
     return page_of(title, content, modules)
 
 
-def live_part(scenarios: Sequence[str | Exportable]) -> LivePart | None:
+def live_part(scenarios: "Sequence[str | Exportable]") -> LivePart | None:
     """Return a part of a page with the controls that matter most; None where one of the programs cannot be had.
 
     Of scenarios with one name only the first is in it.
@@ -76,7 +76,7 @@ def live_part(scenarios: Sequence[str | Exportable]) -> LivePart | None:
 
 
 def _content(
-    scenarios: Sequence[str | Exportable], overrides: Sequence[str], title: str, form: str
+    scenarios: "Sequence[str | Exportable]", overrides: Sequence[str], title: str, form: str
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Content of a page, and its modules by name; programs that are the same are there once."""
     simulated = _simulated(scenarios, overrides)
@@ -100,7 +100,7 @@ def known_intervals() -> Mapping[str, Interval]:
     return {path: (low, high) for path, (low, high) in told.items()}
 
 
-def _simulated(given: Sequence[str | Exportable], overrides: Sequence[str]) -> list[Simulated]:
+def _simulated(given: "Sequence[str | Exportable]", overrides: Sequence[str]) -> list[Simulated]:
     if not 1 <= len(given) <= MOST_SCENARIOS:
         raise ScenarioError(f"a workbench has 1 to {MOST_SCENARIOS} scenarios, not {len(given)}")
     loaded = [load_exportable(item, overrides) if isinstance(item, str) else item for item in given]
