@@ -5,6 +5,7 @@ nothing else depends on it.
 """
 
 import ast
+import contextlib
 import json
 import tomllib
 from collections.abc import Iterator
@@ -38,22 +39,18 @@ def _texts_in(value: Any) -> Iterator[str]:
 def known_units() -> dict[str, list[Any]]:
     """Return scale, offset and dimensions of each unit by its normal spelling."""
     found = {}
-    for text in texts_of_package():
-        try:
-            unit = _unit_of(text)
+    for unit in {unit for text in texts_of_package() for unit in _units_in(text)}:
+        with contextlib.suppress(UnitError):
             parsed = units.unit_by_pint(unit)
-        except UnitError:
-            continue
-        found[units.split_pressure_kind(unit)[0]] = [str(parsed.scale), str(parsed.offset), parsed.dimensions]
+            found[units.split_pressure_kind(unit)[0]] = [str(parsed.scale), str(parsed.offset), parsed.dimensions]
     return dict(sorted(found.items()))
 
 
-def _unit_of(text: str) -> str:
-    """The unit of a quantity such as ``50 psi_g``; a text without a number may be a unit itself."""
-    try:
-        return units.split_quantity(text)[1]
-    except UnitError:
-        return text
+def _units_in(text: str) -> Iterator[str]:
+    """A text as a unit, and as a quantity such as ``50 psi_g``."""
+    yield text
+    with contextlib.suppress(UnitError):
+        yield units.split_quantity(text)[1]
 
 
 def text_of(known: dict[str, list[Any]]) -> str:
