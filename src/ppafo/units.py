@@ -7,13 +7,18 @@ Three rules go beyond arithmetic:
   ``Pa_a`` and a difference ``Pa_d``.
 - An angle is a dimension: ``75`` is no angle, ``75 deg`` is, and ``rad/s`` is not ``Hz``.
 - Only the units listed here exist. A short list makes a misspelling an error and the start quick.
+
+pint reads units. What it says of those in the files of the package is kept in ``known_units.json``, so that most
+processes start without it; ``scripts/known_units.py`` writes that file.
 """
 
 import functools
+import json
 import math
 import re
 from decimal import Decimal
-from typing import TYPE_CHECKING, Any
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.errors import UnitError, nearest_name
@@ -67,6 +72,17 @@ _EXPRESSION = re.compile(rf"(?:1|{_PRODUCT})(?:/(?:{_FACTOR}|\({_PRODUCT}\)))*")
 _SPELLINGS = str.maketrans({"²": "^2", "³": "^3", "·": " ", "*": " ", "°": "deg", "μ": "µ", "%": "percent"})
 
 
+class ParsedUnit(NamedTuple):
+    """What a unit is: a value in base units (m, kg, s, K, mol, rad) is ``scale`` times the one in it plus ``offset``.
+
+    ``dimensions`` are the powers of the base dimensions, such as ``[mass]`` and ``[angle]``.
+    """
+
+    scale: Decimal
+    offset: Decimal
+    dimensions: dict[str, int]
+
+
 def split_quantity(text: str) -> tuple[float, str]:
     """Return number and unit of a text such as ``12.6mm^2``, ``50 psi_g`` or ``0.4 1/s``; the unit may be empty."""
     stripped = text.strip()
@@ -116,14 +132,13 @@ def check_unit(unit: str) -> None:
 def base_value(value: float, unit: str) -> float:
     """Return ``value`` in the base units (m, kg, s, K, mol, rad) of its own unit, whatever its dimension is."""
     parsed, kind = _parse_unit(unit)
-    exact = Decimal(repr(_finite(value, value)))
-    base = float(_registry().Quantity(exact, parsed).to_base_units().magnitude)
+    base = float(Decimal(repr(_finite(value, value))) * parsed.scale + parsed.offset)
     return base + (STANDARD_ATMOSPHERE if kind == "g" else 0.0)
 
 
 def dimension(unit: str) -> dict[str, int]:
     """Return the powers of the base dimensions of a unit, such as ``[mass]`` and ``[angle]``."""
-    return {name: round(float(str(power))) for name, power in _parse_unit(unit)[0].dimensionality.items()}
+    return dict(_parse_unit(unit)[0].dimensions)
 
 
 @functools.lru_cache(maxsize=512)
@@ -131,13 +146,13 @@ def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
     """Return scale, offset and whether the atmosphere is to be added; in decimals, so that 8.4 g is 0.0084 kg."""
     given, kind = _parse_unit(unit)
     wanted, _ = _parse_unit(si_unit)
-    if given.dimensionality != wanted.dimensionality:
+    if given.dimensions != wanted.dimensions:
         raise UnitError(f"{_quote_unit(unit)} does not fit: {_describe_unit(si_unit)}")
     _check_kind(unit, kind, si_unit)
-    quantity = _registry().Quantity
-    offset = quantity(Decimal(0), given).to(wanted).magnitude
-    scale = quantity(Decimal(1), given).to(wanted).magnitude - offset
-    return scale, offset, kind == "g" and si_unit == _LEVEL
+    counts_from_atmosphere = kind == "g" and si_unit == _LEVEL
+    if wanted.scale == 1 and wanted.offset == 0:
+        return given.scale, given.offset, counts_from_atmosphere
+    return given.scale / wanted.scale, (given.offset - wanted.offset) / wanted.scale, counts_from_atmosphere
 
 
 def _check_kind(unit: str, kind: str, si_unit: str) -> None:
@@ -168,13 +183,27 @@ def _quote_unit(unit: str) -> str:
 
 
 @functools.lru_cache(maxsize=512)
-def _parse_unit(unit: str) -> "tuple[pint.Unit, str]":
-    """Return pint's unit of a text, and ``g``, ``a`` or ``d`` for a pressure that says so; else an empty text."""
+def _parse_unit(unit: str) -> tuple[ParsedUnit, str]:
+    """Return what a unit is, and ``g``, ``a`` or ``d`` for a pressure that says so; else an empty text."""
+    bare, kind = split_pressure_kind(unit)
+    parsed = known_units().get(bare) or unit_by_pint(unit)
+    if kind and parsed.dimensions != known_units()["Pa"].dimensions:
+        raise UnitError(f"'{unit}': {_KIND_BELONGS}")
+    return parsed, kind
+
+
+@functools.cache
+def known_units() -> dict[str, ParsedUnit]:
+    """Return what is kept of units, by their normal spelling."""
+    told = json.loads((files("ppafo") / "known_units.json").read_text(encoding="utf-8"))
+    return {unit: ParsedUnit(Decimal(scale), Decimal(offset), powers) for unit, (scale, offset, powers) in told.items()}
+
+
+def unit_by_pint(unit: str) -> ParsedUnit:
+    """Return what pint makes of a unit, be it gauge, absolute or a difference; UnitError where it does not exist."""
     import pint
 
-    normal = _normal(unit)
-    pressure = _PRESSURE_KIND.fullmatch(normal)
-    bare, kind = (pressure[1], pressure[2]) if pressure else (normal, "")
+    bare, _ = split_pressure_kind(unit)
     try:
         parsed = _registry().parse_units(bare.replace("^", "**").replace(" ", "*"))
     except pint.UndefinedUnitError as error:
@@ -184,9 +213,16 @@ def _parse_unit(unit: str) -> "tuple[pint.Unit, str]":
         raise _unknown_unit(bare) from error
     except pint.OffsetUnitCalculusError as error:  # milli of a temperature that has another zero
         raise UnitError(f"'{unit}': degC takes no prefix; give degC or K") from error
-    if kind and parsed.dimensionality != _registry().parse_units("Pa").dimensionality:
-        raise UnitError(f"'{unit}': {_KIND_BELONGS}")
-    return parsed, kind
+    zero, one = (_registry().Quantity(Decimal(number), parsed).to_base_units().magnitude for number in (0, 1))
+    powers = {name: round(float(str(power))) for name, power in parsed.dimensionality.items()}
+    return ParsedUnit(one - zero, zero, powers)
+
+
+def split_pressure_kind(unit: str) -> tuple[str, str]:
+    """Return a unit in its normal spelling without ``_g``, ``_a`` or ``_d`` at its end, and that letter."""
+    normal = _normal(unit)
+    pressure = _PRESSURE_KIND.fullmatch(normal)
+    return (pressure[1], pressure[2]) if pressure else (normal, "")
 
 
 def _normal(unit: str) -> str:

@@ -10,7 +10,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ppafo.errors import UnitError
-from ppafo.units import base_value, check_unit, format_quantity, from_si, parse_quantity, split_quantity, to_si
+from ppafo.units import (
+    ParsedUnit,
+    base_value,
+    check_unit,
+    format_quantity,
+    from_si,
+    known_units,
+    parse_quantity,
+    split_quantity,
+    to_si,
+    unit_by_pint,
+)
 
 PAIRS = [
     ("mm^2", "m^2"),
@@ -171,6 +182,20 @@ def test_any_text_is_a_quantity_or_a_clear_error(text: str) -> None:
 def test_importing_the_module_does_not_load_pint() -> None:
     code = "import sys, ppafo.units; sys.exit('pint' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_what_is_kept_of_a_unit_is_what_pint_says_of_it() -> None:
+    def described(parsed: ParsedUnit) -> tuple[str, str, dict[str, int]]:
+        return str(parsed.scale), str(parsed.offset), parsed.dimensions
+
+    assert len(known_units()) > 50
+    for unit, parsed in known_units().items():
+        assert described(parsed) == described(unit_by_pint(unit)), f"{unit}: python scripts/known_units.py"
+
+
+def test_a_unit_of_which_nothing_is_kept_is_read_by_pint() -> None:
+    assert "lbf ft/deg" not in known_units()
+    assert to_si(2.0, "lbf ft/deg", "N m/rad") == pytest.approx(2.0 * 4.4482216152605 * 0.3048 * 180.0 / math.pi)
 
 
 @pytest.mark.parametrize("unit", ["mm^0", "degC^0", "percent^0", "m/s^0", "m^-0"])

@@ -14,13 +14,13 @@ Model = TypeVar("Model", bound=BaseModel)
 NAME = r"^[a-z0-9][a-z0-9_-]*$"
 """What the name of a set or scenario looks like."""
 
-STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
-"""What is true of every table of a file: no other keys, no other types, finite numbers."""
+STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
+"""What is true of every table of a file: no other keys, no other types, finite numbers; made ready when it is read."""
 
 Text = Annotated[str, Field(min_length=1)]
 Texts = Annotated[tuple[Text, ...], Field(strict=False)]
 
-_CONFIG = ConfigDict(strict=True, extra="forbid", frozen=True)
+_CONFIG = ConfigDict(strict=True, extra="forbid", frozen=True, defer_build=True)
 
 
 def table(name: str, fields: dict[str, Any]) -> type[BaseModel]:

@@ -8,7 +8,7 @@ from typing import Any, final
 
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
-from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.source_text import Collector
 
 LANES = 32
 """Most runs of a block."""
@@ -46,7 +46,7 @@ class LaneRows:
     wait for others keep, where few do: the state, what was left of the step, and what it was handed.
     """
 
-    def __init__(self, program: Program, collector: SourceCollector, lanes: int = 0) -> None:
+    def __init__(self, program: Program, collector: Collector, lanes: int = 0) -> None:
         self.program = program
         self.lanes = lanes or lanes_of(program)
         self.add: Callable[[Callable[..., Any] | type], str] = collector.add

@@ -6,7 +6,7 @@ from ppafo.engine.lane_rows import VECTOR, LaneRows, indent, over_lanes
 from ppafo.engine.lane_step import find_begin, over_rows, plant_loop
 from ppafo.engine.program import Program
 from ppafo.engine.scheme.shaped_gas import links_of
-from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.source_text import Collector, SourceCollector
 
 HEADER = '''"""Generated from the functions of ppafo; their hash is in the file name. Not to be edited."""
 
@@ -63,13 +63,13 @@ def lane_source(program: Program) -> str:
     return write_lanes(program, SourceCollector(INLINE))
 
 
-def write_lanes(program: Program, collector: SourceCollector, lanes: int = 0) -> str:
+def write_lanes(program: Program, collector: Collector, lanes: int = 0) -> str:
     """Source text of a program of some lanes, 0 for as many as fit; ``collector`` then has all that it is made from."""
     advance = lane_loop(program, collector, "advance", lanes)
     return f"{HEADER}\n\n{collector.text()}\n\n\n{advance}\n"
 
 
-def lane_loop(program: Program, collector: SourceCollector, name: str, lanes: int = 0) -> str:
+def lane_loop(program: Program, collector: Collector, name: str, lanes: int = 0) -> str:
     """The function that runs one block of a program, of some lanes, 0 for as many as fit.
 
     That of one lane takes the first column of its arrays, however many there are.

@@ -16,9 +16,11 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.engine.kept import kept
 from ppafo.engine.lane_rows import VECTOR, lanes_of
 from ppafo.engine.lane_source import INLINE, SAME_MOMENT, write_lanes
 from ppafo.engine.loading import load_source, load_sources
+from ppafo.engine.outline import Outline
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
 
@@ -98,18 +100,20 @@ def load_programs(programs: Iterable[Program]) -> None:
 
 def _current_source(program: Program) -> str:
     """The source of a program, written anew where it is out of date."""
-    collector, source = write_source(program)
-    if collector.is_current():
+    outline, source = write_source(program)
+    if outline.is_current():
         return source
     write_source.cache_clear()
     return write_source(program)[1]
 
 
 @lru_cache(maxsize=64)
-def write_source(program: Program, lanes: int = 0) -> tuple[SourceCollector, str]:
-    """What a program is made from, and its source for some lanes, 0 for as many as fit."""
-    collector = SourceCollector(INLINE)
-    return collector, write_lanes(program, collector, lanes)
+def write_source(program: Program, lanes: int = 0) -> tuple[Outline, str]:
+    """What a program is made from, and its source for some lanes, 0 for as many as fit; written once, then kept."""
+    outline = Outline(INLINE)
+    made_from = write_lanes(program, outline, lanes)
+    source = kept("lanes", made_from, lambda: write_lanes(program, SourceCollector(INLINE), lanes).encode())
+    return outline, source.decode()
 
 
 def run_batch(batch: Batch, threads: int | None = None) -> BatchResult:

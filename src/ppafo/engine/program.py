@@ -1,7 +1,8 @@
 """Which compiled pieces a run is made of."""
 
 from dataclasses import dataclass
-from typing import NamedTuple, get_type_hints
+from functools import cache
+from typing import Any, NamedTuple, get_type_hints
 
 from ppafo.control.controllers import constant as constant_controller
 from ppafo.control.kind import ControllerKind, ProfileKind
@@ -195,7 +196,7 @@ class Program:
         fed, free_gas = (FedThermalGas, ThermalGas) if self.is_thermal else (FedGas, MovingGas)
         gas = fed if self.has_lines else (StillGas if self.keeps_volumes else free_gas)
         change = ThermalFlows if self.is_thermal else GasChange
-        _, shown, _ = get_type_hints(self.valve.connect).values()
+        shown = _shown_by(self.valve.connect)
         return {
             **({"place": GaitPlace} if self.walks and not self.takes_course else {}),
             **({"next_gait": GaitNow} if self.walks else {}),
@@ -212,3 +213,10 @@ class Program:
             **({"next_valve": self.valve.state} if self.is_parted else {}),
             **({"next_lines": LineState} if self.is_parted and self.has_lines else {}),
         }
+
+
+@cache
+def _shown_by(connect: Any) -> Any:
+    """The class of what a valve shows beside its openings, from the function that connects it."""
+    _, shown, _ = get_type_hints(connect).values()
+    return shown

@@ -9,11 +9,11 @@ import ast
 import inspect
 import re
 import textwrap
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field
 from types import CodeType, FunctionType, ModuleType
-from typing import Any, Generic, NamedTuple
+from typing import Any, Generic, NamedTuple, Protocol
 
 from ppafo.engine.composed_names import Composer, is_row
 from ppafo.engine.plain_python import check_flow, check_grammar, parse_module, place, refusal
@@ -52,6 +52,16 @@ def without_origins(source: str) -> str:
     return "\n".join(line for line in source.split("\n") if not line.startswith(ORIGIN))
 
 
+def is_unchanged(reads: Iterable[Read], functions: Iterable[Made]) -> bool:
+    """True while every name stands for what it stood for, and every function is what it was."""
+    return all(read.scope.get(read.name, read) is read.value for read in reads) and all(
+        made.function.__code__ is made.code
+        and made.function.__defaults__ is made.defaults
+        and (made.function.__kwdefaults__ or {}) == made.named_defaults
+        for made in functions
+    )
+
+
 Adaptation = Callable[[FunctionType, ast.FunctionDef], ast.FunctionDef]
 """Makes a definition one of the part of Python that is compiled; it is handed a copy of its own."""
 
@@ -59,6 +69,20 @@ Adaptation = Callable[[FunctionType, ast.FunctionDef], ast.FunctionDef]
 def as_it_is(_function: FunctionType, tree: ast.FunctionDef) -> ast.FunctionDef:
     """The definition itself."""
     return tree
+
+
+class Collector(Protocol):
+    """Gathers definitions for the module around them: a ``SourceCollector`` writes them, an ``Outline`` hashes them."""
+
+    @property
+    def links(self) -> dict[Any, Any]:
+        """Functions that stand for others."""
+
+    def add(self, item: Callable[..., Any] | type) -> str:
+        """Add a function or NamedTuple class and all that it needs; return the name it has in the module."""
+
+    def text(self) -> str:
+        """What stands for all definitions in the module."""
 
 
 @dataclass(slots=True)
@@ -98,12 +122,7 @@ class SourceCollector:
 
     def is_current(self) -> bool:
         """True while every name and function that was composed is what it was then."""
-        return all(read.scope.get(read.name, read) is read.value for read in self.reads) and all(
-            made.function.__code__ is made.code
-            and made.function.__defaults__ is made.defaults
-            and (made.function.__kwdefaults__ or {}) == made.named_defaults
-            for made in self.functions
-        )
+        return is_unchanged(self.reads, self.functions)
 
     def _check_is_the_same(self, item: Any, owner: Any, name: str) -> None:
         """Refuse a second thing of the same name, unless it is the same text, as after a module was loaded anew."""
@@ -159,13 +178,15 @@ def check_is_plain(function: Any) -> None:
         if type(function).__module__ == "builtins" and type(function).__name__ == "builtin_function_or_method":
             raise ProgramError(f"cannot compile {name}: its source text is not available")
         raise ProgramError(f"cannot compile {name}: it must be a plain function defined with 'def'")
-    where = place_of(function)
     if hasattr(function, "__wrapped__"):
-        raise ProgramError(f"{where}: '{name}' is wrapped by a decorator, which cannot be compiled; remove it")
+        raise ProgramError(
+            f"{place_of(function)}: '{name}' is wrapped by a decorator, which cannot be compiled; remove it"
+        )
     if function.__closure__:
         names = ", ".join(f"'{item}'" for item in function.__code__.co_freevars)
         raise ProgramError(
-            f"{where}: '{name}' uses {names} of the function around it, which cannot be compiled; make it a parameter"
+            f"{place_of(function)}: '{name}' uses {names} of the function around it, which cannot be compiled; "
+            "make it a parameter"
         )
 
 

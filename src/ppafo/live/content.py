@@ -14,6 +14,7 @@ from importlib.resources import files
 from typing import Any
 
 from ppafo.errors import UnitError
+from ppafo.exports.loading import Exportable
 from ppafo.exports.wasm import WasmModule
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.simulation.declaration import PRESSURE_WORDS
@@ -21,9 +22,6 @@ from ppafo.simulation.overriding import apply_overrides, is_of_device, split_ove
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import conversion, from_si, to_si
 from ppafo.version import __version__
-from ppafo.walking.configuration import Configuration
-from ppafo.walking.contradictions import COMPRESSION
-from ppafo.walking.walk import LONGEST_MINUTES, SHORTEST_STRIDES
 
 Interval = tuple[float, float]
 
@@ -51,13 +49,6 @@ _UNITS: dict[str, tuple[str, ...]] = {
 _GAUGES = ("psi_g", "kPa_g", "bar_g", "Pa_g")
 _OTHER_ATMOSPHERE = 90000.0
 _FIRST_STRIDE = "controller.first_stride_time"
-_OF_FILES = (
-    ("controller.highest_pressure", "supply.pressure", COMPRESSION),
-    ("controller.highest_pressure", "supply.dorsiflexion_pressure", COMPRESSION),
-    ("controller.frozen_time", "controller.period", 2.0),
-    ("controller.fill_time", "valve.delay", 1.0),
-    ("controller.vent_time", "valve.delay", 1.0),
-)
 _WALKED = 6
 """Length [s] of a walk in a page, unless somebody wants more: five strides."""
 _ABSOLUTE = ("largest_pressure",)
@@ -69,7 +60,7 @@ _NICE = (1.0, 2.0, 2.5, 5.0, 10.0)
 class Simulated:
     """A scenario or walk and the module that simulates it; ``label`` tells it from others of its tab."""
 
-    scenario: Scenario | Configuration
+    scenario: Exportable
     module: WasmModule
     label: str
 
@@ -113,28 +104,43 @@ def program_content(item: Simulated, module: str, intervals: Mapping[str, Interv
     }
 
 
-def usual_changes(scenario: Scenario | Configuration) -> dict[str, str]:
+def usual_changes(scenario: Exportable) -> dict[str, str]:
     """Return the changes that a configuration of a page begins with, texts by key: a walk is short."""
     if isinstance(scenario, Scenario):
         return {}
+    from ppafo.walking.walk import SHORTEST_STRIDES
+
     return {"run.duration": f"{max(_WALKED, math.ceil(SHORTEST_STRIDES * scenario.gait.stride_time))} s"}
 
 
 def _relations_of_files(told: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Contradictions that the file of a walk refuses and its program does not."""
+    if told["kind"] != "walk":
+        return []
+    from ppafo.walking.contradictions import COMPRESSION
+
+    above = (
+        ("controller.highest_pressure", "supply.pressure", COMPRESSION),
+        ("controller.highest_pressure", "supply.dorsiflexion_pressure", COMPRESSION),
+        ("controller.frozen_time", "controller.period", 2.0),
+        ("controller.fill_time", "valve.delay", 1.0),
+        ("controller.vent_time", "valve.delay", 1.0),
+    )
     keys = {entry["key"] for entry in told["settings"]}
     return [
         {"key": key, "relation": "above", "other": other, "factor": factor, "slack": 0.0}
-        for key, other, factor in _OF_FILES
-        if told["kind"] == "walk" and {key, other} <= keys
+        for key, other, factor in above
+        if {key, other} <= keys
     ]
 
 
-def _as_in_files(entry: Mapping[str, Any], item: Scenario | Configuration) -> dict[str, Any]:
+def _as_in_files(entry: Mapping[str, Any], item: Exportable) -> dict[str, Any]:
     """A setting with what only Python knows of a walk: its stride and length, and which pressures are absolute."""
-    if isinstance(item, Configuration) and entry["key"] == _FIRST_STRIDE:
+    if not isinstance(item, Scenario) and entry["key"] == _FIRST_STRIDE:
         return {**entry, "minimum": 0.5 * item.gait.stride_time, "maximum": 2.0 * item.gait.stride_time}
-    if isinstance(item, Configuration) and entry["key"] == "run.duration":
+    if not isinstance(item, Scenario) and entry["key"] == "run.duration":
+        from ppafo.walking.walk import LONGEST_MINUTES, SHORTEST_STRIDES
+
         shortest = SHORTEST_STRIDES * item.gait.stride_time
         return {**entry, "minimum": shortest, "maximum": 60.0 * LONGEST_MINUTES, "is_minimum_allowed": True}
     if entry["group"] == "controller" and entry["display"]["unit"] == "psi_g":
@@ -257,7 +263,7 @@ def _shown(entry: Mapping[str, Any]) -> dict[str, str]:
     }
 
 
-def _gauge_texts(item: Scenario | Configuration, settings: Iterable[Mapping[str, Any]]) -> dict[str, str]:
+def _gauge_texts(item: Exportable, settings: Iterable[Mapping[str, Any]]) -> dict[str, str]:
     """Texts of the pressures that count from the atmosphere: they move with it, as they do in Python."""
     following = {entry["key"] for entry in settings if entry["follows"]}
     gaps = {

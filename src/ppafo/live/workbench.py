@@ -1,31 +1,25 @@
 """A workbench of scenarios and walks: which of them share a tab, what they are called there, and the page of them."""
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
+from importlib.resources import files
 from typing import Any
-
-import numpy as np
 
 from ppafo.answers import LivePart
 from ppafo.errors import PpafoError, ScenarioError
-from ppafo.exports.loading import load_exportable
+from ppafo.exports.loading import Exportable, load_exportable
 from ppafo.exports.wasm import module_of
 from ppafo.live.content import Interval, Simulated, page_content, program_content, usual_changes, words
 from ppafo.live.page import block_of, packed, page_of, policy_of_block
 from ppafo.live.start import check_start
 from ppafo.simulation.scenario import FreeMotion, Scenario
-from ppafo.studies.loading import load_study
-from ppafo.walking.configuration import Configuration
-
-Simulable = Scenario | Configuration
 
 TITLE = "The powered ankle-foot orthosis, live"
 DEFAULT = ("torque-task-solenoid", "torque-task-proportional", "step-response", "solenoid")
 MOST_SCENARIOS = 24
 _OPEN = 2
 """Configurations that a tab opens with."""
-_STUDY = "torque-task-uncertainty"
-_ENDS = (0.025, 0.975)
 _LABELS = {
     "torque-task-solenoid": "Solenoid pair",
     "torque-task-proportional": "Proportional valve",
@@ -68,7 +62,7 @@ def workbench(
     return page_of(title, content, modules)
 
 
-def live_part(scenarios: Sequence[str | Simulable]) -> LivePart | None:
+def live_part(scenarios: "Sequence[str | Exportable]") -> LivePart | None:
     """Return a part of a page with the controls that matter most; None where one of the programs cannot be had.
 
     Of scenarios with one name only the first is in it.
@@ -82,7 +76,7 @@ def live_part(scenarios: Sequence[str | Simulable]) -> LivePart | None:
 
 
 def _content(
-    scenarios: Sequence[str | Simulable], overrides: Sequence[str], title: str, form: str
+    scenarios: "Sequence[str | Exportable]", overrides: Sequence[str], title: str, form: str
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Content of a page, and its modules by name; programs that are the same are there once."""
     simulated = _simulated(scenarios, overrides)
@@ -98,17 +92,19 @@ def _content(
 
 @cache
 def known_intervals() -> Mapping[str, Interval]:
-    """Return 95 % intervals in SI, by key, of numbers of which the set does not say how well they are known."""
-    ends = np.array(_ENDS)
-    drawn = {item.path: item.distribution.values(ends) for item in load_study(_STUDY).drawn}
-    return {path: (float(low), float(high)) for path, (low, high) in drawn.items()}
+    """Return 95 % intervals in SI, by key, of numbers of which the set does not say how well they are known.
+
+    They are those of a study, which takes long to read: ``scripts/known_intervals.py`` writes the file.
+    """
+    told = json.loads(files("ppafo.live").joinpath("intervals.json").read_text(encoding="utf-8"))
+    return {path: (low, high) for path, (low, high) in told.items()}
 
 
-def _simulated(given: Sequence[str | Simulable], overrides: Sequence[str]) -> list[Simulated]:
+def _simulated(given: "Sequence[str | Exportable]", overrides: Sequence[str]) -> list[Simulated]:
     if not 1 <= len(given) <= MOST_SCENARIOS:
         raise ScenarioError(f"a workbench has 1 to {MOST_SCENARIOS} scenarios, not {len(given)}")
     loaded = [load_exportable(item, overrides) if isinstance(item, str) else item for item in given]
-    found: dict[str, Simulable] = {}
+    found: dict[str, Exportable] = {}
     for scenario in loaded:
         if scenario.name in found:
             raise ScenarioError(f"two scenarios are called '{scenario.name}'; a workbench tells them apart by name")
@@ -116,7 +112,7 @@ def _simulated(given: Sequence[str | Simulable], overrides: Sequence[str]) -> li
     return [Simulated(scenario, module_of(scenario), _label(scenario)) for scenario in loaded]
 
 
-def _label(scenario: Simulable) -> str:
+def _label(scenario: Exportable) -> str:
     words_of_name = scenario.name.replace("-", " ").replace("_", " ")
     return _LABELS.get(scenario.name, words_of_name[:1].upper() + words_of_name[1:])
 
@@ -128,8 +124,8 @@ def _tabs(simulated: Sequence[Simulated]) -> list[dict[str, Any]]:
     return [_tab(title, group) for title, group in groups.items()]
 
 
-def _task(scenario: Simulable) -> str:
-    if isinstance(scenario, Configuration):
+def _task(scenario: Exportable) -> str:
+    if not isinstance(scenario, Scenario):
         return _WALK
     motion = scenario.motion
     if isinstance(motion, FreeMotion):

@@ -9,6 +9,8 @@ from bisect import bisect_right
 from typing import NamedTuple
 
 Column = tuple[float, ...]
+Nodes = tuple[int, float]
+"""Number of the node below a place, and the fraction of the way to the next."""
 
 _HALVINGS = 80
 
@@ -37,23 +39,19 @@ def has_liquid(table: FluidTable) -> bool:
 
 def densest_gas(table: FluidTable, temperature: float) -> float:
     """Density [kg/m^3] of the densest gas at a temperature [K]: saturated vapour where the fluid has a liquid."""
-    return _along(table.densest, *_place(table.temperatures, temperature))
+    return between(table.densest, nodes_around(table, temperature))
 
 
 def liquid_density(table: FluidTable, temperature: float) -> float:
     """Density [kg/m^3] of the liquid under its own vapour at a temperature [K]."""
-    return _along(table.liquid_densities, *_place(table.temperatures, temperature))
-
-
-def liquid_energy(table: FluidTable, temperature: float) -> float:
-    """Specific internal energy [J/kg] of the liquid under its own vapour at a temperature [K]."""
-    return _along(table.liquid_energies, *_place(table.temperatures, temperature))
+    return between(table.liquid_densities, nodes_around(table, temperature))
 
 
 def fluid_pressure(table: FluidTable, temperature: float, density: float) -> float:
     """Absolute pressure [Pa] of gas at a density [kg/m^3]; above the densest gas there is, that gas's pressure."""
-    held = min(density, densest_gas(table, temperature))
-    factor = _across(table.factors, table, temperature, density)
+    nodes = nodes_around(table, temperature)
+    held = min(density, between(table.densest, nodes))
+    factor = across(table.factors, table, nodes, density)
     return factor * held * table.gas_constant * temperature
 
 
@@ -71,23 +69,32 @@ def gas_density(table: FluidTable, temperature: float, pressure: float) -> float
 
 def gas_specific_energy(table: FluidTable, temperature: float, density: float) -> float:
     """Specific internal energy [J/kg] of gas at a density [kg/m^3], at most that of the densest gas there is."""
-    return _across(table.energies, table, temperature, density)
+    return across(table.energies, table, nodes_around(table, temperature), density)
 
 
-def _across(rows: tuple[Column, ...], table: FluidTable, temperature: float, density: float) -> float:
-    """Value at a temperature and a density, straight in the temperature and in the fraction of the densest gas."""
-    index, weight = _place(table.temperatures, temperature)
-    fraction = min(density / _along(table.densest, index, weight), 1.0)
+def nodes_around(table: FluidTable, temperature: float) -> Nodes:
+    """Place of a temperature [K] among those of the table; the ends of the table hold outside it."""
+    return _place(table.temperatures, temperature)
+
+
+def across(rows: tuple[Column, ...], table: FluidTable, nodes: Nodes, density: float) -> float:
+    """Value of some rows at a place among the temperatures and a density [kg/m^3], straight in both.
+
+    What runs straight is the fraction of the densest gas.
+    """
+    index, weight = nodes
+    fraction = min(density / between(table.densest, nodes), 1.0)
     place = _place(table.fractions, fraction)
-    return (1.0 - weight) * _along(rows[index], *place) + weight * _along(rows[index + 1], *place)
+    return (1.0 - weight) * between(rows[index], place) + weight * between(rows[index + 1], place)
 
 
-def _along(column: Column, index: int, weight: float) -> float:
+def between(column: Column, nodes: Nodes) -> float:
+    """Value of a column at a place among its nodes, in its own unit."""
+    index, weight = nodes
     return (1.0 - weight) * column[index] + weight * column[index + 1]
 
 
-def _place(nodes: Column, at: float) -> tuple[int, float]:
-    """Node below a place and the fraction of the way to the next; the ends of the table hold outside it."""
+def _place(nodes: Column, at: float) -> Nodes:
     index = min(max(bisect_right(nodes, at) - 1, 0), len(nodes) - 2)
     weight = (at - nodes[index]) / (nodes[index + 1] - nodes[index])
     return index, min(max(weight, 0.0), 1.0)

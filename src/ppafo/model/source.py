@@ -10,12 +10,14 @@ from typing import NamedTuple
 
 from ppafo.model.fluid_table import (
     FluidTable,
+    Nodes,
+    across,
+    between,
     densest_gas,
     fluid_pressure,
     gas_specific_energy,
     has_liquid,
-    liquid_density,
-    liquid_energy,
+    nodes_around,
 )
 from ppafo.model.gas import choked_flow_constant
 from ppafo.model.orifice import isentropic_flow_function
@@ -88,19 +90,24 @@ def bottle_content(table: FluidTable, mass: float, volume: float, temperature: f
 
 def liquid_mass(table: FluidTable, mass: float, volume: float, temperature: float) -> float:
     """Liquid [kg] in a bottle of a volume [m^3], from the densities of both phases; 0 where all is gas."""
-    vapour = densest_gas(table, temperature)
+    return _liquid_beside(table, mass, volume, nodes_around(table, temperature))
+
+
+def _liquid_beside(table: FluidTable, mass: float, volume: float, nodes: Nodes) -> float:
+    vapour = between(table.densest, nodes)
     if mass <= volume * vapour or not has_liquid(table):
         return 0.0
-    liquid = liquid_density(table, temperature)
+    liquid = between(table.liquid_densities, nodes)
     return min((mass - volume * vapour) / (1.0 - vapour / liquid), mass)
 
 
 def content_energy(table: FluidTable, mass: float, volume: float, temperature: float) -> float:
     """Internal energy [J] of the content of a bottle, at the reference of the table."""
-    liquid = liquid_mass(table, mass, volume, temperature)
-    gas = gas_specific_energy(table, temperature, mass / volume)
+    nodes = nodes_around(table, temperature)
+    liquid = _liquid_beside(table, mass, volume, nodes)
+    gas = across(table.energies, table, nodes, mass / volume)
     energy = (mass - liquid) * gas
-    return energy + liquid * liquid_energy(table, temperature) if liquid > 0.0 else energy
+    return energy + liquid * between(table.liquid_energies, nodes) if liquid > 0.0 else energy
 
 
 def content_temperature(table: FluidTable, mass: float, volume: float, energy: float) -> float:
@@ -110,24 +117,35 @@ def content_temperature(table: FluidTable, mass: float, volume: float, energy: f
     """
     nodes = table.temperatures
     below, above = 0, len(nodes) - 1
-    if energy <= content_energy(table, mass, volume, nodes[below]):
+    miss_below = content_energy(table, mass, volume, nodes[below]) - energy
+    miss_above = content_energy(table, mass, volume, nodes[above]) - energy
+    if miss_below >= 0.0:
         return nodes[below]
-    if energy >= content_energy(table, mass, volume, nodes[above]):
+    if miss_above <= 0.0:
         return nodes[above]
     while above - below > 1:
         middle = (below + above) // 2
-        if content_energy(table, mass, volume, nodes[middle]) <= energy:
-            below = middle
+        miss = content_energy(table, mass, volume, nodes[middle]) - energy
+        if miss <= 0.0:
+            below, miss_below = middle, miss
         else:
-            above = middle
-    return _between_nodes(table, mass, volume, energy, (nodes[below], nodes[above]))
+            above, miss_above = middle, miss
+    return _between_nodes(table, mass, volume, energy, (nodes[below], miss_below), (nodes[above], miss_above))
 
 
-def _between_nodes(table: FluidTable, mass: float, volume: float, energy: float, bracket: tuple[float, float]) -> float:
-    """Return the root between two nodes, by the Illinois form of false position: the energy grows with temperature."""
-    low, high = bracket
-    miss_low = content_energy(table, mass, volume, low) - energy
-    miss_high = content_energy(table, mass, volume, high) - energy
+def _between_nodes(
+    table: FluidTable,
+    mass: float,
+    volume: float,
+    energy: float,
+    below: tuple[float, float],
+    above: tuple[float, float],
+) -> float:
+    """Return the root between two nodes, each with how far its energy is off, by the Illinois form of false position.
+
+    The energy grows with temperature.
+    """
+    (low, miss_low), (high, miss_high) = below, above
     for _ in range(_MAXIMUM_HALVINGS):
         middle = (low * miss_high - high * miss_low) / (miss_high - miss_low)
         miss = content_energy(table, mass, volume, middle) - energy

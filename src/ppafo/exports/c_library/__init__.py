@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from ppafo.engine.program import Program
 from ppafo.engine.run import batch_of
@@ -10,23 +11,16 @@ from ppafo.exports.c_library.files import Library, Setting, Switch, c_identifier
 from ppafo.exports.c_library.page import choosing, words_of, words_of_walk
 from ppafo.exports.c_library.preparation import links_of, preparation_of, relations_of, settings_of
 from ppafo.exports.c_library.program import Further, exported
-from ppafo.exports.c_library.walk_preparation import (
-    check_can_leave,
-    links_of_walk,
-    preparation_of_walk,
-    relations_of_walk,
-    sensors_that_fail,
-    settings_of_walk,
-)
 from ppafo.exports.c_library.writing import following_text
+from ppafo.exports.loading import Exportable
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.preparation import step_counts
 from ppafo.simulation.scenario import Control, Scenario, Sensors
-from ppafo.walking.configuration import Configuration
-from ppafo.walking.planning import plan_walk
-from ppafo.walking.walk import plan_of, walk_duration
+
+if TYPE_CHECKING:
+    from ppafo.walking.configuration import Configuration
 
 _ARRAYS = {
     "given": "SETTINGS",
@@ -46,14 +40,14 @@ _FLAWS_OF_WALK = (
 )
 
 
-def c_library(item: Scenario | Configuration) -> dict[str, bytes]:
+def c_library(item: Exportable) -> dict[str, bytes]:
     """Files of a library in C by name. ProgramError for what cannot be translated, with file and line."""
     return library_files(library_of(item))
 
 
-def library_of(item: Scenario | Configuration) -> Library:
+def library_of(item: Exportable) -> Library:
     """The library of a scenario or a walk."""
-    return walk_library(item) if isinstance(item, Configuration) else scenario_library(item)
+    return scenario_library(item) if isinstance(item, Scenario) else walk_library(item)
 
 
 def scenario_library(scenario: Scenario) -> Library:
@@ -93,8 +87,19 @@ def commanded(scenario: Scenario) -> Scenario:
     )
 
 
-def walk_library(configuration: Configuration) -> Library:
+def walk_library(configuration: "Configuration") -> Library:
     """A library whose settings are all numbers of a walk; ScenarioError for one that cannot be exported."""
+    from ppafo.exports.c_library.walk_preparation import (
+        check_can_leave,
+        links_of_walk,
+        preparation_of_walk,
+        relations_of_walk,
+        sensors_that_fail,
+        settings_of_walk,
+    )
+    from ppafo.walking.planning import plan_walk
+    from ppafo.walking.walk import plan_of, walk_duration
+
     check_can_leave(configuration)
     if configuration.converter is not None:
         raise ProgramError(
@@ -103,6 +108,9 @@ def walk_library(configuration: Configuration) -> Library:
     run = plan_walk(plan_of(configuration, walk_duration(configuration)))
     program = exported(batch_of(run).program)
     settings, links = settings_of_walk(configuration), links_of_walk(configuration)
+    failing = sensors_that_fail(configuration)
+    # A sensor that fails is never ideal, whatever the settings are.
+    of_readings = [] if failing else [((*_FLAWS, *_FLAWS_OF_WALK), not program.program.ideal_sensors)]
     return Library(
         title=configuration.name,
         description=" ".join(configuration.description.split()),
@@ -110,9 +118,9 @@ def walk_library(configuration: Configuration) -> Library:
         settings=settings,
         relations=relations_of_walk(configuration),
         preparation=_preparing(settings),
-        switches=_switches(configuration.device, _of_readings(configuration, program.program)),
+        switches=_switches(configuration.device, of_readings),
         other_program=(f"(prepared->counts[COUNT_SIGNAL_DELAY] > 0.0) != {_truth(program.program.late_readings)}",),
-        words=words_of_walk(configuration, links),
+        words=words_of_walk(configuration, links, failing),
         further=lambda collector: preparation_of_walk(configuration, program.program, collector),
         following=_following(settings, links),
         defaults=frozenset(c_identifier(path) for path in links if not path.startswith("supply.")),
@@ -151,11 +159,6 @@ def _samples_elsewhere(program: Program) -> str:
     """True in C where samples lie between steps and did not, or the other way round."""
     interval = "prepared->counts[COUNT_INTERVAL]"
     return f"({interval} != (double)(int64_t){interval}) != {_truth(program.samples_inside)}"
-
-
-def _of_readings(configuration: Configuration, program: Program) -> list[tuple[Sequence[str], bool]]:
-    """The same of a walk; a sensor that fails is never ideal, whatever the settings are."""
-    return [] if sensors_that_fail(configuration) else [((*_FLAWS, *_FLAWS_OF_WALK), not program.ideal_sensors)]
 
 
 def _truth(value: bool) -> str:

@@ -11,7 +11,7 @@ from importlib.resources import files
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import SIGNAL_ROWS
 from ppafo.engine.run import NEVER_FAILED
-from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.source_text import Collector
 from ppafo.exports.c_library.program import COUNTS, IN_PARTS, WHOLE, ExportedProgram, Further, c_text
 from ppafo.model.declaration import Quantity
 from ppafo.version import __version__
@@ -158,7 +158,7 @@ def library_files(library: Library) -> dict[str, bytes]:
     title = f"{library.title}: the functions of ppafo {__version__} that a run is made of. Not to be edited."
     written = [add for add in (library.further, library.following) if add is not None]
 
-    def further(collector: SourceCollector) -> str:
+    def further(collector: Collector) -> str:
         return "\n\n".join(add(collector) for add in written)
 
     functions = c_text(program, title, [item.name for item in library.settings], further if written else None)

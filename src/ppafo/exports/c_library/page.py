@@ -1,16 +1,19 @@
 """What the page of an exported library says of the scenario or walk that it was made from."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from ppafo.exports.c_library.files import c_identifier
-from ppafo.exports.c_library.walk_preparation import sensors_that_fail
 from ppafo.metrics.catalog import METRICS
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.graph import Graph
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
-from ppafo.walking.configuration import Configuration
+
+if TYPE_CHECKING:
+    from ppafo.walking.configuration import Configuration
+    from ppafo.walking.sensor_settings import FaultSettings
 
 _METRICS_OF_SCENARIO = """\
 They are those of a study (`ppafo sweep`), to the bit. In `ppafo simulate` the same are computed from the recording,
@@ -60,9 +63,11 @@ def _followers(links: Graph) -> str:
     return _FOLLOWS.format(followers=", ".join(said) or "none")
 
 
-def words_of_walk(configuration: Configuration, links: Graph) -> dict[str, str]:
-    """What the page of the library says of this walk, in which settings follow others by ``links``."""
-    faults = [f"{sensor} `{item.kind}`" for sensor, item in sensors_that_fail(configuration).items()]
+def words_of_walk(
+    configuration: "Configuration", links: Graph, failing: "Mapping[str, FaultSettings]"
+) -> dict[str, str]:
+    """What the page of the library says of this walk: settings follow others by ``links``, some sensors ``failing``."""
+    faults = [f"{sensor} `{item.kind}`" for sensor, item in failing.items()]
     course = configuration.course
     way = "stride after equal stride" if course is None else f"the course `{course.name}`, which stays as it is"
     fixed = [

@@ -8,7 +8,7 @@ from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.engine.program import Program
 from ppafo.engine.replay import RECORDED_ANGLE, Segment
 from ppafo.engine.run import sensors_at_start
-from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.source_text import Collector
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
 from ppafo.exports.c_library.writing import Writing
 from ppafo.model.declaration import Quantity
@@ -110,7 +110,7 @@ def used_numbers(device: Device, declared: Mapping[str, Quantity]) -> dict[str, 
     return {path: item for path, item in declared.items() if path not in unused}
 
 
-def preparation_of(scenario: Scenario, program: Program, collector: SourceCollector) -> str:
+def preparation_of(scenario: Scenario, program: Program, collector: Collector) -> str:
     """The composed function ``prepare`` of a scenario, once everything it calls is gathered."""
     writing = Writing(scenario.device, scenario.supply_lines, program, collector)
     torque = "motion_external_torque" if isinstance(scenario.motion, FreeMotion) else "0.0"

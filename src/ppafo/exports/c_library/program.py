@@ -8,25 +8,23 @@ from typing import Protocol
 from ppafo.engine.lane_meters import REQUEST, TRACED, walk_traces
 from ppafo.engine.lane_rows import HANDED, indent
 from ppafo.engine.lane_source import HEADER, INLINE, lane_loop
+from ppafo.engine.outline import Outline
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.scheme.shaped_gas import links_of
-from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.source_text import Collector
 from ppafo.metrics.catalog import METRICS
 from ppafo.metrics.metric import Floats, Readings
 from ppafo.signals.meter import MeterKind
 from ppafo.simulation.ensemble.running import ThermalTotals, Totals, has_channels, thermal_totals, totals
-from ppafo.translation.c99 import c_source, documents_of
-from ppafo.translation.one_run import one_run_collector
-from ppafo.translation.walk import walk_module
-from ppafo.walking.stride_meters import stride_metrics_of
+from ppafo.translation.one_run import for_one_run, one_run_collector
 
 COUNTS = ("interval", "steps", "steps_per_sample", "signal_delay", "command_delay", "needs_parts")
 """Numbers of the steps of a run: steps from one sample to the next, in all, to a sample of the controller; delays.
 
 The last one is 1 where the error decides about the parts of a step, else 0.
 """
-Further = Callable[[SourceCollector], str]
+Further = Callable[[Collector], str]
 """Writes a further composed function, once it has gathered what that calls."""
 WHOLE, IN_PARTS = "advance", "advance_in_parts"
 """Names of the lane loops in C: of whole steps or of the one there is, and of steps in parts where there are both."""
@@ -103,6 +101,8 @@ def exported(program: Program) -> ExportedProgram:
     missing = _missing(program)
     metrics: tuple[MeteredMetric, ...]
     if program.walks:
+        from ppafo.walking.stride_meters import stride_metrics_of
+
         metrics = stride_metrics_of(program.takes_course, "reference" not in missing)
     else:
         metrics = tuple(kind for kind in METRICS.values() if has_channels(program, kind) and not kind.traced)
@@ -133,13 +133,11 @@ def c_text(
 
     With ``together`` each lane loop stands there once more, with ``TOGETHER`` after its name, for so many runs at once.
     """
+    from ppafo.translation.c99 import c_source, documents_of
+    from ppafo.translation.walk import walk_module
+
     collector = one_run_collector(INLINE)
-    collector.links.update(links_of(item.program.actuator))
-    entries = [metrics_entry(item, collector), *([] if further is None else [further(collector)])]
-    loops = [lane_loop(program, collector, name, lanes=1) for name, program in item.loops.items()]
-    if together:
-        loops += [lane_loop(program, collector, name + TOGETHER, together) for name, program in item.loops.items()]
-    composed = "\n\n".join([HEADER, collector.text(), *loops, *entries, ""])
+    composed = _composed_text(item, collector, further, together)
     state, parameter = list(item.state_places.values()), list(item.parameter_places.values())
     alone = [name.replace("AT_", "PARAMETER_", 1) for name in parameter]
     steps = {name: _stepping(program, _STEPS[name]) for name, program in item.loops.items()}
@@ -172,6 +170,22 @@ def c_text(
     return "\n".join([*counted, c_source(walk_module(composed), documents, title, places)])
 
 
+def outline_of(item: ExportedProgram, settings: Sequence[str], further: Further | None, together: int) -> str:
+    """All that ``c_text`` makes the same functions from but its title: the same outline, the same code."""
+    composed = _composed_text(item, Outline(INLINE, for_one_run), further, together)
+    names = [item.state_places, item.parameter_places, [kind.name for kind in item.metrics], list(settings)]
+    return f"{names!r}\n{composed}"
+
+
+def _composed_text(item: ExportedProgram, collector: Collector, further: Further | None, together: int) -> str:
+    collector.links.update(links_of(item.program.actuator))
+    entries = [metrics_entry(item, collector), *([] if further is None else [further(collector)])]
+    loops = [lane_loop(program, collector, name, lanes=1) for name, program in item.loops.items()]
+    if together:
+        loops += [lane_loop(program, collector, name + TOGETHER, together) for name, program in item.loops.items()]
+    return "\n\n".join([HEADER, collector.text(), *loops, *entries, ""])
+
+
 def _stepping(program: Program, prefix: str) -> list[str]:
     """Names of the places of what a step hands on, of its parts, and of what lies aside while lanes wait."""
     handed = [name.removeprefix("AT_") for name in places_of(program.step_rows()).values()]
@@ -190,7 +204,7 @@ def _enumeration(said: str, names: Sequence[str], first: int = 0) -> str:
     return f"/* {said} */\nenum {{\n{lines}\n}};\n"
 
 
-def metrics_entry(item: ExportedProgram, collector: SourceCollector) -> str:
+def metrics_entry(item: ExportedProgram, collector: Collector) -> str:
     """The metrics of a run, from its first and its last states."""
     program, groups = item.program, item.program.state_rows()
     names = [kind.name for kind in program.meters]
@@ -220,7 +234,7 @@ def metrics_entry(item: ExportedProgram, collector: SourceCollector) -> str:
     return "\n".join([*rows, METRICS_ENTRY, "def metrics(first, states, parameters, samples, found):", *indent(lines)])
 
 
-def _loaded(group: str, groups: Mapping[str, type], array: str, collector: SourceCollector) -> str:
+def _loaded(group: str, groups: Mapping[str, type], array: str, collector: Collector) -> str:
     """The NamedTuple of a group of rows, from an array of all of them."""
     paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
     cells = {path: f"{array}[{place}]" for place, path in enumerate(paths)}

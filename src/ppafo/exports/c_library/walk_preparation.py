@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from ppafo.control.walking.catalog import walking_controllers
 from ppafo.engine.program import Program
-from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.source_text import Collector
 from ppafo.errors import ScenarioError
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
 from ppafo.exports.c_library.preparation import SAID, used_numbers
@@ -173,7 +173,7 @@ def relations_of_walk(configuration: Configuration) -> tuple[Relation, ...]:
     )
 
 
-def preparation_of_walk(configuration: Configuration, program: Program, collector: SourceCollector) -> str:
+def preparation_of_walk(configuration: Configuration, program: Program, collector: Collector) -> str:
     """The composed function ``prepare`` of a walk, once everything it calls is gathered."""
     writing = Writing(configuration.device, configuration.supply_lines, program, collector)
     lines = [

@@ -9,7 +9,7 @@ from ppafo.engine.program import LaneResult, LaneTiming, Program
 from ppafo.engine.rows import leaf_paths, numbers, row_expression
 from ppafo.engine.run import NEVER_FAILED, initial_masses, whole_and_rest
 from ppafo.engine.scheme.parts import Pace
-from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.source_text import Collector
 from ppafo.exports.c_library.files import Setting, c_identifier
 from ppafo.exports.c_library.program import COUNTS
 from ppafo.model.actuators.kind import Range, mean_growth, plant_in_shape
@@ -33,7 +33,7 @@ FLAWS = ("angle_noise", "pressure_noise", "angle_resolution", "pressure_resoluti
 FOLLOWING = '@njit("void(float64[::1], float64[::1])")'
 
 
-def following_text(settings: Sequence[Setting], links: Graph, collector: SourceCollector) -> str:
+def following_text(settings: Sequence[Setting], links: Graph, collector: Collector) -> str:
     """The composed function ``follow``: settings that still have their default follow others; see ``Graph``."""
     places = {item.path: place for place, item in enumerate(settings)}
     used = {source for found in links.values() for link in found for source in link.sources}
@@ -52,7 +52,7 @@ def following_text(settings: Sequence[Setting], links: Graph, collector: SourceC
     return "\n".join([*rows, FOLLOWING, "def follow(settings, followed):", *indent(lines)])
 
 
-def _term(term: Term, rows: list[str], collector: SourceCollector) -> str:
+def _term(term: Term, rows: list[str], collector: Collector) -> str:
     """A term of what is followed; rows that only it has are added to ``rows``."""
     given = ", ".join(map(c_identifier, term.sources))
     if term.names:
@@ -66,7 +66,7 @@ def _term(term: Term, rows: list[str], collector: SourceCollector) -> str:
 class Writing:
     """Writes lines for one device and program; what they call is gathered by ``add``."""
 
-    def __init__(self, device: Device, lines: SupplyLines | None, program: Program, collector: SourceCollector) -> None:
+    def __init__(self, device: Device, lines: SupplyLines | None, program: Program, collector: Collector) -> None:
         self.device = device
         self.lines = lines
         self.program = program

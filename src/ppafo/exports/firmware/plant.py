@@ -10,7 +10,7 @@ from ppafo.control.fixed.converter import COMMAND_STEPS, SETTINGS, Converter, Re
 from ppafo.control.fixed.kind import PLANT_TARGETS
 from ppafo.engine.lanes import SIGNAL_ROWS
 from ppafo.engine.rows import leaf_paths, numbers, row_expression
-from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.source_text import Collector
 from ppafo.errors import ScenarioError
 from ppafo.exports.c_library import commanded, scenario_library
 from ppafo.exports.c_library.files import Library, filled, library_files, steps_source
@@ -72,7 +72,7 @@ def plant_values(library: Library) -> tuple[str, ...]:
     return ("time", *library.program.outputs)
 
 
-def _shown(scenario: Scenario, converter: Converter, collector: SourceCollector) -> str:
+def _shown(scenario: Scenario, converter: Converter, collector: Collector) -> str:
     """The composed function that makes the readings of the controller from the values of a sample."""
     add = collector.add
     names = ("time", "pressure_1", "pressure_2")
@@ -89,7 +89,7 @@ def _shown(scenario: Scenario, converter: Converter, collector: SourceCollector)
     return "\n".join([_SHOWN, "def shown_by_converter(sampled, converted):", *lines])
 
 
-def _constant(row: tuple[float, ...], path: str, collector: SourceCollector) -> str:
+def _constant(row: tuple[float, ...], path: str, collector: Collector) -> str:
     """A NamedTuple of numbers that are known."""
     cells = dict(zip(leaf_paths(type(row), path), map(repr, numbers(row)), strict=True))
     return row_expression(type(row), path, cells, collector.add)

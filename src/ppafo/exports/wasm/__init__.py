@@ -39,10 +39,9 @@ from dataclasses import dataclass
 from typing import Any, final
 
 from ppafo.exports.c_library import library_of
+from ppafo.exports.loading import Exportable
 from ppafo.exports.wasm.building import program_of
 from ppafo.exports.wasm.description import description_of
-from ppafo.simulation.scenario import Scenario
-from ppafo.walking.configuration import Configuration
 
 
 @final
@@ -54,7 +53,7 @@ class WasmModule:
     description: dict[str, Any]
 
 
-def module_of(item: Scenario | Configuration) -> WasmModule:
+def module_of(item: Exportable) -> WasmModule:
     """A scenario or a walk as a module.
 
     Its program comes with the package where a shipped scenario or walk has the same one, whatever its numbers are, and

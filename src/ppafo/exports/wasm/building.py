@@ -7,14 +7,15 @@ import re
 import sys
 import tempfile
 from functools import cache
-from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 
+from ppafo.engine.kept import kept
+from ppafo.engine.outline import file_hash
 from ppafo.errors import ProgramError
 from ppafo.exports.c_library.files import Library, conditions_of, filled, run_words
-from ppafo.exports.c_library.program import IN_PARTS, TOGETHER, WHOLE, ExportedProgram, c_text
-from ppafo.translation.native import asked, complaint
+from ppafo.exports.c_library.program import IN_PARTS, TOGETHER, WHOLE, ExportedProgram, c_text, outline_of
+from ppafo.version import __version__
 
 LANES = 8
 """Runs that go on together: with more of them their numbers leave the registers of today's browsers."""
@@ -40,19 +41,40 @@ _HOW_TO_INSTALL = "pip install 'ppafo[workbench]'"
 
 
 def program_of(library: Library) -> bytes:
-    """The module of a library: the one that comes with the package where the text is the same, else a new one."""
-    text = source_of(library)
-    prebuilt = prebuilt_programs().get(digest_of(text))
-    return build(text) if prebuilt is None else _programs().joinpath(prebuilt).read_bytes()
+    """The module of a library: the one that comes with the package where the text is the same, else a new one.
+
+    Neither the text nor a module is made twice on a computer.
+    """
+    digest = kept("digest", _made_from(library), lambda: digest_of(source_of(library)).encode()).decode()
+    prebuilt = prebuilt_programs().get(digest)
+    if prebuilt is not None:
+        return _programs().joinpath(prebuilt).read_bytes()
+    check_can_build()
+    return kept("wasm", f"{digest} {compiler_version()}", lambda: build(source_of(library)))
 
 
 def source_of(library: Library) -> str:
     """The translation unit of a library. Values of settings are not in it: other numbers, same program."""
+    names = [item.name for item in library.settings]
+    return _unit(library, c_text(library.program, _TITLE, names, library.further, LANES))
+
+
+def _made_from(library: Library) -> str:
+    """What decides the translation unit of a library: what its functions are made from, and what translates them."""
+    names = [item.name for item in library.settings]
+    outline = _unit(library, outline_of(library.program, names, library.further, LANES))
+    translators = [*(files("ppafo.translation").iterdir()), *(files("ppafo.exports.c_library").iterdir()), __file__]
+    hashes = sorted(f"{Path(str(file)).name} {file_hash(str(file))}" for file in translators)
+    return "\n".join([__version__, *hashes, *FLAGS, _template("math.h"), outline])
+
+
+def _unit(library: Library, functions: str) -> str:
+    """The translation unit around functions."""
     program, names = library.program, [item.name for item in library.settings]
     refused = "    if (!({})) {{\n        return SETTING_{};\n    }}"
     words = {
         **run_words(library, "run_settings"),
-        "functions": c_text(program, _TITLE, names, library.further, LANES),
+        "functions": functions,
         "lanes": str(LANES),
         "go_on": _chosen_loop(program, ""),
         "go_on_together": _chosen_loop(program, TOGETHER),
@@ -87,13 +109,20 @@ def digest_of(text: str) -> str:
     return hashlib.sha256(code.encode()).hexdigest()[:16]
 
 
-def build(text: str) -> bytes:
-    """A module of a translation unit. ProgramError where ziglang is not there, or refuses."""
+def check_can_build() -> None:
+    """Raise ProgramError where ziglang is not there."""
     if importlib.util.find_spec("ziglang") is None:
         raise ProgramError(
             "this scenario needs functions that no program of the package has, and ziglang to build them: "
             f"{_HOW_TO_INSTALL}"
         )
+
+
+def build(text: str) -> bytes:
+    """A module of a translation unit. ProgramError where ziglang is not there, or refuses."""
+    from ppafo.translation.native import asked, complaint
+
+    check_can_build()
     with tempfile.TemporaryDirectory() as folder:
         for name, content in {"module.c": text, "math.h": _template("math.h")}.items():
             (Path(folder) / name).write_text(content, encoding="utf-8")
@@ -108,6 +137,8 @@ def build(text: str) -> bytes:
 
 def compiler_version() -> str:
     """Version of the package ziglang; empty where it is not there."""
+    from importlib.metadata import version
+
     return version("ziglang") if importlib.util.find_spec("ziglang") is not None else ""
 
 

@@ -27,11 +27,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ppafo.answers.display_units import display_unit, quantity_of_unit
 from ppafo.errors import PpafoError
 from ppafo.exports.c_library.files import OUTPUTS, Library, Setting, c_identifier
+from ppafo.exports.loading import Exportable
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph
@@ -45,8 +46,9 @@ from ppafo.simulation.overriding import is_of_device, split_override
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import to_si
 from ppafo.version import __version__
-from ppafo.walking.configuration import Configuration
-from ppafo.walking.loading import FILE, list_walks
+
+if TYPE_CHECKING:
+    from ppafo.walking.configuration import Configuration
 
 _TASK = {"origin": "task", "source": "", "note": "", "half_width": None}
 _CHANGED = {**_TASK, "origin": "changed"}
@@ -63,9 +65,9 @@ class _File:
     assumed: Mapping[str, str]
 
 
-def description_of(item: Scenario | Configuration, library: Library) -> dict[str, Any]:
+def description_of(item: Exportable, library: Library) -> dict[str, Any]:
     """The description of the module of a scenario or a walk, as the beginning of this file has it."""
-    file = _file_of_walk(item) if isinstance(item, Configuration) else _file_of_scenario(item)
+    file = _file_of_scenario(item) if isinstance(item, Scenario) else _file_of_walk(item)
     keys = {setting.name: setting.path for setting in library.settings}
     origins, follows, kept = _origins(file, item.device, library), _follows(item.graph), _kept(library)
     program, atmosphere = library.program, item.device.supply.atmospheric_pressure
@@ -74,7 +76,7 @@ def description_of(item: Scenario | Configuration, library: Library) -> dict[str
         "name": library.title,
         "title": library.description,
         "version": __version__,
-        "kind": "walk" if isinstance(item, Configuration) else "scenario",
+        "kind": "scenario" if isinstance(item, Scenario) else "walk",
         "document": dict(file.document),
         "overrides": list(file.overrides),
         "settings": [
@@ -107,8 +109,10 @@ def _file_of_scenario(scenario: Scenario) -> _File:
     return _File(origin.content, folder, origin.overrides, {item.path: item.note for item in scenario.assumptions})
 
 
-def _file_of_walk(walk: Configuration) -> _File:
+def _file_of_walk(walk: "Configuration") -> _File:
     """Read the file of a walk again; an empty document where it is not there any more."""
+    from ppafo.walking.loading import FILE, list_walks
+
     name = walk.name if walk.name in list_walks() else walk.file
     try:
         document = FILE.parse(FILE.read(name), name)

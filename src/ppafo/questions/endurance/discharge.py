@@ -1,7 +1,8 @@
 """The course of a bottle from full to the moment at which it no longer holds the supply pressure."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -62,16 +63,22 @@ class Balance:
     wall_energy_change: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Discharge:
-    """The course of a bottle: its recording, time of walking and of all [s], steps, how it ended, and the balance."""
+    """The course of a bottle: time of walking and of all [s], steps, how it ended, the balance, and the solution."""
 
-    recording: Recording
     walking_time: float
     total_time: float
     steps: float
     ending: Ending
     balance: Balance
+    bottle: Bottle = field(repr=False)
+    stretches: tuple[Stretch, ...] = field(repr=False, compare=False)
+
+    @cached_property
+    def recording(self) -> Recording:
+        """The course at evenly spaced times: made when it is first read, which takes as long as the course itself."""
+        return _recording(self.bottle, self.stretches)
 
 
 def discharge(bottle: Bottle, draw: Draw, schedule: Schedule) -> Discharge:
@@ -138,16 +145,17 @@ def _gather(
         wall_energy_change=float(change[2]) * bottle.wall.wall_heat_capacity,
     )
     return Discharge(
-        recording=_recording(bottle, stretches),
         walking_time=walking,
         total_time=stretches[-1].end,
         steps=walking / draw.step_time,
         ending=ending(bottle, draw, float(last[0]), content_of(bottle, float(last[0]), float(last[1])), reason),
         balance=balance,
+        bottle=bottle,
+        stretches=tuple(stretches),
     )
 
 
-def _recording(bottle: Bottle, stretches: list[Stretch]) -> Recording:
+def _recording(bottle: Bottle, stretches: Sequence[Stretch]) -> Recording:
     """Return the course at evenly spaced times, and exactly at its end."""
     times = np.linspace(0.0, stretches[-1].end, SAMPLES)
     ends = np.array([stretch.end for stretch in stretches])

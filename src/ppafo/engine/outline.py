@@ -1,0 +1,133 @@
+"""A composed module without its functions: in their place stands a hash of all that they would be written from.
+
+Writing the functions of a program takes nearly all the time of composing it. Where the text, or what was made of it, is
+kept from earlier, its outline is enough to find it. Each function counts with its bytecode, its place and the content
+of its file, its defaults, and with every name that it reads, down to the last constant. Two programs have one outline
+only where they have one text.
+"""
+
+import functools
+import hashlib
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
+from typing import Any
+
+from ppafo.engine import composed_names, plain_python, source_text
+from ppafo.engine.composed_names import is_row
+from ppafo.engine.source_text import Adaptation, Made, Read, as_it_is, check_is_plain, emitted_name, is_unchanged
+
+_WRITTEN_BY = (source_text, composed_names, plain_python)
+"""The modules that decide how a function is written; the outline has their content in it."""
+
+
+@dataclass(slots=True)
+class Outline:
+    """Takes the place of a ``SourceCollector`` that gathers the same definitions; its text is one line, the hash."""
+
+    decorator: str
+    adapt: Adaptation = as_it_is
+    links: dict[Any, Any] = field(default_factory=dict)
+    reads: list[Read] = field(default_factory=list)
+    functions: list[Made] = field(default_factory=list)
+    numbers: dict[Any, int] = field(default_factory=dict)
+    parts: list[str] = field(default_factory=list)
+
+    def add(self, item: Callable[..., Any] | type) -> str:
+        """Take a function or NamedTuple class with all that it needs; return the name that it has in the module."""
+        item = self.links.get(item, item)
+        if not is_row(item):
+            check_is_plain(item)
+        self.parts.append(self._described(item))
+        return emitted_name(item)
+
+    def text(self) -> str:
+        """The hash of everything that was added, as a line of the module."""
+        made = hashlib.sha256()
+        composers = [file_hash(module.__file__ or "") for module in _WRITTEN_BY]
+        adapted = f"{emitted_name(self.adapt)} {file_hash(self.adapt.__code__.co_filename)}"
+        for part in (sys.version, *composers, adapted, self.decorator, *self.parts):
+            made.update(f"{len(part)} {part}".encode("utf-8", "surrogatepass"))
+        return f"# made from {made.hexdigest()}"
+
+    def is_current(self) -> bool:
+        """True while every name and function that was met is what it was then."""
+        return is_unchanged(self.reads, self.functions)
+
+    def _described(self, value: Any) -> str:
+        """What a value is in the text; a function or a class is described once, and numbered."""
+        value = value.__wrapped__ if isinstance(value, functools._lru_cache_wrapper) else value
+        if isinstance(value, FunctionType):
+            value = self.links.get(value, value)
+        if isinstance(value, FunctionType) or is_row(value):
+            if value not in self.numbers:
+                self.numbers[value] = len(self.numbers)
+                describe = self._function if isinstance(value, FunctionType) else self._row
+                self.parts.append(f"{self.numbers[value]} is {describe(value)}")
+            return f"item {self.numbers[value]}"
+        if isinstance(value, tuple):
+            kind = self._described(type(value)) if is_row(type(value)) else "tuple"
+            return f"{kind}({', '.join(map(self._described, value))})"
+        if value is None or isinstance(value, bool | int | float | str | bytes):
+            return f"{type(value).__name__} {value!r}"
+        # A builtin function, a module or a class is written by its name; anything else is refused where it is read.
+        named = getattr(value, "__qualname__", "") or getattr(value, "__name__", "")
+        return f"{type(value).__qualname__} {getattr(value, '__module__', '')} {named}"
+
+    def _row(self, row: Any) -> str:
+        defaults = {name: self._described(value) for name, value in row._field_defaults.items()}
+        file = getattr(sys.modules.get(row.__module__), "__file__", None) or ""
+        return repr((emitted_name(row), row._fields, defaults, file_hash(file)))
+
+    def _function(self, function: FunctionType) -> str:
+        code, named_defaults = function.__code__, dict(function.__kwdefaults__ or {})
+        self.functions.append(Made(function, code, function.__defaults__, named_defaults))
+        given = self._described(function.__defaults__), self._described(tuple(named_defaults.items()))
+        codes = list(_codes(code))
+        names = sorted({name for inner in codes for name in inner.co_names})
+        read = [f"{name} = {self._described(value)}" for name, value in self._read(function.__globals__, names, ())]
+        shapes = [(inner.co_code.hex(), inner.co_names, inner.co_varnames, _constants(inner)) for inner in codes]
+        place = code.co_filename, code.co_firstlineno, file_hash(code.co_filename)
+        return repr((emitted_name(function), place, code.co_argcount, code.co_kwonlyargcount, shapes, given, read))
+
+    def _read(
+        self, scope: dict[str, Any], names: Sequence[str], above: tuple[ModuleType, ...]
+    ) -> Iterator[tuple[str, Any]]:
+        """Those names that stand for something in a scope or in a module that is read there, and what for."""
+        for name in names:
+            # A module may load what it has when it is first read.
+            found = getattr(above[-1], name, self) if above else scope.get(name, self)
+            if found is self:
+                continue
+            self.reads.append(Read(scope, name, found))
+            yield name, found
+            if isinstance(found, ModuleType) and found not in above:
+                for inner, value in self._read(vars(found), names, (*above, found)):
+                    yield f"{name}.{inner}", value
+
+
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    yield code
+    for item in code.co_consts:
+        if isinstance(item, CodeType):
+            yield from _codes(item)
+
+
+def _constants(code: CodeType) -> list[tuple[str, str]]:
+    return [(type(item).__name__, repr(item)) for item in code.co_consts if not isinstance(item, CodeType | frozenset)]
+
+
+def file_hash(file: str) -> str:
+    """Return the hash of the content of a file as it is now; empty where there is none, as of what was typed in."""
+    try:
+        found = Path(file).stat()
+        return _hash_of(file, found.st_mtime_ns, found.st_size)
+    except (OSError, ValueError):
+        return ""
+
+
+@functools.lru_cache(maxsize=1024)
+def _hash_of(file: str, _changed: int, _size: int) -> str:
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
