@@ -106,7 +106,7 @@ def _load_by(source: str, compilers: tuple[Compiler, ...]) -> ModuleType:
 
 
 def _load_by_numba(source: str, numba: Compiler, refused: ProgramError) -> ModuleType:
-    """A model that has no C, for instance because a law calls ``math.exp``."""
+    """A model that has no C, for instance because a law calls ``math.sin``."""
     was_kept = is_kept(source, numba)
     module = load_generated(source, numba)
     if not was_kept:
