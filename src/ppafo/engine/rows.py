@@ -1,7 +1,7 @@
 """How NamedTuples of floats lie in the rows of a lane block: one row for each number, nested ones flattened."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cache
+from functools import cache, lru_cache
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -24,6 +24,7 @@ def members(row: Any) -> tuple[tuple[str, Any], ...]:
     return ()
 
 
+@lru_cache(maxsize=4096)
 def is_number(row: Any) -> bool:
     """True for the type of a single number, false for a NamedTuple or a tuple."""
     return not is_row(row) and get_origin(row) is not Annotated
@@ -31,9 +32,14 @@ def is_number(row: Any) -> bool:
 
 def leaf_paths(row: Any, prefix: str) -> list[str]:
     """Paths of all numbers in a NamedTuple class (or a float), in order, each beginning with ``prefix``: ``a.b[3]``."""
+    return list(_leaf_paths(row, prefix))
+
+
+@lru_cache(maxsize=4096)
+def _leaf_paths(row: Any, prefix: str) -> tuple[str, ...]:
     if is_number(row):
-        return [prefix]
-    return [path for way, inner in members(row) for path in leaf_paths(inner, f"{prefix}{way}")]
+        return (prefix,)
+    return tuple(path for way, inner in members(row) for path in _leaf_paths(inner, f"{prefix}{way}"))
 
 
 def row_numbers(groups: Mapping[str, type]) -> dict[str, int]:

@@ -55,7 +55,8 @@ def csv_bytes(recording: Recording) -> bytes:
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow([f"{TIME} [{TIME_UNIT}]", *(f"{name} [{recording.unit(name)}]" for name in recording.names)])
     columns = [recording.time, *(recording[name] for name in recording.names)]
-    writer.writerows(zip(*(map(repr, column.tolist()) for column in columns), strict=True))
+    rows = map(",".join, zip(*(map(repr, column.tolist()) for column in columns), strict=True))
+    buffer.writelines(f"{row}\n" for row in rows)
     return buffer.getvalue().encode()
 
 

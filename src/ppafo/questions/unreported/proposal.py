@@ -22,7 +22,8 @@ NARROWEST = 0.02
 """Smallest standard deviation of a bell along any direction, of the side of the cube."""
 ENOUGH = 100.0
 """Effective number of completions that the bells are laid around; weights are tempered until there are as many."""
-_ROWS = 2048
+_ROWS = 512
+"""Points whose densities are computed together: few enough that their table of bells stays in the cache of a core."""
 
 
 @dataclass(frozen=True, slots=True)

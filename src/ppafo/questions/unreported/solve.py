@@ -4,9 +4,12 @@ Rounds that follow what agreed so far may all miss the same corner, which no cou
 draws are shared out to replicates, none of which knows where another looks, and the spread between them is the error.
 """
 
+import os
 import time
 from collections.abc import Collection, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import repeat
 from typing import final
 
 import numpy as np
@@ -132,7 +135,8 @@ def infer_settings(draws: int = 262_144, seed: int = 2011, progress: Report | No
         if number < ROUNDS:
             # Every third round looks where the improvement does not count, so that it can be judged by the rest.
             left_out = (IMPROVEMENT,) if number % 3 == 1 else ()
-            added = [search.next_points(number + 1, left_out) for search in searches]
+            with ThreadPoolExecutor(os.cpu_count()) as pool:
+                added = list(pool.map(_Search.next_points, searches, repeat(number + 1), repeat(left_out)))
     return _family(searches, seed)
 
 
@@ -181,22 +185,14 @@ def _run_together(searches: Sequence[_Search], added: Sequence[Floats]) -> None:
 
 def _family(searches: Sequence[_Search], seed: int) -> Family:
     """Return all searches as one family, what each drew evenly first."""
-    ran, replicate, is_even, densities = [], [], [], []
+    ran, replicate, is_even = [], [], []
     for number, search in enumerate(searches):
         assert search.ran is not None, "every search has run"
         ran.append(search.ran)
         replicate.append(np.full(len(search.points), number))
         is_even.append(np.arange(len(search.points)) < search.rounds[0])
-        own = _mixture(search.known, search.rounds)
-        # What contradicts the text has no weight, whatever its density.
-        counts = np.flatnonzero(agreement(search.ran.metrics, (IMPROVEMENT, *GAS)) > 0.0)
-        density = np.ones((len(search.points), len(searches)))
-        for column, other in enumerate(searches):
-            if other is search:
-                density[:, column] = own
-            else:
-                density[counts, column] = other.density(search.points[counts])
-        densities.append(density)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        densities = list(pool.map(_densities, searches, repeat(searches)))
     whole, even = _join(ran), np.concatenate(is_even)
     rows = np.flatnonzero(whole.completed)
     rows = rows[np.argsort(~even[rows], kind="stable")]
@@ -213,6 +209,20 @@ def _family(searches: Sequence[_Search], seed: int) -> Family:
         len(points),
         seed,
     )
+
+
+def _densities(search: _Search, searches: Sequence[_Search]) -> Floats:
+    """How densely each search draws at the points of one (points, searches)."""
+    assert search.ran is not None, "every search has run"
+    # What contradicts the text has no weight, whatever its density.
+    counts = np.flatnonzero(agreement(search.ran.metrics, (IMPROVEMENT, *GAS)) > 0.0)
+    density = np.ones((len(search.points), len(searches)))
+    for column, other in enumerate(searches):
+        if other is search:
+            density[:, column] = _mixture(search.known, search.rounds)
+        else:
+            density[counts, column] = other.density(search.points[counts])
+    return density
 
 
 @dataclass(frozen=True, slots=True)
