@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import ppafo
+from ppafo.engine.loading import BACKEND_VARIABLE, NUMBA
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.sensors import Measurement, measure
 
@@ -18,6 +19,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv  # noqa: E402
 import ppafo.worlds.gym  # noqa: E402
 from ppafo.worlds.gym.environments import PneumaticEnv, PneumaticVectorEnv  # noqa: E402
 from ppafo.worlds.gym.tasks import BAR, TASKS, finite, reward_of, within  # noqa: E402
+from tests.compilers_here import compilers_here  # noqa: E402
 
 TORQUE, ANGLE, WALK = TASK_NAMES = tuple(ppafo.worlds.gym.TASKS)
 SHORT = {TORQUE: 0.02, ANGLE: 0.02, WALK: 6.0}
@@ -173,6 +175,23 @@ def test_many_are_as_each_would_be_alone(name: str, count: int, mode: AutoresetM
             mask = ended if step != 9 else np.arange(count) % 2 == 0
             both = [env.reset(options={"reset_mask": mask.copy()}) for env in (many, alone)]
             assert_same(*both)
+
+
+@pytest.mark.parametrize("name", TASK_NAMES)
+def test_every_compiler_gives_the_same_bits(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = {}
+    # Numba takes half a minute for each task.
+    for compiler in [item for item in compilers_here() if item != NUMBA or name == TORQUE]:
+        monkeypatch.setenv(BACKEND_VARIABLE, compiler)
+        many = vector(name, AutoresetMode.NEXT_STEP, 35)
+        many.action_space.seed(1)
+        shown = [many.reset(seed=7)[0].tobytes()]
+        for _ in range(300):
+            observations, rewards, terminated, truncated, _ = many.step(many.action_space.sample())
+            shown += [values.tobytes() for values in (observations, rewards, terminated, truncated)]
+        found[compiler] = shown
+    assert len(set(shown)) > 600
+    assert all(other == shown for other in found.values())
 
 
 def test_replayed_commands_of_a_law_have_the_bits_of_its_walk_and_its_sensors_are_late() -> None:

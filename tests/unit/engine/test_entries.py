@@ -1,0 +1,102 @@
+"""Entries of generated modules: the same calls and bits by every compiler, and nothing that C would misread."""
+
+import math
+import random
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ppafo.engine.entries import (
+    ARRAY,
+    ARRAY_2D,
+    FLOAT,
+    HEADER,
+    INT,
+    Table,
+    Vector,
+    array_module,
+    entry_text,
+    entry_types,
+    with_arrays,
+)
+from ppafo.translation.native_entries import NativeEntry
+from tests.compilers_here import modules_of
+
+
+def scaled(rows: Table, found: Vector, factor: float, first: int) -> None:
+    """Sums of the rows from ``first`` on, each times a factor."""
+    for row in range(first, rows.shape[0]):
+        total = 0.0
+        for column in range(rows.shape[1]):
+            total += rows[row, column]
+        found[row] = factor * total
+
+
+def library(x: Vector, y: Vector, found: Table) -> None:
+    """What the C library computes."""
+    for place in range(x.shape[0]):
+        found[0, place] = math.exp(y[place])
+        found[1, place] = math.log(x[place])
+        found[2, place] = x[place] ** y[place]
+        found[3, place] = math.exp(-2.5) * x[place]
+
+
+def test_types_of_an_entry_are_read_from_its_text() -> None:
+    text = HEADER + entry_text("show", {"x": ARRAY_2D, "y": ARRAY, "time": FLOAT, "count": INT}, ["y[0] = time"])
+    assert entry_types(text) == {"show": [ARRAY_2D, ARRAY, FLOAT, INT]}
+
+
+@pytest.mark.parametrize("is_packed", [False, True])
+def test_every_compiler_has_all_entries_of_a_module(is_packed: bool) -> None:
+    rows, expected = np.arange(6.0).reshape(3, 2), np.zeros(3)
+    scaled(rows, expected, 0.5, 1)
+    for name, module in modules_of(array_module([scaled, library])).items():
+        found = np.zeros(3)
+        call: Callable[..., None] = with_arrays(module.scaled, rows, found) if is_packed else module.scaled
+        for first in (1, 2):  # what is packed once is used twice
+            call(*(() if is_packed else (rows, found)), 0.5, first)
+        assert found.tolist() == expected.tolist(), name
+        assert callable(module.library)
+
+
+def test_what_is_packed_is_read_and_written_where_it_lies() -> None:
+    for module in modules_of(array_module([scaled, library])).values():
+        rows, found = np.ones((3, 2)), np.zeros(3)
+        call = with_arrays(module.scaled, rows, found)
+        rows[:] = 4.0
+        call(1.0, 0)
+        assert found.tolist() == [8.0] * 3
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        np.ones((2, 3), dtype=np.float32),
+        np.ones(6),
+        np.ones((3, 2)).T,
+        np.ones((2, 6))[:, ::2],
+        np.broadcast_to(np.ones(3), (2, 3)),
+    ],
+    ids=["other numbers", "other dimensions", "columns first", "with gaps", "read-only"],
+)
+def test_an_array_that_c_would_misread_is_refused(wrong: Any) -> None:
+    for module in modules_of(array_module([scaled, library])).values():
+        with pytest.raises(TypeError):
+            module.scaled(wrong, np.zeros(3), 1.0, 0)
+        if isinstance(module.scaled, NativeEntry):
+            with pytest.raises(TypeError):
+                with_arrays(module.scaled, wrong, np.zeros(3))
+
+
+def test_functions_of_the_c_library_have_one_value_by_every_compiler() -> None:
+    draw = random.Random(5)
+    x = np.array([draw.uniform(1e-3, 9.0) for _ in range(2000)])
+    y = np.array([draw.uniform(-5.0, 5.0) for _ in range(2000)])
+    expected = np.zeros((4, 2000))
+    library(x, y, expected)
+    for name, module in modules_of(array_module([scaled, library])).items():
+        found = np.zeros((4, 2000))
+        module.library(x, y, found)
+        assert found.tobytes() == expected.tobytes(), name
