@@ -1,8 +1,10 @@
 """From a name or a path to the document in a TOML file; every mistake is one clear line."""
 
+import copy
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
@@ -52,7 +54,7 @@ class TomlKind:
         if not text.strip():
             raise self.error(f"{file}: is empty; 'ppafo schema {self.schema}' prints its format")
         try:
-            document = tomllib.loads(text)
+            document = copy.deepcopy(_document(text))
         except tomllib.TOMLDecodeError as error:
             raise self.error(f"{file}: is not valid TOML: {one_line(error)}") from error
         except (RecursionError, ValueError) as error:
@@ -64,6 +66,12 @@ class TomlKind:
         """Refuse tables that lie in each other too deep; ``file`` is what messages call the document."""
         if is_nested_too_deeply(document):
             raise self.error(f"{file}: has tables nested deeper than {MAXIMUM_LEVELS} levels; a few are enough")
+
+
+@lru_cache(maxsize=16)
+def _document(text: str) -> dict[str, Any]:
+    """Return the document of a text, not to be changed: one run reads the same set several times."""
+    return tomllib.loads(text)
 
 
 def label(file: str) -> str:
