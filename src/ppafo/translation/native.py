@@ -32,7 +32,7 @@ _LIBRARY_AS_IT_RUNS = tuple(f"-fno-builtin-{name}" for name in sorted(LIBRARY))
 """Else a compiler works out what it can by itself, to other last bits than those of the library, which Numba calls."""
 _THIS_PROCESSOR = "-march=native" if platform.machine().lower() in ("x86_64", "amd64", "i686") else "-mcpu=native"
 _WIDEST_VECTORS = ("-mprefer-vector-width=512",) if _THIS_PROCESSOR.startswith("-march") else ()
-_LIBRARY = {"win32": "program.dll", "darwin": "program.dylib"}.get(sys.platform, "program.so")
+_LIBRARY_FILE = {"win32": "program.dll", "darwin": "program.dylib"}.get(sys.platform, "program.so")
 COMPILERS = ("clang", "gcc", "zig")
 """In the order of preference: lanes are about as quick by each."""
 _INTERRUPTED = (-signal.SIGINT, -signal.SIGTERM)
@@ -87,7 +87,7 @@ class CCompiler:
 
     def run_text(self, source: str, path: str, module: ModuleType) -> None:
         """Load the library beside ``path``."""
-        _fill(module, Path(path).with_name(_LIBRARY), entries_of(source))
+        _fill(module, Path(path).with_name(_LIBRARY_FILE), entries_of(source))
 
     def _build(self, source: str, folder: Path) -> Path:
         return _compiled(source, folder, self.command, self.flags)
@@ -185,7 +185,7 @@ def _compiled(source: str, folder: Path, command: Sequence[str], flags: Sequence
     """The library that a compiler makes of C, in a folder."""
     if _is_mounted_without_execution(folder):
         raise CompilerError(f"libraries in {folder.parent} cannot be loaded (it is mounted noexec)", *COMPILERS)
-    written, library = folder / "program.c", folder / _LIBRARY
+    written, library = folder / "program.c", folder / _LIBRARY_FILE
     written.write_text(source, encoding="utf-8")
     position = () if sys.platform == "win32" else ("-fPIC",)
     line = [*command, *flags, "-shared", *position, str(written), "-o", str(library), "-lm"]
