@@ -17,7 +17,7 @@ EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 _LONGEST_MESSAGE = 1000
 
-_OBJECTS_BETWEEN_COLLECTIONS = 1_000_000
+OBJECTS_BETWEEN_COLLECTIONS = 1_000_000
 """The usual 700 make Python look for garbage hundreds of times while it imports, which is a tenth of a start."""
 
 
@@ -61,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code: 0 good, 1 a check failed, 2 bad input, 130 interrupted."""
     if arguments is not None:
         return _run(list(arguments))
-    gc.set_threshold(_OBJECTS_BETWEEN_COLLECTIONS)
+    gc.set_threshold(OBJECTS_BETWEEN_COLLECTIONS)
     try:
         return _run(sys.argv[1:])
     finally:

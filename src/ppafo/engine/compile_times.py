@@ -3,11 +3,9 @@
 import contextlib
 import logging
 import os
-import statistics
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextvars import ContextVar, copy_context
 from pathlib import Path
 
@@ -26,6 +24,8 @@ _models: ContextVar[int] = ContextVar("models that are compiled together", defau
 
 def compile_side_by_side(tasks: Sequence[Callable[[], object]], expected: float, where: str) -> None:
     """Compile several models on all cores, with one message about all; ``expected`` [s] is the time on one core."""
+    from concurrent.futures import ThreadPoolExecutor
+
     workers = min(len(tasks), os.cpu_count() or 1)
     with announce(expected / workers, where, len(tasks)), ThreadPoolExecutor(workers) as pool:
         known = _models.set(len(tasks))
@@ -64,6 +64,8 @@ def announce(expected: float, where: str, models: int = 1) -> Iterator[None]:
 
 def estimate_seconds(source: str, kept: Iterable[Path], usual: float) -> float:
     """Return about how long [s] a source takes to compile, from how long the kept programs of this computer took."""
+    import statistics
+
     rates = []
     for folder in kept:
         with contextlib.suppress(OSError, ValueError, StopIteration):

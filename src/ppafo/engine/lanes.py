@@ -8,7 +8,6 @@ import math
 import os
 import threading
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
 from types import ModuleType
@@ -147,6 +146,8 @@ def run_blocks(batch: Batch, take: Callable[[slice, BatchResult], None], threads
     if workers == 1:
         work()
         return
+    from concurrent.futures import ThreadPoolExecutor
+
     with ThreadPoolExecutor(workers) as pool:
         try:
             for done in [pool.submit(work) for _ in range(workers)]:

@@ -10,6 +10,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from ppafo.engine.kept import kept
+
 _POLICY = (
     "default-src 'none'; script-src 'sha256-{script}' 'strict-dynamic' 'wasm-unsafe-eval'; style-src 'sha256-{style}'; "
     "worker-src blob:; img-src data: blob:; base-uri 'none'; form-action 'none'"
@@ -82,13 +84,18 @@ def policy_of_block() -> str:
 def data_of(content: Mapping[str, Any], modules: Mapping[str, str]) -> str:
     """Return the elements that hold the script and what it reads, content and programs: compressed, in base 85."""
     text = json.dumps(content, ensure_ascii=False, separators=(",", ":"))
-    texts = {SCRIPT: packed(bundled("page.js").encode()), CONTENT: packed(text.encode()), **modules}
+    texts = {SCRIPT: packed_once(bundled("page.js").encode()), CONTENT: packed(text.encode()), **modules}
     return "\n".join(f'<script type="text/plain" id="{escape(name)}">{text}</script>' for name, text in texts.items())
 
 
 def digest(text: str) -> str:
     """Return the SHA-256 of a script or style as a policy names it."""
     return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")
+
+
+def packed_once(content: bytes) -> str:
+    """Return the same of what many pages hold, from the disk where it was packed before."""
+    return kept("packed", hashlib.sha256(content).hexdigest(), lambda: packed(content).encode()).decode()
 
 
 def packed(content: bytes) -> str:

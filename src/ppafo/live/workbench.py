@@ -11,7 +11,7 @@ from ppafo.errors import PpafoError, ScenarioError
 from ppafo.exports.loading import Exportable, load_exportable
 from ppafo.exports.wasm import module_of
 from ppafo.live.content import Interval, Simulated, page_content, program_content, usual_changes, words
-from ppafo.live.page import block_of, packed, page_of, policy_of_block
+from ppafo.live.page import block_of, packed_once, page_of, policy_of_block
 from ppafo.live.start import check_start
 from ppafo.simulation.scenario import FreeMotion, Scenario
 
@@ -84,7 +84,7 @@ def _content(
     names: dict[str, str] = {}
     programs = []
     for item in simulated:
-        name = names.setdefault(packed(item.module.wasm), f"module-{len(names) + 1}")
+        name = names.setdefault(packed_once(item.module.wasm), f"module-{len(names) + 1}")
         programs.append(program_content(item, name, intervals))
     content = page_content(title, form, _tabs(simulated), programs)
     return content, {name: text for text, name in names.items()}
