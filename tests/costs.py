@@ -1,4 +1,4 @@
-"""What the files of tests cost: costly ones begin first, each is shown with its seconds, and a new one is an error.
+"""What the files of tests cost, and which tests are long: ``make test`` leaves those out, ``make test-all`` nothing.
 
 ``--costs show`` prints the table, ``--costs record`` also writes it to ``costs.toml``. A cost is CPU time of the tests
 and of the processes that they start, so that a busy machine changes it little. Models and libraries that are built only
@@ -7,10 +7,12 @@ once in a session count apart: which file builds them is chance.
 
 import contextlib
 import gc
+import json
 import os
 import tomllib
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,17 +21,22 @@ import pytest
 from ppafo.engine import cache
 
 RECORDED = Path(__file__).with_name("costs.toml")
+LONG = 2.0
+"""CPU seconds of a test function, with all its parameters, above which it is long."""
 NOTED = 5.0
 """CPU seconds above which a file is recorded."""
 LARGEST = 10.0
-"""CPU seconds of a file that is not recorded: twice the above, for a machine that is slower or busy."""
+"""CPU seconds up to which nobody minds a file."""
+GROWN = 2.0
+"""Times the recorded cost that a file may have, on a computer that is slower or busy."""
 SHOWN = 2.0
 HEADING = """\
-# CPU seconds of each file of tests that costs more than 5, models not counted. Written by
+# CPU seconds of the costly files of tests, models not counted, and their long tests, which `make test` leaves out.
+# Written by
 #     .venv/bin/pytest -n 2 --dist loadfile --costs record
-# A file above 10 that is not here is an error of `make test` and `make test-all`: make it quicker, mark as
-# `@pytest.mark.long` what `make test-all` alone shall run, and only then record it here.
-
+# which adds tests above 2 s; take a name out to try it again. `@pytest.mark.short` keeps a test in `make test` whatever
+# it costs, `@pytest.mark.long` keeps one out. A file above 10 s that is not here, or that takes more than twice the
+# seconds that stand here, is an error of both suites: make it quicker before you record it.
 """
 _PROPERTY = "ppafo_costs"
 
@@ -79,7 +86,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Let models count apart, and gather the costs where the session is led."""
-    config.addinivalue_line("markers", "long: takes long, so that `make test-all` alone runs it")
+    config.addinivalue_line("markers", "long: `make test-all` alone runs it")
+    config.addinivalue_line("markers", "short: `make test` runs it too, whatever it costs")
     cache._Wanted.compile = counted(cache._Wanted.compile)  # type: ignore[method-assign]
     if not hasattr(config, "workerinput"):
         config.pluginmanager.register(Table(config), "table of costs")
@@ -96,10 +104,15 @@ def pytest_collection() -> Iterator[object]:
         gc.enable()
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Let costly files begin first, so that no process is left alone with one at the end."""
+    """Mark what is long; let costly files begin first, so that no process is left alone with one at the end."""
     known = recorded()
-    items.sort(key=lambda item: -known.get(file_of(item.nodeid), 0.0))
+    for item in items:
+        file, function = file_and_function(item.nodeid)
+        if file in known and function in known[file].long and item.get_closest_marker("short") is None:
+            item.add_marker("long")
+    items.sort(key=lambda item: -known.get(file_and_function(item.nodeid)[0], NOTHING).seconds)
 
 
 @pytest.hookimpl(wrapper=True)
@@ -123,14 +136,29 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) ->
 _BEFORE = pytest.StashKey[tuple[float, float]]()
 
 
-def file_of(nodeid: str) -> str:
-    """The file of a test."""
-    return nodeid.partition("::")[0]
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """Recorded CPU seconds of a file, and the names of its long tests."""
+
+    seconds: float
+    long: frozenset[str]
 
 
-def recorded() -> dict[str, float]:
-    """Recorded costs [s] by file."""
-    return tomllib.loads(RECORDED.read_text(encoding="utf-8")) if RECORDED.exists() else {}
+NOTHING = Cost(0.0, frozenset())
+
+
+def file_and_function(nodeid: str) -> tuple[str, str]:
+    """The file of a test, and its name without parameters."""
+    file, _, name = nodeid.partition("::")
+    return file, name.partition("[")[0]
+
+
+def recorded() -> dict[str, Cost]:
+    """What is recorded, by file."""
+    if not RECORDED.exists():
+        return {}
+    tables = tomllib.loads(RECORDED.read_text(encoding="utf-8"))
+    return {file: Cost(table["seconds"], frozenset(table["long"])) for file, table in tables.items()}
 
 
 class Table:
@@ -139,6 +167,7 @@ class Table:
     def __init__(self, config: pytest.Config) -> None:
         self.config = config
         self.own: dict[str, float] = defaultdict(float)
+        self.functions: dict[tuple[str, str], float] = defaultdict(float)
         self.tests: dict[str, int] = defaultdict(int)
         self.built = 0.0
 
@@ -147,21 +176,28 @@ class Table:
         for name, costs in report.user_properties:
             if name == _PROPERTY and report.when == "teardown":
                 own, built = costs
-                self.own[file_of(report.nodeid)] += own
-                self.tests[file_of(report.nodeid)] += 1
+                file, function = file_and_function(report.nodeid)
+                self.own[file] += own
+                self.functions[file, function] += own
+                self.tests[file] += 1
                 self.built += built
 
-    def unrecorded(self) -> list[str]:
-        """Files that are costly, and not recorded as such."""
-        return sorted({file for file, own in self.own.items() if own > LARGEST} - recorded().keys())
+    def too_costly(self) -> list[str]:
+        """What is to be said of files that cost more than is recorded."""
+        known = {file: max(LARGEST, GROWN * cost.seconds) for file, cost in recorded().items()}
+        return [
+            f"{file} costs {own:.1f} s, more than {known.get(file, LARGEST):g} s: see {RECORDED.name}"
+            for file, own in sorted(self.own.items())
+            if own > known.get(file, LARGEST)
+        ]
 
     @pytest.hookimpl(trylast=True)
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         """Record, or let the session fail."""
         asked = self.config.getoption("--costs")
         if asked == "record":
-            write(self.own)
-        elif asked and self.unrecorded() and session.exitstatus == pytest.ExitCode.OK:
+            write(self.own, self.functions, is_whole=not (self.config.option.markexpr or self.config.option.keyword))
+        elif asked and self.too_costly() and session.exitstatus == pytest.ExitCode.OK:
             session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
@@ -177,14 +213,21 @@ class Table:
         write_line(f"{sum(self.own[file] for file in others):8.1f}  {len(others)} other files")
         write_line(f"{self.built:8.1f}  models and libraries that are built once")
         write_line(f"{sum(self.own.values()) + self.built:8.1f}  in all, of {sum(self.tests.values())} tests")
-        for file in self.unrecorded():
-            write_line(f"ERROR {file} takes more than {LARGEST:g} s: see {RECORDED.name}")
+        for line in self.too_costly():
+            write_line(f"ERROR {line}")
 
 
-def write(own: dict[str, float]) -> None:
-    """Record the costs [s] of files that ran; those of others stay as long as the files are there."""
-    root = RECORDED.parents[1]
-    known = {file: seconds for file, seconds in recorded().items() if file not in own and (root / file).is_file()}
-    known |= {file: seconds for file, seconds in own.items() if seconds > NOTED}
-    lines = [f'"{file}" = {seconds:.1f}\n' for file, seconds in sorted(known.items())]
+def write(own: Mapping[str, float], functions: Mapping[tuple[str, str], float], is_whole: bool) -> None:
+    """Record the costs [s] of files and test functions that ran. Where only some were to run, costs of files stay."""
+    root, known = RECORDED.parents[1], recorded()
+    lines = []
+    for file in sorted(known.keys() | own.keys()):
+        before = known.get(file, NOTHING)
+        text = (root / file).read_text(encoding="utf-8") if (root / file).is_file() else ""
+        found = {name for (place, name), seconds in functions.items() if place == file and seconds > LONG}
+        long = sorted(name for name in before.long | found if f"def {name}(" in text)
+        seconds = own[file] if file in own and (is_whole or file not in known) else before.seconds
+        if text and (long or seconds > NOTED):
+            names = "".join(f"    {json.dumps(name)},\n" for name in long)
+            lines.append(f'\n["{file}"]\nseconds = {seconds:.1f}\nlong = [\n{names}]\n')
     RECORDED.write_text(HEADING + "".join(lines), encoding="utf-8")

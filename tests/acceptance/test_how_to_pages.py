@@ -39,7 +39,9 @@ PAGES = Path(__file__).parents[2] / "docs" / "how-to"
 
 def blocks(page: str, language: str) -> list[str]:
     """The code blocks of a page in one language, without their indentation."""
-    found = re.findall(rf"^( *)```{language}\n(.*?)^\1```", (PAGES / page).read_text(), re.DOTALL | re.MULTILINE)
+    found = re.findall(
+        rf"^( *)```{language}\n(.*?)^\1```", (PAGES / page).read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE
+    )
     return [textwrap.dedent(text) for _, text in found]
 
 
@@ -135,7 +137,7 @@ def test_the_check_of_the_scenario_page_finds_what_the_page_shows(
 
 
 def test_the_message_on_the_scenario_page_is_the_real_one() -> None:
-    text = (PAGES / "write-a-scenario.md").read_text()
+    text = (PAGES / "write-a-scenario.md").read_text(encoding="utf-8")
     shown = re.findall(r"`stairs\.toml: (.+?)`", text)
     with pytest.raises(ppafo.ScenarioError) as caught:
         ppafo.load_scenario("torque-task-proportional", ["motion.angel=75 deg"])
@@ -247,7 +249,7 @@ def three_position(install: Callable[..., ModuleType]) -> ModuleType:
 
 @pytest.mark.usefixtures("three_position")
 def test_the_parameter_set_of_the_page_has_its_valve() -> None:
-    shipped = (files("ppafo.parameters") / "sets" / "ppafo2011.toml").read_text()
+    shipped = (files("ppafo.parameters") / "sets" / "ppafo2011.toml").read_text(encoding="utf-8")
     valve = blocks("add-a-valve.md", "toml")[1]
     for kind in ("three_position", "my_valves.three_position:KIND"):
         text = shipped + "\n" + valve.replace('"three_position"', f'"{kind}"')
@@ -275,7 +277,7 @@ def diaphragms(install: Callable[..., ModuleType]) -> ModuleType:
 
 @pytest.mark.usefixtures("diaphragms")
 def test_the_actuator_of_the_page_gives_the_shaft_what_its_gas_gives() -> None:
-    shipped = (files("ppafo.parameters") / "sets" / "fabric-bladder.toml").read_text()
+    shipped = (files("ppafo.parameters") / "sets" / "fabric-bladder.toml").read_text(encoding="utf-8")
     head, tail = shipped.split("[actuator]")
     common = tail[tail.index("[actuator.angle_min]") :]
     for kind in ("diaphragms", "my_actuators.diaphragms:KIND"):

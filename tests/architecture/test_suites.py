@@ -6,7 +6,9 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -18,8 +20,17 @@ from tests.repeatable import TOO_SLOW
 
 ROOT = Path(__file__).parents[2]
 needs_make = pytest.mark.skipif(shutil.which("make") is None, reason="no make on this machine")
-BURNS = "def test_a():\n    assert sum(range(20_000_000)) > 1\n"
-"""A test of about half a second of CPU time."""
+BURNS = """
+import pytest
+
+def test_a():
+    assert sum(range(20_000_000)) > 1
+
+@pytest.mark.short
+def test_b():
+    assert sum(range(20_000_000)) > 1
+"""
+"""Tests of about half a second of CPU time."""
 
 
 def words_of(target: str) -> list[str]:
@@ -50,32 +61,59 @@ def test_make_test_leaves_out_what_is_long_and_make_test_all_nothing() -> None:
     assert [word for word in everything if word not in short] == []
 
 
-def test_a_new_file_that_costs_much_is_an_error_until_it_is_recorded(tmp_path: Path) -> None:
+@pytest.fixture
+def costly(tmp_path: Path) -> Path:
+    """A folder with a costly file and a light one, of which nothing is recorded, and limits that are soon reached."""
     (tmp_path / "pytest.ini").write_text("[pytest]\n", encoding="utf-8")
     (tmp_path / "conftest.py").write_text(
         "from pathlib import Path\nfrom tests import costs\npytest_plugins = ('tests.costs',)\n"
         "costs.RECORDED = Path(__file__).parent / 'tests' / 'costs.toml'\n"
-        "costs.NOTED, costs.LARGEST, costs.SHOWN = 0.05, 0.1, 0.05\n",
+        "costs.LONG, costs.NOTED, costs.LARGEST, costs.SHOWN = 0.05, 0.05, 0.1, 0.05\n",
         encoding="utf-8",
     )
-    folder = tmp_path / "tests"
-    folder.mkdir()
-    (folder / "test_burns.py").write_text(BURNS, encoding="utf-8")
-    (folder / "test_light.py").write_text("def test_b():\n    assert True\n", encoding="utf-8")
-    asked = run_tests("--costs", "show", cwd=tmp_path)
+    (tmp_path / "tests").mkdir()
+    (tmp_path / "tests" / "test_burns.py").write_text(BURNS, encoding="utf-8")
+    (tmp_path / "tests" / "test_light.py").write_text("def test_c():\n    assert True\n", encoding="utf-8")
+    return tmp_path
+
+
+def test_a_new_file_that_costs_much_is_an_error_until_it_is_recorded(costly: Path) -> None:
+    asked = run_tests("--costs", "show", cwd=costly)
     assert asked.returncode == 1
-    assert "ERROR tests/test_burns.py takes more than 0.1 s" in asked.stdout
-    assert "test_light.py takes" not in asked.stdout
-    assert run_tests(cwd=tmp_path).returncode == 0, "nobody asked"
-    assert run_tests("--costs", "record", cwd=tmp_path).returncode == 0
-    assert re.findall(r'^"(.*)" = ', (folder / "costs.toml").read_text(), re.MULTILINE) == ["tests/test_burns.py"]
-    again = run_tests("--costs", "show", cwd=tmp_path)
+    assert re.findall(r"^ERROR (\S+) costs \S+ s, more than 0.1 s: see costs.toml$", asked.stdout, re.MULTILINE) == [
+        "tests/test_burns.py"
+    ]
+    assert run_tests(cwd=costly).returncode == 0, "nobody asked"
+    assert run_tests("--costs", "record", cwd=costly).returncode == 0
+    again = run_tests("--costs", "show", cwd=costly)
     assert again.returncode == 0
-    assert "(1 tests)" in again.stdout
+    assert "tests/test_burns.py (2 tests)" in again.stdout
+    record = costly / "tests" / "costs.toml"
+    record.write_text(re.sub(r"seconds = .*", "seconds = 0.06", record.read_text("utf-8")), encoding="utf-8")
+    assert run_tests("--costs", "show", cwd=costly).returncode == 1, "it costs more than twice as much"
 
 
-def test_the_recorded_files_are_there() -> None:
-    assert [file for file in costs.recorded() if not (ROOT / file).is_file()] == []
+def test_what_was_long_is_left_out_of_the_short_suite_but_for_what_is_marked_short(costly: Path) -> None:
+    words = ("-m", "not long", "--costs", "record")
+    assert "3 passed" in run_tests(*words, cwd=costly).stdout
+    assert costs_of(costly).keys() == {"tests/test_burns.py"}
+    assert costs_of(costly)["tests/test_burns.py"]["long"] == ["test_a", "test_b"]
+    assert "2 passed, 1 deselected" in run_tests(*words, cwd=costly).stdout, "test_b is marked"
+    assert costs_of(costly)["tests/test_burns.py"]["long"] == ["test_a", "test_b"], "what did not run stays"
+    (costly / "tests" / "test_burns.py").write_text(BURNS.replace("test_a", "test_d"), encoding="utf-8")
+    assert "2 passed, 1 deselected" not in run_tests(*words, cwd=costly).stdout
+    assert costs_of(costly)["tests/test_burns.py"]["long"] == ["test_b", "test_d"], "what is gone does not"
+
+
+def costs_of(folder: Path) -> dict[str, Any]:
+    """What was recorded in a folder."""
+    return tomllib.loads((folder / "tests" / "costs.toml").read_text(encoding="utf-8"))
+
+
+def test_the_recorded_files_and_tests_are_there() -> None:
+    for file, cost in costs.recorded().items():
+        text = (ROOT / file).read_text(encoding="utf-8")
+        assert [name for name in cost.long if f"def {name}(" not in text] == []
 
 
 @pytest.mark.usefixtures("fresh_cache")

@@ -11,7 +11,7 @@ from ppafo.parameters import build_device
 from ppafo.parameters.audit import audit
 from ppafo.parameters.loading import parse_parameter_set
 
-LINES = (resources.files("ppafo.parameters") / "sets" / "ppafo2011.toml").read_text().splitlines()
+LINES = (resources.files("ppafo.parameters") / "sets" / "ppafo2011.toml").read_text(encoding="utf-8").splitlines()
 NUMBERS = ["0", "-1", "0.5", "1e308", "-1e308", "1e-308", "1e400", "nan", "inf", "10" * 200]
 TEXTS = ["", "psi", "psi_g", "psi_d", "mm^2", "s/m", "deg", "k", "(((((", "m" * 300, r"\u0000", r"\n"]
 JUNK = [*NUMBERS, *(f'"{text}"' for text in TEXTS), "true", "[]", "{}", "[[[[", "1979-05-27"]

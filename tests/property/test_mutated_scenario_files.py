@@ -14,7 +14,9 @@ from ppafo.simulation.plan import profile_parameters
 from ppafo.simulation.scenario import FreeMotion, Scenario
 
 FILE = "damaged.toml"
-ORIGINALS = [(resources.files("ppafo") / "scenarios" / f"{name}.toml").read_text() for name in list_scenarios()]
+ORIGINALS = [
+    (resources.files("ppafo") / "scenarios" / f"{name}.toml").read_text(encoding="utf-8") for name in list_scenarios()
+]
 BARE = ["\n".join(line for line in text.splitlines() if line and not line.startswith("#")) for text in ORIGINALS]
 NUMBERS = ["0", "-1", "-0.0", "0.5", "1e308", "-1e308", "1e-308", "1e400", "nan", "-inf", "inf", "10" * 200, "0x1F"]
 UNITS = ["s", "ms", "us", "min", "Hz", "kHz", "deg", "rad", "rad/s", "N m", "psi", "psi_g", "psi_a", "psi_d", "Pa_a"]

@@ -118,7 +118,9 @@ def test_gas_is_that_of_coolprop(name: str, properties: Any) -> None:
 
 @pytest.mark.parametrize("name", FLUIDS)
 def test_the_tables_are_what_the_script_makes(name: str, properties: Any) -> None:
-    content = json.loads((resources.files("ppafo.parameters.bottles") / "fluid_tables" / f"{name}.json").read_text())
+    content = json.loads(
+        (resources.files("ppafo.parameters.bottles") / "fluid_tables" / f"{name}.json").read_text(encoding="utf-8")
+    )
     plan = fluid_tables.PLANS[name]
     assert content["temperatures"] == pytest.approx(plan.temperatures, rel=1e-7)
     for index in (0, len(plan.temperatures) // 2, len(plan.temperatures) - 1):

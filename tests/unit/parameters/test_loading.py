@@ -209,7 +209,7 @@ def test_the_number_of_further_problems_is_told() -> None:
 
 
 def test_a_wrong_dimension_is_kept_for_the_audit_and_refused_for_a_device(tmp_path: Path) -> None:
-    text = (resources.files("ppafo.parameters") / "sets" / "ppafo2011.toml").read_text()
+    text = (resources.files("ppafo.parameters") / "sets" / "ppafo2011.toml").read_text(encoding="utf-8")
     file = tmp_path / "wrong.toml"
     file.write_text(text.replace('value = 31.6\nunit = "mm^2"', 'value = 31.6\nunit = "mm"'))
     load_parameter_set(file)
@@ -219,7 +219,7 @@ def test_a_wrong_dimension_is_kept_for_the_audit_and_refused_for_a_device(tmp_pa
 
 def test_the_example_of_the_how_to_page_is_a_valid_set() -> None:
     page = Path(__file__).parents[3] / "docs" / "how-to" / "add-a-parameter-set.md"
-    blocks = re.findall(r"```toml\n(.*?)```", page.read_text(), re.DOTALL)
+    blocks = re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
     parameter_set = parse_parameter_set("\n".join(map(textwrap.dedent, blocks)).encode(), page.name)
     assert set(parameter_set.accepted) == {"flow-of-main"}
     assert "reported.valves.main.mass_flow" in parameter_set.numbers

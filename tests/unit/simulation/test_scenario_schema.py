@@ -17,7 +17,7 @@ from ppafo.simulation.schema import json_schema
 
 
 def document_of(name: str) -> dict[str, Any]:
-    return tomllib.loads((resources.files("ppafo") / "scenarios" / f"{name}.toml").read_text())
+    return tomllib.loads((resources.files("ppafo") / "scenarios" / f"{name}.toml").read_text(encoding="utf-8"))
 
 
 def test_the_schema_is_itself_valid() -> None:
