@@ -15,7 +15,7 @@ from ppafo.engine.loading import BACKEND_VARIABLE, NUMBA
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 
-pytest_plugins = ("tests.costs", "tests.repeatable")
+pytest_plugins = ("tests.costs", "tests.built_once", "tests.repeatable")
 TESTS = Path(__file__).parent
 BY_NUMBA = (
     "unit/engine/test_compile",

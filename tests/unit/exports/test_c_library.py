@@ -24,6 +24,7 @@ from ppafo.simulation.result import Result
 from ppafo.simulation.simulate import simulate
 from ppafo.translation.c99 import program_source
 from ppafo.translation.native import build, run_native
+from tests.built_once import shared_library
 
 PAGE = Path(__file__).parents[3] / "docs" / "how-to" / "export-to-c.md"
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Werror")
@@ -140,9 +141,7 @@ class Loaded:
         self.name = written(folder, scenario, *overrides)
         self.exported = scenario_library(load_scenario(scenario, overrides))
         self.settings = [item.name for item in self.exported.settings]
-        library = folder / "library.so"
-        flags = ["-std=c99", "-O1", "-ffp-contract=off", "-shared", "-fPIC"]
-        subprocess.run(["gcc", *flags, str(folder / f"{self.name}.c"), "-o", str(library), "-lm"], check=True)
+        library = shared_library(folder / f"{self.name}.c", "-O1", "-ffp-contract=off")
         self.library = ctypes.CDLL(str(library))
 
     def call(self, function: str, *given: Any, returns: Any = ctypes.c_int) -> Any:

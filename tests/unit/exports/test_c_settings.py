@@ -2,7 +2,6 @@
 
 import ctypes
 import shutil
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import TIMES, with_numbers
 from ppafo.simulation.plan import plan_runs
 from ppafo.simulation.scenario import Scenario
+from tests.built_once import shared_library
 
 RUNS = 1000
 SPREAD = (0.7, 1.4)
@@ -49,10 +49,8 @@ def built(scenario: Scenario, folder: Path) -> ctypes.CDLL:
     """The library of a scenario, with the function from settings to numbers to be called from outside."""
     for name, content in c_library(scenario).items():
         (folder / name).write_bytes(content)
-    source, library = folder / f"{c_identifier(scenario.name)}.c", folder / "library.so"
-    flags = ["-std=c99", "-O0", "-ffp-contract=off", "-DPPAFO_ENTRY=extern", "-shared", "-fPIC", "-w"]
-    subprocess.run(["gcc", *flags, str(source), "-o", str(library), "-lm"], check=True)
-    return ctypes.CDLL(str(library))
+    source = folder / f"{c_identifier(scenario.name)}.c"
+    return ctypes.CDLL(str(shared_library(source, "-O0", "-ffp-contract=off", "-DPPAFO_ENTRY=extern", "-w")))
 
 
 class Handed(ctypes.Structure):

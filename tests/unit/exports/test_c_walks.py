@@ -29,6 +29,7 @@ from ppafo.walking.configuration import Configuration
 from ppafo.walking.loading import FILE
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.walk import plan_of, walk
+from tests.built_once import shared_library
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
 
@@ -75,12 +76,10 @@ def written(walked: Configuration, folder: Path) -> str:
     return c_identifier(walked.name)
 
 
-def built(walked: Configuration, folder: Path, *further: str) -> ctypes.CDLL:
-    """The library of a walk, to be called from here."""
-    source, library = folder / f"{written(walked, folder)}.c", folder / "library.so"
-    flags = ["-std=c99", "-O0", "-ffp-contract=off", "-shared", "-fPIC", "-w", *further]
-    subprocess.run(["gcc", *flags, str(source), "-o", str(library), "-lm"], check=True)
-    return ctypes.CDLL(str(library))
+def built(walked: Configuration, folder: Path) -> ctypes.CDLL:
+    """The library of a walk, with the function from settings to numbers to be called from outside."""
+    source = folder / f"{written(walked, folder)}.c"
+    return ctypes.CDLL(str(shared_library(source, "-O0", "-ffp-contract=off", "-DPPAFO_ENTRY=extern", "-w")))
 
 
 class Handed(ctypes.Structure):
@@ -142,8 +141,7 @@ def batches(name: str, overrides: tuple[str, ...], settings: tuple[Setting, ...]
 @pytest.mark.parametrize(("name", "overrides"), VARIED)
 def test_c_makes_the_numbers_of_a_walk_that_python_makes(name: str, overrides: tuple[str, ...], tmp_path: Path) -> None:
     settings = walk_library(load_walk(name, overrides)).settings
-    # The function from settings to numbers is called from outside.
-    library = built(load_walk(name, overrides), tmp_path, "-DPPAFO_ENTRY=extern")
+    library = built(load_walk(name, overrides), tmp_path)
     for values, batch in itertools.islice(batches(name, overrides, settings), DRAWS):
         parameters, states, counts = numbers_in_c(library, values, (len(batch.parameters), len(batch.states)))
         assert parameters.tobytes() == batch.parameters[:, 0].tobytes()
