@@ -23,11 +23,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(parsed: argparse.Namespace) -> int:
     """Compile or remove programs as requested, and list what is there."""
     from ppafo.engine.cache import cache_folder, clear
+    from ppafo.engine.kept import clear_kept
     from ppafo.engine.private_folder import refusal
 
     check_output(parsed)
     folder = cache_folder()
-    cleared = clear(folder) if parsed.clear and folder is not None else 0
+    cleared = clear_kept(folder) + clear(folder) if parsed.clear and folder is not None else 0
     why_not = "" if parsed.clear else refusal(folder)
     if parsed.warm:
         _warm(why_not)
@@ -48,6 +49,7 @@ def _warm(why_not: str) -> None:
 
 def _document(folder: Path | None, why_not: str) -> dict[str, Any]:
     from ppafo.engine.cache import LONGEST_UNUSED, MAXIMUM_BYTES, list_programs
+    from ppafo.engine.kept import kept_sizes
 
     programs = [] if folder is None else list_programs(folder)
     now = time.time()
@@ -55,6 +57,7 @@ def _document(folder: Path | None, why_not: str) -> dict[str, Any]:
         "folder": None if folder is None else str(folder),
         "not_used": why_not or None,
         "size": sum(program.size for program in programs),
+        "made_from_programs": 0 if folder is None else sum(kept_sizes(folder)),
         "kept_unused_days": LONGEST_UNUSED / _DAY,
         "most_bytes": MAXIMUM_BYTES,
         "programs": [
@@ -71,6 +74,8 @@ def _lines(document: dict[str, Any]) -> list[str]:
     if "freed" in document:
         lines.append(f"removed: {_megabytes(document['freed'])}")
     lines.append(f"programs: {len(document['programs'])}, {_megabytes(document['size'])}")
+    if document["made_from_programs"]:
+        lines.append(f"texts of programs and their forms for pages: {_megabytes(document['made_from_programs'])}")
     lines += [
         f"  {item['name']}  {_megabytes(item['size']):>8}  last used {_days(item['unused_days'])}"
         for item in document["programs"]

@@ -7,6 +7,7 @@ with the folder, only the next process makes it again.
 import contextlib
 import hashlib
 import os
+import re
 import secrets
 import stat
 import time
@@ -24,6 +25,7 @@ MAXIMUM_BYTES = 50_000_000
 """Size of all files above which those that were not used for longest are removed."""
 
 _HASH_BYTES = hashlib.sha256().digest_size
+_OWN_NAME = re.compile(r"[a-z]+-[0-9a-f]{32}|\.writing-[0-9a-f]{16}")
 
 
 def kept(kind: str, made_from: str, make: Callable[[], bytes]) -> bytes:
@@ -31,7 +33,8 @@ def kept(kind: str, made_from: str, make: Callable[[], bytes]) -> bytes:
     folder = cache_folder()
     if folder is None or refusal(folder):
         return make()
-    place = folder / FOLDER / f"{kind}-{hashlib.sha256(made_from.encode()).hexdigest()[:32]}"
+    key = hashlib.sha256(made_from.encode("utf-8", "surrogatepass")).hexdigest()[:32]
+    place = folder / FOLDER / f"{kind}-{key}"
     content = _read(place)
     if content is None:
         content = make()
@@ -39,6 +42,15 @@ def kept(kind: str, made_from: str, make: Callable[[], bytes]) -> bytes:
             _write(place, content)
             _evict(place.parent)
     return content
+
+
+def kept_sizes(folder: Path) -> list[int]:
+    """Return the sizes [bytes] of what is kept in the folder of the programs."""
+    sizes = []
+    for place in _files(folder / FOLDER):
+        with contextlib.suppress(OSError):  # another process has removed it in this instant
+            sizes.append(place.lstat().st_size)
+    return sizes
 
 
 def clear_kept(folder: Path) -> int:
@@ -70,6 +82,8 @@ def _is_own(found: os.stat_result, above: os.stat_result) -> bool:
 
 
 def _write(place: Path, content: bytes) -> None:
+    if place.parent.is_symlink():
+        return
     place.parent.mkdir(mode=0o700, exist_ok=True)
     aside = place.with_name(f".writing-{secrets.token_hex(8)}")
     try:
@@ -97,8 +111,9 @@ def _last_used(place: Path) -> float:
 
 
 def _files(folder: Path) -> list[Path]:
+    """The files of this module in a folder that is no link; what others put beside them is left alone."""
     try:
-        return [place for place in folder.iterdir() if not stat.S_ISDIR(place.lstat().st_mode)]
+        return [] if folder.is_symlink() else [item for item in folder.iterdir() if _OWN_NAME.fullmatch(item.name)]
     except OSError:
         return []
 

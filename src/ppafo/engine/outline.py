@@ -73,8 +73,9 @@ class Outline:
         if value is None or isinstance(value, bool | int | float | str | bytes):
             return f"{type(value).__name__} {value!r}"
         # A builtin function, a module or a class is written by its name; anything else is refused where it is read.
-        named = getattr(value, "__qualname__", "") or getattr(value, "__name__", "")
-        return f"{type(value).__qualname__} {getattr(value, '__module__', '')} {named}"
+        if isinstance(value, ModuleType):
+            return f"module {value.__name__}"
+        return f"{type(value).__qualname__} {getattr(value, '__module__', '')} {getattr(value, '__qualname__', '')}"
 
     def _row(self, row: Any) -> str:
         defaults = {name: self._described(value) for name, value in row._field_defaults.items()}

@@ -4,6 +4,7 @@ import json
 import math
 import shutil
 from collections import Counter
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -117,6 +118,51 @@ def test_other_numbers_need_no_compiler(monkeypatch: pytest.MonkeyPatch) -> None
         "motion.angle",
         "sensors.seed",
     }
+
+
+def test_a_module_that_was_found_once_is_found_again_without_writing_its_text(
+    fresh_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = module_of(load_scenario("torque-task-proportional"))
+    monkeypatch.setattr(building, "source_of", lambda _library: pytest.fail("the text was written"))
+    assert module_of(load_scenario("torque-task-proportional", MOVED)).wasm == first.wasm
+    assert list(fresh_cache.rglob("digest-*"))
+
+
+def as_it_is(number: float) -> float:
+    """Stands for another function of the preparation."""
+    return number
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        ("ppafo.engine.scheme.pneumatics.GAMMA", 0.3),
+        ("ppafo.metrics.switching.OSCILLATION_THRESHOLD", 0.06),
+        ("ppafo.simulation.preparation.WHOLE", 1e-8),
+        ("ppafo.simulation.preparation.rounded_up", as_it_is),
+    ],
+)
+def test_changed_physics_never_takes_a_program_of_the_package(
+    place: str, value: object, fresh_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenario = load_scenario("torque-task-proportional")
+    shipped = module_of(scenario).wasm
+    monkeypatch.setattr(building, "check_can_build", lambda: None)
+    monkeypatch.setattr(building, "build", lambda text: f"built of {building.digest_of(text)}".encode())
+    with monkeypatch.context() as patch:
+        patch.setattr(place, value)
+        assert module_of(scenario).wasm.startswith(b"built of ")
+    assert module_of(scenario).wasm == shipped
+
+
+def test_what_had_to_be_built_is_built_once(fresh_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    built: list[str] = []
+    monkeypatch.setattr(building, "check_can_build", lambda: None)
+    monkeypatch.setattr(building, "build", lambda text: built.append(text) or b"built")
+    scenario = load_scenario("torque-task-proportional", ["sensors.delay=2 ms"])
+    assert [module_of(scenario).wasm for _ in range(3)] == [b"built"] * 3
+    assert len(built) == 1
 
 
 def test_without_a_compiler_it_is_said_how_to_get_one(monkeypatch: pytest.MonkeyPatch) -> None:

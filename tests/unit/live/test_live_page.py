@@ -1,5 +1,7 @@
 """The page that simulates, in a headless browser: what it asks for, whether its bits are Python's, what damage does."""
 
+import base64
+import gzip
 import json
 import os
 import random
@@ -14,11 +16,13 @@ import pytest
 from ppafo.errors import ScenarioError
 from ppafo.exports import wasm
 from ppafo.live import page as pages
+from ppafo.live.page import packed, packed_once
 from ppafo.live.start import check_start
-from ppafo.live.workbench import DEFAULT, workbench
+from ppafo.live.workbench import DEFAULT, known_intervals, workbench
 from ppafo.simulation.loading import load_scenario
 from ppafo.units import parse_quantity
 from ppafo.walking import list_walks, load_walk
+from scripts.known_intervals import known_intervals as intervals_of_study
 from scripts.live_page import check_bits, check_damage, check_refusals, missing, opened, programs_by_tab
 from scripts.page_states import address_of, hard_states
 
@@ -162,6 +166,20 @@ def _refusal(start: dict[str, Any], content: dict[str, Any]) -> bool:
 def test_a_pipe_is_no_page_and_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.html")
     assert not pages.is_page(tmp_path / "pipe.html")
+
+
+def test_the_intervals_of_the_page_are_those_of_the_study() -> None:
+    assert known_intervals() == {path: tuple(ends) for path, ends in intervals_of_study().items()}, (
+        "python scripts/known_intervals.py"
+    )
+
+
+def test_what_pages_hold_is_packed_once_and_unpacks_to_itself(fresh_cache: Path) -> None:
+    content = bytes(range(256)) * 40
+    first = packed_once(content)
+    assert packed_once(content) == first == packed(content)
+    assert gzip.decompress(base64.b85decode(first)) == content
+    assert len(list(fresh_cache.rglob("packed-*"))) == 1
 
 
 def test_the_decision_has_the_sizes_of_the_programs() -> None:

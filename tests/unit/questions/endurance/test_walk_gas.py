@@ -5,6 +5,7 @@ import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from ppafo.cli.main import main
 from ppafo.errors import DataError, ParameterError
 from ppafo.model.chambers import chamber_1_volume, chamber_2_volume
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
+from ppafo.questions.endurance import discharge
 from ppafo.questions.endurance.draw import (
     FORMAT,
     Actuator,
@@ -279,3 +281,22 @@ def test_the_largest_flow_is_that_of_the_bottles_regulator_where_there_are_lines
     assert largest_flow(both) != largest_flow(
         Recording("valve", recording.time, {"supplied_mass": channels["supplied_mass"]})
     )
+
+
+def test_how_long_a_bottle_lasts_is_known_without_its_course(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[object] = []
+    original = discharge._recording
+
+    def counted(*given: Any) -> Recording:
+        made.append(given)
+        return original(*given)
+
+    monkeypatch.setattr(discharge, "_recording", counted)
+    found = endurance_of_walk(solenoid())
+    assert found is not None
+    assert found.discharge.walking_time > 60.0
+    assert made == []
+    course = found.discharge.recording
+    assert course is found.discharge.recording
+    assert course.time[-1] == found.discharge.total_time
+    assert len(made) == 1

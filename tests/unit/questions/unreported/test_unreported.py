@@ -206,3 +206,13 @@ def test_a_choice_is_implied_where_one_alone_is_left_and_open_where_all_are_alik
     assert spread_of([0.5, 0.5]) == pytest.approx(1.0)
     assert spread_of([1 / 3] * 3) == pytest.approx(1.0)
     assert np.isnan(spread_of([0.0, 0.0]))
+
+
+def test_how_densely_a_proposal_draws_does_not_depend_on_how_many_points_are_judged_together() -> None:
+    chance = np.random.default_rng(1)
+    shape = np.linalg.cholesky(0.05 * np.eye(CELLS.count(0)) + 0.01)
+    proposal = Proposal(chance.random((50, len(CELLS))), shape, CELLS)
+    points = chance.random((1300, len(CELLS)))
+    together = proposal.density(points)
+    assert np.array_equal(together, np.concatenate([proposal.density(part) for part in np.array_split(points, 13)]))
+    assert np.array_equal(together, proposal.density(points))

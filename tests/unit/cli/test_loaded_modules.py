@@ -1,0 +1,103 @@
+"""What a run loads: each library where it is needed, and no part of the package that the run has nothing to do with."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ppafo.engine.loading import NUMBA, chosen_compiler
+
+HEAVY = frozenset(
+    {
+        *("casadi", "dask", "h5netcdf", "h5py", "jax", "jinja2", "llvmlite", "matplotlib", "numba", "numpy", "pandas"),
+        *("PIL", "pint", "pyarrow", "pydantic", "scipy", "sksundae", "xarray"),
+    }
+)
+READING, DRAWING = {"numpy", "pydantic"}, {"matplotlib", "PIL"}
+WRITING = {"h5netcdf", "h5py", "jinja2"}
+MOST_BEFORE_THE_RUN, MOST = 200, 230
+"""Modules of the package that a run of a scenario may load; what has no part in it stays out."""
+
+CODE = """
+import json, sys
+from ppafo.engine.lanes import LaneBlock
+
+advance, seen = LaneBlock.advance, []
+
+def watched(self, steps):
+    seen or seen.append(list(sys.modules))
+    advance(self, steps)
+
+LaneBlock.advance = watched
+{command}
+print(json.dumps([seen[0], list(sys.modules)]))
+"""
+COMMAND = "from ppafo.cli.main import main\nassert main({words!r}) == 0"
+
+
+def loaded_by(command: str) -> tuple[list[str], list[str]]:
+    """Modules that a command had loaded as the run began, and in the end."""
+    done = subprocess.run(
+        [sys.executable, "-c", CODE.format(command=command)], env=os.environ, capture_output=True, text=True, check=True
+    )
+    found: Any = json.loads(done.stdout.splitlines()[-1])
+    return found[0], found[1]
+
+
+def heavy(modules: list[str]) -> set[str]:
+    compiler = {"numba", "llvmlite"} if chosen_compiler().name == NUMBA else set()
+    return {name.partition(".")[0] for name in modules} & HEAVY - compiler
+
+
+def own(modules: list[str]) -> set[str]:
+    return {name for name in modules if name.partition(".")[0] == "ppafo"}
+
+
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[str], list[str]]:
+    """What ``ppafo simulate`` loads, with everything made that is kept."""
+    words = ["simulate", "torque-task-proportional", "--out", str(tmp_path_factory.mktemp("run") / "result")]
+    command = COMMAND.format(words=words)
+    loaded_by(command)
+    return loaded_by(command)
+
+
+def test_a_run_loads_no_library_that_it_does_not_use(simulated: tuple[list[str], list[str]]) -> None:
+    before, after = simulated
+    assert heavy(before) == READING
+    assert heavy(after) == READING | DRAWING | WRITING
+
+
+def test_a_run_of_a_scenario_loads_no_walks_studies_rigs_and_questions(
+    simulated: tuple[list[str], list[str]],
+) -> None:
+    foreign = ("walking", "gait", "studies", "rig", "identification", "validation", "worlds")
+    _, after = simulated
+    assert {name for name in own(after) if name.startswith(tuple(f"ppafo.{part}" for part in foreign))} == set()
+    assert {name for name in own(after) if name.startswith("ppafo.questions.")} == {
+        "ppafo.questions.catalogue",
+        "ppafo.questions.question",
+    }
+
+
+def test_the_number_of_modules_of_a_run_does_not_grow_unnoticed(simulated: tuple[list[str], list[str]]) -> None:
+    before, after = simulated
+    assert len(own(before)) <= MOST_BEFORE_THE_RUN
+    assert len(own(after)) <= MOST
+
+
+def test_a_run_from_python_draws_and_writes_nothing() -> None:
+    command = "import ppafo\nppafo.simulate('torque-task-proportional')"
+    loaded_by(command)
+    _, after = loaded_by(command)
+    assert heavy(after) == READING
+
+
+def test_a_walk_reads_units_without_their_library(tmp_path: Path) -> None:
+    command = COMMAND.format(words=["walk", "off", "--minutes", "0.2", "--out", str(tmp_path / "walk")])
+    _, after = loaded_by(command)
+    assert heavy(after) <= READING | DRAWING | WRITING | {"scipy"}
