@@ -1,5 +1,7 @@
 /** What `ppafo workbench` puts into a page: programs with their settings, channels and metrics, and how they are grouped. */
 
+import type { Made } from "./following";
+
 export interface UnitScale {
   readonly unit: string;
   /** SI = number * scale + offset, in decimals; a gauge pressure counts from the atmosphere. */
@@ -22,6 +24,8 @@ export interface Setting {
   readonly text: string;
   /** The setting whose value this one has until somebody changes it; else empty. */
   readonly follows: string;
+  /** What others make of it until somebody changes it; null where it stands for itself. */
+  readonly made: Made | null;
   /** Words that may stand for the value of another setting. */
   readonly words: Readonly<Record<string, string>>;
   /** Why this one cannot be changed here: it has to stay `zero`, or `above zero`; else empty. */

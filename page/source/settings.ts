@@ -1,6 +1,7 @@
 /** From what is typed to the numbers that the engine is given: one configuration at a time. */
 
 import { type Content, programNamed, type Program, type Relation, scalesOf, type Setting } from "./content";
+import { madeOf } from "./following";
 import { fromSi, InputError, plain, readableUnit, scaleOf, short, splitQuantity, toSi } from "./units";
 
 export const ATMOSPHERE = "supply.atmospheric_pressure";
@@ -63,7 +64,19 @@ function valuesFrom(content: Content, configuration: Configuration): Values {
     const followed = setting.words[changes[setting.key] ?? ""] ?? setting.follows;
     values.set(setting.key, values.get(followed) ?? setting.value);
   }
+  for (const [key, value] of madeFrom(program, configuration, values)) values.set(key, value);
   return values;
+}
+
+/** What is made of other settings that stand at some values, in the order in which one is made of another. */
+export function madeFrom(program: Program, { changes }: Configuration, values: Values): ReadonlyMap<string, number> {
+  const found = new Map<string, number>();
+  for (const { key, made } of program.settings) {
+    if (made === null || changes[key] !== undefined) continue;
+    const value = madeOf(made, (source) => found.get(source) ?? values.get(source) ?? NaN);
+    if (value !== null) found.set(key, value);
+  }
+  return found;
 }
 
 /** A typed number with its unit in SI, within its range. A bare number has the unit that is shown. */

@@ -5,7 +5,7 @@ import { programNamed, scalesOf } from "./content";
 import type { Ensemble, Run } from "./engine";
 import { NO_TRACE, together, type Workers } from "./jobs";
 import type { Band } from "./panels";
-import { ATMOSPHERE, changed, type Configuration, isInside, settingsByKey, type Values, valuesOf } from "./settings";
+import { ATMOSPHERE, changed, type Configuration, isInside, madeFrom, settingsByKey, type Values, valuesOf } from "./settings";
 import { scaleOf, toSi } from "./units";
 
 /** Values of each of both settings of a map. */
@@ -104,7 +104,7 @@ function differences(content: Content, configuration: Configuration, setting: Se
 }
 
 /** What differs in a run, with the settings that have the value of another one as long as nobody changes them. */
-function withFollowers(program: Program, configuration: Configuration, given: Differences): Differences {
+function withFollowers(program: Program, configuration: Configuration, base: Values, given: Differences): Differences {
   const found = new Map(given);
   const own = new Set(found.keys());
   // A follower may be followed in its turn.
@@ -113,7 +113,8 @@ function withFollowers(program: Program, configuration: Configuration, given: Di
     const value = found.get(typed === undefined ? follows : (words[typed] ?? ""));
     if (value !== undefined && !own.has(key)) found.set(key, value);
   }
-  return [...found];
+  const made = madeFrom(program, configuration, new Map([...base, ...found]));
+  return [...found, ...[...made].filter(([key, value]) => !own.has(key) && value !== base.get(key))];
 }
 
 /** The settings of many runs, one after the other: those of a configuration but for what differs in each. */
@@ -148,7 +149,7 @@ export async function bandOf(
   const drawn = Array.from({ length: DRAWS }, () =>
     free.map(({ key, interval }): [string, number] => [key, (interval?.[0] ?? 0) + ((interval?.[1] ?? 0) - (interval?.[0] ?? 0)) * draw()]),
   );
-  const rows = rowsOf(program, base, drawn.map((changes) => withFollowers(program, configuration, changes)));
+  const rows = rowsOf(program, base, drawn.map((changes) => withFollowers(program, configuration, base, changes)));
   const every = Math.max(1, Math.floor(run.time.length / BAND_PLACES));
   const places = Math.floor((run.time.length - 1) / every) + 1;
   const time = Float64Array.from({ length: places }, (_, place) => run.time[place * every] ?? 0);
@@ -206,7 +207,7 @@ export async function effectsOf(content: Content, workers: Workers, configuratio
   const moved = found.filter(isMoved);
   const assumed = moved.map(([setting]) => setting);
   const ends = moved.map(([, both]) => both);
-  const differing = assumed.flatMap(({ key }, place) => (ends[place] ?? [0, 0]).map((end) => withFollowers(program, configuration, [[key, end]])));
+  const differing = assumed.flatMap(({ key }, place) => (ends[place] ?? [0, 0]).map((end) => withFollowers(program, configuration, base, [[key, end]])));
   if (differing.length === 0) return [];
   const runs = await workers.runMany(program, rowsOf(program, base, differing), NO_TRACE, { goesOn: isWanted, isWanted });
   const width = program.metrics.length;

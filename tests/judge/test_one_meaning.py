@@ -38,7 +38,7 @@ def test_settings_of_a_library_are_single_runs_with_the_same_words(name: str) ->
 
 @needs_gcc
 @needs_node
-@pytest.mark.parametrize("name", ["torque-task-proportional", "solenoid-regulators"])
+@pytest.mark.parametrize("name", ["torque-task-proportional", "solenoid"])
 def test_texts_on_a_page_are_single_runs_with_the_same_words(name: str) -> None:
     found = at_page(name, 20, seed=14)
     assert found.differing == []

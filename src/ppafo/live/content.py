@@ -204,6 +204,7 @@ def _setting(entry: Mapping[str, Any], gauge: Mapping[str, str], intervals: Mapp
         "value": entry["value"],
         "text": gauge.get(key, ""),
         "follows": entry["follows"] or "",
+        "made": entry["made"],
         "words": {word: f"supply.{name}" for word, name in PRESSURE_WORDS.items()} if is_initial else {},
         "kept": entry["kept"] or "",
         "slider": _slider(entry),

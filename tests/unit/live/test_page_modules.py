@@ -23,7 +23,7 @@ console.log(JSON.stringify(told));
 """
 
 _BAND = """async ({ bandOf }) => {
-    const setting = (key, interval) => ({ key, value: 1, text: "", follows: "", words: {}, interval });
+    const setting = (key, interval) => ({ key, value: 1, text: "", follows: "", made: null, words: {}, interval });
     const named = name => ({ name, unit: "", shown: "" });
     const program = {
         name: "one", kind: "scenario", metrics: [], relations: [],

@@ -70,6 +70,7 @@ def scenario_library(scenario: Scenario) -> Library:
         words=words_of(scenario, links),
         further=lambda collector: preparation_of(scenario, program.program, collector),
         following=_following(settings, links),
+        links=links,
     )
 
 
@@ -123,6 +124,7 @@ def walk_library(configuration: "Configuration") -> Library:
         words=words_of_walk(configuration, links, failing),
         further=lambda collector: preparation_of_walk(configuration, program.program, collector),
         following=_following(settings, links),
+        links=links,
         defaults=frozenset(c_identifier(path) for path in links if not path.startswith("supply.")),
     )
 

@@ -5,7 +5,7 @@ import re
 import sys
 import textwrap
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.resources import files
 
 from ppafo.engine.lane_source import SAME_MOMENT
@@ -14,6 +14,7 @@ from ppafo.engine.run import NEVER_FAILED
 from ppafo.engine.source_text import Collector
 from ppafo.exports.c_library.program import COUNTS, IN_PARTS, WHOLE, ExportedProgram, Further, c_text
 from ppafo.model.declaration import Quantity
+from ppafo.parameters.graph import Graph
 from ppafo.version import __version__
 
 OUTPUTS = {
@@ -119,7 +120,7 @@ class Library:
     ``further`` adds the function that makes the numbers of a run from the settings, ``preparation`` has the lines of C
     around it. ``switches`` choose the program, ``other_program`` has further conditions in C under which another would
     be needed. ``following`` adds the function that lets settings follow others, None where none does, and ``defaults``
-    names those whose default does so, which has no range. ``words`` fill the page.
+    names those whose default does so, which has no range; ``links`` say what follows what. ``words`` fill the page.
     """
 
     title: str
@@ -134,6 +135,7 @@ class Library:
     further: Further | None = None
     following: Further | None = None
     defaults: frozenset[str] = frozenset()
+    links: Graph = field(default_factory=dict)
 
     @property
     def name(self) -> str:

@@ -9,7 +9,9 @@
                    "minimum": 0.0 or null, "is_minimum_allowed": true, "maximum": 0.01 or null, "is_whole": false,
                    "display": {"unit": "mm^2", "factor": 1e-06, "zero": 0.0}, "description": ..., "origin": "published",
                    "source": ..., "note": ..., "half_width": 95 % interval in SI or null,
-                   "follows": key or null, "kept": "zero", "above zero" or null}, ...],
+                   "follows": key or null,
+                   "made": {"terms": [{"rule": ..., "sources": [keys]}], "gap": ...} or null,
+                   "kept": "zero", "above zero" or null}, ...],
      "channels": [{"name": "time", "unit": "s", "display": {...}, "description": ...}, ...],
      "metrics": [{"name": ..., "unit": ..., "display": {...}, "description": ...}, ...],
      "relations": [{"key": ..., "relation": "below", "at most", "at least" or "above", "other": key,
@@ -19,8 +21,8 @@
 ``factor`` times the one that is shown. ``origin`` is that of the parameter set (published, datasheet, derived,
 identified, fitted, assumed), ``task`` for a number of the scenario itself, ``default`` for one that nobody gave, or
 ``changed`` for one that an override or a caller put there. What ``follows`` another setting is the same number as
-long as nobody changes it by itself. ``kept`` says that a setting must stay 0, or above 0, as another program would be
-needed.
+long as nobody changes it by itself; what is ``made`` of others is the sum of a gap and of what rules make of them.
+``kept`` says that a setting must stay 0, or above 0, as another program would be needed.
 """
 
 import math
@@ -35,7 +37,7 @@ from ppafo.exports.c_library.files import OUTPUTS, Library, Setting, c_identifie
 from ppafo.exports.loading import Exportable
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
 from ppafo.parameters.device import Device
-from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph
+from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, Term, itself
 from ppafo.parameters.overrides import SOURCE
 from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si
 from ppafo.parameters.provenance import Entry
@@ -69,7 +71,8 @@ def description_of(item: Exportable, library: Library) -> dict[str, Any]:
     """The description of the module of a scenario or a walk, as the beginning of this file has it."""
     file = _file_of_scenario(item) if isinstance(item, Scenario) else _file_of_walk(item)
     keys = {setting.name: setting.path for setting in library.settings}
-    origins, follows, kept = _origins(file, item.device, library), _follows(item.graph), _kept(library)
+    origins, follows, kept = _origins(file, item.device, library), _follows(library.links), _kept(library)
+    made = _made(library.links)
     program, atmosphere = library.program, item.device.supply.atmospheric_pressure
     channels = {"time": ("s", "since the start"), **{name: OUTPUTS[name] for name in program.outputs}}
     return {
@@ -84,6 +87,7 @@ def description_of(item: Exportable, library: Library) -> dict[str, Any]:
                 **_setting(setting, atmosphere),
                 **origins[setting.path],
                 "follows": follows.get(setting.path),
+                "made": made.get(setting.path),
                 "kept": kept.get(setting.name),
             }
             for setting in library.settings
@@ -243,3 +247,22 @@ def _parameter_set(file: _File, device: Device) -> ParameterSet | None:
 def _follows(links: Graph) -> dict[str, str]:
     """Settings that have the number of another until they are changed by themselves."""
     return {path: found[0].sources[0] for path, found in links.items() if found[0].is_same}
+
+
+def _made(links: Graph) -> dict[str, dict[str, Any]]:
+    """Settings that rules make of others until they are changed by themselves; a rule has the name of its function."""
+    return {
+        path: {
+            "terms": [
+                {"rule": f"{_module(term)}.{term.function.__name__}", "sources": list(term.sources)}
+                for term in found[0].terms
+            ],
+            "gap": found[0].gap,
+        }
+        for path, found in links.items()
+        if any(term.function is not itself for term in found[0].terms)
+    }
+
+
+def _module(term: Term) -> str:
+    return term.function.__module__.rpartition(".")[2]
