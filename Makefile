@@ -8,7 +8,7 @@ CORES := $(shell nproc 2>/dev/null || echo 2)
 QUICK_TESTS := tests/architecture tests/contract/test_command_words.py tests/contract/test_catalogs.py $(addprefix tests/unit/,\
 	test_public_interface.py test_units.py control documents gait metrics model parameters signals storage)
 
-.PHONY: reproduce gallery validation test test-all coverage quick check format bench bits dist page site opensim lock clean
+.PHONY: reproduce gallery validation test test-long test-all coverage quick check format bench bits dist page site opensim lock clean
 
 reproduce: $(LEAN)
 	$(BIN)/ppafo reproduce --out out/reproduce
@@ -25,12 +25,16 @@ validation: $(READY)
 test: check
 	$(TESTS) -m "not long"
 
+# What `make test` leaves out.
+test-long: $(READY)
+	$(TESTS) -m long
+
 # Everything there is.
 test-all: check
 	$(TESTS)
 
 # Kept as bytecode, tests and libraries begin at once in the next run, whatever the surroundings say of it.
-test test-all quick coverage: export PYTHONDONTWRITEBYTECODE =
+test test-long test-all quick coverage: export PYTHONDONTWRITEBYTECODE =
 TESTS := $(BIN)/python -m pytest -n $(CORES) --dist loadfile --no-loadscope-reorder --costs show
 
 # The last line is branch coverage of the package in percent; `coverage report --sort=miss` says where it is not. Compiled code is not seen.

@@ -7,7 +7,7 @@ import pytest
 
 from ppafo.errors import ProgramError
 from ppafo.exports.fmu import binaries
-from ppafo.translation import native
+from ppafo.translation import compiler_process
 from tests import built_once
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
@@ -21,7 +21,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
 
     def ask(line: list[str], remedy: str, folder: str) -> built_once.Done:
         lines.append(line)
-        return native.asked(line, remedy, folder)
+        return compiler_process.asked(line, remedy, folder)
 
     monkeypatch.setattr(binaries, "asked", built_once._asked_once(ask))
     monkeypatch.setattr(binaries, "compiler_for", lambda _name: ["gcc", "-s"])

@@ -5,7 +5,6 @@ import importlib.util
 import os
 import platform
 import signal
-import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -22,6 +21,7 @@ from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, join_results
 from ppafo.engine.loading import HOW_TO_INSTALL, WITHOUT_C
 from ppafo.errors import SimulationError, one_line, reason
 from ppafo.translation.c99 import FLAGS, c_source
+from ppafo.translation.compiler_process import asked, complaint
 from ppafo.translation.native_entries import Entries, load_entries, with_packed_entries
 from ppafo.translation.typed import LIBRARY
 from ppafo.translation.walk import entries_of, walk_module
@@ -122,20 +122,6 @@ def _file_identity(command: str) -> tuple[str, int, int]:
     except OSError:
         return str(place), 0, 0
     return str(place), found.st_size, found.st_mtime_ns
-
-
-def asked(line: Sequence[str], remedy: str = "", folder: str | None = None) -> "subprocess.CompletedProcess[str]":
-    """What a compiler says and how it ends, run in ``folder``; CompilerError, with a remedy, if it cannot be run."""
-    try:
-        return subprocess.run(line, cwd=folder, capture_output=True, encoding="utf-8", errors="replace", check=False)
-    except OSError as error:
-        raise CompilerError(f"{line[0]} cannot be run: {reason(error)}{remedy and '; '}{remedy}") from error
-
-
-def complaint(done: "subprocess.CompletedProcess[str]") -> str:
-    """The line in which a compiler says what is wrong; how it ended where it says nothing."""
-    lines = [*done.stderr.splitlines(), *done.stdout.splitlines(), f"it ended with {done.returncode}"]
-    return one_line(next((text for text in lines if "error" in text), next(filter(str.strip, lines))))
 
 
 @cache

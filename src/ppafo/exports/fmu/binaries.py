@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ppafo.errors import ProgramError
 from ppafo.exports.fmu import component
-from ppafo.translation.native import asked, complaint
+from ppafo.translation.compiler_process import asked, complaint
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv")
 _ANOTHER = "install gcc, clang or 'pip install ppafo[native]' anew"
