@@ -88,9 +88,6 @@ def test_a_new_file_that_costs_much_is_an_error_until_it_is_recorded(costly: Pat
     again = run_tests("--costs", "show", cwd=costly)
     assert again.returncode == 0
     assert "tests/test_burns.py (2 tests)" in again.stdout
-    record = costly / "tests" / "costs.toml"
-    record.write_text(re.sub(r"seconds = .*", "seconds = 0.06", record.read_text("utf-8")), encoding="utf-8")
-    assert run_tests("--costs", "show", cwd=costly).returncode == 1, "it costs more than twice as much"
 
 
 def test_what_was_long_is_left_out_of_the_short_suite_but_for_what_is_marked_short(costly: Path) -> None:
