@@ -77,9 +77,13 @@ def written(walked: Configuration, folder: Path) -> str:
 
 
 def built(walked: Configuration, folder: Path) -> ctypes.CDLL:
-    """The library of a walk, with the function from settings to numbers to be called from outside."""
+    """The library of a walk, with the function from settings to numbers to be called from outside.
+
+    Its own calls stay inside of it: the C library of GNU has an ``advance`` too.
+    """
     source = folder / f"{written(walked, folder)}.c"
-    return ctypes.CDLL(str(shared_library(source, "-O0", "-ffp-contract=off", "-DPPAFO_ENTRY=extern", "-w")))
+    flags = ("-O0", "-ffp-contract=off", "-DPPAFO_ENTRY=extern", "-Wl,-Bsymbolic", "-w")
+    return ctypes.CDLL(str(shared_library(source, *flags)))
 
 
 class Handed(ctypes.Structure):
