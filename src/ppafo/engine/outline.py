@@ -84,7 +84,8 @@ class Outline:
 
     def _function(self, function: FunctionType) -> str:
         code, named_defaults = function.__code__, dict(function.__kwdefaults__ or {})
-        self.functions.append(Made(function, code, function.__defaults__, named_defaults))
+        made = Made(function=function, code=code, defaults=function.__defaults__, named_defaults=named_defaults)
+        self.functions.append(made)
         given = self._described(function.__defaults__), self._described(tuple(named_defaults.items()))
         codes = list(_codes(code))
         names = sorted({name for inner in codes for name in inner.co_names})

@@ -15,6 +15,7 @@ from ppafo.engine.outline import file_hash
 from ppafo.errors import ProgramError
 from ppafo.exports.c_library.files import Library, conditions_of, filled, run_words
 from ppafo.exports.c_library.program import IN_PARTS, TOGETHER, WHOLE, ExportedProgram, c_text, outline_of
+from ppafo.translation.native import asked, complaint
 from ppafo.version import __version__
 
 LANES = 8
@@ -120,8 +121,6 @@ def check_can_build() -> None:
 
 def build(text: str) -> bytes:
     """A module of a translation unit. ProgramError where ziglang is not there, or refuses."""
-    from ppafo.translation.native import asked, complaint
-
     check_can_build()
     with tempfile.TemporaryDirectory() as folder:
         for name, content in {"module.c": text, "math.h": _template("math.h")}.items():
