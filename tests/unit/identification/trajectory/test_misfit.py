@@ -124,6 +124,9 @@ def test_a_fit_with_more_numbers_never_ends_above_one_with_fewer(experiment: Exp
 
 
 def test_what_cannot_be_had_is_said_before_the_search(experiment: Experiment) -> None:
+    # Chamber 2 starts at the pressure of its regulator; with a start of its own, it never meets that regulator again.
+    start = {"initial.pressure_2": experiment.scenario.initial_pressure_2}
+    experiment = dataclasses.replace(experiment, scenario=with_numbers(experiment.scenario, start))
     useless = FreeParameter("supply.dorsiflexion_pressure")
     both = (FreeParameter("valve.discharge_coefficient"), FreeParameter("valve.area"))
     problem = TrajectoryProblem((FreeParameter("foot_plate.inertia"), useless, *both), (experiment,))
