@@ -28,7 +28,7 @@ from ppafo.cli.output import (
     tell,
     write_files,
 )
-from ppafo.cli.quick_imports import load_compiler, load_drawing
+from ppafo.cli.quick_imports import load_drawing
 from ppafo.questions.question import counting_number, whole_number
 
 COMMAND = "coverage"
@@ -63,7 +63,6 @@ def main(words: Sequence[str] | None = None) -> int:
 
 def run(parsed: argparse.Namespace) -> int:
     """Fit, count and print; 1 where a cell of the table is outside of what it should be."""
-    load_compiler()
     from benchmarks.intervals.calibration import run_tasks, tasks_of
     from benchmarks.intervals.noise_kinds import NOISE_KINDS
     from benchmarks.intervals.report import coverage_document, coverage_text, is_good, ranks_figure

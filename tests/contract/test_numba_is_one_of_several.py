@@ -10,8 +10,7 @@ import pytest
 from tests.compilers_here import compilers_here
 
 ROOT = Path(__file__).parents[2]
-MAY_IMPORT = {"engine/numba_compiler.py", "cli/quick_imports.py"}
-"""Numba as a compiler, and how it is imported quickly where it is one."""
+MAY_IMPORT = {"engine/numba_compiler.py"}
 
 USES = """
 import sys

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.cli.output import EXIT_GOOD, add_output_arguments, check_output, deliver
-from ppafo.cli.quick_imports import load_compiler
 from ppafo.errors import SimulationError
 
 _DAY = 86400.0
@@ -40,7 +39,6 @@ def run(parsed: argparse.Namespace) -> int:
 def _warm(why_not: str) -> None:
     if why_not:
         raise SimulationError(f"--warm: compiled models cannot be kept: {why_not}")
-    load_compiler()
     from ppafo.simulation.loading import list_scenarios
     from ppafo.simulation.simulate import compile_models
 

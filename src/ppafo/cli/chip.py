@@ -13,7 +13,6 @@ from ppafo.cli.output import (
     check_output,
     deliver,
 )
-from ppafo.cli.quick_imports import load_compiler
 from ppafo.control.fixed.kind import PLANT_TARGETS, TARGETS, WALK_TARGETS
 from ppafo.errors import ScenarioError
 
@@ -79,7 +78,6 @@ def run(parsed: argparse.Namespace) -> int:
     if not parsed.table and not parsed.scenarios:
         raise ScenarioError("give a SCENARIO, or --table; see 'ppafo chip --help'")
     check_output(parsed)
-    load_compiler()
     told = _table(parsed) if parsed.table else _one(parsed)
     deliver("chip", told.text, told.document, parsed, told.draw)
     return EXIT_GOOD if told.agrees else EXIT_CHECK_FAILED

@@ -14,7 +14,7 @@ from ppafo.cli.output import (
     print_result,
     tell,
 )
-from ppafo.cli.quick_imports import load_compiler, load_drawing
+from ppafo.cli.quick_imports import load_drawing
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil.packets import HIGHEST_RATE, LOWEST_RATE, RATE
 from ppafo.exports.hil.ports import DEFAULT_BAUD, FORMS
@@ -108,7 +108,6 @@ def run(parsed: argparse.Namespace) -> int:
 
 
 def _run(parsed: argparse.Namespace, scenario: "Scenario", is_stopped: Any) -> "HardwareRun":
-    load_compiler()
     from ppafo.exports.hil.pace import LockStep, RealTime
     from ppafo.exports.hil.plant import check_baud, plant_of
     from ppafo.exports.hil.ports import open_port

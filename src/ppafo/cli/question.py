@@ -16,7 +16,7 @@ from ppafo.cli.output import (
     deliver_answer,
     print_result,
 )
-from ppafo.cli.quick_imports import load_compiler, load_drawing
+from ppafo.cli.quick_imports import load_drawing
 from ppafo.documents.toml_text import TomlKind
 from ppafo.progress import ProgressLine
 from ppafo.questions.question import Question, load_name
@@ -38,8 +38,6 @@ def run(parsed: argparse.Namespace, question: Question) -> int:
         if parsed.list:
             return _list(parsed, library, question.listing)
         _check_named(parsed, question, library)
-    if question.compiles:
-        load_compiler()
     solve = question.solver()
     values = {argument.parameter: getattr(parsed, argument.parameter) for argument in question.arguments}
     if question.fills_folder:

@@ -1,6 +1,6 @@
-"""Loads the compiler and the drawing library without what they do at import for other programs: a quarter of a start.
+"""Loads the drawing library without what it does at import for other programs.
 
-Called before the first import of either; what was imported earlier stays as it is.
+Called before its first import; what was imported earlier stays as it is.
 """
 
 import importlib
@@ -11,24 +11,7 @@ from contextlib import contextmanager
 from types import ModuleType
 from typing import Any
 
-_LINEAR_ALGEBRA = "scipy.linalg"
 _AXES_IN_SPACE = "mpl_toolkits.mplot3d"
-
-
-def load_compiler() -> None:
-    """Import Numba, where it compiles, without SciPy's linear algebra, which it looks for at import; models have none.
-
-    SimulationError where ``PPAFO_BACKEND`` names what is no compiler, or one that is not here.
-    """
-    from ppafo.engine.loading import NUMBA, chosen_compiler
-
-    if chosen_compiler().name != NUMBA:
-        return
-    if "numba" in sys.modules or _LINEAR_ALGEBRA in sys.modules:
-        return
-    modules: dict[str, Any] = sys.modules
-    with _replaced(modules, _LINEAR_ALGEBRA, None):  # as where it is not installed: the import fails
-        import numba.np.arraymath  # noqa: F401
 
 
 def load_drawing() -> None:

@@ -4,7 +4,6 @@ import argparse
 from pathlib import Path
 
 from ppafo.cli.output import EXIT_GOOD, add_json_argument, add_override_argument, blame_out_option, print_result
-from ppafo.cli.quick_imports import load_compiler
 from ppafo.errors import ParameterError
 
 _DEFAULT_OUT = Path("out") / "rig"
@@ -65,7 +64,6 @@ def _list(parsed: argparse.Namespace) -> int:
 
 
 def _record(parsed: argparse.Namespace) -> int:
-    load_compiler()
     from ppafo.rig.folder import check_rig_folder, write_rig_recording
     from ppafo.rig.record import NOTICE, find_experiment, record
 

@@ -13,7 +13,7 @@ from ppafo.cli.output import (
     blame_out_option,
     print_result,
 )
-from ppafo.cli.quick_imports import load_compiler, load_drawing
+from ppafo.cli.quick_imports import load_drawing
 from ppafo.documents.json_text import json_text
 from ppafo.errors import ScenarioError
 
@@ -68,7 +68,6 @@ def run(parsed: argparse.Namespace) -> int:
 
 
 def _simulate(scenario: "Scenario") -> "Result":
-    load_compiler()
     from ppafo.simulation.simulate import simulate
 
     return simulate(scenario)

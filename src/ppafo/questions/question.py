@@ -57,17 +57,15 @@ class Question:
 
     ``solve`` takes the parameters of the arguments, and ``progress`` where it is long work, and returns a ``Solved``.
     ``library`` is the ``TomlKind`` of the files that come with the package (``module:NAME``), for ``--list``, and
-    ``listing`` returns the entries of that list where these are more than the words of the files. ``compiles`` is false
-    where nothing is simulated. ``default_folder`` (``module:function``) takes the values of the arguments by name and
-    returns where the answer is written unless ``--out`` says so; without it nothing is. ``fills_folder`` is true where
-    solving itself fills the folder, an argument ``out`` of its own, so that a later call resumes; the data of its
-    answer name it as ``folder``.
+    ``listing`` returns the entries of that list where these are more than the words of the files. ``default_folder``
+    (``module:function``) takes the values of the arguments by name and returns where the answer is written unless
+    ``--out`` says so; without it nothing is. ``fills_folder`` is true where solving itself fills the folder, an
+    argument ``out`` of its own, so that a later call resumes; the data of its answer name it as ``folder``.
     """
 
     solve: str
     arguments: tuple[Argument, ...]
     library: str = ""
-    compiles: bool = True
     listing: str = ""
     default_folder: str = ""
     fills_folder: bool = False

@@ -67,5 +67,4 @@ QUESTION = Question(
         SET,
     ),
     library="ppafo.parameters.bottles.bottle:FILE",
-    compiles=False,
 )

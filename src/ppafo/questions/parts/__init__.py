@@ -14,5 +14,4 @@ QUESTION = Question(
             default="parts",
         ),
     ),
-    compiles=False,
 )
