@@ -101,7 +101,7 @@ def _answer(result: "Result", check: "Check | None") -> "Answer":
         lead=(" ".join(scenario.description.split()), f"{device}{changed if scenario.origin.overrides else ''}"),
         sections=(
             Section(remarks=() if status.is_completed else (f"The run {status.message}",)),
-            Section("What comes of it", table=_metrics_table(result)),
+            Section("Metrics", table=_metrics_table(result)),
             Section("Over time", figure=figure),
             Section() if check is None else Section("What the run determines", code=repr(check)),
         ),

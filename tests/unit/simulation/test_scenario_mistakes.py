@@ -327,3 +327,10 @@ def test_the_old_name_of_a_prescribed_motion_is_refused_with_the_new_one() -> No
         ScenarioError, match=r"override 'motion\.kind=led': the kind of motion 'led' is now called 'prescribed'"
     ):
         load_scenario("step-response", ["motion.kind=led", "motion.profile.kind=sine"])
+
+
+def test_a_parameter_set_that_is_given_as_a_scenario_is_called_what_it_is() -> None:
+    with pytest.raises(
+        ScenarioError, match=r"^bench\.toml: is a parameter set, not a scenario; .*device\.set=bench\.toml$"
+    ):
+        parse_scenario(b'name = "bench"\ndefault_valve = "main"\n', "bench.toml")
