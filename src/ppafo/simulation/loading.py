@@ -77,7 +77,8 @@ def _scenario(request: ScenarioRequest) -> Scenario:
     """Check the keys of the file itself, put the overrides in, and then ask for all that is needed."""
     if "default_valve" in request.content and "run" not in request.content:
         raise ScenarioError(
-            f"{request.file}: is a parameter set, not a scenario; run one with it: SCENARIO --set device.set={request.file}"
+            f"{request.file}: is a parameter set, not a scenario; "
+            f"run one with it: SCENARIO --set device.set={request.file}"
         )
     find_kinds(request.content, request.file)
     if request.overrides:
