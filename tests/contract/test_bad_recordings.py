@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.identification.bench.decay import angle_of_decay
+from ppafo.identification.bench.free_decay import angle_of_decay
 
 AT = 37
 """Index of the sample that is spoilt."""

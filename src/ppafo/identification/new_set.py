@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from ppafo.errors import ParameterError
+from ppafo.errors import ParameterError, UnitError
 from ppafo.identification.estimate import Estimate, half_width_for
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.building import build_device
@@ -13,7 +13,8 @@ from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, l
 from ppafo.parameters.provenance import CONFIDENCE, Entry
 from ppafo.units import from_si
 
-_FORMS = (frozenset(item.name for item in AREA_FORM), frozenset(item.name for item in SONIC_FORM))
+_AREA_NAMES, _SONIC_NAMES = ({item.name for item in form} for form in (AREA_FORM, SONIC_FORM))
+_FORMS = ((_AREA_NAMES, _SONIC_NAMES), (_SONIC_NAMES, _AREA_NAMES))
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,22 +35,22 @@ def with_estimates(parameter_set: ParameterSet, estimates: Iterable[Estimate], v
     """Return the set with every usable estimate that has a place in it; the later of two for one path counts."""
     found: dict[str, bool] = {}
     for estimate in estimates:
-        if _has_a_place(parameter_set, estimate):
-            parameter_set = _with_estimate(parameter_set, estimate)
+        quantity = parameter_set.declarations().get(estimate.path)
+        if quantity is not None and estimate.is_usable and is_within(estimate.value, quantity):
+            parameter_set = _with_estimate(parameter_set, estimate, quantity)
             found[estimate.path] = estimate.is_identified
+    problem = ""
+    try:
+        build_device(parameter_set, valve)
+    except ParameterError as error:
+        problem = str(error)
     written = tuple(path for path, is_identified in found.items() if is_identified)
     fitted = tuple(path for path, is_identified in found.items() if not is_identified)
-    return NewSet(parameter_set, written, fitted, _device_problem(parameter_set, valve))
+    return NewSet(parameter_set, written, fitted, problem)
 
 
-def _has_a_place(parameter_set: ParameterSet, estimate: Estimate) -> bool:
-    quantity = parameter_set.declarations().get(estimate.path)
-    return quantity is not None and estimate.is_usable and is_within(estimate.value, quantity)
-
-
-def _with_estimate(parameter_set: ParameterSet, estimate: Estimate) -> ParameterSet:
+def _with_estimate(parameter_set: ParameterSet, estimate: Estimate, quantity: Quantity) -> ParameterSet:
     """Return the set with one value replaced; it keeps the unit that the set had."""
-    quantity = parameter_set.declarations()[estimate.path]
     before = parameter_set.numbers.get(estimate.path)
     atmosphere = atmospheric_pressure(parameter_set)
     unit = quantity.unit if before is None else before.unit
@@ -71,7 +72,10 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate) -> Parameter
         note=f"{estimate.verdict_in_words}, {interval}. {estimate.explanation} Before, {was}.",
         uncertainty=half_width_for(CONFIDENCE, max(high - value, value - low), estimate.confidence),
     )
-    kept = {path: old for path, old in parameter_set.numbers.items() if path not in _other_form(estimate.path)}
+    # An orifice that is given as an area has no sonic conductance any more, and the other way round.
+    section, _, name = estimate.path.rpartition(".")
+    others = {f"{section}.{member}" for form, other in _FORMS if name in form for member in other}
+    kept = {path: old for path, old in parameter_set.numbers.items() if path not in others}
     # What was fitted as the pressure of both regulators is that of both.
     links = acting(links_of_set(parameter_set), {estimate.path})
     found = {path: entry for path in (estimate.path, *(path for path, link in links.items() if link.when_set))}
@@ -80,35 +84,13 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate) -> Parameter
 
 def fitting_unit(unit: str, quantity: Quantity) -> str:
     """Return the SI unit of a quantity, of the several that it may be declared in, that a unit can be turned into."""
-    return next((item for item in alternatives(quantity) if _fits(unit, item)), quantity.unit)
-
-
-def _fits(unit: str, si_unit: str) -> bool:
-    from ppafo.errors import UnitError
-
-    try:
-        from_si(1.0, unit, si_unit)
-    except UnitError:
-        return False
-    return True
-
-
-def _other_form(path: str) -> frozenset[str]:
-    """Return the paths of an orifice that no longer hold when it is given in the form that ``path`` belongs to."""
-    section, _, name = path.rpartition(".")
-    own = next((form for form in _FORMS if name in form), None)
-    other = (
-        next((form for form in _FORMS if form is not own), frozenset[str]()) if own is not None else frozenset[str]()
-    )
-    return frozenset(f"{section}.{member}" for member in other)
-
-
-def _device_problem(parameter_set: ParameterSet, valve: str | None) -> str:
-    try:
-        build_device(parameter_set, valve)
-    except ParameterError as error:
-        return str(error)
-    return ""
+    for item in alternatives(quantity):
+        try:
+            from_si(1.0, unit, item)
+        except UnitError:
+            continue
+        return item
+    return quantity.unit
 
 
 def in_set_unit(number: float, path: str, si_unit: str, parameter_set: ParameterSet) -> tuple[float, str]:

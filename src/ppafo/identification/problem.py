@@ -1,5 +1,13 @@
-"""The problem file of ``ppafo identify``: which recordings, how their columns read, and which procedures to apply."""
+"""The problem file of ``ppafo identify``: which recordings, how their columns read, and which procedures to apply.
 
+Each procedure is a table of the file, which knows the settings of its procedure from a parameter set. The recommended
+order matters where one leans on another: torque and friction are measured first because they need nothing else, the
+flow of the open valve before its map, and the leak last, since its chambers must be known to hold.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -9,9 +17,23 @@ from pydantic import BaseModel, Field
 from ppafo.documents.models import NAME, STRICT, Text, make_schema, validate
 from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, read_regular_file
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import IdentificationError, nearest_name, reason
+from ppafo.errors import IdentificationError, UnitError, nearest_name, reason
+from ppafo.identification.bench.flow_laws import GasAt
+from ppafo.identification.bench.free_decay import FreeDecaySettings, decay_prospects, free_decay
+from ppafo.identification.bench.inputs import data_prospects
+from ppafo.identification.bench.open_valve_flow import OpenValveFlowSettings, flow_prospects, open_valve_flow
+from ppafo.identification.bench.result import BenchResult
+from ppafo.identification.bench.static_torque import StaticTorqueSettings, static_prospects, static_torque
+from ppafo.identification.bench.valve_map import ValveMapSettings, map_prospects, valve_map
+from ppafo.identification.bench.vane_leak import VaneLeakSettings, leak_prospects, vane_leak
+from ppafo.identification.estimate import Prospect, half_width_for
+from ppafo.identification.source import Source
 from ppafo.identification.trajectory.section import TrajectorySection
+from ppafo.model.gas import SPECIES
+from ppafo.parameters.parameter_set import ParameterSet, chosen_valve, number_in_si
+from ppafo.parameters.provenance import CONFIDENCE
 from ppafo.storage.column_map import ColumnMap
+from ppafo.units import parse_quantity, to_si
 
 _Recordings = Annotated[tuple[Text, ...], Field(strict=False, min_length=1, description="files, relative to this one")]
 _Columns = Annotated[
@@ -29,12 +51,75 @@ _Temperature = Annotated[
 ]
 _Valve = Annotated[Text | None, Field(description="name of a valve of the set; default: the chosen one")]
 
-PROCEDURES = ("static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak")
-"""Kinds of procedures in the recommended order."""
+UNKNOWN = "unknown"
+_COLDEST, _HOTTEST = 150.0, 600.0
 
 _FILE = TomlKind(
     "identification problem", "identification", resources.files("ppafo.identification"), IdentificationError
 )
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What a procedure may lean on: the set as it stands, the chosen valve, and what messages call the place."""
+
+    parameter_set: ParameterSet
+    valve: str
+    place: str
+
+    def number(self, path: str) -> float:
+        """Return the value at a path [SI]; IdentificationError where the set lacks it."""
+        value = number_in_si(self.parameter_set, path)
+        if value is None:
+            raise IdentificationError(f"{self.place}: needs {path}, which {self.parameter_set.file} does not have")
+        return value
+
+    def quantity(self, name: str, text: str | None, unit: str) -> float | None:
+        """Return a quantity of the problem file [unit], None where it was left out.
+
+        IdentificationError where its text does not fit the unit.
+        """
+        if text is None:
+            return None
+        try:
+            return parse_quantity(text, unit)
+        except UnitError as error:
+            raise IdentificationError(f"{self.place}: {name} = {text!r}: {error}") from error
+
+    def gas(self, species: str | None, text: str | None, confidence: float) -> GasAt:
+        """Return the gas of the bench; species and temperature are the set's where none is named.
+
+        IdentificationError for an unknown species.
+        """
+        temperature, half_width = self.quantity("temperature", text, "K"), 0.0
+        if temperature is None:
+            temperature = self.number("gas.temperature")
+            half_width = self.half_width("gas.temperature", "K", confidence)
+        elif not _COLDEST <= temperature <= _HOTTEST:
+            raise IdentificationError(
+                f"{self.place}: temperature = {text!r} must be from {_COLDEST:g} to {_HOTTEST:g} K"
+            )
+        if species is None:
+            own = self.number("gas.molar_mass"), self.number("gas.heat_capacity_ratio")
+            return GasAt(*own, temperature, half_width)
+        if species not in SPECIES:
+            hint = nearest_name(species, SPECIES)
+            known = ", ".join(SPECIES)
+            raise IdentificationError(f"{self.place}: gas = {species!r} is unknown{hint}; available: {known}")
+        known_gas = SPECIES[species]
+        return GasAt(known_gas.molar_mass, known_gas.heat_capacity_ratio, temperature, half_width)
+
+    def half_width(self, path: str, unit: str, confidence: float) -> float:
+        """Return half the interval of a value in the set [unit], for some confidence; 0 where it has none."""
+        entry = self.parameter_set.numbers.get(path)
+        if entry is None or not entry.uncertainty:
+            return 0.0
+        stated = to_si(entry.value + entry.uncertainty, entry.unit, unit) - to_si(entry.value, entry.unit, unit)
+        return half_width_for(confidence, stated, CONFIDENCE)
+
+    def valve_path(self, name: str | None) -> str:
+        """Return the path of a valve in the set, ``valves.main``."""
+        return f"valves.{chosen_valve(self.parameter_set, name or self.valve)}"
 
 
 class StaticTorqueProblem(BaseModel):
@@ -47,6 +132,10 @@ class StaticTorqueProblem(BaseModel):
     columns: _Columns = None
     confidence: _Confidence = 0.95
     calibration: _Calibration = 0.0
+
+    def settings(self, _setting: Setting) -> StaticTorqueSettings:
+        """Return the settings of the procedure."""
+        return StaticTorqueSettings(self.confidence, self.calibration)
 
 
 class FreeDecayProblem(BaseModel):
@@ -65,6 +154,20 @@ class FreeDecayProblem(BaseModel):
         Text | None, Field(description="such as '8.4 g m^2', or 'unknown'; default: that of the set")
     ] = None
 
+    def settings(self, setting: Setting) -> FreeDecaySettings:
+        """Return the settings of the procedure [SI]; the inertia is the set's where none is named, if it has one."""
+        start, end = setting.quantity("start", self.start, "s"), setting.quantity("end", self.end, "s")
+        entry = setting.parameter_set.numbers.get("foot_plate.inertia")
+        inertia, half_width, source = None, 0.0, ""
+        if self.inertia is not None and self.inertia != UNKNOWN:
+            inertia, source = setting.quantity("inertia", self.inertia, "kg m^2"), "given in the problem"
+            if inertia is None or inertia <= 0.0:
+                raise IdentificationError(f"{setting.place}: inertia = {self.inertia!r} must be above zero")
+        elif self.inertia is None and entry is not None:
+            inertia, source = setting.number("foot_plate.inertia"), f"{entry.origin} in {setting.parameter_set.name}"
+            half_width = setting.half_width("foot_plate.inertia", "kg m^2", self.confidence)
+        return FreeDecaySettings(start, end, inertia, half_width, source, self.confidence, self.calibration)
+
 
 class OpenValveFlowProblem(BaseModel):
     """Flow through the fully open valve: Cd, or C and b of ISO 6358."""
@@ -82,6 +185,13 @@ class OpenValveFlowProblem(BaseModel):
     law: Annotated[Literal["orifice", "iso6358"], Field(description="form in which it is written into the set")] = (
         "orifice"
     )
+
+    def settings(self, setting: Setting) -> OpenValveFlowSettings:
+        """Return the settings of the procedure [SI]."""
+        path = setting.valve_path(self.valve)
+        area = number_in_si(setting.parameter_set, f"{path}.area")
+        gas = setting.gas(self.gas, self.temperature, self.confidence)
+        return OpenValveFlowSettings(gas, self.law, area, path, self.confidence, self.calibration)
 
 
 class VaneLeakProblem(BaseModel):
@@ -102,6 +212,35 @@ class VaneLeakProblem(BaseModel):
     volume_1: Annotated[Text | None, Field(description="volume of chamber 1 with its line, such as '40 cm^3'")] = None
     volume_2: Annotated[Text | None, Field(description="volume of chamber 2 with its line")] = None
 
+    def settings(self, setting: Setting) -> VaneLeakSettings:
+        """Return the settings of the procedure [SI]; volumes as given, else from the angle, equations (4), (5)."""
+        start, end = setting.quantity("start", self.start, "s"), setting.quantity("end", self.end, "s")
+        volumes = {}
+        for name, text in (("volume_1", self.volume_1), ("volume_2", self.volume_2)):
+            volume = volumes[name] = setting.quantity(name, text, "m^3")
+            if volume is not None and volume <= 0.0:
+                raise IdentificationError(f"{setting.place}: {name} = {text!r} must be above zero")
+        angle = setting.quantity("angle", self.angle, "rad")
+        if angle is not None:
+            names = ("angle_min", "angle_max", "volume_per_angle", "dead_volume_1", "dead_volume_2")
+            lower, upper, per_angle, dead_1, dead_2 = (setting.number(f"actuator.{name}") for name in names)
+            if not lower <= angle <= upper:
+                raise IdentificationError(f"{setting.place}: angle = {self.angle!r} lies beyond the stops of the set")
+            volumes["volume_1"] = volumes["volume_1"] or dead_1 + per_angle * (angle - lower)
+            volumes["volume_2"] = volumes["volume_2"] or dead_2 + per_angle * (upper - angle)
+        forms = ("discharge_coefficient", "critical_ratio")
+        coefficient, ratio = (number_in_si(setting.parameter_set, f"actuator.leak.{name}") for name in forms)
+        return VaneLeakSettings(
+            gas=setting.gas(self.gas, self.temperature, self.confidence),
+            discharge_coefficient=coefficient,
+            start=start,
+            end=end,
+            confidence=self.confidence,
+            calibration=self.calibration,
+            critical_ratio=ratio,
+            **volumes,
+        )
+
 
 class ValveMapProblem(BaseModel):
     """Command against flow: dead band, gain, saturation, hysteresis."""
@@ -117,6 +256,11 @@ class ValveMapProblem(BaseModel):
     temperature: _Temperature = None
     valve: _Valve = None
 
+    def settings(self, setting: Setting) -> ValveMapSettings:
+        """Return the settings of the procedure [SI]."""
+        gas = setting.gas(self.gas, self.temperature, self.confidence)
+        return ValveMapSettings(gas, setting.valve_path(self.valve), self.confidence, self.calibration)
+
 
 class DeviceProblem(BaseModel):
     """The set to start from, its valve, and changes to it."""
@@ -131,10 +275,43 @@ class DeviceProblem(BaseModel):
 
 
 ProcedureProblem = StaticTorqueProblem | FreeDecayProblem | OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem
-_Procedure = Annotated[
-    StaticTorqueProblem | FreeDecayProblem | OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem,
-    Field(discriminator="kind"),
-]
+
+
+@dataclass(frozen=True, slots=True)
+class _Procedure:
+    """How a procedure runs, and what it can give before it runs."""
+
+    run: Callable[..., BenchResult]
+    prospects: Callable[..., tuple[Prospect, ...]]
+
+
+_PROCEDURES = {
+    "static-torque": _Procedure(static_torque, static_prospects),
+    "free-decay": _Procedure(free_decay, decay_prospects),
+    "open-valve-flow": _Procedure(open_valve_flow, flow_prospects),
+    "valve-map": _Procedure(valve_map, map_prospects),
+    "vane-leak": _Procedure(vane_leak, leak_prospects),
+}
+PROCEDURES = tuple(_PROCEDURES)
+"""Kinds of procedures in the recommended order."""
+
+
+def run_procedure(sources: tuple[Source, ...], problem: ProcedureProblem, setting: Setting) -> BenchResult:
+    """Return what a procedure of a problem makes of its recordings."""
+    return _PROCEDURES[problem.kind].run(sources, problem.settings(setting))
+
+
+def prospects_of(sources: tuple[Source, ...], problem: ProcedureProblem, setting: Setting) -> tuple[Prospect, ...]:
+    """Return what a procedure can have of its recordings and what not, before it runs."""
+    found = _PROCEDURES[problem.kind].prospects(sources, problem.settings(setting))
+    return (*found, *data_prospects(sources))
+
+
+def window_of(problem: ProcedureProblem, setting: Setting) -> tuple[float, float]:
+    """Return first and last time [s] that a procedure uses of its recordings."""
+    texts = {name: getattr(problem, name, None) for name in ("start", "end")}
+    first, last = (setting.quantity(name, text, "s") for name, text in texts.items())
+    return -math.inf if first is None else first, math.inf if last is None else last
 
 
 class ProblemFile(BaseModel):
@@ -148,7 +325,7 @@ class ProblemFile(BaseModel):
     device: Annotated[DeviceProblem, Field(description="the set to start from")]
     columns: Annotated[dict[str, ColumnMap], Field(description="column maps by name, for files from elsewhere")] = {}
     procedure: Annotated[
-        tuple[_Procedure, ...],
+        tuple[Annotated[ProcedureProblem, Field(discriminator="kind")], ...],
         Field(strict=False, min_length=1, description="bench procedures to apply"),
     ] = ()
     trajectory: Annotated[
@@ -173,38 +350,24 @@ def parse_problem(content: bytes, file: str) -> ProblemFile:
 
     IdentificationError for one that is not usable.
     """
-    problem = validate(ProblemFile, _with_hyphens(_FILE.parse(content, file)), file, IdentificationError)
+    document = _FILE.parse(content, file)
+    procedures = document.get("procedure")
+    for item in procedures if isinstance(procedures, list) else ():
+        # 0.1 wrote ``static_torque``.
+        kind = item.get("kind") if isinstance(item, dict) else None
+        if isinstance(kind, str) and kind.replace("_", "-") in PROCEDURES:
+            item["kind"] = kind.replace("_", "-")
+    problem = validate(ProblemFile, document, file, IdentificationError)
     if not problem.procedure and problem.trajectory is None:
         raise IdentificationError(f"{file}: has nothing to do: neither a [[procedure]] nor a [trajectory]")
-    for place, name in _column_maps(problem):
-        if name not in problem.columns:
+    fitted = () if problem.trajectory is None else problem.trajectory.experiments
+    named = [(f"procedure {number}", item.columns) for number, item in enumerate(problem.procedure, start=1)]
+    for place, name in [*named, *((f"experiment '{item.label}'", item.columns) for item in fitted)]:
+        if name is not None and name not in problem.columns:
             hint = nearest_name(name, problem.columns)
             known = ", ".join(problem.columns) or "none"
             raise IdentificationError(f"{file}: {place}: there is no column map '{name}'{hint}; available: {known}")
     return problem
-
-
-def _with_hyphens(document: dict[str, Any]) -> dict[str, Any]:
-    """Return the document with the kinds of its procedures as they are spelled today; 0.1 wrote ``static_torque``."""
-    procedures = document.get("procedure")
-    if not isinstance(procedures, list):
-        return document
-    return {**document, "procedure": [_with_hyphen(item) for item in procedures]}
-
-
-def _with_hyphen(procedure: object) -> object:
-    kind = procedure.get("kind") if isinstance(procedure, dict) else None
-    if not isinstance(procedure, dict) or not isinstance(kind, str) or kind.replace("_", "-") not in PROCEDURES:
-        return procedure
-    return {**procedure, "kind": kind.replace("_", "-")}
-
-
-def _column_maps(problem: ProblemFile) -> list[tuple[str, str]]:
-    """Return every place that names a column map, with the name."""
-    bench = [(f"procedure {number}", item.columns) for number, item in enumerate(problem.procedure, start=1)]
-    fitted = () if problem.trajectory is None else problem.trajectory.experiments
-    places = [*bench, *((f"experiment '{item.label}'", item.columns) for item in fitted)]
-    return [(place, name) for place, name in places if name is not None]
 
 
 def json_schema() -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from ppafo.identification.bench.decay import angle_of_decay
 from ppafo.identification.bench.flow_laws import (
     LAMINAR,
     LINEAR,
@@ -12,6 +11,7 @@ from ppafo.identification.bench.flow_laws import (
     difference_in_time,
     orifice_shape,
 )
+from ppafo.identification.bench.free_decay import angle_of_decay
 from ppafo.identification.bench.valve_map import area_of_command
 from ppafo.identification.source import Source
 from ppafo.signals import Channel, Recording

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.identification.bench.result import Number
 from ppafo.signals.recording import Floats
 
 if TYPE_CHECKING:
@@ -63,18 +64,28 @@ def lack_of_fit(residuals: Floats, parameters: int, confidence: float, along: Se
     ``along`` are variables over which a misfit may run besides, such as a pressure. Readings that have some are steady
     ones, whose noise may differ from place to place; in a course of time a misfit may fill one block alone.
     """
-    freedom = max(1, residuals.size - parameters)
-    widest = LackOfFit(float(residuals @ residuals) / freedom, freedom, ())
-    orders = [np.arange(residuals.size), *(np.argsort(values, kind="stable") for values in along)]
-    counts = _block_counts(residuals.size, parameters)
+    size = residuals.size
+    widest = LackOfFit(float(residuals @ residuals) / max(1, size - parameters), max(1, size - parameters), ())
+    orders = [np.arange(size), *(np.argsort(values, kind="stable") for values in along)]
+    # From few blocks to as many as leave two readings in each, and a limit.
+    counts: list[int] = []
+    count = max(_FEWEST_BLOCKS, 2 * parameters)
+    while count * _FEWEST_IN_A_BLOCK <= size and (not counts or count <= _MAXIMUM_BLOCKS):
+        counts.append(count)
+        count *= 2
     chance = CHANCE / max(1, len(counts) * len(orders))
     for order in orders:
         for count in counts:
-            found = _misfit_between(residuals, tuple(np.array_split(order, count)), parameters, chance)
-            if found is None or (
-                along and not _exceeds_uneven_noise([residuals[block] for block in found.blocks], chance)
-            ):
+            blocks = tuple(np.array_split(order, count))
+            parts = [residuals[block] for block in blocks]
+            freedom, inner = count - parameters, size - count
+            between = sum(float(part.sum()) ** 2 / part.size for part in parts) / freedom
+            within = sum(float(((part - part.mean()) ** 2).sum()) for part in parts) / inner
+            if not exceeds_chance(between, within, freedom, inner, chance):
                 continue
+            if along and not _exceeds_uneven_noise(parts, chance):
+                continue
+            found = LackOfFit(between, freedom, blocks)
             if found.deviation(confidence) > widest.deviation(confidence):
                 widest = found
     return widest
@@ -100,26 +111,6 @@ def jackknife(values_without: Sequence[Floats], confidence: float) -> Floats:
     count = stacked.shape[0]
     variance = (count - 1) / count * ((stacked - stacked.mean(axis=0)) ** 2).sum(axis=0)
     return np.asarray(quantile(confidence, count - 1) * np.sqrt(variance))
-
-
-def _block_counts(size: int, parameters: int) -> list[int]:
-    """Return the numbers of blocks to try: from few to as many as leave two readings in each, and a limit."""
-    counts: list[int] = []
-    count = max(_FEWEST_BLOCKS, 2 * parameters)
-    while count * _FEWEST_IN_A_BLOCK <= size and (not counts or count <= _MAXIMUM_BLOCKS):
-        counts.append(count)
-        count *= 2
-    return counts
-
-
-def _misfit_between(residuals: Floats, blocks: tuple[Indices, ...], parameters: int, chance: float) -> LackOfFit | None:
-    """Return the lack of fit between blocks where it is larger than chance allows, else None."""
-    freedom, inner = len(blocks) - parameters, residuals.size - len(blocks)
-    parts = [residuals[block] for block in blocks]
-    between = sum(float(part.sum()) ** 2 / part.size for part in parts) / freedom
-    within = sum(float(((part - part.mean()) ** 2).sum()) for part in parts) / inner
-    is_missing = exceeds_chance(between, within, freedom, inner, chance)
-    return LackOfFit(between, freedom, blocks) if is_missing else None
 
 
 def _exceeds_uneven_noise(parts: list[Floats], chance: float) -> bool:
@@ -161,33 +152,35 @@ class CurveFit:
         """Root mean square of the residuals, in the unit of what was fitted."""
         return float(np.sqrt(np.mean(self.residuals**2)))
 
+    def number(self, index: int, path: str, unit: str, text: str) -> Number:
+        """Return a fitted value, in its unit, that cannot be negative, as a number of the result."""
+        half, widened = self.half_widths[index], self.widened[index]
+        return Number(path, unit, self.values[index], half, text, lowest=0.0, widened=widened)
 
-@dataclass(frozen=True, slots=True)
-class _BoundedProblem:
-    """What is fitted: residuals over values, and the bounds of the values."""
 
-    residuals_of: Callable[[Floats], Floats]
-    lower: Floats
-    upper: Floats
+ResidualsOf = Callable[[Floats], Floats]
 
-    def solve(self, start: Floats, kept: "NDArray[np.bool_] | slice" = slice(None)) -> "OptimizeResult":
-        """Return the least squares over the samples that are kept."""
-        from scipy.optimize import least_squares
 
-        return least_squares(
-            lambda values: self.residuals_of(values)[kept],
-            np.clip(start, self.lower, self.upper),
-            bounds=(self.lower, self.upper),
-            x_scale="jac",
-            xtol=1e-12,
-            ftol=1e-12,
-            gtol=1e-12,
-            max_nfev=400,
-        )
+def _least_squares(
+    residuals_of: ResidualsOf, start: Floats, lower: Floats, upper: Floats, kept: "NDArray[np.bool_] | slice"
+) -> "OptimizeResult":
+    """Return the bounded least squares over the samples that are kept."""
+    from scipy.optimize import least_squares
+
+    return least_squares(
+        lambda values: residuals_of(values)[kept],
+        np.clip(start, lower, upper),
+        bounds=(lower, upper),
+        x_scale="jac",
+        xtol=1e-12,
+        ftol=1e-12,
+        gtol=1e-12,
+        max_nfev=400,
+    )
 
 
 def fit_curve(
-    residuals_of: Callable[[Floats], Floats],
+    residuals_of: ResidualsOf,
     start: Floats,
     lower: Floats,
     upper: Floats,
@@ -202,50 +195,47 @@ def fit_curve(
     """
     fit = solve_curve(residuals_of, start, lower, upper, confidence)
     missing = lack_of_fit(fit.residuals, start.size, confidence, along)
-    return _widen(fit, _BoundedProblem(residuals_of, lower, upper), missing, confidence) if missing.is_seen else fit
-
-
-def solve_curve(
-    residuals_of: Callable[[Floats], Floats], start: Floats, lower: Floats, upper: Floats, confidence: float
-) -> CurveFit:
-    """Return the bounded least-squares fit, each value in its unit with the first of these intervals."""
-    found = _BoundedProblem(residuals_of, lower, upper).solve(start)
-    residuals, inverse = np.asarray(found.fun), _inverse(np.asarray(found.jac))
-    spread = np.sqrt(np.maximum(np.diag(inverse), 0.0))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        correlation = inverse / np.outer(spread, spread)
-    return CurveFit(
-        values=np.asarray(found.x),
-        half_widths=_half_width_per_unit(residuals, spread.size, confidence) * spread,
-        correlation=correlation,
-        residuals=residuals,
-        effective=effective_samples(residuals),
-        widened=np.ones(spread.size),
-        spread=spread,
-    )
-
-
-def _half_width_per_unit(residuals: Floats, parameters: int, confidence: float) -> float:
-    """Return the half width per unit of the design for samples that each resemble the one before."""
-    freedom = max(1.0, effective_samples(residuals) - parameters)
-    variance = np.mean(residuals**2) * residuals.size / freedom
-    return float(quantile(confidence, max(1, int(freedom))) * np.sqrt(variance))
-
-
-def _widen(fit: CurveFit, problem: _BoundedProblem, missing: LackOfFit, confidence: float) -> CurveFit:
-    """Return the fit with the intervals that hold where the law misses the samples."""
-    spread = fit.spread
-    freedom = max(1, fit.residuals.size - spread.size)
+    if not missing.is_seen:
+        return fit
+    size, spread = fit.residuals.size, fit.spread
+    freedom = max(1, size - spread.size)
     independent = quantile(confidence, freedom) * float(np.sqrt(fit.residuals @ fit.residuals / freedom)) * spread
     without = []
     for block in missing.blocks:
-        kept = np.ones(fit.residuals.size, dtype=np.bool_)
+        kept = np.ones(size, dtype=np.bool_)
         kept[block] = False
-        without.append(np.asarray(problem.solve(fit.values, kept).x))
+        without.append(np.asarray(_least_squares(residuals_of, fit.values, lower, upper, kept).x))
     candidates = (fit.half_widths, missing.deviation(confidence) * spread, jackknife(without, confidence))
     half_widths = np.max(np.stack(candidates), axis=0)
     widened = half_widths / np.where(independent > 0.0, independent, half_widths)
     return replace(fit, half_widths=half_widths, widened=widened)
+
+
+def solve_curve(residuals_of: ResidualsOf, start: Floats, lower: Floats, upper: Floats, confidence: float) -> CurveFit:
+    """Return the bounded least-squares fit, each value in its unit with the first of these intervals."""
+    found = _least_squares(residuals_of, start, lower, upper, slice(None))
+    residuals, jacobian = np.asarray(found.fun), np.asarray(found.jac)
+    # (J'J)^-1 on scaled columns; a direction that the samples do not see gets a huge variance, not none.
+    scale = np.sqrt((jacobian**2).sum(axis=0))
+    scale = np.where(scale > 0.0, scale, 1.0)
+    values, vectors = np.linalg.eigh((jacobian / scale).T @ (jacobian / scale))
+    floor = max(float(values.max()), 1e-300) * 1e-14
+    inverse = np.asarray((vectors / np.maximum(values, floor)) @ vectors.T / np.outer(scale, scale))
+    spread = np.sqrt(np.maximum(np.diag(inverse), 0.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        correlation = inverse / np.outer(spread, spread)
+    effective = effective_samples(residuals)
+    freedom = max(1.0, effective - spread.size)
+    variance = np.mean(residuals**2) * residuals.size / freedom
+    return CurveFit(
+        values=np.asarray(found.x),
+        half_widths=float(quantile(confidence, max(1, int(freedom))) * np.sqrt(variance)) * spread,
+        correlation=correlation,
+        residuals=residuals,
+        effective=effective,
+        widened=np.ones(spread.size),
+        spread=spread,
+    )
 
 
 def effective_samples(residuals: Floats) -> float:
@@ -256,13 +246,3 @@ def effective_samples(residuals: Floats) -> float:
     likeness = float(residuals[1:] @ residuals[:-1]) / total
     likeness = min(max(likeness, 0.0), _MAXIMUM_CORRELATION)
     return max(3.0, residuals.size * (1.0 - likeness) / (1.0 + likeness))
-
-
-def _inverse(jacobian: Floats) -> Floats:
-    """Return (J'J)^-1 on scaled columns; a direction that the samples do not see gets a huge variance, not none."""
-    scale = np.sqrt((jacobian**2).sum(axis=0))
-    scale = np.where(scale > 0.0, scale, 1.0)
-    values, vectors = np.linalg.eigh((jacobian / scale).T @ (jacobian / scale))
-    floor = max(float(values.max()), 1e-300) * 1e-14
-    inverse = (vectors / np.maximum(values, floor)) @ vectors.T
-    return np.asarray(inverse / np.outer(scale, scale))

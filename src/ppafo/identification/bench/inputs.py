@@ -28,12 +28,24 @@ def check_sources(sources: tuple[Source, ...], procedure: str, channels: Iterabl
     if not sources:
         raise IdentificationError(f"{procedure}: no recording was given")
     for source in sources:
+        recording = source.recording
         for name in channels:
-            _check_channel(source, procedure, name)
-        _check_sizes(source, procedure)
-        if len(source.recording) < fewest:
+            if name not in recording:
+                known, hint = CHANNELS[name], nearest_name(name, recording.names)
+                raise IdentificationError(
+                    f"{source.name}: {procedure} needs a channel '{name} [{known.unit}]', {known.summary}{hint}; "
+                    f"the file has {', '.join(recording.names) or 'only time'}; a column map can name it"
+                )
+        for name, values in (("time", recording.time), *((name, recording[name]) for name in recording.names)):
+            worst = int(np.argmax(np.abs(values)))
+            if abs(values[worst]) > _LARGEST_NUMBER:
+                raise IdentificationError(
+                    f"{source.name}: {procedure}: '{name}' is {values[worst]:g} at sample {worst + 1}, more than any "
+                    f"sensor measures: the line is damaged"
+                )
+        if len(recording) < fewest:
             raise IdentificationError(
-                f"{source.name}: {procedure} needs at least {fewest} samples, it has {len(source.recording)}"
+                f"{source.name}: {procedure} needs at least {fewest} samples, it has {len(recording)}"
             )
 
 
@@ -124,65 +136,32 @@ def kind_of(sources: tuple[Source, ...]) -> RecordingKind:
 
 def data_prospects(sources: tuple[Source, ...]) -> tuple[Prospect, ...]:
     """Return what the sensors did not show: values beyond a limit, and what is finer than a converter's steps."""
-    found = [
-        prospect
-        for source in sources
-        for name in source.recording.names
-        if name not in _NO_SENSORS
-        for prospect in _of_sensor(source, name)
-    ]
+    found = []
+    for source in sources:
+        for name in source.recording.names:
+            if name in _NO_SENSORS:
+                continue
+            values = source.recording[name]
+            limits = [item for item in plateaus(values) if is_at_limit(values, item)]
+            for item in limits:
+                text = f"{source.name}: it stays there for {item.count} samples, from sample {item.first + 1}: a limit"
+                found.append(Prospect(f"'{name}' beyond {item.value:.6g}", False, text))
+            # A converter is coarse where many samples share few values, far apart.
+            levels = np.unique(values)
+            if limits or levels.size < 2 or levels.size > values.size / 10:
+                continue
+            step = float(np.median(np.diff(levels)) / (levels[-1] - levels[0]))
+            if step > _COARSE:
+                text = f"{source.name}: its values are {step:.0%} of their range apart, a coarse converter"
+                found.append(Prospect(f"'{name}' at a finer resolution", False, text))
     if found:
         return tuple(found)
     count = sum(len(source.recording) for source in sources)
-    pauses = [gap.duration for source in sources if (gap := longest_gap(source.recording.time)) is not None]
-    pause = f"the longest pause is {max(pauses):.3g} s" if pauses else "no pause"
+    gaps = [gap.duration for source in sources if (gap := longest_gap(source.recording.time)) is not None]
+    pause = f"the longest pause is {max(gaps):.3g} s" if gaps else "no pause"
     return (Prospect("all samples", True, f"{count}; no sensor at its limit, no coarse converter, {pause}"),)
-
-
-def _of_sensor(source: Source, name: str) -> list[Prospect]:
-    values, found = source.recording[name], []
-    for item in plateaus(values):
-        if is_at_limit(values, item):
-            text = f"{source.name}: it stays there for {item.count} samples, from sample {item.first + 1}: a limit"
-            found.append(Prospect(f"'{name}' beyond {item.value:.6g}", False, text))
-    step = _coarseness(values)
-    if step > _COARSE and not found:
-        text = f"{source.name}: its values are {step:.0%} of their range apart, a coarse converter"
-        found.append(Prospect(f"'{name}' at a finer resolution", False, text))
-    return found
-
-
-def _coarseness(values: Floats) -> float:
-    """Return the usual distance of neighbouring values over their range, where many samples share few values."""
-    different = np.unique(values)
-    if different.size < 2 or different.size > values.size / 10:
-        return 0.0
-    return float(np.median(np.diff(different)) / (different[-1] - different[0]))
 
 
 def pool(sources: tuple[Source, ...], name: str) -> Floats:
     """Return a channel [SI] of all recordings, one after the other."""
     return np.concatenate([source.recording[name] for source in sources])
-
-
-def _check_sizes(source: Source, procedure: str) -> None:
-    """Refuse numbers that no sensor shows in any unit: a damaged line."""
-    recording = source.recording
-    for name, values in (("time", recording.time), *((name, recording[name]) for name in recording.names)):
-        worst = int(np.argmax(np.abs(values)))
-        if abs(values[worst]) > _LARGEST_NUMBER:
-            raise IdentificationError(
-                f"{source.name}: {procedure}: '{name}' is {values[worst]:g} at sample {worst + 1}, more than any "
-                f"sensor measures: the line is damaged"
-            )
-
-
-def _check_channel(source: Source, procedure: str, name: str) -> None:
-    if name in source.recording:
-        return
-    known = CHANNELS[name]
-    hint = nearest_name(name, source.recording.names)
-    raise IdentificationError(
-        f"{source.name}: {procedure} needs a channel '{name} [{known.unit}]', {known.summary}{hint}; "
-        f"the file has {', '.join(source.recording.names) or 'only time'}; a column map can name it"
-    )

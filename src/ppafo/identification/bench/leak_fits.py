@@ -1,4 +1,4 @@
-"""The laws of a leak fitted to decays: of flow, a relaxation that no leak makes, and a curve without physics."""
+"""The laws of a leak fitted to decays: of flow, a relaxation that no leak makes; which of them the readings prefer."""
 
 import math
 from collections.abc import Callable
@@ -19,18 +19,18 @@ EDGE = 20
 DESCRIBES = 1.25
 """Misfit of a law over that of the smooth curve, up to which it describes the data."""
 
-Solve = Callable[[Callable[[Floats], Floats], Floats, Floats, Floats, float], CurveFit]
-
-_CLOSE = 0.01
-_DEGREE = 5
+NOT_DESCRIBED: Verdict = "law does not describe the data"
 RELAXATION = "relaxation"
+_CLOSE = 0.01
+
+Solve = Callable[[Callable[[Floats], Floats], Floats, Floats, Floats, float], CurveFit]
 
 
 @dataclass(frozen=True, slots=True)
 class Decay:
     """Times from the start [s], falling pressure difference [Pa], the chambers, and how well gas is kept.
 
-    ``emptying`` is the number of the chamber that loses gas, 1 or 2.
+    ``floor`` [Pa] is the least of the differences, ``emptying`` the number of the chamber that loses gas, 1 or 2.
     """
 
     time: Floats
@@ -40,10 +40,15 @@ class Decay:
     floor: float
     emptying: int = 1
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The difference [Pa] at the start and at the end."""
+        return float(np.mean(self.difference[:EDGE])), float(np.mean(self.difference[-EDGE:]))
+
 
 @dataclass(frozen=True, slots=True)
 class FittedLaw:
-    """A law fitted to all decays: its rate first, misfit [Pa], Akaike's criterion, and the curves.
+    """A law fitted to all readings: its rate first, misfit [Pa] or [kg/s], Akaike's criterion, and the curves.
 
     ``plateaus`` are the differences [Pa] towards which a relaxation goes, each with half the width of its interval.
     """
@@ -60,21 +65,15 @@ class FittedLaw:
     plateaus: tuple[tuple[float, float], ...] = ()
 
 
-def smooth_curve(decay: Decay) -> Floats:
-    """Return a polynomial [Pa] through the decay: what any smooth law could reach."""
-    curve = np.polynomial.Chebyshev.fit(decay.time, decay.difference, _DEGREE)
-    return np.asarray(curve(decay.time))
-
-
 def fit_law(
     law: Law, decays: tuple[Decay, ...], count: float, confidence: float, solve: Solve = fit_curve
 ) -> FittedLaw:
     """Return a law of flow fitted to all decays with one rate [SI]; each decay has a start of its own."""
-    starts = [float(np.mean(decay.difference[:EDGE])) for decay in decays]
+    starts = [decay.ends[0] for decay in decays]
     guesses = []
-    for decay, start in zip(decays, starts, strict=True):
+    for decay in decays:
+        start, end = decay.ends
         lasting, difference = decay_times(law, decay.chambers, start, decay.floor)
-        end = float(np.mean(decay.difference[-EDGE:]))
         guesses.append(float(np.interp(-end, -difference, lasting)) / float(decay.time[-1]))
     rate = float(np.mean(guesses))
 
@@ -87,9 +86,9 @@ def fit_law(
     scale = max(starts)
     ones = np.ones(1 + len(decays))
     fit = solve(lambda values: _misfits(decays, curves(values)) / scale, ones, 1e-3 * ones, 1e3 * ones, confidence)
-    wide = float(fit.half_widths[0]) * rate
-    return _law_of_fit(
-        law.name, law.formula, law.rate_unit, float(fit.values[0]) * rate, wide, fit, scale, count, curves(fit.values)
+    found = float(fit.values[0]) * rate, float(fit.half_widths[0]) * rate, law.rate_unit
+    return FittedLaw(
+        law.name, law.formula, *found, *_merit(fit, scale, count), tuple(curves(fit.values)), float(fit.widened[0])
     )
 
 
@@ -98,7 +97,7 @@ def fit_relaxation(decays: tuple[Decay, ...], count: float, confidence: float) -
 
     Values are the rate, then for each decay its start and its plateau, over how far it fell.
     """
-    starts = [float(np.mean(decay.difference[:EDGE])) for decay in decays]
+    starts = [decay.ends[0] for decay in decays]
     drops = [start - decay.floor for start, decay in zip(starts, decays, strict=True)]
     longest = max(float(decay.time[-1]) for decay in decays)
 
@@ -114,34 +113,23 @@ def fit_relaxation(decays: tuple[Decay, ...], count: float, confidence: float) -
     lower = np.array([1e-2, *(item for _ in decays for item in (-10.0, -1e3))])
     upper = np.array([1e3, *(item for _ in decays for item in (10.0, 10.0))])
     fit = fit_curve(lambda values: _misfits(decays, curves(values)) / scale, guess, lower, upper, confidence)
-    rate, wide = float(fit.values[0]) / longest, float(fit.half_widths[0]) / longest
-    formula = "exponential towards a difference above zero"
     plateaus = tuple(
         (start + drop * float(fit.values[place]), drop * float(fit.half_widths[place]))
         for place, start, drop in zip(range(2, fit.values.size, 2), starts, drops, strict=True)
     )
-    fitted = _law_of_fit(RELAXATION, formula, "1/s", rate, wide, fit, scale, count, curves(fit.values))
-    return replace(fitted, plateaus=plateaus)
+    found = float(fit.values[0]) / longest, float(fit.half_widths[0]) / longest, "1/s"
+    formula, shown = "exponential towards a difference above zero", tuple(curves(fit.values))
+    return FittedLaw(RELAXATION, formula, *found, *_merit(fit, scale, count), shown, float(fit.widened[0]), plateaus)
 
 
 def _misfits(decays: tuple[Decay, ...], curves: list[Floats]) -> Floats:
     return np.concatenate([decay.difference - curve for decay, curve in zip(decays, curves, strict=True)])
 
 
-def _law_of_fit(
-    name: str,
-    formula: str,
-    unit: str,
-    rate: float,
-    wide: float,
-    fit: CurveFit,
-    scale: float,
-    count: float,
-    curves: list[Floats],
-) -> FittedLaw:
+def _merit(fit: CurveFit, scale: float, count: float) -> tuple[float, float]:
+    """Return the rms misfit and Akaike's criterion [-] for the number of independent samples."""
     rms = fit.rms * scale
-    criterion = 2.0 * count * float(np.log(max(rms, 1e-12))) + 2.0 * fit.values.size
-    return FittedLaw(name, formula, rate, wide, unit, rms, criterion, tuple(curves), float(fit.widened[0]))
+    return rms, 2.0 * count * float(np.log(max(rms, 1e-12))) + 2.0 * fit.values.size
 
 
 def best_law(fitted: list[FittedLaw]) -> FittedLaw:
@@ -163,6 +151,18 @@ class Judgement:
         """The reason, as a sentence of its own."""
         return f"{self.reason[:1].upper()}{self.reason[1:]}."
 
+    def estimates(self, evidence: Evidence, opening: Opening, numbers: list[Number]) -> tuple[Estimate, ...]:
+        """Return the estimates of an opening; none but the reason where the law does not describe the data."""
+        if self.verdict == NOT_DESCRIBED:
+            missing = Number(opening.path, opening.unit, math.nan, math.nan, self.sentence)
+            return (evidence.estimate(missing, math.nan, self.verdict),)
+        return tuple(self.weaken(evidence.with_calibration(number)) for number in numbers)
+
+    def weaken(self, estimate: Estimate) -> Estimate:
+        """Return the estimate, called weak where its law is."""
+        is_too_sure = estimate.verdict in ("identified", "holds for this model only") and self.verdict == "weak"
+        return replace(estimate, verdict="weak") if is_too_sure else estimate
+
 
 def judge(fitted: list[FittedLaw], best: FittedLaw, noise: float, span: float, unit: str) -> Judgement:
     """Return whether the orifice law, the first, describes the data: it must come close to what a smooth curve reaches.
@@ -177,8 +177,6 @@ def judge(fitted: list[FittedLaw], best: FittedLaw, noise: float, span: float, u
     misses = f"the orifice law misses the data by {orifice.rms:.3g} {unit} rms, "
     misses += f"a smooth curve by {noise:.3g} {unit}: {times}"
     is_close = orifice.rms <= DESCRIBES * noise and behind <= CLEARLY_WORSE
-    decides = f"the {best.name} law misses by {best.rms:.3g} {unit}, which is clearly better (AIC by {behind:.3g}; "
-    decides += f"{CLEARLY_WORSE:g} is clear)"
     if not is_close and not rivals and orifice.rms <= _CLOSE * span:
         return Judgement(
             "weak",
@@ -186,8 +184,10 @@ def judge(fitted: list[FittedLaw], best: FittedLaw, noise: float, span: float, u
             f"interval covers what of that appears in the residuals",
         )
     if not is_close:
-        compared = f"{misses}, and {decides}" if behind > CLEARLY_WORSE else misses
-        return Judgement("law does not describe the data", f"{compared}; an area would be meaningless")
+        if behind > CLEARLY_WORSE:
+            misses += f", and the {best.name} law misses by {best.rms:.3g} {unit}, which is clearly better "
+            misses += f"(AIC by {behind:.3g}; {CLEARLY_WORSE:g} is clear)"
+        return Judgement(NOT_DESCRIBED, f"{misses}; an area would be meaningless")
     if rivals:
         return Judgement(
             "weak",
@@ -214,7 +214,7 @@ def law_checks(fitted: list[FittedLaw], best: FittedLaw, judged: Judgement, unit
         f"{item.name} {item.rms:.3g} {unit} ({item.criterion - best.criterion:+.3g})" for item in ranking
     )
     return (
-        Check("orifice law", judged.verdict != "law does not describe the data", judged.reason),
+        Check("orifice law", judged.verdict != NOT_DESCRIBED, judged.reason),
         Check("which law", not rivals, f"{found}; misfit (AIC above the best): {listed}"),
     )
 
@@ -243,11 +243,13 @@ def leak_or_relaxation(
         rate = relaxation.rate / (1.0 + decays[0].chambers.volume_ratio)
         text = f"undecided: a linear leak of {rate:.3g} 1/s and a sensor offset of {plateau:.4g} Pa in the difference "
         return Check(name, False, f"{text}give the same curve; a decay from another pressure distinguishes them"), None
-    offset = _fit_shared_plateau(decays, confidence, lambda shared, _top: shared)
-    share = _fit_shared_plateau(decays, confidence, lambda shared, top: shared * top)
+    # Curves are fitted in multiples of the largest difference [Pa] and of the longest time [s].
+    scale = max(float(decay.difference.max()) for decay in decays)
+    longest = max(float(decay.time[-1]) for decay in decays)
+    offset = _fit_shared_plateau(decays, scale, longest, confidence, lambda shared, _top: shared)
+    share = _fit_shared_plateau(decays, scale, longest, confidence, lambda shared, top: shared * top)
     freedom = max(1, int(count) - 1 - 2 * len(decays))
     own = relaxation.rms**2 * count / freedom
-    scale, longest = _scales(decays)
 
     def explains(fit: CurveFit) -> bool:
         more = max(0.0, (fit.rms * scale) ** 2 - relaxation.rms**2) * count / (len(decays) - 1)
@@ -261,20 +263,18 @@ def leak_or_relaxation(
         return Check(name, True, "a relaxation: no sensor offset common to all decays explains them"), None
     units = np.array([1.0 / longest, scale])
     (rate, zero), wide = (offset.values[:2] * units).tolist(), (offset.half_widths[:2] * units).tolist()
-    found = OffsetLeak((rate, wide[0]), (zero, wide[1]))
-    return Check(name, True, f"a linear leak: a sensor offset of {found.offset[0]:.4g} Pa explains all decays"), found
-
-
-def _scales(decays: tuple[Decay, ...]) -> tuple[float, float]:
-    """Return the largest difference [Pa] and the longest time [s], in whose multiples curves are fitted."""
-    return max(float(decay.difference.max()) for decay in decays), max(float(decay.time[-1]) for decay in decays)
+    text = f"a linear leak: a sensor offset of {zero:.4g} Pa explains all decays"
+    return Check(name, True, text), OffsetLeak((rate, wide[0]), (zero, wide[1]))
 
 
 def _fit_shared_plateau(
-    decays: tuple[Decay, ...], confidence: float, plateau_of: Callable[[float, float], float]
+    decays: tuple[Decay, ...],
+    scale: float,
+    longest: float,
+    confidence: float,
+    plateau_of: Callable[[float, float], float],
 ) -> CurveFit:
     """Return the exponentials whose plateaus follow from one number and their starts; values: rate, number, starts."""
-    scale, longest = _scales(decays)
 
     def residuals(values: Floats) -> Floats:
         curves = []
@@ -284,8 +284,7 @@ def _fit_shared_plateau(
             curves.append(scale * (end + (top - end) * np.exp(-speed * decay.time)))
         return _misfits(decays, curves) / scale
 
-    tops = np.array([float(np.mean(decay.difference[:EDGE])) / scale for decay in decays])
-    ends = np.array([float(np.mean(decay.difference[-EDGE:])) / scale for decay in decays])
+    tops, ends = (np.array([decay.ends[at] / scale for decay in decays]) for at in (0, 1))
     limits = np.array([1e3, 10.0, *(10.0 for _ in decays)])
     fits = [
         fit_curve(residuals, np.array([2.0, guess, *tops]), np.array([1e-2, *-limits[1:]]), limits, confidence)
@@ -297,20 +296,3 @@ def _fit_shared_plateau(
 def condition_of(best: FittedLaw, which: Check) -> str:
     """Return where the rate of the best law holds: only if that law does, where the laws cannot be distinguished."""
     return "" if which.holds else f"if the leak is {best.name}"
-
-
-def opening_estimates(
-    evidence: Evidence, opening: Opening, numbers: list[Number], judged: Judgement
-) -> tuple[Estimate, ...]:
-    """Return the estimates of an opening; none but the reason where the law does not describe the data."""
-    if judged.verdict == "law does not describe the data":
-        nothing = math.nan
-        missing = Number(opening.path, opening.unit, nothing, nothing, judged.sentence)
-        return (evidence.estimate(missing, nothing, judged.verdict),)
-    return tuple(weaken(evidence.with_calibration(number), judged) for number in numbers)
-
-
-def weaken(estimate: Estimate, judged: Judgement) -> Estimate:
-    """Return the estimate, called weak where its law is."""
-    is_too_sure = estimate.verdict in ("identified", "holds for this model only") and judged.verdict == "weak"
-    return replace(estimate, verdict="weak") if is_too_sure else estimate

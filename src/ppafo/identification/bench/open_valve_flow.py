@@ -18,7 +18,7 @@ from ppafo.identification.bench.inputs import (
     pauses,
     pool,
 )
-from ppafo.identification.bench.result import BenchResult, Evidence, Number, Panel, Series
+from ppafo.identification.bench.result import BenchResult, Evidence, Panel, Series
 from ppafo.identification.estimate import Check, Estimate, Prospect
 from ppafo.identification.source import Source, traces
 from ppafo.model.gas import critical_pressure_ratio
@@ -70,6 +70,11 @@ class OpenReadings:
         """The ratio [-] in coarse steps: sorted by its own noise, residuals would follow it though the law is right."""
         return np.round(self.ratio / _RATIO_STEP)
 
+    def spans_enough(self, gas: GasAt) -> bool:
+        """Return whether flow is both nearly choked and clearly subsonic, so that the critical ratio can be fitted."""
+        choked = critical_pressure_ratio(gas.heat_capacity_ratio)
+        return bool(np.ptp(self.ratio) >= _SPREAD_OF_RATIOS and self.ratio.max() > choked + 0.5 * _SPREAD_OF_RATIOS)
+
 
 def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings) -> BenchResult:
     """Return Cd A [m^2] and Cd [-], and C [m^3/(s Pa)] and b [-] where the pressure ratios span enough; (6), (7).
@@ -77,25 +82,40 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
     IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
     """
     check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
+    gas = settings.gas
     for source in sources:
-        _check_source(source, settings.gas)
+        check_absolute(source, PROCEDURE, CHANNELS[:2])
+        upstream, downstream = (source.recording[name] for name in CHANNELS[:2])
+        # A meter that is saturated stays where these pressures would have the flow change.
+        driving = orifice_shape(upstream, downstream, gas.heat_capacity_ratio)
+        check_not_clipped(source, PROCEDURE, "mass_flow", "orifice flow at these pressures", driving)
     points = open_readings(sources)
-    orifice = _orifice_fit(points, settings)
-    sonic = _sonic_fit(points, settings) if spans_enough(points, settings.gas) else None
+    scale = float(np.abs(points.flow).max())
+    # Equation (6): flow = Cd A C1 P_up psi(P_down / P_up), linear in Cd A.
+    per_area = gas.choked_flow_constant * orifice_shape(points.upstream, points.downstream, gas.heat_capacity_ratio)
+    orifice = fit_curve(
+        lambda values: (points.flow - values[0] * per_area) / scale,
+        np.array([per_area @ points.flow / (per_area @ per_area)]),
+        np.array([0.0]),
+        np.array([np.inf]),
+        settings.confidence,
+        (points.steps,),
+    )
+    sonic = _sonic_fit(points, settings, scale) if points.spans_enough(gas) else None
     if settings.law == "iso6358" and sonic is None:
         raise IdentificationError(
             f"{sources[0].name}: {PROCEDURE}: C and b need choked and subsonic flow, pressure ratios that span "
             f"{_SPREAD_OF_RATIOS:g} or more; these go from {points.ratio.min():.3g} to {points.ratio.max():.3g}"
         )
-    evidence = Evidence(traces(sources), settings.confidence, settings.gas.flow_uncertainty(settings.calibration))
-    estimates = _estimates(evidence, settings, orifice, sonic)
-    checks = _checks(settings, orifice, sonic)
+    reported = sonic if settings.law == "iso6358" and sonic is not None else orifice
+    evidence = Evidence(traces(sources), settings.confidence, gas.flow_uncertainty(settings.calibration))
     one_ratio = "one pressure ratio, or choked flow alone: the orifice law and C with b cannot be distinguished"
     remarks = (*(() if sonic is not None else (one_ratio,)), *pauses(sources))
     text = f"{points.flow.size} readings, pressure ratios {points.ratio.min():.3g} to {points.ratio.max():.3g}; "
     text += f"Cd A = {orifice.values[0] * 1e6:.4g} mm^2"
     text += "" if sonic is None else f"; C = {sonic.values[0]:.4g} m^3/(s Pa), b = {sonic.values[1]:.3g}"
-    panels = _panels(points, settings, orifice, sonic)
+    estimates, checks = _estimates(evidence, settings, orifice, sonic), _checks(settings, reported, orifice, sonic)
+    panels = _panels(points, settings, reported, orifice, sonic)
     return BenchResult(PROCEDURE, text, estimates, checks, panels, kind_of(sources), remarks)
 
 
@@ -107,7 +127,7 @@ def flow_prospects(sources: tuple[Source, ...], settings: OpenValveFlowSettings)
     spread = f"{ratio.size} readings with the valve open, pressure ratios {ratio.min():.3g} to {ratio.max():.3g}"
     has_area = bool(settings.area)
     area = "over the area of the set" if has_area else "the set has no area of the valve: only the product Cd A"
-    both = spans_enough(readings, settings.gas)
+    both = readings.spans_enough(settings.gas)
     needed = spread if both else f"{spread}: choked and subsonic flow are needed"
     return (
         Prospect("effective area", True, spread),
@@ -116,21 +136,17 @@ def flow_prospects(sources: tuple[Source, ...], settings: OpenValveFlowSettings)
     )
 
 
-def _check_source(source: Source, gas: GasAt) -> None:
-    """Refuse pressures that are not absolute, and a flow that stays where these would have it change."""
-    check_absolute(source, PROCEDURE, CHANNELS[:2])
-    upstream, downstream = (source.recording[name] for name in CHANNELS[:2])
-    driving = orifice_shape(upstream, downstream, gas.heat_capacity_ratio)
-    check_not_clipped(source, PROCEDURE, "mass_flow", "orifice flow at these pressures", driving)
-
-
 def open_readings(sources: tuple[Source, ...]) -> OpenReadings:
     """Return the readings with the valve fully open; exchanged pressures and a valve that never was are refused.
 
     IdentificationError says which.
     """
     upstream, downstream, flow = (pool(sources, name) for name in CHANNELS)
-    is_open = np.concatenate([_is_open(source) for source in sources])
+    commands = [
+        source.recording["command"] if "command" in source.recording else np.ones(len(source.recording))
+        for source in sources
+    ]
+    is_open = np.abs(np.concatenate(commands)) >= _FULLY_OPEN
     if is_open.sum() < MINIMUM_SAMPLES:
         raise IdentificationError(
             f"{sources[0].name}: {PROCEDURE} needs {MINIMUM_SAMPLES} readings with the valve fully open, "
@@ -148,55 +164,18 @@ def open_readings(sources: tuple[Source, ...]) -> OpenReadings:
     return points
 
 
-def _is_open(source: Source) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
-    if "command" not in source.recording:
-        return np.ones(len(source.recording), dtype=np.bool_)
-    return np.asarray(np.abs(source.recording["command"]) >= _FULLY_OPEN)
-
-
-def spans_enough(points: OpenReadings, gas: GasAt) -> bool:
-    """Whether flow is both nearly choked and clearly subsonic, so that the critical ratio has something to rest on."""
-    choked = critical_pressure_ratio(gas.heat_capacity_ratio)
-    return bool(np.ptp(points.ratio) >= _SPREAD_OF_RATIOS and points.ratio.max() > choked + 0.5 * _SPREAD_OF_RATIOS)
-
-
-def _orifice_flow(points: OpenReadings, gas: GasAt) -> Floats:
-    return gas.choked_flow_constant * orifice_shape(points.upstream, points.downstream, gas.heat_capacity_ratio)
-
-
-def _orifice_fit(points: OpenReadings, settings: OpenValveFlowSettings) -> CurveFit:
-    per_area = _orifice_flow(points, settings.gas)
-    start = np.array([per_area @ points.flow / (per_area @ per_area)])
-    scale = float(np.abs(points.flow).max())
-    return fit_curve(
-        lambda values: (points.flow - values[0] * per_area) / scale,
-        start,
-        np.array([0.0]),
-        np.array([np.inf]),
-        settings.confidence,
-        (points.steps,),
-    )
-
-
-def _sonic_fit(points: OpenReadings, settings: OpenValveFlowSettings) -> CurveFit:
+def _sonic_fit(points: OpenReadings, settings: OpenValveFlowSettings, scale: float) -> CurveFit:
     """Fit C (as a multiple of a first guess, so that both unknowns are of order one) and b."""
     per_conductance = settings.gas.flow_per_sonic_conductance
     guess = float(points.flow.max()) / (per_conductance * float(points.upstream[np.argmax(points.flow)]))
-    scale = float(np.abs(points.flow).max())
 
     def residuals(values: Floats) -> Floats:
         shape = iso6358_shape(points.upstream, points.downstream, float(values[1]))
         return np.asarray((points.flow - values[0] * guess * per_conductance * shape) / scale)
 
+    upper = np.array([100.0, _LARGEST_CRITICAL_RATIO])
     fits = [
-        fit_curve(
-            residuals,
-            np.array([1.0, start]),
-            np.zeros(2),
-            np.array([100.0, _LARGEST_CRITICAL_RATIO]),
-            settings.confidence,
-            (points.steps,),
-        )
+        fit_curve(residuals, np.array([1.0, start]), np.zeros(2), upper, settings.confidence, (points.steps,))
         for start in (0.2, 0.5)
     ]
     best = min(fits, key=lambda fit: fit.rms)
@@ -207,72 +186,41 @@ def _sonic_fit(points: OpenReadings, settings: OpenValveFlowSettings) -> CurveFi
 def _estimates(
     evidence: Evidence, settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveFit | None
 ) -> tuple[Estimate, ...]:
+    """Return Cd where the set has an area, Cd A, C and b; a gain that both pressures share leaves b as it is."""
     given = f"{settings.gas.temperature_text}; {evidence.calibration_text}"
-    product = Number(
-        "open_valve_flow.effective_area",
-        "m^2",
-        orifice.values[0],
-        orifice.half_widths[0],
-        f"Cd A, the product; it alone sets the flow. {given}.",
-        lowest=0.0,
-        widened=orifice.widened[0],
-    )
-    estimates = [evidence.with_calibration(number) for number in (*_coefficient(product, settings, given), product)]
-    return (*estimates, *_sonic_estimates(evidence, settings, sonic, given))
-
-
-def _coefficient(product: Number, settings: OpenValveFlowSettings, given: str) -> list[Number]:
-    """Return Cd where the set has an area and the orifice law is requested."""
-    if settings.law != "orifice" or not settings.area:
-        return []
-    text = f"Cd A over the set's area of {settings.area * 1e6:.4g} mm^2, taken as exact. {given}."
-    value, half = product.value / settings.area, product.half_width / settings.area
-    path = f"{settings.path}.discharge_coefficient"
-    return [replace(product, path=path, unit="", value=value, half_width=half, explanation=text)]
-
-
-def _sonic_estimates(
-    evidence: Evidence, settings: OpenValveFlowSettings, sonic: CurveFit | None, given: str
-) -> tuple[Estimate, ...]:
-    """Return C and b; a gain that both pressures share leaves b, their ratio, as it is."""
-    if sonic is None:
-        return ()
-    section = settings.path if settings.law == "iso6358" else "open_valve_flow"
-    trade = f"Errors of C and b are correlated by {sonic.correlation[0, 1]:+.2f}"
-    forms = (
-        ("sonic_conductance", "m^3/(s Pa)", f"C of ISO 6358. {trade}. {given}."),
-        ("critical_ratio", "", f"b of ISO 6358. {trade}."),
-    )
-    fitted = zip(forms, sonic.values, sonic.half_widths, sonic.widened, strict=True)
-    conductance, ratio = (
-        Number(f"{section}.{name}", unit, value, half, text, lowest=0.0, widened=widened)
-        for (name, unit, text), value, half, widened in fitted
-    )
-    return evidence.with_calibration(conductance), evidence.without_calibration(ratio)
-
-
-def _checks(settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveFit | None) -> tuple[Check, ...]:
-    reported = _law_to_report(settings, orifice, sonic)
-    noise = "of the largest flow"
-    listed = [
-        Check(
-            "residuals", reported.rms <= _GOOD_FRACTION, f"the law misses the flow by {reported.rms:.2%} {noise} (rms)"
-        )
-    ]
-    bound = float(np.mean(reported.residuals))
-    drift = abs(bound) <= max(0.01, 2.0 * reported.rms / np.sqrt(reported.effective))
-    listed.append(Check("bias", bool(drift), f"mean residual {bound:+.2%} {noise}"))
+    text = f"Cd A, the product; it alone sets the flow. {given}."
+    product = orifice.number(0, "open_valve_flow.effective_area", "m^2", text)
+    estimates = [evidence.with_calibration(product)]
+    if settings.law == "orifice" and settings.area:
+        text = f"Cd A over the set's area of {settings.area * 1e6:.4g} mm^2, taken as exact. {given}."
+        value, half = product.value / settings.area, product.half_width / settings.area
+        path = f"{settings.path}.discharge_coefficient"
+        coefficient = replace(product, path=path, unit="", value=value, half_width=half, explanation=text)
+        estimates.insert(0, evidence.with_calibration(coefficient))
     if sonic is not None:
-        listed.append(_which_law(settings, orifice, sonic))
-    return tuple(listed)
+        section = settings.path if settings.law == "iso6358" else "open_valve_flow"
+        trade = f"Errors of C and b are correlated by {sonic.correlation[0, 1]:+.2f}"
+        text = f"C of ISO 6358. {trade}. {given}."
+        conductance = sonic.number(0, f"{section}.sonic_conductance", "m^3/(s Pa)", text)
+        ratio = sonic.number(1, f"{section}.critical_ratio", "", f"b of ISO 6358. {trade}.")
+        estimates += [evidence.with_calibration(conductance), evidence.without_calibration(ratio)]
+    return tuple(estimates)
 
 
-def _law_to_report(settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveFit | None) -> CurveFit:
-    return sonic if settings.law == "iso6358" and sonic is not None else orifice
-
-
-def _which_law(settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveFit) -> Check:
-    """Return whether the readings clearly prefer the law that was not requested (Akaike's criterion)."""
+def _checks(
+    settings: OpenValveFlowSettings, reported: CurveFit, orifice: CurveFit, sonic: CurveFit | None
+) -> tuple[Check, ...]:
+    noise = "of the largest flow"
+    text = f"the law misses the flow by {reported.rms:.2%} {noise} (rms)"
+    bias = float(np.mean(reported.residuals))
+    is_small = abs(bias) <= max(0.01, 2.0 * reported.rms / np.sqrt(reported.effective))
+    listed = [
+        Check("residuals", reported.rms <= _GOOD_FRACTION, text),
+        Check("bias", bool(is_small), f"mean residual {bias:+.2%} {noise}"),
+    ]
+    if sonic is None:
+        return tuple(listed)
+    # Whether the readings clearly prefer the law that was not requested (Akaike's criterion; b is one number more).
     count = min(orifice.effective, sonic.effective)
     gain = count * math.log(max(orifice.rms, 1e-15) / max(sonic.rms, 1e-15)) * 2.0 - 2.0
     better = (
@@ -282,11 +230,15 @@ def _which_law(settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveF
     text = f"AIC prefers {better} (difference {gain:+.1f}): rms {orifice.rms:.2%} orifice, {sonic.rms:.2%} ISO 6358"
     holds = better in (requested, "neither law clearly")
     other = "iso6358" if settings.law == "orifice" else "orifice"
-    return Check("which law", holds, text if holds else f"{text}; try law = '{other}'")
+    return (*listed, Check("which law", holds, text if holds else f"{text}; try law = '{other}'"))
 
 
 def _panels(
-    points: OpenReadings, settings: OpenValveFlowSettings, orifice: CurveFit, sonic: CurveFit | None
+    points: OpenReadings,
+    settings: OpenValveFlowSettings,
+    reported: CurveFit,
+    orifice: CurveFit,
+    sonic: CurveFit | None,
 ) -> tuple[Panel, ...]:
     """Show conductance over ratio: flow over upstream pressure, which both laws make a function of the ratio alone."""
     ratios = np.linspace(0.0, 1.0, 201)
@@ -298,8 +250,8 @@ def _panels(
     if sonic is not None:
         curve = sonic.values[0] * gas.flow_per_sonic_conductance * iso6358_shape(ones, ratios, float(sonic.values[1]))
         shown.append(Series("ISO 6358", ratios, curve, "law" if settings.law == "iso6358" else "other law"))
-    modelled = points.flow - _law_to_report(settings, orifice, sonic).residuals * float(points.flow.max())
-    ends = np.array([0.0, float(points.flow.max())])
+    largest = float(points.flow.max())
+    modelled, ends = points.flow - reported.residuals * largest, np.array([0.0, largest])
     compared = (Series("", points.flow, modelled, "measured"), Series("", ends, ends, "law"))
     ratio_axis = ("Downstream over upstream pressure", "-")
     return (

@@ -5,28 +5,39 @@ While the pressure rises, friction keeps part of the torque from the scale; whil
     torque = K dP + T_0 - s (T_s + g (dP - mean dP)),   s = +1 rising, -1 falling
 
 K is the common slope, T_s half the distance of the branches, g how the friction grows with pressure, T_0 the zero of
-the scale. All are linear, so one regression gives them all.
+the scale. All are linear, so one regression gives them all. Its intervals stay honest where readings are not
+independent of each other: those of one repetition, or of one pressure, share an error.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench.curve_fit import CHANCE, quantile
-from ppafo.identification.bench.inputs import check_moves, check_not_clipped, check_sources, kind_of, pauses
+from ppafo.identification.bench.curve_fit import CHANCE, exceeds_chance, quantile
+from ppafo.identification.bench.inputs import check_moves, check_not_clipped, check_sources, kind_of, pauses, pool
 from ppafo.identification.bench.result import BenchResult, Evidence, Number, Panel, Role, Series, prospect_of
-from ppafo.identification.bench.static_readings import PROCEDURE, Readings, Regression, labels_of, readings_of, regress
-from ppafo.identification.estimate import Check, Estimate, Prospect
+from ppafo.identification.estimate import Check, Prospect
 from ppafo.identification.source import Source, traces
 from ppafo.signals.recording import Floats
 
+Labels = NDArray[np.int64]
+
+PROCEDURE = "static-torque"
 CHANNELS = ("torque", "pressure_difference", "direction")
+MINIMUM_SAMPLES = 6
+_MINIMUM_LEVELS = 3
+_SLOPE, _ZERO, _FRICTION, _GROWTH = range(4)
+
 _MORE_THAN_FRICTION = 0.3
 """Fraction of its range by which the torque may move at one pressure, as friction turns round."""
-
 _SAG_THAT_HARMS_NOBODY = 0.02
-_SLOPE, _ZERO, _FRICTION, _GROWTH = range(4)
+_FEWEST_CLUSTERS = 3
+_LEVEL_GAP, _WIDEST_LEVEL, _BINS = 1.0 / 40.0, 1.0 / 8.0, 20
+"""Gap between two pressure levels and width of one, over the whole span; equal parts where readings have no levels."""
+_FLAT = 0.002
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,96 +63,11 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
         check_not_clipped(source, PROCEDURE, "torque", "pressure_difference", pressure)
     readings = readings_of(sources)
     for source in sources:
-        check_not_clipped(
-            source, PROCEDURE, "pressure_difference", "torque", source.recording["torque"], _MORE_THAN_FRICTION
-        )
+        torque = source.recording["torque"]
+        check_not_clipped(source, PROCEDURE, "pressure_difference", "torque", torque, _MORE_THAN_FRICTION)
     growing = _fit(readings, True, chosen.confidence)
     grows = _fit(readings, True, 1.0 - CHANCE).differs_from_zero(_GROWTH)
     fit = growing if grows else _fit(readings, False, chosen.confidence)
-    _check_order(sources, fit)
-    evidence = Evidence(traces(sources), chosen.confidence, chosen.calibration)
-    estimates = _estimates(evidence, readings, fit, growing if grows else None, growing)
-    if grows:
-        estimates = (*estimates, evidence.with_calibration(_at_no_pressure(readings, chosen.confidence)))
-    straight = _straight_check(readings, grows, chosen.confidence)
-    return BenchResult(
-        PROCEDURE,
-        _summary(readings, fit, grows),
-        estimates,
-        (straight, _outliers(readings, fit), _growth_check(growing, readings, grows)),
-        _panels(readings, fit),
-        kind_of(sources),
-        pauses(sources),
-    )
-
-
-def static_prospects(sources: tuple[Source, ...], settings: StaticTorqueSettings) -> tuple[Prospect, ...]:
-    """Return how well torque constant, static friction and its growth can be had; intervals from scatter and design."""
-    check_sources(sources, PROCEDURE, CHANNELS, 1)
-    readings = readings_of(sources)
-    design = np.stack(
-        [
-            readings.pressure,
-            np.ones_like(readings.pressure),
-            -readings.branch,
-            -readings.branch * (readings.pressure - readings.middle),
-        ],
-        axis=1,
-    )
-    scale = np.sqrt((design**2).mean(axis=0))
-    noise, means = _cells(readings)
-    factor = quantile(settings.confidence, max(1, readings.pressure.size - 4)) * noise
-    inverse = np.linalg.pinv((design / scale).T @ (design / scale))
-    half = factor * np.sqrt(np.diag(inverse)) / scale
-    span = float(np.ptp(readings.pressure))
-    slope = float(np.polyfit(readings.pressure, readings.torque, 1)[0])
-    levels = int(readings.levels.max()) + 1
-    where = f"{levels} pressures over {span / 1e3:.3g} kPa"
-    return (
-        prospect_of("torque constant", half[0], slope, where),
-        prospect_of("static friction", half[2], means, f"both branches at {where}"),
-        Prospect(
-            "growth of the friction",
-            bool(levels > 2 and half[3] * span < abs(means)),
-            f"{half[3] * span:.2g} N m from the lowest to the highest pressure would show",
-        ),
-    )
-
-
-def _cells(readings: Readings) -> tuple[float, float]:
-    """Return the scatter within pressures and branches [N m], about lines of their own, and half their distance."""
-    cells = labels_of([readings.levels, (readings.branch > 0).astype(np.int64)])
-    left, count = 0.0, 0
-    for cell in range(int(cells.max()) + 1):
-        x, y = readings.pressure[cells == cell], readings.torque[cells == cell]
-        if y.size > 2 and np.ptp(x) > 0.0:
-            y = y - np.polyval(np.polyfit(x - x.mean(), y, 1), x - x.mean())
-        left, count = left + float(((y - y.mean()) ** 2).sum()), count + y.size - 1
-    rising = readings.branch > 0
-    line = np.polyfit(readings.pressure, readings.torque, 1)
-    rest = readings.torque - np.polyval(line, readings.pressure)
-    return float(np.sqrt(left / max(count, 1))), 0.5 * float(np.mean(rest[~rising]) - np.mean(rest[rising]))
-
-
-def _fit(
-    readings: Readings, with_growth: bool, confidence: float, extra: Floats | None = None, at: float | None = None
-) -> Regression:
-    """Return the regression; a friction that grows is that ``at`` a pressure difference [Pa], the mean one if None."""
-    columns = [readings.pressure, np.ones_like(readings.pressure), -readings.branch]
-    middle = readings.middle if at is None else at
-    columns += [-readings.branch * (readings.pressure - middle)] if with_growth else []
-    columns += [] if extra is None else [extra]
-    design = np.stack(columns, axis=1)
-    if readings.pressure.size <= design.shape[1]:
-        raise IdentificationError(f"{PROCEDURE}: {readings.pressure.size} readings are too few")
-    scale = np.sqrt((design**2).mean(axis=0))
-    sides = (readings.branch > 0).astype(np.int64)
-    cells = labels_of([readings.levels, sides])
-    scaled = regress(design / scale, readings.torque, readings.clusters, cells, confidence)
-    return replace(scaled, coefficients=scaled.coefficients / scale, half_widths=scaled.half_widths / scale)
-
-
-def _check_order(sources: tuple[Source, ...], fit: Regression) -> None:
     names = ", ".join(source.name for source in sources)
     if fit.coefficients[_SLOPE] <= 0.0:
         raise IdentificationError(
@@ -152,69 +78,300 @@ def _check_order(sources: tuple[Source, ...], fit: Regression) -> None:
             f"{names}: {PROCEDURE}: the rising branch lies above the falling one, as if friction drove the motion; "
             f"reverse the sign of channel 'direction'"
         )
-
-
-def _estimates(
-    evidence: Evidence, readings: Readings, fit: Regression, seen: Regression | None, growing: Regression
-) -> tuple[Estimate, ...]:
-    """Return what the readings give; ``seen`` is the growing friction where it was found to grow."""
-    numbers = (
-        _torque_constant(evidence, fit),
-        _static_torque(readings, fit, seen),
-        Number(
-            "static_torque.zero_offset",
-            "N m",
-            fit.coefficients[_ZERO],
-            fit.half_widths[_ZERO],
-            "Torque that the scale shows at no pressure difference, midway between the branches.",
-            scale=float(np.ptp(readings.torque)),
-            widened=fit.widened[_ZERO],
+    evidence = Evidence(traces(sources), chosen.confidence, chosen.calibration)
+    numbers = _numbers(evidence, readings, fit, growing, grows)
+    count, levels = readings.pressure.size, int(readings.levels.max()) + 1
+    return BenchResult(
+        PROCEDURE,
+        f"{count} readings at {levels} pressures, {int(readings.clusters.max()) + 1} repetitions; "
+        f"K = {fit.coefficients[_SLOPE]:.4g} m^3, friction {fit.coefficients[_FRICTION]:.3g} N m"
+        f"{' on average, growing with pressure' if grows else ''}",
+        tuple(evidence.with_calibration(number) for number in numbers),
+        (
+            _straight_check(readings, grows, chosen.confidence),
+            _outlier_check(readings, fit),
+            _growth_check(growing, readings, grows),
         ),
-        Number(
-            "static_torque.friction_per_pressure",
-            "m^3",
-            growing.coefficients[_GROWTH],
-            growing.half_widths[_GROWTH],
-            "Growth of the static friction with the pressure difference [N m per Pa].",
-            widened=growing.widened[_GROWTH],
+        _panels(readings, fit),
+        kind_of(sources),
+        pauses(sources),
+    )
+
+
+def static_prospects(sources: tuple[Source, ...], settings: StaticTorqueSettings) -> tuple[Prospect, ...]:
+    """Return how well torque constant, static friction and its growth can be had; intervals from scatter and design."""
+    check_sources(sources, PROCEDURE, CHANNELS, 1)
+    readings = readings_of(sources)
+    pressure, torque, rising = readings.pressure, readings.torque, readings.branch > 0
+    # The scatter within pressures and branches, about lines of their own: what the law misses is not in it.
+    cells = readings.cells
+    left, count = 0.0, 0
+    for cell in range(int(cells.max()) + 1):
+        x, y = pressure[cells == cell], torque[cells == cell]
+        if y.size > 2 and np.ptp(x) > 0.0:
+            y = y - np.polyval(np.polyfit(x - x.mean(), y, 1), x - x.mean())
+        left, count = left + float(((y - y.mean()) ** 2).sum()), count + y.size - 1
+    noise = float(np.sqrt(left / max(count, 1)))
+    line = np.polyfit(pressure, torque, 1)
+    rest = torque - np.polyval(line, pressure)
+    friction = 0.5 * float(np.mean(rest[~rising]) - np.mean(rest[rising]))
+    design = _design(readings, True)
+    scale = np.sqrt((design**2).mean(axis=0))
+    factor = quantile(settings.confidence, max(1, pressure.size - 4)) * noise
+    inverse = np.linalg.pinv((design / scale).T @ (design / scale))
+    half = factor * np.sqrt(np.diag(inverse)) / scale
+    span, levels = float(np.ptp(pressure)), int(readings.levels.max()) + 1
+    where = f"{levels} pressures over {span / 1e3:.3g} kPa"
+    return (
+        prospect_of("torque constant", half[_SLOPE], float(line[0]), where),
+        prospect_of("static friction", half[_FRICTION], friction, f"both branches at {where}"),
+        Prospect(
+            "growth of the friction",
+            bool(levels > 2 and half[_GROWTH] * span < abs(friction)),
+            f"{half[_GROWTH] * span:.2g} N m from the lowest to the highest pressure would show",
         ),
     )
-    return tuple(evidence.with_calibration(number) for number in numbers)
 
 
-def _torque_constant(evidence: Evidence, fit: Regression) -> Number:
-    source = {"independent readings": "the scatter of the readings"}.get(fit.widest, f"the {fit.widest}")
-    text = f"Common slope of both branches; residuals scatter by {fit.scatter:.3g} N m; "
-    text += f"the interval comes from {source}; {evidence.calibration_text}."
-    value, half = fit.coefficients[_SLOPE], fit.half_widths[_SLOPE]
-    return Number("actuator.torque_constant", "m^3", value, half, text, widened=fit.widened[_SLOPE])
+@dataclass(frozen=True, slots=True)
+class Readings:
+    """All readings of a branch: pressure difference [Pa], torque [N m], branch (+1, -1), groups, place in a file."""
+
+    pressure: Floats
+    torque: Floats
+    branch: Floats
+    clusters: Labels
+    levels: Labels
+    places: tuple[str, ...]
+
+    @property
+    def middle(self) -> float:
+        """Mean pressure difference [Pa]."""
+        return float(np.mean(self.pressure))
+
+    @property
+    def cells(self) -> Labels:
+        """One label for each pressure level of each branch."""
+        return labels_of([self.levels, (self.branch > 0).astype(np.int64)])
 
 
-def _static_torque(readings: Readings, fit: Regression, seen: Regression | None) -> Number:
-    """Return the friction; where it grows, that at the mean pressure difference, which the number says."""
-    condition = ""
-    grown = "no growth with pressure shows in these readings"
-    if seen is not None:
-        growth = seen.coefficients[_GROWTH]
-        at_rest = seen.coefficients[_FRICTION] - growth * readings.middle
+def readings_of(sources: tuple[Source, ...]) -> Readings:
+    """Return the readings of all recordings; IdentificationError where they cannot separate slope from friction."""
+    for source in sources:
+        values = source.recording["direction"]
+        wrong = np.flatnonzero(~np.isin(values, (-1.0, 0.0, 1.0)))
+        if wrong.size:
+            raise IdentificationError(
+                f"{source.name}: {PROCEDURE}: channel 'direction' is {values[wrong[0]]:g} at sample {wrong[0] + 1}; "
+                f"it is 1 while the pressure rises, -1 while it falls, 0 for neither"
+            )
+    pressure, torque, direction = (pool(sources, name) for name in ("pressure_difference", "torque", "direction"))
+    used = direction != 0.0
+    # A scale that only pulls shows nothing until friction is overcome: the rising branch then has a flat start, a
+    # lowest reading that belongs to two pressures or more, or is nothing at all.
+    lowest = torque.min()
+    resting = (direction > 0.0) & (torque <= lowest + _FLAT * np.ptp(torque))
+    is_flat = resting.any() and np.ptp(pressure[resting]) > _LEVEL_GAP * np.ptp(pressure)
+    if is_flat or lowest == 0.0:
+        used &= ~resting
+    pressure, torque, direction = pressure[used], torque[used], direction[used]
+    if pressure.size < MINIMUM_SAMPLES:
+        raise IdentificationError(
+            f"{sources[0].name}: {PROCEDURE} needs at least {MINIMUM_SAMPLES} readings, there are {pressure.size}"
+        )
+    for sign, name in ((1.0, "rising"), (-1.0, "falling")):
+        if not (direction == sign).any():
+            raise IdentificationError(
+                f"{', '.join(source.name for source in sources)}: {PROCEDURE}: the {name} branch is missing: no "
+                f"reading has direction {sign:+.0f}; without both, friction cannot be separated from "
+                "the zero of the scale"
+            )
+    if pressure.max() == pressure.min():
+        check_moves(sources[0], PROCEDURE, "pressure_difference")
+    levels = _levels(pressure)
+    if levels.max() + 1 < _MINIMUM_LEVELS:
+        raise IdentificationError(
+            f"{sources[0].name}: {PROCEDURE} needs readings at {_MINIMUM_LEVELS} different pressures or more, "
+            f"there are {levels.max() + 1}"
+        )
+    # A repetition of a recording is one cluster; so is a recording without repetitions.
+    recordings = [source.recording for source in sources]
+    files = np.concatenate([np.full(len(one), number) for number, one in enumerate(recordings)])
+    repetitions = [one["repetition"] if "repetition" in one else np.zeros(len(one)) for one in recordings]
+    _, repetition = np.unique(np.concatenate(repetitions), return_inverse=True)
+    clusters = labels_of([files.astype(np.int64), repetition.astype(np.int64)])
+    places = [
+        f"sample {number} of {source.name}" for source in sources for number in range(1, len(source.recording) + 1)
+    ]
+    kept = tuple(place for place, is_used in zip(places, used.tolist(), strict=True) if is_used)
+    return Readings(pressure, torque, direction, clusters[used], levels, kept)
+
+
+def _levels(pressure: Floats) -> Labels:
+    """Return which pressure level each reading belongs to: groups with gaps between them, else equal parts."""
+    span = float(pressure.max() - pressure.min())
+    if span == 0.0:
+        return np.zeros(pressure.size, dtype=np.int64)
+    order = np.argsort(pressure)
+    steps = np.diff(pressure[order]) > _LEVEL_GAP * span
+    levels = np.empty(pressure.size, dtype=np.int64)
+    levels[order] = np.concatenate(([0], np.cumsum(steps)))
+    widths = [float(np.ptp(pressure[levels == level])) for level in range(int(levels.max()) + 1)]
+    if max(widths) <= _WIDEST_LEVEL * span:
+        return levels
+    bins = np.minimum((pressure - pressure.min()) / span * _BINS, _BINS - 1).astype(np.int64)
+    return labels_of([bins])
+
+
+def labels_of(parts: Sequence[Labels]) -> Labels:
+    """Return one label for each combination of labels."""
+    _, labels = np.unique(np.stack(parts), axis=1, return_inverse=True)
+    return np.asarray(labels, dtype=np.int64).reshape(-1)
+
+
+@dataclass(frozen=True, slots=True)
+class Regression:
+    """Coefficients in the order of the design's columns, half widths of their intervals, and the residuals.
+
+    ``widened`` says how many times as wide each interval is as independent readings would have it, 1 where the line
+    misses the cells by no more than the readings scatter in them.
+    """
+
+    coefficients: Floats
+    half_widths: Floats
+    residuals: Floats
+    widest: str
+    widened: Floats
+
+    @property
+    def scatter(self) -> float:
+        """Standard deviation of the residuals, in the unit of what was fitted."""
+        freedom = max(1, self.residuals.size - self.coefficients.size)
+        return float(np.sqrt(self.residuals @ self.residuals / freedom))
+
+    def differs_from_zero(self, index: int) -> bool:
+        """Whether the interval of a coefficient leaves zero out."""
+        return bool(abs(self.coefficients[index]) > self.half_widths[index])
+
+    def number(self, index: int, path: str, unit: str, text: str) -> Number:
+        """Return a coefficient as a number of the result."""
+        half, widened = self.half_widths[index], self.widened[index]
+        return Number(path, unit, self.coefficients[index], half, text, widened=widened)
+
+
+def regress(
+    design: Floats, values: Floats, clusters: Labels, cells: Labels, confidence: float, judged_by: int = 0
+) -> Regression:
+    """Return the least-squares fit; for each coefficient, in its unit, the widest of three intervals.
+
+    1. Readings independent of each other. 2. Readings of one cluster (a repetition, a stroke) share an error: the
+    cluster-robust covariance, where there are three clusters or more. 3. Readings of one cell (a pressure, one
+    branch) share an error, as they do where the straight line does not quite hold: the regression of the cells' means.
+    ``widest`` names the one that counted for the coefficient ``judged_by``.
+    """
+    count, columns = design.shape
+    inverse = np.asarray(np.linalg.inv(design.T @ design), dtype=np.float64)
+    coefficients = inverse @ (design.T @ values)
+    residuals = values - design @ coefficients
+    candidates = {
+        "independent readings": _independent_half_widths(design, inverse, residuals, confidence),
+        "scatter between repetitions": np.zeros(columns),
+        "departure of pressure levels from a straight line": np.zeros(columns),
+    }
+    groups = int(clusters.max()) + 1
+    if _FEWEST_CLUSTERS <= groups < count:
+        scores = np.zeros((groups, columns))
+        np.add.at(scores, clusters, design * residuals[:, None])
+        correction = groups / (groups - 1) * (count - 1) / (count - columns)
+        covariance = correction * inverse @ (scores.T @ scores) @ inverse
+        half_widths = quantile(confidence, groups - 1) * np.sqrt(np.diag(covariance))
+        candidates["scatter between repetitions"] = np.asarray(half_widths)
+    counts = np.bincount(cells)
+    if columns < counts.size < count:
+        means = np.stack([np.bincount(cells, weights=column) / counts for column in (*design.T, values)])
+        mean_design, mean_values = means[:-1].T, means[-1]
+        if np.linalg.matrix_rank(mean_design) == columns:
+            of_means = np.asarray(np.linalg.inv(mean_design.T @ mean_design), dtype=np.float64)
+            left = mean_values - mean_design @ (of_means @ (mean_design.T @ mean_values))
+            half_widths = _independent_half_widths(mean_design, of_means, left, confidence)
+            candidates["departure of pressure levels from a straight line"] = half_widths
+    stacked = np.array(list(candidates.values()))
+    half_widths = stacked.max(axis=0)
+    widened = np.ones_like(half_widths)
+    # Whether the line misses the cells by more than the readings scatter in them: the test of lack of fit.
+    freedom, inner = counts.size - columns, count - counts.size
+    if freedom >= 1 and inner >= 1:
+        centres = np.bincount(cells, weights=residuals) / counts
+        between = float(counts @ centres**2 / freedom)
+        within = float(((residuals - centres[cells]) ** 2).sum()) / inner
+        if exceeds_chance(between, within, freedom, inner, CHANCE):
+            np.divide(half_widths, stacked[0], out=widened, where=stacked[0] > 0.0)
+    name = list(candidates)[int(np.argmax(stacked[:, judged_by]))]
+    return Regression(coefficients, half_widths, residuals, name, widened)
+
+
+def _independent_half_widths(design: Floats, inverse: Floats, residuals: Floats, confidence: float) -> Floats:
+    freedom = design.shape[0] - design.shape[1]
+    variance = residuals @ residuals / freedom
+    return np.asarray(quantile(confidence, freedom) * np.sqrt(variance * np.diag(inverse)))
+
+
+def _design(readings: Readings, with_growth: bool, at: float | None = None) -> Floats:
+    """Return the columns of K, T_0, T_s and, on request, g; T_s is that ``at`` a pressure [Pa], the mean if None."""
+    columns = [readings.pressure, np.ones_like(readings.pressure), -readings.branch]
+    middle = readings.middle if at is None else at
+    columns += [-readings.branch * (readings.pressure - middle)] if with_growth else []
+    return np.stack(columns, axis=1)
+
+
+def _fit(
+    readings: Readings, with_growth: bool, confidence: float, extra: Floats | None = None, at: float | None = None
+) -> Regression:
+    """Return the regression, on columns of one size; ``extra`` is a further column, its coefficient the last."""
+    design = _design(readings, with_growth, at)
+    design = design if extra is None else np.column_stack([design, extra])
+    if readings.pressure.size <= design.shape[1]:
+        raise IdentificationError(f"{PROCEDURE}: {readings.pressure.size} readings are too few")
+    scale = np.sqrt((design**2).mean(axis=0))
+    scaled = regress(design / scale, readings.torque, readings.clusters, readings.cells, confidence)
+    return replace(scaled, coefficients=scaled.coefficients / scale, half_widths=scaled.half_widths / scale)
+
+
+def _numbers(
+    evidence: Evidence, readings: Readings, fit: Regression, growing: Regression, grows: bool
+) -> tuple[Number, ...]:
+    """Return what the readings give; where the friction grows, it is that at the mean pressure, which it says."""
+    source = "the scatter of the readings" if fit.widest == "independent readings" else f"the {fit.widest}"
+    slope_text = (
+        f"Common slope of both branches; residuals scatter by {fit.scatter:.3g} N m; "
+        f"the interval comes from {source}; {evidence.calibration_text}."
+    )
+    condition, grown = "", "no growth with pressure shows in these readings"
+    if grows:
+        growth = growing.coefficients[_GROWTH]
+        at_rest = growing.coefficients[_FRICTION] - growth * readings.middle
         condition = f"at {readings.middle / 1e3:.4g} kPa"
         grown = f"it grows by {growth:.3g} m^3 with the pressure difference (per Pa), from {at_rest:.3g} N m at none, "
         grown += "and a model with one friction torque is right at that pressure only"
     text = (
         f"Half the distance between the branches at the mean pressure difference of {readings.middle:.4g} Pa; {grown}."
     )
-    value, half = fit.coefficients[_FRICTION], fit.half_widths[_FRICTION]
-    widened = fit.widened[_FRICTION]
-    return Number("friction.static_torque", "N m", value, half, text, widened=widened, condition=condition)
-
-
-def _at_no_pressure(readings: Readings, confidence: float) -> Number:
-    """Return the friction that is left without a pressure difference, where it grows along a straight line."""
-    fit = _fit(readings, True, confidence, at=0.0)
+    zero_text = "Torque that the scale shows at no pressure difference, midway between the branches."
+    growth_text = "Growth of the static friction with the pressure difference [N m per Pa]."
+    friction = fit.number(_FRICTION, "friction.static_torque", "N m", text)
+    zero = fit.number(_ZERO, "static_torque.zero_offset", "N m", zero_text)
+    found = (
+        fit.number(_SLOPE, "actuator.torque_constant", "m^3", slope_text),
+        replace(friction, condition=condition),
+        replace(zero, scale=float(np.ptp(readings.torque))),
+        growing.number(_GROWTH, "static_torque.friction_per_pressure", "m^3", growth_text),
+    )
+    if not grows:
+        return found
     lowest = float(readings.pressure.min())
     text = f"Static friction without a pressure difference, on a line through readings from {lowest:.4g} Pa upwards."
-    value, half, widened = fit.coefficients[_FRICTION], fit.half_widths[_FRICTION], fit.widened[_FRICTION]
-    return Number("static_torque.friction_at_no_pressure", "N m", value, half, text, widened=widened)
+    at_none = _fit(readings, True, evidence.confidence, at=0.0)
+    return (*found, at_none.number(_FRICTION, "static_torque.friction_at_no_pressure", "N m", text))
 
 
 def _straight_check(readings: Readings, grows: bool, confidence: float) -> Check:
@@ -233,40 +390,28 @@ def _straight_check(readings: Readings, grows: bool, confidence: float) -> Check
     )
 
 
-def _outliers(readings: Readings, fit: Regression) -> Check:
+def _outlier_check(readings: Readings, fit: Regression) -> Check:
+    # 1.4826 times the median of distances is the standard deviation of normal scatter, whatever the outliers do.
     spread = 1.4826 * float(np.median(np.abs(fit.residuals - np.median(fit.residuals))))
     worst = int(np.argmax(np.abs(fit.residuals)))
     count = int((np.abs(fit.residuals) > 6.0 * max(spread, 1e-300)).sum())
-    fraction = count / fit.residuals.size
     text = f"{count} of {fit.residuals.size} readings lie more than six scatters off ({spread:.3g} N m each)"
     text += f"; the worst is {readings.places[worst]}, {fit.residuals[worst]:+.3g} N m" if count else ""
-    return Check("outliers", fraction <= 0.01, text)
+    return Check("outliers", count / fit.residuals.size <= 0.01, text)
 
 
 def _growth_check(growing: Regression, readings: Readings, grows: bool) -> Check:
     """Ask whether one number for the friction will do: a friction that grows fails, but for a chance of one percent."""
-    low, high = (
-        growing.coefficients[_FRICTION] + growing.coefficients[_GROWTH] * (pressure - readings.middle)
-        for pressure in (readings.pressure.min(), readings.pressure.max())
-    )
+    friction, growth = growing.coefficients[_FRICTION], growing.coefficients[_GROWTH]
     if grows:
-        text = (
-            f"friction goes from {low:.3g} N m at the lowest to {high:.3g} N m at the highest pressure difference; a "
-        )
-        text += "model with one friction torque is right at one of them only"
+        ends = readings.pressure.min(), readings.pressure.max()
+        low, high = (friction + growth * (pressure - readings.middle) for pressure in ends)
+        text = f"friction goes from {low:.3g} N m at the lowest to {high:.3g} N m at the highest pressure difference; "
+        text += "a model with one friction torque is right at one of them only"
     else:
-        most = (abs(growing.coefficients[_GROWTH]) + growing.half_widths[_GROWTH]) * float(np.ptp(readings.pressure))
+        most = (abs(growth) + growing.half_widths[_GROWTH]) * float(np.ptp(readings.pressure))
         text = f"one friction torque describes all pressures; more than {most:.2g} N m of growth would have shown"
     return Check("friction over pressure", not grows, text)
-
-
-def _summary(readings: Readings, fit: Regression, grows: bool) -> str:
-    count, levels = readings.pressure.size, int(readings.levels.max()) + 1
-    return (
-        f"{count} readings at {levels} pressures, {int(readings.clusters.max()) + 1} repetitions; "
-        f"K = {fit.coefficients[_SLOPE]:.4g} m^3, friction {fit.coefficients[_FRICTION]:.3g} N m"
-        f"{' on average, growing with pressure' if grows else ''}"
-    )
 
 
 def _panels(readings: Readings, fit: Regression) -> tuple[Panel, ...]:

@@ -23,14 +23,12 @@ from ppafo.identification.source import Source, traces
 from ppafo.signals.faults import FEWEST_AT_LIMIT, plateaus, scatters
 from ppafo.signals.recording import Floats
 
-_FEWEST_SMALL = 5
-
 PROCEDURE = "valve-map"
 CHANNELS = ("command", "mass_flow", "upstream_pressure", "downstream_pressure")
 MINIMUM_SAMPLES = 12
 _MINIMUM_RANGE = 0.5
 _SEEN_BEYOND = 0.02
-_SMALL_COMMAND = 0.2
+_SMALL_COMMAND, _FEWEST_SMALL = 0.2, 5
 _GOOD_FRACTION = 0.05
 _DEAD_BAND, _GAIN, _FULL, _HYSTERESIS = range(4)
 
@@ -54,24 +52,13 @@ class _Map(NamedTuple):
 
     @property
     def is_two_way(self) -> bool:
+        """Whether commands both rise and fall."""
         return bool((self.branch > 0).any() and (self.branch < 0).any())
 
-
-class _MapFit(NamedTuple):
-    """The fitted map, and the area [m^2] in whose multiples gain and full area were fitted."""
-
-    fit: CurveFit
-    scale: float
-
-    def number(self, index: int, path: str, text: str) -> Number:
-        """Return a fitted number that is none of area."""
-        fit = self.fit
-        return Number(path, "", fit.values[index], fit.half_widths[index], text, lowest=0.0, widened=fit.widened[index])
-
-    def area(self, index: int, path: str, text: str) -> Number:
-        """Return a fitted area [m^2]."""
-        found = self.number(index, path, text)
-        return replace(found, unit="m^2", value=found.value * self.scale, half_width=found.half_width * self.scale)
+    @property
+    def has_both_directions(self) -> bool:
+        """Whether the valve was opened both ways."""
+        return bool((self.command > 0.1).any() and (self.command < -0.1).any())
 
 
 def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchResult:
@@ -81,18 +68,32 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
     """
     check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
     measured = _read_map(sources, settings.gas)
-    fitted = _fit(measured, settings.confidence)
-    fit, scale = fitted
+    # Fitted on areas over the largest one: dead band, gain and full area in its multiples, hysteresis.
+    scale = float(np.abs(measured.area).max())
+    widest = 0.5 if measured.is_two_way else 1e-9
+
+    def residuals(values: Floats) -> Floats:
+        return np.asarray(measured.area / scale - area_of_command(measured.command, measured.branch, *values.tolist()))
+
+    lower, upper = np.zeros(4), np.array([0.9, 100.0, 2.0, widest])
+    lower[_GAIN], lower[_FULL] = 1e-3, 1e-2
+    starts = [np.array([band, 1.0 / (1.0 - band), 0.95, 0.25 * widest]) for band in (0.02, 0.15, 0.35)]
+    fits = [fit_curve(residuals, start, lower, upper, settings.confidence, (measured.command,)) for start in starts]
+    fit = min(fits, key=lambda fit: fit.rms)
     evidence = Evidence(traces(sources), settings.confidence, settings.gas.flow_uncertainty(settings.calibration))
-    estimates = _estimates(evidence, measured, fitted, settings.path)
-    checks = (*_checks(measured, fit), _meter_check(sources))
-    remarks = (*_one_way_remark(measured), *pauses(sources))
-    values = fit.values
-    text = (
-        f"{measured.command.size} readings; dead band {values[_DEAD_BAND]:.3g}, hysteresis {values[_HYSTERESIS]:.3g}, "
+    band, gain, _, hysteresis = fit.values
+    text = f"{measured.command.size} readings; dead band {band:.3g}, hysteresis {hysteresis:.3g}, "
+    text += f"gain {gain * scale * 1e6:.4g} mm^2"
+    one_way = "only one direction was recorded: whether the other behaves the same is unknown"
+    return BenchResult(
+        PROCEDURE,
+        text,
+        _estimates(evidence, measured, fit, scale, settings.path),
+        (*_checks(measured, fit), _meter_check(sources)),
+        _panels(measured, fit, scale),
+        kind_of(sources),
+        (*(() if measured.has_both_directions else (one_way,)), *pauses(sources)),
     )
-    text += f"gain {values[_GAIN] * scale * 1e6:.4g} mm^2"
-    return BenchResult(PROCEDURE, text, estimates, checks, _panels(measured, fit, scale), kind_of(sources), remarks)
 
 
 def map_prospects(sources: tuple[Source, ...], _settings: ValveMapSettings) -> tuple[Prospect, ...]:
@@ -100,20 +101,15 @@ def map_prospects(sources: tuple[Source, ...], _settings: ValveMapSettings) -> t
     command = np.concatenate([source.recording["command"] for source in sources])
     small = int((np.abs(command) < _SMALL_COMMAND).sum())
     low, high = float(command.min()), float(command.max())
-    ways = is_two_way(sources)
+    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
+    branches = np.concatenate([_branch(source) for source in sources])
+    ways = bool((branches > 0).any() and (branches < 0).any())
     both = low < -0.1 and high > 0.1
     return (
         Prospect("dead band", small >= _FEWEST_SMALL, f"{small} commands below {_SMALL_COMMAND:g}"),
         Prospect("both directions", both, f"commands from {low:.3g} to {high:.3g}"),
         Prospect("hysteresis", ways, "commands rise and fall" if ways else "the command goes one way only"),
     )
-
-
-def is_two_way(sources: tuple[Source, ...]) -> bool:
-    """Return whether commands both rise and fall."""
-    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
-    branches = np.concatenate([_branch(source) for source in sources])
-    return bool((branches > 0).any() and (branches < 0).any())
 
 
 def area_of_command(
@@ -167,61 +163,38 @@ def _branch(source: Source) -> Floats:
     return signs[last]
 
 
-def _fit(measured: _Map, confidence: float) -> _MapFit:
-    """Fit on areas over the largest one; values are dead band, gain, full area (both over the largest), hysteresis."""
-    scale = float(np.abs(measured.area).max())
-    widest = 0.5 if measured.is_two_way else 1e-9
-
-    def residuals(values: Floats) -> Floats:
-        return np.asarray(measured.area / scale - area_of_command(measured.command, measured.branch, *values.tolist()))
-
-    lower, upper = np.zeros(4), np.array([0.9, 100.0, 2.0, widest])
-    lower[_GAIN], lower[_FULL] = 1e-3, 1e-2
-    starts = [np.array([band, 1.0 / (1.0 - band), 0.95, 0.25 * widest]) for band in (0.02, 0.15, 0.35)]
-    fits = [fit_curve(residuals, start, lower, upper, confidence, (measured.command,)) for start in starts]
-    return _MapFit(min(fits, key=lambda fit: fit.rms), scale)
-
-
-def _estimates(evidence: Evidence, measured: _Map, fitted: _MapFit, path: str) -> tuple[Estimate, ...]:
+def _estimates(evidence: Evidence, measured: _Map, fit: CurveFit, scale: float, path: str) -> tuple[Estimate, ...]:
     """Return what the map has; a wrong gain of the sensors passes on to areas, not to commands."""
-    band = fitted.number(
-        _DEAD_BAND, f"{path}.dead_band", "Command below which nothing flows, the same in both directions."
-    )
-    gain = fitted.area(_GAIN, "valve_map.gain", "Effective area Cd A per command beyond the dead band.")
-    listed = [evidence.without_calibration(replace(band, scale=_SMALL_COMMAND)), evidence.with_calibration(gain)]
-    saturation = _saturation(fitted.fit)
-    if saturation.value < float(np.abs(measured.command).max()) - _SEEN_BEYOND:
-        text = f"The valve is fully open from a command of {saturation.value:.3g} on; Cd A there."
-        listed.append(evidence.with_calibration(fitted.area(_FULL, "valve_map.full_area", text)))
-        listed.append(evidence.without_calibration(saturation))
+
+    def area(index: int, name: str, text: str) -> Estimate:
+        found = fit.number(index, f"valve_map.{name}", "m^2", text)
+        return evidence.with_calibration(replace(found, value=found.value * scale, half_width=found.half_width * scale))
+
+    text = "Command below which nothing flows, the same in both directions."
+    band = replace(fit.number(_DEAD_BAND, f"{path}.dead_band", "", text), scale=_SMALL_COMMAND)
+    gain = area(_GAIN, "gain", "Effective area Cd A per command beyond the dead band.")
+    listed = [evidence.without_calibration(band), gain]
+    # The command from which the valve opens no further: dead band + full area / gain.
+    values, wide = fit.values, fit.half_widths
+    saturation = values[_DEAD_BAND] + values[_FULL] / values[_GAIN]
+    of_slope = wide[_FULL] / values[_GAIN] + wide[_GAIN] * values[_FULL] / values[_GAIN] ** 2
+    if saturation < float(np.abs(measured.command).max()) - _SEEN_BEYOND:
+        text = f"The valve is fully open from a command of {saturation:.3g} on; Cd A there."
+        listed.append(area(_FULL, "full_area", text))
+        half, widened = float(np.hypot(wide[_DEAD_BAND], of_slope)), float(fit.widened.max())
+        name, text = "valve_map.saturation_command", "Command from which the valve opens no further."
+        listed.append(evidence.without_calibration(Number(name, "", saturation, half, text, widened=widened)))
     if measured.is_two_way:
         text = "Width between the curves for a rising and a falling command."
-        width = fitted.number(_HYSTERESIS, "valve_map.hysteresis", text)
+        width = fit.number(_HYSTERESIS, "valve_map.hysteresis", "", text)
         listed.append(evidence.without_calibration(replace(width, scale=_SMALL_COMMAND)))
     return tuple(listed)
 
 
-def _saturation(fit: CurveFit) -> Number:
-    """Return the command from which the valve opens no further: dead band + full area / gain."""
-    values, wide = fit.values, fit.half_widths
-    beyond = values[_FULL] / values[_GAIN]
-    of_slope = wide[_FULL] / values[_GAIN] + wide[_GAIN] * values[_FULL] / values[_GAIN] ** 2
-    return Number(
-        "valve_map.saturation_command",
-        "",
-        values[_DEAD_BAND] + beyond,
-        float(np.hypot(wide[_DEAD_BAND], of_slope)),
-        "Command from which the valve opens no further.",
-        widened=float(fit.widened.max()),
-    )
-
-
 def _checks(measured: _Map, fit: CurveFit) -> tuple[Check, ...]:
-    fits = Check(
-        "residuals", fit.rms <= _GOOD_FRACTION, f"the map misses the opening by {fit.rms:.2%} of the full one (rms)"
-    )
-    listed = [fits]
-    if not _one_way_remark(measured):
+    text = f"the map misses the opening by {fit.rms:.2%} of the full one (rms)"
+    listed = [Check("residuals", fit.rms <= _GOOD_FRACTION, text)]
+    if measured.has_both_directions:
         sides = [float(np.mean(fit.residuals[sign * measured.command > 0.1])) * sign for sign in (1.0, -1.0)]
         apart = abs(sides[0] - sides[1])
         text = f"the two directions differ by {apart:.2%} of the full opening"
@@ -229,12 +202,6 @@ def _checks(measured: _Map, fit: CurveFit) -> tuple[Check, ...]:
     both_ways, one_way = "rising and falling commands were recorded", "the command went one way: hysteresis is unknown"
     text = both_ways if measured.is_two_way else one_way
     return (*listed, Check("hysteresis seen", measured.is_two_way, text))
-
-
-def _one_way_remark(measured: _Map) -> tuple[str, ...]:
-    """Return a remark where the valve was opened one way only: the other remains unknown."""
-    both = bool((measured.command > 0.1).any() and (measured.command < -0.1).any())
-    return () if both else ("only one direction was recorded: whether the other behaves the same is unknown",)
 
 
 def _meter_check(sources: tuple[Source, ...]) -> Check:
@@ -265,15 +232,8 @@ def _panels(measured: _Map, fit: CurveFit, scale: float) -> tuple[Panel, ...]:
             series.append(Series(f"command {role}", measured.command[on], measured.area[on], role))
             law = scale * area_of_command(command, np.full_like(command, sign), *fit.values.tolist())
             series.append(Series("fitted" if sign > 0 else "", command, law, "law"))
-    rest = fit.residuals * scale
+    rest = Series("", measured.command, fit.residuals * scale, "measured")
     return (
         Panel("Valve map", "Command", "-", "Effective area", "m^2", tuple(series)),
-        Panel(
-            "Residuals",
-            "Command",
-            "-",
-            "Measured minus fitted",
-            "m^2",
-            (Series("", measured.command, rest, "measured"),),
-        ),
+        Panel("Residuals", "Command", "-", "Measured minus fitted", "m^2", (rest,)),
     )

@@ -9,8 +9,16 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.estimate import Estimate, Prospect
 from ppafo.identification.new_set import NewSet, with_estimates
-from ppafo.identification.problem import PROCEDURES, ProblemFile, ProcedureProblem, load_problem
-from ppafo.identification.procedures import Setting, prospects_of, run_procedure, window_of
+from ppafo.identification.problem import (
+    PROCEDURES,
+    ProblemFile,
+    ProcedureProblem,
+    Setting,
+    load_problem,
+    prospects_of,
+    run_procedure,
+    window_of,
+)
 from ppafo.identification.source import Source, Use, double_use, source_of
 from ppafo.identification.trajectory.outcome import TrajectoryOutcome, solve_section
 from ppafo.identification.trajectory.section import Setting as FitSetting

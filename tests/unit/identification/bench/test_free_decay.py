@@ -7,7 +7,7 @@ import pytest
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench import FreeDecaySettings, free_decay
-from ppafo.identification.bench.decay import angle_of_decay, stop_time, velocity_of_decay
+from ppafo.identification.bench.free_decay import angle_of_decay, stop_time, velocity_of_decay
 from ppafo.identification.source import Source
 
 

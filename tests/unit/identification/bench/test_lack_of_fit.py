@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ppafo.identification.bench.curve_fit import CurveFit, fit_curve, jackknife, lack_of_fit
-from ppafo.identification.bench.static_readings import labels_of, regress
+from ppafo.identification.bench.static_torque import labels_of, regress
 
 TIME = np.linspace(0.0, 1.0, 400)
 
