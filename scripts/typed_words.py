@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -174,14 +175,18 @@ def planned(batch: Batch, place: int = 0) -> Planned:
     )
 
 
-def single(name: str, words: Words) -> "Planned | str":
-    """What `ppafo simulate --set` or `ppafo walk --set` runs; the line with which it refuses."""
+def single(name: str, words: Words, controller: Any = None) -> "Planned | str":
+    """What `ppafo simulate --set` or `ppafo walk --set` runs; the line with which it refuses.
+
+    ``controller`` takes the place of that of a scenario.
+    """
     texts = [f"{path}={text}" for path, text in words.items()]
     try:
         if name in list_walks():
             walk = load_walk(name, texts)
             return planned(batch_of(plan_walk(plan_of(walk, walk_duration(walk)))))
-        return planned(batch_of(plan_run(load_scenario(name, texts))))
+        scenario = load_scenario(name, texts)
+        return planned(batch_of(plan_run(scenario if controller is None else scenario.controlled_by(controller))))
     except PpafoError as error:
         return str(error)
 

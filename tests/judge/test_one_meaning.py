@@ -7,7 +7,7 @@ import pytest
 
 from ppafo.simulation import numbers
 from ppafo.simulation.loading import list_scenarios
-from scripts.one_meaning import at_library, at_numbers, at_page, at_study
+from scripts.one_meaning import at_gym, at_library, at_numbers, at_page, at_study
 
 PAGE = Path(__file__).parents[2] / "page" / "node_modules" / "esbuild"
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
@@ -24,6 +24,14 @@ def test_columns_of_a_study_are_single_runs_with_the_same_words(name: str) -> No
 @pytest.mark.parametrize("name", list_scenarios())
 def test_replaced_numbers_are_single_runs_with_the_same_words(name: str) -> None:
     found = at_numbers(name, 15, seed=12)
+    assert found.differing == []
+    assert found.same > 8
+
+
+@pytest.mark.parametrize("name", ["step-response", "torque-task-solenoid"])
+def test_ranges_of_an_environment_are_single_runs_with_the_same_words(name: str) -> None:
+    pytest.importorskip("gymnasium")
+    found = at_gym(name, 15, seed=15)
     assert found.differing == []
     assert found.same > 8
 

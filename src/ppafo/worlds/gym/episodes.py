@@ -162,7 +162,7 @@ def scenario_episodes(base: Scenario, randomise: bool, vary: Ranges, targets: tu
         for path, ends in vary.items():
             place, ranges[path] = _range(base, path, ends, varies)
             gauge |= {path} if place.is_gauge else set()
-        ranges[_SEED] = (0.0, float(LARGEST_SEED))
+        ranges.setdefault(_SEED, (0.0, float(LARGEST_SEED)))
     batch = batch_of(plan_run(base))
     program, clock = episode_program(batch)
     middle = Goal(angle=0.5 * (lowest + highest), profile=NO_PROFILE)
