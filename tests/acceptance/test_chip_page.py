@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.control.fixed.kind import TARGETS
+from ppafo.control.fixed.torque_laws import TARGETS
 from ppafo.exports.firmware.catalog import CATALOG
 from ppafo.exports.firmware.simulator import missing_tools
 from ppafo.simulation.loading import load_scenario

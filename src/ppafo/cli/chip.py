@@ -13,7 +13,7 @@ from ppafo.cli.output import (
     check_output,
     deliver,
 )
-from ppafo.control.fixed.kind import PLANT_TARGETS, TARGETS, WALK_TARGETS
+from ppafo.control.fixed.torque_laws import PLANT_TARGETS, TARGETS, WALK_TARGETS
 from ppafo.errors import ScenarioError
 
 if TYPE_CHECKING:

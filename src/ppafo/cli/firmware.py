@@ -12,7 +12,7 @@ from ppafo.cli.output import (
     print_result,
     write_files,
 )
-from ppafo.control.fixed.kind import PLANT_TARGETS, TARGETS, WALK_TARGETS
+from ppafo.control.fixed.torque_laws import PLANT_TARGETS, TARGETS, WALK_TARGETS
 from ppafo.errors import ScenarioError
 
 

@@ -1,16 +1,7 @@
 """The controllers and profiles that a scenario can name. To add one here: a module and one line."""
 
-from ppafo.control import tabulated
-from ppafo.control.controllers import (
-    constant,
-    damped_proportional,
-    feedback_linearisation,
-    on_off,
-    on_off_dead_zone,
-    pid,
-    pid_feedforward,
-    sliding_mode,
-)
+from ppafo.control import profiles
+from ppafo.control.controllers import feedback, model_based, switching
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.control.profiles import CONSTANT, RAMP_HOLD, SINE
 from ppafo.kinds import Kinds
@@ -20,14 +11,14 @@ CONTROLLERS: Kinds[ControllerKind] = Kinds(
     "controller",
     ControllerKind,
     (
-        constant.KIND,
-        on_off.KIND,
-        on_off_dead_zone.KIND,
-        pid.KIND,
-        pid_feedforward.KIND,
-        sliding_mode.KIND,
-        damped_proportional.KIND,
-        feedback_linearisation.KIND,
+        switching.CONSTANT,
+        switching.ON_OFF,
+        switching.ON_OFF_DEAD_ZONE,
+        feedback.PID,
+        model_based.PID_FEEDFORWARD,
+        feedback.SLIDING_MODE,
+        feedback.DAMPED_PROPORTIONAL,
+        model_based.FEEDBACK_LINEARISATION,
     ),
 )
 
@@ -35,5 +26,5 @@ PROFILES: Kinds[ProfileKind] = Kinds(
     "ppafo.profiles",
     "profile",
     ProfileKind,
-    (CONSTANT, RAMP_HOLD, SINE, tabulated.KIND),
+    (CONSTANT, RAMP_HOLD, SINE, profiles.TABLE),
 )

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.control.fixed.whole_numbers import each
 from ppafo.engine.plain_python import refusal
 from ppafo.errors import ProgramError, nearest_name
 
@@ -39,6 +40,7 @@ class Composer(ast.NodeTransformer):
         self.add = add
         self.note = note
         self.local = frozenset(function.__code__.co_varnames)
+        self.kinds: dict[str, Any] = dict(function.__annotations__)
 
     def refuse(self, where: ast.AST, problem: str) -> ProgramError:
         """The error for a place in the function."""
@@ -49,6 +51,16 @@ class Composer(ast.NodeTransformer):
         if node.value is None:
             return ast.copy_location(ast.Pass(), node)
         return ast.copy_location(ast.Assign([node.target], self.visit(node.value)), node)
+
+    def visit_Assign(self, node: ast.Assign) -> ast.stmt:
+        """Remember which row each name stands for, so that ``name._replace`` can be written out."""
+        kind, target = self.kind_of(node.value), node.targets[0]
+        parts = getattr(kind, "__args__", ())
+        named = zip(target.elts, parts, strict=False) if isinstance(target, ast.Tuple) else ((target, kind),)
+        for item, found in named:
+            if isinstance(item, ast.Name):
+                self.kinds[item.id] = found if self.kinds.get(item.id, found) is found else None
+        return ast.copy_location(ast.Assign(node.targets, self.visit(node.value)), node)
 
     def visit_Expr(self, node: ast.Expr) -> ast.stmt:
         """Leave a text that stands alone away."""
@@ -77,7 +89,11 @@ class Composer(ast.NodeTransformer):
         ProgramError where one does not fit.
         """
         called = self.value_of(node.func)
+        if called is each and len(node.args) > 1:
+            return self.each_number(node.args[0], node.args[1])
         if called is _INSIDE:
+            if isinstance(node.func, ast.Attribute) and node.func.attr == "_replace":
+                return self.replaced(node, node.func.value)
             if isinstance(node.func, ast.Attribute):
                 raise self.refuse(node, f"'{ast.unparse(node.func)}()' is a method, which is not compiled")
             self.generic_visit(node)
@@ -116,6 +132,60 @@ class Composer(ast.NodeTransformer):
             self.visit(given[name]) if name in given else self.literal(called._field_defaults[name], node, name)
             for name in takes[len(node.args) :]
         ]
+
+    def kind_of(self, node: ast.expr) -> Any:
+        """What is declared of a value, by the annotations of functions and of fields; None where nothing is."""
+        if isinstance(node, ast.Attribute) and (owner := self.row_of(node.value)) is not None:
+            return owner.__annotations__.get(node.attr)
+        if isinstance(node, ast.Call):
+            called = self.value_of(node.func)
+            if called is each or (isinstance(node.func, ast.Attribute) and node.func.attr == "_replace"):
+                return self.kind_of(node.func.value if isinstance(node.func, ast.Attribute) else node.args[1])
+            return getattr(called, "__annotations__", {}).get("return") if not is_row(called) else called
+        if isinstance(node, ast.Name) and node.id not in self.local:
+            return type(self.value_of(node))
+        return self.kinds.get(node.id) if isinstance(node, ast.Name) else None
+
+    def row_of(self, node: ast.expr) -> Any:
+        """The NamedTuple class that a value is declared to be, as its name stands now; None where it is none."""
+        kind = self.kind_of(node)
+        found = self.function.__globals__.get(kind if isinstance(kind, str) else getattr(kind, "__name__", ""), kind)
+        return found if is_row(found) else None
+
+    def fields_of(self, node: ast.expr) -> tuple[Any, list[ast.Attribute]]:
+        """The class of a row and an expression for each of its fields. ProgramError where the class is not declared."""
+        row, owner = self.row_of(node), node
+        while isinstance(owner, ast.Attribute):
+            owner = owner.value
+        if row is None or not isinstance(owner, ast.Name):
+            raise self.refuse(
+                node,
+                f"'{ast.unparse(node)}' must be a name that is annotated with its NamedTuple class, or a field of one",
+            )
+        return row, [ast.copy_location(ast.Attribute(node, name, ast.Load()), node) for name in row._fields]
+
+    def replaced(self, node: ast.Call, changed: ast.expr) -> ast.expr:
+        """``row._replace(field=...)`` as the row that it makes. ProgramError where there is no such field."""
+        row, fields = self.fields_of(changed)
+        given = {item.arg: item.value for item in node.keywords if item.arg is not None}
+        unknown = sorted(given.keys() - set(row._fields))
+        if unknown or node.args:
+            hint = nearest_name(unknown[0], row._fields) if unknown else ""
+            problem = f"has no '{unknown[0]}'{hint}" if unknown else "'_replace' takes fields by name"
+            raise self.refuse(node, f"{row.__name__}({', '.join(row._fields)}): {problem}")
+        values = [self.visit(given.get(item.attr, item)) for item in fields]
+        return ast.Call(ast.Name(self.add(row), ast.Load()), values, [])
+
+    def each_number(self, convert: ast.expr, node: ast.expr) -> ast.expr:
+        """``each(convert, row)`` as the row that it makes, number by number."""
+        row, fields = self.fields_of(node)
+        values = [
+            self.each_number(convert, item)
+            if is_row(row.__annotations__[item.attr])
+            else ast.Call(self.visit(convert), [self.visit(item)], [])
+            for item in fields
+        ]
+        return ast.Call(ast.Name(self.add(row), ast.Load()), values, [])
 
     def value_of(self, node: ast.expr) -> Any:
         """What a name or ``module.name`` stands for outside the function. ProgramError where it has no value."""

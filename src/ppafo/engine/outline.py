@@ -80,7 +80,11 @@ class Outline:
     def _row(self, row: Any) -> str:
         defaults = {name: self._described(value) for name, value in row._field_defaults.items()}
         file = getattr(sys.modules.get(row.__module__), "__file__", None) or ""
-        return repr((emitted_name(row), row._fields, defaults, file_hash(file)))
+        return repr((emitted_name(row), row._fields, defaults, file_hash(file), self._declared(row)))
+
+    def _declared(self, item: Any) -> list[str]:
+        """Rows that the annotations of a function or a row name: ``_replace`` and ``each`` write out their fields."""
+        return [self._described(kind) for kind in item.__annotations__.values() if is_row(kind)]
 
     def _function(self, function: FunctionType) -> str:
         code, named_defaults = function.__code__, dict(function.__kwdefaults__ or {})
@@ -92,7 +96,10 @@ class Outline:
         read = [f"{name} = {self._described(value)}" for name, value in self._read(function.__globals__, names, ())]
         shapes = [(inner.co_code.hex(), inner.co_names, inner.co_varnames, _constants(inner)) for inner in codes]
         place = code.co_filename, code.co_firstlineno, file_hash(code.co_filename)
-        return repr((emitted_name(function), place, code.co_argcount, code.co_kwonlyargcount, shapes, given, read))
+        declared = self._declared(function)
+        return repr(
+            (emitted_name(function), place, code.co_argcount, code.co_kwonlyargcount, shapes, given, read, declared)
+        )
 
     def _read(
         self, scope: dict[str, Any], names: Sequence[str], above: tuple[ModuleType, ...]

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, NamedTuple, get_type_hints
 
-from ppafo.control.controllers import constant as constant_controller
+from ppafo.control.controllers import switching as constant_controller
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.control.profiles import CONSTANT
 from ppafo.engine.scheme.ankle_torque import CarriedFoot, DeviceShare
@@ -151,7 +151,7 @@ class Program:
     @property
     def has_reference(self) -> bool:
         """True where the controller follows a reference; a constant command follows none."""
-        return self.controller is not constant_controller.KIND
+        return self.controller is not constant_controller.CONSTANT
 
     @property
     def follows_reference(self) -> bool:

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ppafo.control.fixed.converter import SETTINGS as CONVERTER
-from ppafo.control.fixed.kind import FIXED, FLOAT
+from ppafo.control.fixed.torque_laws import FIXED, FLOAT
+from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
 from ppafo.model.declaration import Quantity
 from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set

@@ -9,9 +9,8 @@ from dataclasses import replace
 from typing import Any
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
-from ppafo.control.fixed.catalog import FIXED_LAWS
-from ppafo.control.fixed.converter import SETTINGS as CONVERTER
-from ppafo.control.fixed.kind import FIXED
+from ppafo.control.fixed.torque_laws import FIXED, FIXED_LAWS
+from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
 from ppafo.errors import KindError, ScenarioError
 from ppafo.kinds import Kinds
 from ppafo.model.declaration import Quantity

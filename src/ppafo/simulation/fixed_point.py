@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.control.fixed.catalog import FIXED_LAWS
-from ppafo.control.fixed.converter import SETTINGS, Converter, converter_of
+from ppafo.control.fixed.torque_laws import FIXED_LAWS
+from ppafo.control.fixed.whole_numbers import SETTINGS, Converter, converter_of
 from ppafo.control.kind import ControllerKind
 from ppafo.engine.rows import leaves
 from ppafo.model.columns import Problem, at, over_runs

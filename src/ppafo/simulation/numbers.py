@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
-from ppafo.control.controllers import constant
+from ppafo.control.controllers import switching
 from ppafo.model.declaration import Quantity
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.valves.catalog import VALVES
@@ -118,7 +118,7 @@ def _kinds(scenario: Scenario) -> dict[str, Any]:
     controller = {"kind": scenario.control.kind, "arithmetic": scenario.control.arithmetic}
     gas: dict[str, Any] = {} if scenario.thermal is None else {"gas_model": {"kind": declaration.THERMAL}}
     gas |= {} if scenario.supply_lines is None else {SECTION: {}}
-    if scenario.control.kind == constant.KIND.name:
+    if scenario.control.kind == switching.CONSTANT.name:
         return {"motion": motion, "controller": controller, **gas}
     return {"motion": motion, "controller": controller, "reference": {"kind": scenario.reference.kind}, **gas}
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ppafo.control.fixed.kind import FIXED, FLOAT
+from ppafo.control.fixed.torque_laws import FIXED, FLOAT
 from ppafo.control.kind import PythonController
 from ppafo.errors import ScenarioError
 from ppafo.model.regulator import SupplyLines

@@ -11,8 +11,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field, WithJsonSchema
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
-from ppafo.control.fixed.catalog import FIXED_LAWS
-from ppafo.control.fixed.converter import SETTINGS as CONVERTER
+from ppafo.control.fixed.torque_laws import FIXED_LAWS
+from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table
 from ppafo.model.declaration import Quantity
 from ppafo.simulation import declaration, supply_line

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.control.walking import off
+from ppafo.control.walking import event_on_off
 from ppafo.errors import SimulationError
 from ppafo.metrics import Metric
 from ppafo.model.leg import passive_torque
@@ -62,7 +62,7 @@ def _check_ending(worn: WalkResult) -> None:
 def with_device_off(configuration: Configuration) -> Configuration:
     """The same wearer and device with both chambers vented; no gas flows, so no bottle and no lines are needed."""
     name = f"{configuration.name}-off"
-    bare = replace(configuration, name=name, controller=off.KIND, settings={}, converter=None)
+    bare = replace(configuration, name=name, controller=event_on_off.OFF, settings={}, converter=None)
     return replace(bare, supply_lines=None, bottle=None)
 
 

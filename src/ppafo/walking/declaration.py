@@ -1,7 +1,7 @@
 """Every value that a walk file can hold beside those of its controller and its wearer."""
 
-from ppafo.control.fixed.walking.lanes import FIXED_WALKS
-from ppafo.control.fixed.walking.readings import SETTINGS as CONVERTER
+from ppafo.control.fixed.walking_law import SETTINGS as CONVERTER
+from ppafo.control.fixed.walking_numbers import FIXED_WALKS
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers
 from ppafo.model.declaration import Quantity
 from ppafo.simulation import supply_line

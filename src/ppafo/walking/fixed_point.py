@@ -1,7 +1,7 @@
 """The integer form of a walk's controller: its whole numbers, from settings in SI units."""
 
-from ppafo.control.fixed.walking.lanes import FIXED_WALKS
-from ppafo.control.fixed.walking.readings import GaitConverter, gait_converter
+from ppafo.control.fixed.walking_law import GaitConverter, gait_converter
+from ppafo.control.fixed.walking_numbers import FIXED_WALKS
 from ppafo.control.kind import ControllerKind
 from ppafo.errors import ScenarioError
 from ppafo.walking.configuration import Configuration

@@ -7,8 +7,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ppafo.control.fixed.kind import FIXED
-from ppafo.control.fixed.walking.lanes import FIXED_WALKS
+from ppafo.control.fixed.torque_laws import FIXED
+from ppafo.control.fixed.walking_numbers import FIXED_WALKS
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import TIMINGS, load_walking_controller, walking_controllers, with_timing
 from ppafo.documents.models import validate

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.fixed.walking.lanes import FIXED_WALKS
+from ppafo.control.fixed.walking_numbers import FIXED_WALKS
 from ppafo.control.walking.catalog import TIMINGS, WALKING_CONTROLLERS, walking_controllers
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table
 from ppafo.simulation import supply_line

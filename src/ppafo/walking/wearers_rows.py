@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.control.fixed.walking.lanes import WalkRows
-from ppafo.control.fixed.walking.phases import STRIDE_SHARE
+from ppafo.control.fixed.walking_law import STRIDE_SHARE
+from ppafo.control.fixed.walking_numbers import WalkRows
 from ppafo.engine.lanes import Batch, Floats
 from ppafo.engine.rows import leaf_paths, leaves, row_numbers
 from ppafo.engine.run import Run, batch_of

@@ -11,7 +11,7 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.controllers.constant import KIND, ConstantParameters
+from ppafo.control.controllers.switching import CONSTANT, ConstantParameters
 from ppafo.model.sensors import Measurement
 
 PAGES = Path(__file__).parents[3] / "docs" / "how-to"
@@ -69,7 +69,7 @@ def test_what_cannot_be_translated_is_refused_by_file_and_line_and_nothing_is_wr
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     law = CONTROLLERS["constant"].__class__
-    given = {name: getattr(KIND, name) for name in ("summary", "source", "quantities", "parameters", "initial")}
+    given = {name: getattr(CONSTANT, name) for name in ("summary", "source", "quantities", "parameters", "initial")}
     monkeypatch.setitem(CONTROLLERS, "exponential", law(name="exponential", update=with_exponential, **given))
     folder = tmp_path / "library"
     changed = ["--set", "controller.kind=exponential"]

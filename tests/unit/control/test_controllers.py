@@ -1,17 +1,33 @@
-"""Each law does what its source says: closed forms, limiting cases, and short runs on the engine."""
+"""Torque laws and profiles: commands in closed form, what model-based laws believe, a profile that follows a table."""
 
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import ppafo
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.controllers.damped_proportional import KNOTS, learnt_command
-from ppafo.control.controllers.on_off_dead_zone import OnOffDeadZoneParameters, OnOffDeadZoneState
-from ppafo.control.controllers.sliding_mode import SlidingModeParameters, SlidingModeState
+from ppafo.control.controllers.feedback import KNOTS, SlidingModeParameters, SlidingModeState, learnt_command
+from ppafo.control.controllers.model_based import (
+    NOMINAL_QUANTITIES,
+    NominalChambers,
+    TorqueRates,
+    ellipse_flow,
+    opening_for_rate,
+    torque_rates,
+)
+from ppafo.control.controllers.switching import OnOffDeadZoneParameters, OnOffDeadZoneState
+from ppafo.control.profiles import KNOTS as TABLE_KNOTS
+from ppafo.control.profiles import NEVER, TABLE, Tabulated, table_bounds, table_value, used_knots
 from ppafo.engine.rows import rebuilt
+from ppafo.model.orifice import iso6358_flow_function
 from ppafo.model.sensors import Measurement
+from ppafo.parameters.plant import plant_parameters
+from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.simulate import simulate
 
 PERIOD = 1.0e-3
 WITHIN_REACH = ["reference.level=4 N m", "controller.rate=1 kHz"]
@@ -140,3 +156,122 @@ def test_on_off_laws_run_on_the_solenoid_pair(kind: str) -> None:
     run = ppafo.simulate("torque-task-solenoid", [f"controller.kind={kind}", "run.duration=0.5 s"])
     assert run.status.is_completed
     assert run.recording["torque"].max() > 0.5
+
+
+NOMINAL = NominalChambers(*(item.default for item in NOMINAL_QUANTITIES))
+PRESSURES = st.floats(1.02e5, 4.4e5)
+"""Between the atmosphere and the supply."""
+
+
+def test_the_defaults_are_those_of_the_completed_set() -> None:
+    plant = plant_parameters(ppafo.load_device("ppafo2011"))
+    believed = NOMINAL._asdict()
+    assert believed.pop("critical_ratio") == pytest.approx(plant.valve_curve.critical_ratio)
+    assert believed == pytest.approx({name: getattr(plant, name) for name in believed})
+
+
+@given(PRESSURES, PRESSURES)
+def test_flow_is_the_ellipse_of_the_standard_and_changes_sign_with_the_sides(first: float, second: float) -> None:
+    upstream, downstream = max(first, second), min(first, second)
+    expected = 1.0e-8 * upstream * iso6358_flow_function(downstream / upstream, 0.5)
+    assert abs(ellipse_flow(first, second, 1.0e-8, 0.5)) == pytest.approx(expected, abs=1e-12)
+    assert ellipse_flow(first, second, 1.0e-8, 0.5) == -ellipse_flow(second, first, 1.0e-8, 0.5) or first == second
+
+
+@given(PRESSURES, PRESSURES, st.floats(0.4, 2.2), st.floats(-3.0, 3.0), st.floats(-200.0, 200.0))
+def test_the_opening_gives_the_rate_that_was_wanted_where_the_valve_can(
+    first: float, second: float, angle: float, velocity: float, wanted: float
+) -> None:
+    rates = torque_rates(NOMINAL, angle, velocity, first, second)
+    opening = opening_for_rate(rates, wanted)
+    gain = rates.rising if opening >= 0.0 else rates.falling
+    if abs(opening) < 1.0:
+        assert rates.closed + gain * opening == pytest.approx(wanted, abs=1e-6)
+    else:
+        assert (wanted - rates.closed - gain * opening) * opening > -1e-6
+
+
+def test_a_valve_that_changes_nothing_is_opened_fully_and_not_divided_by_zero() -> None:
+    assert opening_for_rate(TorqueRates(0.0, 0.0, 0.0), 1.0) == 1.0
+    assert opening_for_rate(TorqueRates(0.0, 0.0, 0.0), -1.0) == -1.0
+
+
+@pytest.mark.parametrize("command", [0.3, -0.3])
+def test_the_believed_rate_is_that_of_the_engine(command: float) -> None:
+    task = ["controller.kind=constant", f"controller.command={command}", "run.duration=0.02 s"]
+    task += ["initial.pressure_1=20 psi_g", "initial.pressure_2=10 psi_g"]
+    run = ppafo.simulate("torque-task-proportional", task).recording
+    rates = torque_rates(NOMINAL, float(run["angle"][5]), 0.0, float(run["pressure_1"][5]), float(run["pressure_2"][5]))
+    believed = rates.closed + command * (rates.rising if command > 0.0 else rates.falling)
+    measured = (run["torque"][6] - run["torque"][4]) / (run.time[6] - run.time[4])
+    assert believed == pytest.approx(measured, rel=0.02)
+    assert believed * command > 0.0
+
+
+def test_a_vane_that_turns_changes_the_torque_of_closed_chambers_against_the_motion() -> None:
+    turning = torque_rates(NOMINAL, 1.3, 1.0, 2.0e5, 2.0e5)
+    volume_1, volume_2 = 2.0e-6 + 5.1e-5 * (1.3 - 0.34906585), 2.0e-6 + 5.1e-5 * (2.26892803 - 1.3)
+    expected = -1.451e-5 * 5.1e-5 * 2.0e5 * (1.0 / volume_1 + 1.0 / volume_2)
+    assert turning.closed == pytest.approx(expected, rel=1e-6)
+
+
+TIMES = (0.0, 0.15, 0.35, 0.5, 0.62, 0.7)
+VALUES = (0.5, 0.6, 3.0, 6.0, -3.0, 0.0)
+TABLE_PERIOD = 1.1
+
+
+def table(times: tuple[float, ...] = TIMES, values: tuple[float, ...] = VALUES, level: float = 0.0) -> Tabulated:
+    settings = {item.name: item.default or 0.0 for item in TABLE.quantities} | {"period": TABLE_PERIOD, "level": level}
+    settings |= {f"time_{number:02d}": time for number, time in enumerate(times, 1) if number > 1}
+    settings |= {f"value_{number:02d}": value for number, value in enumerate(values, 1)}
+    return rebuilt(Tabulated, settings.values())
+
+
+def test_the_value_lies_on_straight_lines_between_the_knots_and_repeats() -> None:
+    profile = table(level=2.0)
+    times = np.linspace(0.0, 4.9 * TABLE_PERIOD, 4321)
+    expected = 2.0 + np.interp(np.mod(times, TABLE_PERIOD), (*TIMES, TABLE_PERIOD), (*VALUES, VALUES[0]))
+    found = [table_value(profile, time)[0] for time in times.tolist()]
+    assert np.max(np.abs(np.array(found) - expected)) < 1e-9
+
+
+def test_the_rate_is_that_of_the_line_which_begins_at_a_knot() -> None:
+    assert table_value(table(), 0.35)[1] == pytest.approx((6.0 - 3.0) / 0.15)
+    assert table_value(table(), 1.0)[1] == pytest.approx(0.5 / 0.4)
+
+
+def test_all_knots_may_be_used() -> None:
+    times = tuple(TABLE_PERIOD * knot / TABLE_KNOTS for knot in range(TABLE_KNOTS))
+    values = tuple(float(knot % 7) for knot in range(TABLE_KNOTS))
+    profile = table(times, values)
+    assert [table_value(profile, time)[0] for time in times] == pytest.approx(values)
+    assert len(used_knots(profile)) == TABLE_KNOTS
+
+
+def test_knots_that_never_come_count_neither_in_the_value_nor_in_the_bounds() -> None:
+    whole = table()
+    assert whole.knots[18].time == NEVER
+    knots = (*whole.knots[:18], whole.knots[18]._replace(value=99.0), *whole.knots[19:])
+    profile = whole._replace(knots=knots)
+    assert table_bounds(profile) == (-3.0, 6.0)
+    assert max(table_value(profile, 0.01 * step)[0] for step in range(300)) <= 6.0
+
+
+def test_the_lanes_follow_the_table_as_python_does() -> None:
+    texts = [f"reference.time_{number:02d}={time} s" for number, time in enumerate(TIMES, 1) if number > 1]
+    texts += [f"reference.value_{number:02d}={torque} N m" for number, torque in enumerate(VALUES, 1)]
+    kind = [
+        "reference.kind=tabulated",
+        "reference.level=0 N m",
+        f"reference.period={TABLE_PERIOD} s",
+        "run.duration=2.5 s",
+    ]
+    scenario = load_scenario("torque-task-proportional", [*kind, *texts])
+    pressure = np.array([scenario.device.supply.pressure])
+    lanes = run_ensemble(scenario, {"supply.pressure": pressure}, ("rms_error", "peak_error"))
+    alone = simulate(scenario)
+    reference = alone.recording["reference"]
+    expected = np.interp(np.mod(alone.recording.time, TABLE_PERIOD), (*TIMES, TABLE_PERIOD), (*VALUES, VALUES[0]))
+    assert np.max(np.abs(reference - expected)) < 1e-9
+    for name in ("rms_error", "peak_error"):
+        assert lanes.metrics[name][0] == pytest.approx(alone.metrics[name].value, rel=1e-9)

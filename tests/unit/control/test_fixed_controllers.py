@@ -9,27 +9,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.fixed.arithmetic import (
+from ppafo.control.fixed.torque_laws import FIXED_LAWS, PID, FixedLaw
+from ppafo.control.fixed.whole_numbers import (
+    COMMAND_STEPS,
     FRACTION_BITS,
     LARGEST_FRACTION,
-    WIDEST,
-    fraction_of,
-    gain_of,
-    limited,
-    shifted,
-)
-from ppafo.control.fixed.catalog import FIXED_LAWS
-from ppafo.control.fixed.converter import (
-    COMMAND_STEPS,
     SETTINGS,
+    WIDEST,
     Limits,
     Readings,
     converter_of,
     count_of,
+    fraction_of,
+    gain_of,
+    limited,
     read,
+    shifted,
 )
-from ppafo.control.fixed.kind import FixedLaw
-from ppafo.control.fixed.pid import LAW as PID
 from ppafo.engine.rows import leaf_paths, leaves, rebuilt
 from ppafo.model.sensors import Measurement
 

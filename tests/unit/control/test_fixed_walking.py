@@ -4,13 +4,23 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ppafo.control.fixed.walking.lanes import EVENT_ON_OFF
-from ppafo.control.fixed.walking.phases import HALVES, LONGEST, next_phase, next_stride, next_switch, part_of
-from ppafo.control.fixed.walking.phases import PhaseNumbers as Numbers
-from ppafo.control.fixed.walking.phases import SwitchCounts as Switch
-from ppafo.control.fixed.walking.readings import SETTINGS, TOP, gait_converter, read_gait
+from ppafo.control.fixed.walking_law import (
+    HALVES,
+    LONGEST,
+    SETTINGS,
+    TOP,
+    gait_converter,
+    next_phase,
+    next_stride,
+    next_switch,
+    part_of,
+    read_gait,
+)
+from ppafo.control.fixed.walking_law import PhaseNumbers as Numbers
+from ppafo.control.fixed.walking_law import SwitchCounts as Switch
+from ppafo.control.fixed.walking_numbers import EVENT_ON_OFF
 from ppafo.control.walking import phases, signs
-from ppafo.control.walking.event_on_off import KIND as FLOAT_KIND
+from ppafo.control.walking.event_on_off import EVENT_ON_OFF as FLOAT_KIND
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.exports.firmware.walking.drawn import DrawnGait, Manner
 from ppafo.model.command import VENTS_ABOVE

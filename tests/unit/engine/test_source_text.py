@@ -213,6 +213,50 @@ def test_defaults_of_a_named_tuple_are_written_where_it_is_made(write: Write) ->
     assert generated(module.law)(1.0) == module.law(1.0) == ((1, 2, -1), (1, 2, -1), (1, 2, 4), (1, 5, 6))
 
 
+ROWS = """
+from typing import NamedTuple
+from ppafo.control.fixed.whole_numbers import each
+
+class Inner(NamedTuple):
+    a: float
+    b: float
+
+class Outer(NamedTuple):
+    inner: Inner
+    c: float
+
+def made(x: float) -> tuple[float, Outer]:
+    return x, Outer(Inner(x, 2.5), 3.5)
+
+def law(row: Outer, x: float) -> Outer:
+    first, other = made(x)
+    other = other._replace(inner=other.inner._replace(b=first))
+    return row._replace(c=row.c + other.inner.b, inner=each(int, other).inner)
+"""
+"""A law whose rows are changed in some fields, and converted number by number."""
+
+
+def test_rows_changed_in_some_fields_and_converted_are_what_python_makes_of_them(write: Write) -> None:
+    module = write(ROWS)
+    row = module.Outer(module.Inner(0.5, 1.5), 2.0)
+    assert generated(module.law)(row, 4.75) == module.law(row, 4.75) == ((4, 4), 6.75)
+    whole = module.each(int, row)
+    assert whole == ((0, 1), 2)
+    assert [type(item) for item in (*whole.inner, whole.c)] == [int] * 3
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("row._replace(c", "row._replace(d", "Outer(inner, c): has no 'd'"),
+        ("row: Outer", "row", "'row' must be a name that is annotated with its NamedTuple class"),
+        ("each(int, other).inner", "each(int, made(x)[1]).inner", "'made(x)[1]' must be a name that is annotated"),
+    ],
+)
+def test_a_row_that_cannot_be_changed_so_is_refused(write: Write, old: str, new: str, said: str) -> None:
+    assert said in refused(write(ROWS.replace(old, new)).law)
+
+
 def test_a_named_tuple_that_does_more_than_hold_numbers_is_refused(write: Write) -> None:
     module = write(
         "from typing import NamedTuple\n\n\nclass Vector(NamedTuple):\n    x: float\n\n    def __add__(self, other):\n"

@@ -9,9 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.control.fixed.catalog import FIXED_LAWS
-from ppafo.control.fixed.converter import Readings
-from ppafo.control.fixed.kind import TARGETS, FixedLaw
+from ppafo.control.fixed.torque_laws import FIXED_LAWS, TARGETS, FixedLaw
+from ppafo.control.fixed.whole_numbers import Readings
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports.firmware import chip_controller, firmware
 from ppafo.exports.firmware.catalog import CATALOG

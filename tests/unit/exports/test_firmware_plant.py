@@ -2,7 +2,7 @@
 
 import pytest
 
-from ppafo.control.fixed.kind import PLANT_TARGETS
+from ppafo.control.fixed.torque_laws import PLANT_TARGETS
 from ppafo.errors import ScenarioError
 from ppafo.exports.firmware import two_boards
 from ppafo.exports.firmware.catalog import CATALOG

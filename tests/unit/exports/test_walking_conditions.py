@@ -10,9 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ppafo.control.fixed.arithmetic import FRACTION_BITS, HALF, LARGEST_FRACTION, nearest_fraction_of
-from ppafo.control.fixed.walking.phases import HALVES, LONGEST, LONGEST_STRIDE, next_stride
-from ppafo.control.fixed.walking.readings import TOP
+from ppafo.control.fixed.walking_law import HALVES, LONGEST, LONGEST_STRIDE, TOP, next_stride
+from ppafo.control.fixed.whole_numbers import FRACTION_BITS, HALF, LARGEST_FRACTION, nearest_fraction_of
 from ppafo.exports.firmware.walking import walk_chip, walk_firmware
 from ppafo.exports.firmware.walking.drawn import gait_readings
 from ppafo.exports.firmware.walking.lock_step import PythonWalkChip

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.control.fixed.walking.lanes import EVENT_ON_OFF
+from ppafo.control.fixed.walking_numbers import EVENT_ON_OFF
 from ppafo.control.walking.signs import SIGNS
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports.firmware.catalog import MSP430G2553

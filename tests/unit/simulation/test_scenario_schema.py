@@ -10,8 +10,8 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.control.catalog import CONTROLLERS, PROFILES
-from ppafo.control.fixed.catalog import FIXED_LAWS
-from ppafo.control.fixed.converter import SETTINGS as CONVERTER
+from ppafo.control.fixed.torque_laws import FIXED_LAWS
+from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
 from ppafo.simulation.loading import list_scenarios
 from ppafo.simulation.schema import json_schema
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.control.fixed.walking.readings import read_gait
+from ppafo.control.fixed.walking_law import read_gait
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.rows import leaf_paths, numbers, row_numbers
 from ppafo.engine.run import batch_of

@@ -2,20 +2,92 @@
 
 Landing: a profile in dorsiflexion against the slap, about a spring and damper that hold the foot. Mid-stance: free.
 Push-off: a profile in plantarflexion. Swing: a profile in dorsiflexion about the same spring and damper.
+
+The profile has the four parameters that the exoskeleton literature uses, of J. Zhang et al., Science 356 (2017) 1280:
+zero, a smooth rise to the peak, a smooth fall, zero; cubic with level ends.
 """
 
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
 from ppafo.control.walking import phases, safety
-from ppafo.control.walking.phases import PhaseRules, PhaseState
+from ppafo.control.walking.phases import PHASE_QUANTITIES, PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
-from ppafo.control.walking.signs import SafetyRules
-from ppafo.control.walking.timing.kind import GaitTime
-from ppafo.control.walking.timing.thresholds import follow, gait_time
-from ppafo.control.walking.torque_profile import TorqueProfile, profile_torque
+from ppafo.control.walking.signs import SAFETY_QUANTITIES, SafetyRules
+from ppafo.control.walking.timing import GaitTime, follow_thresholds, threshold_time
 from ppafo.model.command import VENT
+from ppafo.model.declaration import Quantity
 from ppafo.model.gait_sensors import GaitMeasurement
 from ppafo.model.sensors import Measurement
+
+
+class TorqueProfile(NamedTuple):
+    """Peak [N m], its time, and the times of rise and fall, in turns from the heel strike."""
+
+    peak_torque: float
+    peak_time: float
+    rise_time: float
+    fall_time: float
+
+
+def smooth(fraction: float) -> float:
+    """A cubic from 0 to 1 with level ends, at a fraction [-] from 0 to 1."""
+    inside = max(0.0, min(1.0, fraction))
+    return inside * inside * (3.0 - 2.0 * inside)
+
+
+def profile_torque(profile: TorqueProfile, phase: float) -> float:
+    """Requested torque [N m] at a phase in turns from the heel strike."""
+    rise = smooth((phase - profile.peak_time + profile.rise_time) / profile.rise_time)
+    fall = smooth((phase - profile.peak_time) / profile.fall_time)
+    return profile.peak_torque * (rise - fall)
+
+
+HOLD_QUANTITIES = (
+    Quantity("swing_angle", "rad", "angle about which the lifted foot is held", 1.28, 0.5, 2.5),
+    Quantity("hold_stiffness", "N m/rad", "requested torque per angle from it", 3.7, 0.0, 1.0e3),
+    Quantity("hold_damping", "N m s/rad", "requested torque against the angle's rate", 0.35, 0.0, 1.0e3),
+    Quantity("angle_rate_filter", "s", "time constant of the filter on the angle's rate", 0.006, 0.0, 1.0),
+)
+
+PUSH_OFF_QUANTITIES = (
+    Quantity("peak_torque", "N m", "peak of the torque in push-off", 5.0, 0.0, 1.0e3),
+    Quantity("peak_time", "1", "phase of the peak, fraction of the stride time", 0.53, 0.1, 0.9),
+    Quantity("rise_time", "1", "fraction of the stride time from zero to the peak", 0.15, 0.01, 0.8),
+    Quantity("fall_time", "1", "fraction of the stride time from the peak to zero", 0.09, 0.01, 0.8),
+)
+
+ASSISTANCE_QUANTITIES = (
+    *HOLD_QUANTITIES,
+    Quantity("landing_peak_torque", "N m", "peak of the torque in dorsiflexion while landing", 5.0, 0.0, 1.0e3),
+    Quantity("landing_peak_time", "1", "phase of that peak", 0.046, 0.0, 0.9),
+    Quantity("landing_rise_time", "1", "fraction of the stride time from zero to that peak", 0.09, 0.01, 0.8),
+    Quantity("landing_fall_time", "1", "fraction of the stride time from that peak to zero", 0.078, 0.01, 0.8),
+    *PUSH_OFF_QUANTITIES,
+    Quantity("swing_peak_torque", "N m", "peak of the torque in dorsiflexion in the swing", 2.7, 0.0, 1.0e3),
+    Quantity("swing_peak_time", "1", "phase of that peak", 0.805, 0.1, 1.0),
+    Quantity("swing_rise_time", "1", "fraction of the stride time from zero to that peak", 0.24, 0.01, 0.8),
+    Quantity("swing_fall_time", "1", "fraction of the stride time from that peak to zero", 0.14, 0.01, 0.8),
+    Quantity(
+        "largest_torque",
+        "N m",
+        "limit of the requested torque, either direction; about what 50 psi_g holds",
+        5.0,
+        0.0,
+        1.0e3,
+    ),
+)
+"""Fields of ``Assistance`` in order."""
+
+ASSISTING_QUANTITIES = (*ASSISTANCE_QUANTITIES, *PHASE_QUANTITIES, *SAFETY_QUANTITIES)
+"""What every law declares after its own settings that follows ``assistance``."""
+
+
+def with_defaults(quantities: tuple[Quantity, ...], defaults: Mapping[str, float]) -> tuple[Quantity, ...]:
+    """The quantities of a law with other defaults [SI] for walking, by name; the others keep theirs."""
+    assert set(defaults) <= {item.name for item in quantities}, "a default belongs to a quantity"
+    return tuple(replace(item, default=defaults.get(item.name, item.default)) for item in quantities)
 
 
 class Hold(NamedTuple):
@@ -134,13 +206,13 @@ def timed_phase(
 ) -> tuple[PhaseState, Any, GaitTime]:
     """Phase, clock and time in the stride after a sample, taken every ``period`` [s].
 
-    A way to know the time puts its own functions in the place of ``follow`` and ``gait_time``.
+    A way to know the time puts its own functions in the place of ``follow_thresholds`` and ``threshold_time``.
     """
-    passed = gait_time(parameters.timing, clock, phase).since_strike + period
+    passed = threshold_time(parameters.timing, clock, phase).since_strike + period
     heel, toe = measurement.heel_force, measurement.toe_force
     after = phases.timed_phase_state(parameters.phases, phase, heel, toe, passed, period)
-    followed = follow(parameters.timing, parameters.phases, clock, phase, after, measurement, period)
-    return after, followed, gait_time(parameters.timing, followed, after)
+    followed = follow_thresholds(parameters.timing, parameters.phases, clock, phase, after, measurement, period)
+    return after, followed, threshold_time(parameters.timing, followed, after)
 
 
 def assess(

@@ -9,18 +9,11 @@ import functools
 from dataclasses import dataclass, replace
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.controllers import (
-    constant,
-    feedback_linearisation,
-    on_off_dead_zone,
-    pid,
-    pid_feedforward,
-    sliding_mode,
-)
+from ppafo.control.controllers import feedback, model_based, switching
 from ppafo.control.kind import ControllerKind
-from ppafo.control.walking import assistance, event_damped_learning, event_on_off, off, proportional
-from ppafo.control.walking.timing import estimated, fractional, thresholds
-from ppafo.control.walking.timing.kind import TimingKind
+from ppafo.control.walking import assistance, event_on_off, learning, torque_law
+from ppafo.control.walking.estimated_timing import ESTIMATED
+from ppafo.control.walking.timing import FRACTIONAL, THRESHOLDS, TimingKind
 from ppafo.control.walking.torque_law import bind, row_with, shared_settings, walking_law
 from ppafo.errors import ScenarioError
 from ppafo.kinds import Kinds
@@ -37,13 +30,13 @@ class Walking:
 
 LAWS = (
     Walking(
-        on_off_dead_zone.KIND,
+        switching.ON_OFF_DEAD_ZONE,
         "on/off switching with a dead zone",
         (("dead_zone", 0.21), ("release", 0.031), ("opening", 0.77)),
     ),
-    Walking(proportional.KIND, "proportional and integral action"),
+    Walking(torque_law.PROPORTIONAL, "proportional and integral action"),
     Walking(
-        pid.KIND,
+        feedback.PID,
         "a PID with anti-windup",
         (
             ("proportional_gain", 1.5),
@@ -54,7 +47,7 @@ LAWS = (
         ),
     ),
     Walking(
-        pid_feedforward.KIND,
+        model_based.PID_FEEDFORWARD,
         "a PID and the inverse of a valve model",
         (
             ("proportional_gain", 1.2),
@@ -65,12 +58,12 @@ LAWS = (
         ),
     ),
     Walking(
-        sliding_mode.KIND,
+        feedback.SLIDING_MODE,
         "a sliding mode law with a boundary layer",
         (("surface_slope", 71.0), ("boundary_layer", 0.35), ("reaching_command", 0.78)),
     ),
     Walking(
-        feedback_linearisation.KIND,
+        model_based.FEEDBACK_LINEARISATION,
         "inverting the chamber dynamics",
         (("convergence_rate", 91.0), ("rate_filter", 0.0018)),
     ),
@@ -85,11 +78,11 @@ def _event_based(item: Walking) -> ControllerKind:
 
 _EVENT_BASED = {item.law.name: _event_based(item) for item in LAWS}
 _ORDER = (
-    event_on_off.KIND,
+    event_on_off.EVENT_ON_OFF,
     *(_EVENT_BASED[name] for name in ("on_off_dead_zone", "proportional", "pid", "pid_feedforward", "sliding_mode")),
-    event_damped_learning.KIND,
+    learning.KIND,
     _EVENT_BASED["feedback_linearisation"],
-    off.KIND,
+    event_on_off.OFF,
 )
 
 WALKING_CONTROLLERS: Kinds[ControllerKind] = Kinds(
@@ -104,7 +97,9 @@ def walking_controllers() -> dict[str, ControllerKind]:
     A law that has gains for walking has them under its own name too: ``pid`` is ``event_pid``. A constant command
     follows no torque and does not walk, nor does a law whose settings have names that walking has taken.
     """
-    laws = {name: law for name, law in CONTROLLERS.items() if law is not constant.KIND and not shared_settings(law)}
+    laws = {
+        name: law for name, law in CONTROLLERS.items() if law is not switching.CONSTANT and not shared_settings(law)
+    }
     return dict(WALKING_CONTROLLERS) | {name: law_that_walks(law) for name, law in laws.items()}
 
 
@@ -123,7 +118,10 @@ def law_that_walks(law: ControllerKind) -> ControllerKind:
 
 
 TIMINGS: Kinds[TimingKind] = Kinds(
-    "ppafo.walking_timings", "timing of walking", TimingKind, (thresholds.KIND, fractional.KIND, estimated.KIND)
+    "ppafo.walking_timings",
+    "timing of walking",
+    TimingKind,
+    (THRESHOLDS, FRACTIONAL, ESTIMATED),
 )
 """The ways to know the time in the stride. The first one is that of every controller unless another is chosen."""
 
@@ -136,7 +134,7 @@ def keeps_time(kind: ControllerKind) -> bool:
 @functools.cache
 def with_timing(kind: ControllerKind, timing: TimingKind) -> ControllerKind:
     """Return a controller of walking that knows the time in the stride in another way; ScenarioError if it has none."""
-    if timing is thresholds.KIND:
+    if timing is THRESHOLDS:
         return kind
     if not keeps_time(kind):
         raise ScenarioError(f"controller '{kind.name}' goes by no time in the stride: timing.kind cannot be given")
@@ -144,7 +142,7 @@ def with_timing(kind: ControllerKind, timing: TimingKind) -> ControllerKind:
     title = timing.name.capitalize()
     state = row_with(f"{before.__name__}{title}", before, clock=type(timing.initial))
     parameters = row_with(f"{kind.parameters.__name__}{title}", kind.parameters, timing=timing.parameters)
-    own = {"follow": timing.follow, "gait_time": timing.gait_time}
+    own = {"follow_thresholds": timing.follow, "threshold_time": timing.gait_time}
     timed = {"timed_phase": bind(assistance.timed_phase, f"timed_phase_{timing.name}", own)}
     pieces = timed | {"assess": bind(assistance.assess, f"assess_{timing.name}", timed)}
     made = {word: state for word, value in kind.update.__globals__.items() if value is before}

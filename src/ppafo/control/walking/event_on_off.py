@@ -10,11 +10,10 @@ from typing import NamedTuple
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking import phases, safety
 from ppafo.control.walking.assistance import timed_phase
-from ppafo.control.walking.declaration import PHASE_QUANTITIES, SAFETY_QUANTITIES
-from ppafo.control.walking.phases import PhaseRules, PhaseState
+from ppafo.control.walking.phases import PHASE_QUANTITIES, PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
-from ppafo.control.walking.signs import SafetyRules
-from ppafo.control.walking.timing.thresholds import ThresholdClock, ThresholdRules
+from ppafo.control.walking.signs import SAFETY_QUANTITIES, SafetyRules
+from ppafo.control.walking.timing import ThresholdClock, ThresholdRules
 from ppafo.model.command import VENT
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait_sensors import GaitMeasurement
@@ -62,7 +61,7 @@ def update(
     return command, EventOnOffState(phase=phase, clock=clock, safety=watch, lifting=lifting if held else 0.0)
 
 
-KIND = ControllerKind(
+EVENT_ON_OFF = ControllerKind(
     name="event_on_off",
     summary="Event-based: dorsiflexion in swing and landing, free in mid-stance, plantarflexion in push-off.",
     source="the paper, figure 1A and section 'PPAFO Hardware': binary, event-based control",
@@ -78,5 +77,32 @@ KIND = ControllerKind(
     parameters=EventOnOffParameters,
     initial=EventOnOffState(phase=phases.START, clock=ThresholdClock(), safety=safety.START, lifting=0.0),
     update=update,
+    only_switches=True,
+)
+
+
+class OffParameters(NamedTuple):
+    """Nothing to set."""
+
+
+class OffState(NamedTuple):
+    """Nothing to remember."""
+
+
+def off_update(
+    parameters: OffParameters, state: OffState, reference: float, measurement: GaitMeasurement, period: float
+) -> tuple[float, OffState]:
+    """Command [-]: always ``VENT``."""
+    return VENT, state
+
+
+OFF = ControllerKind(
+    name="off",
+    summary="Both chambers vented.",
+    source="comparison without assistance",
+    quantities=(),
+    parameters=OffParameters,
+    initial=OffState(),
+    update=off_update,
     only_switches=True,
 )

@@ -7,6 +7,8 @@ of it, once the heel is off the ground, and ends where the heel comes down again
 
 from typing import NamedTuple
 
+from ppafo.model.declaration import Quantity
+
 SWING = 0.0
 LANDING = 1.0
 MID_STANCE = 2.0
@@ -103,16 +105,7 @@ def timed_phase_state(
     toe = next_switch(rules, state.toe, toe_force, period)
     since = state.since_strike + period
     known = state.stride_time if state.stride_time > 0.0 else rules.first_stride_time
-    aged = PhaseState(
-        phase=state.phase,
-        heel=heel,
-        toe=toe,
-        in_phase=state.in_phase + period,
-        since_strike=since,
-        stride_time=known,
-        strikes=state.strikes,
-    )
-    phase = next_phase(rules, aged, heel.loaded, toe.loaded, passed)
+    phase = next_phase(rules, state._replace(stride_time=known), heel.loaded, toe.loaded, passed)
     # A foot that comes down on its toes, or with a lost heel sensor, begins a stride too.
     strikes = state.phase == SWING and phase != SWING
     plausible = state.strikes > 0.5 and since > 0.5 * known and since < 2.0 * known
@@ -121,8 +114,18 @@ def timed_phase_state(
         phase=phase,
         heel=heel,
         toe=toe,
-        in_phase=0.0 if phase != state.phase else aged.in_phase,
+        in_phase=0.0 if phase != state.phase else state.in_phase + period,
         since_strike=0.0 if strikes else since,
         stride_time=learnt if strikes else known,
         strikes=state.strikes + (1.0 if strikes else 0.0),
     )
+
+
+PHASE_QUANTITIES = (
+    Quantity("load_threshold", "N", "a force sensor counts as loaded above this", 60.0, 1.0, 5.0e3),
+    Quantity("unload_threshold", "N", "and as unloaded below this", 30.0, 0.0, 5.0e3),
+    Quantity("debounce", "s", "a change of load counts when it has lasted this long", 0.01, 0.0, 0.2),
+    Quantity("first_stride_time", "s", "stride time until one has been measured", 1.1, 0.3, 5.0),
+    Quantity("stride_weight", "1", "weight of a new stride in the moving average", 0.3, 0.0, 1.0),
+    Quantity("push_off_start", "1", "fraction of the stride time at which push-off may begin", 0.4, 0.0, 1.0),
+)

@@ -217,17 +217,12 @@ def remembered(
     usual = abs(before.since_strike - phase.stride_time) < STEADY * phase.stride_time
     steady = (1.0 if usual else 0.0) if enters else state.steady
     vented = state.valve_times.filling_1 + state.valve_times.venting
-    return SafetyState(
-        level=state.level,
-        good_strides=state.good_strides,
-        ventings=state.ventings,
-        finding=state.finding,
+    return state._replace(
         readings=seen,
         landing=readings.next_landing(rules, state.landing, seen, before, phase, steady, period),
         stance=next_stance(state.stance, before, phase, period),
         toe_strides=(state.toe_strides + 1.0 if on_toes else 0.0) if enters else state.toe_strides,
         steady=steady,
-        valve_times=state.valve_times,
         emptying=readings.next_emptying(rules, state.emptying, vented, measurement, period),
         slow_pressure_1=readings.next_slow_pressure(state.slow_pressure_1, measurement.pressure_1, period),
         slow_pressure_2=readings.next_slow_pressure(state.slow_pressure_2, measurement.pressure_2, period),
@@ -270,21 +265,11 @@ def monitor(
     good_strides = next_good_strides(state, before, phase, sign)
     level = max(level_after(rules, state, good_strides, now.stance.together), signs.level_of(sign))
     vents = level > state.level
-    return SafetyState(
+    return now._replace(
         level=level,
         good_strides=good_strides,
         ventings=state.ventings + (1.0 if vents else 0.0),
         finding=later_finding(vents, sign, measurement, state.finding),
-        readings=now.readings,
-        landing=now.landing,
-        stance=now.stance,
-        toe_strides=now.toe_strides,
-        steady=now.steady,
-        valve_times=now.valve_times,
-        emptying=now.emptying,
-        slow_pressure_1=now.slow_pressure_1,
-        slow_pressure_2=now.slow_pressure_2,
-        thin=now.thin,
     )
 
 
@@ -321,19 +306,4 @@ def safe_command(state: SafetyState, phase: float, command: float, period: float
         feed_time(state.valve_times.filling_2, -opening, period),
         state.valve_times.venting + period if vents else 0.0,
     )
-    return sent, SafetyState(
-        level=state.level,
-        good_strides=state.good_strides,
-        ventings=state.ventings,
-        finding=state.finding,
-        readings=state.readings,
-        landing=state.landing,
-        stance=state.stance,
-        toe_strides=state.toe_strides,
-        steady=state.steady,
-        valve_times=valve_times,
-        emptying=state.emptying,
-        slow_pressure_1=state.slow_pressure_1,
-        slow_pressure_2=state.slow_pressure_2,
-        thin=state.thin,
-    )
+    return sent, state._replace(valve_times=valve_times)

@@ -8,6 +8,8 @@ is a number in the lanes, and 0 is none.
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from ppafo.model.declaration import PRESSURE_LAG, VALVE_LAG, Quantity
+
 HELPS = 0.0
 LIFTS = 1.0
 PAUSED = 2.0
@@ -152,3 +154,42 @@ def first_sign(some: float, others: float) -> float:
     """The sign of two that comes first: one that stops before one that pauses, either before none."""
     lower = min(some, others)
     return lower if lower > NO_SIGN else max(some, others)
+
+
+SAFETY_QUANTITIES = (
+    Quantity("lowest_force", "N", "a force below this is not a valid reading", -40.0, -1.0e5, 0.0),
+    Quantity("largest_force", "N", "a force above this is not a valid reading", 3.0e3, 100.0, 1.0e5),
+    Quantity("lowest_angle", "rad", "an angle below this is not a valid reading", 0.3, -10.0, 10.0),
+    Quantity("highest_angle", "rad", "an angle above this is not a valid reading", 2.4, -10.0, 10.0),
+    Quantity("longest_phase", "1", "longest stance or swing, in stride times", 1.2, 0.3, 20.0),
+    Quantity("frozen_time", "s", "a loaded sensor whose reading does not change for longer is frozen", 0.24, 0.01, 5.0),
+    Quantity("most_toe_strides", "1", "strides in a row that may be on the toes alone", 1.0, 0.0, 1.0e6),
+    Quantity(
+        "flat_from", "1", "from this fraction of a steady stride on, heel and toes are both loaded", 0.16, 0.05, 0.6
+    ),
+    Quantity("flat_to", "1", "and until this fraction", 0.24, 0.05, 0.6),
+    Quantity("lowest_pressure", "Pa_a", "a chamber pressure below this is not a valid reading", 4.5e4, 0.0, 1.0e5),
+    Quantity("highest_pressure", "Pa_a", "a chamber pressure above this is not a valid reading", 2.0e6, 1.1e5, 1.0e8),
+    Quantity(
+        "filled_pressure", "Pa_a", "a filled chamber has a higher pressure, a vented one a lower", 1.25e5, 1.0e4, 1.0e8
+    ),
+    Quantity("fill_time", "s", "a chamber is filled when the open valve has fed it for this long", 0.05, 1.0e-3, 10.0),
+    Quantity(
+        "vent_time", "s", "both chambers are vented when the valve has vented them for this long", 0.25, 1.0e-3, 10.0
+    ),
+    Quantity("shortest_swing", "1", "shortest swing that is seen in a steady stride, fraction of it", 0.25, 0.0, 0.6),
+    Quantity("resume_strides", "1", "good strides in a row after which a pause ends", 2.0, 1.0, 1.0e3),
+    Quantity("largest_drop", "N", "no force as large as this is gone within a sample", 300.0, 10.0, 1.0e5),
+    Quantity("lowest_flat_angle", "rad", "no ankle has less while the foot must stand flat", 1.22, -10.0, 10.0),
+    Quantity("highest_flat_angle", "rad", "no ankle has more while the foot must stand flat", 1.92, -10.0, 10.0),
+    Quantity(
+        "follow_time",
+        "s",
+        "a pressure follows the valve within this, and the lags of valve and sensor",
+        8.0e-3,
+        0.0,
+        1.0,
+        follows=(VALVE_LAG, PRESSURE_LAG),
+    ),
+    Quantity("highest_toe_off_angle", "rad", "no ankle has more while its toes still carry", 2.06, -10.0, 10.0),
+)

@@ -13,14 +13,15 @@ from typing import Any, NamedTuple
 
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking import assistance, phases, safety
-from ppafo.control.walking.assistance import Assistance, TorqueRequest, assess
-from ppafo.control.walking.declaration import ASSISTING_QUANTITIES, with_defaults
+from ppafo.control.walking.assistance import ASSISTING_QUANTITIES, Assistance, TorqueRequest, assess, with_defaults
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.signs import SafetyRules
-from ppafo.control.walking.timing.thresholds import ThresholdClock, ThresholdRules
+from ppafo.control.walking.timing import ThresholdClock, ThresholdRules
 from ppafo.errors import ScenarioError
+from ppafo.model.declaration import Quantity
 from ppafo.model.gait_sensors import GaitMeasurement
+from ppafo.model.sensors import Measurement
 
 
 class LawParameters(NamedTuple):
@@ -142,3 +143,52 @@ def walking_law(law: ControllerKind, name: str, summary: str, gains: tuple[tuple
         update=bind(update, f"update_{name}", pieces),
         restart=None,
     )
+
+
+class ProportionalParameters(NamedTuple):
+    """Gains on the torque error [1/(N m)] and its integral [1/(N m s)]."""
+
+    torque_gain: float
+    torque_integral_gain: float
+
+
+class ProportionalState(NamedTuple):
+    """Integral part of the command [-]."""
+
+    integral: float
+
+
+def proportional_update(
+    parameters: ProportionalParameters,
+    state: ProportionalState,
+    reference: float,
+    measurement: Measurement,
+    period: float,
+) -> tuple[float, ProportionalState]:
+    """Command from -1 to 1 of the torque error [N m]."""
+    error = reference - measurement.torque
+    proposed = parameters.torque_gain * error + state.integral
+    # The integral waits while the valve is fully open: more of it could not be carried out.
+    added = parameters.torque_integral_gain * error * period
+    integral = state.integral + (added if abs(proposed) < 1.0 else 0.0)
+    return max(-1.0, min(1.0, proposed)), ProportionalState(integral)
+
+
+def proportional_restart(state: ProportionalState, requested: float, continues: float) -> ProportionalState:
+    """The state, reset where another task begins (``continues`` 0, else 1); ``requested`` [N m] is not used."""
+    return ProportionalState(integral=state.integral * continues)
+
+
+PROPORTIONAL = ControllerKind(
+    name="proportional",
+    summary="Proportional and integral action on the torque error.",
+    source="profile of four parameters as in J. Zhang et al., Science 356 (2017) 1280",
+    quantities=(
+        Quantity("torque_gain", "1/(N m)", "opening per torque error", 1.3, 0.0, 1.0e3),
+        Quantity("torque_integral_gain", "1/(N m s)", "opening per integral of the torque error", 0.2, 0.0, 1.0e3),
+    ),
+    parameters=ProportionalParameters,
+    initial=ProportionalState(0.0),
+    update=proportional_update,
+    restart=proportional_restart,
+)

@@ -6,9 +6,8 @@ from importlib.resources import files
 from typing import NamedTuple
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.fixed.catalog import FIXED_LAWS
-from ppafo.control.fixed.converter import SETTINGS, Converter
-from ppafo.control.fixed.kind import TARGETS, FixedLaw
+from ppafo.control.fixed.torque_laws import FIXED_LAWS, TARGETS, FixedLaw
+from ppafo.control.fixed.whole_numbers import SETTINGS, Converter
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import ScenarioError
 from ppafo.exports.firmware.catalog import target_of

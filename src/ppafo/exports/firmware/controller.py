@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, get_type_hints
 
-from ppafo.control.fixed.converter import COMMAND_STEPS, LARGEST_READING, Readings
-from ppafo.control.fixed.kind import FixedLaw, WholeLaw
+from ppafo.control.fixed.torque_laws import FixedLaw, WholeLaw
+from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, LARGEST_READING, Readings
 from ppafo.engine.composed_names import is_row
 from ppafo.engine.rows import is_number, leaf_paths, members
 from ppafo.engine.source_text import SourceCollector

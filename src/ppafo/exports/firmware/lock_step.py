@@ -7,8 +7,8 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from ppafo.control.fixed.converter import COMMAND_STEPS, Converter, Limits, Readings, read
-from ppafo.control.fixed.kind import TARGETS
+from ppafo.control.fixed.torque_laws import TARGETS
+from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, Converter, Limits, Readings, read
 from ppafo.errors import SimulationError
 from ppafo.exports.firmware import ChipController, chip_controller, firmware
 from ppafo.exports.firmware.catalog import target_of

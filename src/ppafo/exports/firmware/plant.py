@@ -6,8 +6,8 @@ from dataclasses import replace
 from importlib.resources import files
 
 from ppafo.control.catalog import PROFILES
-from ppafo.control.fixed.converter import COMMAND_STEPS, SETTINGS, Converter, Readings, read
-from ppafo.control.fixed.kind import PLANT_TARGETS
+from ppafo.control.fixed.torque_laws import PLANT_TARGETS
+from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, SETTINGS, Converter, Readings, read
 from ppafo.engine.lanes import SIGNAL_ROWS
 from ppafo.engine.rows import leaf_paths, numbers, row_expression
 from ppafo.engine.source_text import Collector

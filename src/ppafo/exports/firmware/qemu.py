@@ -4,7 +4,7 @@ import struct
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple, final
 
-from ppafo.control.fixed.converter import Readings
+from ppafo.control.fixed.whole_numbers import Readings
 from ppafo.errors import SimulationError
 from ppafo.exports.firmware.simulator import UNTOUCHED, Console, depth_of_stack
 from ppafo.exports.firmware.target import Decision, Image, Target

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from ppafo.control.fixed.converter import COMMAND_STEPS
+from ppafo.control.fixed.whole_numbers import COMMAND_STEPS
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.exports.firmware import firmware
 from ppafo.exports.firmware.catalog import target_of

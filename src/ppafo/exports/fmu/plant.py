@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from ppafo.control.catalog import PROFILES
-from ppafo.control.controllers import constant
+from ppafo.control.controllers import switching
 from ppafo.exports.c_library import commanded, scenario_library, walk_library
 from ppafo.exports.c_library.files import Library, steps_source
 from ppafo.exports.c_library.walk_preparation import check_can_leave
@@ -130,7 +130,7 @@ def _walk_of_plant(configuration: Configuration) -> Configuration:
         configuration,
         name=f"{configuration.name}-plant",
         description=f"The plant alone of this walk, on its leg: {configuration.description}",
-        controller=constant.KIND,
+        controller=switching.CONSTANT,
         settings={"command": 0.0},
         period=step,
         step=step,

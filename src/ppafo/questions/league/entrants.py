@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.walking.catalog import TIMINGS, WALKING_CONTROLLERS
-from ppafo.control.walking.timing.kind import TimingKind
+from ppafo.control.walking.timing import TimingKind
 
 PROPORTIONAL = ("device.valve=proportional", "controller.rate=1 kHz")
 SOLENOID = ("device.valve=solenoid", "controller.rate=20 Hz")

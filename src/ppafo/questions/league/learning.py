@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ppafo.control.controllers.damped_proportional import KNOTS
+from ppafo.control.controllers.feedback import KNOTS
 from ppafo.engine.lanes import Floats
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.signals import Recording

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
-from ppafo.control.tabulated import KNOTS
+from ppafo.control.profiles import KNOTS
 from ppafo.documents.models import STRICT, Text, Texts
 from ppafo.errors import DataError, StudyError, UnitError
 from ppafo.storage.recordings import read_recording

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ppafo.control.walking.torque_profile import TorqueProfile
+from ppafo.control.walking.assistance import TorqueProfile
 from ppafo.engine.lanes import Batch, Clock, Floats
 from ppafo.engine.program import Program
 from ppafo.engine.rows import numbers

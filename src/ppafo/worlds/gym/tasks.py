@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from ppafo.control.walking.torque_profile import TorqueProfile, profile_torque
+from ppafo.control.walking.assistance import TorqueProfile, profile_torque
 from ppafo.engine.rows import leaf_paths
 from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import GaitMeasurement

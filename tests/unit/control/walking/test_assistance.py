@@ -5,13 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.control.controllers.feedback_linearisation import FeedbackLinearisationState, restart
+from ppafo.control.controllers.model_based import FeedbackLinearisationState, linearising_restart
 from ppafo.control.walking import assistance
-from ppafo.control.walking.assistance import Assistance, Hold
+from ppafo.control.walking.assistance import Assistance, Hold, TorqueProfile, profile_torque
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, Switch
-from ppafo.control.walking.timing.thresholds import ThresholdClock, ThresholdRules, gait_time
-from ppafo.control.walking.torque_profile import TorqueProfile, profile_torque
+from ppafo.control.walking.timing import ThresholdClock, ThresholdRules, threshold_time
 from ppafo.engine.rows import rebuild
 from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import GaitMeasurement
@@ -31,7 +30,9 @@ FOLLOWING = [
 
 
 def wanted(phase: PhaseState, angle: float, rate: float, rules: Assistance = RULES) -> float:
-    return assistance.requested_torque(rules, phase, gait_time(ThresholdRules(), ThresholdClock(), phase), angle, rate)
+    return assistance.requested_torque(
+        rules, phase, threshold_time(ThresholdRules(), ThresholdClock(), phase), angle, rate
+    )
 
 
 def at(phase: float, share: float) -> PhaseState:
@@ -134,8 +135,8 @@ def test_a_law_forgets_where_another_task_begins(name: str) -> None:
 
 def test_a_new_task_has_no_rate_of_the_torque_wanted_for_the_inverted_chambers() -> None:
     law = FeedbackLinearisationState(4.0, 1.6, 0.3, 1.0)
-    assert restart(law, -2.0, 0.0) == FeedbackLinearisationState(-2.0, 1.6, 0.3, 1.0)
-    assert restart(law, -2.0, 1.0) == law
+    assert linearising_restart(law, -2.0, 0.0) == FeedbackLinearisationState(-2.0, 1.6, 0.3, 1.0)
+    assert linearising_restart(law, -2.0, 1.0) == law
 
 
 def test_nothing_is_done_once_safety_has_vented() -> None:

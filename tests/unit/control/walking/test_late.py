@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from ppafo.control.walking import phases, safety, signs
-from ppafo.control.walking.declaration import PHASE_QUANTITIES, SAFETY_QUANTITIES
-from ppafo.control.walking.phases import PUSH_OFF, SWING, PhaseRules, PhaseState, Switch
+from ppafo.control.walking.phases import PHASE_QUANTITIES, PUSH_OFF, SWING, PhaseRules, PhaseState, Switch
 from ppafo.control.walking.safety import SafetyState
-from ppafo.control.walking.signs import SafetyRules
+from ppafo.control.walking.signs import SAFETY_QUANTITIES, SafetyRules
 from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import GaitMeasurement
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from ppafo.control.walking.learnt_table import (
+from ppafo.control.walking.assistance import TorqueProfile
+from ppafo.control.walking.learning import (
     EMPTY,
     KNOTS,
     LearningRules,
@@ -13,7 +14,6 @@ from ppafo.control.walking.learnt_table import (
     next_table,
     place_in_table,
 )
-from ppafo.control.walking.torque_profile import TorqueProfile
 
 PLACES = np.linspace(-2.0, KNOTS + 1.0, 701)
 

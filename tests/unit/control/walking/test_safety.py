@@ -5,10 +5,9 @@ import math
 import pytest
 
 from ppafo.control.walking import phases, readings, safety, signs
-from ppafo.control.walking.declaration import SAFETY_QUANTITIES
 from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, Switch
 from ppafo.control.walking.safety import Finding, SafetyState, Stance, ValveTimes
-from ppafo.control.walking.signs import SafetyRules
+from ppafo.control.walking.signs import SAFETY_QUANTITIES, SafetyRules
 from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import GaitMeasurement
 

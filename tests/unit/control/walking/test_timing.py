@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ppafo.control.walking import phases
+from ppafo.control.walking import estimated_timing, phases, timing
+from ppafo.control.walking import timing as gait_clock
 from ppafo.control.walking.catalog import TIMINGS, WALKING_CONTROLLERS, keeps_time, with_timing
+from ppafo.control.walking.estimated_timing import EstimationRules, LearntStride, Window
 from ppafo.control.walking.phases import PhaseRules
-from ppafo.control.walking.timing import clock as gait_clock
-from ppafo.control.walking.timing import estimated, fractional
-from ppafo.control.walking.timing.estimated import EstimationRules, LearntStride, Window
-from ppafo.control.walking.timing.kind import TimingKind
+from ppafo.control.walking.timing import TimingKind
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import ScenarioError
 from ppafo.model.command import VENT
@@ -66,7 +65,7 @@ def late(clocks: list[Any], phase: Floats) -> Floats:
 
 
 def test_a_force_that_rises_evenly_is_detected_as_late_as_the_known_delays_say() -> None:
-    late_by = gait_clock.detection_delays(settings(fractional.KIND).delays, RULES, PERIOD)
+    late_by = gait_clock.detection_delays(settings(timing.FRACTIONAL).delays, RULES, PERIOD)
     heel, toe = forces(np.arange(0.0, 1.0, PERIOD), 1.0)
     seen, times = phases.START, {}
     for sample, (on_heel, on_toe) in enumerate(zip(heel.tolist(), toe.tolist(), strict=True)):
@@ -81,12 +80,12 @@ def test_a_force_that_rises_evenly_is_detected_as_late_as_the_known_delays_say()
 
 def test_percent_of_gait_is_right_once_two_strides_were_seen() -> None:
     phase = np.arange(0.5, 8.0, PERIOD)
-    assert np.abs(late(followed(fractional.KIND, phase), phase)[3000:]).max() < 0.003
+    assert np.abs(late(followed(timing.FRACTIONAL, phase), phase)[3000:]).max() < 0.003
 
 
 def test_events_are_known_when_they_happen_and_not_when_they_are_detected() -> None:
     phase = np.arange(0.5, 8.0, PERIOD)
-    event = np.array([clock.event for clock in followed(fractional.KIND, phase)])
+    event = np.array([clock.event for clock in followed(timing.FRACTIONAL, phase)])
     for number, share in enumerate(TRUE.values()):
         known = np.flatnonzero((event[1:] == number) & (event[:-1] != number)) + 1
         true = np.flatnonzero(np.diff(np.floor(phase - share))) + 1
@@ -97,31 +96,31 @@ def test_events_are_known_when_they_happen_and_not_when_they_are_detected() -> N
 def test_the_clock_waits_for_who_stands() -> None:
     walking = np.arange(0.5, 5.25, PERIOD)
     phase = np.concatenate([walking, np.full(3000, 5.25)])
-    clock = followed(fractional.KIND, phase)[-1]
+    clock = followed(timing.FRACTIONAL, phase)[-1]
     assert clock.fraction == pytest.approx(clock.come.heel_off + gait_clock.WAITS)
 
 
 def test_a_strike_that_does_not_come_is_no_landing_for_ever() -> None:
     walking = np.arange(0.5, 5.9, PERIOD)
-    clocks = followed(fractional.KIND, np.concatenate([walking, np.full(500, 5.9)]))
+    clocks = followed(timing.FRACTIONAL, np.concatenate([walking, np.full(500, 5.9)]))
     swing = phases.START._replace(stride_time=1.0)
-    rules = settings(fractional.KIND)
-    lands = [fractional.gait_time(rules, clock, swing).lands for clock in clocks[-500:]]
+    rules = settings(timing.FRACTIONAL)
+    lands = [timing.fractional_time(rules, clock, swing).lands for clock in clocks[-500:]]
     assert lands[-1] == 0.0
     assert sum(lands) * PERIOD == pytest.approx(gait_clock.WAITS, abs=2.0 * PERIOD)
 
 
 def test_the_delay_of_the_valve_is_a_lead() -> None:
-    rules, clock = settings(fractional.KIND, valve_delay=0.03), gait_clock.START._replace(fraction=0.5)
+    rules, clock = settings(timing.FRACTIONAL, valve_delay=0.03), gait_clock.CLOCK_START._replace(fraction=0.5)
     stance = phases.START._replace(phase=phases.MID_STANCE, stride_time=1.2)
-    assert fractional.gait_time(rules, clock, stance).since_strike == pytest.approx(0.5 * 1.2 + 0.03)
+    assert timing.fractional_time(rules, clock, stance).since_strike == pytest.approx(0.5 * 1.2 + 0.03)
 
 
 @pytest.mark.parametrize("even", [0.0, 1.0])
 def test_a_slow_valve_makes_no_strike_of_a_foot_that_hangs_after_an_odd_stride(even: float) -> None:
     """At 0.95 the clock waits there; 60 ms ahead is beyond the strike."""
-    strides = gait_clock.START.strides._replace(even=even)
-    clock = gait_clock.START._replace(fraction=0.95, strides=strides)
+    strides = gait_clock.CLOCK_START.strides._replace(even=even)
+    clock = gait_clock.CLOCK_START._replace(fraction=0.95, strides=strides)
     found = gait_clock.place_in_stride(clock, 0.06, phases.START._replace(stride_time=1.1))
     assert found.lands == even
     assert (found.since_strike < 0.1) == (even > 0.5)
@@ -130,7 +129,7 @@ def test_a_slow_valve_makes_no_strike_of_a_foot_that_hangs_after_an_odd_stride(e
 @pytest.mark.parametrize("pace", [0.4, 0.5, 1.1, 2.4])
 @pytest.mark.parametrize("before", [0, 5])
 def test_the_second_stride_of_any_pace_sets_it_and_the_first_does_not(before: int, pace: float) -> None:
-    strides, found = gait_clock.START.strides, []
+    strides, found = gait_clock.CLOCK_START.strides, []
     for taken in [1.1] * before + [pace, pace, pace]:
         strides = gait_clock.next_strides(strides, True, True, True, taken, 1.1, 0.2)
         found.append(strides.mean_time)
@@ -148,13 +147,16 @@ def test_the_time_since_a_strike_is_never_below_0_when_strides_become_quicker(ki
 
 
 def test_a_clock_that_a_strike_left_before_it_is_not_moved_where_nothing_is_estimated() -> None:
-    rules, fraction = settings(estimated.KIND), gait_clock.struck_fraction(0.9, 0.025, estimated.KEEPS)
+    rules, fraction = (
+        settings(estimated_timing.ESTIMATED),
+        gait_clock.struck_fraction(0.9, 0.025, estimated_timing.KEEPS),
+    )
     assert fraction == pytest.approx(-0.075)
-    clock, at = estimated.START._replace(next_knot=29.0), gait_clock.START._replace(fraction=fraction)
+    clock, at = estimated_timing.START._replace(next_knot=29.0), gait_clock.CLOCK_START._replace(fraction=fraction)
     measurement = GaitMeasurement(1.6, 1.0e5, 1.0e5, 0.0, 0.0, 0.0)
-    found = estimated.passed_knot(rules.estimation, clock, at, 0.0, measurement)
+    found = estimated_timing.passed_knot(rules.estimation, clock, at, 0.0, measurement)
     assert (found.clock.fraction, found.moved) == (fraction, 0.0)
-    assert estimated.gait_time(rules, found, phases.START._replace(phase=phases.LANDING)).since_strike == 0.0
+    assert estimated_timing.gait_time(rules, found, phases.START._replace(phase=phases.LANDING)).since_strike == 0.0
 
 
 def learnt(shape: Floats) -> LearntStride:
@@ -180,7 +182,7 @@ def brute_force(stride: Floats, window: Floats, scales: Floats, trust: float) ->
 @pytest.mark.parametrize("ahead", [-2.6, -1.0, -0.4, 0.0, 0.3, 1.2, 2.5])
 def test_the_estimated_shift_is_that_of_brute_force(ahead: float, trust: float) -> None:
     """Smooth signals, so that both see the same stride between its knots."""
-    turns = np.arange(1, estimated.KNOTS + 1) / estimated.KNOTS
+    turns = np.arange(1, estimated_timing.KNOTS + 1) / estimated_timing.KNOTS
 
     def shape(phase: Floats) -> Floats:
         heel = 200.0 + 200.0 * np.sin(2.0 * np.pi * phase) + 60.0 * np.cos(4.0 * np.pi * phase)
@@ -188,21 +190,23 @@ def test_the_estimated_shift_is_that_of_brute_force(ahead: float, trust: float) 
         return np.stack([angles(phase), heel, toe])
 
     stride = shape(turns)
-    window = shape(turns + ahead / estimated.KNOTS)[:, -estimated.WINDOW :]
+    window = shape(turns + ahead / estimated_timing.KNOTS)[:, -estimated_timing.WINDOW :]
     rules = EstimationRules(3.0, 0.0, 0.1, 150.0, 100.0, trust, 1.0)
-    moved = (0.0,) * estimated.WINDOW
-    found = estimated.estimated_shift(learnt(stride), Window(*(tuple(row.tolist()) for row in window), moved), rules)
+    moved = (0.0,) * estimated_timing.WINDOW
+    found = estimated_timing.estimated_shift(
+        learnt(stride), Window(*(tuple(row.tolist()) for row in window), moved), rules
+    )
     expected = brute_force(stride, window, np.array([0.1, 150.0, 150.0]), trust)
     assert trust > 0.0 or expected == pytest.approx(ahead, abs=0.02), "without trust in the clock it is the true shift"
     assert abs(expected) <= abs(ahead) + 0.02, "which pulls it to 0"
-    assert found * estimated.KNOTS == pytest.approx(expected, abs=0.12)
+    assert found * estimated_timing.KNOTS == pytest.approx(expected, abs=0.12)
 
 
 def test_nothing_is_estimated_from_what_is_no_stride() -> None:
-    stride = learnt(np.zeros((3, estimated.KNOTS)))
-    window = Window(*((9.0,) * estimated.WINDOW for _ in range(3)), (0.0,) * estimated.WINDOW)
+    stride = learnt(np.zeros((3, estimated_timing.KNOTS)))
+    window = Window(*((9.0,) * estimated_timing.WINDOW for _ in range(3)), (0.0,) * estimated_timing.WINDOW)
     rules = EstimationRules(3.0, 0.0, 0.1, 150.0, 1.0, 2.0, 1.0)
-    assert estimated.estimated_shift(stride, window, rules) == 0.0
+    assert estimated_timing.estimated_shift(stride, window, rules) == 0.0
 
 
 def test_an_estimate_follows_a_stride_that_becomes_quicker_before_it_ends() -> None:
@@ -210,16 +214,16 @@ def test_an_estimate_follows_a_stride_that_becomes_quicker_before_it_ends() -> N
     steady = np.arange(0.5, 9.1, PERIOD)
     phase = np.concatenate([steady, 9.1 + np.arange(0.0, 0.85, 1.06 * PERIOD)])
     errors = {}
-    for kind in (fractional.KIND, estimated.KIND):
+    for kind in (timing.FRACTIONAL, estimated_timing.ESTIMATED):
         errors[kind.name] = float(np.abs(late(followed(kind, phase, anchor_weight=0.0), phase)[-150:]).mean())
     assert errors["estimated"] < 0.7 * errors["fractional"]
 
 
 def test_the_learnt_stride_is_the_gait_at_the_knots() -> None:
     phase = np.arange(0.5, 10.0, PERIOD)
-    clock = followed(estimated.KIND, phase)[-1]
-    assert clock.learnt == settings(estimated.KIND).estimation.learning_strides
-    knots = (clock.next_knot + np.arange(estimated.KNOTS)) % estimated.KNOTS / estimated.KNOTS
+    clock = followed(estimated_timing.ESTIMATED, phase)[-1]
+    assert clock.learnt == settings(estimated_timing.ESTIMATED).estimation.learning_strides
+    knots = (clock.next_knot + np.arange(estimated_timing.KNOTS)) % estimated_timing.KNOTS / estimated_timing.KNOTS
     assert np.abs(np.array(clock.stride.angle) - angles(knots)).max() < 0.01
     assert np.abs(np.array(clock.stride.heel_force) - forces(knots, 1.0)[0]).max() < 30.0
 
@@ -227,7 +231,7 @@ def test_the_learnt_stride_is_the_gait_at_the_knots() -> None:
 def test_a_timing_changes_no_controller_without_a_time_in_the_stride() -> None:
     assert not keeps_time(WALKING_CONTROLLERS["off"])
     with pytest.raises(ScenarioError, match="goes by no time in the stride"):
-        with_timing(WALKING_CONTROLLERS["off"], fractional.KIND)
+        with_timing(WALKING_CONTROLLERS["off"], timing.FRACTIONAL)
     for kind in WALKING_CONTROLLERS.values():
         if keeps_time(kind):
             timed = [with_timing(kind, timing) for timing in TIMINGS.values()]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.control.controllers.damped_proportional import KNOTS
+from ppafo.control.controllers.feedback import KNOTS
 from ppafo.errors import ScenarioError
 from ppafo.questions.league.learning import LearningLaw, knot_errors, learn, with_table
 from ppafo.signals import Channel, Recording

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ppafo.answers.text import text_of
-from ppafo.control.tabulated import KNOTS
+from ppafo.control.profiles import KNOTS
 from ppafo.errors import PpafoError
 from ppafo.parameters.parts import load_catalogue
 from ppafo.questions.size import search

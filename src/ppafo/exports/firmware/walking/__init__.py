@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 from importlib.resources import files
 from typing import Any, NamedTuple
 
-from ppafo.control.fixed.kind import WALK_TARGETS
-from ppafo.control.fixed.walking.lanes import FIXED_WALKS, FixedWalk
-from ppafo.control.fixed.walking.readings import GaitConverter
+from ppafo.control.fixed.torque_laws import WALK_TARGETS
+from ppafo.control.fixed.walking_law import GaitConverter
+from ppafo.control.fixed.walking_numbers import FIXED_WALKS, FixedWalk
 from ppafo.control.walking.signs import SIGNS
 from ppafo.engine.rows import rebuilt
 from ppafo.engine.source_text import SourceCollector

@@ -9,7 +9,7 @@ import random
 from collections.abc import Callable, Generator
 from typing import NamedTuple
 
-from ppafo.control.fixed.walking.readings import TOP, GaitConverter, GaitReadings, read_gait
+from ppafo.control.fixed.walking_law import TOP, GaitConverter, GaitReadings, read_gait
 from ppafo.exports.firmware.walking.made import ROOM, SAMPLES, UPRIGHT, made_readings, next_pressures
 from ppafo.model.gait_sensors import GaitMeasurement
 

@@ -4,9 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ppafo.control.fixed.converter import COMMAND_STEPS
-from ppafo.control.fixed.walking.event_on_off import WalkCounts
-from ppafo.control.fixed.walking.readings import GaitConverter, GaitReadings, read_gait
+from ppafo.control.fixed.walking_law import GaitConverter, GaitReadings, WalkCounts, read_gait
+from ppafo.control.fixed.whole_numbers import COMMAND_STEPS
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of

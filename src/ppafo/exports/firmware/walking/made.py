@@ -7,7 +7,7 @@ import math
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
 
-from ppafo.control.fixed.walking.readings import TOP, GaitConverter, GaitReadings, read_gait
+from ppafo.control.fixed.walking_law import TOP, GaitConverter, GaitReadings, read_gait
 from ppafo.model.gait_sensors import GaitMeasurement
 
 ROOM, FILLED = 1.013e5, 4.4e5

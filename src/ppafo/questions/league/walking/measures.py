@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.control.walking.torque_profile import TorqueProfile, profile_torque
+from ppafo.control.walking.assistance import TorqueProfile, profile_torque
 from ppafo.engine.lanes import Floats, run_batch
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, batch_of

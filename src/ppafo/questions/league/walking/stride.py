@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.control.walking.torque_profile import TorqueProfile, profile_torque
+from ppafo.control.walking.assistance import TorqueProfile, profile_torque
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Walk
 from ppafo.model import contact as ground

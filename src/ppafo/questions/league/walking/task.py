@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from ppafo.control.walking.assistance import PUSH_OFF_QUANTITIES, TorqueProfile
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS, keeps_time
-from ppafo.control.walking.declaration import PHASE_QUANTITIES, PUSH_OFF_QUANTITIES, SAFETY_QUANTITIES
-from ppafo.control.walking.torque_profile import TorqueProfile
+from ppafo.control.walking.phases import PHASE_QUANTITIES
+from ppafo.control.walking.signs import SAFETY_QUANTITIES
 from ppafo.errors import ScenarioError, nearest_name, one_line
 from ppafo.simulation.declaration import PERIOD, RATE
 from ppafo.simulation.overriding import split_override

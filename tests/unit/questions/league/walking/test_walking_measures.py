@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ppafo.control.walking.torque_profile import TorqueProfile, profile_torque
+from ppafo.control.walking.assistance import TorqueProfile, profile_torque
 from ppafo.model.command import VENT
 from ppafo.model.contact import SWING, TOE
 from ppafo.model.gait import GaitTiming

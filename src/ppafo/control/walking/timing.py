@@ -1,9 +1,10 @@
-"""A clock of the stride: it runs at the pace of recent strides, and is anchored anew at each detected event.
+"""The time in the stride: since the detected heel strike, or by a clock that is anchored anew at each event.
 
-Heel strike, toes on the ground, heel off and toes off are each detected some known time after (or, where a force fades,
-before) they happen: the force has to pass its threshold, the sensor follows late, the change has to last, samples are
-taken. At each detected event the clock is anchored anew at the fraction at which that event has come in recent strides,
-plus its delay. So an event is known when the clock passes its fraction, before the sensors show it.
+A force sensor shows an event some known time after (or, where a force fades, before) it happens: the force has to pass
+its threshold, the sensor follows late, the change has to last, samples are taken. Fractional timing takes these delays
+off. Its clock runs at the pace of recent strides, and at each detected event (heel strike, toes on the ground, heel
+off, toes off) it is anchored anew at the fraction at which that event has come in recent strides, plus its delay. So an
+event is known when the clock passes its fraction, before the sensors show it.
 
 The clock waits for an event that does not come: for the toes to come down, the heel or the toes to rise, the next
 strike. Who stands has no percent of gait. A stride whose heel and toes leave the ground late takes longer: the clock
@@ -11,12 +12,80 @@ goes on at its pace. After a stride that was not even, as at starts, stops and s
 known when they are detected.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 from ppafo.control.walking import phases
 from ppafo.control.walking.phases import PhaseRules, PhaseState
-from ppafo.control.walking.timing.kind import GaitTime
 from ppafo.model.declaration import FORCE_LAG, VALVE_DELAY, Quantity
+from ppafo.model.gait_sensors import GaitMeasurement
+
+
+class GaitTime(NamedTuple):
+    """Time since the heel strike [s] by which torque is requested, and 1 where the foot lands or is about to."""
+
+    since_strike: float
+    lands: float
+
+
+@dataclass(frozen=True, slots=True)
+class TimingKind:
+    """A way to know the time in the stride.
+
+    ``parameters`` is a NamedTuple class whose numbers are the quantities in order, ``initial`` the start of the state.
+    ``follow(rules, phase_rules, clock, before, phase, measurement, period)`` returns the state after a sample, with
+    the phases before and after it; ``gait_time(rules, clock, phase)`` where in the stride the wearer is. The safety
+    checks go by the detected phases, whichever way is chosen.
+    """
+
+    name: str
+    summary: str
+    source: str
+    quantities: tuple[Quantity, ...]
+    parameters: type
+    initial: Any
+    follow: Callable[..., Any]
+    gait_time: Callable[..., GaitTime]
+
+
+class ThresholdRules(NamedTuple):
+    """Nothing to set: the rules of the phases say it all."""
+
+
+class ThresholdClock(NamedTuple):
+    """Nothing to remember beside the phases."""
+
+
+def follow_thresholds(
+    rules: ThresholdRules,
+    phase_rules: PhaseRules,
+    clock: ThresholdClock,
+    before: PhaseState,
+    phase: PhaseState,
+    measurement: GaitMeasurement,
+    period: float,
+) -> ThresholdClock:
+    """The clock after a sample, taken every ``period`` [s]: nothing."""
+    return clock
+
+
+def threshold_time(rules: ThresholdRules, clock: ThresholdClock, phase: PhaseState) -> GaitTime:
+    """The time since the detected heel strike [s]; the foot lands once that was detected."""
+    return GaitTime(phase.since_strike, 1.0 if phase.phase == phases.LANDING else 0.0)
+
+
+THRESHOLDS = TimingKind(
+    name="thresholds",
+    summary="The stride begins when the heel force has passed its threshold; nothing is known before it is detected.",
+    source="the paper, figure 1A",
+    quantities=(),
+    parameters=ThresholdRules,
+    initial=ThresholdClock(),
+    follow=follow_thresholds,
+    gait_time=threshold_time,
+)
+
 
 WAITS = 0.05
 """Fraction of the stride by which the clock runs past an event that was not detected, before it waits."""
@@ -82,7 +151,7 @@ class GaitClock(NamedTuple):
 
 
 NOT_KNOWN = Events(strike=0.0, toes_on=0.0, heel_off=0.0, toes_off=0.0)
-START = GaitClock(
+CLOCK_START = GaitClock(
     fraction=0.0,
     event=TOES_OFF,
     come=NOT_KNOWN,
@@ -238,13 +307,7 @@ def paced(strides: Strides, seen: Events, found: Events, come: Events, weight: f
     pace = found.heel_off / come.heel_off if heel else 1.0
     pace = found.toes_off / come.toes_off if toes else pace
     told = strides.mean_time * (1.0 + weight * (max(1.0 - FASTER, min(1.0 + FASTER, pace)) - 1.0))
-    return Strides(
-        mean_time=strides.mean_time,
-        counted=strides.counted,
-        last=strides.last,
-        even=strides.even,
-        this_time=told if heel | toes else strides.this_time,
-    )
+    return strides._replace(this_time=told if heel | toes else strides.this_time)
 
 
 def anchored_fraction(
@@ -337,4 +400,44 @@ DELAY_QUANTITIES = (
         0.2,
         follows=(VALVE_DELAY,),
     ),
+)
+
+
+class FractionalRules(NamedTuple):
+    """The known delays, and how far an event after the strike moves the clock [-]."""
+
+    delays: Delays
+    anchor_weight: float
+
+
+def follow_fraction(
+    rules: FractionalRules,
+    phase_rules: PhaseRules,
+    clock: GaitClock,
+    before: PhaseState,
+    phase: PhaseState,
+    measurement: GaitMeasurement,
+    period: float,
+) -> GaitClock:
+    """The clock after a sample, taken every ``period`` [s]; a detected strike sets it anew."""
+    return next_clock(rules.delays, phase_rules, clock, before, phase, rules.anchor_weight, 1.0, period)
+
+
+def fractional_time(rules: FractionalRules, clock: GaitClock, phase: PhaseState) -> GaitTime:
+    """The time since the heel strike [s], ahead by the delay of the valve."""
+    return place_in_stride(clock, rules.delays.valve_delay, phase)
+
+
+FRACTIONAL = TimingKind(
+    name="fractional",
+    summary="Percent of gait: time since the heel strike over recent stride times, known delays taken off.",
+    source="fractional timing, usual in the field; anchored anew at each detected event",
+    quantities=(
+        *DELAY_QUANTITIES,
+        ANCHOR_WEIGHT,
+    ),
+    parameters=FractionalRules,
+    initial=CLOCK_START,
+    follow=follow_fraction,
+    gait_time=fractional_time,
 )

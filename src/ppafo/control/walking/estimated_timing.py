@@ -12,16 +12,17 @@ The learnt stride is kept as a ring: its first knot is the next to come, its las
 from typing import Annotated, NamedTuple
 
 from ppafo.control.walking.phases import PhaseRules, PhaseState
-from ppafo.control.walking.timing.clock import (
+from ppafo.control.walking.timing import (
     ANCHOR_WEIGHT,
+    CLOCK_START,
     DELAY_QUANTITIES,
     Delays,
     GaitClock,
+    GaitTime,
+    TimingKind,
     next_clock,
     place_in_stride,
 )
-from ppafo.control.walking.timing.clock import START as CLOCK_START
-from ppafo.control.walking.timing.kind import GaitTime, TimingKind
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait_sensors import GaitMeasurement
 
@@ -224,7 +225,7 @@ def passed_knot(
     moved = max(rules.estimate_weight * shift, min(0.0, -at.fraction))
     following = clock.next_knot + 1.0
     return EstimatedClock(
-        clock=GaitClock(fraction=at.fraction + moved, event=at.event, come=at.come, strides=at.strides),
+        clock=at._replace(fraction=at.fraction + moved),
         stride=stride,
         window=window,
         next_knot=following - KNOTS if following >= KNOTS else following,
@@ -250,15 +251,7 @@ def follow(
     learnt = next_learnt(rules.estimation, clock, before, phase)
     if knots_passed(at.fraction, clock.next_knot) >= 0.0:
         return passed_knot(rules.estimation, clock, at, learnt, measurement)
-    return EstimatedClock(
-        clock=at,
-        stride=clock.stride,
-        window=clock.window,
-        next_knot=clock.next_knot,
-        filled=clock.filled,
-        learnt=learnt,
-        moved=clock.moved,
-    )
+    return clock._replace(clock=at, learnt=learnt)
 
 
 def gait_time(rules: EstimatedRules, clock: EstimatedClock, phase: PhaseState) -> GaitTime:
@@ -266,7 +259,7 @@ def gait_time(rules: EstimatedRules, clock: EstimatedClock, phase: PhaseState) -
     return place_in_stride(clock.clock, rules.delays.valve_delay, phase)
 
 
-KIND = TimingKind(
+ESTIMATED = TimingKind(
     name="estimated",
     summary="State estimation: a window of angle and forces fitted to a learnt stride by least squares.",
     source="Li, Becker, Shorter, Bretl, Hsiao-Wecksler, IEEE/ASME Trans Mechatronics 16 (2011) 835",

@@ -1,10 +1,70 @@
-"""On/off control with a dead zone and hysteresis: a small error is left alone."""
+"""Laws that open the valve by a fixed amount: always, by the sign of the error (equation 14), or beyond a dead zone."""
 
 from typing import NamedTuple
 
 from ppafo.control.kind import ControllerKind
 from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
+
+
+class ConstantParameters(NamedTuple):
+    """The command [-], -1 to 1."""
+
+    command: float
+
+
+class ConstantState(NamedTuple):
+    """The law has no state."""
+
+
+def constant_update(
+    parameters: ConstantParameters, state: ConstantState, reference: float, measurement: Measurement, period: float
+) -> tuple[float, ConstantState]:
+    """Command from -1 to 1: the setting."""
+    return parameters.command, state
+
+
+CONSTANT = ControllerKind(
+    name="constant",
+    summary="The same command from beginning to end.",
+    source="the paper, section on model validation: valve fully open",
+    quantities=(Quantity("command", "", "command, above 0 feeds chamber 1", 1.0, -1.0, 1.0),),
+    parameters=ConstantParameters,
+    initial=ConstantState(),
+    update=constant_update,
+)
+
+
+ROUNDING = 1.0e-9
+"""N m: an error this small counts as zero, so that rounding does not decide the first command."""
+
+
+class OnOffParameters(NamedTuple):
+    """The law has no parameters; the paper has no dead zone."""
+
+
+class OnOffState(NamedTuple):
+    """The law has no state."""
+
+
+def on_off_update(
+    parameters: OnOffParameters, state: OnOffState, reference: float, measurement: Measurement, period: float
+) -> tuple[float, OnOffState]:
+    """Command: 1 (valve A) where the error [N m] is 0 or more, else -1 (valve B). Equation (14)."""
+    error = reference - measurement.torque
+    return (1.0 if error >= -ROUNDING else -1.0), state
+
+
+ON_OFF = ControllerKind(
+    name="on_off",
+    summary="Valve A where the torque is below the reference, valve B where it is above.",
+    source="the paper, equation (14)",
+    quantities=(),
+    parameters=OnOffParameters,
+    initial=OnOffState(),
+    update=on_off_update,
+    only_switches=True,
+)
 
 
 class OnOffDeadZoneParameters(NamedTuple):
@@ -21,7 +81,7 @@ class OnOffDeadZoneState(NamedTuple):
     direction: float
 
 
-def update(
+def dead_zone_update(
     parameters: OnOffDeadZoneParameters,
     state: OnOffDeadZoneState,
     reference: float,
@@ -41,12 +101,12 @@ def update(
     return direction * parameters.opening, OnOffDeadZoneState(direction)
 
 
-def restart(state: OnOffDeadZoneState, requested: float, continues: float) -> OnOffDeadZoneState:
+def dead_zone_restart(state: OnOffDeadZoneState, requested: float, continues: float) -> OnOffDeadZoneState:
     """The state, reset where another task begins (``continues`` 0, else 1); ``requested`` [N m] is not used."""
     return OnOffDeadZoneState(direction=state.direction * continues)
 
 
-KIND = ControllerKind(
+ON_OFF_DEAD_ZONE = ControllerKind(
     name="on_off_dead_zone",
     summary="On/off with a dead zone and hysteresis: the valve opens for a large error and closes for a small one.",
     source="relay with dead zone and hysteresis: Gelb and Vander Velde 1968, Multiple-Input Describing Functions",
@@ -57,7 +117,7 @@ KIND = ControllerKind(
     ),
     parameters=OnOffDeadZoneParameters,
     initial=OnOffDeadZoneState(0.0),
-    update=update,
-    restart=restart,
+    update=dead_zone_update,
+    restart=dead_zone_restart,
     only_switches=True,
 )

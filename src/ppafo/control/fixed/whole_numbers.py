@@ -1,9 +1,88 @@
-"""What a converter shows of pressures and reference, whether that can be true, and the error that is left."""
+"""What a small processor computes with: products by shifts and additions, gains as whole numbers, converter readings.
 
-from typing import NamedTuple
+A gain is a fraction of 15 bits and a number of places: ``(value * fraction >> 15) >> places``, rounded down each time.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar
 
 from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
+
+FRACTION_BITS = 15
+LARGEST_FRACTION: int = 2**FRACTION_BITS - 1
+HALF: int = 2 ** (FRACTION_BITS - 1)
+"""Added before fifteen shifts to the right: a half of what is left."""
+MOST_PLACES = 30
+WIDEST = 2**30
+"""Size of the largest value that ``fraction_of`` takes without leaving 32 bits."""
+
+Row = TypeVar("Row", bound=tuple[Any, ...])
+
+
+def each(convert: Callable[[float], float], row: Row) -> Row:
+    """A row with each of its numbers, those of nested rows too, converted: whole numbers from floats, and back.
+
+    The engine writes it out number by number, by the class that the row is declared to be.
+    """
+    make: Any = type(row)
+    found: Row = make(*(each(convert, item) if isinstance(item, tuple) else convert(item) for item in row))
+    return found
+
+
+class Gain(NamedTuple):
+    """A factor from 0 up as a fraction of 15 bits and the places by which the product is shifted right."""
+
+    fraction: float
+    places: float
+
+
+def fraction_of(value: int, fraction: int) -> int:
+    """``value`` (2^30 at most in size) times ``fraction`` / 2^15, rounded down at every bit of the fraction."""
+    total = 0
+    left = fraction
+    for _ in range(FRACTION_BITS):
+        total = (total + value if left & 1 == 1 else total) >> 1
+        left = left >> 1
+    return total
+
+
+def nearest_fraction_of(value: int, fraction: int) -> int:
+    """``value`` (2^14 at most in size) times ``fraction`` / 2^15, rounded to the nearest; 16 bits hold all of it."""
+    total = HALF
+    left = fraction
+    for _ in range(FRACTION_BITS):
+        total = (total + value if left & 1 == 1 else total) >> 1
+        left = left >> 1
+    return total
+
+
+def shifted(value: int, places: int) -> int:
+    """``value`` divided by 2 to the power ``places``, rounded down."""
+    result = value
+    for _ in range(places):
+        result = result >> 1
+    return result
+
+
+def limited(value: int, limit: int) -> int:
+    """``value`` within ``limit`` to both sides."""
+    return max(min(value, limit), -limit)
+
+
+def gain_of(factor: float) -> Gain:
+    """A factor from 0 to 32767 times 2^15 as a gain: as many bits as there are, the largest one where it is larger."""
+    if not factor > 0.0:
+        return Gain(0.0, 0.0)
+    _, exponent = math.frexp(factor)
+    places = min(MOST_PLACES, max(0, FRACTION_BITS - exponent))
+    fraction = math.floor(math.ldexp(factor, places) + 0.5)
+    if fraction > LARGEST_FRACTION and places > 0:
+        places -= 1
+        fraction = math.floor(math.ldexp(factor, places) + 0.5)
+    return Gain(float(min(fraction, LARGEST_FRACTION)), float(places))
+
 
 FEWEST_BITS, MOST_BITS = 8, 14
 COMMAND_STEPS = 1000
@@ -35,6 +114,13 @@ class Limits(NamedTuple):
     middle: int
 
 
+class Steps(NamedTuple):
+    """Pressure and torque of one count of a converter [Pa], [N m]."""
+
+    pressure_step: float
+    torque_step: float
+
+
 class Readings(NamedTuple):
     """What the converter shows, from 0 to its largest reading: reference, pressure in chamber 1 and in chamber 2."""
 
@@ -64,9 +150,11 @@ def converter_of(bits: float, pressure_range: float, torque_constant: float) -> 
     )
 
 
-def limits_of(converter: Converter) -> Limits:
-    """The whole numbers of a converter that a law needs."""
-    return Limits(int(converter.top), int(converter.middle))
+def converter_with(steps: Steps, limits: Limits) -> Converter:
+    """The converter with these steps and limits, as the lanes keep both."""
+    return Converter(
+        pressure_step=steps.pressure_step, torque_step=steps.torque_step, top=limits.top, middle=limits.middle
+    )
 
 
 def count_of(value: float, step: float, top: float) -> int:

@@ -1,0 +1,225 @@
+"""Laws that act on the torque error alone: PID (equation (13)), sliding mode, and damped proportional control."""
+
+from typing import Annotated, NamedTuple
+
+from ppafo.control.kind import ControllerKind
+from ppafo.model.declaration import Quantity
+from ppafo.model.sensors import Measurement
+
+
+class PidParameters(NamedTuple):
+    """Gains [1/(N m)], [1/(N m s)], [s/(N m)]; time constant of the derivative filter [s]; back-calculation [1/s]."""
+
+    proportional_gain: float
+    integral_gain: float
+    derivative_gain: float
+    derivative_filter: float
+    anti_windup: float
+
+
+class PidState(NamedTuple):
+    """Integral part of the command [-], error one sample ago [N m], filtered slope of the error [N m/s], start mark."""
+
+    integral: float
+    error: float
+    slope: float
+    started: float
+
+
+def pid_command(
+    parameters: PidParameters, state: PidState, error: float, ahead: float, period: float
+) -> tuple[float, PidState]:
+    """Command from -1 to 1 for a torque error [N m], added to the command ``ahead`` [-]. Equation (13)."""
+    change = (error - state.error) * state.started
+    slope = state.slope + (change - period * state.slope) / (period + parameters.derivative_filter)
+    integral = state.integral + parameters.integral_gain * error * period
+    unlimited = ahead + parameters.proportional_gain * error + integral + parameters.derivative_gain * slope
+    command = max(-1.0, min(1.0, unlimited))
+    integral = integral + parameters.anti_windup * period * (command - unlimited)
+    return command, PidState(integral=integral, error=error, slope=slope, started=1.0)
+
+
+def pid_update(
+    parameters: PidParameters, state: PidState, reference: float, measurement: Measurement, period: float
+) -> tuple[float, PidState]:
+    """Command from -1 to 1 from the torque error [N m]; rectangular integral, backward difference. Equation (13)."""
+    return pid_command(parameters, state, reference - measurement.torque, 0.0, period)
+
+
+def pid_restart(state: PidState, requested: float, continues: float) -> PidState:
+    """The state, reset where another task begins (``continues`` 0, else 1); ``requested`` [N m] is not used."""
+    return state._replace(
+        integral=state.integral * continues, slope=state.slope * continues, started=state.started * continues
+    )
+
+
+PID = ControllerKind(
+    name="pid",
+    summary="Proportional, integral and derivative action on the torque error.",
+    source="the paper, equation (13); gains k_p 0.095, k_i 0.25, k_d 0.006",
+    quantities=(
+        Quantity("proportional_gain", "1/(N m)", "k_p", 0.095, 0.0, 1.0e3),
+        Quantity("integral_gain", "1/(N m s)", "k_i", 0.25, 0.0, 1.0e4),
+        Quantity("derivative_gain", "s/(N m)", "k_d", 0.006, 0.0, 1.0e3),
+        Quantity("derivative_filter", "s", "time constant of the derivative filter, 0 for none", 0.0, 0.0, 1.0),
+        Quantity(
+            "anti_windup", "1/s", "rate of back-calculation while the command is clipped, 0 for none", 0.0, 0.0, 1.0e3
+        ),
+    ),
+    parameters=PidParameters,
+    initial=PidState(integral=0.0, error=0.0, slope=0.0, started=0.0),
+    update=pid_update,
+    restart=pid_restart,
+)
+
+
+class SlidingModeParameters(NamedTuple):
+    """Slope of the surface [1/s], half width of the boundary layer [N m], command outside of it [-]."""
+
+    surface_slope: float
+    boundary_layer: float
+    reaching_command: float
+
+
+class SlidingModeState(NamedTuple):
+    """Integral of the torque error [N m s]."""
+
+    integral: float
+
+
+def sliding_update(
+    parameters: SlidingModeParameters,
+    state: SlidingModeState,
+    reference: float,
+    measurement: Measurement,
+    period: float,
+) -> tuple[float, SlidingModeState]:
+    """Command: saturation of s over the boundary layer, with s = e + slope times the integral of e [N m].
+
+    The integral stands still outside the layer, where a longer error could not open the valve further.
+    """
+    error = reference - measurement.torque
+    integral = state.integral + period * error
+    surface = error + parameters.surface_slope * integral
+    is_inside = abs(surface) < parameters.boundary_layer
+    fraction = max(-1.0, min(1.0, surface / parameters.boundary_layer))
+    return parameters.reaching_command * fraction, SlidingModeState(integral if is_inside else state.integral)
+
+
+def sliding_restart(state: SlidingModeState, requested: float, continues: float) -> SlidingModeState:
+    """The state, reset where another task begins (``continues`` 0, else 1); ``requested`` [N m] is not used."""
+    return SlidingModeState(integral=state.integral * continues)
+
+
+SLIDING_MODE = ControllerKind(
+    name="sliding_mode",
+    summary="Sliding mode on the torque error and its integral, with a boundary layer.",
+    source="Slotine and Li 1991, Applied Nonlinear Control, chapter 7; on pneumatic actuators Bone and Ning 2007",
+    quantities=(
+        Quantity("surface_slope", "1/s", "weight of the error's integral in the surface", 14.0, 0.0, 1.0e3),
+        Quantity("boundary_layer", "N m", "half width of the layer without switching", 0.13, 1.0e-6, 100.0),
+        Quantity("reaching_command", "", "command outside the layer", 0.14, 0.0, 1.0),
+    ),
+    parameters=SlidingModeParameters,
+    initial=SlidingModeState(0.0),
+    update=sliding_update,
+    restart=sliding_restart,
+)
+
+
+KNOTS = 31
+
+
+class DampedProportionalParameters(NamedTuple):
+    """Gain [1/(N m)], damping [s/(N m)], its filter [s], time between knots [s]; learnt commands [-] at the knots."""
+
+    proportional_gain: float
+    damping: float
+    damping_filter: float
+    knot_spacing: float
+    knots: Annotated[tuple[float, ...], KNOTS]
+
+
+class DampedGains(NamedTuple):
+    """Gain [1/(N m)], damping [s/(N m)], time constant of its filter [s]."""
+
+    proportional_gain: float
+    damping: float
+    damping_filter: float
+
+
+class TorqueSlope(NamedTuple):
+    """Torque one sample ago [N m], its filtered rate [N m/s], start mark."""
+
+    torque: float
+    slope: float
+    started: float
+
+
+class DampedProportionalState(NamedTuple):
+    """Time since the start [s], and the torque's course."""
+
+    elapsed: float
+    course: TorqueSlope
+
+
+def learnt_command(parameters: DampedProportionalParameters, elapsed: float) -> float:
+    """Command [-] of the table at a time since the start [s]: straight between knots, the last one held."""
+    position = min(elapsed / parameters.knot_spacing, KNOTS - 1.0)
+    before = min(int(position), KNOTS - 2)
+    fraction = position - before
+    first = parameters.knots[before]
+    return first + fraction * (parameters.knots[before + 1] - first)
+
+
+def damped_command(
+    gains: DampedGains, course: TorqueSlope, reference: float, torque: float, ahead: float, period: float
+) -> tuple[float, TorqueSlope]:
+    """Command from -1 to 1: gain times torque error, less damping times the rate of the torque, plus ``ahead`` [-].
+
+    Reference and torque [N m], period [s]. Damping acts on the rate of the torque, not of the error, so that a step of
+    the reference gives no kick.
+    """
+    change = (torque - course.torque) * course.started
+    slope = course.slope + (change - period * course.slope) / (period + gains.damping_filter)
+    feedback = gains.proportional_gain * (reference - torque) - gains.damping * slope
+    return max(-1.0, min(1.0, feedback + ahead)), TorqueSlope(torque, slope, 1.0)
+
+
+def damped_update(
+    parameters: DampedProportionalParameters,
+    state: DampedProportionalState,
+    reference: float,
+    measurement: Measurement,
+    period: float,
+) -> tuple[float, DampedProportionalState]:
+    """Command from -1 to 1 by ``damped_command``, on top of the learnt command of the table."""
+    gains = DampedGains(parameters.proportional_gain, parameters.damping, parameters.damping_filter)
+    ahead = learnt_command(parameters, state.elapsed)
+    command, course = damped_command(gains, state.course, reference, measurement.torque, ahead, period)
+    return command, DampedProportionalState(state.elapsed + period, course)
+
+
+GAIN_QUANTITIES = (
+    Quantity("proportional_gain", "1/(N m)", "command per torque error", 1.7, 0.0, 1.0e3),
+    Quantity("damping", "s/(N m)", "command per rate of the torque, against it", 0.0067, 0.0, 1.0e3),
+    Quantity("damping_filter", "s", "time constant of the filter on the torque's rate", 0.0011, 0.0, 10.0),
+)
+"""Fields of ``DampedGains`` in order."""
+
+DAMPED_PROPORTIONAL = ControllerKind(
+    name="damped_proportional",
+    summary="Proportional control with damping injection and a feed-forward table that iterative learning fills.",
+    source="Zhang, Cheah and Collins 2015, Experimental comparison of torque control methods on an ankle exoskeleton",
+    quantities=(
+        *GAIN_QUANTITIES,
+        Quantity("knot_spacing", "s", "time between two knots of the table", 0.1, 1.0e-3, 1.0e3),
+        *(
+            Quantity(f"knot_{number}", "", f"learnt command at knot {number}", 0.0, -1.0, 1.0)
+            for number in range(KNOTS)
+        ),
+    ),
+    parameters=DampedProportionalParameters,
+    initial=DampedProportionalState(0.0, TorqueSlope(0.0, 0.0, 0.0)),
+    update=damped_update,
+)

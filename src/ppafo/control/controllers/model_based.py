@@ -1,0 +1,234 @@
+"""Laws with a model of the device: what they believe of it, its inverse, and two controllers that use it.
+
+The model is equations (2) to (9) for a proportional valve, with the ellipse of ISO 6358 for the flow function. Every
+number is the controller's own, so that it can be wrong about the device as a real controller is.
+"""
+
+import math
+from typing import NamedTuple
+
+from ppafo.control.controllers.feedback import PidParameters, PidState, pid_command, pid_restart
+from ppafo.control.kind import ControllerKind
+from ppafo.model.chambers import chamber_1_volume, chamber_2_volume
+from ppafo.model.declaration import Quantity
+from ppafo.model.sensors import Measurement
+
+SMALLEST_GAIN = 1.0e-3
+"""N m/s: where full opening changes the torque no faster, the valve opens fully and the result is clipped."""
+
+
+class NominalChambers(NamedTuple):
+    """The believed device, SI units; conductances are Cd A C1 [kg/(s Pa)], ``gas_product`` is R T / M [J/kg]."""
+
+    torque_constant: float
+    volume_per_angle: float
+    angle_min: float
+    angle_max: float
+    dead_volume_1: float
+    dead_volume_2: float
+    gas_product: float
+    valve_conductance: float
+    leak_conductance: float
+    critical_ratio: float
+    supply_pressure: float
+    dorsiflexion_pressure: float
+    atmospheric_pressure: float
+
+
+class TorqueRates(NamedTuple):
+    """Torque rate of the closed valve [N m/s], and what full opening either way adds to or takes from it [N m/s]."""
+
+    closed: float
+    rising: float
+    falling: float
+
+
+NOMINAL_QUANTITIES = (
+    Quantity("torque_constant", "m^3", "believed K_actuator", 1.451e-5, 1.0e-9, 1.0),
+    Quantity("volume_per_angle", "m^3/rad", "believed B_vane", 5.1e-5, 1.0e-9, 1.0),
+    Quantity("angle_min", "rad", "believed lower stop", math.radians(20.0), -10.0, 10.0),
+    Quantity("angle_max", "rad", "believed upper stop", math.radians(130.0), -10.0, 10.0),
+    Quantity("dead_volume_1", "m^3", "believed dead volume of chamber 1", 2.0e-6, 1.0e-9, 1.0),
+    Quantity("dead_volume_2", "m^3", "believed dead volume of chamber 2", 2.0e-6, 1.0e-9, 1.0),
+    Quantity("gas_product", "J/kg", "believed R T / M, that of CO2 at 298 K", 5.6308454545e4, 1.0e3, 1.0e7),
+    Quantity("valve_conductance", "kg/(s Pa)", "believed Cd A C1 of the valve", 1.0040962467e-8, 1.0e-15, 1.0),
+    Quantity("leak_conductance", "kg/(s Pa)", "believed Cd A C1 of the leak", 9.532559304e-11, 0.0, 1.0),
+    Quantity("critical_ratio", "", "believed critical pressure ratio, ISO 6358", 0.545727733814, 0.01, 0.95),
+    Quantity("supply_pressure", "Pa_a", "believed pressure to chamber 1", 446062.864658, 1.0e3, 1.0e8),
+    Quantity("dorsiflexion_pressure", "Pa_a", "believed pressure to chamber 2", 446062.864658, 1.0e3, 1.0e8),
+    Quantity("atmospheric_pressure", "Pa_a", "believed atmosphere", 101325.0, 1.0e3, 1.0e8),
+)
+"""Fields of ``NominalChambers`` in order; the defaults are those of the set ppafo2011 with its proportional valve."""
+
+
+def ellipse_flow(pressure_a: float, pressure_b: float, conductance: float, critical_ratio: float) -> float:
+    """Mass flow from a to b [kg/s] by the ellipse of ISO 6358, antisymmetric; conductance [kg/(s Pa)]."""
+    upstream = max(pressure_a, pressure_b)
+    ratio = min(pressure_a, pressure_b) / upstream
+    position = max(0.0, min(1.0, (ratio - critical_ratio) / (1.0 - critical_ratio)))
+    flow = conductance * upstream * math.sqrt(1.0 - position * position)
+    return flow if pressure_a >= pressure_b else -flow
+
+
+def torque_rates(
+    nominal: NominalChambers, angle: float, angular_velocity: float, pressure_1: float, pressure_2: float
+) -> TorqueRates:
+    """Believed rates of K (P_1 - P_2) [N m/s] at an angle [rad], its rate [rad/s] and absolute pressures [Pa].
+
+    Equations (2) to (9). Opening the valve raises or lowers the torque as it should where both pressures are above the
+    atmosphere: the believed supplies let gas in only.
+    """
+    least = min(nominal.dead_volume_1, nominal.dead_volume_2)
+    volume_1 = chamber_1_volume(angle, nominal.angle_min, nominal.volume_per_angle, nominal.dead_volume_1)
+    volume_2 = chamber_2_volume(angle, nominal.angle_max, nominal.volume_per_angle, nominal.dead_volume_2)
+    volume_1, volume_2 = max(volume_1, least), max(volume_2, least)
+    ratio, valve = nominal.critical_ratio, nominal.valve_conductance
+    leak = ellipse_flow(pressure_1, pressure_2, nominal.leak_conductance, ratio)
+    feed_1 = max(ellipse_flow(nominal.supply_pressure, pressure_1, valve, ratio), 0.0)
+    vent_2 = ellipse_flow(pressure_2, nominal.atmospheric_pressure, valve, ratio)
+    feed_2 = max(ellipse_flow(nominal.dorsiflexion_pressure, pressure_2, valve, ratio), 0.0)
+    vent_1 = ellipse_flow(pressure_1, nominal.atmospheric_pressure, valve, ratio)
+    per_flow = nominal.torque_constant * nominal.gas_product
+    swept = nominal.torque_constant * nominal.volume_per_angle * angular_velocity
+    closed = -per_flow * leak * (1.0 / volume_1 + 1.0 / volume_2)
+    closed = closed - swept * (pressure_1 / volume_1 + pressure_2 / volume_2)
+    rising = per_flow * (feed_1 / volume_1 + vent_2 / volume_2)
+    falling = per_flow * (vent_1 / volume_1 + feed_2 / volume_2)
+    return TorqueRates(closed, rising, falling)
+
+
+def opening_for_rate(rates: TorqueRates, requested: float) -> float:
+    """Opening from -1 to 1 that gives a torque rate [N m/s], the inverse of ``torque_rates``; clipped to full."""
+    needed = requested - rates.closed
+    gain = rates.rising if needed >= 0.0 else rates.falling
+    return max(-1.0, min(1.0, needed / max(gain, SMALLEST_GAIN)))
+
+
+NEARLY_SUPPLY = 0.999
+"""Largest fraction of the supply pressure that the feed-forward plans for: above it no opening follows a demand."""
+
+
+class PidFeedforwardParameters(NamedTuple):
+    """Gains of the feedback, weight of the feed-forward [-], and the believed device."""
+
+    feedback: PidParameters
+    feedforward: float
+    nominal: NominalChambers
+
+
+class PidFeedforwardState(NamedTuple):
+    """The state of the PID, and the reference one sample ago [N m]."""
+
+    feedback: PidState
+    reference: float
+
+
+def rates_on_reference(nominal: NominalChambers, reference: float, angle: float) -> TorqueRates:
+    """Believed torque rates of a vane at rest whose torque is the reference [N m] with the other chamber vented."""
+    ambient = nominal.atmospheric_pressure
+    above = reference / nominal.torque_constant
+    pressure_1 = min(ambient + max(above, 0.0), NEARLY_SUPPLY * nominal.supply_pressure)
+    pressure_2 = min(ambient + max(-above, 0.0), NEARLY_SUPPLY * nominal.dorsiflexion_pressure)
+    return torque_rates(nominal, angle, 0.0, pressure_1, pressure_2)
+
+
+def feedforward_update(
+    parameters: PidFeedforwardParameters,
+    state: PidFeedforwardState,
+    reference: float,
+    measurement: Measurement,
+    period: float,
+) -> tuple[float, PidFeedforwardState]:
+    """Command from -1 to 1: PID of the torque error [N m], equation (13), and the opening for the reference's rate."""
+    rate = (reference - state.reference) / period * state.feedback.started
+    rates = rates_on_reference(parameters.nominal, reference, measurement.angle)
+    ahead = parameters.feedforward * opening_for_rate(rates, rate)
+    error = reference - measurement.torque
+    command, feedback = pid_command(parameters.feedback, state.feedback, error, ahead, period)
+    return command, PidFeedforwardState(feedback, reference)
+
+
+def feedforward_restart(state: PidFeedforwardState, requested: float, continues: float) -> PidFeedforwardState:
+    """The state, reset where another task begins (``continues`` 0, else 1); the reference [N m] then has no rate."""
+    return state._replace(feedback=pid_restart(state.feedback, requested, continues))
+
+
+PID_FEEDFORWARD = ControllerKind(
+    name="pid_feedforward",
+    summary="PID on the torque error, with feed-forward from a valve model along the reference.",
+    source="the paper, equation (13), with the inverse of equations (2) to (9); Åström and Hägglund 2006, Advanced PID",
+    quantities=(
+        Quantity("proportional_gain", "1/(N m)", "k_p", 1.1, 0.0, 1.0e3),
+        Quantity("integral_gain", "1/(N m s)", "k_i", 3.3, 0.0, 1.0e5),
+        Quantity("derivative_gain", "s/(N m)", "k_d", 0.0061, 0.0, 1.0e3),
+        Quantity("derivative_filter", "s", "time constant of the filter on the slope of the error", 0.0025, 0.0, 10.0),
+        Quantity("anti_windup", "1/s", "rate at which the integral is pulled back, 0 for none", 0.33, 0.0, 1.0e4),
+        Quantity("feedforward", "", "weight of the feed-forward, 0 for none", 1.0, 0.0, 2.0),
+        *NOMINAL_QUANTITIES,
+    ),
+    parameters=PidFeedforwardParameters,
+    initial=PidFeedforwardState(PidState(integral=0.0, error=0.0, slope=0.0, started=0.0), 0.0),
+    update=feedforward_update,
+    restart=feedforward_restart,
+)
+
+
+class FeedbackLinearisationParameters(NamedTuple):
+    """Decay rate of the error [1/s], filter of the angle's rate [s], and the believed device."""
+
+    convergence_rate: float
+    rate_filter: float
+    nominal: NominalChambers
+
+
+class FeedbackLinearisationState(NamedTuple):
+    """Reference [N m] and angle [rad] one sample ago, filtered angular velocity [rad/s], start mark."""
+
+    reference: float
+    angle: float
+    angular_velocity: float
+    started: float
+
+
+def linearising_update(
+    parameters: FeedbackLinearisationParameters,
+    state: FeedbackLinearisationState,
+    reference: float,
+    measurement: Measurement,
+    period: float,
+) -> tuple[float, FeedbackLinearisationState]:
+    """Command: the opening for which the believed chambers change the torque by r' + rate (r - torque) [N m/s]."""
+    reference_rate = (reference - state.reference) / period * state.started
+    turned = (measurement.angle - state.angle) * state.started
+    velocity = state.angular_velocity
+    velocity = velocity + (turned - period * velocity) / (period + parameters.rate_filter)
+    rates = torque_rates(
+        parameters.nominal, measurement.angle, velocity, measurement.pressure_1, measurement.pressure_2
+    )
+    requested = reference_rate + parameters.convergence_rate * (reference - measurement.torque)
+    return opening_for_rate(rates, requested), FeedbackLinearisationState(
+        reference=reference, angle=measurement.angle, angular_velocity=velocity, started=1.0
+    )
+
+
+def linearising_restart(
+    state: FeedbackLinearisationState, requested: float, continues: float
+) -> FeedbackLinearisationState:
+    """The state; where another task begins (``continues`` 0, else 1), the requested torque [N m] has no rate yet."""
+    return state._replace(reference=state.reference if continues > 0.5 else requested)
+
+
+FEEDBACK_LINEARISATION = ControllerKind(
+    name="feedback_linearisation",
+    summary="Chamber dynamics inverted at the measured pressures and angle: the torque error decays at a chosen rate.",
+    source="Slotine and Li 1991, Applied Nonlinear Control, chapter 6; on pneumatic actuators Richer and Hurmuzlu 2000",
+    quantities=(
+        Quantity("convergence_rate", "1/s", "rate at which the torque error decays", 93.0, 0.0, 1.0e5),
+        Quantity("rate_filter", "s", "time constant of the filter on the angle's rate", 0.0054, 0.0, 10.0),
+        *NOMINAL_QUANTITIES,
+    ),
+    parameters=FeedbackLinearisationParameters,
+    initial=FeedbackLinearisationState(reference=0.0, angle=0.0, angular_velocity=0.0, started=0.0),
+    update=linearising_update,
+    restart=linearising_restart,
+)

@@ -1,1 +1,0 @@
-"""Event-based walking on whole numbers: readings are counts of a converter, times are counts of samples."""
