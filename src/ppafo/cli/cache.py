@@ -21,9 +21,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(parsed: argparse.Namespace) -> int:
     """Compile or remove programs as requested, and list what is there."""
-    from ppafo.engine.cache import cache_folder, clear
+    from ppafo.engine.cache import cache_folder, clear, refusal
     from ppafo.engine.kept import clear_kept
-    from ppafo.engine.private_folder import refusal
 
     check_output(parsed)
     folder = cache_folder()

@@ -16,19 +16,23 @@ import stat
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextvars import ContextVar, copy_context
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import ModuleType
 
 from ppafo.documents.regular_file import read_regular_file
-from ppafo.engine.compile_times import SECONDS_FILE, announce, compile_side_by_side, estimate_seconds
 from ppafo.engine.compilers import Compiler
-from ppafo.engine.private_folder import WRITTEN_BY_OTHERS, refusal
-from ppafo.engine.program_lock import LOCK, one_process
 from ppafo.engine.source_text import without_origins
 from ppafo.errors import reason
+from ppafo.progress import time_text
+
+try:
+    import fcntl
+except ImportError:  # not on this system: each process compiles for itself
+    fcntl = None  # type: ignore[assignment]
 
 logger = logging.getLogger("ppafo")
 
@@ -38,6 +42,20 @@ LONGEST_UNUSED = 90.0 * 86400.0
 
 MAXIMUM_BYTES = 500_000_000
 """Size of all programs above which those that were not used for longest are removed."""
+
+WRITTEN_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
+
+LONGEST_WAIT = 300.0
+"""Seconds after which a process compiles for itself, whoever holds the lock; one that has died holds none."""
+_PAUSE = 0.05
+LOCK = ".lock-"
+"""Beginning of the name of a lock file; the rest is the program's."""
+QUIET = 2.0
+"""Seconds of compiling that nobody has to hear of."""
+SECONDS_FILE = "seconds.txt"
+"""The file of a kept program that says how long it took to compile [s]."""
+_MAXIMUM_ASKED = 20
+_models: ContextVar[int] = ContextVar("models that are compiled together", default=0)
 
 _PROGRAM = re.compile(r"ppafo_[a-z]+_[0-9a-f]{24}(-[0-9a-f]{12}|\..+)?")
 """What the name of a program looks like; beside it, one of an earlier release, which lay in several files."""
@@ -308,3 +326,138 @@ def _remove(place: Path) -> None:
             shutil.rmtree(aside)
         else:
             place.unlink()
+
+
+def refusal(folder: Path | None) -> str:
+    """Return why programs are neither read from nor kept in a folder, as the end of a sentence; empty where they are.
+
+    The folder is made if need be. It must be this user's own and no link, and nobody else may write it or put another
+    in its place.
+    """
+    if folder is None:
+        return "this user has no home folder"
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with contextlib.suppress(FileExistsError):
+            folder.mkdir(mode=0o700)
+        found = folder.lstat()
+        above = [place.stat() for place in Path(os.path.realpath(folder)).parents]
+    except (OSError, ValueError) as error:
+        return f"{folder} cannot be made: {reason(error)}"
+    whose = _why_not_private(folder, found, above)
+    if whose or os.access(folder, os.W_OK | os.X_OK):
+        return whose
+    return f"{folder} cannot be written"
+
+
+def _why_not_private(folder: Path, found: os.stat_result, above: list[os.stat_result]) -> str:
+    if not stat.S_ISDIR(found.st_mode):
+        return f"{folder} is {'a link' if stat.S_ISLNK(found.st_mode) else 'not a folder'}"
+    if not hasattr(os, "geteuid"):
+        return ""
+    if found.st_uid != os.geteuid():
+        return f"{folder} belongs to another user"
+    if found.st_mode & WRITTEN_BY_OTHERS:
+        return f"others can write into {folder}; 'ppafo cache --clear' and 'chmod 700' make it safe"
+    is_exchanged = any(_can_be_exchanged(place) for place in above)
+    return f"others can put another folder in the place of {folder}" if is_exchanged else ""
+
+
+def _can_be_exchanged(place: os.stat_result) -> bool:
+    """Tell whether another user can rename what lies in a folder."""
+    is_theirs = place.st_uid not in (0, os.geteuid())
+    return is_theirs or bool(place.st_mode & stat.S_IWOTH and not place.st_mode & stat.S_ISVTX)
+
+
+@contextlib.contextmanager
+def one_process(kept: Path) -> Iterator[None]:
+    """Hold the lock of a program while it is compiled; where none can be had, go on without."""
+    place = kept.with_name(LOCK + kept.name)
+    held = _lock(place)
+    try:
+        yield
+    finally:
+        if held is not None:
+            with contextlib.suppress(OSError):
+                place.unlink()
+            os.close(held)
+
+
+def _lock(place: Path) -> int | None:
+    """Open and lock a file, waiting for who has it; None where that cannot be done."""
+    if fcntl is None:
+        return None
+    end = time.monotonic() + LONGEST_WAIT
+    while time.monotonic() < end:
+        try:
+            file = os.open(place, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW, 0o600)
+        except OSError:
+            return None
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            # Who had it before may have removed it in the meantime: then others lock another file of this name.
+            if os.path.samestat(os.fstat(file), os.lstat(place)):
+                return file
+        except BlockingIOError:
+            time.sleep(_PAUSE)
+        except FileNotFoundError:
+            pass
+        except OSError:
+            os.close(file)
+            return None
+        os.close(file)
+    return None
+
+
+def compile_side_by_side(tasks: Sequence[Callable[[], object]], expected: float, where: str) -> None:
+    """Compile several models on all cores, with one message about all; ``expected`` [s] is the time on one core."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    workers = min(len(tasks), os.cpu_count() or 1)
+    with announce(expected / workers, where, len(tasks)), ThreadPoolExecutor(workers) as pool:
+        known = _models.set(len(tasks))
+        try:
+            started = [pool.submit(copy_context().run, task) for task in tasks]
+        finally:
+            _models.reset(known)
+        for task in started:
+            task.result()
+
+
+@contextlib.contextmanager
+def announce(expected: float, where: str, models: int = 1) -> Iterator[None]:
+    """Say, once it takes longer than ``QUIET``, what is compiled and about how long [s] that takes, and how it ended.
+
+    Nothing is said of what is quick, and of one of several models that are announced together.
+    """
+    if _models.get():
+        yield
+        return
+    what = "a model" if models == 1 else f"{models} models"
+    text = f"ppafo: compiling {what} for this computer, about {time_text(max(expected, QUIET))} ..."
+    timer = threading.Timer(QUIET, logger.warning, (text,))
+    timer.daemon = True
+    start = time.perf_counter()
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        timer.join()
+    seconds = time.perf_counter() - start
+    if seconds >= QUIET:
+        logger.warning("ppafo: compiled in %.1f s and %s", seconds, where)
+
+
+def estimate_seconds(source: str, kept: Iterable[Path], usual: float) -> float:
+    """Return about how long [s] a source takes to compile, from how long the kept programs of this computer took."""
+    import statistics
+
+    rates = []
+    for folder in kept:
+        with contextlib.suppress(OSError, ValueError, StopIteration):
+            seconds = float((folder / SECONDS_FILE).read_text(encoding="ascii"))
+            rates.append(seconds / next(folder.glob("*.py")).stat().st_size)
+        if len(rates) == _MAXIMUM_ASKED:
+            break
+    return len(source) * (statistics.median(rates) if rates else usual)

@@ -15,8 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ppafo.documents.regular_file import read_regular_file
-from ppafo.engine.cache import LONGEST_UNUSED, cache_folder
-from ppafo.engine.private_folder import WRITTEN_BY_OTHERS, refusal
+from ppafo.engine.cache import LONGEST_UNUSED, WRITTEN_BY_OTHERS, cache_folder, refusal
 
 FOLDER = "made"
 """Folder of these files in that of the programs."""

@@ -15,9 +15,8 @@ from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 
-from ppafo.engine.cache import cache_folder, is_kept, load_all, load_generated, note_name
+from ppafo.engine.cache import cache_folder, is_kept, load_all, load_generated, note_name, refusal
 from ppafo.engine.compilers import OFFERED, Compiler, CompilerError
-from ppafo.engine.private_folder import refusal
 from ppafo.errors import ProgramError, SimulationError, nearest_name, one_line
 
 logger = logging.getLogger("ppafo")

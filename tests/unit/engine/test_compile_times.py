@@ -7,9 +7,8 @@ from types import ModuleType
 
 import pytest
 
-from ppafo.engine import cache, compile_times
-from ppafo.engine.cache import load_generated
-from ppafo.engine.compile_times import announce, compile_side_by_side, estimate_seconds
+from ppafo.engine import cache
+from ppafo.engine.cache import announce, compile_side_by_side, estimate_seconds, load_generated
 from ppafo.engine.numba_compiler import NumbaCompiler
 from ppafo.errors import ProgramError
 
@@ -18,7 +17,7 @@ QUICK = "answer = {}\n"
 
 @pytest.fixture(autouse=True)
 def _soon(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compile_times, "QUIET", 0.05)
+    monkeypatch.setattr(cache, "QUIET", 0.05)
 
 
 def test_nothing_is_said_of_what_is_quick(caplog: pytest.LogCaptureFixture) -> None:

@@ -8,10 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.engine import numba_compiler, program_lock
-from ppafo.engine.cache import load_generated
+from ppafo.engine import cache, numba_compiler
+from ppafo.engine.cache import LOCK, load_generated, one_process
 from ppafo.engine.numba_compiler import NumbaCompiler
-from ppafo.engine.program_lock import LOCK, one_process
 from ppafo.errors import ProgramError
 
 HEADER = "from collections import namedtuple\n\nimport math\nfrom numba import njit\n\nFAST = {fast}\n"
@@ -123,7 +122,7 @@ def test_killed_process_holds_no_lock(fresh_cache: Path, tmp_path: Path) -> None
 
 
 def test_process_that_waits_too_long_goes_on_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(program_lock, "LONGEST_WAIT", 0.2)
+    monkeypatch.setattr(cache, "LONGEST_WAIT", 0.2)
     with one_process(tmp_path / "program"):
         begin = time.monotonic()
         with one_process(tmp_path / "program"):

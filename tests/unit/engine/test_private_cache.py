@@ -11,9 +11,8 @@ from pathlib import Path
 import pytest
 
 from ppafo.engine import cache
-from ppafo.engine.cache import cache_folder, clear, evict, list_programs, load_generated
+from ppafo.engine.cache import cache_folder, clear, evict, list_programs, load_generated, refusal
 from ppafo.engine.numba_compiler import NumbaCompiler
-from ppafo.engine.private_folder import refusal
 
 SOURCE = 'from numba import njit\n\n\n@njit("float64(float64)", cache=True)\ndef twice(x):\n    return 2.0 * x\n'
 
