@@ -28,19 +28,27 @@ def is_row(candidate: object) -> bool:
 
 
 class Composer(ast.NodeTransformer):
-    """Rewrites the body of one function; ``add`` adds another to the module, ``note`` keeps what was looked up."""
+    """Rewrites the body of one function; ``add`` adds another to the module, ``note`` keeps what was looked up.
+
+    ``rows_of`` says which rows of effects a function that was added needs: each call hands them over before its own
+    arguments. ``needed`` has those that this function must be handed in its turn, because it has no such parameter.
+    """
 
     def __init__(
         self,
         function: types.FunctionType,
         add: Callable[[Any], str],
         note: Callable[[Mapping[str, Any], str, Any], None],
+        rows_of: Callable[[str], tuple[str, ...]] = lambda _name: (),
     ) -> None:
         self.function = function
         self.add = add
         self.note = note
+        self.rows_of = rows_of
         self.local = frozenset(function.__code__.co_varnames)
         self.kinds: dict[str, Any] = dict(function.__annotations__)
+        self.given = frozenset(_parameters(function.__code__))
+        self.needed: set[str] = set()
 
     def refuse(self, where: ast.AST, problem: str) -> ProgramError:
         """The error for a place in the function."""
@@ -71,13 +79,13 @@ class Composer(ast.NodeTransformer):
     def visit_Name(self, node: ast.Name) -> ast.expr:
         """Replace a name from outside."""
         value = self.value_of(node)
-        return node if value is _INSIDE else self.stand_in(value, node)
+        return node if value is _INSIDE else self.handed_over(value, node)
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
         """Replace ``module.name``. ProgramError where it cannot be compiled."""
         value = self.value_of(node)
         if value is not _INSIDE:
-            return self.stand_in(value, node)
+            return self.handed_over(value, node)
         owner = self.value_of(node.value)
         if owner is not _INSIDE and not isinstance(owner, tuple):
             raise self.refuse(node, f"'{ast.unparse(node)}' is of a {type(owner).__name__}, which cannot be compiled")
@@ -102,11 +110,27 @@ class Composer(ast.NodeTransformer):
         if isinstance(called, types.FunctionType) or is_row(called):
             own = self.own_arguments(called, node)
         function = self.stand_in(called, node.func)
-        arguments = [self.visit(item) for item in node.args]
+        arguments = [*self.rows_for(function, node), *(self.visit(item) for item in node.args)]
         if not own:
             named = [ast.keyword(item.arg, self.visit(item.value)) for item in node.keywords]
             return ast.Call(function, arguments, named)
         return ast.Call(function, [*arguments, *own], [])
+
+    def rows_for(self, function: ast.expr, node: ast.AST) -> list[ast.expr]:
+        """Rows of effects that a function of the module is handed first. ProgramError where a local name hides one."""
+        rows = self.rows_of(function.id) if isinstance(function, ast.Name) else ()
+        for row in rows:
+            if row in self.local - self.given:
+                raise self.refuse(node, f"the local name '{row}' hides the row of the effect '{row}'; rename it")
+        self.needed.update(row for row in rows if row not in self.given)
+        return [ast.Name(row, ast.Load()) for row in rows]
+
+    def handed_over(self, value: Any, node: ast.expr) -> ast.expr:
+        """What is written for a value that is not called. ProgramError for a function that needs rows of effects."""
+        found = self.stand_in(value, node)
+        if isinstance(found, ast.Name) and self.rows_of(found.id):
+            raise self.refuse(node, f"an effect acts inside '{ast.unparse(node)}', so that it can only be called")
+        return found
 
     def own_arguments(self, called: Any, node: ast.Call) -> list[ast.expr]:
         """Fields of a NamedTuple after those given by place, where some have the defaults of its class; else none.

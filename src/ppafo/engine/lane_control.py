@@ -1,6 +1,6 @@
 """What the lanes do at a sample: sense, control, and keep what sensors and valve get late."""
 
-from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
+from ppafo.engine.lane_rows import LaneRows, indent
 from ppafo.engine.scheme.parts import SAME_INSTANT
 from ppafo.engine.scheme.pneumatics import held_pressures
 from ppafo.engine.scheme.shaped_gas import seen_with_torque, torque_at
@@ -35,7 +35,7 @@ def control_loop(rows: LaneRows) -> list[str]:
         *rows.store("controller_state"),
         f"{rows.cells['result.command']} = command",
     ]
-    return ["if step_index % steps_per_sample == 0:", *indent([*places(rows), *over_lanes(lines)])]
+    return ["if step_index % steps_per_sample == 0:", *indent([*places(rows), *rows.over_lanes(lines)])]
 
 
 def places(rows: LaneRows) -> list[str]:
@@ -131,7 +131,7 @@ def signals_before_start(rows: LaneRows) -> list[str]:
     return [
         "if step_index == 0:",
         "    for slot in range(signal_history.shape[1]):",
-        *indent(over_lanes(lines), 2),
+        *indent(rows.over_lanes(lines), 2),
     ]
 
 
@@ -171,4 +171,4 @@ def remember_commands(rows: LaneRows) -> list[str]:
     lines = [
         f"command_history[command_place, lane] = {rows.cells['result.command']}",
     ]
-    return ["command_place = step_index % command_history.shape[0]", *over_lanes(lines)]
+    return ["command_place = step_index % command_history.shape[0]", *rows.over_lanes(lines)]

@@ -5,7 +5,7 @@ once before the first sample, then followed.
 """
 
 from ppafo.engine.lane_control import present_pressures, torque_line
-from ppafo.engine.lane_rows import LaneRows, indent, over_lanes
+from ppafo.engine.lane_rows import LaneRows, indent
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths
 from ppafo.signals.meter import SAME_LEVEL, Sample, WalkSample, advance_course, is_away
@@ -55,9 +55,9 @@ def _meter_lines(rows: LaneRows, moment: str) -> list[str]:
     lines = [*sample_lines(rows, moment), *follow_lines(rows)]
     return [
         "if next_record == 0:",
-        *indent([*course_lines(rows), *over_lanes([*lines, *begin])]),
+        *indent([*course_lines(rows), *rows.over_lanes([*lines, *begin])]),
         "else:",
-        *indent(over_lanes([*lines, *update])),
+        *indent(rows.over_lanes([*lines, *update])),
     ]
 
 
@@ -132,7 +132,7 @@ def _trace_lines(rows: LaneRows, moment: str) -> list[str]:
     keep = [f"trace[{place}, {row}, lane] = {paths.get(name, name)}" for row, name in enumerate(traced)]
     return [
         "if next_record % trace_every == 0:",
-        *indent(over_lanes([*sample_lines(rows, moment), *keep])),
+        *indent(rows.over_lanes([*sample_lines(rows, moment), *keep])),
     ]
 
 
@@ -152,20 +152,20 @@ def course_lines(rows: LaneRows) -> list[str]:
         f"{cell['largest']} = max(abs({_value(rows, '0')}), abs({cell['last']}))",
         f"{cell['hold_start']} = 0.0",
     ]
-    tolerance = over_lanes([f"{cell['tolerance']} = {SAME_LEVEL!r} * {cell['largest']}"])
+    tolerance = rows.over_lanes([f"{cell['tolerance']} = {SAME_LEVEL!r} * {cell['largest']}"])
     if rows.program.reference.is_monotone:
-        return [*over_lanes(ends), *tolerance]
+        return [*rows.over_lanes(ends), *tolerance]
     away = f"{rows.add(is_away)}({_value(rows, 'index')}, {cell['last']}, {cell['tolerance']})"
     found = f"index + 1.0 if {cell['hold_start']} == 0.0 and {away} else {cell['hold_start']}"
     return [
-        *over_lanes(ends),
+        *rows.over_lanes(ends),
         "for index in range(last_record):",
-        *indent(over_lanes([*given, f"{cell['largest']} = max({cell['largest']}, abs({_value(rows, 'index')}))"])),
+        *indent(rows.over_lanes([*given, f"{cell['largest']} = max({cell['largest']}, abs({_value(rows, 'index')}))"])),
         *tolerance,
         "for index in range(last_record - 1, -1, -1):",
-        *indent(over_lanes([*given, f"{cell['hold_start']} = {found}"])),
+        *indent(rows.over_lanes([*given, f"{cell['hold_start']} = {found}"])),
         "    earliest = 1.0",
-        *indent(over_lanes([f"earliest = min(earliest, {cell['hold_start']})"])),
+        *indent(rows.over_lanes([f"earliest = min(earliest, {cell['hold_start']})"])),
         "    if earliest > 0.0:",
         "        break",
     ]

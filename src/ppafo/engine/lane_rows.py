@@ -8,7 +8,7 @@ from typing import Any, final
 
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
-from ppafo.engine.source_text import Collector
+from ppafo.engine.source_text import Collector, woven
 
 LANES = 32
 """Most runs of a block."""
@@ -50,6 +50,7 @@ class LaneRows:
         self.program = program
         self.lanes = lanes or lanes_of(program)
         self.add: Callable[[Callable[..., Any] | type], str] = collector.add
+        self.needs = collector.needs
         self.state_at = _row_numbers(program.state_rows(), 0)
         self.parameter_at = _row_numbers(program.parameter_rows(), len(self.state_at))
         self.step_at = _row_numbers(program.step_rows(), len(self.state_at) + len(self.parameter_at))
@@ -81,6 +82,25 @@ class LaneRows:
         groups = self.program.step_rows()
         return [f"{self.cells[path]} = {path}" for name in names for path in leaf_paths(groups[name], name)]
 
+    def over_lanes(self, lines: list[str]) -> list[str]:
+        """A loop over all lanes of the block, without loads that nothing in it asks for: they take time to compile.
+
+        Rows of effects are loaded where a function that is called needs them.
+        """
+        lines = woven(lines, self.needs)
+        words = {word for line in lines for word in re.findall(r"\w+", line)}
+        lines = [*[self.load(row) for row in self.program.effect_rows if row in words], *lines]
+        kept: list[str] = []
+        loaded_groups: set[str] = set()
+        for line in reversed(lines):
+            load = _LOAD.fullmatch(line)
+            found = re.findall(r"\w+", line)
+            # A line that names its own group again, as in least = min(least, x), gathers over the lanes.
+            if load is None or load["group"] in loaded_groups or found.count(load["group"]) > 1:
+                kept.append(line)
+                loaded_groups.update(found)
+        return ["for lane in range(width):", *indent(kept[::-1])]
+
 
 def _row_numbers(groups: dict[str, type], first: int) -> dict[str, int]:
     paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
@@ -106,17 +126,3 @@ def count_lanes(name: str, condition: str) -> list[str]:
 def indent(lines: list[str], levels: int = 1) -> list[str]:
     """The lines, some levels further in."""
     return ["    " * levels + line for line in lines]
-
-
-def over_lanes(lines: list[str]) -> list[str]:
-    """A loop over all lanes of the block, without loads that nothing in it asks for: they take time to compile."""
-    kept: list[str] = []
-    loaded_groups: set[str] = set()
-    for line in reversed(lines):
-        load = _LOAD.fullmatch(line)
-        words = re.findall(r"\w+", line)
-        # A line that names its own group again, as in least = min(least, x), gathers over the lanes for what follows.
-        if load is None or load["group"] in loaded_groups or words.count(load["group"]) > 1:
-            kept.append(line)
-            loaded_groups.update(words)
-    return ["for lane in range(width):", *indent(kept[::-1])]

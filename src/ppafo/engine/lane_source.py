@@ -2,10 +2,10 @@
 
 from ppafo.engine.lane_control import control_loop, remember_commands, signals_before_start
 from ppafo.engine.lane_meters import measure_sample
-from ppafo.engine.lane_rows import VECTOR, LaneRows, indent, over_lanes
+from ppafo.engine.lane_rows import VECTOR, LaneRows, indent
 from ppafo.engine.lane_step import find_begin, over_rows, plant_loop
+from ppafo.engine.links import link_program
 from ppafo.engine.program import Program
-from ppafo.engine.scheme.shaped_gas import links_of
 from ppafo.engine.source_text import Collector, SourceCollector
 
 HEADER = '''"""Generated from the functions of ppafo; their hash is in the file name. Not to be edited."""
@@ -74,7 +74,7 @@ def lane_loop(program: Program, collector: Collector, name: str, lanes: int = 0)
 
     That of one lane takes the first column of its arrays, however many there are.
     """
-    collector.links.update(links_of(program.actuator))
+    link_program(program, collector)
     rows = LaneRows(program, collector, lanes)
     body = [
         COMPILED,
@@ -102,7 +102,7 @@ def all_steps(rows: LaneRows) -> list[str]:
     """
     whole = [*at_sample(rows, "step_index"), *plant_loop(rows)]
     step = between_samples(rows) if rows.program.samples_inside else whole
-    start = over_lanes([f"{rows.before} = 0.0"]) if rows.program.is_parted else []
+    start = rows.over_lanes([f"{rows.before} = 0.0"]) if rows.program.is_parted else []
     return [
         "due = next_record * interval",
         "goal = 1.0",

@@ -8,7 +8,7 @@ that are through wait, masked, and no lane sees another.
 
 from ppafo.engine.lane_control import sense_end
 from ppafo.engine.lane_gas import begin_gas, feed, open_valve, pass_gas
-from ppafo.engine.lane_rows import HANDED, LaneRows, RarePhase, count_lanes, indent, over_lanes
+from ppafo.engine.lane_rows import HANDED, LaneRows, RarePhase, count_lanes, indent
 from ppafo.engine.lane_walk import lead_walk, mark_stride, reach_end
 from ppafo.engine.scheme import motion, parts, thermal_gas, walking
 from ppafo.engine.scheme.ankle_torque import carried_foot
@@ -23,10 +23,10 @@ def plant_loop(rows: LaneRows) -> list[str]:
     """Valve, gas and vane up to ``goal`` [-], a share of the step; 1 for programs that are not parted."""
     if rows.program.is_parted:
         return step_in_parts(rows)
-    return over_phases([*opening(rows), "length = timing.step"], phases(rows))
+    return over_phases(rows, [*opening(rows), "length = timing.step"], phases(rows))
 
 
-def over_phases(prelude: list[str], all_phases: list[list[str] | RarePhase]) -> list[str]:
+def over_phases(rows: LaneRows, prelude: list[str], all_phases: list[list[str] | RarePhase]) -> list[str]:
     """Each phase in a loop of its own: loops this short let the processor work on several lanes at once.
 
     It looks some hundred instructions ahead, and one lane's division or root waits for the one before.
@@ -34,10 +34,10 @@ def over_phases(prelude: list[str], all_phases: list[list[str] | RarePhase]) -> 
     lines: list[str] = []
     for phase in all_phases:
         if isinstance(phase, RarePhase):
-            loop = over_lanes([*prelude, *phase.lines])
+            loop = rows.over_lanes([*prelude, *phase.lines])
             lines += [*count_lanes("wanting", f"{phase.cell} > 0.0"), "if wanting > 0:", *indent(loop)]
         else:
-            lines += over_lanes([*prelude, *phase])
+            lines += rows.over_lanes([*prelude, *phase])
     return lines
 
 
@@ -67,7 +67,7 @@ def find_begin(rows: LaneRows) -> list[str]:
     if rows.program.walks:
         carried = f"carried = {rows.add(carried_foot)}(leg, share, walk.now, walk.foot)"
         lines += [*[rows.load(name) for name in ("leg", "share", "walk")], carried, *rows.keep("carried")]
-    return over_lanes(lines)
+    return rows.over_lanes(lines)
 
 
 def step_in_parts(rows: LaneRows) -> list[str]:
@@ -82,15 +82,15 @@ def step_in_parts(rows: LaneRows) -> list[str]:
     return [
         *places,
         f"for part in range({MAXIMUM_PARTS}):",
-        *indent(over_lanes([*part_opening(rows), *measure(rows)])),
+        *indent(rows.over_lanes([*part_opening(rows), *measure(rows)])),
         *indent(put_aside(rows)),
-        *indent(over_phases(inside, phases(rows))),
+        *indent(over_phases(rows, inside, phases(rows))),
         *indent(put_back(rows)),
         *indent(count_lanes("waiting", f"{rows.remaining} > 0.0")),
         "    if waiting == 0:",
         "        break",
         "else:",
-        *indent(over_lanes(give_up(rows))),
+        *indent(rows.over_lanes(give_up(rows))),
     ]
 
 
@@ -101,7 +101,7 @@ def put_aside(rows: LaneRows) -> list[str]:
     kept = f"x[{rows.aside} + row, lane] = x[row, lane]"
     lines = [f"{cell} = {rows.cells[path]}" for path, cell in handed_aside(rows).items()]
     lines.append(f"x[{rows.aside + len(rows.state_at)}, lane] = {rows.remaining}")
-    return ["if part > 0:", *indent([*over_rows(len(rows.state_at), kept), *over_lanes(lines)])]
+    return ["if part > 0:", *indent([*over_rows(len(rows.state_at), kept), *rows.over_lanes(lines)])]
 
 
 def put_back(rows: LaneRows) -> list[str]:
@@ -112,7 +112,7 @@ def put_back(rows: LaneRows) -> list[str]:
     back = f"x[row, lane] = x[row, lane] if {moves} else x[{rows.aside} + row, lane]"
     handed = handed_aside(rows).items()
     lines = [f"{rows.cells[path]} = {rows.cells[path]} if {moves} else {cell}" for path, cell in handed]
-    return ["if part > 0:", *indent([*over_rows(len(rows.state_at), back), *(over_lanes(lines) if lines else [])])]
+    return ["if part > 0:", *indent([*over_rows(len(rows.state_at), back), *(rows.over_lanes(lines) if lines else [])])]
 
 
 def handed_aside(rows: LaneRows) -> dict[str, str]:

@@ -30,6 +30,8 @@ class Outline:
     decorator: str
     adapt: Adaptation = as_it_is
     links: dict[Any, Any] = field(default_factory=dict)
+    effects: dict[Any, tuple[str, ...]] = field(default_factory=dict)
+    needs: dict[str, tuple[str, ...]] = field(default_factory=dict)
     reads: list[Read] = field(default_factory=list)
     functions: list[Made] = field(default_factory=list)
     numbers: dict[Any, int] = field(default_factory=dict)
@@ -56,11 +58,11 @@ class Outline:
         """True while every name and function that was met is what it was then."""
         return is_unchanged(self.reads, self.functions)
 
-    def _described(self, value: Any) -> str:
-        """What a value is in the text; a function or a class is described once, and numbered."""
+    def _described(self, value: Any, inside: Any = None) -> str:
+        """What a value is in the text, read ``inside`` a function; what is described is numbered."""
         value = value.__wrapped__ if isinstance(value, functools._lru_cache_wrapper) else value
         if isinstance(value, FunctionType):
-            value = self.links.get(value, value)
+            value = self.links.get((inside, value), self.links.get(value, value))
         if isinstance(value, FunctionType) or is_row(value):
             if value not in self.numbers:
                 self.numbers[value] = len(self.numbers)
@@ -93,13 +95,15 @@ class Outline:
         given = self._described(function.__defaults__), self._described(tuple(named_defaults.items()))
         codes = list(_codes(code))
         names = sorted({name for inner in codes for name in inner.co_names})
-        read = [f"{name} = {self._described(value)}" for name, value in self._read(function.__globals__, names, ())]
+        read = [
+            f"{name} = {self._described(value, function)}"
+            for name, value in self._read(function.__globals__, names, ())
+        ]
         shapes = [(inner.co_code.hex(), inner.co_names, inner.co_varnames, _constants(inner)) for inner in codes]
         place = code.co_filename, code.co_firstlineno, file_hash(code.co_filename)
-        declared = self._declared(function)
-        return repr(
-            (emitted_name(function), place, code.co_argcount, code.co_kwonlyargcount, shapes, given, read, declared)
-        )
+        counts = code.co_argcount, code.co_kwonlyargcount
+        further = self._declared(function), self.effects.get(function, ())
+        return repr((emitted_name(function), place, *counts, shapes, given, read, *further))
 
     def _read(
         self, scope: dict[str, Any], names: Sequence[str], above: tuple[ModuleType, ...]

@@ -20,6 +20,7 @@ from ppafo.model.actuators.kind import ActuatorModel
 from ppafo.model.actuators.vane import MODEL as VANE
 from ppafo.model.course import Course as WalkCourse
 from ppafo.model.course import Marks
+from ppafo.model.effects.kind import Effect
 from ppafo.model.gait import GaitNow, GaitPlace, GaitSeries, GaitTiming
 from ppafo.model.gait_sensors import GaitSeen, GaitSensors
 from ppafo.model.leg import LegParameters
@@ -80,7 +81,7 @@ class Program:
     samples lie between the steps. ``meters`` are updated at every sample that a recording would have, ``traced`` names
     channels, or paths of the state, that are kept at some of them. ``starts_apart`` True lets the run of each lane
     begin at a step of its own, while others of the block are under way. ``actuator`` is what stands between the
-    chambers and the joint.
+    chambers and the joint. ``effects`` act in this order at the places of their laws.
     """
 
     valve: ValveModel
@@ -102,6 +103,7 @@ class Program:
     traced: tuple[str, ...] = ()
     starts_apart: bool = False
     actuator: ActuatorModel = VANE
+    effects: tuple[Effect, ...] = ()
 
     def parameter_rows(self) -> dict[str, type]:
         """Groups of parameter rows of this program, in order."""
@@ -119,7 +121,13 @@ class Program:
             **({"walk_course": WalkCourse} if self.takes_course else {}),
             **({"lines": SupplyLines} if self.has_lines else {}),
             **({"sensor_rates": SensorRates} if self.slow_sensors else {}),
+            **self.effect_rows,
         }
+
+    @property
+    def effect_rows(self) -> dict[str, type]:
+        """Groups of rows of the effects, by their names."""
+        return {effect.name: effect.parameters for effect in self.effects}
 
     def state_rows(self) -> dict[str, type]:
         """Groups of state rows of this program, in order."""

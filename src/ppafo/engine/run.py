@@ -64,9 +64,10 @@ class Run:
 
     ``step`` divides ``period`` (of the controller). ``valve``, ``controller``, ``reference`` and ``path`` are the
     parameters of the program's pieces, () where it has none. Delays are in seconds. ``tolerance`` is the error over
-    the one that a run is allowed by default. Where one ``Run`` stands for an ensemble, any number in it, whole ones
-    and truth values too, may be an array (runs,); ``needs_parts`` and ``record_every`` then say which of the runs have
-    a program that is adaptive, or that has samples inside its steps, whatever ``program`` says.
+    the one that a run is allowed by default. ``effects`` are the rows of those of the program, in their order. Where
+    one ``Run`` stands for an ensemble, any number in it, whole ones and truth values too, may be an array (runs,);
+    ``needs_parts`` and ``record_every`` then say which of the runs have a program that is adaptive, or that has samples
+    inside its steps, whatever ``program`` says.
     """
 
     program: Program
@@ -91,6 +92,7 @@ class Run:
     walk: Walk | None = None
     lines: Lines | None = None
     sensor_rates: SensorRates | NoParameters = field(default_factory=NoParameters)
+    effects: tuple[Any, ...] = ()
 
     @property
     def period(self) -> float:
@@ -124,7 +126,7 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     plant, valve = [run.plant, run.thermal], [run.valve]
     walk, walk_states = _walk_groups(run.walk)
     lines, line_states = ([], []) if run.lines is None else ([run.lines.parameters], [run.lines.initial])
-    rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, run.sensor_rates]
+    rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, run.sensor_rates, *run.effects]
     parameters = table([timing, *plant, *valve, *rest], runs)
     controller_state = NoParameters() if program.controller is None else program.controller.initial
     # The gas begins at the reference temperature, where its true mass is what the state counts.

@@ -52,6 +52,14 @@ def without_origins(source: str) -> str:
     return "\n".join(line for line in source.split("\n") if not line.startswith(ORIGIN))
 
 
+def woven(lines: Iterable[str], needs: Mapping[str, tuple[str, ...]]) -> list[str]:
+    """Lines of the text around a module, in which calls hand over the rows of effects that functions need."""
+    if not needs:
+        return list(lines)
+    calls = re.compile(rf"\b({'|'.join(map(re.escape, needs))})\(")
+    return [calls.sub(lambda call: f"{call[0]}{', '.join(needs[call[1]])}, ", line) for line in lines]
+
+
 def is_unchanged(reads: Iterable[Read], functions: Iterable[Made]) -> bool:
     """True while every name stands for what it stood for, and every function is what it was."""
     return all(read.scope.get(read.name, read) is read.value for read in reads) and all(
@@ -76,7 +84,15 @@ class Collector(Protocol):
 
     @property
     def links(self) -> dict[Any, Any]:
-        """Functions that stand for others."""
+        """Functions that stand for others; those under a pair stand for its second inside its first alone."""
+
+    @property
+    def effects(self) -> dict[Any, tuple[str, ...]]:
+        """Laws of effects, each with the rows that it asks for by the names of its parameters."""
+
+    @property
+    def needs(self) -> dict[str, tuple[str, ...]]:
+        """Rows of effects that functions of the module are handed before their own arguments, by emitted name."""
 
     def add(self, item: Callable[..., Any] | type) -> str:
         """Add a function or NamedTuple class and all that it needs; return the name it has in the module."""
@@ -89,7 +105,9 @@ class Collector(Protocol):
 class SourceCollector:
     """Gathers definitions in the order in which they must stand; ``adapt`` may write a definition in another way.
 
-    Where a function is among ``links``, the one that it is linked to is added and called in its place.
+    Where a function is among ``links``, the one that it is linked to is added and called in its place; a link under a
+    pair holds inside the first of it. The ``effects`` are laws with the rows that they ask for: whoever calls one is
+    handed these rows in its turn, and so on up to the text around the module (``needs``, ``woven``).
     """
 
     decorator: str
@@ -99,10 +117,14 @@ class SourceCollector:
     reads: list[Read] = field(default_factory=list)
     functions: list[Made] = field(default_factory=list)
     links: dict[Any, Any] = field(default_factory=dict)
+    effects: dict[Any, tuple[str, ...]] = field(default_factory=dict)
+    needs: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     def add(self, item: Callable[..., Any] | type) -> str:
         """Add a function or NamedTuple class and all that it needs; return the name it has in the module."""
-        item = self.links.get(item, item)
+        return self._add(self.links.get(item, item))
+
+    def _add(self, item: Any) -> str:
         if not is_row(item):
             check_is_plain(item)
         name = emitted_name(item)
@@ -146,8 +168,11 @@ class SourceCollector:
         if any(known.function is function for known in self.functions):
             raise refusal(file, tree, f"'{function.__name__}' calls itself, which cannot be compiled")
         self.functions.append(made)
-        composer = Composer(function, self.add, self._note)
+        composer = Composer(function, lambda item: self._add_inside(function, item), self._note, self._rows_of)
         arguments = tree.args
+        asked = self.effects.get(function, ())
+        if asked:
+            arguments.args = sorted(arguments.args, key=lambda item: item.arg not in asked)
         for argument in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs):
             argument.annotation = None
         # What Python calls the function with, whatever the text of the default stands for by now.
@@ -161,9 +186,27 @@ class SourceCollector:
         body = tree.body[1:] if ast.get_docstring(tree) is not None else tree.body
         tree.name, tree.returns = name, None
         tree.body = [composer.visit(statement) for statement in body]
+        handed = sorted(composer.needed)
+        arguments.args = [*map(ast.arg, handed), *arguments.args]
+        if asked or handed:
+            own = [item.arg for item in arguments.args if item.arg in asked]
+            self.needs[name] = (*handed, *own)
         lines = " ".join(map(str, [tree.lineno, *_line_numbers(tree.body), (tree.end_lineno or tree.lineno) + 1]))
         text = ast.unparse(tree)
         return f"{ORIGIN} {one_line(file)}: {lines}\n{self.decorator}\n{text}"
+
+    def _add_inside(self, function: Any, item: Any) -> str:
+        """Add what a function calls; a law of an effect that calls its own place gets what was there before it."""
+        if (function, item) in self.links:
+            return self._add(self.links[function, item])
+        if item in self.effects and isinstance(item, FunctionType):
+            raise ProgramError(
+                f"{place_of(function)}: '{item.__name__}' is the law of an effect: call its place instead"
+            )
+        return self.add(item)
+
+    def _rows_of(self, name: str) -> tuple[str, ...]:
+        return self.needs.get(name, ())
 
     def _note(self, scope: Mapping[str, Any], name: str, value: Any) -> None:
         self.reads.append(Read(scope, name, value))

@@ -5,6 +5,7 @@ from typing import NamedTuple
 from ppafo.model.chambers import chamber_1_volume, chamber_2_volume
 from ppafo.model.columns import Number
 from ppafo.model.orifice import FlowCurve
+from ppafo.model.places import way_in, way_out
 from ppafo.model.ports import BlendedPort, SinglePort
 from ppafo.model.vane import actuator_torque, gravity_torque, net_driving_torque
 
@@ -154,6 +155,7 @@ def driving_torque(plant: PlantParameters, angle: float, pressure_1: float, pres
 def single_ports(plant: PlantParameters, opening: float) -> tuple[SinglePort, SinglePort]:
     """Ports of both chambers for a steady opening [-], -1 to 1: above 0 feeds chamber 1 and vents 2. Equation (8)."""
     conductance = abs(opening) * plant.valve_conductance
+    fed, vented = way_in(conductance), way_out(conductance)
     feeds_1 = opening >= 0.0
     node_1 = plant.supply_pressure if feeds_1 else plant.atmospheric_pressure
     node_2 = plant.atmospheric_pressure if feeds_1 else plant.dorsiflexion_pressure
@@ -161,8 +163,13 @@ def single_ports(plant: PlantParameters, opening: float) -> tuple[SinglePort, Si
     back_1 = plant.relieving if feeds_1 else 1.0
     back_2 = 1.0 if feeds_1 else plant.relieving
     return SinglePort(
-        conductance=conductance, node_pressure=node_1, source_fraction=share_1, takes_back=back_1
-    ), SinglePort(conductance=conductance, node_pressure=node_2, source_fraction=1.0 - share_1, takes_back=back_2)
+        conductance=fed if feeds_1 else vented, node_pressure=node_1, source_fraction=share_1, takes_back=back_1
+    ), SinglePort(
+        conductance=vented if feeds_1 else fed,
+        node_pressure=node_2,
+        source_fraction=1.0 - share_1,
+        takes_back=back_2,
+    )
 
 
 def blended_ports(plant: PlantParameters, openings: Openings) -> tuple[BlendedPort, BlendedPort]:
@@ -170,16 +177,16 @@ def blended_ports(plant: PlantParameters, openings: Openings) -> tuple[BlendedPo
     full, back = plant.valve_conductance, plant.relieving
     ambient = plant.atmospheric_pressure
     port_1 = BlendedPort(
-        source_conductance=openings.source_1 * full,
+        source_conductance=way_in(openings.source_1 * full),
         source_pressure=plant.supply_pressure,
-        vent_conductance=openings.vent_1 * full,
+        vent_conductance=way_out(openings.vent_1 * full),
         vent_pressure=ambient,
         takes_back=back,
     )
     port_2 = BlendedPort(
-        source_conductance=openings.source_2 * full,
+        source_conductance=way_in(openings.source_2 * full),
         source_pressure=plant.dorsiflexion_pressure,
-        vent_conductance=openings.vent_2 * full,
+        vent_conductance=way_out(openings.vent_2 * full),
         vent_pressure=ambient,
         takes_back=back,
     )

@@ -13,6 +13,8 @@ from ppafo.model.actuators.kind import Range
 from ppafo.model.actuators.table import Table
 from ppafo.model.columns import Problem, at, larger
 from ppafo.model.declaration import Quantity
+from ppafo.model.effects.catalog import EFFECTS
+from ppafo.model.effects.kind import SECTION
 from ppafo.model.gas import SPECIES
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters import declaration
@@ -69,6 +71,7 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
         valve=_valve(parameter_set, reader, name),
         flow=Flow(**_section(reader, "flow", declaration.FLOW)),
         valve_name=name,
+        effects=_effects(parameter_set, reader),
         links=links,
     )
     _check_consistent(parameter_set, device)
@@ -216,6 +219,18 @@ def _valve(parameter_set: ParameterSet, read: Callable[[str], float], name: str)
         quantity.name: _given_or_default(parameter_set, read, section, quantity) for quantity in VALVES[kind].quantities
     }
     return Valve(kind, _orifice(parameter_set, read, section), settings)
+
+
+def _effects(parameter_set: ParameterSet, read: Callable[[str], float]) -> dict[str, dict[str, float]]:
+    """Return the settings of all effects that the set says something of; what it leaves out has its default."""
+    given = {path.split(".")[1] for path in parameter_set.numbers if path.startswith(f"{SECTION}.")}
+    return {
+        name: {
+            item.name: _given_or_default(parameter_set, read, EFFECTS[name].section, item)
+            for item in EFFECTS[name].quantities
+        }
+        for name in sorted(given)
+    }
 
 
 def both_forms(parameter_set: ParameterSet, section: str) -> tuple[str, ...]:

@@ -12,6 +12,8 @@ from types import MappingProxyType
 from ppafo.model.actuators.catalog import ACTUATORS
 from ppafo.model.actuators.vane import KIND as VANE
 from ppafo.model.declaration import Quantity
+from ppafo.model.effects.catalog import EFFECTS
+from ppafo.model.effects.kind import Effect
 from ppafo.model.valves.catalog import VALVES
 
 SPECIES_PATH = "gas.species"
@@ -127,17 +129,21 @@ def members(section: str, actuator_kind: str) -> tuple[Quantity, ...]:
 
 def quantities(valve_kinds: Mapping[str, str], actuator_kind: str = VANE.name) -> Mapping[str, Quantity]:
     """Return every number's declaration by dotted path, for a set with such valves, by name, and such an actuator."""
-    return _by_path(tuple(valve_kinds.items()), actuator_kind)
+    return _by_path(tuple(valve_kinds.items()), actuator_kind, tuple(EFFECTS.values()))
 
 
 @functools.lru_cache(maxsize=32)
-def _by_path(valve_kinds: tuple[tuple[str, str], ...], actuator_kind: str) -> Mapping[str, Quantity]:
+def _by_path(
+    valve_kinds: tuple[tuple[str, str], ...], actuator_kind: str, _effects: tuple[Effect, ...]
+) -> Mapping[str, Quantity]:
     return MappingProxyType({quantity.name: quantity for quantity in _declare(valve_kinds, actuator_kind)})
 
 
 def _declare(valve_kinds: Iterable[tuple[str, str]], actuator_kind: str) -> Iterator[Quantity]:
     for section in SECTIONS:
         yield from (_at(section, member) for member in members(section, actuator_kind))
+    for effect in EFFECTS.values():
+        yield from (_at(effect.section, member) for member in effect.quantities)
     for name, kind in valve_kinds:
         yield from (_at(f"valves.{name}", member) for member in ORIFICE + VALVES[kind].quantities)
         yield from (_at(f"reported.valves.{name}", member) for member in REPORTED_OF_A_VALVE)

@@ -123,6 +123,7 @@ class Flow:
 class Device:
     """A complete device with the one valve that was chosen; everything that a run needs to know of the hardware.
 
+    ``effects`` has the settings [SI] of effects by their names, of those that anything was said of; the others are off.
     ``links`` say which of its numbers follow others that are varied.
     """
 
@@ -135,6 +136,7 @@ class Device:
     valve: Valve
     flow: Flow
     valve_name: str
+    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     links: Graph = field(default_factory=dict, compare=False, repr=False)
 
     def check_vane(self, what: str) -> None:

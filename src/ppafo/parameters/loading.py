@@ -17,6 +17,8 @@ from ppafo.model.actuators.catalog import ACTUATORS
 from ppafo.model.actuators.table import Table
 from ppafo.model.actuators.vane import KIND as VANE
 from ppafo.model.declaration import Quantity
+from ppafo.model.effects.catalog import EFFECTS, find_effects
+from ppafo.model.effects.kind import SECTION
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters import declaration
 from ppafo.parameters.actuator_table import read_actuator_table
@@ -85,13 +87,20 @@ def _sections() -> dict[str, Any]:
         "foot_plate": _section("FootPlate", declaration.FOOT_PLATE),
         "supply": _section("Supply", declaration.SUPPLY, {"relieving": optional(FlagEntry, declaration.RELIEVING)}),
         "flow": _section("Flow", declaration.FLOW),
+        SECTION: table(
+            "Effects",
+            {
+                effect.name: optional(_section(f"{_capital(effect.name)}Effect", effect.quantities), effect.summary)
+                for effect in EFFECTS.values()
+            },
+        ),
         "reported": _section("Reported", declaration.REPORTED, reported),
     }
 
 
 def parameter_file() -> type[BaseModel]:
-    """Return the model of a parameter set file, for the valves and actuators that are loaded."""
-    return _parameter_file((*VALVES.items(), *ACTUATORS.items()))
+    """Return the model of a parameter set file, for the valves, actuators and effects that are loaded."""
+    return _parameter_file((*VALVES.items(), *ACTUATORS.items(), *EFFECTS.items()))
 
 
 @functools.lru_cache(maxsize=4)
@@ -115,8 +124,9 @@ def _parameter_file(_kinds: Any) -> type[BaseModel]:
 
 
 def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a parameter set file, with the valves and actuators of all packages."""
+    """Return the JSON Schema of a parameter set file, with the valves, actuators and effects of all packages."""
     VALVES.load_all()
+    EFFECTS.load_all()
     ACTUATORS.load_all()
     return make_schema(parameter_file(), "ppafo parameter set")
 
@@ -152,6 +162,8 @@ def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -
     document = _FILE.parse(content, file)
     _find_valves(document)
     _find_actuator(document)
+    effects = document.get(SECTION)
+    find_effects(f"{SECTION}.{name}" for name in (effects if isinstance(effects, dict) else ()))
     parsed: Any = validate(parameter_file(), document, file, ParameterError)
     parameter_set = _flatten(parsed, file, _read_table(parsed.actuator, folder or Path()))
     _check(parameter_set)

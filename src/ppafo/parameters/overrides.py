@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
+from ppafo.model.effects.catalog import find_effects
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.declaration import AREA_FORM, RELIEVING_PATH, SONIC_FORM, SPECIES_PATH
 from ppafo.parameters.graph import acting
@@ -82,7 +83,9 @@ def overridden_paths(parameter_set: ParameterSet) -> frozenset[str]:
 
 
 def _with_number(parameter_set: ParameterSet, order: _Order) -> ParameterSet:
-    declared, path = parameter_set.declarations(), order.path
+    path = order.path
+    find_effects([path])
+    declared = parameter_set.declarations()
     if path not in declared:
         allowed = [order.typed_path(known) for known in (*declared, SPECIES_PATH, RELIEVING_PATH)]
         hint = nearest_name(order.typed, allowed) or f"; for example {', '.join(_neighbours(order.typed, allowed))}"

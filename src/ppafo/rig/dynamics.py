@@ -47,7 +47,7 @@ def orifice_exchange(
 
     The gas has the temperature upstream. ``takes_back`` is 1 where gas may flow back into a, else 0.
     """
-    flow = admitted_flow(exact_flow(a.pressure, b.pressure, fraction, orifice), takes_back)
+    flow = admitted_flow(exact_flow(a.pressure, b.pressure, fraction * orifice.conductance, orifice), takes_back)
     upstream_temperature = a.temperature if flow >= 0.0 else b.temperature
     enthalpy = a.enthalpy if flow >= 0.0 else b.enthalpy
     flow = flow * temperature_flow_factor(rig.reference_temperature, upstream_temperature)

@@ -9,10 +9,13 @@ from typing import Any
 
 from ppafo.control.controllers import switching
 from ppafo.model.declaration import Quantity
+from ppafo.model.effects.catalog import EFFECTS
+from ppafo.model.effects.kind import SECTION as EFFECT_SETTINGS
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, members
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
+from ppafo.parameters.effects import all_settings
 from ppafo.parameters.graph import Graph, holding, left, resolved
 from ppafo.simulation import declaration
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
@@ -50,6 +53,7 @@ def device_numbers(device: Device) -> dict[str, Quantity]:
         for item in members(section, device.actuator.kind)
     }
     found |= {f"actuator.leak.{item.name}": item for item in ORIFICE}
+    found |= {f"{effect.section}.{item.name}": item for effect in EFFECTS.values() for item in effect.quantities}
     return found | {f"valve.{item.name}": item for item in (*ORIFICE, *VALVES[device.valve.kind].quantities)}
 
 
@@ -100,8 +104,14 @@ def number_at(scenario: Scenario, path: str) -> float:
 
 def _number(node: Any, place: tuple[str, ...]) -> Any:
     for part in place:
-        node = node[part] if isinstance(node, Mapping) else getattr(node, part)
+        node = _inner(node, part)
     return node
+
+
+def _inner(node: Any, part: str) -> Any:
+    if part == EFFECT_SETTINGS and isinstance(node, Device):
+        return all_settings(node)
+    return node[part] if isinstance(node, Mapping) else getattr(node, part)
 
 
 def other_form(device: Device, section: str) -> tuple[str, ...]:
@@ -165,7 +175,7 @@ def _replace_number(node: Any, parts: tuple[str, ...], number: Any) -> Any:
     inside = parts[1:]
     if isinstance(node, Mapping):
         return {**node, parts[0]: _replace_number(node[parts[0]], inside, number) if inside else number}
-    inner = _replace_number(getattr(node, parts[0]), inside, number) if inside else number
+    inner = _replace_number(_inner(node, parts[0]), inside, number) if inside else number
     if isinstance(node, SupplyLines):
         return node._replace(**{parts[0]: inner})
     return replace(node, **{parts[0]: inner})

@@ -23,6 +23,7 @@ from ppafo.model.sensors import SensorParameters, SensorRates
 from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
+from ppafo.parameters.effects import effect_rows, effects_of
 from ppafo.parameters.plant import orifice_conductance, plant_parameters
 from ppafo.simulation.fixed_point import fixed_controller
 from ppafo.simulation.preparation import (
@@ -122,6 +123,7 @@ def compose_run(pieces: Pieces, plant: PlantParameters, rule: StepRule, start: S
         walk=walk,
         lines=initial_lines(plant, pieces.supply_lines),
         sensor_rates=pieces.sensor_rates,
+        effects=effect_rows(pieces.device),
     )
 
 
@@ -145,6 +147,7 @@ def _program(pieces: Pieces, steps: Steps, walk: Walk | None, has_delay: bool) -
         slow_sensors=isinstance(pieces.sensor_rates, SensorRates),
         is_adaptive=bool(first(steps.needs_parts)),
         samples_inside=bool(first(steps.record_every % 1.0)),
+        effects=effects_of(pieces.device),
     )
 
 

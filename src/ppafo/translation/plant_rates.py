@@ -23,7 +23,7 @@ from ppafo.model.plant import (
     pressures_per_mass,
 )
 from ppafo.model.ports import PortFlow, blended_port_flow
-from ppafo.translation.symbolic import Compare, both_sides, symbolic
+from ppafo.translation.symbolic import Acting, Compare, both_sides, symbolic
 
 Around = Mapping[Any, Callable[..., Any]]
 
@@ -104,14 +104,15 @@ def gas_rates(
     pressures: tuple[Any, Any],
     around: Around | None = None,
     compare: Compare = both_sides,
+    acting: Acting | None = None,
 ) -> PlantRates:
     """Rates at an angle [rad] that is a symbol, its rate [rad/s] and absolute pressures [Pa]; gas of one temperature.
 
-    Equation (3) is differentiated, (6) to (9) are as the lanes have them. ``around`` as in ``symbolic``.
+    Equation (3) is differentiated, (6) to (9) are as the lanes have them. ``around`` and ``acting`` as in ``symbolic``.
     """
-    flows = symbolic(gas_flows, PlantParameters, Openings, float, float, around=around, compare=compare)
+    flows = symbolic(gas_flows, PlantParameters, Openings, float, float, around=around, compare=compare, acting=acting)
     found = flows(plant, openings, *pressures)
-    slopes = _pressure_rates(plant, angle, rate, pressures, (found.mass_1, found.mass_2))
+    slopes = _pressure_rates(plant, angle, rate, pressures, (found.mass_1, found.mass_2), acting)
     return PlantRates(
         pressure_1=slopes[0],
         pressure_2=slopes[1],
@@ -131,15 +132,16 @@ def thermal_gas_rates(
     pressures: tuple[Any, Any],
     temperatures: tuple[Any, Any],
     compare: Compare = both_sides,
+    acting: Acting | None = None,
 ) -> PlantRates:
     """As ``gas_rates`` for gas with an energy balance at temperatures [K]."""
-    per_mass = symbolic(pressures_per_mass, PlantParameters, float)(plant, angle)
+    per_mass = symbolic(pressures_per_mass, PlantParameters, float, acting=acting)(plant, angle)
     content_1, content_2 = (pressure / factor for pressure, factor in zip(pressures, per_mass, strict=True))
     mass_1, mass_2 = (
         content * thermal.temperature / warm for content, warm in zip((content_1, content_2), temperatures, strict=True)
     )
     types = (PlantParameters, ThermalParameters, Openings, PlantState, ThermalState, float, float)
-    flows = symbolic(thermal_gas_flows, *types, compare=compare)
+    flows = symbolic(thermal_gas_flows, *types, compare=compare, acting=acting)
     state = PlantState(
         angle=angle,
         angular_velocity=rate,
@@ -154,7 +156,7 @@ def thermal_gas_rates(
     )
     found = flows(plant, thermal, openings, state, masses, *pressures)
     # The contents hold the work of the moving wall already: only the volumes are left of equation (3).
-    slopes = _pressure_rates(plant, angle, rate, pressures, (found.content_1, found.content_2))
+    slopes = _pressure_rates(plant, angle, rate, pressures, (found.content_1, found.content_2), acting)
     # A temperature is that of the walls times content over mass.
     return PlantRates(
         pressure_1=slopes[0],
@@ -167,12 +169,17 @@ def thermal_gas_rates(
 
 
 def _pressure_rates(
-    plant: PlantParameters, angle: Any, rate: Any, pressures: tuple[Any, Any], mass_rates: tuple[Any, Any]
+    plant: PlantParameters,
+    angle: Any,
+    rate: Any,
+    pressures: tuple[Any, Any],
+    mass_rates: tuple[Any, Any],
+    acting: Acting | None,
 ) -> tuple[Any, Any]:
     """Rates of both pressures [Pa/s] from those of the gas [kg/s] and of the angle [rad/s]: equation (3) in time."""
     import casadi
 
-    per_mass = symbolic(pressures_per_mass, PlantParameters, float)(plant, angle)
+    per_mass = symbolic(pressures_per_mass, PlantParameters, float, acting=acting)(plant, angle)
     first, second = (
         factor * gained + pressure / factor * casadi.jtimes(factor, angle, rate)
         for factor, pressure, gained in zip(per_mass, pressures, mass_rates, strict=True)
@@ -181,8 +188,14 @@ def _pressure_rates(
 
 
 def vane_acceleration(
-    plant: PlantParameters, angle: Any, rate: Any, pressures: tuple[Any, Any], way: float, compare: Compare = both_sides
+    plant: PlantParameters,
+    angle: Any,
+    rate: Any,
+    pressures: tuple[Any, Any],
+    way: float,
+    compare: Compare = both_sides,
+    acting: Acting | None = None,
 ) -> Any:
     """Angular acceleration [rad/s^2] of a vane that slides one ``way`` (1 or -1), 0 where it is held (0)."""
-    motion = symbolic(free_motion, PlantParameters, float, float, float, float, float, compare=compare)
+    motion = symbolic(free_motion, PlantParameters, float, float, float, float, float, compare=compare, acting=acting)
     return motion(plant, angle, rate, *pressures, way)[1]

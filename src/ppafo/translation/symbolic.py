@@ -14,9 +14,11 @@ from functools import lru_cache
 from typing import Any
 
 from ppafo.engine.composed_names import is_row
+from ppafo.engine.links import link_effects
 from ppafo.engine.rows import is_number, members
 from ppafo.engine.source_text import SourceCollector, emitted_name
 from ppafo.errors import ProgramError
+from ppafo.model.effects.kind import Effect
 from ppafo.translation import typed
 from ppafo.translation.typed import FLOAT, INT, Function, Handed, Items, Row, Statement, Term, Type, is_empty
 from ppafo.translation.walk import walk_module
@@ -24,6 +26,8 @@ from ppafo.translation.walk import walk_module
 Compare = Callable[[str, Any, Any, str], Any]
 """From a sign, two values and where they are compared: the expression of it, or a truth value where it is decided."""
 Around = Mapping[str, Callable[..., Any]]
+Acting = Mapping[Effect, Any]
+"""Effects in the order in which they act, with their rows."""
 
 
 def _quotient(left: Any, right: Any) -> Any:
@@ -55,16 +59,19 @@ class Symbolic:
     """A function of the model that takes CasADi symbols in the place of floats; call it as the function itself.
 
     ``around`` has functions by the name of those of the model that they stand before: each is called with the function
-    of the model and with its arguments. ``compare`` says what becomes of a comparison.
+    of the model and with its arguments. ``compare`` says what becomes of a comparison. ``rows`` are those of the
+    effects that act inside it.
     """
 
     walked: "_Walked"
     around: Around = field(default_factory=dict)
     compare: Compare = both_sides
+    rows: tuple[Any, ...] = ()
 
     def __call__(self, *values: Any) -> Any:
         """The function's value, in its own units."""
-        given = [value for value, is_given in zip(values, self.walked.is_given, strict=True) if is_given]
+        every = (*self.rows, *values)
+        given = [value for value, is_given in zip(every, self.walked.is_given, strict=True) if is_given]
         return self.result(self.walked.functions[self.walked.name], given)
 
     def result(self, function: Function, given: list[Any]) -> Any:
@@ -84,16 +91,21 @@ def symbolic(
     *given: type | Callable[..., Any],
     around: Mapping[Callable[..., Any], Callable[..., Any]] | None = None,
     compare: Compare = both_sides,
+    acting: Acting | None = None,
 ) -> Symbolic:
     """A function of the model for CasADi, from its text; ``given`` are the types of its parameters.
 
-    These are ``float``, classes of NamedTuples, or functions that are handed over. ProgramError, with file and line,
+    These are ``float``, classes of NamedTuples, or functions that are handed over. ``acting`` are the effects that act
+    in it, with their rows. ProgramError, with file and line,
     for what is outside the subset.
     """
     before = {emitted_name(item): wrapper for item, wrapper in (around or {}).items()}
-    if not _walked(function, given).collector.is_current():
+    rows = {effect.name: row for effect, row in (acting or {}).items()}
+    effects = tuple(acting or ())
+    if not _walked(function, given, effects).collector.is_current():
         _walked.cache_clear()
-    return Symbolic(_walked(function, given), before, compare)
+    walked = _walked(function, given, effects)
+    return Symbolic(walked, before, compare, tuple(rows[name] for name in walked.collector.needs.get(walked.name, ())))
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,11 +123,16 @@ class _Walked:
 
 
 @lru_cache(maxsize=32)
-def _walked(function: Callable[..., Any], given: tuple[type | Callable[..., Any], ...]) -> _Walked:
-    """The typed functions of a function of the model, for types of its parameters."""
+def _walked(
+    function: Callable[..., Any], given: tuple[type | Callable[..., Any], ...], effects: tuple[Effect, ...]
+) -> _Walked:
+    """The typed functions of a function of the model, for types of its parameters, with effects in their order."""
     collector = SourceCollector("@function")
+    link_effects(effects, collector)
     name = collector.add(function)
-    types = tuple(_type_of(item, collector) for item in given)
+    asked = {effect.name: effect.parameters for effect in effects}
+    first = [asked[row] for row in collector.needs.get(name, ())]
+    types = tuple(_type_of(item, collector) for item in (*first, *given))
     module = walk_module(collector.text(), {name: types})
     places = {
         own: f"{item.__module__.removeprefix('ppafo.')}.{item.__qualname__}" for own, item in collector.owners.items()

@@ -17,6 +17,7 @@ from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.engine.lanes import BatchResult, Floats, begin_block
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
+from ppafo.errors import ScenarioError
 from ppafo.model.cold_gas import DRY_ICE, SupplyNow, SupplyState, advance_supply, open_share
 from ppafo.model.fluid_table import has_liquid
 from ppafo.model.plant import PlantParameters
@@ -136,6 +137,11 @@ def run_on_bottle(
 
     ``stride_time`` [s] is how long a stride takes; ``progress`` gets the minutes done and in all.
     """
+    if run.effects:
+        names = ", ".join(f"'{effect.name}'" for effect in run.program.effects)
+        raise ScenarioError(
+            f"effects ({names}) do not follow the temperature of a bottle: switch them off, or walk without"
+        )
     batch = batch_of(run)
     count = batch.clock.step_count
     block = begin_block(batch)

@@ -4,6 +4,7 @@ import math
 from typing import NamedTuple
 
 from ppafo.model.orifice import isentropic_flow_function, iso6358_flow_function
+from ppafo.model.places import way_in, way_out
 from ppafo.model.plant import (
     Openings,
     PlantParameters,
@@ -67,11 +68,14 @@ def exact_flow_function(ratio: float, orifice: ExactOrifice) -> float:
     return value * min((1.0 - ratio) / (1.0 - orifice.linear_ratio), 1.0)
 
 
-def exact_flow(pressure_a: float, pressure_b: float, fraction: float, orifice: ExactOrifice) -> float:
-    """Mass flow from a to b [kg/s] through a fraction of an orifice, positive from a to b. Equations (6), (7)."""
+def exact_flow(pressure_a: float, pressure_b: float, conductance: float, orifice: ExactOrifice) -> float:
+    """Mass flow from a to b [kg/s] through a conductance [kg/(s Pa)] with the flow function of an orifice.
+
+    Positive from a to b. Equations (6), (7).
+    """
     upstream = max(pressure_a, pressure_b)
     ratio = min(pressure_a, pressure_b) / upstream
-    flow = fraction * orifice.conductance * upstream * exact_flow_function(ratio, orifice)
+    flow = conductance * upstream * exact_flow_function(ratio, orifice)
     return flow if pressure_a >= pressure_b else -flow
 
 
@@ -84,13 +88,14 @@ def gas_rates(
     pressure_2: float,
 ) -> GasRates:
     """All mass flows [kg/s] at two chamber pressures [Pa absolute]. Equations (8), (9)."""
-    source_1 = exact_flow(plant.supply_pressure, pressure_1, openings.source_1, valve_orifice)
-    source_2 = exact_flow(plant.dorsiflexion_pressure, pressure_2, openings.source_2, valve_orifice)
+    full = valve_orifice.conductance
+    source_1 = exact_flow(plant.supply_pressure, pressure_1, way_in(openings.source_1 * full), valve_orifice)
+    source_2 = exact_flow(plant.dorsiflexion_pressure, pressure_2, way_in(openings.source_2 * full), valve_orifice)
     source_1 = admitted_flow(source_1, plant.relieving)
     source_2 = admitted_flow(source_2, plant.relieving)
-    vent_1 = exact_flow(pressure_1, plant.atmospheric_pressure, openings.vent_1, valve_orifice)
-    vent_2 = exact_flow(pressure_2, plant.atmospheric_pressure, openings.vent_2, valve_orifice)
-    leak = exact_flow(pressure_1, pressure_2, 1.0, leak_orifice)
+    vent_1 = exact_flow(pressure_1, plant.atmospheric_pressure, way_out(openings.vent_1 * full), valve_orifice)
+    vent_2 = exact_flow(pressure_2, plant.atmospheric_pressure, way_out(openings.vent_2 * full), valve_orifice)
+    leak = exact_flow(pressure_1, pressure_2, leak_orifice.conductance, leak_orifice)
     return GasRates(
         mass_1=source_1 - vent_1 - leak,
         mass_2=source_2 - vent_2 + leak,
@@ -125,16 +130,16 @@ def thermal_gas_rates(
 ) -> ThermalGasRates:
     """All rates of gas with an energy balance [kg/s]; contents as in ``PlantState``. Equations (3), (6) to (9)."""
     source_pressure_1, source_pressure_2 = plant.supply_pressure, plant.dorsiflexion_pressure
-    room = plant.atmospheric_pressure
+    room, full = plant.atmospheric_pressure, valve_orifice.conductance
     volume_1, volume_2 = chamber_volumes(plant, angle)
     pressure_1, pressure_2 = chamber_pressures(plant, angle, contents[0], contents[1])
     warmth_1, warmth_2 = contents[0] / masses[0], contents[1] / masses[1]
-    supply_1 = exact_flow(source_pressure_1, pressure_1, openings.source_1, valve_orifice)
-    supply_2 = exact_flow(source_pressure_2, pressure_2, openings.source_2, valve_orifice)
+    supply_1 = exact_flow(source_pressure_1, pressure_1, way_in(openings.source_1 * full), valve_orifice)
+    supply_2 = exact_flow(source_pressure_2, pressure_2, way_in(openings.source_2 * full), valve_orifice)
     supply_1, supply_2 = admitted_flow(supply_1, plant.relieving), admitted_flow(supply_2, plant.relieving)
-    outlet_1 = exact_flow(pressure_1, room, openings.vent_1, valve_orifice)
-    outlet_2 = exact_flow(pressure_2, room, openings.vent_2, valve_orifice)
-    across = exact_flow(pressure_1, pressure_2, 1.0, leak_orifice)
+    outlet_1 = exact_flow(pressure_1, room, way_out(openings.vent_1 * full), valve_orifice)
+    outlet_2 = exact_flow(pressure_2, room, way_out(openings.vent_2 * full), valve_orifice)
+    across = exact_flow(pressure_1, pressure_2, leak_orifice.conductance, leak_orifice)
     source_1 = transport(thermal, source_pressure_1, pressure_1, 1.0, warmth_1, supply_1)
     source_2 = transport(thermal, source_pressure_2, pressure_2, 1.0, warmth_2, supply_2)
     vent_1 = transport(thermal, pressure_1, room, warmth_1, 1.0, outlet_1)
@@ -158,7 +163,7 @@ def joined_gas_rates(
     gas: GasRates, valve_orifice: ExactOrifice, opening: float, pressure_1: float, pressure_2: float
 ) -> GasRates:
     """Mass flows [kg/s] with a valve beside the leak that joins the chambers. Equations (6), (7), (9)."""
-    across = exact_flow(pressure_1, pressure_2, opening, valve_orifice)
+    across = exact_flow(pressure_1, pressure_2, opening * valve_orifice.conductance, valve_orifice)
     return GasRates(
         mass_1=gas.mass_1 - across,
         mass_2=gas.mass_2 + across,
@@ -179,7 +184,7 @@ def joined_thermal_rates(
     warmth_2: float,
 ) -> ThermalGasRates:
     """As ``joined_gas_rates`` [kg/s], of gas with an energy balance; warmths are T/T_0 [-]."""
-    flow = exact_flow(pressure_1, pressure_2, opening, valve_orifice)
+    flow = exact_flow(pressure_1, pressure_2, opening * valve_orifice.conductance, valve_orifice)
     across = transport(thermal, pressure_1, pressure_2, warmth_1, warmth_2, flow)
     return ThermalGasRates(
         content_1=gas.content_1 - across.content,

@@ -60,7 +60,16 @@ class RightHandSide(NamedTuple):
 def load_right_hand_side(run: Run) -> RightHandSide:
     """Return the right-hand side of a run, whose unknowns are those of ``right_hand_side_source``."""
     program = run.program
-    groups = (run.plant, run.thermal, run.valve_orifice, run.leak_orifice, run.valve, run.path, run.sensor_rates)
+    groups = (
+        run.plant,
+        run.thermal,
+        run.valve_orifice,
+        run.leak_orifice,
+        run.valve,
+        run.path,
+        run.sensor_rates,
+        *run.effects,
+    )
     parameters = np.array([number for group in groups for number in numbers(group)])
     y = np.empty(unknowns_before_valve(program) + len(numbers(program.valve.initial())))
     slopes = np.empty_like(y)

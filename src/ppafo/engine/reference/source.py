@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from ppafo.engine.entries import ARRAY, FLOAT, HEADER, INLINE, entry_text
+from ppafo.engine.links import link_program
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.reference.derivative import (
     ExactOrifice,
@@ -13,8 +14,7 @@ from ppafo.engine.reference.derivative import (
     thermal_gas_rates,
 )
 from ppafo.engine.rows import leaf_paths, row_expression
-from ppafo.engine.scheme.shaped_gas import links_of
-from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.source_text import SourceCollector, woven
 from ppafo.model.plant import ThermalParameters, chamber_pressures
 from ppafo.model.sensors import SensorRates
 
@@ -45,6 +45,7 @@ def parameter_groups(program: Program) -> dict[str, type]:
         "valve": program.valve.parameters,
         "path": NoParameters if program.angle is None else program.angle.parameters,
         "sensor_rates": SensorRates if program.slow_sensors else NoParameters,
+        **program.effect_rows,
     }
 
 
@@ -55,7 +56,7 @@ def right_hand_side_source(program: Program) -> str:
     balance, what slow sensors show of angle and pressures, and the state of the valve.
     """
     collector = SourceCollector(INLINE)
-    collector.links.update(links_of(program.actuator))
+    link_program(program, collector)
     add = collector.add
     cells: dict[str, str] = {}
     for name, row in parameter_groups(program).items():
@@ -92,7 +93,9 @@ def right_hand_side_source(program: Program) -> str:
             f"slopes[{place}] = sensor_rates.{sensor} * ({truth} - y[{place}])"
             for place, (sensor, truth) in enumerate(truths, gas_unknowns(program))
         ]
-    fill = entry_text("fill", dict.fromkeys(ARRAYS, ARRAY) | dict.fromkeys(NUMBERS, FLOAT), lines)
+    fill = entry_text(
+        "fill", dict.fromkeys(ARRAYS, ARRAY) | dict.fromkeys(NUMBERS, FLOAT), woven(lines, collector.needs)
+    )
     return "\n\n\n".join([HEADER, collector.text(), fill])
 
 

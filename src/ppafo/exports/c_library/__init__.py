@@ -14,6 +14,7 @@ from ppafo.exports.c_library.program import Further, exported
 from ppafo.exports.c_library.writing import following_text
 from ppafo.exports.loading import Exportable
 from ppafo.parameters.device import Device
+from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import Graph
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.preparation import step_counts
@@ -145,7 +146,10 @@ def _switches(device: Device, others: Iterable[tuple[Sequence[str], bool]]) -> t
     """What chooses the program by being 0 or not: settings of the valve, and others."""
     given = device.valve.settings
     of_valve = [((f"valve_{name}",), given[name] > 0.0) for name in choosing(device)]
-    return tuple(Switch(tuple(names), is_above) for names, is_above in (*of_valve, *others))
+    of_effects = [
+        ([c_identifier(f"{effect.section}.{name}") for name in effect.switch], True) for effect in effects_of(device)
+    ]
+    return tuple(Switch(tuple(names), is_above) for names, is_above in (*of_valve, *of_effects, *others))
 
 
 def _of_sensors(program: Program) -> list[tuple[Sequence[str], bool]]:

@@ -8,6 +8,7 @@ from ppafo.exports.c_library.files import c_identifier
 from ppafo.metrics.catalog import METRICS
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
+from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import Graph
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
 
@@ -93,10 +94,12 @@ def _fixed_of_device(device: Device, is_thermal: bool, has_lines: bool) -> list[
     """What no setting of a device changes."""
     forms = {"valve": device.valve.orifice, "leak": device.actuator.leak}
     lines = "with lines behind the regulators" if has_lines else "constant supply pressures"
+    effects = ", ".join(f"`{effect.name}`" for effect in effects_of(device))
     return [
         *(f"the form of the {name}, `{_form(orifice)}`" for name, orifice in forms.items()),
         f"the gas, `{'thermal' if is_thermal else 'isothermal'}`; {lines}, which "
         f"{'take' if device.supply.relieving else 'do not take'} gas back from a chamber above them",
+        *([f"the effects, {effects}, none of which can be switched off"] if effects else []),
     ]
 
 

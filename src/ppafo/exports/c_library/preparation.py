@@ -12,8 +12,10 @@ from ppafo.engine.source_text import Collector
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
 from ppafo.exports.c_library.writing import Writing
 from ppafo.model.declaration import Quantity
+from ppafo.model.effects.catalog import ordered_effects
 from ppafo.parameters.building import consistency
 from ppafo.parameters.device import Device
+from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import Graph
 from ppafo.simulation.clock import links_of_times, step_unless_given, step_with_output
 from ppafo.simulation.declaration import value_at
@@ -104,9 +106,16 @@ def _declared(scenario: Scenario) -> dict[str, Quantity]:
 
 
 def used_numbers(device: Device, declared: Mapping[str, Quantity]) -> dict[str, Quantity]:
-    """Declarations by path, without the form of an orifice that is not used."""
+    """Declarations by path, without the form of an orifice that is not used, and effects that are off."""
     sections = "valve", "actuator.leak"
     unused = {f"{section}.{name}" for section in sections for name in other_form(device, section)}
+    is_on = effects_of(device)
+    unused |= {
+        f"{effect.section}.{item.name}"
+        for effect in ordered_effects()
+        if effect not in is_on
+        for item in effect.quantities
+    }
     return {path: item for path, item in declared.items() if path not in unused}
 
 

@@ -8,11 +8,11 @@ from typing import Protocol
 from ppafo.engine.lane_meters import REQUEST, TRACED, walk_traces
 from ppafo.engine.lane_rows import HANDED, indent
 from ppafo.engine.lane_source import HEADER, INLINE, lane_loop
+from ppafo.engine.links import link_program
 from ppafo.engine.outline import Outline
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
-from ppafo.engine.scheme.shaped_gas import links_of
-from ppafo.engine.source_text import Collector
+from ppafo.engine.source_text import Collector, woven
 from ppafo.metrics.catalog import METRICS
 from ppafo.metrics.metric import Floats, Readings
 from ppafo.signals.meter import MeterKind
@@ -178,7 +178,7 @@ def outline_of(item: ExportedProgram, settings: Sequence[str], further: Further 
 
 
 def _composed_text(item: ExportedProgram, collector: Collector, further: Further | None, together: int) -> str:
-    collector.links.update(links_of(item.program.actuator))
+    link_program(item.program, collector)
     entries = [metrics_entry(item, collector), *([] if further is None else [further(collector)])]
     loops = [lane_loop(program, collector, name, lanes=1) for name, program in item.loops.items()]
     if together:
@@ -211,7 +211,8 @@ def metrics_entry(item: ExportedProgram, collector: Collector) -> str:
     kind, make = (ThermalTotals, thermal_totals) if program.is_thermal else (Totals, totals)
     further = ", plant, thermal" if program.is_thermal else ""
     parameters = program.parameter_rows()
-    lines = [f"{name} = {_loaded(name, parameters, 'parameters', collector)}" for name in ("plant", "thermal")]
+    given = ("plant", "thermal", *program.effect_rows)
+    lines = [f"{name} = {_loaded(name, parameters, 'parameters', collector)}" for name in given]
     add = collector.add
     for array in ("first", "states"):
         state = _loaded("state", groups, array, collector)
@@ -231,7 +232,14 @@ def metrics_entry(item: ExportedProgram, collector: Collector) -> str:
         f"Meters = namedtuple('Meters', {names!r})",
         "Readings = namedtuple('Readings', ['meters', 'course', 'samples', 'gains'])",
     ]
-    return "\n".join([*rows, METRICS_ENTRY, "def metrics(first, states, parameters, samples, found):", *indent(lines)])
+    return "\n".join(
+        [
+            *rows,
+            METRICS_ENTRY,
+            "def metrics(first, states, parameters, samples, found):",
+            *indent(woven(lines, collector.needs)),
+        ]
+    )
 
 
 def _loaded(group: str, groups: Mapping[str, type], array: str, collector: Collector) -> str:

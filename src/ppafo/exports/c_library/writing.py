@@ -9,7 +9,7 @@ from ppafo.engine.program import LaneResult, LaneTiming, Program
 from ppafo.engine.rows import leaf_paths, numbers, row_expression
 from ppafo.engine.run import NEVER_FAILED, initial_masses, whole_and_rest
 from ppafo.engine.scheme.parts import Pace
-from ppafo.engine.source_text import Collector
+from ppafo.engine.source_text import Collector, woven
 from ppafo.exports.c_library.files import Setting, c_identifier
 from ppafo.exports.c_library.program import COUNTS
 from ppafo.model.actuators.kind import Range, mean_growth, plant_in_shape
@@ -19,13 +19,13 @@ from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.declaration import members
 from ppafo.parameters.device import Device, SonicOrifice
+from ppafo.parameters.effects import SEEN_BY_EFFECTS
 from ppafo.parameters.graph import Graph, Term
 from ppafo.parameters.plant import area_restriction, plant_with, sonic_restriction
 from ppafo.simulation.preparation import lines_at_start, thermal_gas
 from ppafo.simulation.supply_line import LINES, SECTION
 
 ENTRY = '@njit("void(float64[::1], float64[::1], float64[::1], float64[::1])")'
-_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply")
 FLAWS = ("angle_noise", "pressure_noise", "angle_resolution", "pressure_resolution")
 """Settings of noise and rounding, in the order of ``SensorParameters``."""
 
@@ -71,6 +71,7 @@ class Writing:
         self.lines = lines
         self.program = program
         self.add: Callable[[Callable[..., Any] | type], str] = collector.add
+        self.needs = collector.needs
         self.rows: dict[str, list[str]] = {}
 
     def text(self, settings: Iterable[Setting], lines: Iterable[str]) -> str:
@@ -93,7 +94,9 @@ class Writing:
         }
         body += [f"counts[{place}] = {counted[name]}" for place, name in enumerate(COUNTS)]
         own = [f"{name} = namedtuple({name!r}, {fields!r})" for name, fields in self.rows.items()]
-        return "\n".join([*own, ENTRY, "def prepare(settings, parameters, states, counts):", *indent(body)])
+        return "\n".join(
+            [*own, ENTRY, "def prepare(settings, parameters, states, counts):", *indent(woven(body, self.needs))]
+        )
 
     def _initial_rows(self) -> dict[str, type]:
         """State rows that a run begins with; those of meters begin with the first sample."""
@@ -124,7 +127,8 @@ class Writing:
         add = self.add
         kind = self.device.actuator.kind
         fields = {
-            section: self.section(section, [item.name for item in members(section, kind)]) for section in _SECTIONS
+            section: self.section(section, [item.name for item in members(section, kind)])
+            for section in SEEN_BY_EFFECTS
         }
         if self.program.has_shape:
             fields["actuator"] |= {"torque_constant": "0.0", "volume_per_angle": "0.0"}
@@ -137,6 +141,10 @@ class Writing:
         yield f"device = {self.row('Device', {section: section for section in fields})}"
         yield f"valve_restriction = {self._restriction('valve', self.device.valve.orifice)}"
         yield f"leak_restriction = {self._restriction('actuator.leak', self.device.actuator.leak)}"
+        for effect in self.program.effects:
+            own = self.section(effect.section, [item.name for item in effect.quantities])
+            settings = self.row(f"{effect.name.title().replace('_', '')}Settings", own)
+            yield f"{effect.name} = {add(effect.prepare)}({settings}, device)"
         made = f"vane_{name}" if self.program.has_shape else name
         yield f"{made} = {add(plant_with)}(device, valve_restriction, leak_restriction, {torque})"
         if self.program.has_shape:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.model.declaration import Quantity
+from ppafo.model.effects.catalog import EFFECTS, find_effects
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.declaration import AREA_FORM, SECTIONS, SONIC_FORM
 from ppafo.parameters.device import Device, Orifice
@@ -169,6 +170,7 @@ def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     """Return every number that can be fitted in this scenario, with its declaration, by path."""
     device = scenario.device
     found = {f"{section}.{item.name}": item for section in _DEVICE_SECTIONS for item in SECTIONS[section]}
+    found |= {f"{effect.section}.{item.name}": item for effect in EFFECTS.values() for item in effect.quantities}
     found |= {f"actuator.leak.{item.name}": item for item in _orifice_form(device.actuator.leak)}
     valve = (*_orifice_form(device.valve.orifice), *VALVES[device.valve.kind].quantities)
     found |= {f"valves.{device.valve_name}.{item.name}": item for item in valve}
@@ -180,6 +182,7 @@ def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
 
 def declaration_of(path: str, scenario: Scenario) -> Quantity:
     """Return the declaration of the number at a path; IdentificationError with the nearest name for an unknown one."""
+    find_effects([path])
     known = declared_numbers(scenario)
     full = full_path(path, scenario)
     if full not in known:

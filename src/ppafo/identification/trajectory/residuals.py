@@ -25,6 +25,7 @@ from ppafo.model.columns import at, over_runs
 from ppafo.model.plant import PlantParameters
 from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveKind
+from ppafo.parameters.effects import effect_rows, switches_of
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.plan import (
     exact_orifice,
@@ -84,6 +85,11 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
             f"experiment '{prepared.label}': a setting of the valve went to or from 0, which is another "
             f"model of the valve; start above 0 and give a lower bound above 0"
         )
+    if any(np.any(is_on != (effect in base.program.effects)) for effect, is_on in switches_of(device).items()):
+        raise IdentificationError(
+            f"experiment '{prepared.label}': an effect went on or off, which is another model; start above 0 and give "
+            "a lower bound above 0"
+        )
     bare = plant_parameters(device, motion.external_torque if isinstance(motion, FreeMotion) else 0.0)
     plant = plant_behind_lines(bare, scenario.supply_lines)
     # The engine allows a fraction of the supply pressure. Where that is fitted, the error in pascals must stay.
@@ -99,6 +105,7 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
         valve=valve_parameters(base.program.valve, settings),
         command_delay=delay,
         lines=initial_lines(plant, scenario.supply_lines),
+        effects=effect_rows(device),
     )
 
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from ppafo.model.command import VENTS_ABOVE
 from ppafo.model.declaration import Quantity
+from ppafo.model.places import way_in, way_out
 from ppafo.model.plant import Openings, PlantParameters
 from ppafo.model.ports import SinglePort, single_port_flow, single_port_flow_slopes
 from ppafo.model.valves.kind import ValveKind, ValveModel
@@ -77,14 +78,15 @@ def connect_positions(plant: PlantParameters, shown: PairPositions) -> tuple[Sin
     node_2 = plant.dorsiflexion_pressure if open_b else plant.atmospheric_pressure
     back_1 = plant.relieving if open_a else 1.0
     back_2 = plant.relieving if open_b else 1.0
+    fed, vented = way_in(plant.valve_conductance), way_out(plant.valve_conductance)
     port_1 = SinglePort(
-        conductance=plant.valve_conductance,
+        conductance=fed if open_a else vented,
         node_pressure=node_1,
         source_fraction=1.0 if open_a else 0.0,
         takes_back=back_1,
     )
     port_2 = SinglePort(
-        conductance=plant.valve_conductance,
+        conductance=fed if open_b else vented,
         node_pressure=node_2,
         source_fraction=1.0 if open_b else 0.0,
         takes_back=back_2,

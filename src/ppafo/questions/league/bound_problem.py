@@ -113,7 +113,8 @@ def chamber_rates(
 
     angle, rate, pressure, share = map(casadi.SX.sym, ("angle", "rate", "pressures", "shares"), (1, 1, 2, len(ways)))
     openings = mean_openings(run, ways, casadi.vertsplit(share))
-    found = gas_rates(run.plant, openings, angle, rate, (pressure[0], pressure[1]), SMOOTH)
+    acting = dict(zip(run.program.effects, run.effects, strict=True))
+    found = gas_rates(run.plant, openings, angle, rate, (pressure[0], pressure[1]), SMOOTH, acting=acting)
     at_a_point = casadi.Function(
         "rates", [angle, rate, pressure, share], [found.pressure_1, found.pressure_2, found.supplied]
     )

@@ -88,7 +88,11 @@ def plant_of(run: Run, way: float | None, compare: Compare = both_sides) -> Plan
     turning: dict[str, Any] = {}
     if way:
         angle, rate = (at[name] for name in motion)
-        turning = {"angle": rate, "angular_velocity": vane_acceleration(plant, angle, rate, pressures, way, compare)}
+        acting = dict(zip(program.effects, run.effects, strict=True))
+        turning = {
+            "angle": rate,
+            "angular_velocity": vane_acceleration(plant, angle, rate, pressures, way, compare, acting),
+        }
     outputs = {"torque": actuator_torque(*pressures, plant.torque_constant)}
     outputs |= {name: at[name] for name in (*turning, *gas)}
     outputs |= {"supplied_flow": found.supplied, "vented_flow": found.vented}
@@ -112,12 +116,13 @@ def _valve(run: Run, state: list[Any], command: Any, compare: Compare) -> tuple[
 
 def _gas(run: Run, plant: Any, openings: Any, at: Mapping[str, Any], compare: Compare) -> PlantRates:
     """Rates of the gas in both chambers."""
+    acting = dict(zip(run.program.effects, run.effects, strict=True))
     pressures = at["pressure_1"], at["pressure_2"]
     motion = at["angle"], at["angular_velocity"]
     if not isinstance(run.thermal, ThermalParameters):
-        return gas_rates(plant, openings, *motion, pressures, compare=compare)
+        return gas_rates(plant, openings, *motion, pressures, compare=compare, acting=acting)
     temperatures = at["temperature_1"], at["temperature_2"]
-    return thermal_gas_rates(plant, run.thermal, openings, *motion, pressures, temperatures, compare)
+    return thermal_gas_rates(plant, run.thermal, openings, *motion, pressures, temperatures, compare, acting)
 
 
 def without_slew_limit(run: Run) -> Run:

@@ -9,6 +9,7 @@ import numpy as np
 from ppafo.engine.lanes import Floats
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.model.declaration import Quantity
+from ppafo.model.effects.catalog import find_effects
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.simulation import declaration
 from ppafo.simulation.clock import Clock, read_clock
@@ -55,6 +56,7 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
     """
     if base.control.kind == PYTHON_CONTROLLER and base.control.custom is None:
         raise ScenarioError(f"{base.name}: nothing controls the valve; give a controller (controlled_by)")
+    find_effects(columns)
     declared = declared_numbers(base)
     values: dict[str, Floats] = {}
     for given, column in columns.items():

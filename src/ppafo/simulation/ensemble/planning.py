@@ -13,6 +13,7 @@ from ppafo.engine.run import Members, batches_of
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem
 from ppafo.model.declaration import Quantity
+from ppafo.parameters.effects import switches_of
 from ppafo.simulation.clock import Clock
 from ppafo.simulation.ensemble.columns import Columns, TimeTexts, clock_of, clock_with, time_texts, varied_scenario
 from ppafo.simulation.ensemble.rules import RULES, Rule
@@ -168,12 +169,13 @@ def _plan_batches(screen: Screen, places: Members) -> list[tuple[Members, Batch]
 
 
 def _of_one_program(scenario: Scenario, runs: int) -> list[Members]:
-    """Places of the runs, those together that have zeros in the same settings of the valve and the sensors."""
+    """Places of the runs, those together that have the same effects and zeros in the same settings."""
     settings: tuple[Any, ...] = (*scenario.device.valve.settings.values(), *scenario.sensors.flaws)
-    varied_settings = [setting for setting in settings if isinstance(setting, np.ndarray)]
+    varied_settings = [setting > 0.0 for setting in settings if isinstance(setting, np.ndarray)]
+    varied_settings += [is_on for is_on in switches_of(scenario.device).values() if isinstance(is_on, np.ndarray)]
     if not varied_settings:
         return [np.arange(runs)]
     patterns: NDArray[np.int64] = np.zeros(runs, dtype=np.int64)
     for setting in varied_settings:
-        patterns = 2 * patterns + (setting > 0.0)
+        patterns = 2 * patterns + setting
     return [np.flatnonzero(patterns == pattern) for pattern in np.unique(patterns)]

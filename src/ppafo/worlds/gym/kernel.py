@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ppafo.engine.entries import ARRAY, ARRAY_2D, ARRAY_3D, FLOAT, INT, entry_text, with_arrays
 from ppafo.engine.lane_control import SIGNALS, current_readings, pressures_of, sense, sense_gait
-from ppafo.engine.lane_rows import VECTOR, LaneRows, indent, lanes_of, over_lanes
+from ppafo.engine.lane_rows import VECTOR, LaneRows, indent, lanes_of
 from ppafo.engine.lane_source import HEADER, INLINE, lane_loop
 from ppafo.engine.lanes import SIGNAL_ROWS, Batch, Clock, Floats
 from ppafo.engine.loading import load_source
@@ -95,7 +95,7 @@ def _step(rows: LaneRows, task: Task) -> list[str]:
         f"        {rows.cells['result.command']} = {given}",
         f"    {call}",
         *_places(rows),
-        *over_lanes(_observed(rows, task)),
+        *rows.over_lanes(_observed(rows, task)),
     ]
     return [f"for block in range(all_states.shape[0] // {heights['states']}):", *indent(body)]
 

@@ -1,0 +1,39 @@
+"""The effects that a device can have. To add one: a module beside this file and one line here, or an entry point."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from ppafo.errors import KindError, one_line
+from ppafo.kinds import Kinds
+from ppafo.model.effects import silencer
+from ppafo.model.effects.kind import SECTION, Effect, effect_problem
+
+_OWN = (silencer.EFFECT,)
+EFFECTS: Kinds[Effect] = Kinds("ppafo.effects", "effect", Effect, _OWN)
+
+
+def find_effects(paths: Iterable[str]) -> None:
+    """Load the effects that some paths name, where they are those of other packages.
+
+    KindError for one that is there and cannot be used.
+    """
+    for path in paths:
+        section, _, rest = path.partition(".")
+        name = rest.partition(".")[0]
+        if section == SECTION and name and name not in tuple(EFFECTS):
+            effect = EFFECTS.get(name)
+            problem = "" if effect is None else effect_problem(effect)
+            if problem:
+                del EFFECTS[name]
+                raise KindError(f"effect '{one_line(name)}': {problem}")
+
+
+def ordered_effects() -> tuple[Effect, ...]:
+    """Return all effects that are loaded, in the order in which they act: those of the package, then by name."""
+    others = sorted((effect for effect in EFFECTS.values() if effect not in _OWN), key=lambda effect: effect.name)
+    return (*_OWN, *others)
+
+
+def effects_that_are_on(settings: Mapping[str, Mapping[str, Any]]) -> tuple[Effect, ...]:
+    """Return the effects that are on with some settings [SI] by name, in the order in which they act."""
+    return tuple(effect for effect in ordered_effects() if effect.is_on(settings.get(effect.name, effect.defaults())))

@@ -1,0 +1,50 @@
+"""A silencer behind the valve's exhaust: what leaves a chamber passes two restrictions, one behind the other."""
+
+import math
+from typing import Any, NamedTuple
+
+from ppafo.model.declaration import Quantity
+from ppafo.model.effects.kind import Effect
+from ppafo.model.orifice_curves import sonic_conductance_mass
+from ppafo.model.places import way_out
+
+
+class Silencer(NamedTuple):
+    """One over the square of the silencer's conductance [(s Pa/kg)^2]; 0 where there is none."""
+
+    resistance: float
+
+
+def behind_silencer(conductance: float, silencer: Silencer) -> float:
+    """Conductance [kg/(s Pa)] of valve and silencer in a row, from that of the valve.
+
+    ``1/C^2 = 1/C_v^2 + 1/C_s^2``: pressure drops of a subsonic flow add up, each as the square of the flow. Written as
+    ``C_v / sqrt(1 + (C_v/C_s)^2)``, it holds for a shut valve too. Exact where the flow is far from choked; where it is
+    choked, up to 12 % low for a silencer as narrow as the valve, 5 % for one three times as wide (ISO 6358-3).
+    """
+    return way_out(conductance / math.sqrt(1.0 + conductance * conductance * silencer.resistance))
+
+
+def prepare(settings: Any, device: Any) -> Silencer:
+    """The silencer's row from its sonic conductance and the gas of the device, as ISO 6358 counts it."""
+    sonic, gas = settings["sonic_conductance"], device.gas
+    conductance = sonic_conductance_mass(sonic, gas.specific_gas_constant, gas.temperature)
+    return Silencer(1.0 / (conductance * conductance) if sonic > 0.0 else 0.0)
+
+
+EFFECT = Effect(
+    name="silencer",
+    summary="A silencer at the exhaust of the valve, in a row with it.",
+    quantities=(
+        Quantity(
+            "sonic_conductance", "m^3/(s Pa)", "sonic conductance C of the silencer, 0 for none", 0.0, 0.0, 1.0e-4
+        ),
+    ),
+    parameters=Silencer,
+    prepare=prepare,
+    switch=("sonic_conductance",),
+    laws={way_out: behind_silencer},
+    source="ISO 6358-3:2014, restrictions in series, with equal critical ratios and far from choking",
+    equation="1/C^2 = 1/C_v^2 + 1/C_s^2",
+    symbols=(("C_s", "conductance of the silencer, from its sonic conductance", "kg/(s Pa)"),),
+)

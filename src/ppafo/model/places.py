@@ -1,0 +1,15 @@
+"""Places of the physics at which effects act, each as it is without any: what passes through and nothing more.
+
+The plant calls them where its equations have them. An effect gives a law for a place, and a program with that effect
+calls the law instead (``model/effects/kind.py``). A law takes what its place takes, and its own row.
+"""
+
+
+def way_in(conductance: float) -> float:
+    """Conductance [kg/(s Pa)] from a regulated supply to a chamber, from that of the open valve. Equation (8)."""
+    return conductance
+
+
+def way_out(conductance: float) -> float:
+    """Conductance [kg/(s Pa)] from a chamber to the atmosphere, from that of the open valve. Equation (8)."""
+    return conductance

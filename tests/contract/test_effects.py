@@ -1,0 +1,210 @@
+"""An effect of another package is one file and one entry point: every door knows it by that."""
+
+import ctypes
+import importlib.util
+import shutil
+import sys
+from collections.abc import Iterator
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import ppafo
+from ppafo.cli.main import main
+from ppafo.engine.reference.agreement import compare_with_reference
+from ppafo.engine.run import batch_of
+from ppafo.exports.c_library import c_library, library_of
+from ppafo.exports.c_library.files import c_identifier
+from ppafo.exports.fmu import closed_loop, functional_unit
+from ppafo.exports.fmu.binaries import host_platform
+from ppafo.exports.wasm import module_of
+from ppafo.identification.trajectory.experiment import declaration_of
+from ppafo.identification.trajectory.experiment import with_numbers as with_fitted
+from ppafo.live.content import words
+from ppafo.model.effects.catalog import EFFECTS
+from ppafo.parameters.building import build_device
+from ppafo.parameters.loading import json_schema, parse_parameter_set
+from ppafo.questions.linearise.solve import linearise
+from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.simulate import simulate
+from ppafo.walking import load_walk
+from ppafo.walking.walk import walk
+from tests.built_once import shared_library
+from tests.modules_under_node import compared, drawn
+
+AREA = "effects.mesh.area"
+NARROW = f"{AREA}=4 mm^2"
+NAME, SHORT = "step-response", ("run.duration=0.3 s",)
+EXAMPLE = files("ppafo.examples") / "add-an-effect"
+
+
+@pytest.fixture(autouse=True)
+def _forgotten() -> Iterator[None]:
+    known, modules = set(EFFECTS), set(sys.modules)
+    yield
+    for name in set(EFFECTS) - known:
+        del EFFECTS[name]
+    for name in set(sys.modules) - modules:
+        if name.split(".")[0] == "my_effects":
+            del sys.modules[name]
+
+
+@pytest.fixture(autouse=True)
+def _installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The package of the example, as an installer leaves it."""
+    folder = tmp_path / "site"
+    shutil.copytree(Path(str(EXAMPLE)) / "my_effects", folder / "my_effects")
+    about = folder / "my_effects-0.1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: my-effects\nVersion: 0.1.0\n")
+    (about / "entry_points.txt").write_text("[ppafo.effects]\nmesh = my_effects.mesh:EFFECT\n")
+    monkeypatch.syspath_prepend(folder)
+
+
+def slower(with_mesh: Any, without: Any) -> bool:
+    """Whether chamber 2 keeps its pressure for longer than without."""
+    return bool(np.abs(with_mesh.recording["pressure_2"] - without.recording["pressure_2"]).max() > 1.0e3)
+
+
+def test_it_is_set_as_any_number_is_and_found_only_then() -> None:
+    without = simulate(load_scenario(NAME, SHORT))
+    assert "mesh" not in tuple(EFFECTS)
+    scenario = load_scenario(NAME, (*SHORT, NARROW))
+    assert scenario.device.effects["mesh"] == {"area": pytest.approx(4e-6), "discharge_coefficient": 0.6}
+    assert slower(simulate(scenario), without)
+
+
+def test_switched_off_it_leaves_every_bit_and_the_program_as_they_were() -> None:
+    without = load_scenario(NAME, SHORT)
+    off = load_scenario(NAME, (*SHORT, f"{AREA}=0 mm^2"))
+    assert batch_of(plan_run(off)).program == batch_of(plan_run(without)).program
+    np.testing.assert_array_equal(simulate(off).recording["torque"], simulate(without).recording["torque"])
+
+
+def test_a_wrong_setting_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    for text, said in (
+        (f"{AREA}=-1 mm^2", "effects.mesh.area = -1 mm^2: open area of the mesh, 0 for none must be at least 0"),
+        ("effects.mesh.aera=1 mm^2", "did you mean 'effects.mesh.area'?"),
+        ("effects.mash.area=1 mm^2", "did you mean 'effects.mesh.area'?"),
+        (f"{AREA}=1 mm", "unit 'mm' does not fit"),
+    ):
+        assert main(["simulate", "torque-task-solenoid", "--set", text]) == 2
+        assert said in capsys.readouterr().err
+
+
+def test_a_column_of_it_has_the_bits_of_the_single_runs_and_splits_where_it_is_off() -> None:
+    areas = np.array([0.0, 4e-6, 0.0, 9e-6])
+    base = load_scenario(NAME, SHORT)
+    found = run_ensemble(base, {AREA: areas}, ["gas_vented"])
+    for area, gas in zip(areas, found.metrics["gas_vented"], strict=True):
+        alone = simulate(load_scenario(NAME, (*SHORT, f"{AREA}={float(area)!r} m^2")))
+        assert gas == alone.metrics["gas_vented"].value
+    assert len(set(found.metrics["gas_vented"])) == 3
+
+
+def test_the_schema_has_it_and_a_set_file_may_give_it() -> None:
+    assert "open area of the mesh, 0 for none" in str(json_schema())
+    shipped = (files("ppafo.parameters") / "sets" / "ppafo2011.toml").read_text(encoding="utf-8")
+    given = '[effects.mesh.area]\nvalue = 3.0\nunit = "mm^2"\norigin = "datasheet"\nsource = "catalogue"\n'
+    device = build_device(parse_parameter_set(f"{shipped}\n{given}".encode(), "mine.toml"))
+    assert device.effects["mesh"]["area"] == pytest.approx(3e-6)
+
+
+def test_it_can_be_fitted() -> None:
+    scenario = load_scenario(NAME, (*SHORT, NARROW))
+    assert declaration_of(AREA, scenario).unit == "m^2"
+    (row,) = plan_run(with_fitted(scenario, {AREA: 8e-6})).effects
+    assert row.resistance == pytest.approx(plan_run(scenario).effects[0].resistance / 4.0)
+
+
+def test_the_reference_solver_has_the_same_law() -> None:
+    for name, motion in (("torque-task-solenoid", "motion.kind=free"), ("step-response", "valve.area=12 mm^2")):
+        agreement = compare_with_reference(plan_run(load_scenario(name, ("run.duration=0.3 s", motion, NARROW))))
+        assert agreement.angle < 2e-4
+        assert agreement.worst_pressure < 1e-3
+
+
+def test_a_linear_model_has_it_as_a_difference_of_two_runs_has() -> None:
+    venting = ("controller.kind=constant", "controller.command=-0.4", "run.duration=0.3 s")
+    rates = [linearise("torque-task-proportional", 0.2, (*venting, text)).rates for text in (f"{AREA}=0 mm^2", NARROW)]
+    step = ("run.step=0.01 ms", "run.output_interval=0.01 ms")
+    found = simulate(load_scenario("torque-task-proportional", (*venting, NARROW, *step))).recording
+    here = int(np.searchsorted(found.time, 0.2 - 1e-9))
+    slope = (found["pressure_1"][here + 20] - found["pressure_1"][here - 20]) / (40 * 1e-5)
+    assert rates[1][0] == pytest.approx(slope, rel=1e-3)
+    assert rates[0][0] != pytest.approx(slope, rel=0.1)
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
+@pytest.mark.parametrize("name", [NAME, "proportional"])
+def test_an_exported_library_makes_the_numbers_of_a_run_that_python_makes(name: str, tmp_path: Path) -> None:
+    is_walk = name == "proportional"
+    walked: Any = load_walk("proportional", [NARROW]) if is_walk else load_scenario(name, (*SHORT, NARROW))
+    library = library_of(walked)
+    places = {item.path: place for place, item in enumerate(library.settings)}
+    assert {AREA, "effects.mesh.discharge_coefficient"} <= set(places)
+    assert not any(path.startswith("effects.silencer.") for path in places)
+    for file, content in c_library(walked).items():
+        (tmp_path / file).write_bytes(content)
+    source = tmp_path / f"{c_identifier(walked.name)}.c"
+    built = ctypes.CDLL(str(shared_library(source, "-O0", "-ffp-contract=off", "-DPPAFO_ENTRY=extern", "-w")))
+    run = planned(walked)
+    batch = batch_of(run)
+    settings = np.array([item.value for item in library.settings])
+    found = np.zeros(len(batch.parameters))
+    built.prepare(*map(handed, (settings, found, np.zeros(len(batch.states)), np.zeros(6))))
+    assert found.tobytes() == batch.parameters[:, 0].tobytes()
+
+
+def planned(walked: Any) -> Any:
+    """The run of a scenario or a walk."""
+    if isinstance(walked, ppafo.Scenario):
+        return plan_run(walked)
+    from ppafo.walking.planning import plan_walk
+    from ppafo.walking.walk import plan_of, walk_duration
+
+    return plan_walk(plan_of(walked, walk_duration(walked)))
+
+
+class Handed(ctypes.Structure):
+    _fields_ = (("values", ctypes.POINTER(ctypes.c_double)), ("extent", ctypes.c_int64 * 3))
+
+
+def handed(values: Any) -> Handed:
+    return Handed(values.ctypes.data_as(ctypes.POINTER(ctypes.c_double)), (ctypes.c_int64 * 3)(values.size, 0, 0))
+
+
+@pytest.mark.skipif(
+    importlib.util.find_spec("fmpy") is None or host_platform() != "linux64", reason="needs FMPy on linux64"
+)
+def test_a_unit_has_its_settings_and_the_bits_of_python(tmp_path: Path) -> None:
+    fmpy = importlib.import_module("fmpy")
+    scenario = load_scenario(NAME, (*SHORT, NARROW))
+    ((file, content),) = functional_unit(closed_loop(scenario), 2, ["linux64"]).items()
+    (tmp_path / file).write_bytes(content)
+    moved = simulate(load_scenario(NAME, (*SHORT, f"{AREA}=7e-06 m^2")))
+    given = {"stop_time": scenario.duration, "step_size": scenario.output_interval, "start_values": {AREA: 7e-6}}
+    found = fmpy.simulate_fmu(
+        str(tmp_path / file), output=["torque"], output_interval=scenario.output_interval, **given
+    )
+    np.testing.assert_array_equal(found["torque"], moved.recording["torque"])
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
+def test_the_page_has_its_words_and_the_bits_of_python() -> None:
+    module = module_of(load_scenario(NAME, (*SHORT, NARROW)))
+    (entry,) = [item for item in module.description["settings"] if item["key"] == AREA]
+    assert entry["description"] == "open area of the mesh, 0 for none"
+    assert AREA not in words()["labels"], "a page needs no words of its own for it"
+    assert compared(NAME, module, drawn(module, 3))
+
+
+def test_it_walks() -> None:
+    without, narrow = (walk(load_walk("proportional", texts), 0.1) for texts in ((), (NARROW,)))
+    assert narrow.status.is_completed
+    assert slower(narrow, without)
