@@ -83,23 +83,10 @@ class LaneRows:
         return [f"{self.cells[path]} = {path}" for name in names for path in leaf_paths(groups[name], name)]
 
     def over_lanes(self, lines: list[str]) -> list[str]:
-        """A loop over all lanes of the block, without loads that nothing in it asks for: they take time to compile.
-
-        Rows of effects are loaded where a function that is called needs them.
-        """
+        """A loop over all lanes of the block, with the rows of effects where a function that is called needs them."""
         lines = woven(lines, self.needs)
         words = {word for line in lines for word in re.findall(r"\w+", line)}
-        lines = [*[self.load(row) for row in self.program.effect_rows if row in words], *lines]
-        kept: list[str] = []
-        loaded_groups: set[str] = set()
-        for line in reversed(lines):
-            load = _LOAD.fullmatch(line)
-            found = re.findall(r"\w+", line)
-            # A line that names its own group again, as in least = min(least, x), gathers over the lanes.
-            if load is None or load["group"] in loaded_groups or found.count(load["group"]) > 1:
-                kept.append(line)
-                loaded_groups.update(found)
-        return ["for lane in range(width):", *indent(kept[::-1])]
+        return over_lanes([*[self.load(row) for row in self.program.effect_rows if row in words], *lines])
 
 
 def _row_numbers(groups: dict[str, type], first: int) -> dict[str, int]:
@@ -126,3 +113,17 @@ def count_lanes(name: str, condition: str) -> list[str]:
 def indent(lines: list[str], levels: int = 1) -> list[str]:
     """The lines, some levels further in."""
     return ["    " * levels + line for line in lines]
+
+
+def over_lanes(lines: list[str]) -> list[str]:
+    """A loop over all lanes of the block, without loads that nothing in it asks for: they take time to compile."""
+    kept: list[str] = []
+    loaded_groups: set[str] = set()
+    for line in reversed(lines):
+        load = _LOAD.fullmatch(line)
+        words = re.findall(r"\w+", line)
+        # A line that names its own group again, as in least = min(least, x), gathers over the lanes for what follows.
+        if load is None or load["group"] in loaded_groups or words.count(load["group"]) > 1:
+            kept.append(line)
+            loaded_groups.update(words)
+    return ["for lane in range(width):", *indent(kept[::-1])]
