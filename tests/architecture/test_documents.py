@@ -16,6 +16,8 @@ import pytest
 from ppafo.model import plant, sensors
 from ppafo.model.actuators.catalog import ACTUATORS
 from ppafo.model.declaration import Quantity
+from ppafo.model.effects.catalog import EFFECTS
+from ppafo.model.effects.kind import Effect, equation_lines, nomenclature_lines
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters import declaration, device
 from ppafo.signals.channels import CHANNELS
@@ -167,6 +169,16 @@ def test_every_field_of_plant_state_and_device_is_in_the_nomenclature(group: Any
 def test_every_number_that_the_physics_takes_or_keeps_is_in_the_nomenclature() -> None:
     data_only = {"default", "minimum", "maximum"}
     assert sorted(names_of(SOURCE / "model", only_numbers=True) - data_only - set(dict(nomenclature()))) == []
+
+
+@pytest.mark.parametrize("effect", EFFECTS.values(), ids=lambda effect: effect.name)
+def test_an_effect_has_its_lines_in_nomenclature_and_equations(effect: Effect) -> None:
+    nomenclature_page, equations = (
+        (ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("nomenclature.md", "equations.md")
+    )
+    for line in nomenclature_lines(effect):
+        assert line in nomenclature_page.splitlines()
+    assert "\n".join(equation_lines(effect)) in equations
 
 
 def test_units_of_the_nomenclature_are_the_declared_ones() -> None:

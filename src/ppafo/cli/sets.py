@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from ppafo.parameters import ParameterSet
 
 _WIDTH = 110
-_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow", "valves", "reported")
+_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow", "effects", "valves", "reported")
 _COLUMNS = ("path", "value", "unit", "origin", "source")
 
 

@@ -6,7 +6,7 @@ know an effect by this value alone; none of them names one.
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from ppafo.errors import ProgramError
@@ -31,8 +31,8 @@ class Effect:
     and its row by the effect's name as a further parameter, which whoever calls the place then hands on. A law that
     calls its own place gets the law of the effect before, or the place as it is without effects.
 
-    ``source`` says where law and numbers are from; ``symbols`` are lines of the nomenclature (symbol, meaning, unit),
-    ``equation`` the line of the equations.
+    ``source`` says where law and numbers are from, ``equation`` is its line of the equations; ``symbols`` are lines of
+    the nomenclature: symbol, name in the code, unit, meaning.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Effect:
     laws: Mapping[Callable[..., Any], Callable[..., Any]]
     source: str = ""
     equation: str = ""
-    symbols: tuple[tuple[str, str, str], ...] = field(default=())
+    symbols: tuple[tuple[str, str, str, str], ...] = ()
 
     @property
     def section(self) -> str:
@@ -61,6 +61,20 @@ class Effect:
         for name in self.switch:
             found = found | (settings[name] > 0.0)
         return found
+
+
+def nomenclature_lines(effect: Effect) -> list[str]:
+    """Return the lines that an effect has in the table of the nomenclature."""
+    return [f"| {symbol} | `{name}` | {unit} | {meaning} |" for symbol, name, unit, meaning in effect.symbols]
+
+
+def equation_lines(effect: Effect) -> list[str]:
+    """Return what the page of the equations says of an effect: its laws by place, its equation and its source."""
+    laws = [
+        f"- `{law.__module__}.{law.__qualname__}`: at `{place.__name__}`; {effect.source}"
+        for place, law in effect.laws.items()
+    ]
+    return [f"### {effect.name}: {effect.summary}", "", f"    {effect.equation}", "", *laws]
 
 
 def effect_problem(effect: Effect) -> str:

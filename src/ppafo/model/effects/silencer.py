@@ -46,5 +46,7 @@ EFFECT = Effect(
     laws={way_out: behind_silencer},
     source="ISO 6358-3:2014, restrictions in series, with equal critical ratios and far from choking",
     equation="1/C^2 = 1/C_v^2 + 1/C_s^2",
-    symbols=(("C_s", "conductance of the silencer, from its sonic conductance", "kg/(s Pa)"),),
+    symbols=(
+        ("1/C_s^2", "resistance", "(s Pa/kg)^2", "one over the square of the conductance of a silencer or a mesh"),
+    ),
 )

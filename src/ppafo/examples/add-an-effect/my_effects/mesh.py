@@ -46,5 +46,5 @@ EFFECT = Effect(
     laws={way_out: behind_mesh},
     source="equation (6) of the paper, and pressure drops in a row that add up",
     equation="1/C^2 = 1/C_v^2 + 1/C_m^2",
-    symbols=(("C_m", "conductance of the mesh", "kg/(s Pa)"),),
+    symbols=(("1/C_m^2", "resistance", "(s Pa/kg)^2", "one over the square of the conductance of the mesh"),),
 )
