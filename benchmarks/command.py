@@ -4,8 +4,7 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 
-from ppafo.cli.arguments import CommandParser, check_options
-from ppafo.cli.main import EXIT_BAD_INPUT, EXIT_INTERRUPTED
+from ppafo.cli.main import EXIT_BAD_INPUT, EXIT_INTERRUPTED, CommandParser, check_options
 from ppafo.errors import PpafoError, one_line
 
 

@@ -20,7 +20,7 @@ from benchmarks.command import run_command
 from benchmarks.report import describe_machine
 from ppafo.cli.output import EXIT_GOOD, add_json_argument, print_result
 from ppafo.errors import SimulationError
-from ppafo.exports.fmu.binaries import host_platform
+from ppafo.exports.fmu import host_platform
 from ppafo.exports.mujoco import installed_headers, plugin_files
 from ppafo.simulation.loading import load_scenario
 from ppafo.worlds.mujoco import Plugin, add_device, add_friction, load_plugin, outputs_of

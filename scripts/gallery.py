@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from ppafo.live.gallery import gallery
+from ppafo.live.workbench import gallery
 from ppafo.storage.files import write_file
 
 

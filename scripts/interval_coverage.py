@@ -24,11 +24,11 @@ from ppafo.cli.output import (
     EXIT_GOOD,
     add_output_arguments,
     check_output,
+    load_drawing,
     print_result,
     tell,
     write_files,
 )
-from ppafo.cli.quick_imports import load_drawing
 from ppafo.questions.question import counting_number, whole_number
 
 COMMAND = "coverage"

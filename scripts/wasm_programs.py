@@ -28,14 +28,15 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from ppafo.exports import wasm
 from ppafo.exports.c_library import library_of
 from ppafo.exports.loading import load_exportable
-from ppafo.exports.wasm import building, module_of
+from ppafo.exports.wasm import module_of
 from ppafo.simulation.loading import list_scenarios
 from ppafo.walking.loading import list_walks
 from tests.modules_under_node import compared, drawn, drawn_walks
 
-FOLDER = Path(building.__file__).parent / "programs"
+FOLDER = Path(wasm.__file__).parent / "programs"
 SIDE, SIDE_OF_WALKS = 32, 8
 """Values of each of both settings of a map."""
 
@@ -49,13 +50,13 @@ def shipped_programs() -> dict[str, bytes]:
     """Files of the programs and of their index, built from the physics as it is now; two runs may share a program."""
     programs, contents = {}, {}
     for name in shipped():
-        text = building.source_of(library_of(load_exportable(name)))
-        digest = building.digest_of(text)
+        text = wasm.source_of(library_of(load_exportable(name)))
+        digest = wasm.digest_of(text)
         if digest not in programs:
             programs[digest] = f"{name}.wasm"
-            contents[f"{name}.wasm"] = building.build(text)
-    index = {"ziglang": building.compiler_version(), "programs": programs}
-    return {building.INDEX: f"{json.dumps(index, indent=2)}\n".encode(), **contents}
+            contents[f"{name}.wasm"] = wasm.build(text)
+    index = {"ziglang": wasm.compiler_version(), "programs": programs}
+    return {wasm.INDEX: f"{json.dumps(index, indent=2)}\n".encode(), **contents}
 
 
 def write(is_check: bool) -> int:

@@ -294,7 +294,7 @@ def build(site: Path) -> int:
     """Stage, build, add the gallery, check; return 0 where all is well."""
     from sphinx.cmd.build import build_main
 
-    from ppafo.live.gallery import gallery
+    from ppafo.live.workbench import gallery
 
     source = site.with_suffix(".source")
     for folder in (source, site):

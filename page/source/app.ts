@@ -9,6 +9,7 @@ import { Engine, failedRun, type Run } from "./engine";
 import { Extras } from "./extras";
 import { Workers } from "./jobs";
 import { OutcomeTable } from "./outcome";
+import type { Named, Page } from "./page";
 import { Panels } from "./panels";
 import { changed, type Configuration, contradiction, normalText, settingsByKey, valuesOf } from "./settings";
 import { Stage } from "./stage";
@@ -19,13 +20,7 @@ import { makeFrame, type PageFrame } from "./frame";
 
 const MOST_RUNS = 4 * MOST_CONFIGURATIONS;
 
-export interface Named {
-  readonly name: string;
-  readonly place: number;
-  readonly configuration: Configuration;
-}
-
-export class App {
+export class App implements Page {
   state: State;
   overlay: Overlay | null = null;
   readonly workers: Workers;

@@ -1,6 +1,6 @@
 /** Bands of uncertainty of the configurations: made when the page has come to rest, and kept. */
 
-import type { App } from "./app";
+import type { Page } from "./page";
 import type { Band } from "./panels";
 import type { Configuration } from "./settings";
 import { bandOf } from "./variation";
@@ -14,7 +14,7 @@ export class Bands {
   private readonly latest = new Map<number, BandsOfChannels>();
   private readonly underWay = new Set<Configuration>();
 
-  constructor(private readonly app: App) {}
+  constructor(private readonly app: Page) {}
 
   /** The bands of the configuration at a place, or those that were there before. */
   of(configuration: Configuration, place: number): BandsOfChannels | null {

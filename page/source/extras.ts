@@ -1,12 +1,12 @@
 /** What the page offers beside the plots: sharing, the map, a recording of one's own, and what each assumption does. */
 
-import type { App, Named } from "./app";
 import { programNamed } from "./content";
 import { element, say } from "./dom";
 import type { PageFrame } from "./frame";
 import { refuseFile } from "./jobs";
 import { MapView } from "./map";
 import { shownMetric } from "./outcome";
+import type { Named, Page } from "./page";
 import { agreementTable, askForColumns, columnsOf, type ColumnMap, mapOfHeader } from "./recording";
 import { scenarioFile } from "./scenario_file";
 import { atmosphereOf, type Configuration, shownNumber, valuesOf } from "./settings";
@@ -33,7 +33,7 @@ export class Extras {
 
   constructor(
     private readonly frame: PageFrame,
-    private readonly app: App,
+    private readonly app: Page,
   ) {
     this.map = new MapView(frame.map, app.content, app.workers, (configuration) => app.runOf(configuration), (place, texts) => app.changeOne(place, texts));
     frame.map.closest("details")?.addEventListener("toggle", () => this.follow(app.named));

@@ -1,8 +1,8 @@
 /** The places of the page: head, tabs, configurations, controls, plots, and what is folded away below. */
 
-import type { App, Named } from "./app";
 import { type Content, programNamed } from "./content";
 import { element } from "./dom";
+import type { Named, Page } from "./page";
 import { MOST_CONFIGURATIONS, type State } from "./state";
 
 export interface PageFrame {
@@ -20,7 +20,7 @@ export interface PageFrame {
   readonly follow: (state: State, named: readonly Named[], target: number | null, isBeside: boolean, canUndo: boolean, canRedo: boolean) => void;
 }
 
-export function makeFrame(host: HTMLElement, content: Content, app: App): PageFrame {
+export function makeFrame(host: HTMLElement, content: Content, app: Page): PageFrame {
   const place = (name: string) => element("div", { class: name });
   const [controls, panels, stage, outcome] = [place("controls"), place("panels"), place("stage"), place("outcomes")];
   const [share, map, recording, assumptions] = [place("share"), place("map-place"), place("recording"), place("assumptions")];
@@ -104,7 +104,7 @@ function choice(words: string, change: (isOn: boolean) => void): { label: HTMLEl
   return { label: element("label", { class: "switch" }, box, words), box };
 }
 
-function fillTabs(tabs: HTMLElement, content: Content, state: State, app: App): void {
+function fillTabs(tabs: HTMLElement, content: Content, state: State, app: Page): void {
   if (tabs.childElementCount === 0) {
     tabs.append(
       ...content.tabs.map((tab, number) => element("button", { type: "button", role: "tab", "aria-controls": "panel", onclick: () => app.openTab(number) }, tab.title)),
@@ -123,7 +123,7 @@ function fillTabs(tabs: HTMLElement, content: Content, state: State, app: App): 
   });
 }
 
-function fillBench(bench: HTMLElement, content: Content, named: readonly Named[], app: App): void {
+function fillBench(bench: HTMLElement, content: Content, named: readonly Named[], app: Page): void {
   const layout = JSON.stringify(named.map(({ name }) => name)) + app.state.tab;
   if (bench.dataset["layout"] === layout) return;
   bench.dataset["layout"] = layout;
@@ -153,7 +153,7 @@ function refill(host: HTMLElement, ...children: Node[]): void {
   if (at >= 0) after[at === before.length - 1 ? after.length - 1 : Math.min(at, after.length - 1)]?.focus();
 }
 
-function fillTarget(target: HTMLElement, named: readonly Named[], chosen: number | null, app: App): void {
+function fillTarget(target: HTMLElement, named: readonly Named[], chosen: number | null, app: Page): void {
   target.hidden = named.length < 2;
   const layout = JSON.stringify([named.map(({ name }) => name), app.state.tab]);
   if (target.dataset["layout"] !== layout) {
@@ -168,7 +168,7 @@ function fillTarget(target: HTMLElement, named: readonly Named[], chosen: number
   for (const box of target.querySelectorAll("input")) box.checked = box.value === String(chosen);
 }
 
-function keyed(event: KeyboardEvent, app: App): void {
+function keyed(event: KeyboardEvent, app: Page): void {
   if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z") return;
   if (event.target instanceof HTMLInputElement && event.target.type === "text") return;
   event.preventDefault();

@@ -12,7 +12,7 @@ import pytest
 from ppafo.cli.main import main
 from ppafo.control.fixed.torque_laws import TARGETS
 from ppafo.exports.firmware.catalog import CATALOG
-from ppafo.exports.firmware.simulator import missing_tools
+from ppafo.exports.firmware.simulators import missing_tools
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate
 

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.answers.text import text_of
-from ppafo.cli.catalog import COMMANDS
-from ppafo.cli.main import build_parser, main
+from ppafo.cli.main import COMMANDS, build_parser, main
 from ppafo.engine.reference.agreement import compare_with_reference
 from ppafo.questions.bits.solve import golden_hashes
 from ppafo.questions.reproduce.solve import Reproduction, Studies, reproduce

@@ -9,7 +9,7 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.exports.firmware.catalog import MSP430G2553
-from ppafo.exports.firmware.simulator import missing_tools
+from ppafo.exports.firmware.simulators import missing_tools
 from ppafo.walking.walk import walk
 
 MISSING = missing_tools(MSP430G2553)

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.live.gallery import declared_workbenches
 from ppafo.live.page import is_page
+from ppafo.live.workbench import declared_workbenches
 
 DOCS = Path(__file__).parents[2] / "docs"
 TEXT = (DOCS / "how-to" / "workbench.md").read_text(encoding="utf-8")

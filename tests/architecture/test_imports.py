@@ -1,5 +1,6 @@
 """No circle of imports, under TYPE_CHECKING and inside functions neither."""
 
+import re
 import runpy
 from pathlib import Path
 
@@ -47,6 +48,13 @@ def test_no_modules_import_each_other() -> None:
     assert len(graph) > 100
     found = {tuple(name.removeprefix("ppafo.") for name in circle) for circle in HOUSE["circles"](graph)}
     assert found == set()
+
+
+def test_no_modules_of_the_page_import_each_other_for_types_neither() -> None:
+    texts = {path.stem: path.read_text(encoding="utf-8") for path in (ROOT / "page" / "source").glob("*.ts")}
+    graph = {name: frozenset(re.findall(r'from "\./(\w+)"', text)) & texts.keys() for name, text in texts.items()}
+    assert {"engine", "panels"} <= graph["app"]
+    assert HOUSE["circles"]({"": frozenset(), **graph}) == []
 
 
 def test_no_module_imports_the_package_itself() -> None:

@@ -15,8 +15,7 @@ from pathlib import Path
 import pytest
 from inline_snapshot import external_file
 
-from ppafo.cli.catalog import COMMANDS, GROUPS
-from ppafo.cli.main import main
+from ppafo.cli.main import COMMANDS, GROUPS, main
 
 SNAPSHOTS = Path(__file__).parents[1] / "snapshots" / "commands"
 SESSIONS = sorted(SNAPSHOTS.glob("*.txt"))

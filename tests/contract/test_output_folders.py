@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.cli.catalog import COMMANDS
-from ppafo.cli.main import main
+from ppafo.cli.main import COMMANDS, main
 from ppafo.storage.owned_folder import MARK
 from tests.virtual_wire import free_port, sending_bench
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from ppafo.errors import ProgramError
-from ppafo.exports.fmu import binaries
-from ppafo.translation import compiler_process
+from ppafo.exports import fmu
+from ppafo.translation import native
 from tests import built_once
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
@@ -21,27 +21,27 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
 
     def ask(line: list[str], remedy: str, folder: str) -> built_once.Done:
         lines.append(line)
-        return compiler_process.asked(line, remedy, folder)
+        return native.asked(line, remedy, folder)
 
-    monkeypatch.setattr(binaries, "asked", built_once._asked_once(ask))
-    monkeypatch.setattr(binaries, "compiler_for", lambda _name: ["gcc", "-s"])
+    monkeypatch.setattr(fmu, "asked", built_once._asked_once(ask))
+    monkeypatch.setattr(fmu, "compiler_for", lambda _name: ["gcc", "-s"])
     return lines
 
 
 def test_the_same_sources_are_built_once_and_others_anew(asked: list[list[str]], tmp_path: Path) -> None:
     mark = f"/* {tmp_path} */\n"
-    first, again = (binaries.build("linux64", {"a.c": (mark + SOURCE).encode()}, "a.c") for _ in range(2))
+    first, again = (fmu.build("linux64", {"a.c": (mark + SOURCE).encode()}, "a.c") for _ in range(2))
     assert first == again
     assert first.startswith(b"\x7fELF")
     assert len(asked) == 1
-    binaries.build("linux64", {"a.c": (mark + SOURCE.replace("42", "43")).encode()}, "a.c")
+    fmu.build("linux64", {"a.c": (mark + SOURCE.replace("42", "43")).encode()}, "a.c")
     assert len(asked) == 2
 
 
 def test_what_is_refused_is_refused_again(asked: list[list[str]]) -> None:
     for _ in range(2):
         with pytest.raises(ProgramError, match="does not build the library"):
-            binaries.build("linux64", {"a.c": b"double answer(void) {\n"}, "a.c")
+            fmu.build("linux64", {"a.c": b"double answer(void) {\n"}, "a.c")
     assert len(asked) == 2
 
 

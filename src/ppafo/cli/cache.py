@@ -29,19 +29,15 @@ def run(parsed: argparse.Namespace) -> int:
     cleared = clear_kept(folder) + clear(folder) if parsed.clear and folder is not None else 0
     why_not = "" if parsed.clear else refusal(folder)
     if parsed.warm:
-        _warm(why_not)
+        if why_not:
+            raise SimulationError(f"--warm: compiled models cannot be kept: {why_not}")
+        from ppafo.simulation.loading import list_scenarios
+        from ppafo.simulation.simulate import compile_models
+
+        compile_models(list_scenarios())
     document = _document(folder, why_not) | ({"freed": cleared} if parsed.clear else {})
     deliver("cache", "\n".join(_lines(document)), document, parsed)
     return EXIT_GOOD
-
-
-def _warm(why_not: str) -> None:
-    if why_not:
-        raise SimulationError(f"--warm: compiled models cannot be kept: {why_not}")
-    from ppafo.simulation.loading import list_scenarios
-    from ppafo.simulation.simulate import compile_models
-
-    compile_models(list_scenarios())
 
 
 def _document(folder: Path | None, why_not: str) -> dict[str, Any]:

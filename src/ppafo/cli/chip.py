@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ppafo.exports.firmware.lock_step import ChipRun, Comparison, Cost
-    from ppafo.exports.firmware.two_boards import BoardsRun
+    from ppafo.exports.firmware.plant import BoardsRun
     from ppafo.exports.firmware.walking.lock_step import WalkOnChip
     from ppafo.simulation.scenario import Scenario
     from ppafo.walking.configuration import Configuration
@@ -118,8 +118,7 @@ def _target_of(scenario: "Scenario", parsed: argparse.Namespace) -> str:
 
 def _runs(scenarios: "Sequence[Scenario]", parsed: argparse.Namespace) -> _Told:
     """Scenarios with the chip in charge, one after the other, and their figure."""
-    from ppafo.exports.firmware.figure import chip_figure
-    from ppafo.exports.firmware.lock_step import run_on_chip
+    from ppafo.exports.firmware.lock_step import chip_figure, run_on_chip
 
     found = [run_on_chip(scenario, _target_of(scenario, parsed)) for scenario in scenarios]
     documents = [{"scenario": one.scenario.name, "target": one.cost.target.name, **_run_document(one)} for one in found]
@@ -134,7 +133,7 @@ def _runs(scenarios: "Sequence[Scenario]", parsed: argparse.Namespace) -> _Told:
 def _scenario(scenario: "Scenario", parsed: argparse.Namespace) -> _Told:
     """A scenario on the chip."""
     from ppafo.exports.firmware.lock_step import compare_drawn
-    from ppafo.exports.firmware.two_boards import run_on_two_boards
+    from ppafo.exports.firmware.plant import run_on_two_boards
 
     target = _target_of(scenario, parsed)
     if parsed.plant:
@@ -196,14 +195,14 @@ def _walk_document(found: "WalkOnChip") -> dict[str, Any]:
 
 def _table(parsed: argparse.Namespace) -> _Told:
     """Every controller on every target, as a table."""
-    from ppafo.exports.firmware.table import rows
+    from ppafo.exports.firmware.lock_step import table_rows
 
     lines = ["| target | controller | flash | data + stack | worst and mean | drawn samples | other decisions |"]
     lines.append("|---|---|---|---|---|---|---|")
     documents = []
     agrees = True
     targets = TARGETS if parsed.target is None else (parsed.target,)
-    for row in rows(targets, parsed.samples or SAMPLES_OF_TABLE):
+    for row in table_rows(targets, parsed.samples or SAMPLES_OF_TABLE):
         found, own = row.found, {"target": row.target.name, "controller": row.law.replace("`", "")}
         if found is None:
             lines.append(f"| {row.target.name} | {row.law} | not run: {', '.join(row.missing)} is missing | | | | |")

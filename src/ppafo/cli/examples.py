@@ -61,20 +61,18 @@ def run(parsed: argparse.Namespace) -> int:
     if parsed.name is None:
         if parsed.out is not None:
             raise DataError("--out: needs the NAME of the example to write")
-        _list(examples, parsed.json)
+        width = max(map(len, examples))
+        lines = [f"{name:<{width}}  {example.summary}" for name, example in examples.items()]
+        document = {"examples": [{"name": name, **_document(example)} for name, example in examples.items()]}
+        print_result(
+            "\n".join([*lines, "", "ppafo examples NAME writes one into a new folder."]), document, parsed.json
+        )
     elif parsed.name not in examples:
         hint = nearest_name(parsed.name, examples)
         raise DataError(f"there is no example '{parsed.name}'{hint}; available: {', '.join(examples)}")
     else:
         _write(parsed.name, examples[parsed.name], parsed.out or Path(parsed.name), parsed.json)
     return EXIT_GOOD
-
-
-def _list(examples: dict[str, Example], as_json: bool) -> None:
-    width = max(map(len, examples))
-    lines = [f"{name:<{width}}  {example.summary}" for name, example in examples.items()]
-    document = {"examples": [{"name": name, **_document(example)} for name, example in examples.items()]}
-    print_result("\n".join([*lines, "", "ppafo examples NAME writes one into a new folder."]), document, as_json)
 
 
 def _write(name: str, example: Example, folder: Path, as_json: bool) -> None:

@@ -128,7 +128,7 @@ def _plugin(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
 
 def _platforms(parsed: argparse.Namespace) -> list[str]:
     """The requested platforms without duplicates; by default that of this computer."""
-    from ppafo.exports.fmu.binaries import host_platform
+    from ppafo.exports.fmu import host_platform
 
     chosen = [host_platform()] if parsed.platforms is None else parsed.platforms.split(",")
     return list(dict.fromkeys(name.strip() for name in chosen if name is not None))

@@ -17,7 +17,7 @@ from ppafo.errors import DataError, UnitError
 
 if TYPE_CHECKING:
     from ppafo.gait import Gait
-    from ppafo.gait.recorded import ImportedGait, ImportSettings
+    from ppafo.gait.recorded import ImportedGait
 
 _SIDES = ("right", "left")
 
@@ -114,20 +114,11 @@ def _show(parsed: argparse.Namespace) -> int:
 
 
 def _import(parsed: argparse.Namespace) -> int:
-    from ppafo.gait.recorded import import_gait
-
-    settings = _settings(parsed)
-    check_output(parsed)
-    imported = import_gait(parsed.files, settings)
-    return _deliver(imported.gait, imported, parsed)
-
-
-def _settings(parsed: argparse.Namespace) -> "ImportSettings":
-    from ppafo.gait.recorded import ImportSettings
+    from ppafo.gait.recorded import ImportSettings, import_gait
     from ppafo.gait.recorded.mapping import load_map
 
     _check_side(parsed.side)
-    return ImportSettings(
+    settings = ImportSettings(
         body_mass=_optional("--body-mass", parsed.body_mass, "kg"),
         side=parsed.side,
         columns=None if parsed.map is None else load_map(parsed.map),
@@ -142,6 +133,9 @@ def _settings(parsed: argparse.Namespace) -> "ImportSettings":
         longest_gap=_optional("--fill-gaps", parsed.fill_gaps, "s") or 0.0,
         ankle_neutral=_optional("--ankle-neutral", parsed.ankle_neutral, "rad"),
     )
+    check_output(parsed)
+    imported = import_gait(parsed.files, settings)
+    return _deliver(imported.gait, imported, parsed)
 
 
 def _check_side(side: str) -> None:

@@ -11,10 +11,10 @@ from ppafo.cli.output import (
     add_json_argument,
     add_override_argument,
     blame_out_option,
+    load_drawing,
     print_result,
     tell,
 )
-from ppafo.cli.quick_imports import load_drawing
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil.packets import HIGHEST_RATE, LOWEST_RATE, RATE
 from ppafo.exports.hil.ports import DEFAULT_BAUD, FORMS
@@ -80,7 +80,7 @@ def check_patience(patience: float) -> None:
 def run(parsed: argparse.Namespace) -> int:
     """Run the plant to its end; 1 where it was vented or diverged, 130 where Ctrl-C stopped it."""
     check_patience(parsed.patience)
-    from ppafo.exports.hil.pace import stop_by_interrupt
+    from ppafo.exports.hil.loop import stop_by_interrupt
     from ppafo.exports.loading import load_exportable
     from ppafo.simulation.scenario import Scenario
     from ppafo.storage import check_result_folder
@@ -96,7 +96,10 @@ def run(parsed: argparse.Namespace) -> int:
         check_result_folder(folder)
     with stop_by_interrupt() as is_stopped:
         found = _run(parsed, scenario, is_stopped)
-        _save(found, folder)
+        load_drawing()
+        from ppafo.answers.recording_figure import figure_files
+
+        found.save(folder, figure_files(found.plot_signals()))
     print_result(_text(found, parsed.port, folder), _document(found, parsed.port, folder), parsed.json)
     if found.exchange.is_stopped:
         print(f"ppafo: stopped at {found.exchange.vented_at:.6g} s and vented; {folder} is whole", file=sys.stderr)
@@ -108,10 +111,9 @@ def run(parsed: argparse.Namespace) -> int:
 
 
 def _run(parsed: argparse.Namespace, scenario: "Scenario", is_stopped: Any) -> "HardwareRun":
-    from ppafo.exports.hil.pace import LockStep, RealTime
-    from ppafo.exports.hil.plant import check_baud, plant_of
+    from ppafo.exports.hil.loop import LockStep, RealTime
     from ppafo.exports.hil.ports import open_port
-    from ppafo.exports.hil.run import run_plant
+    from ppafo.exports.hil.run import check_baud, plant_of, run_plant
 
     port = open_port(parsed.port, parsed.baud)
     try:
@@ -138,13 +140,6 @@ def _slower(apart: float, period: float, rate: int) -> str:
         f"every {period * _PER_THOUSAND:.4g} ms; it has the wrong gains unless it was exported for this rate: give "
         f"--set controller.rate={rate}Hz here and to 'ppafo export controller'"
     )
-
-
-def _save(found: "HardwareRun", folder: Path) -> None:
-    load_drawing()
-    from ppafo.answers.recording_figure import figure_files
-
-    found.save(folder, figure_files(found.plot_signals()))
 
 
 def _text(found: "HardwareRun", port: str, folder: Path) -> str:

@@ -1,17 +1,193 @@
-"""Entry point of the command line: finds the subcommand, turns errors into one line and an exit code."""
+"""Entry point of the command line: the commands, their parser, and errors as one line and an exit code.
+
+The parser is like any of argparse, but a mistake is one error, and it names what was mistyped.
+"""
 
 import argparse
 import gc
 import importlib
+import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
+from itertools import takewhile
+from typing import TYPE_CHECKING, NoReturn, final
 
-from ppafo.cli.arguments import CommandParser, UsageError, check_command, check_options
-from ppafo.cli.catalog import COMMANDS, GROUPS, MOVED
-from ppafo.errors import PpafoError, one_line
+from ppafo.cli.output import flush_output, printing
+from ppafo.errors import PpafoError, nearest_name, one_line
 from ppafo.questions.catalogue import QUESTIONS, question
 from ppafo.version import __version__
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
+
+
+COMMANDS: dict[str, str] = {
+    "reproduce": QUESTIONS["reproduce"],
+    "simulate": "run a scenario and write its recording, metrics and figure",
+    "workbench": "write scenarios as one page that simulates them while sliders are dragged",
+    "unreported": QUESTIONS["unreported"],
+    "sweep": QUESTIONS["sweep"],
+    "compare": QUESTIONS["compare"],
+    "sensitivity": QUESTIONS["sensitivity"],
+    "montecarlo": QUESTIONS["montecarlo"],
+    "find": QUESTIONS["find"],
+    "tune": QUESTIONS["tune"],
+    "linearise": QUESTIONS["linearise"],
+    "walk": QUESTIONS["walk"],
+    "league": QUESTIONS["league"],
+    "timing": QUESTIONS["timing"],
+    "validate": QUESTIONS["validate"],
+    "record": "record a bench that speaks the protocol of 'ppafo hil'",
+    "rig": "record synthetic bench data on the virtual test rig",
+    "identify": QUESTIONS["identify"],
+    "gait": "list, show and import gaits; export recordings for OpenSim",
+    "endurance": QUESTIONS["endurance"],
+    "design": QUESTIONS["design"],
+    "size": QUESTIONS["size"],
+    "new": "write an input file to start from: a template, or a copy of a shipped one",
+    "examples": "list the examples of the how-to pages, or write one into a folder, ready to run",
+    "plot": "redraw the figures of a result folder",
+    "sets": "list parameter sets, or show one with the source of every value",
+    "parts": QUESTIONS["parts"],
+    "audit": "check a parameter set for contradictions",
+    "export": "write a scenario or a walk for other tools: a library in C, an FMU, a controller for 'ppafo hil'",
+    "firmware": "write the controller of a scenario or a walk, or a plant, as firmware for a small processor",
+    "chip": "run a scenario or a walk with its controller on the simulator of a small processor",
+    "hil": "run a scenario's plant in real time against a controller at a serial port or over UDP",
+    "bits": QUESTIONS["bits"],
+    "cache": "show, compile or remove the compiled models of this computer",
+    "schema": "print the JSON Schema of a file format",
+}
+
+GROUPS: dict[str, tuple[str, ...]] = {
+    "the paper": ("reproduce", "unreported"),
+    "your device": ("new", "examples", "simulate", "workbench", "plot", "sets", "parts", "audit"),
+    "from bench to model": ("record", "rig", "identify", "validate"),
+    "decide": (
+        "sweep",
+        "compare",
+        "sensitivity",
+        "montecarlo",
+        "find",
+        "tune",
+        "linearise",
+        "design",
+        "size",
+        "endurance",
+        "league",
+    ),
+    "walk": ("walk", "gait", "timing"),
+    "tools": ("export", "firmware", "chip", "hil", "bits", "cache", "schema"),
+}
+"""The commands as the help shows them, by what somebody has come for."""
+
+MOVED: dict[str, str] = {
+    "bench": "'python -m benchmarks' or 'make bench'",
+    "coverage": "'python scripts/interval_coverage.py'",
+}
+"""Commands that the package had once, and what does the same in a checkout of the repository."""
+
+
+_BAD_VALUE = re.compile(r"argument (?:--?\w+/)*(\S+): (?!invalid )(.+: .+)")
+"""What argparse makes of an ArgumentTypeError."""
+
+_NEGATIVE_NUMBER = re.compile(r"-\d+|-\d*\.\d+")
+
+
+RENAMED = {
+    "--first": "--first-draws",
+    "--maximum": "--draws",
+    "--most": "--draws",
+    "--most-failed": "--maximum-failed",
+    "--runs": "--draws",
+    "--least-strides": "--minimum-strides",
+}
+"""Options of version 0.1 and what they are called now."""
+
+REMOVED = {"--config": "name what is run without it, as in 'ppafo walk solenoid'"}
+"""Options of version 0.1 that are none any more, and what to write instead."""
+
+
+class UsageError(PpafoError):
+    """The words after ``ppafo`` are not an order that it knows."""
+
+
+@final
+class CommandParser(argparse.ArgumentParser):
+    """A parser that raises ``UsageError`` where argparse would print its usage and end the process."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise the message of argparse as an error of one line that names the help to look at."""
+        bad_value = _BAD_VALUE.fullmatch(message)
+        if bad_value is not None:
+            raise UsageError(f"{bad_value[1]} {bad_value[2]}")
+        raise UsageError(f"{message.removeprefix('argument ')}; see '{self.prog} --help'")
+
+    def _print_message(self, message: str, file: "SupportsWrite[str] | None" = None) -> None:
+        """Print a help text; some versions of Python leave it to the caller that it cannot be written."""
+        with printing():
+            super()._print_message(message, file)
+
+    def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
+        """End the process after ``--help`` or ``--version``, once their text has really been written."""
+        flush_output()
+        super().exit(status, message)
+
+    def options(self) -> set[str]:
+        """Return every option of this parser and of the subcommands that it knows."""
+        found = {name for action in self._actions for name in action.option_strings}
+        for action in self._actions:
+            if isinstance(action.choices, Mapping):
+                found = found.union(*(parser.options() for parser in action.choices.values()))
+        return found
+
+
+def check_command(word: str | None, known: Sequence[str], moved: Mapping[str, str]) -> None:
+    """Refuse a word in the place of the command that names none; argparse would list them without the nearest.
+
+    ``moved`` has, for each command of earlier versions, what does the same in a checkout of the repository.
+    """
+    if word is not None and word in moved:
+        raise UsageError(f"'{word}' is no longer a command of the package: run {moved[word]} in a checkout of ppafo")
+    if word is not None and word not in known:
+        hint = nearest_name(word, known)
+        raise UsageError(f"there is no command '{word}'{hint}; available: {', '.join(known)}")
+
+
+def check_options(words: Sequence[str], parser: CommandParser) -> None:
+    """Refuse an option that no part of the parser has, before argparse complains of what it finds missing besides."""
+    known = sorted(parser.options())
+    for word in takewhile(lambda word: word != "--", words):
+        name = word.partition("=")[0]
+        if name in RENAMED and name not in known and RENAMED[name] in known:
+            raise UsageError(f"{name} is now called {RENAMED[name]}")
+        if _looks_like_option(word) and not any(_stands_for(name, option) for option in known):
+            if name in REMOVED:
+                raise UsageError(f"there is no option '{name}' any more: {REMOVED[name]}")
+            raise UsageError(
+                f"there is no option '{name}'{_nearest_option(name, known)}; available: {', '.join(known)}"
+            )
+
+
+def _nearest_option(name: str, known: Sequence[str]) -> str:
+    """Return the hint; the dashes, which all have in common, would make strangers look alike."""
+    hint = nearest_name(name.strip("-"), [option.removeprefix("--") for option in known if option.startswith("--")])
+    return hint.replace("'", "'--", 1)
+
+
+def _looks_like_option(word: str) -> bool:
+    """Tell whether argparse takes a word for an option: a dash alone, numbers and words with a space are values."""
+    is_number = _NEGATIVE_NUMBER.fullmatch(word) is not None
+    return word.startswith("-") and len(word) > 1 and " " not in word and not is_number
+
+
+def _stands_for(name: str, option: str) -> bool:
+    """Tell whether a name is an option, the beginning of a long one, or a short one with its value behind it."""
+    if name.startswith("--"):
+        return option.startswith(name)
+    return name == option or (len(option) == 2 and name.startswith(option))
+
 
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
@@ -70,7 +246,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(words: list[str]) -> int:
     try:
-        parsed = _parse(words)
+        _check_text(words)
+        chosen = next((word for word in words if not word.startswith("-")), None)
+        check_command(chosen, tuple(COMMANDS), MOVED)
+        parser = build_parser(chosen)
+        check_options(words, parser)
+        parsed = parser.parse_args(words)
+        if parsed.command is None:
+            raise UsageError(
+                "no command was given; 'ppafo --help' lists them; try 'ppafo simulate torque-task-proportional' first"
+            )
         return int(parsed.run(parsed))
     except PpafoError as error:
         print(f"ppafo: {_readable(one_line(error))}", file=sys.stderr)
@@ -85,20 +270,6 @@ def _readable(message: str) -> str:
     if len(message) <= _LONGEST_MESSAGE:
         return message
     return f"{message[: _LONGEST_MESSAGE // 2]} ... {message[-_LONGEST_MESSAGE // 2 :]}"
-
-
-def _parse(words: list[str]) -> argparse.Namespace:
-    _check_text(words)
-    chosen = next((word for word in words if not word.startswith("-")), None)
-    check_command(chosen, tuple(COMMANDS), MOVED)
-    parser = build_parser(chosen)
-    check_options(words, parser)
-    parsed = parser.parse_args(words)
-    if parsed.command is None:
-        raise UsageError(
-            "no command was given; 'ppafo --help' lists them; try 'ppafo simulate torque-task-proportional' first"
-        )
-    return parsed
 
 
 def _check_text(words: list[str]) -> None:

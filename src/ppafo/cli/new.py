@@ -100,7 +100,19 @@ def run(parsed: argparse.Namespace) -> int:
         raise DataError(f"--out {path}: the name must end in {_SUFFIX}")
     if os.path.lexists(path):
         raise DataError(f"{path}: already exists; remove it or choose another name")
-    _write(path, kind, _content(parsed.kind, parsed.source, parsed.name, path))
+    from ppafo.questions.question import load_name
+    from ppafo.storage.files import write_file
+
+    load = load_name(kind.load)
+    write_file(path, _content(parsed.kind, parsed.source, parsed.name, path).encode())
+    # What does not load, such as a file with a path relative to another folder, is not left.
+    is_good = False
+    try:
+        load(path)
+        is_good = True
+    finally:
+        if not is_good:
+            path.unlink(missing_ok=True)
     command = kind.command.replace("FILE", shlex.quote(str(path))).replace("NAME", parsed.name)
     document = {"kind": parsed.kind, "name": parsed.name, "file": str(path), "next": command}
     print_result(f"written: {path}; next: {command}", document, parsed.json)
@@ -124,19 +136,3 @@ def _content(kind: str, source: str | None, name: str, path: Path) -> str:
     # A file of the package shows in its first lines how it is run.
     shown = [line.replace(named[2], str(path)) if line.startswith("#   ppafo ") else line for line in text.split("\n")]
     return "\n".join(shown)
-
-
-def _write(path: Path, kind: _NewFile, text: str) -> None:
-    """Write the file; where it does not load, such as one with a path relative to another folder, it is not left."""
-    from ppafo.questions.question import load_name
-    from ppafo.storage.files import write_file
-
-    load = load_name(kind.load)
-    write_file(path, text.encode())
-    is_good = False
-    try:
-        load(path)
-        is_good = True
-    finally:
-        if not is_good:
-            path.unlink(missing_ok=True)

@@ -4,8 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ppafo.cli.output import EXIT_GOOD, add_json_argument, check_new_file, print_result
-from ppafo.cli.quick_imports import load_drawing
+from ppafo.cli.output import EXIT_GOOD, add_json_argument, check_new_file, load_drawing, print_result
 from ppafo.errors import DataError, reason
 
 if TYPE_CHECKING:

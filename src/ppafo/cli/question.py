@@ -14,9 +14,9 @@ from ppafo.cli.output import (
     add_output_arguments,
     check_output,
     deliver_answer,
+    load_drawing,
     print_result,
 )
-from ppafo.cli.quick_imports import load_drawing
 from ppafo.documents.toml_text import TomlKind
 from ppafo.progress import ProgressLine
 from ppafo.questions.question import Question, load_name
@@ -36,7 +36,19 @@ def run(parsed: argparse.Namespace, question: Question) -> int:
     if question.library:
         library = load_name(question.library)
         if parsed.list:
-            return _list(parsed, library, question.listing)
+            from ppafo.answers.text import align_columns
+
+            listed: list[dict[str, Any]] = (
+                load_name(question.listing)() if question.listing else _words_of_files(library)
+            )
+            rows = [
+                [f"{value:,} {key}" if isinstance(value, int) else value for key, value in item.items()]
+                for item in listed
+            ]
+            rows = rows if question.listing else [[row[0], row[-1]] for row in rows]
+            plural = f"{library.noun[:-1]}ies" if library.noun.endswith("y") else f"{library.noun}s"
+            print_result("\n".join(align_columns(rows, len(rows[0]))), {plural: listed}, parsed.json)
+            return EXIT_GOOD
         _check_named(parsed, question, library)
     solve = question.solver()
     values = {argument.parameter: getattr(parsed, argument.parameter) for argument in question.arguments}
@@ -79,17 +91,6 @@ def _check_named(parsed: argparse.Namespace, question: Question, library: TomlKi
         if argument.nargs == "?" and getattr(parsed, argument.parameter) is None:
             names = ", ".join(library.names())
             raise library.error(f"no {library.noun} was given: name one ({names}) or give a .toml file")
-
-
-def _list(parsed: argparse.Namespace, library: TomlKind, listing: str) -> int:
-    from ppafo.answers.text import align_columns
-
-    listed: list[dict[str, Any]] = load_name(listing)() if listing else _words_of_files(library)
-    rows = [[f"{value:,} {key}" if isinstance(value, int) else value for key, value in item.items()] for item in listed]
-    rows = rows if listing else [[row[0], row[-1]] for row in rows]
-    plural = f"{library.noun[:-1]}ies" if library.noun.endswith("y") else f"{library.noun}s"
-    print_result("\n".join(align_columns(rows, len(rows[0]))), {plural: listed}, parsed.json)
-    return EXIT_GOOD
 
 
 def _words_of_files(library: TomlKind) -> list[dict[str, Any]]:

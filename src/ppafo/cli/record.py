@@ -53,7 +53,7 @@ def run(parsed: argparse.Namespace) -> int:
 
     with blame_out_option():
         check_files_can_be_added(parsed.out.parent, [parsed.out.name])
-    from ppafo.exports.hil.pace import stop_by_interrupt
+    from ppafo.exports.hil.loop import stop_by_interrupt
     from ppafo.exports.hil.ports import open_port
     from ppafo.exports.hil.recording import record
     from ppafo.storage.comma_separated import write_csv

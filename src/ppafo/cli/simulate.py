@@ -11,9 +11,9 @@ from ppafo.cli.output import (
     add_json_argument,
     add_override_argument,
     blame_out_option,
+    load_drawing,
     print_result,
 )
-from ppafo.cli.quick_imports import load_drawing
 from ppafo.documents.json_text import json_text
 from ppafo.errors import ScenarioError
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from ppafo.answers import Answer, Table
     from ppafo.simulation.check import Check
     from ppafo.simulation.result import Result
-    from ppafo.simulation.scenario import Scenario
 
 DEFAULT_FOLDER = Path("out")
 CHECK_FILE = "check.json"
@@ -57,23 +56,10 @@ def run(parsed: argparse.Namespace) -> int:
     folder = parsed.out if parsed.out is not None else DEFAULT_FOLDER / scenario.name
     with blame_out_option():
         check_result_folder(folder)
-    result = _simulate(scenario)
-    check = result.check() if parsed.check and result.status.is_completed else None
-    _save(result, check, folder)
-    print_result(_text(result, check, folder), _document(result, check, folder), parsed.json)
-    if result.status.is_completed:
-        return EXIT_GOOD if check is None or check.is_determined else EXIT_CHECK_FAILED
-    print(f"ppafo: {scenario.name}: {result.status.message}", file=sys.stderr)
-    return EXIT_CHECK_FAILED
-
-
-def _simulate(scenario: "Scenario") -> "Result":
     from ppafo.simulation.simulate import simulate
 
-    return simulate(scenario)
-
-
-def _save(result: "Result", check: "Check | None", folder: Path) -> None:
+    result = simulate(scenario)
+    check = result.check() if parsed.check and result.status.is_completed else None
     load_drawing()
     from ppafo.answers.page import page_of
     from ppafo.answers.recording_figure import figure_files
@@ -83,6 +69,11 @@ def _save(result: "Result", check: "Check | None", folder: Path) -> None:
     report = page_of(_answer(result, check), {FIGURE: figures[f"{FIGURE}.svg"]})
     checked = {} if check is None else {CHECK_FILE: f"{json_text(check.document())}\n".encode()}
     result.save(folder, {**figures, REPORT: report, **checked})
+    print_result(_text(result, check, folder), _document(result, check, folder), parsed.json)
+    if result.status.is_completed:
+        return EXIT_GOOD if check is None or check.is_determined else EXIT_CHECK_FAILED
+    print(f"ppafo: {scenario.name}: {result.status.message}", file=sys.stderr)
+    return EXIT_CHECK_FAILED
 
 
 def _answer(result: "Result", check: "Check | None") -> "Answer":

@@ -1,6 +1,7 @@
 """A workbench of scenarios and walks: which of them share a tab, what they are called there, and the page of them."""
 
 import json
+import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
@@ -11,8 +12,7 @@ from ppafo.errors import PpafoError, ScenarioError
 from ppafo.exports.loading import Exportable, load_exportable
 from ppafo.exports.wasm import module_of
 from ppafo.live.content import Interval, Simulated, page_content, program_content, usual_changes, words
-from ppafo.live.page import block_of, packed_once, page_of, policy_of_block
-from ppafo.live.start import check_start
+from ppafo.live.page import block_of, check_start, packed_once, page_of, policy_of_block
 from ppafo.simulation.scenario import FreeMotion, Scenario
 
 TITLE = "The powered ankle-foot orthosis, live"
@@ -149,3 +149,19 @@ _SUMMARIES = {
     "Torque task": "The foot stays flat on the ground while the actuator follows a torque that ramps up and is held.",
     "Walk": "A leg that walks with the device; the dashed line is what a healthy ankle would do.",
 }
+
+
+def gallery() -> dict[str, bytes]:
+    """Return the pages of the gallery by file name, in the order in which they are declared."""
+    return {f"{name}.html": _page(entry) for name, entry in declared_workbenches().items()}
+
+
+def declared_workbenches() -> dict[str, Mapping[str, Any]]:
+    """Return title, summary, scenarios and start of each workbench by name."""
+    return tomllib.loads(files("ppafo.live").joinpath("gallery.toml").read_text(encoding="utf-8"))
+
+
+def _page(entry: Mapping[str, Any]) -> bytes:
+    return workbench(
+        entry["scenarios"], entry.get("overrides", ()), entry["title"], entry.get("start", ()), entry["summary"]
+    )

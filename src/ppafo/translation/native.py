@@ -1,18 +1,29 @@
-"""A program built from its C by a compiler of this machine; it does what the compiled module of the lanes does."""
+"""A program built from its C by a compiler of this machine; it does what the compiled module of the lanes does.
 
+Handing an array to C costs Python about a microsecond, a number a twentieth of that. So the arrays of an entry are
+packed into one block of memory, once where they stay the same.
+"""
+
+import ctypes
 import hashlib
 import importlib.util
 import os
 import platform
 import signal
+import struct
+import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from shutil import which
 from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.engine.compilers import CompilerError
 from ppafo.engine.lane_rows import lanes_of
@@ -21,10 +32,102 @@ from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, join_results
 from ppafo.engine.loading import HOW_TO_INSTALL, WITHOUT_C
 from ppafo.errors import SimulationError, one_line, reason
 from ppafo.translation.c99 import FLAGS, c_source
-from ppafo.translation.compiler_process import asked, complaint
-from ppafo.translation.native_entries import Entries, load_entries, with_packed_entries
-from ppafo.translation.typed import LIBRARY
+from ppafo.translation.typed import FLOAT, INT, LIBRARY, Array, Scalar, Type
 from ppafo.translation.walk import entries_of, walk_module
+
+
+def asked(line: Sequence[str], remedy: str = "", folder: str | None = None) -> "subprocess.CompletedProcess[str]":
+    """What a compiler says and how it ends, run in ``folder``; CompilerError, with a remedy, if it cannot be run."""
+    try:
+        return subprocess.run(line, cwd=folder, capture_output=True, encoding="utf-8", errors="replace", check=False)
+    except OSError as error:
+        raise CompilerError(f"{line[0]} cannot be run: {reason(error)}{remedy and '; '}{remedy}") from error
+
+
+def complaint(done: "subprocess.CompletedProcess[str]") -> str:
+    """The line in which a compiler says what is wrong; how it ended where it says nothing."""
+    lines = [*done.stderr.splitlines(), *done.stdout.splitlines(), f"it ended with {done.returncode}"]
+    return one_line(next((text for text in lines if "error" in text), next(filter(str.strip, lines))))
+
+
+Entries = Mapping[str, tuple[Type, ...]]
+"""Types of the parameters of entries, by name."""
+
+_PACKED = "_packed"
+_NOTHING, _FLOATS = ctypes.c_double * 0, np.dtype(np.float64)
+_NUMBERS: dict[Scalar, Any] = {FLOAT: ctypes.c_double, INT: ctypes.c_int64}
+
+
+@dataclass(frozen=True, slots=True)
+class NativeEntry:
+    """An entry of a library, called as that of a module by Numba: arrays, then numbers.
+
+    ``function`` takes its arrays, of these dimensions, one after another as ``layout`` writes each ``ppafo_array``.
+    """
+
+    function: Any
+    dimensions: tuple[int, ...]
+    layout: struct.Struct
+
+    def __call__(self, *given: Any) -> None:
+        """Call it with arrays, and the numbers that follow them."""
+        count = len(self.dimensions)
+        self.function(self._packed(given[:count]), *given[count:])
+
+    def with_arrays(self, *arrays: NDArray[np.float64]) -> Callable[..., None]:
+        """The entry as a function of what follows these arrays, which it keeps.
+
+        TypeError for what C would misread: arrays of other numbers or dimensions, or that lie otherwise in memory.
+        """
+        called: partial[None] = partial(self.function, self._packed(arrays))
+        called.arrays = arrays  # type: ignore[attr-defined]
+        return called
+
+    def _packed(self, arrays: Sequence[Any]) -> bytes:
+        numbers: list[int] = []
+        for array, dimensions in zip(arrays, self.dimensions, strict=True):
+            if array.dtype != _FLOATS or array.ndim != dimensions:
+                problem = f"not one of {array.dtype} {array.shape}"
+                raise TypeError(f"an array of floats in {dimensions} dimensions is needed, {problem}")
+            # Refuses what is read-only, or does not lie row after row.
+            numbers.append(ctypes.addressof(_NOTHING.from_buffer(array)))
+            numbers += array.shape
+        return self.layout.pack(*numbers)
+
+
+def with_packed_entries(source: str, entries: Entries) -> str:
+    """A translation unit that shows nothing but entries, which take their arrays one after another.
+
+    All else is of the file alone. A call of ``advance`` that other libraries see would be one of what the C library of
+    GNU has under this name.
+    """
+    texts = ["#define PPAFO_ENTRY static", source]
+    for name, types in entries.items():
+        arrays = [kind for kind in types if isinstance(kind, Array)]
+        numbers = {
+            f"number_{place}": "double" if kind == FLOAT else "int64_t"
+            for place, kind in enumerate(types[len(arrays) :])
+        }
+        taken = ", ".join(["const ppafo_array *arrays", *(f"{kind} {number}" for number, kind in numbers.items())])
+        given = ", ".join([*(f"arrays[{place}]" for place in range(len(arrays))), *numbers])
+        texts.append(f"void {name}{_PACKED}({taken})\n{{\n    {name}({given});\n}}\n")
+    return "\n".join(texts)
+
+
+def load_entries(library: Path, entries: Entries) -> dict[str, NativeEntry]:
+    """Return the entries of a library by name; OSError where it cannot be loaded, AttributeError where it lacks one."""
+    loaded = ctypes.CDLL(str(library))
+    return {name: _entry(loaded[f"{name}{_PACKED}"], types) for name, types in entries.items()}
+
+
+def _entry(function: Any, types: Sequence[Type]) -> NativeEntry:
+    dimensions = tuple(kind.dimensions for kind in types if isinstance(kind, Array))
+    function.restype = None
+    function.argtypes = [ctypes.c_void_p, *(_NUMBERS[kind] for kind in types if isinstance(kind, Scalar))]
+    return NativeEntry(
+        function, dimensions, struct.Struct("".join(f"P{count}q{8 * (3 - count)}x" for count in dimensions))
+    )
+
 
 FOR_GCC = ("-fno-thread-jumps", "-fno-ssa-phiopt", "-fno-tree-pre", "--param", "sra-max-scalarization-size-Ospeed=4096")
 """What lets gcc take lanes side by side: without them it makes jumps of choices first. The bits stay as they are."""

@@ -169,7 +169,11 @@ class _Ranges:
         if term.kind == "name":
             found = names[term.detail]
         elif term.kind in ("field", "item") and len(parts) == 1:
-            found = _part(term, parts[0])
+            whole = parts[0]
+            assert not isinstance(whole, Interval)
+            kind = term.parts[0].type
+            place = [name for name, _ in kind.fields].index(term.detail) if isinstance(kind, Row) else int(term.detail)
+            found = whole[place]
         elif term.kind == "build":
             found = parts
         elif term.kind == "call":
@@ -179,14 +183,6 @@ class _Ranges:
         else:
             found = _calculated(item, term, [part for part in parts if isinstance(part, Interval)])
         return found
-
-
-def _part(term: Term, whole: Range) -> Range:
-    """That of one field or item."""
-    assert not isinstance(whole, Interval)
-    kind = term.parts[0].type
-    place = [name for name, _ in kind.fields].index(term.detail) if isinstance(kind, Row) else int(term.detail)
-    return whole[place]
 
 
 def _calculated(item: Function, term: Term, parts: list[Interval]) -> Interval:

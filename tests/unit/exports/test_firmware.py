@@ -12,13 +12,18 @@ import pytest
 from ppafo.control.fixed.torque_laws import FIXED_LAWS, TARGETS, FixedLaw
 from ppafo.control.fixed.whole_numbers import Readings
 from ppafo.errors import ProgramError, ScenarioError
-from ppafo.exports.firmware import chip_controller, firmware
+from ppafo.exports.firmware import chip_controller, firmware, proof
 from ppafo.exports.firmware.catalog import CATALOG
-from ppafo.exports.firmware.controller import proof
 from ppafo.exports.firmware.lock_step import PythonChip, compare_drawn, drawn_readings, run_on_chip
-from ppafo.exports.firmware.qemu import QemuSimulator
-from ppafo.exports.firmware.simulator import built, chip_simulator, missing_tools, read_image, sizes
-from ppafo.exports.firmware.target import Target
+from ppafo.exports.firmware.simulators import (
+    QemuSimulator,
+    Target,
+    built,
+    chip_simulator,
+    missing_tools,
+    read_image,
+    sizes,
+)
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.widths import Interval

@@ -12,8 +12,7 @@ from ppafo.control.fixed.whole_numbers import Readings
 from ppafo.exports.firmware import chip_controller, firmware
 from ppafo.exports.firmware.catalog import CORTEX_M0
 from ppafo.exports.firmware.lock_step import PythonChip
-from ppafo.exports.firmware.qemu import Debugger
-from ppafo.exports.firmware.simulator import built, missing_tools, read_image
+from ppafo.exports.firmware.simulators import Debugger, built, missing_tools, read_image
 from tests.unit.exports.test_firmware import scenario_of
 
 MISSING = missing_tools(CORTEX_M0)

@@ -4,11 +4,10 @@ import pytest
 
 from ppafo.control.fixed.torque_laws import PLANT_TARGETS
 from ppafo.errors import ScenarioError
-from ppafo.exports.firmware import two_boards
+from ppafo.exports.firmware import plant
 from ppafo.exports.firmware.catalog import CATALOG
-from ppafo.exports.firmware.plant import plant_firmware
-from ppafo.exports.firmware.simulator import missing_tools
-from ppafo.exports.firmware.two_boards import run_on_two_boards
+from ppafo.exports.firmware.plant import plant_firmware, run_on_two_boards
+from ppafo.exports.firmware.simulators import missing_tools
 from tests.unit.exports.test_firmware import scenario_of
 
 MISSING = missing_tools(CATALOG["cortex-m4"])
@@ -42,7 +41,7 @@ def test_a_run_of_one_sample_is_refused_before_anything_is_built() -> None:
 def test_a_plant_with_another_supply_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
     duration = "run.duration=0.02 s"
     other = plant_firmware(scenario_of("pid", duration, "supply.pressure=51 psi_g"), "cortex-m4")
-    monkeypatch.setattr(two_boards, "plant_firmware", lambda *_: other)
+    monkeypatch.setattr(plant, "plant_firmware", lambda *_: other)
     found = run_on_two_boards(scenario_of("pid", duration), "cortex-m0", "cortex-m4")
     assert found.differences > 0
     assert found.first_difference.startswith("sample 2, pressure")

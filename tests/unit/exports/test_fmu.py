@@ -19,9 +19,8 @@ import pytest
 
 from ppafo.errors import ScenarioError
 from ppafo.exports.c_library import c_library
-from ppafo.exports.fmu import closed_loop, functional_unit
-from ppafo.exports.fmu.binaries import host_platform
-from ppafo.exports.fmu.variables import FIXED_NAMES
+from ppafo.exports.fmu import closed_loop, functional_unit, host_platform
+from ppafo.exports.fmu.description import FIXED_NAMES
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate
 from scripts.instances import Instance, growth_of

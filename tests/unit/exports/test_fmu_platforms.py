@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from ppafo.errors import SimulationError
-from ppafo.exports.fmu import binaries, closed_loop, functional_unit
-from ppafo.exports.fmu.binaries import PLATFORMS, compiler_for
+from ppafo.exports import fmu
+from ppafo.exports.fmu import PLATFORMS, closed_loop, compiler_for, functional_unit
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate
 
@@ -100,6 +100,6 @@ def test_a_compiler_that_fails_halfway_is_said_in_one_line(
     broken = tmp_path / "gcc"
     broken.write_text(script, encoding="utf-8")
     broken.chmod(0o755)
-    monkeypatch.setattr(binaries, "compiler_for", lambda _: [str(broken)])
+    monkeypatch.setattr(fmu, "compiler_for", lambda _: [str(broken)])
     with pytest.raises(SimulationError, match=line):
-        binaries.build("linux64", {"unit.c": b""}, "unit.c")
+        fmu.build("linux64", {"unit.c": b""}, "unit.c")

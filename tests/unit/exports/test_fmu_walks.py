@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.exports.fmu import closed_loop, functional_unit
-from ppafo.exports.fmu.binaries import host_platform
+from ppafo.exports.fmu import closed_loop, functional_unit, host_platform
 from ppafo.exports.fmu.plant import plant_alone
 from ppafo.walking import load_walk
 from ppafo.walking.walk import WalkResult, walk

@@ -12,11 +12,9 @@ from hypothesis import strategies as st
 from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
-from ppafo.exports.hil.loop import BROKEN, NOT_SOUND, SILENT, STOPPED, Bench, Row
-from ppafo.exports.hil.pace import LockStep, RealTime
+from ppafo.exports.hil.loop import BROKEN, NOT_SOUND, SILENT, STOPPED, Bench, LockStep, RealTime, Row
 from ppafo.exports.hil.packets import OVER, VENTED, Answer, Sample, answer_bytes
-from ppafo.exports.hil.plant import Plant, check_baud, plant_of
-from ppafo.exports.hil.run import HardwareRun, longest_silence, run_plant
+from ppafo.exports.hil.run import HardwareRun, Plant, check_baud, longest_silence, plant_of, run_plant
 from ppafo.model.command import VENT
 from ppafo.model.sensors import Measurement
 from ppafo.parameters.device import Device

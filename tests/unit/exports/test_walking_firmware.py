@@ -10,9 +10,9 @@ import pytest
 from ppafo.control.fixed.walking_numbers import EVENT_ON_OFF
 from ppafo.control.walking.signs import SIGNS
 from ppafo.errors import ProgramError, ScenarioError
+from ppafo.exports.firmware import proof
 from ppafo.exports.firmware.catalog import MSP430G2553
-from ppafo.exports.firmware.controller import proof
-from ppafo.exports.firmware.simulator import built, missing_tools, sizes
+from ppafo.exports.firmware.simulators import built, missing_tools, sizes
 from ppafo.exports.firmware.walking import walk_chip, walk_firmware
 from ppafo.exports.firmware.walking.drawn import DrawnGait
 from ppafo.exports.firmware.walking.lock_step import SIGN_BITS, PythonWalkChip, compare_drawn_walk, walk_on_chip

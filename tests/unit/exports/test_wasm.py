@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from ppafo.errors import ProgramError
+from ppafo.exports import wasm
 from ppafo.exports.c_library import library_of
 from ppafo.exports.loading import load_exportable
-from ppafo.exports.wasm import building, module_of
+from ppafo.exports.wasm import module_of
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate
@@ -95,18 +96,18 @@ def test_what_would_need_another_program_is_said_and_refused() -> None:
 
 def test_the_programs_of_the_package_are_those_of_its_physics() -> None:
     """The texts are compared everywhere, the bytes where the compiler is the one that made them."""
-    index = json.loads((FOLDER / building.INDEX).read_text())
+    index = json.loads((FOLDER / wasm.INDEX).read_text())
     shipped = (*list_scenarios(), *list_walks())
-    texts = {name: building.source_of(library_of(load_exportable(name))) for name in shipped}
-    missing = [name for name, text in texts.items() if building.digest_of(text) not in index["programs"]]
+    texts = {name: wasm.source_of(library_of(load_exportable(name))) for name in shipped}
+    missing = [name for name, text in texts.items() if wasm.digest_of(text) not in index["programs"]]
     assert missing == [], "python scripts/wasm_programs.py builds them anew"
-    if building.compiler_version() != index["ziglang"]:
+    if wasm.compiler_version() != index["ziglang"]:
         pytest.skip(f"ziglang {index['ziglang']} is not here: the bytes are not compared")
     assert shipped_programs() == {path.name: path.read_bytes() for path in FOLDER.iterdir()}
 
 
 def test_other_numbers_need_no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(building, "build", lambda _text: pytest.fail("it was built"))
+    monkeypatch.setattr(wasm, "build", lambda _text: pytest.fail("it was built"))
     plain = module_of(load_scenario("torque-task-proportional"))
     changed = module_of(load_scenario("torque-task-proportional", MOVED))
     assert changed.wasm == plain.wasm
@@ -124,7 +125,7 @@ def test_a_module_that_was_found_once_is_found_again_without_writing_its_text(
     fresh_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first = module_of(load_scenario("torque-task-proportional"))
-    monkeypatch.setattr(building, "source_of", lambda _library: pytest.fail("the text was written"))
+    monkeypatch.setattr(wasm, "source_of", lambda _library: pytest.fail("the text was written"))
     assert module_of(load_scenario("torque-task-proportional", MOVED)).wasm == first.wasm
     assert list(fresh_cache.rglob("digest-*"))
 
@@ -148,8 +149,8 @@ def test_changed_physics_never_takes_a_program_of_the_package(
 ) -> None:
     scenario = load_scenario("torque-task-proportional")
     shipped = module_of(scenario).wasm
-    monkeypatch.setattr(building, "check_can_build", lambda: None)
-    monkeypatch.setattr(building, "build", lambda text: f"built of {building.digest_of(text)}".encode())
+    monkeypatch.setattr(wasm, "check_can_build", lambda: None)
+    monkeypatch.setattr(wasm, "build", lambda text: f"built of {wasm.digest_of(text)}".encode())
     with monkeypatch.context() as patch:
         patch.setattr(place, value)
         assert module_of(scenario).wasm.startswith(b"built of ")
@@ -158,15 +159,15 @@ def test_changed_physics_never_takes_a_program_of_the_package(
 
 def test_what_had_to_be_built_is_built_once(fresh_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     built: list[str] = []
-    monkeypatch.setattr(building, "check_can_build", lambda: None)
-    monkeypatch.setattr(building, "build", lambda text: built.append(text) or b"built")
+    monkeypatch.setattr(wasm, "check_can_build", lambda: None)
+    monkeypatch.setattr(wasm, "build", lambda text: built.append(text) or b"built")
     scenario = load_scenario("torque-task-proportional", ["sensors.delay=2 ms"])
     assert [module_of(scenario).wasm for _ in range(3)] == [b"built"] * 3
     assert len(built) == 1
 
 
 def test_without_a_compiler_it_is_said_how_to_get_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(building.importlib.util, "find_spec", lambda _name: None)
+    monkeypatch.setattr(wasm.importlib.util, "find_spec", lambda _name: None)
     with pytest.raises(ProgramError, match=r"pip install 'ppafo\[workbench\]'"):
         module_of(load_scenario("torque-task-proportional", ["sensors.delay=2 ms"]))
 

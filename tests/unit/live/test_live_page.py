@@ -16,8 +16,7 @@ import pytest
 from ppafo.errors import ScenarioError
 from ppafo.exports import wasm
 from ppafo.live import page as pages
-from ppafo.live.page import packed, packed_once
-from ppafo.live.start import check_start
+from ppafo.live.page import check_start, packed, packed_once
 from ppafo.live.workbench import DEFAULT, known_intervals, workbench
 from ppafo.simulation.loading import load_scenario
 from ppafo.units import parse_quantity

@@ -69,7 +69,7 @@ def replay(name: str, folder: Path) -> dict[str, Any]:
     import opensim
 
     from ppafo.worlds.opensim import CoSimulation, DeviceAtAnkle, follow_motion
-    from ppafo.worlds.opensim.cosimulation import add_foot_plate
+    from ppafo.worlds.opensim.device import add_foot_plate
 
     chosen = load_walk(name, ["wearer.keeps_gait=1"])
     recording = walk(chosen, 0.1).recording
@@ -350,7 +350,7 @@ def heavy_plate() -> tuple[float, float]:
     import opensim
 
     from ppafo.worlds.opensim import DeviceAtAnkle
-    from ppafo.worlds.opensim.cosimulation import add_foot_plate
+    from ppafo.worlds.opensim.device import add_foot_plate
 
     device = DeviceAtAnkle(load_walk("solenoid"), 1.0e-3, 1.0)
     device.plant = device.plant._replace(inertia=0.0084, gravity_torque=1.0)

@@ -23,7 +23,7 @@ from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.errors import ParameterError, ScenarioError
-from ppafo.exports.fmu.binaries import compiler_for, host_platform
+from ppafo.exports.fmu import compiler_for, host_platform
 from ppafo.exports.mujoco import Headers, attributes_of, installed_headers, plugin_files, plugin_library
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run

@@ -129,7 +129,19 @@ NUMBERS = (
 
 def whole_numbers(settings: Mapping[str, float], period: float, converter: GaitConverter) -> dict[str, float]:
     """Whole numbers by name, not yet limited, for settings in SI units and a sample period [s]."""
-    steps = _differences(settings, period, converter)
+    angle, force, pressure = (
+        step / converter.scale for step in (converter.angle_step, converter.force_step, converter.pressure_step)
+    )
+    steps = {
+        "moves": readings.MOVES / force,
+        "turns": readings.TURNS / angle,
+        "fades": readings.FADES * period / angle,
+        "turned_up": readings.TURNED_UP / angle,
+        "turns_down": readings.TURNS_DOWN / angle,
+        "is_flat": readings.IS_FLAT / angle,
+        "rises": readings.RISES / pressure,
+        "compresses": readings.COMPRESSES / angle,
+    }
     strides = {
         name: settings[name] * STRIDE_SHARE
         for name in ("push_off_end", "push_off_start", "longest_phase", "flat_from", "flat_to", "shortest_swing")
@@ -179,23 +191,6 @@ def _levels(settings: Mapping[str, float], period: float, converter: GaitConvert
     # Who samples slowly may miss how a force goes: no reading is above the largest.
     found["largest_drop"] = found["largest_drop"] if period < readings.QUICK_PERIOD else converter.top
     return {name: value * converter.scale for name, value in found.items()}
-
-
-def _differences(settings: Mapping[str, float], period: float, converter: GaitConverter) -> dict[str, float]:
-    """Changes of readings in counts."""
-    angle, force, pressure = (
-        step / converter.scale for step in (converter.angle_step, converter.force_step, converter.pressure_step)
-    )
-    return {
-        "moves": readings.MOVES / force,
-        "turns": readings.TURNS / angle,
-        "fades": readings.FADES * period / angle,
-        "turned_up": readings.TURNED_UP / angle,
-        "turns_down": readings.TURNS_DOWN / angle,
-        "is_flat": readings.IS_FLAT / angle,
-        "rises": readings.RISES / pressure,
-        "compresses": readings.COMPRESSES / angle,
-    }
 
 
 def _times(settings: Mapping[str, float], period: float) -> dict[str, float]:

@@ -7,11 +7,18 @@ from typing import TYPE_CHECKING
 from ppafo.engine.program import Program
 from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError
-from ppafo.exports.c_library.files import Library, Setting, Switch, c_identifier, library_files
-from ppafo.exports.c_library.page import choosing, words_of, words_of_walk
-from ppafo.exports.c_library.preparation import links_of, preparation_of, relations_of, settings_of
+from ppafo.exports.c_library.files import (
+    Library,
+    Setting,
+    Switch,
+    c_identifier,
+    choosing,
+    library_files,
+    words_of,
+    words_of_walk,
+)
+from ppafo.exports.c_library.preparation import following_text, links_of, preparation_of, relations_of, settings_of
 from ppafo.exports.c_library.program import Further, exported
-from ppafo.exports.c_library.writing import following_text
 from ppafo.exports.loading import Exportable
 from ppafo.parameters.device import Device
 from ppafo.parameters.effects import effects_of

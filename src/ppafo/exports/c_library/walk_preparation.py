@@ -11,8 +11,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.source_text import Collector
 from ppafo.errors import ScenarioError
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
-from ppafo.exports.c_library.preparation import SAID, used_numbers
-from ppafo.exports.c_library.writing import FLAWS, Writing
+from ppafo.exports.c_library.preparation import FLAWS, SAID, Writing, used_numbers
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait import gait_at
 from ppafo.model.gait_sensors import NOTHING_SEEN

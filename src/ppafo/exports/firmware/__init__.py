@@ -1,30 +1,149 @@
-"""A scenario's controller as firmware for a small processor: translated C, a thin layer, make file and page."""
+"""A scenario's controller as firmware for a small processor: proof, translated C, a thin layer, make file, page."""
 
-import re
-from collections.abc import Iterator, Mapping
-from importlib.resources import files
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple, get_type_hints
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.fixed.torque_laws import FIXED_LAWS, TARGETS, FixedLaw
-from ppafo.control.fixed.whole_numbers import SETTINGS, Converter
-from ppafo.engine.rows import rebuilt
-from ppafo.errors import ScenarioError
+from ppafo.control.fixed.torque_laws import FIXED_LAWS, TARGETS, FixedLaw, WholeLaw
+from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, LARGEST_READING, SETTINGS, Converter, Readings
+from ppafo.engine.composed_names import is_row
+from ppafo.engine.rows import is_number, leaf_paths, members, rebuilt
+from ppafo.engine.source_text import SourceCollector
+from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports.firmware.catalog import target_of
-from ppafo.exports.firmware.controller import controller_source, defined_numbers
-from ppafo.exports.firmware.target import Target
+from ppafo.exports.templates import filled, licence, template
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.fixed_point import fixed_controller
 from ppafo.simulation.plan import plan_run, profile_bounds
 from ppafo.simulation.reading import quantity_text
 from ppafo.simulation.scenario import Scenario
+from ppafo.translation.c99 import c_source, documents_of
+from ppafo.translation.typed import INT, Row
+from ppafo.translation.walk import walk_module
+from ppafo.translation.widths import Interval, Narrowed, Range, hull, narrowed
 from ppafo.version import __version__
+
+PRELUDE = "prelude_whole.h"
+
+
+def proof(law: WholeLaw, numbers: Sequence[Quantity] | None = None) -> Narrowed:
+    """The typed functions of a law in 16 and 32 bits, and the range of the command and of the next state.
+
+    For every number within what ``numbers`` (those of the law) declare, every state within the ranges of the law and
+    every reading. ProgramError where a value may leave 32 bits, or the next state its ranges.
+    """
+    collector = SourceCollector("")
+    entry = collector.add(law.sample)
+    parameters = (
+        _typed_row(law.numbers, collector),
+        _typed_row(state_type(law), collector),
+        _typed_row(law.readings, collector),
+    )
+    module = walk_module(collector.text(), {entry: parameters})
+    declared = iter(numbers or law.number_quantities)
+    given: dict[str, Range] = {
+        "numbers": _nested(law.numbers, map(_range, declared)),
+        "state": _nested(state_type(law), (Interval(*law.state_ranges[name]) for name in _leaf_names(state_type(law)))),
+        "readings": (Interval(0, LARGEST_READING),) * len(members(law.readings)),
+    }
+    found = narrowed(module, given)
+    allowed = Interval(-COMMAND_STEPS, COMMAND_STEPS)
+    if not is_within(found.returned, (allowed, given["state"])):
+        raise ProgramError(f"{law.name}: command and state may leave their ranges: {found.returned}")
+    return found
+
+
+def is_within(found: Range, allowed: Range) -> bool:
+    """True where every number of a range lies within the same of another."""
+    return hull(found, allowed) == allowed
+
+
+def controller_source(law: FixedLaw) -> str:
+    """The law in C, with a state of its own and the numbers of ``parameters.h``."""
+    collector = SourceCollector("")
+    entry = collector.add(law.sample)
+    documents = documents_of(collector)
+    title = f"The controller '{law.name}' of ppafo {__version__} on whole numbers. Not to be edited."
+    text = c_source(proof(law).module, documents, title, prelude=PRELUDE)
+    numbers, state, readings = (collector.add(item) for item in (law.numbers, state_type(law), Readings))
+    names = [macro(item) for item in law.number_quantities]
+    given = ", ".join(["{" + ", ".join(names[:2]) + "}", *names[2:]])
+    begin = ", ".join(str(int(value)) for value in law.kind.initial)
+    return f"""#include "controller.h"
+
+#include "parameters.h"
+
+{text}
+static {state} state;
+
+void controller_begin(void)
+{{
+    static const {state} begin = {{{begin}}};
+    state = begin;
+}}
+
+int16_t controller_sample(int16_t reference, int16_t pressure_1, int16_t pressure_2)
+{{
+    static const {numbers} numbers = {{{given}}};
+    const {readings} readings = {{reference, pressure_1, pressure_2}};
+    const {entry}_result result = {entry}(numbers, state, readings);
+    state = result.item_1;
+    return result.item_0;
+}}
+
+bool controller_is_sound(void)
+{{
+    return state.sound == 1;
+}}
+"""
+
+
+def macro(item: Quantity) -> str:
+    """Name of a number in ``parameters.h``."""
+    return f"CONTROLLER_{item.name.upper()}"
+
+
+def defined_numbers(quantities: Iterable[Quantity], numbers: Mapping[str, float]) -> list[str]:
+    """Lines of ``parameters.h`` that define the numbers of a law, and refuse one beyond its range."""
+    lines = []
+    for item in quantities:
+        number = int(numbers[item.name])
+        lines.append(f"#define {macro(item)} {number} /* {item.summary}; {item.minimum:g} to {item.maximum:g} */")
+        lines += [f"#if {macro(item)} < {item.minimum:.0f} || {macro(item)} > {item.maximum:.0f}"]
+        lines += [f'#error "{macro(item)} is beyond its range"', "#endif"]
+    return lines
+
+
+def state_type(law: WholeLaw) -> Any:
+    """The NamedTuple class of the state of a law, which its function says."""
+    return get_type_hints(law.sample)["state"]
+
+
+def _nested(row: type, ranges: Iterator[Interval]) -> Range:
+    """The ranges of a NamedTuple, nested ones in their place."""
+    return tuple(next(ranges) if is_number(kind) else _nested(kind, ranges) for _, kind in members(row))
+
+
+def _leaf_names(row: type) -> Iterator[str]:
+    """Own names of all numbers of a NamedTuple, in order."""
+    return (path.rpartition(".")[2] for path in leaf_paths(row, ""))
+
+
+def _range(item: Quantity) -> Interval:
+    return Interval(int(item.minimum), int(item.maximum))
+
+
+def _typed_row(kind: Any, collector: SourceCollector) -> Row:
+    """A NamedTuple of whole numbers as the walk has it."""
+    hints = get_type_hints(kind)
+    fields = tuple((name, _typed_row(hints[name], collector) if is_row(hints[name]) else INT) for name in kind._fields)
+    return Row(collector.add(kind), fields)
+
 
 TICK = 125.0e-6
 """What a sample period must be a multiple of [s]: one pulse of the timer."""
 MOST_TICKS = 32767
-_MARK = re.compile(r"@(\w+)@")
 _TEMPLATES = ("Makefile", "README.md", "board.h", "board_simulated.c", "controller.h", "host.c", "main.c")
 
 
@@ -69,31 +188,15 @@ def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
     """Files of the firmware of a scenario's controller, by name. ScenarioError where it has no integer form."""
     chosen = target_of(target)
     chip = chip_controller(scenario)
-    words = _words(scenario, chip, chosen)
-    words["wiring"] = _filled(chosen.wiring, words).rstrip()
-    texts = {name: _filled(name, words) for name in (*_TEMPLATES, *chosen.templates)}
-    texts["LICENSE"] = files("ppafo.exports.c_library").joinpath("templates", "LICENSE").read_text(encoding="utf-8")
-    texts["controller.c"] = controller_source(chip.law)
-    texts["parameters.h"] = _parameters(scenario, chip)
-    return {name: text.encode() for name, text in sorted(texts.items())}
-
-
-def _filled(name: str, words: Mapping[str, str]) -> str:
-    text = files("ppafo.exports.firmware").joinpath("templates", name).read_text(encoding="utf-8")
-    return _MARK.sub(lambda found: words[found[1]], text)
-
-
-def _words(scenario: Scenario, chip: ChipController, target: Target) -> dict[str, str]:
-    """What fills the templates."""
     converter = chip.converter
-    return {
+    words = {
         "title": scenario.name,
         "description": scenario.description,
         "kind": chip.law.name,
-        "target": target.name,
-        "processor": target.processor,
-        "board": target.board,
-        "own_bits": str(target.converter_bits),
+        "target": chosen.name,
+        "processor": chosen.processor,
+        "board": chosen.board,
+        "own_bits": str(chosen.converter_bits),
         "version": __version__,
         "period": quantity_text(scenario.control.period, "s"),
         "range": f"{scenario.control.settings[SETTINGS[1].name] / 1.0e3:.6g} kPa",
@@ -102,12 +205,12 @@ def _words(scenario: Scenario, chip: ChipController, target: Target) -> dict[str
         "lowest": f"{-converter.middle * converter.torque_step:.4g} N m",
         "highest": f"{(converter.top - converter.middle) * converter.torque_step:.4g} N m",
         "silence": f"{(2 * chip.ticks * TICK + 2.05e-3) * 1.0e3:.4g} ms",
-        **target.words,
+        **chosen.words,
     }
-
-
-def _parameters(scenario: Scenario, chip: ChipController) -> str:
-    """The header with every number of the law, its unit, meaning and origin."""
+    words["wiring"] = filled(template("firmware", chosen.wiring), words).rstrip()
+    texts = {name: filled(template("firmware", name), words) for name in (*_TEMPLATES, *chosen.templates)}
+    texts["LICENSE"] = licence()
+    texts["controller.c"] = controller_source(chip.law)
     control = scenario.control
     lines = [
         f"/* Numbers of the controller '{chip.law.name}' of {scenario.name}, made by ppafo {__version__} from:",
@@ -119,7 +222,10 @@ def _parameters(scenario: Scenario, chip: ChipController) -> str:
         f"#define CONTROLLER_TICKS {chip.ticks}u /* of 125 us in a sample period of {control.period:.9g} s */",
         f"#define CONTROLLER_BITS {int(control.settings[SETTINGS[0].name])} /* of the converter */",
     ]
-    return "\n".join([*lines, *defined_numbers(chip.law.number_quantities, chip.numbers), "", "#endif", ""])
+    texts["parameters.h"] = "\n".join(
+        [*lines, *defined_numbers(chip.law.number_quantities, chip.numbers), "", "#endif", ""]
+    )
+    return {name: text.encode() for name, text in sorted(texts.items())}
 
 
 def _origins(scenario: Scenario) -> Iterator[str]:

@@ -3,9 +3,7 @@
 from collections.abc import Mapping
 
 from ppafo.errors import ScenarioError
-from ppafo.exports.firmware.mspdebug import MspdebugSimulator
-from ppafo.exports.firmware.qemu import QemuSimulator
-from ppafo.exports.firmware.target import Doubles, Machine, Memory, Target
+from ppafo.exports.firmware.simulators import Doubles, Machine, Memory, MspdebugSimulator, QemuSimulator, Target
 
 _VARIABLES = """\
 # Others do as well: make COMPILER="clang --target=arm-none-eabi" LINKER='$(COMPILER) -fuse-ld=lld',

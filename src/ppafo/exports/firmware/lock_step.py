@@ -1,24 +1,38 @@
 """A controller on the chip's simulator beside the same in Python: drawn samples, or a run with the lanes as plant."""
 
 import random
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
+from ppafo.answers.layout import Margins, figure_of_panels
+from ppafo.answers.style import BLACK, BLUE, VERMILION, WANTED, house_style, mark_kind
 from ppafo.control.fixed.torque_laws import TARGETS
 from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, Converter, Limits, Readings, read
 from ppafo.errors import SimulationError
-from ppafo.exports.firmware import ChipController, chip_controller, firmware
+from ppafo.exports.firmware import ChipController, chip_controller, firmware, state_type
 from ppafo.exports.firmware.catalog import target_of
-from ppafo.exports.firmware.controller import state_type
-from ppafo.exports.firmware.simulator import chip_simulator
-from ppafo.exports.firmware.target import ChipSimulator, Decision, Image, Sizes, Target
+from ppafo.exports.firmware.simulators import (
+    ChipSimulator,
+    Decision,
+    Image,
+    Sizes,
+    Target,
+    chip_simulator,
+    missing_tools,
+)
 from ppafo.model.sensors import Measurement
+from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.result import Result
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 
 EPISODE = 200
 """Drawn samples from one reset to the next."""
@@ -214,3 +228,87 @@ def cost_of(target: Target, image: Image, stack: int, decisions: list[Decision])
         raise SimulationError("no sample was taken on the chip")
     work = [item.work for item in decisions]
     return Cost(target, image.shipped, stack, worst=max(work), mean=sum(work) / len(work))
+
+
+_MARGINS = Margins(left=0.68, right=0.15, top=0.42, bottom=0.52, row_gap=0.36)
+"""Inches."""
+_WIDTH, _TORQUE, _COMMAND = 7.6, 2.6, 0.9
+_COLOURS = (VERMILION, BLUE)
+_LANES = (0, (1, 3))
+
+
+def chip_figure(runs: Sequence[ChipRun]) -> "Figure":
+    """Return the figure of some runs, two panels for each: torque with its reference, and the command to the valve.
+
+    With ``torque-task-solenoid`` and ``torque-task-proportional`` it is figure 8 of the paper.
+    """
+    heights = [_TORQUE, _COMMAND] * len(runs)
+    gaps = _MARGINS.row_gap * (len(heights) - 1)
+    size = (_WIDTH, _MARGINS.top + _MARGINS.bottom + gaps + sum(heights))
+    with house_style():
+        figure, rows = figure_of_panels(size, _MARGINS, rows=len(heights), heights=heights)
+        grid = [axes for (axes,) in rows]
+        for place, run in enumerate(runs):
+            _draw(grid[2 * place], grid[2 * place + 1], run, _COLOURS[place % len(_COLOURS)])
+        grid[-1].set_xlabel("Time (s)")
+        grid[-1].set_xlim(0.0, max(run.chip.recording.duration for run in runs))
+        mark_kind(figure, runs[0].chip.recording.kind)
+        return figure
+
+
+def _draw(torque: "Axes", command: "Axes", run: ChipRun, colour: str) -> None:
+    """Draw a run, and that in the lanes as dots on its lines."""
+    chip, lanes, target = run.chip.recording, run.lanes.recording, run.cost.target.name
+    bits = "same bits as in the lanes" if run.same_bits else "NOT the bits of the lanes"
+    torque.set_title(f"{run.scenario.name}: {run.differences} of {run.samples} decisions differ, {bits}")
+    torque.plot(chip.time, chip["reference"], "--", color=WANTED, linewidth=1.3, label="reference")
+    for axes, name in ((torque, "torque"), (command, "command")):
+        step = "steps-post" if name == "command" else "default"
+        axes.plot(chip.time, chip[name], color=colour, drawstyle=step, label=f"{target} in its simulator")
+        axes.plot(
+            lanes.time, lanes[name], color=BLACK, linewidth=0.9, linestyle=_LANES, drawstyle=step, label="the lanes"
+        )
+    torque.set_ylabel("Torque (N m)")
+    torque.legend(loc="lower right")
+    command.set_ylabel("Valve")
+    command.set_ylim(-1.1, 1.1)
+
+
+FIXED = "controller.arithmetic=fixed"
+
+
+class TriedLaw(NamedTuple):
+    """A controller in words, and the scenario with the settings that it is tried with."""
+
+    said: str
+    scenario: str
+    overrides: tuple[str, ...]
+
+
+TRIED = (
+    TriedLaw("`pid`", "torque-task-proportional", (FIXED,)),
+    TriedLaw("`pid`, with filter and anti-windup", "torque-task-anti-windup", (FIXED,)),
+    TriedLaw("`on_off`", "torque-task-solenoid", (FIXED,)),
+    TriedLaw("`on_off_dead_zone`", "torque-task-proportional", ("controller.kind=on_off_dead_zone", FIXED)),
+)
+"""What the table has, for each target."""
+
+
+class TableRow(NamedTuple):
+    """A controller on a target: what was found, None where a tool is ``missing``."""
+
+    law: str
+    target: Target
+    found: Comparison | None
+    missing: tuple[str, ...]
+
+
+def table_rows(targets: Sequence[str], samples: int) -> Iterator[TableRow]:
+    """The rows of the table, each after so many drawn samples on the simulator and in Python."""
+    for name in targets:
+        target = target_of(name)
+        missing = missing_tools(target)
+        for law in TRIED:
+            scenario = load_scenario(law.scenario, law.overrides)
+            found = None if missing else compare_drawn(scenario, samples, target=name)
+            yield TableRow(law=law.said, target=target, found=found, missing=missing)

@@ -1,9 +1,7 @@
-"""The plant of a scenario as firmware: the exported library, a thin layer, and what the converter shows."""
+"""The plant of a scenario as firmware, and a run of two boards in their simulators beside the same run in the lanes."""
 
 import textwrap
-from collections.abc import Mapping
-from dataclasses import replace
-from importlib.resources import files
+from dataclasses import dataclass, replace
 
 from ppafo.control.catalog import PROFILES
 from ppafo.control.fixed.torque_laws import PLANT_TARGETS
@@ -11,17 +9,29 @@ from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, SETTINGS, Converter
 from ppafo.engine.lanes import SIGNAL_ROWS
 from ppafo.engine.rows import leaf_paths, numbers, row_expression
 from ppafo.engine.source_text import Collector
-from ppafo.errors import ScenarioError
+from ppafo.errors import ScenarioError, SimulationError
 from ppafo.exports.c_library import commanded, scenario_library
-from ppafo.exports.c_library.files import Library, filled, library_files, steps_source
-from ppafo.exports.firmware import chip_controller
+from ppafo.exports.c_library.files import Library, library_files, steps_source
+from ppafo.exports.firmware import chip_controller, firmware
 from ppafo.exports.firmware.catalog import target_of
-from ppafo.exports.firmware.target import Doubles, Target
+from ppafo.exports.firmware.simulators import (
+    ChipSimulator,
+    Doubles,
+    PlantSample,
+    QemuPlant,
+    Sizes,
+    Target,
+    built_image,
+    check_tools,
+    chip_simulator,
+)
+from ppafo.exports.templates import filled, template
 from ppafo.model.sensors import Measurement
 from ppafo.simulation.plan import profile_parameters
 from ppafo.simulation.preparation import step_counts
 from ppafo.simulation.reading import quantity_text
 from ppafo.simulation.scenario import Scenario, Sensors
+from ppafo.simulation.simulate import simulate
 from ppafo.version import __version__
 
 FILES = {
@@ -46,8 +56,8 @@ def plant_firmware(scenario: Scenario, target: str) -> dict[str, bytes]:
         raise ScenarioError(f"no plant for '{target}': floats of 64 bits need more memory: {', '.join(PLANT_TARGETS)}")
     library = plant_library(scenario)
     words = _words(scenario, library, chosen, chosen.doubles)
-    texts = {name: _filled(template, words) for template, name in FILES.items()}
-    texts |= {name: _filled(name, words) for name in ("start_cortex.c", words["script"])}
+    texts = {name: filled(template("firmware", source), words) for source, name in FILES.items()}
+    texts |= {name: filled(template("firmware", name), words) for name in ("start_cortex.c", words["script"])}
     written = library_files(library)
     own = {name: written[name] for name in (f"{library.name}.c", f"{library.name}.h", "LICENSE")}
     return {name: text.encode() for name, text in sorted(texts.items())} | own
@@ -95,10 +105,6 @@ def _constant(row: tuple[float, ...], path: str, collector: Collector) -> str:
     return row_expression(type(row), path, cells, collector.add)
 
 
-def _filled(template: str, words: Mapping[str, str]) -> str:
-    return filled(files("ppafo.exports.firmware").joinpath("templates", template).read_text(encoding="utf-8"), words)
-
-
 def _words(scenario: Scenario, library: Library, target: Target, doubles: Doubles) -> dict[str, str]:
     """What fills the templates."""
     control = scenario.control
@@ -127,3 +133,91 @@ def _words(scenario: Scenario, library: Library, target: Target, doubles: Double
         "period": quantity_text(control.period, "s"),
         "range": f"{control.settings[SETTINGS[1].name] / 1.0e3:.6g} kPa",
     }
+
+
+FEWEST_SAMPLES = 2
+
+
+@dataclass(frozen=True, slots=True)
+class BoardsRun:
+    """A run of controller and plant on two boards, compared with the lanes at every sample of the controller.
+
+    ``differences`` are samples at which the command, or any value of the plant, has other bits. Of the plant: sizes and
+    depth of the stack [bytes], instructions from one sample to the next, the most and the mean.
+    """
+
+    scenario: Scenario
+    plant: Target
+    samples: int
+    differences: int
+    first_difference: str
+    compared: tuple[str, ...]
+    sizes: Sizes
+    stack: int
+    worst: int
+    mean: float
+
+
+def run_on_two_boards(scenario: Scenario, target: str, plant: str) -> BoardsRun:
+    """Run a scenario with its controller on one board and its plant on another, in virtual time, and in the lanes.
+
+    ScenarioError where either has no firmware or the run has less than two samples, SimulationError where a tool is
+    missing or the plant cannot go on.
+    """
+    chosen, samples = target_of(plant), _samples_of_run(scenario)
+    check_tools(chosen)
+    files, controller = plant_firmware(scenario, plant), firmware(scenario, target)
+    names = plant_values(plant_library(scenario))
+    with chip_simulator(controller, target_of(target)) as (chip, _), built_image(files, chosen) as image:
+        board = QemuPlant(chosen, image, len(names))
+        try:
+            run = _coupled(samples, chip, board)
+            stack = board.stack()
+        finally:
+            board.close()
+    lanes = simulate(replace(scenario, output_interval=scenario.control.period)).recording
+    compared = tuple(name for name in names if name in lanes.names)
+    columns = {name: lanes[name] for name in (*compared, "command")}
+    differ = [
+        (number, name)
+        for number, (sample, command) in enumerate(run)
+        for name, value in {**dict(zip(names, sample.values, strict=True)), "command": command / COMMAND_STEPS}.items()
+        if name in columns and value != columns[name][number]
+    ]
+    work = [sample.work for sample, _ in run[1:]]
+    return BoardsRun(
+        scenario=scenario,
+        plant=chosen,
+        samples=len(run),
+        differences=len({number for number, _ in differ}),
+        first_difference="sample {}, {}".format(*differ[0]) if differ else "",
+        compared=compared,
+        sizes=image.sizes,
+        stack=stack,
+        worst=max(work),
+        mean=sum(work) / len(work),
+    )
+
+
+def _samples_of_run(scenario: Scenario) -> int:
+    """Samples of the controller in a run; what a plant takes is counted from each to the next."""
+    samples = int(scenario.duration / scenario.control.period + 1.0e-9)
+    if samples < FEWEST_SAMPLES:
+        raise ScenarioError(
+            f"{scenario.name}: run.duration = {scenario.duration:g} s: must be at least "
+            f"{FEWEST_SAMPLES * scenario.control.period:g} s on two boards, {FEWEST_SAMPLES} samples of the controller"
+        )
+    return samples
+
+
+def _coupled(samples: int, chip: ChipSimulator, board: QemuPlant) -> list[tuple[PlantSample, int]]:
+    """What the plant shows at every sample, and the command that the controller gives for it."""
+    found: list[tuple[PlantSample, int]] = []
+    for number in range(samples):
+        if number:
+            board.go_on(found[-1][1])
+        shown = board.shown()
+        if shown.is_well != 1:
+            raise SimulationError(f"the plant on its board left what is possible after {number} samples")
+        found.append((shown, chip.sample(shown.readings).command))
+    return found

@@ -2,24 +2,120 @@
 
 import hashlib
 import html
+import importlib.util
 import io
-import re
+import platform
+import shutil
+import sys
+import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from importlib.resources import files
+from pathlib import Path
 
-from ppafo.errors import ScenarioError, nearest_name
+from ppafo.errors import ProgramError, ScenarioError, nearest_name
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.fmu import component
-from ppafo.exports.fmu.binaries import FLAGS, PLATFORMS, Platform, build
-from ppafo.exports.fmu.description import build_description_of_fmi3, description_of_fmi2, description_of_fmi3
-from ppafo.exports.fmu.variables import Interface, change_of, variability_of
+from ppafo.exports.fmu.description import (
+    Interface,
+    build_description_of_fmi3,
+    change_of,
+    description_of_fmi2,
+    description_of_fmi3,
+    variability_of,
+)
+from ppafo.exports.templates import filled, licence, template
 from ppafo.simulation.scenario import Scenario
+from ppafo.translation.native import asked, complaint
 from ppafo.version import __version__
 from ppafo.walking.configuration import Configuration
 
-_MARK = re.compile(r"@(\w+)@")
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv")
+_ANOTHER = "install gcc, clang or 'pip install ppafo[native]' anew"
+HIDDEN = ("-shared", "-fPIC", "-fvisibility=hidden")
+
+
+@dataclass(frozen=True, slots=True)
+class Platform:
+    """A kind of computer: its folder in a unit of FMI 2 (None: there is none) and of FMI 3, and how it is built for.
+
+    ``tried`` says what the binary of this platform was run on by the authors.
+    """
+
+    folder_2: str | None
+    folder_3: str
+    target: str
+    suffix: str
+    tried: str
+
+
+PLATFORMS = {
+    "linux64": Platform("linux64", "x86_64-linux", "x86_64-linux-gnu.2.17", ".so", "run in the tests"),
+    "win64": Platform("win64", "x86_64-windows", "x86_64-windows-gnu", ".dll", "run under Wine"),
+    "linux-aarch64": Platform(None, "aarch64-linux", "aarch64-linux-gnu.2.17", ".so", "run under qemu"),
+    "darwin64": Platform("darwin64", "x86_64-darwin", "x86_64-macos", ".dylib", "not run"),
+    "darwin-aarch64": Platform(None, "aarch64-darwin", "aarch64-macos", ".dylib", "not run"),
+    "wasm32": Platform(None, "wasm32-wasip2", "wasm32-wasi", ".wasm", "after a draft, fmi-ls-wasm; run under wasmtime"),
+}
+"""Platforms by the name under which they are asked for."""
+
+
+def host_platform() -> str | None:
+    """The platform of this computer, None where a unit has none for it."""
+    machine = {"x86_64": "64", "amd64": "64", "aarch64": "-aarch64", "arm64": "-aarch64"}.get(
+        platform.machine().lower()
+    )
+    system = {"Linux": "linux", "Windows": "win", "Darwin": "darwin"}.get(platform.system())
+    name = f"{system}{machine}"
+    return name if name in PLATFORMS else None
+
+
+def build(name: str, sources: Mapping[str, bytes], main: str) -> bytes:
+    """The library of a unit for a platform. ProgramError where no compiler is there for it, or it refuses."""
+    if name == "wasm32":
+        around = component.sources_of_component(sources, main)
+        return component.component_of(build_library(name, around, component.SOURCE, component.FLAGS))
+    return build_library(name, sources, main, HIDDEN)
+
+
+def build_library(name: str, sources: Mapping[str, bytes], main: str, flags: Sequence[str]) -> bytes:
+    """A library of some sources for a platform; ProgramError as of a unit."""
+    command = [*compiler_for(name), *FLAGS, *flags]
+    with tempfile.TemporaryDirectory() as folder:
+        for file, content in sources.items():
+            (Path(folder) / file).write_bytes(content)
+        library = Path(folder) / f"unit{PLATFORMS[name].suffix}"
+        mathematics = [] if name in ("win64", "wasm32") else ["-lm"]
+        done = asked([*command, main, "-o", library.name, *mathematics], _ANOTHER, folder)
+        if done.returncode != 0:
+            raise ProgramError(f"{command[0]} does not build the library for {name}: {complaint(done)}")
+        if not library.is_file():
+            raise ProgramError(f"{command[0]} says that all is well, but made no library for {name}; {_ANOTHER}")
+        return library.read_bytes()
+
+
+def compiler_for(name: str) -> Sequence[str]:
+    """The words of a compiler for a platform. ProgramError where there is none."""
+    if importlib.util.find_spec("ziglang") is not None:
+        return [
+            sys.executable,
+            "-m",
+            "ziglang",
+            "cc",
+            "-target",
+            PLATFORMS[name].target,
+            "-s",
+            "-fno-sanitize=undefined",
+        ]
+    found = next(filter(None, map(shutil.which, ("gcc", "clang"))), None)
+    if name == host_platform() == "linux64" and found is not None:
+        return [found, "-s"]
+    needed = "gcc, clang or the package ziglang" if name == "linux64" else "the package ziglang"
+    raise ProgramError(f"platform {name} needs {needed} (pip install 'ppafo[native]')")
+
+
 _FIRST_DAY = (1980, 1, 1, 0, 0, 0)
 _HEADERS = {
     2: ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),
@@ -51,9 +147,7 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
     contents = {
         "modelDescription.xml": _DESCRIBED[fmi](interface, identifier, token, said),
         "documentation/index.html": _page(interface, chosen, main),
-        "documentation/licenses/license.txt": files("ppafo.exports.c_library")
-        .joinpath("templates", "LICENSE")
-        .read_bytes(),
+        "documentation/licenses/license.txt": licence().encode(),
         **{f"sources/{name}": content for name, content in sources.items()},
     }
     if fmi == 3:
@@ -118,21 +212,15 @@ def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
         "has_clock": "true" if interface.clock else "false",
         **interface.words,
     }
-    unit = "\n".join(_filled(file, words) for file in ("unit.c", interface.template))
+    unit = "\n".join(filled(template("fmu", file), words) for file in ("unit.c", interface.template))
     headers = files("ppafo.exports.fmu").joinpath("headers")
     return {
         f"{name}.h": written[f"{name}.h"],
         f"{name}.c": written[f"{name}.c"],
         "unit.c": unit.encode(),
-        f"fmi{fmi}.c": _filled(f"fmi{fmi}.c", words).encode(),
+        f"fmi{fmi}.c": filled(template("fmu", f"fmi{fmi}.c"), words).encode(),
         **{file: headers.joinpath(file).read_bytes() for file in _HEADERS[fmi]},
     }
-
-
-def _filled(file: str, words: Mapping[str, str]) -> str:
-    """A template with its marks replaced."""
-    text = files("ppafo.exports.fmu").joinpath("templates", file).read_text(encoding="utf-8")
-    return _MARK.sub(lambda found: words[found[1]], text)
 
 
 def _page(interface: Interface, platforms: Mapping[str, Platform], main: str) -> bytes:
@@ -148,7 +236,7 @@ def _page(interface: Interface, platforms: Mapping[str, Platform], main: str) ->
         "main": main,
         "flags": " ".join(FLAGS),
     }
-    return _filled("index.html", words).encode()
+    return filled(template("fmu", "index.html"), words).encode()
 
 
 def _said(interface: Interface, platforms: Mapping[str, Platform]) -> str:

@@ -8,9 +8,9 @@ of the canonical ABI) and around its module the text of a component, which the p
 
 import importlib.util
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 
 from ppafo.errors import ProgramError
+from ppafo.exports.templates import template
 
 VERSION = "3.0.0"
 FOLDER = "extra/org.modelica.fmi-ls-wasm"
@@ -124,7 +124,7 @@ _NEW: Signature = (
 
 def sources_of_component(sources: Mapping[str, bytes], main: str) -> dict[str, bytes]:
     """The sources of a unit with what stands around them; ``main`` is the file of theirs that is compiled."""
-    text = files("ppafo.exports.fmu").joinpath("templates", SOURCE).read_text(encoding="utf-8")
+    text = template("fmu", SOURCE)
     around = text.replace("@main@", main)
     return {**sources, SOURCE: around.encode(), STUBS: _stubs(text).encode()}
 
@@ -164,11 +164,7 @@ def component_of(core: bytes) -> bytes:
     import wasmtime
 
     # Text holds no module in its bytes: an empty one stands for it, the second of the component.
-    return _with_module(bytes(wasmtime.wat2wasm(_text())), 1, core)
-
-
-def _with_module(component: bytes, place: int, core: bytes) -> bytes:
-    """A component with another core module in the place of one that it has."""
+    component = bytes(wasmtime.wat2wasm(_text()))
     found, at, seen = component[:8], 8, 0
     while at < len(component):
         kind, size, shift = component[at], 0, 0
@@ -179,7 +175,7 @@ def _with_module(component: bytes, place: int, core: bytes) -> bytes:
             at += 1
             if component[at - 1] < 128:
                 break
-        content = core if kind == 1 and seen == place else component[at : at + size]
+        content = core if kind == 1 and seen == 1 else component[at : at + size]
         seen += kind == 1
         found += bytes([kind]) + _length(len(content)) + content
         at += size

@@ -7,7 +7,7 @@ from ppafo.control.controllers import switching
 from ppafo.exports.c_library import commanded, scenario_library, walk_library
 from ppafo.exports.c_library.files import Library, steps_source
 from ppafo.exports.c_library.walk_preparation import check_can_leave
-from ppafo.exports.fmu.variables import Input, Interface
+from ppafo.exports.fmu.description import Input, Interface
 from ppafo.model.command import VENT
 from ppafo.model.sensors import SensorParameters
 from ppafo.simulation.preparation import step_counts
@@ -80,7 +80,16 @@ def _hidden(library: Library) -> frozenset[str]:
 
 
 def _plant(scenario: Scenario) -> Interface:
-    chosen = _scenario_of_plant(scenario)
+    # The ankle is led from outside, from where the scenario has it at the start.
+    motion = scenario.motion
+    if isinstance(motion, PrescribedMotion):
+        from ppafo.simulation.plan import profile_parameters
+
+        found: tuple[float, float, float] = PROFILES[motion.profile.kind].value(profile_parameters(motion.profile), 0.0)
+        angle, _, _ = found
+        settings = {"start_level": angle, "level": angle, "ramp_start": 0.0, "ramp_time": 2.0}
+        motion = PrescribedMotion(ProfileChoice("ramp_hold", settings))
+    chosen = replace(commanded(scenario), motion=motion)
     library = scenario_library(chosen)
     is_led = isinstance(chosen.motion, PrescribedMotion)
     unseen = {"command", *(("angle", "angular_velocity") if is_led else ())}
@@ -107,16 +116,6 @@ def _plant(scenario: Scenario) -> Interface:
     )
 
 
-def _scenario_of_plant(scenario: Scenario) -> Scenario:
-    """The scenario with a command that is handed in at every step of its engine, and its ankle led from outside."""
-    motion = scenario.motion
-    if isinstance(motion, PrescribedMotion):
-        angle, _, _ = _path_at_start(motion)
-        settings = {"start_level": angle, "level": angle, "ramp_start": 0.0, "ramp_time": 2.0}
-        motion = PrescribedMotion(ProfileChoice("ramp_hold", settings))
-    return replace(commanded(scenario), motion=motion)
-
-
 def _walk_of_plant(configuration: Configuration) -> Configuration:
     """The walk with a command that is handed in at every step, and sensors that nobody looks at."""
     step = step_counts(1.0, configuration.step, 1.0, configuration.period).step
@@ -140,13 +139,6 @@ def _walk_of_plant(configuration: Configuration) -> Configuration:
         sensor_settings=sensors,
         gait_sensors=sensors_of(sensors, step),
     )
-
-
-def _path_at_start(motion: PrescribedMotion) -> tuple[float, float, float]:
-    from ppafo.simulation.plan import profile_parameters
-
-    found: tuple[float, float, float] = PROFILES[motion.profile.kind].value(profile_parameters(motion.profile), 0.0)
-    return found
 
 
 def _inputs(scenario: Scenario) -> tuple[Input, ...]:

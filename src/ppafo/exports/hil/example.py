@@ -1,15 +1,12 @@
 """A scenario's integer controller behind the protocol: C for this computer, to begin a board's own code with."""
 
-import re
-from importlib.resources import files
-
 from ppafo.errors import ScenarioError
 from ppafo.exports.firmware import chip_controller, firmware
 from ppafo.exports.hil.packets import MICROSECONDS
+from ppafo.exports.templates import filled, template
 from ppafo.simulation.scenario import Scenario
 from ppafo.version import __version__
 
-_MARK = re.compile(r"@(\w+)@")
 _OF_FIRMWARE = ("controller.c", "controller.h", "parameters.h", "LICENSE")
 _TEMPLATES = ("Makefile", "README.md", "host.c", "link.c", "link.h", "plant.h")
 
@@ -34,7 +31,5 @@ def example_controller(scenario: Scenario) -> dict[str, bytes]:
         "middle": repr(chip.converter.middle),
         "next": f"ppafo hil {scenario.name} --port udp:127.0.0.1:5000 --out out/hil",
     }
-    folder = files("ppafo.exports.hil").joinpath("templates")
-    texts = {name: folder.joinpath(name).read_text(encoding="utf-8") for name in _TEMPLATES}
-    filled = {name: _MARK.sub(lambda found: words[found[1]], text).encode() for name, text in texts.items()}
-    return dict(sorted({**filled, **{name: written[name] for name in _OF_FIRMWARE}}.items()))
+    own = {name: filled(template("hil", name), words).encode() for name in _TEMPLATES}
+    return dict(sorted({**own, **{name: written[name] for name in _OF_FIRMWARE}}.items()))

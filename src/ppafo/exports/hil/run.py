@@ -1,4 +1,8 @@
-"""A scenario at the wire, from its settings to a folder: plan, run, result, log, and how the link did."""
+"""A scenario at the wire, from its settings to a folder: plant, run, result, log, and how the link did.
+
+The plant is the lanes of one run, whose command comes from outside. Why in this process and not in one of its own:
+docs/decisions/0023-hardware-in-the-loop.md.
+"""
 
 import csv
 import io
@@ -7,8 +11,9 @@ import platform
 import random
 import statistics
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
@@ -17,19 +22,71 @@ from ppafo.answers.layout import Margins, figure_of_free_panels
 from ppafo.answers.recording_figure import recording_figure
 from ppafo.answers.style import ACTUAL, VERMILION, house_style, render_figure
 from ppafo.documents.json_text import json_text
-from ppafo.exports.hil.loop import Bench, Exchange, Row
-from ppafo.exports.hil.pace import Pace, without_collections
-from ppafo.exports.hil.packets import MICROSECONDS, RATE, described_refusals
-from ppafo.exports.hil.plant import Plant, plant_of
-from ppafo.exports.hil.ports import Port
+from ppafo.engine.lanes import load_program
+from ppafo.engine.loading import chosen_compiler
+from ppafo.engine.run import Run, batch_of
+from ppafo.errors import ScenarioError
+from ppafo.exports.hil.loop import Bench, Exchange, Pace, Row, without_collections
+from ppafo.exports.hil.packets import HIGHEST_RATE, LOWEST_RATE, MICROSECONDS, RATE, described_refusals, sample_length
+from ppafo.exports.hil.ports import BITS_OF_A_BYTE, Port
+from ppafo.model.valves import dump
+from ppafo.simulation.plan import plan_run
 from ppafo.simulation.result import Result
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.sampled import SampledRun
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario
 from ppafo.simulation.simulate import result_of
 from ppafo.storage.comma_separated import marked_csv_bytes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+CHANNELS_SENT = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Plant:
+    """A scenario without its controller: how it is run, and what compiled it."""
+
+    scenario: Scenario
+    run: Run
+    module: ModuleType
+    compiled_by: str
+    period: float
+
+    def begin(self) -> SampledRun:
+        """The plant at its start."""
+        return SampledRun(batch_of(self.run), self.module)
+
+
+def plant_of(scenario: Scenario, rate: int = RATE) -> Plant:
+    """The plant of a scenario, whose command is given ``rate`` times a second; a proportional valve can be dumped."""
+    if not LOWEST_RATE <= rate <= HIGHEST_RATE:
+        raise ScenarioError(f"--rate {rate}: must be {LOWEST_RATE} to {HIGHEST_RATE} samples per second")
+    period = 1.0 / rate
+    chosen = replace(
+        scenario,
+        time_step=min(scenario.time_step, period),
+        control=Control(PYTHON_CONTROLLER, {}, period),
+    )
+    run = plan_run(chosen)
+    valve = chosen.device.valve
+    if valve.kind == "proportional":
+        run = replace(run, program=replace(run.program, valve=dump.choose(valve.settings)))
+    module = load_program(batch_of(run).program)
+    return Plant(chosen, run, module, chosen_compiler().described(), period)
+
+
+def check_baud(baud: int, rate: int) -> None:
+    """Refuse a serial line that cannot carry the samples."""
+    needed = sample_length(CHANNELS_SENT) * BITS_OF_A_BYTE * rate
+    if baud < needed:
+        raise ScenarioError(
+            f"--baud {baud}: {rate} samples per second need {needed} baud; take a faster line or a lower --rate, "
+            f"here at most {baud // (sample_length(CHANNELS_SENT) * BITS_OF_A_BYTE)}"
+        )
+
 
 LOG_COLUMNS = (
     *("sequence [-]", "due [s]", "sent_late [s]", "answered_after [s]"),

@@ -7,16 +7,16 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib.resources import files
 from pathlib import Path
 
 from ppafo.engine.replay import prescribe_recorded_angle
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.exports.c_library import commanded, scenario_library
-from ppafo.exports.c_library.files import OUTPUTS, Library, Setting, filled, library_files, steps_source
+from ppafo.exports.c_library.files import OUTPUTS, Library, Setting, library_files, steps_source
 from ppafo.exports.c_library.preparation import preparation_of
 from ppafo.exports.c_library.program import ExportedProgram
-from ppafo.exports.fmu.binaries import HIDDEN, PLATFORMS, build_library
+from ppafo.exports.fmu import HIDDEN, PLATFORMS, build_library
+from ppafo.exports.templates import filled, template
 from ppafo.simulation.recorded.scenario import held_vane
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
 from ppafo.version import __version__
@@ -95,9 +95,7 @@ def plugin_files(scenario: Scenario, platforms: Sequence[str], mujoco: Headers) 
         },
         NUMBERS: f"{json.dumps(numbers, indent=2)}\n".encode(),
         **{
-            path: filled(
-                files(__name__).joinpath("templates", path.rpartition("/")[2]).read_text("utf-8"), words
-            ).encode()
+            path: filled(template("mujoco", path.rpartition("/")[2]), words).encode()
             for path in ("example.xml", "README.md", "assist_sim/L1config.yaml", "assist_sim/L1model.xml")
         },
         **{f"sources/{name}": content for name, content in sources.items()},
@@ -166,9 +164,8 @@ def _sources(library: Library, mujoco: Headers) -> tuple[dict[str, bytes], str]:
         "steps": steps_source(library),
         "identity": identity,
     }
-    plugin = files(__name__).joinpath("templates", "plugin.c").read_text(encoding="utf-8")
     program = {file: written[file] for file in (f"{name}.c", f"{name}.h", "LICENSE")}
-    return {**program, "plugin.c": filled(plugin, words).encode()}, identity
+    return {**program, "plugin.c": filled(template("mujoco", "plugin.c"), words).encode()}, identity
 
 
 def _numbers(scenario: Scenario, library: Library, mujoco: Headers, binaries: Mapping[str, str]) -> dict[str, object]:

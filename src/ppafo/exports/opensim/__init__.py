@@ -3,7 +3,6 @@
 Nothing here needs OpenSim. Why a script and two forms of the torque: docs/decisions/0028-opensim.md.
 """
 
-import re
 from collections.abc import Sequence
 from importlib.resources import files
 from itertools import pairwise
@@ -12,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from ppafo.errors import ScenarioError
+from ppafo.exports.templates import filled, template
 from ppafo.gait.opensim_names import opensim_recording
 from ppafo.signals import Channel, Recording
 from ppafo.storage.opensim import opensim_bytes
@@ -20,7 +20,6 @@ from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import WalkResult
 
 Side = Literal["right", "left"]
-_MARK = re.compile(r"@(\w+)@")
 SHORTEST_STRIDE, LONGEST_STRIDE = 0.4, 5.0
 """Between two heel strikes of a foot [s]."""
 
@@ -40,9 +39,8 @@ def opensim_files(result: WalkResult, side: Side = "right", strikes: Sequence[fl
         "span": f"{laid} The torque goes from {torque.time[0]:g} to {torque.time[-1]:g} s.",
     }
     folder = files("ppafo.exports.opensim")
-    text = folder.joinpath("templates", "README.md").read_text(encoding="utf-8")
     return {
-        "README.md": _MARK.sub(lambda found: words[found[1]], text).encode(),
+        "README.md": filled(template("opensim", "README.md"), words).encode(),
         "add_device.py": folder.joinpath("add_device.py").read_bytes(),
         "device_torque.sto": opensim_bytes(torque),
         "walk.sto": opensim_bytes(named),

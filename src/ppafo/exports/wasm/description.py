@@ -72,7 +72,18 @@ def description_of(item: Exportable, library: Library) -> dict[str, Any]:
     file = _file_of_scenario(item) if isinstance(item, Scenario) else _file_of_walk(item)
     keys = {setting.name: setting.path for setting in library.settings}
     origins, follows, kept = _origins(file, item.device, library), _follows(library.links), _kept(library)
-    made = _made(library.links)
+    # Settings that rules make of others until they are changed by themselves; a rule has the name of its function.
+    made = {
+        path: {
+            "terms": [
+                {"rule": f"{_module(term)}.{term.function.__name__}", "sources": list(term.sources)}
+                for term in found[0].terms
+            ],
+            "gap": found[0].gap,
+        }
+        for path, found in library.links.items()
+        if any(term.function is not itself for term in found[0].terms)
+    }
     program, atmosphere = library.program, item.device.supply.atmospheric_pressure
     channels = {"time": ("s", "since the start"), **{name: OUTPUTS[name] for name in program.outputs}}
     return {
@@ -247,21 +258,6 @@ def _parameter_set(file: _File, device: Device) -> ParameterSet | None:
 def _follows(links: Graph) -> dict[str, str]:
     """Settings that have the number of another until they are changed by themselves."""
     return {path: found[0].sources[0] for path, found in links.items() if found[0].is_same}
-
-
-def _made(links: Graph) -> dict[str, dict[str, Any]]:
-    """Settings that rules make of others until they are changed by themselves; a rule has the name of its function."""
-    return {
-        path: {
-            "terms": [
-                {"rule": f"{_module(term)}.{term.function.__name__}", "sources": list(term.sources)}
-                for term in found[0].terms
-            ],
-            "gap": found[0].gap,
-        }
-        for path, found in links.items()
-        if any(term.function is not itself for term in found[0].terms)
-    }
 
 
 def _module(term: Term) -> str:

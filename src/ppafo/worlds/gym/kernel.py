@@ -66,7 +66,13 @@ def kernel_source(program: Program, task: Task) -> str:
 
 def _step(rows: LaneRows, task: Task) -> list[str]:
     """Lines of ``go_on``: block by block the commands, the lane loop, and what is observed at its end."""
-    _name_cells(rows)
+    # The rows are those of the arrays between two calls of the lane loop, the held chambers those of now.
+    rows.cells.update({path: f"states[{row}, lane]" for path, row in rows.state_at.items()})
+    first = len(rows.state_at)
+    rows.cells.update({path: f"parameters[{row - first}, lane]" for path, row in rows.parameter_at.items()})
+    rows.cells.update({path: f"own[{row}, lane]" for row, path in enumerate(OWN_PATHS)})
+    if rows.program.hands_chambers_on:
+        rows.cells.update({path: f"chambers{path.removeprefix('held')}" for path in leaf_paths(HeldChambers, "held")})
     command = rows.add(valve_or_dump if task.walks else valve_command)
     given = f"{command}(actions[place, 0], actions[place, actions.shape[1] - 1])"
     call = (
@@ -98,16 +104,6 @@ def _step(rows: LaneRows, task: Task) -> list[str]:
         *rows.over_lanes(_observed(rows, task)),
     ]
     return [f"for block in range(all_states.shape[0] // {heights['states']}):", *indent(body)]
-
-
-def _name_cells(rows: LaneRows) -> None:
-    """Let the rows be those of the arrays between two calls of the lane loop, and the held chambers those of now."""
-    rows.cells.update({path: f"states[{row}, lane]" for path, row in rows.state_at.items()})
-    first = len(rows.state_at)
-    rows.cells.update({path: f"parameters[{row - first}, lane]" for path, row in rows.parameter_at.items()})
-    rows.cells.update({path: f"own[{row}, lane]" for row, path in enumerate(OWN_PATHS)})
-    if rows.program.hands_chambers_on:
-        rows.cells.update({path: f"chambers{path.removeprefix('held')}" for path in leaf_paths(HeldChambers, "held")})
 
 
 def _places(rows: LaneRows) -> list[str]:

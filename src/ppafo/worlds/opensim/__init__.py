@@ -20,9 +20,7 @@ except ImportError as error:
         "ppafo.worlds.opensim needs OpenSim, which has wheels up to Python 3.13: pip install 'ppafo[opensim]'"
     ) from error
 
-from ppafo.worlds.opensim.cosimulation import CoSimulation, Sample
-from ppafo.worlds.opensim.device import DeviceAtAnkle
-from ppafo.worlds.opensim.models import follow_motion, load_model
+from ppafo.worlds.opensim.device import CoSimulation, DeviceAtAnkle, Sample, follow_motion, load_model
 from ppafo.worlds.opensim.muscles import AnkleMuscles, ankle_muscles
 
 opensim.Logger.removeFileSink()

@@ -18,14 +18,7 @@ from ppafo.answers.style import BLACK, BLUE, GREY, VERMILION, house_style, label
 from ppafo.errors import DataError, SimulationError, nearest_name, one_line
 from ppafo.exports.opensim.add_device import SUFFIX, add_load
 from ppafo.signals import Recording
-from ppafo.worlds.opensim.models import (
-    CONTACT,
-    check_place,
-    coordinate_names,
-    load_model,
-    muscles_across,
-    read_motion,
-)
+from ppafo.worlds.opensim.device import CONTACT, check_place, coordinate_names, load_model, muscles_across, read_motion
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -139,7 +132,11 @@ def ankle_muscles(
     found: dict[str, _Solved] = {}
     for way in (_WITHOUT, _WITH):
         prepared = load_model(model)
-        _without_contact(prepared)
+        # Without what presses the feet on the ground.
+        forces = prepared.updForceSet()
+        for index in reversed(range(forces.getSize())):
+            if forces.get(index).getConcreteClassName() in CONTACT:
+                forces.remove(index)
         if way == _WITH:
             add_load(prepared, coordinate, torque.time.tolist(), torque[channel].tolist())
         with tempfile.TemporaryDirectory() as folder:
@@ -215,14 +212,6 @@ def _check_loads(path: Path, model: Any) -> None:
                 f"{path}: model {model.getName()} has no body '{body}'{nearest_name(body, bodies)}; "
                 f"there are: {', '.join(bodies)}"
             )
-
-
-def _without_contact(model: Any) -> None:
-    """Leave out what presses the feet on the ground."""
-    forces = model.updForceSet()
-    for index in reversed(range(forces.getSize())):
-        if forces.get(index).getConcreteClassName() in CONTACT:
-            forces.remove(index)
 
 
 def _solve(model: Any, task: _Task, coordinate: str, names: tuple[str, ...], folder: Path) -> _Solved:

@@ -1,9 +1,7 @@
 """The controller of a walk as firmware: translated C, a thin layer for an MSP430G2553, make file and page."""
 
 import math
-import re
 from collections.abc import Iterator, Mapping
-from importlib.resources import files
 from typing import Any, NamedTuple
 
 from ppafo.control.fixed.torque_laws import WALK_TARGETS
@@ -13,9 +11,9 @@ from ppafo.control.walking.signs import SIGNS
 from ppafo.engine.rows import rebuilt
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ScenarioError
-from ppafo.exports.firmware import MOST_TICKS, TICK
+from ppafo.exports.firmware import MOST_TICKS, PRELUDE, TICK, defined_numbers, macro, proof, state_type
 from ppafo.exports.firmware.catalog import MSP430G2553
-from ppafo.exports.firmware.controller import PRELUDE, defined_numbers, macro, proof, state_type
+from ppafo.exports.templates import filled, licence, template
 from ppafo.simulation.reading import quantity_text
 from ppafo.translation.c99 import c_source, documents_of
 from ppafo.version import __version__
@@ -23,7 +21,6 @@ from ppafo.walking.configuration import Configuration
 from ppafo.walking.declaration import ARITHMETIC, quantities
 from ppafo.walking.fixed_point import converter_of_walk, numbers_of_walk
 
-_MARK = re.compile(r"@(\w+)@")
 _TEMPLATES = (
     "Makefile",
     "README.md",
@@ -85,11 +82,9 @@ def walk_firmware(configuration: Configuration, target: str = WALK_TARGETS[0]) -
         raise ScenarioError(f"{configuration.name}: a walk's firmware is for {', '.join(WALK_TARGETS)}, not '{target}'")
     chip = walk_chip(configuration)
     words = _words(configuration, chip, target)
-    texts = {
-        name: _MARK.sub(lambda found: words[found[1]], _template("walking/templates", name)) for name in _TEMPLATES
-    }
-    texts |= {name: _template("templates", name) for name in ("msp430.h", "start_msp430.c")}
-    texts["LICENSE"] = files("ppafo.exports.c_library").joinpath("templates", "LICENSE").read_text(encoding="utf-8")
+    texts = {name: filled(template("firmware.walking", name), words) for name in _TEMPLATES}
+    texts |= {name: template("firmware", name) for name in ("msp430.h", "start_msp430.c")}
+    texts["LICENSE"] = licence()
     texts["controller.c"] = walk_source(chip.law)
     texts["parameters.h"] = _parameters(configuration, chip)
     return {name: text.encode() for name, text in sorted(texts.items())}
@@ -137,10 +132,6 @@ int16_t controller_sign(void)
     return state.safety.sign;
 }}
 """
-
-
-def _template(folder: str, name: str) -> str:
-    return files("ppafo.exports.firmware").joinpath(*folder.split("/"), name).read_text(encoding="utf-8")
 
 
 def _written(row: Any) -> str:

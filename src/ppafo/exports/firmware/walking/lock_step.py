@@ -11,8 +11,7 @@ from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.exports.firmware.catalog import MSP430G2553
 from ppafo.exports.firmware.lock_step import Comparison, Cost, compare_with, cost_of
-from ppafo.exports.firmware.simulator import chip_simulator
-from ppafo.exports.firmware.target import ChipSimulator, Decision
+from ppafo.exports.firmware.simulators import ChipSimulator, Decision, chip_simulator
 from ppafo.exports.firmware.walking import WalkChip, walk_chip, walk_firmware
 from ppafo.exports.firmware.walking.drawn import gait_readings
 from ppafo.model.command import VENT

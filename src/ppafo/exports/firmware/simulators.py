@@ -1,0 +1,538 @@
+"""Small processors and their simulators: memory and tools of a target, images built and measured, mspdebug and QEMU.
+
+mspdebug is driven by its console, QEMU with a Cortex-M in it by the remote protocol of gdb over its standard input and
+output.
+"""
+
+import os
+import re
+import select
+import struct
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from shutil import which
+from typing import NamedTuple, Protocol, final
+from weakref import finalize
+
+from ppafo.control.fixed.whole_numbers import Readings
+from ppafo.errors import SimulationError, one_line, reason
+
+
+class Memory(NamedTuple):
+    """A range of addresses: its first one, and its size [bytes]."""
+
+    start: int
+    size: int
+
+    def holds(self, address: int) -> bool:
+        """True for an address within it."""
+        return self.start <= address < self.start + self.size
+
+
+class Machine(NamedTuple):
+    """What QEMU calls a machine: its name, and the clock of its processor [Hz]."""
+
+    name: str
+    clock: float
+
+
+NO_MACHINE = Machine("", 0.0)
+"""That of a target which QEMU does not simulate."""
+
+
+class Doubles(NamedTuple):
+    """How a target computes floats of 64 bits: flags of the compiler, and the same in words."""
+
+    flags: str
+    said: str
+
+
+class Decision(NamedTuple):
+    """Command in steps, 1 while all readings have been sound, and the cycles or instructions of the sample."""
+
+    command: int
+    is_sound: int
+    work: int
+
+
+class Sizes(NamedTuple):
+    """Flash of an image and RAM of its data [bytes]."""
+
+    flash: int
+    data: int
+
+
+@dataclass(frozen=True, slots=True)
+class Image:
+    """A program for the simulator that was built: its file, what it takes, the addresses of its symbols.
+
+    ``shipped`` is what the program for the board takes, which has the real layer around the controller.
+    """
+
+    file: Path
+    sizes: Sizes
+    shipped: Sizes
+    symbols: Mapping[str, int]
+
+
+class ChipSimulator(Protocol):
+    """A simulator with an image in it, which waits for a sample. SimulationError where it does not answer."""
+
+    def begin(self) -> None:
+        """Reset the processor, and let it come to where it waits for a sample."""
+
+    def sample(self, readings: Iterable[int]) -> Decision:
+        """What the chip decides for the readings of one sample."""
+
+    def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
+        """What it decides for some samples in turn, at most 50: asked at once where the simulator takes that."""
+
+    def stack(self) -> int:
+        """How deep the stack has been [bytes]."""
+
+    def close(self) -> None:
+        """End the simulator."""
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A processor that firmware is written for.
+
+    ``processor`` and ``board`` say what it is, ``clock`` is that of the processor [Hz], ``interrupt_stack`` what an
+    interrupt of the board puts on the stack [bytes], ``converter_bits`` those of its converter. ``words`` fill the
+    templates: how it is compiled, linked and written, which pins it has. ``templates`` are the files that belong to
+    this target alone, ``wiring`` is the one with the part of README.md that says what is wired to it.
+
+    ``tools`` are the programs that building and simulating need, ``packages`` those of Debian that have them.
+    ``simulator`` starts one with an image, ``machine`` is what QEMU has to know, ``counted`` what is counted of a
+    sample: cycles or instructions. The plant can be written for a target that has ``doubles``.
+    """
+
+    name: str
+    processor: str
+    board: str
+    clock: float
+    flash: Memory
+    ram: Memory
+    interrupt_stack: int
+    converter_bits: int
+    words: Mapping[str, str]
+    templates: tuple[str, ...]
+    wiring: str
+    tools: tuple[str, ...]
+    packages: str
+    counted: str
+    simulator: Callable[["Target", Image], ChipSimulator]
+    machine: Machine = NO_MACHINE
+    doubles: Doubles | None = None
+
+
+UNTOUCHED = 0xA5
+"""What the RAM for the stack is filled with, so that what the stack has overwritten can be seen."""
+_PATIENCE = 60.0
+_LOADED = 2
+_WITH_VALUES, _SYMBOL_TABLE = 1, 2
+_SECTION = struct.Struct("<IIIIIIIIII")
+_SYMBOL = struct.Struct("<IIIBBH")
+
+
+def missing_tools(target: Target) -> tuple[str, ...]:
+    """The tools of a target that this computer lacks."""
+    return tuple(tool for tool in target.tools if which(tool) is None)
+
+
+def check_tools(target: Target) -> None:
+    """SimulationError where this computer lacks a tool of a target."""
+    absent = missing_tools(target)
+    if absent:
+        raise SimulationError(
+            f"the simulator of {target.name} needs {', '.join(absent)}; {target.packages} are packages of Debian"
+        )
+
+
+def built(contents: Mapping[str, bytes], folder: Path, goals: Sequence[str] = ("all",)) -> None:
+    """Write the files of a firmware into a folder and make what is asked for; SimulationError where that fails."""
+    for name, content in contents.items():
+        (folder / name).write_bytes(content)
+    try:
+        done = subprocess.run(["make", "-C", str(folder), *goals], capture_output=True, text=True, check=False)
+    except OSError as error:
+        raise SimulationError(f"make cannot be run: {reason(error)}") from error
+    if done.returncode != 0:
+        said = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr)
+        raise SimulationError(f"the firmware cannot be built: {one_line(said)}")
+
+
+@contextmanager
+def chip_simulator(contents: Mapping[str, bytes], target: Target) -> Iterator[tuple[ChipSimulator, Image]]:
+    """The simulator of a target with the firmware of these files in it, and the image; both end with the ``with``.
+
+    SimulationError where a tool is missing, the files cannot be built, or the simulator does not answer.
+    """
+    with built_image(contents, target) as image:
+        simulator = target.simulator(target, image)
+        try:
+            yield simulator, image
+        finally:
+            simulator.close()
+
+
+@contextmanager
+def built_image(contents: Mapping[str, bytes], target: Target) -> Iterator[Image]:
+    """The image for the simulator that is built of these files, in a folder that goes with the ``with``."""
+    check_tools(target)
+    with tempfile.TemporaryDirectory(prefix="ppafo-chip-", ignore_cleanup_errors=True) as folder:
+        built(contents, Path(folder))
+        yield read_image(Path(folder), target)
+
+
+def read_image(folder: Path, target: Target) -> Image:
+    """The image for the simulator in a folder where a firmware was built; a plant has no other one."""
+    file, shipped = folder / "simulated.elf", folder / "firmware.elf"
+    content = file.read_bytes()
+    own = _sizes(content, target)
+    return Image(file, own, sizes(shipped, target) if shipped.is_file() else own, _symbols(content))
+
+
+def sizes(image: Path, target: Target) -> Sizes:
+    """Flash and RAM that a program takes of a target."""
+    return _sizes(image.read_bytes(), target)
+
+
+class _Section(NamedTuple):
+    """A section of an ELF file."""
+
+    name: int
+    kind: int
+    flags: int
+    address: int
+    offset: int
+    size: int
+    link: int
+    info: int
+    alignment: int
+    entry_size: int
+
+
+def _sections(content: bytes) -> list[_Section]:
+    """The sections of a 32-bit ELF file, lowest byte first."""
+    (start,) = struct.unpack_from("<I", content, 0x20)
+    length, count = struct.unpack_from("<HH", content, 0x2E)
+    return [_Section._make(_SECTION.unpack_from(content, start + length * place)) for place in range(count)]
+
+
+def _sizes(content: bytes, target: Target) -> Sizes:
+    loaded = [item for item in _sections(content) if item.flags & _LOADED]
+    in_ram = [item for item in loaded if target.ram.holds(item.address)]
+    values = sum(item.size for item in in_ram if item.kind == _WITH_VALUES)
+    flash = sum(item.size for item in loaded if target.flash.holds(item.address))
+    return Sizes(flash + values, sum(item.size for item in in_ram))
+
+
+def _symbols(content: bytes) -> dict[str, int]:
+    """Addresses of the symbols of an ELF file, by name."""
+    sections = _sections(content)
+    found = {}
+    for item in sections:
+        if item.kind == _SYMBOL_TABLE:
+            names = sections[item.link].offset
+            for at in range(item.offset, item.offset + item.size, _SYMBOL.size):
+                name, address, *_ = _SYMBOL.unpack_from(content, at)
+                begin = names + name
+                found[content[begin : content.index(b"\0", begin)].decode()] = address
+    return found
+
+
+@final
+class Console:
+    """A program of this machine that is spoken to by its standard input and output; ``close`` ends it."""
+
+    def __init__(self, command: Sequence[str], folder: Path) -> None:
+        self._name = command[0]
+        self._seen = b""
+        try:
+            self._process = subprocess.Popen(
+                command,
+                cwd=folder,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                bufsize=0,
+            )
+        except OSError as error:
+            raise SimulationError(f"{self._name} cannot be run: {reason(error)}") from error
+        # Nothing else ends it where what holds this object fails before it can close it.
+        self.close = finalize(self, _end, self._process)
+
+    def say(self, text: bytes) -> None:
+        """Write to the program. SimulationError where it has ended."""
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(text)
+        except OSError as error:
+            raise SimulationError(f"{self._name} has ended: {reason(error)}; {self._last()}") from error
+
+    def until(self, mark: bytes) -> bytes:
+        """What the program says up to a mark. SimulationError where it falls silent."""
+        assert self._process.stdout is not None
+        while mark not in self._seen:
+            ready, _, _ = select.select([self._process.stdout], [], [], _PATIENCE)
+            said = os.read(self._process.stdout.fileno(), 65536) if ready else b""
+            if not said:
+                raise SimulationError(f"{self._name} does not answer; {self._last()}")
+            self._seen += said
+        found, _, self._seen = self._seen.partition(mark)
+        return found
+
+    def _last(self) -> str:
+        last = self._seen.decode(errors="replace").strip().splitlines()[-1:]
+        return f"the last it said: {one_line(' '.join(last))}"
+
+
+def _end(process: "subprocess.Popen[bytes]") -> None:
+    process.kill()
+    process.communicate()
+
+
+def depth_of_stack(memory: bytes) -> int:
+    """How deep a stack has been [bytes] that grows down from the end of memory filled with ``UNTOUCHED``."""
+    return len(memory) - next((place for place, byte in enumerate(memory) if byte != UNTOUCHED), len(memory))
+
+
+_CYCLES = re.compile(rb"MCLK:\s+(\d+)")
+_ASKED = "asked.txt"
+_SAID_OUTPUTS = "simio info counter\nmd simulated_outputs 4"
+
+
+@final
+class MspdebugSimulator:
+    """mspdebug's simulator of an MSP430 with an image in it."""
+
+    def __init__(self, target: Target, image: Image) -> None:
+        self._cycles = 0
+        self._folder = image.file.parent
+        self._console = Console(["mspdebug", "-n", "-q", "sim"], self._folder)
+        self._start = target.ram.start + image.sizes.data
+        self._free = target.ram.size - image.sizes.data
+        self._say(f"prog {image.file.name}\nfill {self._start} {self._free} {UNTOUCHED:x}")
+        self._say(f"simio add tracer counter\nsetbreak board_wait\nrun\n{_SAID_OUTPUTS}")
+        self._answer()
+
+    def close(self) -> None:
+        """End the simulator."""
+        self._console.close()
+
+    def begin(self) -> None:
+        """Reset the processor, and let it come to where it waits for a sample."""
+        self._say(f"reset\nrun\n{_SAID_OUTPUTS}")
+        self._answer()
+
+    def sample(self, readings: Iterable[int]) -> Decision:
+        """What the chip decides for the readings of one sample."""
+        return self.samples((readings,))[0]
+
+    def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
+        """What it decides for some samples in turn, at most 50: asked at once, so that neither waits for the other."""
+        asked = []
+        for readings in every:
+            given = " ".join(f"0x{byte:02x}" for number in readings for byte in number.to_bytes(2, "little"))
+            asked.append(f"mw simulated_readings {given}\nrun\n{_SAID_OUTPUTS}\n")
+        # mspdebug asks the system for every byte of its console, and for a file at once.
+        (self._folder / _ASKED).write_text("".join(asked), encoding="ascii")
+        self._say(f"read {_ASKED}")
+        return [self._decision() for _ in every]
+
+    def _decision(self) -> Decision:
+        before = self._cycles
+        words = self._answer()
+        command = int.from_bytes(words[:2], "little", signed=True)
+        return Decision(command, int.from_bytes(words[2:], "little"), self._cycles - before)
+
+    def stack(self) -> int:
+        """How deep the stack has been [bytes]: what it has written of the RAM that was filled before."""
+        self._say(f"md {self._start} {self._free}\n{_SAID_OUTPUTS}")
+        shown = self._console.until(b"simulated_outputs 4\n")
+        self._console.until(b"\n")
+        lines = re.findall(rb"^    [0-9a-f]{5}: ((?:[0-9a-f]{2} )+)", shown, re.MULTILINE)
+        return depth_of_stack(bytes.fromhex(b"".join(lines).decode()))
+
+    def _say(self, text: str) -> None:
+        self._console.say(f"{text}\n".encode())
+
+    def _answer(self) -> bytes:
+        """The four bytes of the outputs, at the end of what was asked; the cycles are noted."""
+        said = self._console.until(b"simulated_outputs 4\n")
+        self._cycles = int(_CYCLES.findall(said)[-1])
+        return bytes.fromhex(self._console.until(b"\n").split(b":")[1].split(b"|")[0].decode())
+
+
+DEEPEST = 1024
+"""How far below the end of RAM the stack is looked for [bytes]."""
+DEEPEST_OF_PLANT = 16384
+_SHIFT = 7
+_NANOSECONDS = 2**_SHIFT
+"""What an instruction takes of the machine's time [ns]: more than two ticks of the counter, so that none is missed."""
+_COUNTER_BITS = 24
+"""Those of SysTick, which counts the ticks of the processor's clock down."""
+_PIECE = 1024
+"""Bytes that are read or written at once; a packet has no room for many more."""
+_FORM_OF_OUTPUTS = struct.Struct("<hhII")
+_THUMB, _LENGTH_OF_NOP = 1, 2
+
+
+@final
+class Debugger:
+    """A machine of QEMU that stands still but when it is told to go on; addresses are those of its processor."""
+
+    def __init__(self, machine: str, image: Image) -> None:
+        time = f"shift={_SHIFT},sleep=off"
+        command = ["qemu-system-arm", "-M", machine, "-kernel", image.file.name, "-icount", time, "-S"]
+        quiet = ["-display", "none", "-monitor", "none", "-serial", "none", "-gdb", "stdio"]
+        self._console = Console([*command, *quiet], image.file.parent)
+        self.packet("QStartNoAckMode")
+        self._console.say(b"+")
+
+    def close(self) -> None:
+        """End QEMU."""
+        self._console.close()
+
+    def reset(self) -> None:
+        """Reset the machine; it stands still at its beginning."""
+        answer = self.packet(f"qRcmd,{b'system_reset'.hex()}")
+        while answer != "OK":
+            answer = self._answer()
+
+    def stop_at(self, address: int) -> None:
+        """Let the machine stop before an instruction, whenever it comes there."""
+        self._expect(self.packet(f"Z0,{address:x},2"), "OK")
+
+    def go_on(self, address: int | None = None) -> None:
+        """Let the machine run, from an address where one is given, until it stops."""
+        self._expect(self.packet("c" if address is None else f"c{address | _THUMB:x}")[:3], "T05")
+
+    def read(self, address: int, size: int) -> bytes:
+        """What is in memory."""
+        return b"".join(
+            self._read(at, min(_PIECE, address + size - at)) for at in range(address, address + size, _PIECE)
+        )
+
+    def _read(self, address: int, size: int) -> bytes:
+        answer = self.packet(f"m{address:x},{size:x}")
+        if len(answer) != 2 * size:
+            raise SimulationError(f"QEMU cannot read {size} bytes at 0x{address:x}: {answer}")
+        return bytes.fromhex(answer)
+
+    def write(self, address: int, content: bytes) -> None:
+        """Put something into memory."""
+        for at in range(0, len(content), _PIECE):
+            piece = content[at : at + _PIECE]
+            self._expect(self.packet(f"M{address + at:x},{len(piece):x}:{piece.hex()}"), "OK")
+
+    def packet(self, text: str) -> str:
+        """The answer to a packet of the protocol."""
+        self._console.say(b"$%b#%02x" % (text.encode(), sum(text.encode()) % 256))
+        return self._answer()
+
+    def _answer(self) -> str:
+        self._console.until(b"$")
+        return self._console.until(b"#").decode()
+
+    def _expect(self, answer: str, wanted: str) -> None:
+        if answer != wanted:
+            raise SimulationError(f"QEMU answers '{answer}' where '{wanted}' was expected")
+
+
+@final
+class QemuSimulator:
+    """QEMU with the image of a controller in it.
+
+    It has no model of cycles: what is counted are instructions, by a clock that goes on by the same time with each.
+    """
+
+    def __init__(self, target: Target, image: Image) -> None:
+        self._stop = image.symbols["simulated_stop"] & ~_THUMB
+        self._readings, self._outputs = (image.symbols[f"simulated_{name}"] for name in ("readings", "outputs"))
+        self._ticks = target.machine.clock * _NANOSECONDS * 1.0e-9
+        self._bottom = target.ram.start + target.ram.size - DEEPEST
+        self.debugger = Debugger(target.machine.name, image)
+        self.debugger.write(self._bottom, bytes([UNTOUCHED]) * DEEPEST)
+        self.debugger.stop_at(self._stop)
+        self.debugger.go_on()
+
+    def close(self) -> None:
+        """End the simulator."""
+        self.debugger.close()
+
+    def begin(self) -> None:
+        """Reset the processor, and let it come to where it waits for a sample."""
+        self.debugger.reset()
+        self.debugger.go_on()
+
+    def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
+        """What it decides for some samples, one after the other."""
+        return [self.sample(readings) for readings in every]
+
+    def sample(self, readings: Iterable[int]) -> Decision:
+        """What the chip decides for the readings of one sample."""
+        self.debugger.write(self._readings, b"".join(number.to_bytes(2, "little") for number in readings))
+        self.debugger.go_on(self._stop + _LENGTH_OF_NOP)
+        command, is_sound, begun, ended = _FORM_OF_OUTPUTS.unpack(
+            self.debugger.read(self._outputs, _FORM_OF_OUTPUTS.size)
+        )
+        ticks = (begun - ended) % 2**_COUNTER_BITS
+        return Decision(command, is_sound, round(ticks / self._ticks))
+
+    def stack(self) -> int:
+        """How deep the stack has been [bytes]: what it has written of the RAM that was filled before."""
+        return depth_of_stack(self.debugger.read(self._bottom, DEEPEST))
+
+
+class PlantSample(NamedTuple):
+    """What the plant shows at a sample: readings, 1 while it is well, values; instructions since the last sample."""
+
+    readings: Readings
+    is_well: int
+    values: tuple[float, ...]
+    work: int
+
+
+@final
+class QemuPlant:
+    """QEMU with the image of a plant in it, which waits for a command."""
+
+    def __init__(self, target: Target, image: Image, value_count: int) -> None:
+        self._stop = image.symbols["simulated_stop"] & ~_THUMB
+        self._command, self._plant = image.symbols["simulated_command"], image.symbols["simulated_plant"]
+        self._form = struct.Struct(f"<4h{value_count}dII")
+        self._ticks = target.machine.clock * _NANOSECONDS * 1.0e-9
+        self._bottom = target.ram.start + target.ram.size - DEEPEST_OF_PLANT
+        self._debugger = Debugger(target.machine.name, image)
+        self._debugger.write(self._bottom, bytes([UNTOUCHED]) * DEEPEST_OF_PLANT)
+        self._debugger.stop_at(self._stop)
+        self._debugger.go_on()
+
+    def close(self) -> None:
+        """End the simulator."""
+        self._debugger.close()
+
+    def shown(self) -> PlantSample:
+        """The sample that it shows."""
+        reference, first, second, is_well, *values, begun, ended = self._form.unpack(
+            self._debugger.read(self._plant, self._form.size)
+        )
+        work = round((begun - ended) % 2**32 / self._ticks)
+        seen = Readings(reference, first, second)
+        return PlantSample(readings=seen, is_well=is_well, values=tuple(values), work=work)
+
+    def go_on(self, command: int) -> None:
+        """Hand it the command for the sample that it shows; it then shows the next one."""
+        self._debugger.write(self._command, command.to_bytes(2, "little", signed=True))
+        self._debugger.go_on(self._stop + _LENGTH_OF_NOP)
+
+    def stack(self) -> int:
+        """How deep the stack has been [bytes]."""
+        return depth_of_stack(self._debugger.read(self._bottom, DEEPEST_OF_PLANT))
