@@ -24,11 +24,10 @@ from benchmarks.intervals.noise_kinds import NOISE_KINDS, noise_kind
 from benchmarks.intervals.planted import Planted, planted_problem, two_step_responses
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory import FreeParameter, Prior, Search, TrajectoryFit, fit
-from ppafo.identification.trajectory.experiment import full_path, with_numbers
 from ppafo.identification.trajectory.fitting import residuals_of
 from ppafo.identification.trajectory.information import directions_for, inverse_with_root
-from ppafo.identification.trajectory.preparation import FIT_TOLERANCE, Floats
-from ppafo.identification.trajectory.residuals import Residuals, prior_coordinates
+from ppafo.identification.trajectory.problem import full_path, with_numbers
+from ppafo.identification.trajectory.residuals import FIT_TOLERANCE, Floats, Residuals, prior_coordinates
 from ppafo.identification.trajectory.search import is_at_bound
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.plan import plan_run

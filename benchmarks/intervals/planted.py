@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ppafo.identification.trajectory import Experiment, FreeParameter, Search, TrajectoryProblem
-from ppafo.identification.trajectory.experiment import number_at
+from ppafo.identification.trajectory.problem import number_at
 from ppafo.signals.recording import Channel, Floats, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario

@@ -21,8 +21,8 @@ from ppafo.exports.c_library import c_library, library_of
 from ppafo.exports.c_library.files import c_identifier
 from ppafo.exports.fmu import closed_loop, functional_unit
 from ppafo.exports.wasm import module_of
-from ppafo.identification.trajectory.experiment import declaration_of
-from ppafo.identification.trajectory.experiment import with_numbers as with_fitted
+from ppafo.identification.trajectory.problem import declaration_of
+from ppafo.identification.trajectory.problem import with_numbers as with_fitted
 from ppafo.live.content import words
 from ppafo.model.effects.catalog import EFFECTS
 from ppafo.parameters.building import build_device

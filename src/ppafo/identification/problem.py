@@ -20,14 +20,13 @@ from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import IdentificationError, UnitError, nearest_name, reason
 from ppafo.identification.bench.flow_laws import GasAt
 from ppafo.identification.bench.free_decay import FreeDecaySettings, decay_prospects, free_decay
-from ppafo.identification.bench.inputs import data_prospects
 from ppafo.identification.bench.open_valve_flow import OpenValveFlowSettings, flow_prospects, open_valve_flow
 from ppafo.identification.bench.result import BenchResult
 from ppafo.identification.bench.static_torque import StaticTorqueSettings, static_prospects, static_torque
 from ppafo.identification.bench.valve_map import ValveMapSettings, map_prospects, valve_map
 from ppafo.identification.bench.vane_leak import VaneLeakSettings, leak_prospects, vane_leak
 from ppafo.identification.estimate import Prospect, half_width_for
-from ppafo.identification.source import Source
+from ppafo.identification.source import Source, data_prospects
 from ppafo.identification.trajectory.section import TrajectorySection
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.parameter_set import ParameterSet, chosen_valve, number_in_si

@@ -1,4 +1,7 @@
-"""A recording with the name and the hash of its file, so that a value can be traced back to what was measured."""
+"""Recordings that values come from: traced to their files, used once, and with all that a procedure needs.
+
+Every refusal names the file and the remedy.
+"""
 
 import hashlib
 from collections.abc import Iterable
@@ -6,7 +9,13 @@ from dataclasses import dataclass
 from itertools import combinations, product
 from pathlib import Path
 
-from ppafo.signals import Recording
+import numpy as np
+
+from ppafo.errors import IdentificationError, nearest_name
+from ppafo.identification.estimate import Prospect
+from ppafo.signals import CHANNELS, Recording, RecordingKind
+from ppafo.signals.faults import is_at_limit, longest_gap, plateaus
+from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes
 
 
@@ -89,3 +98,159 @@ def _digest(recording: Recording) -> str:
         total.update(name.encode())
         total.update(recording[name].tobytes())
     return total.hexdigest()
+
+
+_NO_SENSORS = ("command", "direction", "repetition")
+_COARSE = 0.02
+_SHARE_THAT_IS_CLIPPED = 0.05
+_FEWEST_CLIPPED = 4
+_FRACTION_THAT_MOVES = 0.02
+_LARGEST_NUMBER = 1.0e12
+_KINDS: tuple[RecordingKind, ...] = ("synthetic", "simulated", "measured")
+
+
+def check_sources(sources: tuple[Source, ...], procedure: str, channels: Iterable[str], fewest: int) -> None:
+    """Refuse recordings that lack a channel or have fewer samples than the procedure needs.
+
+    IdentificationError names the recording.
+    """
+    if not sources:
+        raise IdentificationError(f"{procedure}: no recording was given")
+    for source in sources:
+        recording = source.recording
+        for name in channels:
+            if name not in recording:
+                known, hint = CHANNELS[name], nearest_name(name, recording.names)
+                raise IdentificationError(
+                    f"{source.name}: {procedure} needs a channel '{name} [{known.unit}]', {known.summary}{hint}; "
+                    f"the file has {', '.join(recording.names) or 'only time'}; a column map can name it"
+                )
+        for name, values in (("time", recording.time), *((name, recording[name]) for name in recording.names)):
+            worst = int(np.argmax(np.abs(values)))
+            if abs(values[worst]) > _LARGEST_NUMBER:
+                raise IdentificationError(
+                    f"{source.name}: {procedure}: '{name}' is {values[worst]:g} at sample {worst + 1}, more than any "
+                    f"sensor measures: the line is damaged"
+                )
+        if len(recording) < fewest:
+            raise IdentificationError(
+                f"{source.name}: {procedure} needs at least {fewest} samples, it has {len(recording)}"
+            )
+
+
+def check_moves(source: Source, procedure: str, name: str) -> None:
+    """Refuse a channel that never changes: nothing can be learnt from it. IdentificationError names the recording."""
+    values = source.recording[name]
+    if values.max() == values.min():
+        raise IdentificationError(
+            f"{source.name}: {procedure}: channel '{name}' is {values[0]:g} {source.recording.unit(name)} throughout; "
+            f"the sensor is stuck, or nothing was done"
+        )
+
+
+def check_not_clipped(
+    source: Source, procedure: str, name: str, driver: str, driving: Floats, fraction: float = _FRACTION_THAT_MOVES
+) -> None:
+    """Refuse a channel that stays exactly at its largest value while what drives it moves: a saturated sensor.
+
+    ``driving`` are the values of that, ``driver`` its name; it must move by ``fraction`` [-] of its largest value.
+    IdentificationError names the recording and the channel.
+    """
+    values = source.recording[name]
+    longest, _ = plateaus(values)
+    moves = float(np.ptp(driving[longest.first : longest.last + 1])) > fraction * float(np.abs(driving).max())
+    if moves and longest.count >= max(_FEWEST_CLIPPED, _SHARE_THAT_IS_CLIPPED * values.size):
+        raise IdentificationError(
+            f"{source.name}: {procedure}: channel '{name}' stays at {values.max():g} {source.recording.unit(name)} for "
+            f"{longest.count} samples, up to sample {longest.last + 1}, while '{driver}' moves: the sensor is "
+            f"saturated; leave those samples out"
+        )
+
+
+def check_absolute(source: Source, procedure: str, names: Iterable[str]) -> None:
+    """Refuse pressures that are zero or less: they were recorded as gauge.
+
+    IdentificationError names the recording and the channel.
+    """
+    for name in names:
+        values = source.recording[name]
+        low = int(np.argmin(values))
+        if values[low] <= 0.0:
+            raise IdentificationError(
+                f"{source.name}: {procedure}: '{name}' is {values[low]:g} Pa at sample {low + 1}, which is not an "
+                f"absolute pressure: use psi_g, bar_g or kPa_g for gauge"
+            )
+
+
+def check_no_gap(source: Source, procedure: str, part: Recording) -> int:
+    """Return how many samples of a recording lie before a part of it; refuse a part with a gap.
+
+    IdentificationError says where the gap is.
+    """
+    skipped = int(np.searchsorted(source.recording.time, part.time[0]))
+    gap = longest_gap(part.time)
+    if gap is not None:
+        raise IdentificationError(
+            f"{source.name}: {procedure}: there is a gap of {gap.duration:.4g} s after {part.time[gap.index]:.6g} s "
+            f"(sample {skipped + gap.index + 1}); give start or end to exclude it"
+        )
+    return skipped
+
+
+def pauses(sources: tuple[Source, ...]) -> tuple[str, ...]:
+    """Return a remark on times without readings; steady readings lose nothing by them."""
+    found = [(source, gap) for source in sources if (gap := longest_gap(source.recording.time)) is not None]
+    if not found:
+        return ()
+    listed = [
+        f"{source.name} has no reading for {gap.duration:.4g} s after sample {gap.index + 1}" for source, gap in found
+    ]
+    return (f"pauses: {'; '.join(listed)}; steady readings are not affected",)
+
+
+def window(recording: Recording, start: float | None, end: float | None) -> Recording:
+    """Return the part of a recording between two times [s]; None is its own start or end."""
+    if start is None and end is None:
+        return recording
+    first = float(recording.time[0]) if start is None else start
+    last = float(recording.time[-1]) if end is None else end
+    return recording.between(first, last)
+
+
+def kind_of(sources: tuple[Source, ...]) -> RecordingKind:
+    """Return the kind of the whole: one synthetic recording makes the result synthetic."""
+    kinds = {source.recording.kind for source in sources}
+    return next(kind for kind in _KINDS if kind in kinds)
+
+
+def data_prospects(sources: tuple[Source, ...]) -> tuple[Prospect, ...]:
+    """Return what the sensors did not show: values beyond a limit, and what is finer than a converter's steps."""
+    found = []
+    for source in sources:
+        for name in source.recording.names:
+            if name in _NO_SENSORS:
+                continue
+            values = source.recording[name]
+            limits = [item for item in plateaus(values) if is_at_limit(values, item)]
+            for item in limits:
+                text = f"{source.name}: it stays there for {item.count} samples, from sample {item.first + 1}: a limit"
+                found.append(Prospect(f"'{name}' beyond {item.value:.6g}", False, text))
+            # A converter is coarse where many samples share few values, far apart.
+            levels = np.unique(values)
+            if limits or levels.size < 2 or levels.size > values.size / 10:
+                continue
+            step = float(np.median(np.diff(levels)) / (levels[-1] - levels[0]))
+            if step > _COARSE:
+                text = f"{source.name}: its values are {step:.0%} of their range apart, a coarse converter"
+                found.append(Prospect(f"'{name}' at a finer resolution", False, text))
+    if found:
+        return tuple(found)
+    count = sum(len(source.recording) for source in sources)
+    gaps = [gap.duration for source in sources if (gap := longest_gap(source.recording.time)) is not None]
+    pause = f"the longest pause is {max(gaps):.3g} s" if gaps else "no pause"
+    return (Prospect("all samples", True, f"{count}; no sensor at its limit, no coarse converter, {pause}"),)
+
+
+def pool(sources: tuple[Source, ...], name: str) -> Floats:
+    """Return a channel [SI] of all recordings, one after the other."""
+    return np.concatenate([source.recording[name] for source in sources])

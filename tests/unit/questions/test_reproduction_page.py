@@ -8,7 +8,7 @@ import pytest
 
 from ppafo.answers.text import text_of
 from ppafo.answers.typesetting import typeset
-from ppafo.identification.bench_figures import synthetic_figure_3
+from ppafo.identification.bench.result import synthetic_figure_3
 from ppafo.live.page import bundled, digest
 from ppafo.questions.reproduce.answer import answer_of
 from ppafo.questions.reproduce.page import holding_torque, reproduction_page

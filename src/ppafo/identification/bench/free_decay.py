@@ -13,10 +13,9 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.curve_fit import CurveFit, fit_curve, quantile
-from ppafo.identification.bench.inputs import check_moves, check_no_gap, check_sources, kind_of, window
 from ppafo.identification.bench.result import BenchResult, Evidence, Number, Panel, Series, count_of, prospect_of
 from ppafo.identification.estimate import Check, Estimate, Prospect
-from ppafo.identification.source import Source, traces
+from ppafo.identification.source import Source, check_moves, check_no_gap, check_sources, kind_of, traces, window
 from ppafo.signals.faults import is_at_limit, plateaus
 from ppafo.signals.recording import Floats
 

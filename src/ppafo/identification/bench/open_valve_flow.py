@@ -9,7 +9,10 @@ import numpy as np
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.curve_fit import CLEARLY_WORSE, CurveFit, fit_curve
 from ppafo.identification.bench.flow_laws import GasAt, iso6358_shape, orifice_shape
-from ppafo.identification.bench.inputs import (
+from ppafo.identification.bench.result import BenchResult, Evidence, Panel, Series
+from ppafo.identification.estimate import Check, Estimate, Prospect
+from ppafo.identification.source import (
+    Source,
     check_absolute,
     check_moves,
     check_not_clipped,
@@ -17,10 +20,8 @@ from ppafo.identification.bench.inputs import (
     kind_of,
     pauses,
     pool,
+    traces,
 )
-from ppafo.identification.bench.result import BenchResult, Evidence, Panel, Series
-from ppafo.identification.estimate import Check, Estimate, Prospect
-from ppafo.identification.source import Source, traces
 from ppafo.model.gas import critical_pressure_ratio
 from ppafo.signals.recording import Floats
 

@@ -17,10 +17,18 @@ from numpy.typing import NDArray
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.curve_fit import CHANCE, exceeds_chance, quantile
-from ppafo.identification.bench.inputs import check_moves, check_not_clipped, check_sources, kind_of, pauses, pool
 from ppafo.identification.bench.result import BenchResult, Evidence, Number, Panel, Role, Series, prospect_of
 from ppafo.identification.estimate import Check, Prospect
-from ppafo.identification.source import Source, traces
+from ppafo.identification.source import (
+    Source,
+    check_moves,
+    check_not_clipped,
+    check_sources,
+    kind_of,
+    pauses,
+    pool,
+    traces,
+)
 from ppafo.signals.recording import Floats
 
 Labels = NDArray[np.int64]

@@ -16,10 +16,9 @@ import numpy as np
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.curve_fit import CurveFit, fit_curve
 from ppafo.identification.bench.flow_laws import GasAt, orifice_shape
-from ppafo.identification.bench.inputs import check_absolute, check_moves, check_sources, kind_of, pauses
 from ppafo.identification.bench.result import BenchResult, Evidence, Number, Panel, Role, Series
 from ppafo.identification.estimate import Check, Estimate, Prospect
-from ppafo.identification.source import Source, traces
+from ppafo.identification.source import Source, check_absolute, check_moves, check_sources, kind_of, pauses, traces
 from ppafo.signals.faults import FEWEST_AT_LIMIT, plateaus, scatters
 from ppafo.signals.recording import Floats
 

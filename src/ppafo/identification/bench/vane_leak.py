@@ -13,17 +13,6 @@ import numpy as np
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.curve_fit import CLEARLY_WORSE, effective_samples, fit_curve, solve_curve
 from ppafo.identification.bench.flow_laws import LAMINAR, LINEAR, Chambers, GasAt, Law, Opening, decay_times
-from ppafo.identification.bench.inputs import (
-    check_absolute,
-    check_moves,
-    check_no_gap,
-    check_not_clipped,
-    check_sources,
-    kind_of,
-    pauses,
-    pool,
-    window,
-)
 from ppafo.identification.bench.leak_fits import (
     EDGE,
     NOT_DESCRIBED,
@@ -47,7 +36,19 @@ from ppafo.identification.bench.result import (
     count_of,
 )
 from ppafo.identification.estimate import Check, Prospect
-from ppafo.identification.source import Source, traces
+from ppafo.identification.source import (
+    Source,
+    check_absolute,
+    check_moves,
+    check_no_gap,
+    check_not_clipped,
+    check_sources,
+    kind_of,
+    pauses,
+    pool,
+    traces,
+    window,
+)
 from ppafo.signals.faults import plateaus, stands_out
 from ppafo.signals.recording import Floats
 

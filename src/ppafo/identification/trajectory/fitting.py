@@ -1,35 +1,236 @@
-"""Fits any numbers of a device to any recordings and says of each how well they fix it."""
+"""Fits any numbers of a device to any recordings: how well they fix each, and what stays unexplained by channel."""
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.identification.trajectory.experiment import Experiment, broken_rule, with_numbers
-from ppafo.identification.trajectory.information import correlation
-from ppafo.identification.trajectory.preparation import Floats, PreparedExperiment, prepare, with_half_steps
-from ppafo.identification.trajectory.problem import Range, TrajectoryProblem, ranges_of, reach_of
+from ppafo.errors import IdentificationError, nearest_name
+from ppafo.identification.estimate import Estimate
+from ppafo.identification.trajectory.information import autocorrelation, correlation
+from ppafo.identification.trajectory.problem import (
+    Experiment,
+    TrajectoryProblem,
+    broken_rule,
+    full_path,
+    ranges_of,
+    reach_of,
+    with_numbers,
+)
 from ppafo.identification.trajectory.residuals import (
+    Floats,
+    PreparedExperiment,
     Residuals,
     coordinate_bounds,
     numbers_in,
+    prepare,
     prior_coordinates,
     trajectories,
+    with_half_steps,
 )
-from ppafo.identification.trajectory.result import (
-    ChannelFit,
-    TrajectoryFit,
-    channel_fits,
-    noise_remark,
-    predictions,
-    reason_of_misfit,
-)
-from ppafo.identification.trajectory.search import Optimum, optimum
-from ppafo.identification.trajectory.uncertainty import Evidence, Uncertainty, estimate_of, uncertainty_of
-from ppafo.identification.trajectory.weighing import weigh
+from ppafo.identification.trajectory.search import Optimum, optimum, weigh
+from ppafo.identification.trajectory.uncertainty import Evidence, Misfit, Uncertainty, estimate_of, uncertainty_of
 from ppafo.parameters.device import Device
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.channels import CHANNELS
 from ppafo.signals.recording import Channel, Recording, RecordingKind
+from ppafo.simulation.scenario import Scenario
+
+if TYPE_CHECKING:
+    from xarray import Dataset, DataTree
+
+_MUCH = 1.5
+_TOGETHER = 0.2
+_OF_NO_SENSOR = 10.0
+"""What is left over the noise from sample to sample: more than an autoregression of 0.98 makes is no sensor's."""
+PREDICTED = 0.95
+"""Fraction of the samples of a new recording that a prediction holds."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelFit:
+    """How one channel of one experiment is explained, in its SI unit.
+
+    ``noise`` is the standard deviation that weighs it, ``is_given`` False where it was estimated from the recording;
+    ``rms``, ``bias`` (model less sample) and ``largest`` describe what is left; ``chi_square`` is the mean square over
+    the noise and ``autocorrelation`` that of neighbouring residuals, 1 and 0 for a model that explains all but noise.
+    ``span`` is the range that the samples cover. ``prediction`` is the distance from the fitted run within which 95 %
+    of the samples of a new recording like this one are expected.
+    """
+
+    experiment: str
+    channel: str
+    unit: str
+    noise: float
+    is_given: bool
+    rms: float
+    bias: float
+    largest: float
+    chi_square: float
+    autocorrelation: float
+    span: float
+    prediction: float
+
+    @property
+    def is_explained(self) -> bool:
+        """True where the model leaves nothing but white noise."""
+        return self.chi_square <= _MUCH**2 and self.autocorrelation <= _TOGETHER
+
+    @property
+    def fraction(self) -> float:
+        """RMS of what is left over the range that the samples cover [-]."""
+        return self.rms / self.span if self.span > 0.0 else 0.0
+
+
+def channel_fits(
+    requested: Sequence[Experiment], experiments: Sequence[PreparedExperiment], signals: Sequence[dict[str, Floats]]
+) -> tuple[ChannelFit, ...]:
+    """Return what is left in every channel [SI]; ``signals`` are those of the fitted runs, by channel."""
+    found = []
+    for experiment, prepared, values in zip(requested, experiments, signals, strict=True):
+        for channel in prepared.channels:
+            left = values[channel.name] - channel.values
+            # 95 % of new samples keep the distance that those at hand keep, less one, for they were fitted.
+            within = min(len(left) - 1, math.ceil(PREDICTED * (len(left) + 1)))
+            fit = ChannelFit(
+                experiment=experiment.label,
+                channel=channel.name,
+                unit=CHANNELS[channel.name].unit,
+                noise=channel.noise,
+                is_given=channel.name in experiment.noise,
+                rms=float(np.sqrt(np.mean(left * left))),
+                bias=float(np.mean(left)),
+                largest=float(np.max(np.abs(left))),
+                chi_square=float(np.mean(np.square(left / channel.noise))),
+                autocorrelation=autocorrelation(left),
+                span=float(np.ptp(channel.values)),
+                prediction=float(np.sort(np.abs(left))[within]),
+            )
+            found.append(fit)
+    return tuple(found)
+
+
+def reason_of_misfit(misfit: Misfit, channels: Sequence[ChannelFit]) -> str:
+    """Return why the model does not explain the recordings, empty where it does.
+
+    Parts want different numbers, or a channel leaves more than its sensor can be blamed for.
+    """
+    if misfit.is_found:
+        return misfit.in_words
+    for channel in channels:
+        size = float(np.sqrt(channel.chi_square))
+        if size > (_MUCH if channel.is_given else _OF_NO_SENSOR):
+            noise = "the noise that was given for it" if channel.is_given else "its noise from sample to sample"
+            return f"{channel.channel} of {channel.experiment} leaves {size:.2g} times {noise}"
+    return ""
+
+
+def predictions(channels: Sequence[ChannelFit]) -> tuple[str, ...]:
+    """Return a sentence for each recording: how near a new one like it is expected to the fitted run."""
+    found = []
+    for label in dict.fromkeys(channel.experiment for channel in channels):
+        widths = []
+        for channel in channels:
+            width, unit = channel.prediction, channel.unit
+            shown = f"{math.degrees(width):.3g} deg" if unit == "rad" else f"{width:.3g} {unit}"
+            widths += [f"{channel.channel} +- {shown}"] if channel.experiment == label else []
+        found.append(
+            f"95 % of the samples of a new recording like '{label}', by sensors whose zeros have not moved since, lie "
+            f"within {', '.join(widths)} of its run"
+        )
+    return tuple(found)
+
+
+@dataclass(frozen=True, slots=True)
+class TrajectoryFit:
+    """Estimates with verdicts, their covariance in SI units and correlation, and what is left unexplained.
+
+    Matrices are in the order of ``estimates``; those of the coordinates are in ``uncertainty``. ``models`` are the
+    fitted runs at the times of the samples, ``measurements`` the samples, both by experiment over the time of the run.
+    ``remarks`` are sentences about the fit as a whole.
+    """
+
+    problem: TrajectoryProblem
+    estimates: tuple[Estimate, ...]
+    covariance: Floats
+    correlation: Floats
+    uncertainty: Uncertainty
+    cost: float
+    evaluations: int
+    channels: tuple[ChannelFit, ...]
+    models: tuple[Recording, ...]
+    measurements: tuple[Recording, ...]
+    scenarios: tuple[Scenario, ...]
+    remarks: tuple[str, ...]
+    optimum: Optimum
+
+    def estimate(self, name: str) -> Estimate:
+        """Return the estimate of a parameter by its path; ``valve.area`` means the valve of the first experiment.
+
+        IdentificationError where it was not fitted.
+        """
+        full = full_path(name, self.scenarios[0])
+        for estimate in self.estimates:
+            if estimate.path == full:
+                return estimate
+        hint = nearest_name(full, [item.path for item in self.estimates])
+        raise IdentificationError(f"'{name}' was not fitted{hint}")
+
+    @property
+    def misfit(self) -> str:
+        """Why the model does not explain the recordings, so that what they fix holds for it only; empty if it does."""
+        return reason_of_misfit(self.uncertainty.misfit, self.channels)
+
+    def posterior(self) -> "DataTree":
+        """Return draws of the numbers and the recordings as a tree of datasets, laid out as ArviZ reads it; SI units.
+
+        ``posterior`` has a variable for each number over ``chain`` and ``draw``, ``observed_data`` the samples and
+        ``fitted_data`` the fitted runs, each channel over the time of its recording.
+        """
+        import numpy as np
+        from xarray import Dataset, DataTree
+
+        mixture, ranges = self.uncertainty.mixture, self.optimum.residuals.ranges
+        chains = len(np.unique(mixture.chain))
+        points = np.clip(self.optimum.point + mixture.draws, *coordinate_bounds(ranges))
+        posterior = {
+            item.name: (
+                ("chain", "draw"),
+                np.array([item.number(float(one)) for one in points[:, index]]).reshape(chains, -1),
+                {"unit": item.unit},
+            )
+            for index, item in enumerate(ranges)
+        }
+        kind = {"kind": self.measurements[0].kind}
+        groups = {
+            "posterior": Dataset(posterior, attrs=kind),
+            "observed_data": _dataset(self.measurements),
+            "fitted_data": _dataset(self.models),
+        }
+        labels = {name: np.arange(size) for name, size in groups["posterior"].sizes.items()}
+        groups["posterior"] = groups["posterior"].assign_coords(labels)
+        return DataTree.from_dict(groups)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The estimates in SI units by path."""
+        return {estimate.path: estimate.value for estimate in self.estimates}
+
+
+def _dataset(recordings: "tuple[Recording, ...]") -> "Dataset":
+    """Return all channels of recordings, each over the time of its own."""
+    from xarray import Dataset
+
+    labelled = {one.label.removeprefix("model of "): one for one in recordings}
+    channels = {
+        f"{label}.{name}": (f"time of {label}", one[name], {"unit": one.unit(name)})
+        for label, one in labelled.items()
+        for name in one.names
+    }
+    return Dataset(channels, coords={f"time of {label}": one.time for label, one in labelled.items()})
+
 
 LARGE = 0.3
 """RMS change over the noise, when steps are halved, from which the steps are reported as too long."""
@@ -51,15 +252,12 @@ def step_remarks(residuals: Residuals, point: Floats, signals: list[dict[str, Fl
         }
         worst = max(moved, key=lambda name: moved[name])
         if moved[worst] > LARGE:
-            remarks.append(_remark(prepared, finer, worst, moved[worst]))
+            remarks.append(
+                f"{prepared.label}: steps of {1e3 * prepared.run.step:.3g} ms are too long for so little noise: half "
+                f"of that changes {worst} by {moved[worst]:.2g} times its noise; "
+                f"give step = '{1e3 * finer.run.step:.3g} ms' or less"
+            )
     return tuple(remarks)
-
-
-def _remark(prepared: PreparedExperiment, finer: PreparedExperiment, channel: str, moved: float) -> str:
-    return (
-        f"{prepared.label}: steps of {1e3 * prepared.run.step:.3g} ms are too long for so little noise: half of that "
-        f"changes {channel} by {moved:.2g} times its noise; give step = '{1e3 * finer.run.step:.3g} ms' or less"
-    )
 
 
 def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> TrajectoryFit:
@@ -68,25 +266,73 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     Estimates are in SI units; matrices (parameters, parameters) follow their order. Residuals are weighted with the
     noise of their channel. ``report`` hears what is being done. IdentificationError where it cannot be run.
     """
-    found = optimum(residuals_of(problem), problem.search, report)
+    first = optimum(residuals_of(problem), problem.search, report)
     report(Progress("trajectory fit: noise of the sensors"))
-    given = [frozenset(item.noise) for item in problem.experiments]
-    whole = weigh(found, given)
-    uncertainty = uncertainty_of(whole, problem.search, *coordinate_bounds(found.residuals.ranges))
-    residuals = whole.optimum.residuals
+    whole = weigh(first, [frozenset(item.noise) for item in problem.experiments])
+    found = whole.optimum
+    prepared, ranges = found.residuals.experiments, found.residuals.ranges
+    uncertainty = uncertainty_of(whole, problem.search, *coordinate_bounds(ranges))
+    centre = uncertainty.centre
     signals = [
         {name: values[:, 0] for name, values in of_one.items()}
-        for of_one in trajectories(residuals.experiments, residuals.ranges, uncertainty.centre[None, :])
+        for of_one in trajectories(prepared, ranges, centre[None, :])
     ]
-    channels = channel_fits(problem.experiments, residuals.experiments, signals)
-    return _result(problem, found.cost, whole.optimum, uncertainty, channels, signals)
+    channels = channel_fits(problem.experiments, prepared, signals)
+    low, high = coordinate_bounds(ranges)
+    evidence = Evidence(
+        ranges=ranges,
+        point=centre,
+        interval=(uncertainty.low, uncertainty.high),
+        information=uncertainty.curvature,
+        covariance=uncertainty.covariance,
+        correlation=correlation(uncertainty.covariance),
+        low=low,
+        high=high,
+        prior_deviation=prior_coordinates(ranges)[1],
+        inflation=uncertainty.inflation,
+        residual_check=uncertainty.residual_check,
+        misfit=reason_of_misfit(uncertainty.misfit, channels),
+        alone=uncertainty.misfit.alone,
+        sources=tuple(
+            tuple(one.source or one.recording.label for one in problem.experiments if item.acts_in(one.label))
+            for item in ranges
+        ),
+        search=problem.search,
+    )
+    slopes = np.array([item.slope(float(z)) for item, z in zip(ranges, centre, strict=True)])
+    scenarios = tuple(with_numbers(item.scenario, numbers_in(item.label, ranges, centre)) for item in prepared)
+    models, measurements = [], []
+    for experiment, one, values in zip(problem.experiments, prepared, signals, strict=True):
+        samples = {channel.name: channel.values for channel in one.channels}
+        models.append(_recording(f"model of {one.label}", one, values, "simulated"))
+        measurements.append(_recording(experiment.label, one, samples, experiment.recording.kind))
+    return TrajectoryFit(
+        problem=problem,
+        estimates=tuple(estimate_of(evidence, index) for index in range(len(ranges))),
+        covariance=uncertainty.covariance * np.outer(slopes, slopes),
+        correlation=evidence.correlation,
+        uncertainty=uncertainty,
+        cost=first.cost,
+        evaluations=found.evaluations,
+        channels=channels,
+        models=tuple(models),
+        measurements=tuple(measurements),
+        scenarios=scenarios,
+        remarks=_remarks(problem, found, evidence.misfit, uncertainty, channels, scenarios[0].device)
+        + step_remarks(found.residuals, centre, signals),
+        optimum=found,
+    )
 
 
 def residuals_of(problem: TrajectoryProblem) -> Residuals:
     """Return the residuals of a problem."""
     ranges = ranges_of(problem)
     start = np.array([item.coordinate(item.start) for item in ranges])
-    return Residuals(tuple(_prepare(item, ranges, start) for item in problem.experiments), ranges)
+    prepared = []
+    for item in problem.experiments:
+        reach = reach_of([one for one in ranges if one.acts_in(item.label)])
+        prepared.append(prepare(item, numbers_in(item.label, ranges, start), reach))
+    return Residuals(tuple(prepared), ranges)
 
 
 def noise_in(problem: TrajectoryProblem) -> dict[str, float]:
@@ -97,79 +343,6 @@ def noise_in(problem: TrajectoryProblem) -> dict[str, float]:
     return found
 
 
-def _prepare(experiment: Experiment, ranges: Sequence[Range], point: Floats) -> PreparedExperiment:
-    reach = reach_of([item for item in ranges if item.acts_in(experiment.label)])
-    return prepare(experiment, numbers_in(experiment.label, ranges, point), reach)
-
-
-def _result(
-    problem: TrajectoryProblem,
-    cost: float,
-    found: Optimum,
-    uncertainty: Uncertainty,
-    channels: tuple[ChannelFit, ...],
-    signals: list[dict[str, Floats]],
-) -> TrajectoryFit:
-    prepared, ranges, centre = found.residuals.experiments, found.residuals.ranges, uncertainty.centre
-    evidence = _evidence(problem, found, uncertainty, channels)
-    slopes = np.array([item.slope(float(z)) for item, z in zip(ranges, centre, strict=True)])
-    scenarios = tuple(with_numbers(item.scenario, numbers_in(item.label, ranges, centre)) for item in prepared)
-    return TrajectoryFit(
-        problem=problem,
-        estimates=tuple(estimate_of(evidence, index) for index in range(len(ranges))),
-        covariance=uncertainty.covariance * np.outer(slopes, slopes),
-        correlation=evidence.correlation,
-        uncertainty=uncertainty,
-        cost=cost,
-        evaluations=found.evaluations,
-        channels=channels,
-        models=tuple(_model(item, values) for item, values in zip(prepared, signals, strict=True)),
-        measurements=tuple(_measurement(*pair) for pair in zip(problem.experiments, prepared, strict=True)),
-        scenarios=scenarios,
-        remarks=_remarks(problem, found, evidence, uncertainty, channels, scenarios[0].device)
-        + step_remarks(found.residuals, centre, signals),
-        optimum=found,
-    )
-
-
-def _evidence(
-    problem: TrajectoryProblem, found: Optimum, uncertainty: Uncertainty, channels: Sequence[ChannelFit]
-) -> Evidence:
-    ranges, misfit = found.residuals.ranges, uncertainty.misfit
-    low, high = coordinate_bounds(ranges)
-    return Evidence(
-        ranges=ranges,
-        point=uncertainty.centre,
-        interval=(uncertainty.low, uncertainty.high),
-        information=uncertainty.curvature,
-        covariance=uncertainty.covariance,
-        correlation=correlation(uncertainty.covariance),
-        low=low,
-        high=high,
-        prior_deviation=prior_coordinates(ranges)[1],
-        inflation=uncertainty.inflation,
-        residual_check=uncertainty.residual_check,
-        misfit=reason_of_misfit(misfit, channels),
-        alone=misfit.alone,
-        sources=tuple(_sources(problem, item) for item in ranges),
-        search=problem.search,
-    )
-
-
-def _sources(problem: TrajectoryProblem, item: Range) -> tuple[str, ...]:
-    acting = [one for one in problem.experiments if item.acts_in(one.label)]
-    return tuple(one.source or one.recording.label for one in acting)
-
-
-def _model(prepared: PreparedExperiment, values: dict[str, Floats]) -> Recording:
-    return _recording(f"model of {prepared.label}", prepared, values, "simulated")
-
-
-def _measurement(experiment: Experiment, prepared: PreparedExperiment) -> Recording:
-    values = {channel.name: channel.values for channel in prepared.channels}
-    return _recording(experiment.label, prepared, values, experiment.recording.kind)
-
-
 def _recording(label: str, prepared: PreparedExperiment, values: dict[str, Floats], kind: RecordingKind) -> Recording:
     channels = {name: Channel(series, CHANNELS[name].unit) for name, series in values.items()}
     return Recording(label, prepared.time, channels, kind)
@@ -178,26 +351,28 @@ def _recording(label: str, prepared: PreparedExperiment, values: dict[str, Float
 def _remarks(
     problem: TrajectoryProblem,
     found: Optimum,
-    evidence: Evidence,
+    misfit: str,
     uncertainty: Uncertainty,
     channels: Sequence[ChannelFit],
     device: Device,
 ) -> tuple[str, ...]:
-    stopped = (
-        f"the search stopped after {problem.search.maximum_evaluations} evaluations before it converged: "
-        f"start closer to the solution, or allow more evaluations"
-    )
+    remarks = []
+    if not found.has_converged:
+        remarks.append(
+            f"the search stopped after {problem.search.maximum_evaluations} evaluations before it converged: "
+            f"start closer to the solution, or allow more evaluations"
+        )
+    if misfit:
+        text = f"the model does not explain the recordings: {misfit}; what it determines holds for this model only"
+        remarks += [text, *predictions(channels)]
+    else:
+        noises = {sensor.channel: sensor.in_words for sensor in uncertainty.sensors}
+        remarks += [
+            f"{one.experiment}: what is left of {one.channel} is {np.sqrt(one.chi_square):.2g} times its noise from "
+            f"sample to sample (neighbours are correlated by {one.autocorrelation:+.2f}) and was attributed to the "
+            f"sensor: {noises[one.channel]}; if the sensor has no such noise, the model is incomplete"
+            for one in channels
+            if not one.is_explained
+        ]
     broken = broken_rule(device)
-    misfit = (
-        f"the model does not explain the recordings: {evidence.misfit}; what it determines holds for this model only"
-    )
-    return (
-        *([] if found.has_converged else [stopped]),
-        *([misfit, *predictions(channels)] if evidence.misfit else _noise_remarks(channels, uncertainty)),
-        *([broken] if broken else []),
-    )
-
-
-def _noise_remarks(channels: Sequence[ChannelFit], uncertainty: Uncertainty) -> list[str]:
-    noises = {sensor.channel: sensor.in_words for sensor in uncertainty.sensors}
-    return [noise_remark(one, noises[one.channel]) for one in channels if not one.is_explained]
+    return (*remarks, *([broken] if broken else []))

@@ -8,12 +8,19 @@ import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.estimate import interval_factor
-from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, full_path
+from ppafo.identification.trajectory.fitting import TrajectoryFit
 from ppafo.identification.trajectory.information import covariance, data_information, directions_for
-from ppafo.identification.trajectory.preparation import Floats, Measured, PreparedExperiment, Samples, prepare_times
-from ppafo.identification.trajectory.problem import Range, reach_of
-from ppafo.identification.trajectory.residuals import Residuals, coordinate_bounds, trajectories
-from ppafo.identification.trajectory.result import TrajectoryFit
+from ppafo.identification.trajectory.problem import FITTED_CHANNELS, Range, full_path, reach_of
+from ppafo.identification.trajectory.residuals import (
+    Floats,
+    Measured,
+    PreparedExperiment,
+    Residuals,
+    Samples,
+    coordinate_bounds,
+    prepare_samples,
+    trajectories,
+)
 from ppafo.identification.trajectory.search import descend, is_at_bound
 from ppafo.simulation.scenario import Scenario
 
@@ -45,9 +52,19 @@ def profile(fit: TrajectoryFit, path: str) -> Profile:
 
     Numbers are in the SI unit of the parameter. IdentificationError for a path that was not fitted.
     """
-    index = _index(fit, path)
+    names, full = [item.name for item in fit.optimum.residuals.ranges], full_path(path, fit.scenarios[0])
+    if full not in names:
+        raise IdentificationError(f"'{path}' was not fitted{nearest_name(full, names)}; fitted: {', '.join(names)}")
+    index = names.index(full)
     item, at = fit.optimum.residuals.ranges[index], float(fit.optimum.point[index])
-    below, above = (dict(_side(fit, index, coordinates)) for coordinates in _held_coordinates(fit, index))
+    # The number is held at a few coordinates on each side, going away from its estimate.
+    low, high = (float(side[index]) for side in coordinate_bounds(fit.optimum.residuals.ranges))
+    fractions = np.arange(1, POINTS_PER_SIDE + 1) / POINTS_PER_SIDE
+    error = float(np.sqrt(fit.uncertainty.covariance[index, index]))
+    reach = REACH * interval_factor(fit.problem.search.confidence) * error
+    down, up = min(reach, at - low), min(reach, high - at)
+    below = _side(fit, index, at - down * fractions) if down > 0.0 else {}
+    above = _side(fit, index, at + up * fractions) if up > 0.0 else {}
     rises = {**below, at: 0.0, **above}
     places = np.array(sorted(rises))
     heights = np.array([rises[place] for place in places])
@@ -64,69 +81,32 @@ def profile(fit: TrajectoryFit, path: str) -> Profile:
     )
 
 
-def _index(fit: TrajectoryFit, path: str) -> int:
-    names = [item.name for item in fit.optimum.residuals.ranges]
-    full = full_path(path, fit.scenarios[0])
-    if full not in names:
-        raise IdentificationError(f"'{path}' was not fitted{nearest_name(full, names)}; fitted: {', '.join(names)}")
-    return names.index(full)
-
-
-def _held_coordinates(fit: TrajectoryFit, index: int) -> tuple[Floats, Floats]:
-    """Return the coordinates at which a number is held, below and above its estimate, going away from it."""
-    at = float(fit.optimum.point[index])
-    low, high = (float(side[index]) for side in coordinate_bounds(fit.optimum.residuals.ranges))
-    error = float(np.sqrt(fit.uncertainty.covariance[index, index]))
-    fractions = np.arange(1, POINTS_PER_SIDE + 1) / POINTS_PER_SIDE
-    reach = REACH * interval_factor(fit.problem.search.confidence) * error
-    down, up = min(reach, at - low), min(reach, high - at)
-    return (at - down * fractions if down > 0.0 else fractions[:0]), (
-        at + up * fractions if up > 0.0 else fractions[:0]
-    )
-
-
-def _side(fit: TrajectoryFit, index: int, coordinates: Floats) -> list[tuple[float, float]]:
-    """Return coordinate and rise on one side; each search starts where the last one ended, moved along the valley."""
+def _side(fit: TrajectoryFit, index: int, coordinates: Floats) -> dict[float, float]:
+    """Return the rise at coordinates on one side; each search starts where the last ended, moved along the valley."""
     best, curvature = fit.optimum, fit.uncertainty.curvature
+    residuals, search = best.residuals, replace(fit.problem.search, loss="linear")
     point = best.point.copy()
     others = np.arange(len(point)) != index
-    inflation = _inflation(fit, index)
-    valley = _valley(curvature, index, others)
-    found = []
+    # The variance of the coordinate over what the curvature of the cost alone would make it.
+    inflation = float(fit.uncertainty.covariance[index, index] / covariance(curvature)[index, index])
+    # How the other coordinates follow along the floor of the valley.
+    part = curvature[np.ix_(others, others)]
+    valley = -covariance(part) @ curvature[others, index] if others.any() else np.zeros(0)
+    found = {}
     for coordinate in coordinates:
         point[others] += valley * (coordinate - point[index])
         point[index] = coordinate
-        cost, point[others] = _best_of_others(fit, index, point)
-        found.append((float(coordinate), max(0.0, 2.0 * (cost - best.cost)) / inflation))
+        held = residuals.hold({index: float(point[index])})
+        prior = _half_square(residuals.of_priors(point)) - _half_square(held.of_priors(point[others]))
+        if held.ranges:
+            low, high = coordinate_bounds(held.ranges)
+            start = np.clip(point[others], low, high)
+            done = descend(held, start, directions_for(part, is_at_bound(start, held.ranges)), search)
+            cost, point[others] = done.cost + prior, done.point
+        else:
+            cost = _half_square(residuals.of_data(point[None, :])[:, 0]) + prior
+        found[float(coordinate)] = max(0.0, 2.0 * (cost - best.cost)) / inflation
     return found
-
-
-def _inflation(fit: TrajectoryFit, index: int) -> float:
-    """Return the variance of a coordinate over what the curvature of the cost alone would make it."""
-    uncertainty = fit.uncertainty
-    return float(uncertainty.covariance[index, index] / covariance(uncertainty.curvature)[index, index])
-
-
-def _valley(information: Floats, index: int, others: "np.ndarray[tuple[int], np.dtype[np.bool_]]") -> Floats:
-    """Return how the other coordinates follow one that is moved, along the floor of the valley."""
-    if not others.any():
-        return np.zeros(0)
-    return np.asarray(-covariance(information[np.ix_(others, others)]) @ information[others, index])
-
-
-def _best_of_others(fit: TrajectoryFit, index: int, point: Floats) -> tuple[float, Floats]:
-    """Return the least cost with one coordinate held, and where the others are then."""
-    residuals, search = fit.optimum.residuals, replace(fit.problem.search, loss="linear")
-    others = np.arange(len(point)) != index
-    held = residuals.hold({index: float(point[index])})
-    prior = _half_square(residuals.of_priors(point)) - _half_square(held.of_priors(point[others]))
-    if not held.ranges:
-        return _half_square(residuals.of_data(point[None, :])[:, 0]) + prior, point[others]
-    low, high = coordinate_bounds(held.ranges)
-    start = np.clip(point[others], low, high)
-    part = fit.uncertainty.curvature[np.ix_(others, others)]
-    done = descend(held, start, directions_for(part, is_at_bound(start, held.ranges)), search)
-    return done.cost + prior, done.point
 
 
 def _half_square(values: Floats) -> float:
@@ -185,15 +165,13 @@ def expected_information(fit: TrajectoryFit, candidates: Sequence[Candidate]) ->
     IdentificationError for a candidate without noise in a channel that can be fitted.
     """
     ranges, point = fit.optimum.residuals.ranges, fit.optimum.point
-    known = _known_information(fit) + _what_bounds_say(ranges)
+    # What is known: the inverse of the covariance, and an even distribution between the bounds, which keeps all finite.
+    low, high = coordinate_bounds(ranges)
+    of_bounds = np.diag(12.0 / np.square(np.minimum(high - low, 2.0 * _WIDEST)))
+    known = covariance(fit.uncertainty.covariance) + of_bounds
     directions = directions_for(known, is_at_bound(point, ranges))
     brought = [_expect(fit, known, candidate, directions) for candidate in candidates]
     return tuple(sorted(brought, key=lambda one: -one.gain))
-
-
-def _known_information(fit: TrajectoryFit) -> Floats:
-    """Return the information that the covariance of a fit stands for."""
-    return covariance(fit.uncertainty.covariance)
 
 
 def _expect(fit: TrajectoryFit, known: Floats, candidate: Candidate, directions: Floats) -> Expected:
@@ -223,13 +201,7 @@ def _imagine(candidate: Candidate, ranges: tuple[Range, ...], point: Floats) -> 
     numbers = {item.path: item.number(float(z)) for item, z in zip(ranges, point, strict=True)}
     empty = tuple(Measured(name, np.zeros(time.size), noise) for name, noise in candidate.noise.items())
     samples = Samples(time, empty, reach_of(ranges))
-    prepared = prepare_times(candidate.label, candidate.scenario, samples, numbers)
+    prepared = prepare_samples(candidate.label, candidate.scenario, samples, numbers)
     signals = trajectories([prepared], ranges, point[None, :])[0]
     filled = tuple(Measured(one.name, signals[one.name][:, 0], one.noise) for one in empty)
     return replace(prepared, samples=replace(samples, channels=filled))
-
-
-def _what_bounds_say(ranges: Sequence[Range]) -> Floats:
-    """Return the information of the bounds alone, as of an even distribution between them; it keeps all finite."""
-    low, high = coordinate_bounds(ranges)
-    return np.diag(12.0 / np.square(np.minimum(high - low, 2.0 * _WIDEST)))

@@ -1,15 +1,13 @@
-"""What recordings say about coordinates: information matrix, covariance, mixtures of normal distributions.
+"""What recordings say about coordinates: information matrix, its inverse, steps along its principal axes.
 
 All matrices are those of the coordinates of ``Range``: logarithms, or numbers over their size.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
-from ppafo.identification.trajectory.preparation import Floats
-from ppafo.identification.trajectory.residuals import Mask, Neighbourhood, Residuals, prior_coordinates
+from ppafo.identification.trajectory.residuals import Floats, Mask, Neighbourhood, Residuals, prior_coordinates
 from ppafo.identification.trajectory.sample_loops import sample_loops
 
 ROBUST_SCALE = 1.345
@@ -122,81 +120,25 @@ def autocorrelation(residuals: Floats) -> float:
     return float(np.sum(away[1:] * away[:-1]) / size) if size > 0.0 else 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Mixture:
-    """Normal distributions of coordinates, counted from a point: means (parts, coordinates), covariances, a draw each.
-
-    ``chain`` says to which chain of draws each part belongs.
-    """
-
-    means: Floats
-    covariances: Floats
-    draws: Floats
-    chain: "np.ndarray[tuple[int], np.dtype[np.intp]]"
-
-    @property
-    def mean(self) -> Floats:
-        """Mean of all coordinates, in their units."""
-        return np.asarray(self.means.mean(axis=0))
-
-    @property
-    def covariance(self) -> Floats:
-        """Covariance of all coordinates, in products of their units."""
-        away = self.means - self.mean
-        return np.asarray(self.covariances.mean(axis=0) + away.T @ away / len(away))
-
-    def below(self, index: int, at: Floats) -> Floats:
-        """Return the probability that a coordinate lies below each of some places."""
-        from scipy.special import ndtr
-
-        spread = np.sqrt(self.covariances[:, index, index])
-        return np.asarray(ndtr((at[:, None] - self.means[:, index]) / spread).mean(axis=1))
-
-    def quantile(self, index: int, fraction: float, low: float = -math.inf, high: float = math.inf) -> float:
-        """Return the place below which a coordinate lies with a probability, given that it lies between two bounds."""
-        from scipy.optimize import brentq
-
-        first, last = self.below(index, np.array([low, high]))
-        wanted = first + fraction * (last - first)
-        error = 12.0 * math.sqrt(float(self.covariance[index, index]))
-        ends = max(low, float(self.mean[index]) - error), min(high, float(self.mean[index]) + error)
-        if not ends[0] < ends[1] or last - first < LEAST:
-            return float(np.clip(self.mean[index], low, high))
-
-        def away(place: float) -> float:
-            return float(self.below(index, np.array([place]))[0] - wanted)
-
-        if away(ends[0]) >= 0.0:
-            return ends[0]
-        return ends[1] if away(ends[1]) <= 0.0 else float(brentq(away, *ends, xtol=1.0e-6 * error))
-
-
 def inverse_with_root(precision: Floats) -> tuple[Floats, Floats]:
     """Return the inverse of a precision [unit^2] and a root of it; huge along a direction that nothing fixes."""
-    root = _root_of_inverse(*principal_axes(precision))
+    root = solution_with_root(precision, np.zeros(len(precision)))[1]
     return root @ root.T, root
 
 
 def solution(precision: Floats, product: Floats) -> Floats:
     """Return the solution of a linear system, in units of the coordinates; it does not move where nothing fixes it."""
-    return _solution_along(*principal_axes(precision), product)
+    return solution_with_root(precision, product)[0]
 
 
 def solution_with_root(precision: Floats, product: Floats) -> tuple[Floats, Floats]:
     """Return what ``solution`` does, and the root of the inverse that ``inverse_with_root`` does, at half the cost."""
-    axes = principal_axes(precision)
-    return _solution_along(*axes, product), _root_of_inverse(*axes)
-
-
-def _root_of_inverse(scale: Floats, values: Floats, vectors: Floats) -> Floats:
-    kept = np.maximum(values, SMALLEST_FRACTION * values[-1])
-    return np.asarray(vectors / np.sqrt(kept) / scale[:, None])
-
-
-def _solution_along(scale: Floats, values: Floats, vectors: Floats, product: Floats) -> Floats:
+    scale, values, vectors = principal_axes(precision)
     is_fixed = values > FIXED * values[-1]
     inverses = np.where(is_fixed, 1.0 / np.where(is_fixed, values, 1.0), 0.0)
-    return np.asarray((vectors * inverses) @ (vectors.T @ (product / scale)) / scale)
+    found = (vectors * inverses) @ (vectors.T @ (product / scale)) / scale
+    root = vectors / np.sqrt(np.maximum(values, SMALLEST_FRACTION * values[-1])) / scale[:, None]
+    return np.asarray(found), np.asarray(root)
 
 
 def likelihood_without_columns(whole: Floats) -> float:
@@ -206,10 +148,8 @@ def likelihood_without_columns(whole: Floats) -> float:
     """
     found = np.full(1, math.nan)
     sample_loops().likelihood_left(np.ascontiguousarray(whole), np.empty(whole.shape), found, _SMALLEST_PIVOT)
-    return _likelihood_along_axes(whole) if math.isnan(found[0]) else float(found[0])
-
-
-def _likelihood_along_axes(whole: Floats) -> float:
+    if not math.isnan(found[0]):
+        return float(found[0])
     scale, values, vectors = principal_axes(whole[:-1, :-1])
     kept = np.maximum(values, SMALLEST_FRACTION * values[-1])
     along = vectors.T @ (whole[:-1, -1] / scale)

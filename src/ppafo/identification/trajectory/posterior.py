@@ -13,30 +13,27 @@ import numpy as np
 
 from ppafo.identification.trajectory.information import (
     LEAST,
-    Mixture,
     inverse_with_root,
     likelihood_without_columns,
     solution_with_root,
 )
-from ppafo.identification.trajectory.preparation import Floats
+from ppafo.identification.trajectory.residuals import Floats
 from ppafo.identification.trajectory.sensor_noise import (
     FREEDOMS,
     LOG_RATIO,
+    AutoRegression,
+    Drift,
     SensorNoise,
+    Shape,
     drift_of,
     errors_of,
+    from_coefficients,
+    from_reflections,
     longest_memory,
     profile_likelihood,
     regression_of,
     sample_weights,
     t_likelihood,
-)
-from ppafo.identification.trajectory.whitening import (
-    AutoRegression,
-    Drift,
-    Shape,
-    from_coefficients,
-    from_reflections,
 )
 
 CHAINS, DRAWS, HEAVY_DRAWS, SETTLING = 2, 100, 300, 20
@@ -76,6 +73,55 @@ class LinearModel:
     def segments(self, values: Floats, sensor: int) -> list[Floats]:
         """Return the samples of a sensor, recording by recording, in the unit of the values."""
         return [values[place] for place in self.sensors[sensor]]
+
+
+@dataclass(frozen=True, slots=True)
+class Mixture:
+    """Normal distributions of coordinates, counted from a point: means (parts, coordinates), covariances, a draw each.
+
+    ``chain`` says to which chain of draws each part belongs.
+    """
+
+    means: Floats
+    covariances: Floats
+    draws: Floats
+    chain: "np.ndarray[tuple[int], np.dtype[np.intp]]"
+
+    @property
+    def mean(self) -> Floats:
+        """Mean of all coordinates, in their units."""
+        return np.asarray(self.means.mean(axis=0))
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of all coordinates, in products of their units."""
+        away = self.means - self.mean
+        return np.asarray(self.covariances.mean(axis=0) + away.T @ away / len(away))
+
+    def below(self, index: int, at: Floats) -> Floats:
+        """Return the probability that a coordinate lies below each of some places."""
+        from scipy.special import ndtr
+
+        spread = np.sqrt(self.covariances[:, index, index])
+        return np.asarray(ndtr((at[:, None] - self.means[:, index]) / spread).mean(axis=1))
+
+    def quantile(self, index: int, fraction: float, low: float = -math.inf, high: float = math.inf) -> float:
+        """Return the place below which a coordinate lies with a probability, given that it lies between two bounds."""
+        from scipy.optimize import brentq
+
+        first, last = self.below(index, np.array([low, high]))
+        wanted = first + fraction * (last - first)
+        error = 12.0 * math.sqrt(float(self.covariance[index, index]))
+        ends = max(low, float(self.mean[index]) - error), min(high, float(self.mean[index]) + error)
+        if not ends[0] < ends[1] or last - first < LEAST:
+            return float(np.clip(self.mean[index], low, high))
+
+        def away(place: float) -> float:
+            return float(self.below(index, np.array([place]))[0] - wanted)
+
+        if away(ends[0]) >= 0.0:
+            return ends[0]
+        return ends[1] if away(ends[1]) <= 0.0 else float(brentq(away, *ends, xtol=1.0e-6 * error))
 
 
 @dataclass(frozen=True, slots=True)
@@ -299,17 +345,11 @@ def _regression(
     found = from_coefficients(mean + inverse_with_root(precision)[1] @ random.standard_normal(shape.order))
     if found is None:
         return shape
-    gain = sum(
-        _first(found, one[: shape.order], weight[: shape.order])
-        - _first(shape, one[: shape.order], weight[: shape.order])
-        for one, weight in zip(scaled, weights, strict=True)
-    )
+    gain = 0.0
+    for one, weight in zip(scaled, weights, strict=True):
+        new, old = (each.square(one[: shape.order], weight[: shape.order]) for each in (found, shape))
+        gain += (-0.5 * new[0] - new[1]) - (-0.5 * old[0] - old[1])
     return found if math.log(random.random()) < gain else shape
-
-
-def _first(shape: AutoRegression, values: Floats, weights: Floats) -> float:
-    square, spread = shape.square(values, weights)
-    return -0.5 * square - spread
 
 
 def _proposal(numbers: Floats, is_zeroed: bool, scaled: Sequence[Floats], weights: Sequence[Floats]) -> Floats:

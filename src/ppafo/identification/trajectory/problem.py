@@ -1,23 +1,221 @@
-"""A trajectory fit as values: which numbers are free, which recordings they are to explain, and how to search."""
+"""A trajectory fit as values: recordings with the scenarios that are to explain them, free numbers, how to search."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal
+
+import numpy as np
 
 from ppafo.errors import IdentificationError, first_twice, nearest_name
 from ppafo.identification.source import Use, double_use
-from ppafo.identification.trajectory.experiment import (
-    TIME_OFFSET,
-    Experiment,
-    check_experiment,
-    declaration_of,
-    full_path,
-    number_at,
-    scenario_of,
-)
 from ppafo.model.declaration import Quantity
-from ppafo.simulation.recorded.inputs import DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY, supply_paths
+from ppafo.model.effects.catalog import EFFECTS, find_effects
+from ppafo.model.valves.catalog import VALVES
+from ppafo.parameters.declaration import AREA_FORM, SECTIONS, SONIC_FORM
+from ppafo.parameters.device import Device, Orifice
+from ppafo.signals import Recording
+from ppafo.simulation import numbers
+from ppafo.simulation.declaration import FREE, INITIAL
+from ppafo.simulation.recorded.checks import check_absolute, check_command, check_gaps
+from ppafo.simulation.recorded.inputs import (
+    ANGLE,
+    COMMAND,
+    DORSIFLEXION_SUPPLY,
+    EXTERNAL_TORQUE,
+    SUPPLY,
+    between_stops,
+    supply_paths,
+)
+from ppafo.simulation.recorded.scenario import replay_control, with_highest_supply
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, Scenario, Sensors
+
+FITTED_CHANNELS = ("angle", "pressure_1", "pressure_2")
+"""What a recording is compared in [rad], [Pa], [Pa]."""
+
+INPUTS = (COMMAND, SUPPLY, EXTERNAL_TORQUE)
+"""Channels that a run follows where they were recorded, sample by sample, if it has no scenario."""
+
+ALL_INPUTS = (*INPUTS, DORSIFLEXION_SUPPLY, ANGLE)
+"""Channels that a run may follow instead of its scenario; a recorded angle prescribes that of the vane."""
+
+InitialState = Literal["scenario", "recording"]
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """A recording and the scenario that is to explain it; time ``start`` [s] of the recording is time 0 of the run.
+
+    ``noise`` is the standard deviation by channel [rad], [Pa]; channels without one have it estimated from the
+    recording. ``channels`` are those that are compared, to the end of the recording. ``inputs`` names measured channels
+    that the run follows sample by sample: ``command``, in place of the scenario's controller, ``supply_pressure`` (of
+    both inlets where they have one pressure), ``dorsiflexion_pressure``, ``external_torque``, ``angle``.
+    ``initial_state`` takes angle and pressures at the start from the scenario or, as means of the samples up to the
+    start, from the recording. ``source`` names the file and its hash.
+    """
+
+    label: str
+    scenario: Scenario
+    recording: Recording
+    start: float = 0.0
+    channels: tuple[str, ...] = FITTED_CHANNELS
+    noise: Mapping[str, float] = field(default_factory=dict)
+    inputs: tuple[str, ...] = ()
+    initial_state: InitialState = "scenario"
+    source: str = ""
+
+
+def check_experiment(experiment: Experiment) -> None:
+    """Refuse an experiment that cannot be fitted; the message begins with its label. It is an IdentificationError."""
+    said = f"experiment '{experiment.label}'"
+    if len(experiment.recording) < 2:
+        raise IdentificationError(f"{said}: {experiment.recording.label} has only one sample")
+    for name in experiment.channels:
+        if name not in FITTED_CHANNELS:
+            raise IdentificationError(f"{said}: channel '{name}' cannot be fitted; {', '.join(FITTED_CHANNELS)} can")
+        if name not in experiment.recording:
+            have = ", ".join(experiment.recording.names)
+            raise IdentificationError(f"{said}: {experiment.recording.label} has no channel '{name}'; it has {have}")
+    if not experiment.channels:
+        raise IdentificationError(f"{said}: there is no channel to compare")
+    if ANGLE in experiment.inputs and ANGLE in experiment.channels:
+        raise IdentificationError(
+            f"{said}: the angle of the vane is prescribed by the recording, so it cannot be compared"
+        )
+    if experiment.channels == ("angle",) and not isinstance(experiment.scenario.motion, FreeMotion):
+        raise IdentificationError(
+            f"{said}: the angle of the vane is prescribed, so it carries no information; add a pressure"
+        )
+    if experiment.scenario.control.kind == PYTHON_CONTROLLER and COMMAND not in experiment.inputs:
+        raise IdentificationError(f"{said}: a Python controller cannot run in lanes; use one of the catalogue")
+    _check_inputs(experiment, said)
+
+
+def _check_inputs(experiment: Experiment, said: str) -> None:
+    """Refuse measured inputs that a run cannot follow, and a noise that is none."""
+    for name in experiment.inputs:
+        if name not in ALL_INPUTS:
+            hint = nearest_name(name, ALL_INPUTS)
+            raise IdentificationError(f"{said}: '{name}' is not a measured input{hint}; use {', '.join(ALL_INPUTS)}")
+        if name not in experiment.recording:
+            have = ", ".join(experiment.recording.names)
+            raise IdentificationError(
+                f"{said}: {experiment.recording.label} has no channel '{name}' to follow; it has {have}"
+            )
+    if EXTERNAL_TORQUE in experiment.inputs and not isinstance(experiment.scenario.motion, FreeMotion):
+        raise IdentificationError(
+            f"{said}: the angle of the vane is prescribed, so a torque on it has no effect; remove it from inputs"
+        )
+    if COMMAND in experiment.inputs:
+        check_command(experiment.recording, said)
+    if experiment.inputs:
+        check_gaps(experiment.recording, said)
+        check_absolute(experiment.recording, experiment.scenario.device.supply.atmospheric_pressure, said)
+    for name, deviation in experiment.noise.items():
+        if not (math.isfinite(deviation) and deviation > 0.0):
+            raise IdentificationError(f"{said}: the noise of '{name}' must be above 0, not {deviation!r}")
+
+
+_FITS = 1.0e-6
+
+
+def scenario_of(experiment: Experiment) -> Scenario:
+    """Return the scenario of an experiment with all that it takes from the recording, but for the samples of inputs.
+
+    A state that is taken from the recording is that of the means of the samples up to the start.
+    """
+    scenario, recording = experiment.scenario, experiment.recording
+    if {SUPPLY, DORSIFLEXION_SUPPLY} & set(experiment.inputs):
+        scenario = replace(scenario, device=with_highest_supply(scenario.device, recording, experiment.inputs))
+    if COMMAND in experiment.inputs:
+        # Nobody measures for a controller that nobody asks.
+        scenario = replace(scenario, control=replay_control(recording), sensors=Sensors())
+    said = f"experiment '{experiment.label}'"
+    if ANGLE in experiment.inputs:
+        # From here the recorded angle prescribes that of the vane.
+        angle = np.interp([experiment.start], recording.time, recording[ANGLE])
+        scenario = replace(scenario, motion=FreeMotion(float(between_stops(angle, scenario.device, said)[0])))
+    if experiment.initial_state == "scenario":
+        return scenario
+    before = recording.time <= experiment.start + _FITS
+    if not before.any():
+        raise IdentificationError(
+            f"{said}: {recording.label} has no sample up to {experiment.start:g} s, from which the initial state could "
+            f"be taken"
+        )
+    means = {name: float(np.mean(recording[name][before])) for name in recording.names}
+    scenario = replace(
+        scenario,
+        initial_pressure_1=means.get("pressure_1", scenario.initial_pressure_1),
+        initial_pressure_2=means.get("pressure_2", scenario.initial_pressure_2),
+    )
+    if ANGLE in means and ANGLE not in experiment.inputs and isinstance(scenario.motion, FreeMotion):
+        start = float(between_stops(np.array([means[ANGLE]]), scenario.device, said)[0])
+        scenario = replace(scenario, motion=replace(scenario.motion, angle=start))
+    return scenario
+
+
+_DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
+TIME_OFFSET = "recording.time_offset"
+"""Path of a number that no scenario has: the time by which the samples of a recording are later than the run."""
+
+RECORDING = (
+    Quantity("time_offset", "s", "time by which the samples are later than the run, a late trigger", 0.0, -1.0, 1.0),
+)
+
+
+def full_path(path: str, scenario: Scenario) -> str:
+    """Return the path as a parameter set has it: ``valve.area`` becomes ``valves.NAME.area`` of the chosen valve."""
+    section, _, name = path.partition(".")
+    return f"valves.{scenario.device.valve_name}.{name}" if section == "valve" else path
+
+
+def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
+    """Return every number that can be fitted in this scenario, with its declaration, by path."""
+    device = scenario.device
+    found = {f"{section}.{item.name}": item for section in _DEVICE_SECTIONS for item in SECTIONS[section]}
+    found |= {f"{effect.section}.{item.name}": item for effect in EFFECTS.values() for item in effect.quantities}
+    orifices = device.actuator.leak, device.valve.orifice
+    leak, opening = (AREA_FORM if isinstance(orifice, Orifice) else SONIC_FORM for orifice in orifices)
+    found |= {f"actuator.leak.{item.name}": item for item in leak}
+    valve = (*opening, *VALVES[device.valve.kind].quantities)
+    found |= {f"valves.{device.valve_name}.{item.name}": item for item in valve}
+    if isinstance(scenario.motion, FreeMotion):
+        found |= {f"motion.{item.name}": item for item in FREE}
+    found |= {f"initial.{item.name}": item for item in INITIAL}
+    return found | {f"recording.{item.name}": item for item in RECORDING}
+
+
+def declaration_of(path: str, scenario: Scenario) -> Quantity:
+    """Return the declaration of the number at a path; IdentificationError with the nearest name for an unknown one."""
+    find_effects([path])
+    known = declared_numbers(scenario)
+    full = full_path(path, scenario)
+    if full not in known:
+        hint = nearest_name(full, known)
+        raise IdentificationError(f"{scenario.name}: no number '{path}' can be fitted{hint}; known: {', '.join(known)}")
+    return known[full]
+
+
+def number_at(scenario: Scenario, path: str) -> float:
+    """Return the number at a path in SI units; the time offset of a recording is 0 before it is fitted."""
+    declaration_of(path, scenario)
+    return 0.0 if path == TIME_OFFSET else numbers.number_at(scenario, path)
+
+
+def with_numbers(scenario: Scenario, changed: Mapping[str, float]) -> Scenario:
+    """Return the scenario with numbers [SI] replaced, by paths of ``declared_numbers``; a time offset is none of it."""
+    return numbers.with_numbers(scenario, {path: number for path, number in changed.items() if path != TIME_OFFSET})
+
+
+def broken_rule(device: Device) -> str:
+    """Return which rule of a device a set of numbers breaks, as a parameter set would say it; empty for none."""
+    if device.friction.dynamic_torque > device.friction.static_torque:
+        return "friction.dynamic_torque came out above friction.static_torque"
+    if device.actuator.angle_min >= device.actuator.angle_max:
+        return "actuator.angle_min came out above actuator.angle_max"
+    return ""
+
 
 Scale = Literal["log", "linear"]
 
@@ -118,14 +316,23 @@ def range_of(parameter: FreeParameter, experiments: Sequence[Experiment]) -> Ran
         )
     path = paths.pop()
     quantity = [declaration_of(path, scenario) for scenario in scenarios][-1]
+    section = path.partition(".")[0]
     for experiment in experiments:
         _refuse_followed(parameter, path, experiment)
-    start = _usual_start(path, experiments[0]) if parameter.start is None else parameter.start
-    is_ratio = start > 0.0 and quantity.minimum >= 0.0 and path.partition(".")[0] not in _ADDED
+    start = parameter.start
+    if start is None:
+        # Of how a run begins the recording may say more than the scenario.
+        first = experiments[0]
+        start = number_at(scenario_of(first) if section in _STATE else first.scenario, path)
+    is_ratio = start > 0.0 and quantity.minimum >= 0.0 and section not in _ADDED
     scale = parameter.scale or ("log" if is_ratio else "linear")
-    low, high = _default_bounds(path, quantity, start, scale)
+    if path == TIME_OFFSET:
+        low, high = -LONGEST_TIME_OFFSET, LONGEST_TIME_OFFSET
+    else:
+        low = max(quantity.minimum, start / _FURTHEST) if scale == "log" and start > 0.0 else quantity.minimum
+        high = min(quantity.maximum, start * _FURTHEST) if start > 0.0 else quantity.maximum
     low, high = (low if parameter.low is None else parameter.low), (high if parameter.high is None else parameter.high)
-    _check_range(parameter, scale, start, low, high)
+    _refuse_nonsense(parameter, scale, start, low, high)
     if low < quantity.minimum or high > quantity.maximum:
         raise IdentificationError(
             f"{parameter.name}: bounds {low:.6g} to {high:.6g} exceed what is allowed, "
@@ -148,20 +355,6 @@ def reach_of(ranges: Sequence[Range]) -> float:
     return max(reaches, default=0.0)
 
 
-def _usual_start(path: str, experiment: Experiment) -> float:
-    """Return where a number begins that was given no start: what the recording says of the state, else the scenario."""
-    is_state = path.partition(".")[0] in _STATE
-    return number_at(scenario_of(experiment) if is_state else experiment.scenario, path)
-
-
-def _default_bounds(path: str, quantity: Quantity, start: float, scale: Scale) -> tuple[float, float]:
-    """Return the bounds of a number that was given none."""
-    if path == TIME_OFFSET:
-        return -LONGEST_TIME_OFFSET, LONGEST_TIME_OFFSET
-    low = max(quantity.minimum, start / _FURTHEST) if scale == "log" and start > 0.0 else quantity.minimum
-    return low, min(quantity.maximum, start * _FURTHEST) if start > 0.0 else quantity.maximum
-
-
 def _refuse_followed(parameter: FreeParameter, path: str, experiment: Experiment) -> None:
     """Refuse a number that a run takes from its recording instead."""
     followed = dict.fromkeys(supply_paths(experiment.scenario.device), SUPPLY)
@@ -175,7 +368,7 @@ def _refuse_followed(parameter: FreeParameter, path: str, experiment: Experiment
         )
 
 
-def _check_range(parameter: FreeParameter, scale: Scale, start: float, low: float, high: float) -> None:
+def _refuse_nonsense(parameter: FreeParameter, scale: Scale, start: float, low: float, high: float) -> None:
     if not all(math.isfinite(number) for number in (start, low)) or math.isnan(high):
         raise IdentificationError(f"{parameter.name}: start and bounds must be finite numbers")
     if not low < high or not low <= start <= high:

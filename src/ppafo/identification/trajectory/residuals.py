@@ -1,5 +1,11 @@
-"""Weighted residuals and their Jacobian: each experiment is one block of lanes, each lane one set of numbers."""
+"""Experiments made ready for fitting, their runs, and the weighted residuals of these with their Jacobian.
 
+Each experiment is one block of lanes, each lane one set of numbers. One clock serves all columns: the step stays as it
+is during the search. The parts in which the engine does it follow the numbers, though, and any other choice of them
+moves a run a little. Runs of a fit are allowed so little error that differences hardly see it.
+"""
+
+import math
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -12,32 +18,199 @@ from numpy.typing import NDArray
 
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.program import Program
-from ppafo.engine.replay import replay
+from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batches_of
 from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import IdentificationError
-from ppafo.identification.trajectory.experiment import TIME_OFFSET, with_numbers
-from ppafo.identification.trajectory.preparation import Floats, PreparedExperiment
-from ppafo.identification.trajectory.problem import Range
+from ppafo.identification.trajectory.problem import TIME_OFFSET, Experiment, Range, scenario_of, with_numbers
 from ppafo.model.chambers import chamber_1_volume, chamber_2_volume, chamber_pressure
 from ppafo.model.columns import at, over_runs
-from ppafo.model.plant import PlantParameters
 from ppafo.model.valves.catalog import VALVES
-from ppafo.model.valves.kind import ValveKind
 from ppafo.parameters.effects import effect_rows, switches_of
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.plan import (
     exact_orifice,
     initial_lines,
     initial_state,
+    plan_run,
     plant_behind_lines,
     thermal_parameters,
     valve_parameters,
 )
-from ppafo.simulation.scenario import FreeMotion
+from ppafo.simulation.recorded.inputs import ANGLE, RecordedInputs, step_inputs, with_prescribed_angle
+from ppafo.simulation.scenario import FreeMotion, Scenario
 
-_KEPT = ("angle", "mass_1", "mass_2")
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+
+MINIMUM_SAMPLES = 10
+FIT_TOLERANCE = 0.02
+"""Error that a run of a fit is allowed over that of any other run; columns of differences keep to 1e-3 with it."""
+_FINER = 0.25
+_FITS = 1.0e-6
+_SPREAD_OF_MEDIAN = 1.4826
+_KEPT = 3.0
+_SHARE_OF_KEPT = 0.98658
+"""Standard deviation of a normal distribution cut at 3 standard deviations, over that of the whole."""
+
+_READ_INTERVAL = 5.0e-5
+"""Seconds between two records that samples lie in between: a chamber fills within milliseconds ..."""
+_MAXIMUM_RECORDS = 100_000
+"""... and more where a recording is so long that memory would run out."""
+
+_GAIN_OF_DIFFERENCES = math.sqrt(20.0)
+"""Standard deviation of the third difference of white noise over that of the noise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """One channel of an experiment: samples [rad] or [Pa] and the standard deviation of their noise."""
+
+    name: str
+    values: Floats
+    noise: float
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """What a run is compared with: times [s] of the run, channels, and how far [s] a fitted offset may move them."""
+
+    time: Floats
+    channels: tuple[Measured, ...]
+    reach: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class PreparedExperiment:
+    """An experiment by its label, with its scenario completed and its samples placed in the record of a run.
+
+    ``run`` has the step and the clock of all columns; a sample is ``fraction`` [-] of the way from record ``place`` to
+    the next. ``inputs`` are what the run follows at each step, made of what ``recorded`` has; None where it follows
+    nothing. ``time_offset`` [s] is how much later the samples are than the run, where it is not fitted.
+    """
+
+    label: str
+    scenario: Scenario
+    run: Run
+    samples: Samples
+    place: Indices
+    fraction: Floats
+    recorded: RecordedInputs | None = None
+    inputs: StepInputs | None = None
+    time_offset: float = 0.0
+
+    @property
+    def time(self) -> Floats:
+        """Times of the samples in the time of the run [s]."""
+        return self.samples.time
+
+    @property
+    def channels(self) -> tuple[Measured, ...]:
+        """The channels that are compared."""
+        return self.samples.channels
+
+    @property
+    def record_interval(self) -> float:
+        """Time between two records of the run [s]."""
+        return self.run.step * self.run.record_every
+
+
+def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float = 0.0) -> PreparedExperiment:
+    """Return the experiment made ready.
+
+    ``numbers`` by path are the start values; ``reach`` [s] is the largest time offset that is tried.
+    IdentificationError for a recording with too few samples or a channel whose noise is unknown.
+    """
+    recording, said = experiment.recording, f"experiment '{experiment.label}'"
+    inside = recording.time >= experiment.start - _FITS
+    time = np.maximum(recording.time[inside] - experiment.start, 0.0)
+    if time.size < MINIMUM_SAMPLES:
+        raise IdentificationError(
+            f"{said}: {recording.label} has {time.size} samples after {experiment.start:g} s, "
+            f"at least {MINIMUM_SAMPLES} are needed"
+        )
+    channels = []
+    for name in experiment.channels:
+        values = recording[name][inside]
+        noise = experiment.noise[name] if name in experiment.noise else noise_of(values)
+        if not noise > 0.0:
+            raise IdentificationError(
+                f"{said}: channel '{name}' shows no noise from sample to sample, so its weight is "
+                f"unknown: give its standard deviation in noise, for example from the sensor's data sheet"
+            )
+        channels.append(Measured(name, values, noise))
+    scenario = replace(scenario_of(experiment), duration=float(time[-1]) + reach)
+    recorded = RecordedInputs(recording, experiment.inputs, experiment.start) if experiment.inputs else None
+    return prepare_samples(experiment.label, scenario, Samples(time, tuple(channels), reach), numbers, recorded)
+
+
+def prepare_samples(
+    label: str,
+    scenario: Scenario,
+    samples: Samples,
+    numbers: Mapping[str, float],
+    recorded: RecordedInputs | None = None,
+) -> PreparedExperiment:
+    """Return samples of a scenario's run made ready, at ``numbers`` [SI] by path."""
+    run = replace(plan_run(with_numbers(scenario, numbers)), tolerance=FIT_TOLERANCE)
+    nowhere = np.zeros(samples.time.size)
+    unplaced = PreparedExperiment(label, scenario, run, samples, nowhere.astype(np.intp), nowhere, recorded)
+    return _place_samples(unplaced, run)
+
+
+def with_half_steps(prepared: PreparedExperiment, numbers: Mapping[str, float]) -> PreparedExperiment:
+    """Return the experiment at ``numbers`` [SI] with steps half as long and a quarter of the allowed error."""
+    scenario = replace(prepared.scenario, time_step=0.5 * prepared.run.step)
+    run = plan_run(with_numbers(scenario, numbers))
+    return _place_samples(prepared, replace(run, tolerance=_FINER * prepared.run.tolerance))
+
+
+def noise_of(values: Floats) -> float:
+    """Return the standard deviation of white noise [unit of the signal], from third differences that are not unusual.
+
+    What the signal itself does between four samples counts as noise where it is larger; a few jumps do not matter.
+    """
+    if values.size < MINIMUM_SAMPLES:
+        return 0.0
+    differences = np.abs(np.diff(values, n=3))
+    most = _KEPT * _SPREAD_OF_MEDIAN * float(np.median(differences))
+    inner = differences[differences <= most]
+    return float(np.sqrt(np.mean(inner * inner)) / _SHARE_OF_KEPT / _GAIN_OF_DIFFERENCES)
+
+
+def _place_samples(prepared: PreparedExperiment, run: Run) -> PreparedExperiment:
+    """Return the samples placed in a record of a run that is no finer than they need."""
+    samples, recorded = prepared.samples, prepared.recorded
+    every = _steps_between_samples(samples, run.step)
+    records = math.ceil((float(samples.time[-1]) + samples.reach) / (run.step * every) - _FITS)
+    position = samples.time / (run.step * every)
+    place = np.minimum(np.floor(position + _FITS), records).astype(np.intp)
+    fraction = np.maximum(position - place, 0.0)
+    fraction[fraction < _FITS] = 0.0
+    frozen = replace(run, record_every=every, step_count=math.ceil(records * every - _FITS), needs_parts=True)
+    if recorded is not None and recorded.has(ANGLE) and isinstance(prepared.scenario.motion, FreeMotion):
+        frozen = with_prescribed_angle(frozen, prepared.scenario.motion.angle)
+    inputs = None if recorded is None else step_inputs(recorded, prepared.scenario.device, frozen)
+    return replace(prepared, run=frozen, place=place, fraction=fraction, inputs=inputs)
+
+
+def _steps_between_samples(samples: Samples, step: float) -> float:
+    """Return the steps between two records: as many as between two samples, fewer where these are read in between.
+
+    A fraction of a step where a whole one is too long to be read in between.
+    """
+    every = max(1, round(float(np.min(np.diff(samples.time))) / step))
+    position = samples.time / (step * every)
+    is_aligned = bool(np.all(np.abs(position - np.round(position)) < _FITS * np.maximum(position, 1.0)))
+    if is_aligned and samples.reach == 0.0:
+        return every
+    read_interval = max(_READ_INTERVAL, float(samples.time[-1]) / _MAXIMUM_RECORDS)
+    most = read_interval / step * (1.0 + _FITS)
+    if most < 1.0:
+        return 1.0 / math.ceil(1.0 / most)
+    return max(count for count in range(1, int(most) + 1) if every % count == 0) if is_aligned else int(most)
 
 
 def numbers_in(label: str, ranges: Sequence[Range], point: Floats) -> dict[str, float]:
@@ -78,13 +251,17 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
     base = prepared.run
     scenario = with_numbers(prepared.scenario, numbers)
     device, motion = scenario.device, scenario.motion
-    settings = device.valve.settings
+    settings: Mapping[str, Any] = device.valve.settings
     delay = base.program.valve.command_delay(settings)
-    if not _keeps_program(base, VALVES[device.valve.kind], settings):
-        raise IdentificationError(
-            f"experiment '{prepared.label}': a setting of the valve went to or from 0, which is another "
-            f"model of the valve; start above 0 and give a lower bound above 0"
-        )
+    counts = [value.size for value in settings.values() if isinstance(value, np.ndarray)]
+    for run in range(max(counts, default=1)):
+        own = {name: at(value, run) for name, value in settings.items()}
+        valve = VALVES[device.valve.kind].choose(own)
+        if valve != base.program.valve or (valve.command_delay(own) > 0.0) != base.program.late_commands:
+            raise IdentificationError(
+                f"experiment '{prepared.label}': a setting of the valve went to or from 0, which is another "
+                f"model of the valve; start above 0 and give a lower bound above 0"
+            )
     if any(np.any(is_on != (effect in base.program.effects)) for effect, is_on in switches_of(device).items()):
         raise IdentificationError(
             f"experiment '{prepared.label}': an effect went on or off, which is another model; start above 0 and give "
@@ -93,7 +270,14 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
     bare = plant_parameters(device, motion.external_torque if isinstance(motion, FreeMotion) else 0.0)
     plant = plant_behind_lines(bare, scenario.supply_lines)
     # The engine allows a fraction of the supply pressure. Where that is fitted, the error in pascals must stay.
-    allowed = supply_range(base.plant) / _supply_ranges(plant)
+
+    def range_of_supply(first: float, second: float, atmosphere: float) -> float:
+        return supply_range(
+            plant._replace(supply_pressure=first, dorsiflexion_pressure=second, atmospheric_pressure=atmosphere)
+        )
+
+    pressures = plant.supply_pressure, plant.dorsiflexion_pressure, plant.atmospheric_pressure
+    allowed = supply_range(base.plant) / over_runs(range_of_supply, *pressures)
     return replace(
         base,
         plant=plant,
@@ -107,29 +291,6 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
         lines=initial_lines(plant, scenario.supply_lines),
         effects=effect_rows(device),
     )
-
-
-def _keeps_program(base: Run, kind: ValveKind, settings: Mapping[str, Any]) -> bool:
-    """Return whether all runs with these settings of the valve have the program of another run."""
-    counts = [value.size for value in settings.values() if isinstance(value, np.ndarray)]
-    for run in range(max(counts, default=1)):
-        own = {name: at(value, run) for name, value in settings.items()}
-        valve = kind.choose(own)
-        if valve != base.program.valve or (valve.command_delay(own) > 0.0) != base.program.late_commands:
-            return False
-    return True
-
-
-def _supply_ranges(plant: PlantParameters) -> Any:
-    """Return the pressure [Pa] of the higher supply over the atmosphere, an array where any of them is one."""
-    pressures = plant.supply_pressure, plant.dorsiflexion_pressure, plant.atmospheric_pressure
-
-    def one(first: float, second: float, atmosphere: float) -> float:
-        return supply_range(
-            plant._replace(supply_pressure=first, dorsiflexion_pressure=second, atmospheric_pressure=atmosphere)
-        )
-
-    return over_runs(one, *pressures)
 
 
 def _trajectories(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
@@ -147,7 +308,14 @@ def _trajectories(prepared: PreparedExperiment, columns: Mapping[str, Floats], c
             records[place][:, members] = outcome.record[:, row]
     assert records is not None
     offsets = np.broadcast_to(columns.get(TIME_OFFSET, np.array(prepared.time_offset)), (count,))
-    found = _signals(run, *(_at_samples(one, prepared, offsets) for one in records))
+    plant = run.plant
+    angle: Any
+    angle, mass_1, mass_2 = (_at_samples(one, prepared, offsets) for one in records)
+    volume_1 = chamber_1_volume(angle, plant.angle_min, plant.volume_per_angle, plant.dead_volume_1)
+    volume_2 = chamber_2_volume(angle, plant.angle_max, plant.volume_per_angle, plant.dead_volume_2)
+    pressure_1: Any = chamber_pressure(mass_1, volume_1, plant.gas_product)
+    pressure_2: Any = chamber_pressure(mass_2, volume_2, plant.gas_product)
+    found = {"angle": angle, "pressure_1": pressure_1, "pressure_2": pressure_2}
     return {channel.name: np.where(failed, np.nan, found[channel.name]) for channel in prepared.channels}
 
 
@@ -155,23 +323,18 @@ def _trajectories(prepared: PreparedExperiment, columns: Mapping[str, Floats], c
 def _rows_of(program: Program) -> tuple[tuple[int, ...], int]:
     """Return the rows of the state that channels are made of, and that of the time of a failure."""
     rows = row_numbers(program.state_rows())
-    return tuple(rows[f"state.{name}"] for name in _KEPT), rows["result.failure_time"]
-
-
-def _signals(run: Run, angle: Any, mass_1: Any, mass_2: Any) -> dict[str, Floats]:
-    """Return angle and pressures from angle and masses, all (samples, runs)."""
-    plant = run.plant
-    volume_1 = chamber_1_volume(angle, plant.angle_min, plant.volume_per_angle, plant.dead_volume_1)
-    volume_2 = chamber_2_volume(angle, plant.angle_max, plant.volume_per_angle, plant.dead_volume_2)
-    pressure_1: Any = chamber_pressure(mass_1, volume_1, plant.gas_product)
-    pressure_2: Any = chamber_pressure(mass_2, volume_2, plant.gas_product)
-    return {"angle": angle, "pressure_1": pressure_1, "pressure_2": pressure_2}
+    return tuple(rows[f"state.{name}"] for name in ("angle", "mass_1", "mass_2")), rows["result.failure_time"]
 
 
 def _at_samples(values: Floats, prepared: PreparedExperiment, offsets: Floats) -> Floats:
     """Return a state at the times of the samples, by straight lines between records; each run with its offset [s]."""
     if offsets.any():
-        return _at_moved_samples(values, prepared, offsets)
+        # Before the first record the device stands still.
+        position = np.clip((prepared.time[:, None] - offsets) / prepared.record_interval, 0.0, len(values) - 1.0)
+        place = np.minimum(position.astype(np.intp), len(values) - 2)
+        lanes = np.arange(len(offsets))
+        here, following = values[place, lanes], values[place + 1, lanes]
+        return np.asarray(here + (position - place) * (following - here))
     place, fraction = prepared.place, prepared.fraction
     here = values[place]
     if not fraction.any():
@@ -179,17 +342,6 @@ def _at_samples(values: Floats, prepared: PreparedExperiment, offsets: Floats) -
     following = values[np.minimum(place + 1, len(values) - 1)]
     return np.asarray(here + fraction[:, None] * (following - here))
 
-
-def _at_moved_samples(values: Floats, prepared: PreparedExperiment, offsets: Floats) -> Floats:
-    """Return a state where samples are later than the run; before its first record the device stands still."""
-    position = np.clip((prepared.time[:, None] - offsets) / prepared.record_interval, 0.0, len(values) - 1.0)
-    place = np.minimum(position.astype(np.intp), len(values) - 2)
-    lanes = np.arange(len(offsets))
-    here, following = values[place, lanes], values[place + 1, lanes]
-    return np.asarray(here + (position - place) * (following - here))
-
-
-Mask = NDArray[np.bool_]
 
 FIRST_STEP = 1.0e-3
 """Step of a difference before standard errors are known: the fraction of a number by which it is moved."""
@@ -215,6 +367,11 @@ class Residuals:
     experiments: tuple[PreparedExperiment, ...]
     ranges: tuple[Range, ...]
     whitening: Whitens | None = None
+
+    @property
+    def start(self) -> Floats:
+        """The coordinates at which the search begins, in their units."""
+        return np.array([item.coordinate(item.start) for item in self.ranges])
 
     def of_data(self, points: Floats) -> Floats:
         """Return the samples' residuals [-] (samples, points) at points (points, coordinates); NaN if a run fails."""
@@ -290,7 +447,13 @@ class Neighbourhood:
         above, below, centre = self.values[:, :count], self.values[:, count:-1], self.values[:, -1:]
         use_above = self._is_inside(self.directions) & np.isfinite(above).all(axis=0)
         use_below = self._is_inside(-self.directions) & np.isfinite(below).all(axis=0)
-        self._refuse_hopeless(~(use_above | use_below))
+        for direction in self.directions.T[~(use_above | use_below)]:
+            index = int(np.argmax(np.abs(direction)))
+            item = self.residuals.ranges[index]
+            raise IdentificationError(
+                f"{item.name}: no run succeeds near {item.number(float(self.point[index])):.6g}, so it cannot be "
+                f"determined; give other bounds or another start"
+            )
         change = np.where(use_above, above, centre) - np.where(use_below, below, centre)
         return np.asarray((change / (1.0 * use_above + use_below)) @ np.linalg.inv(self.directions))
 
@@ -304,15 +467,6 @@ class Neighbourhood:
         reached, touch = self.point[:, None] + directions, _TOUCH * np.abs(directions)
         inside = (reached <= high[:, None] + touch) & (reached >= low[:, None] - touch)
         return np.asarray(inside.all(axis=0))
-
-    def _refuse_hopeless(self, hopeless: Mask) -> None:
-        for direction in self.directions.T[hopeless]:
-            index = int(np.argmax(np.abs(direction)))
-            item = self.residuals.ranges[index]
-            raise IdentificationError(
-                f"{item.name}: no run succeeds near {item.number(float(self.point[index])):.6g}, so it cannot be "
-                f"determined; give other bounds or another start"
-            )
 
 
 def coordinate_bounds(ranges: Sequence[Range]) -> tuple[Floats, Floats]:

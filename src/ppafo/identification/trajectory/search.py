@@ -1,8 +1,13 @@
-"""The search for the optimum: several starts, each refined with scipy's bounded least squares."""
+"""The search for the optimum: several starts, each refined with scipy's bounded least squares.
 
+It resumes with the noise of each sensor: whitened residuals, new slopes, until nothing moves any more. Hum, lines in
+the spectrum of a sensor such as those of the mains, is taken out.
+"""
+
+import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,13 +16,32 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory.information import (
     ROBUST_SCALE,
     directions_for,
+    inverse_with_root,
     precision,
     robust_cost,
+    solution,
     standard_errors,
 )
-from ppafo.identification.trajectory.preparation import Floats
+from ppafo.identification.trajectory.posterior import LinearModel, whiten
 from ppafo.identification.trajectory.problem import Range, Search, is_nuisance
-from ppafo.identification.trajectory.residuals import FIRST_STEP, Mask, Neighbourhood, Residuals, coordinate_bounds
+from ppafo.identification.trajectory.residuals import (
+    FIRST_STEP,
+    Floats,
+    Mask,
+    Neighbourhood,
+    PreparedExperiment,
+    Residuals,
+    coordinate_bounds,
+    prior_coordinates,
+)
+from ppafo.identification.trajectory.sensor_noise import (
+    SensorNoise,
+    errors_of,
+    from_reflections,
+    reflections_of,
+    sample_weights,
+    sensor_noise,
+)
 from ppafo.progress import Progress, Report, report_nothing
 
 DRAWS_PER_START = 8
@@ -55,7 +79,7 @@ def optimum(residuals: Residuals, search: Search, report: Report = report_nothin
     IdentificationError where the model diverges at every start.
     """
     best: Optimum | None = None
-    nested = _nested_descent(residuals, search, report)
+    nested = _without_nuisances(residuals, search, report)
     evaluations = 0 if nested is None else nested.evaluations
     starts = [*_starts(residuals, search), *([] if nested is None else [nested.point])]
     for number, start in enumerate(starts, start=1):
@@ -70,17 +94,13 @@ def optimum(residuals: Residuals, search: Search, report: Report = report_nothin
     others = _without_one(residuals, best, search, report)
     evaluations += sum(one.evaluations for one in others)
     for one in others:
-        if _beats(one, best):
+        if one.cost < best.cost * (1.0 - _NOTABLE):
             found = _refine(residuals, one.point, search)
             evaluations += found.evaluations
             best = found if found.cost < best.cost else best
     fewer = others if nested is None else (nested, *others)
-    has_converged = best.has_converged and not any(_beats(one, best) for one in fewer)
+    has_converged = best.has_converged and not any(one.cost < best.cost * (1.0 - _NOTABLE) for one in fewer)
     return Optimum(best.residuals, best.point, best.cost, evaluations, best.information, has_converged)
-
-
-def _beats(nested: "Descent", best: Optimum) -> bool:
-    return nested.cost < best.cost * (1.0 - _NOTABLE)
 
 
 def _without_one(residuals: Residuals, best: Optimum, search: Search, report: Report) -> tuple["Descent", ...]:
@@ -92,8 +112,7 @@ def _without_one(residuals: Residuals, best: Optimum, search: Search, report: Re
     if count < 2 or 2.0 * best.cost <= _EXPLAINED * residuals.channel_slices()[-1].stop:
         return ()
     report(Progress("trajectory fit: with one number at a time held at its start"))
-    start = np.array([item.coordinate(item.start) for item in residuals.ranges])
-    found = (_descend_holding(residuals, start, np.arange(count) == index, search) for index in range(count))
+    found = (_descend_holding(residuals, np.arange(count) == index, search) for index in range(count))
     return tuple(one for one in found if one is not None)
 
 
@@ -144,7 +163,7 @@ def descend(
     return Descent(done.x, float(done.cost), int(done.nfev), done.status > 0)
 
 
-def _nested_descent(residuals: Residuals, search: Search, report: Report) -> Descent | None:
+def _without_nuisances(residuals: Residuals, search: Search, report: Report) -> Descent | None:
     """Return where the search ends with all nuisances held at their start, as a start with them free.
 
     A fit with more numbers that ends above one with fewer has not found its least. None where no nuisance is fitted, or
@@ -154,26 +173,21 @@ def _nested_descent(residuals: Residuals, search: Search, report: Report) -> Des
     if not is_held.any() or is_held.all():
         return None
     report(Progress("trajectory fit: with initial states and time offsets held"))
-    return _descend_holding(
-        residuals, np.array([item.coordinate(item.start) for item in residuals.ranges]), is_held, search
-    )
+    return _descend_holding(residuals, is_held, search)
 
 
-def _descend_holding(residuals: Residuals, start: Floats, is_held: Mask, search: Search) -> Descent | None:
+def _descend_holding(residuals: Residuals, is_held: Mask, search: Search) -> Descent | None:
     """Return where the search ends with some numbers held at the start; None where the model diverges there."""
-    point, free = start.copy(), ~is_held
+    point, free = residuals.start, ~is_held
     fewer = residuals.hold({index: float(point[index]) for index in np.flatnonzero(is_held).tolist()})
     if not np.isfinite(fewer.of_data(point[None, free])).all():
         return None
     found = descend(fewer.quick(), point[free], np.diag(np.full(int(free.sum()), FIRST_STEP)), search, _TOLERANCES[0])
     point[free] = found.point
-    return Descent(point, _cost_at(fewer, found.point, search), found.evaluations, found.has_converged)
-
-
-def _cost_at(residuals: Residuals, point: Floats, search: Search) -> float:
-    """Return the cost at a point, infinite where the model diverges there."""
-    left = np.concatenate([residuals.of_data(point[None, :])[:, 0], residuals.of_priors(point)])
-    return robust_cost(left, search.loss) if np.isfinite(left).all() else math.inf
+    # The quick runs found it, the exact ones say what it costs; infinite where these diverge.
+    left = np.concatenate([fewer.of_data(found.point[None, :])[:, 0], fewer.of_priors(found.point)])
+    cost = robust_cost(left, search.loss) if np.isfinite(left).all() else math.inf
+    return Descent(point, cost, found.evaluations, found.has_converged)
 
 
 def is_at_bound(point: Floats, ranges: Sequence[Range]) -> Mask:
@@ -190,7 +204,11 @@ def _refine(residuals: Residuals, start: Floats, search: Search) -> Optimum:
         used, tolerance = (residuals, _TOLERANCES[1]) if stage else (residuals.quick(), _TOLERANCES[0])
         found = descend(used, start, directions, search, tolerance)
         evaluations += found.evaluations
-        information, directions = _information(residuals, found.point, directions, search)
+        # Information and the steps that suit it: two passes, since each needs the other.
+        fixed, quick = is_at_bound(found.point, residuals.ranges), residuals.quick()
+        for _ in range(PASSES):
+            directions = directions_for(precision(quick.around(found.point, directions), search.loss), fixed)
+        information = precision(residuals.around(found.point, directions), search.loss)
         moved = np.abs(found.point - start) / standard_errors(information)
         start = found.point
         if stage > 0 and bool(np.all(moved <= _SETTLED)):
@@ -198,38 +216,287 @@ def _refine(residuals: Residuals, start: Floats, search: Search) -> Optimum:
     return Optimum(residuals, found.point, found.cost, evaluations, information, found.has_converged)
 
 
-def _information(residuals: Residuals, point: Floats, directions: Floats, search: Search) -> tuple[Floats, Floats]:
-    """Return the information at a point and the steps that suit it; two passes, since each needs the other."""
-    fixed, quick = is_at_bound(point, residuals.ranges), residuals.quick()
-    for _ in range(PASSES):
-        directions = directions_for(precision(quick.around(point, directions), search.loss), fixed)
-    return precision(residuals.around(point, directions), search.loss), directions
-
-
-def _starts(residuals: Residuals, search: Search) -> Sequence[Floats]:
+def _starts(residuals: Residuals, search: Search) -> list[Floats]:
     """Return the given start and the best of many draws around it, all of which are tried in one block."""
-    first = np.array([item.coordinate(item.start) for item in residuals.ranges])
-    if not np.isfinite(residuals.of_data(first[None, :])).all():
-        if search.other_starts == 0:
-            raise IdentificationError("the model diverges at the start values; check them (ppafo audit)")
-        return _best_draws(residuals, first, search)
-    return [first, *_best_draws(residuals, first, search)]
-
-
-def _best_draws(residuals: Residuals, first: Floats, search: Search) -> list[Floats]:
+    first = residuals.start
+    starts = [first] if np.isfinite(residuals.of_data(first[None, :])).all() else []
     if search.other_starts == 0:
-        return []
-    low, high = _box_of_draws(residuals.ranges, first)
+        if not starts:
+            raise IdentificationError("the model diverges at the start values; check them (ppafo audit)")
+        return starts
+    # Drawn between the bounds, on the log scale at most a factor of 4.5 from the start.
+    low, high = coordinate_bounds(residuals.ranges)
+    low, high = np.maximum(low, first - _WIDEST_DRAW), np.minimum(high, first + _WIDEST_DRAW)
     random = np.random.default_rng(search.seed)
     points = low + (high - low) * random.random((DRAWS_PER_START * search.other_starts, len(first)))
     # In blocks: the records of hundreds of runs at once would fill the memory.
-    blocks = [points[first : first + LANES] for first in range(0, len(points), LANES)]
+    blocks = [points[begin : begin + LANES] for begin in range(0, len(points), LANES)]
     costs = np.concatenate([np.sum(np.square(residuals.of_data(block)), axis=0) for block in blocks])
     order = [int(index) for index in np.argsort(costs) if np.isfinite(costs[index])]
-    return [points[index] for index in order[: search.other_starts]]
+    return [*starts, *(points[index] for index in order[: search.other_starts])]
 
 
-def _box_of_draws(ranges: Sequence[Range], first: Floats) -> tuple[Floats, Floats]:
-    """Return the box of the draws: the bounds, on the log scale at most a factor of 4.5 from the start."""
-    low, high = coordinate_bounds(ranges)
-    return np.maximum(low, first - _WIDEST_DRAW), np.minimum(high, first + _WIDEST_DRAW)
+MAXIMUM_LINES = 3
+CHANCE = 1.0e-4
+"""Chance at which noise alone would be taken for hum, for each sensor."""
+
+_PADDED = 4
+_FEWEST_CYCLES = 5.0
+_CELLS = 12
+_FEWEST_SAMPLES = 64
+
+
+def hum_of(segments: Sequence[Floats]) -> tuple[float, ...]:
+    """Return the frequencies of hum [cycles per sample] in a sensor's recordings."""
+    found: list[float] = []
+    if min(len(one) for one in segments) < _FEWEST_SAMPLES:
+        return ()
+    for _ in range(MAXIMUM_LINES):
+        left = [without_hum(one, tuple(found)) for one in segments]
+        line = _strongest_line(left)
+        if line is None:
+            break
+        found.append(line)
+    return tuple(found)
+
+
+def hum_columns(count: int, frequencies: Sequence[float]) -> Floats:
+    """Return a cosine and a sine [-] of each frequency [cycles per sample] at ``count`` samples, (samples, columns)."""
+    phases = 2.0 * math.pi * np.outer(np.arange(count), np.array(frequencies))
+    return np.hstack([np.cos(phases), np.sin(phases)])
+
+
+def without_hum(segment: Floats, frequencies: Sequence[float]) -> Floats:
+    """Return the samples, in their unit, less what sinusoids of these frequencies [cycles per sample] explain."""
+    if not frequencies:
+        return segment
+    columns = hum_columns(len(segment), frequencies)
+    return np.asarray(segment - columns @ np.linalg.lstsq(columns, segment, rcond=None)[0])
+
+
+def _strongest_line(segments: Sequence[Floats]) -> float | None:
+    """Return the line that stands highest above its neighbourhood, None where chance may have made it."""
+    from scipy.ndimage import median_filter
+    from scipy.optimize import minimize_scalar
+    from scipy.stats import gamma
+
+    reflections, _ = reflections_of(list(segments), 1)
+    white = [errors_of(from_reflections(reflections), one)[1:] for one in segments]
+    shortest = min(len(one) for one in white)
+    size = _PADDED * max(len(one) for one in white)
+    power = np.zeros(size // 2 + 1)
+    for one in white:
+        power += np.square(np.abs(np.fft.rfft((one - one.mean()) * np.hanning(len(one)), size))) / len(one)
+    parts = float(len(white))
+    around = median_filter(power, size=2 * _CELLS * _PADDED + 1, mode="nearest")
+    height = power / np.maximum(around, 1.0e-300) * gamma.ppf(0.5, parts)
+    edge = math.ceil(_FEWEST_CYCLES * size / shortest)
+    height[:edge] = height[-edge:] = 0.0
+    best = int(np.argmax(height))
+    if gamma.sf(height[best], parts) * shortest > CHANCE:
+        return None
+
+    def power_left(place: float) -> float:
+        return sum(float(np.sum(np.square(without_hum(one, (place,))))) for one in white)
+
+    # Near the highest point of the spectrum, where sinusoids explain most.
+    bounds = best / size - 1.0 / size, best / size + 1.0 / size
+    return float(minimize_scalar(power_left, bounds=bounds, method="bounded").x)
+
+
+MAXIMUM_ROUNDS = 8
+ESTIMATED_ROUNDS = 2
+"""Rounds after which the noise stays as it is, so that the others can settle."""
+
+SETTLED = 0.03
+"""Fraction of a standard error below which a step is the last."""
+
+ROUGH = 0.5
+"""The same where no step lowers the cost, although the slopes say so."""
+
+_HALVINGS = 5
+_GAP = 3.0
+_ALIKE = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """One sensor: channel, time between samples [s], the places of its recordings, its noise and its hum [Hz].
+
+    ``weights`` are those of the samples, by recording. A recording with a gap counts as two; one sample between two is
+    left out.
+    """
+
+    channel: str
+    interval: float
+    places: tuple[slice, ...]
+    is_given: bool
+    noise: SensorNoise
+    weights: tuple[Floats, ...] = ()
+    hum: tuple[float, ...] = ()
+
+    @property
+    def in_words(self) -> str:
+        """What its noise is like."""
+        hum = "".join(f", hum at {frequency:.4g} Hz" for frequency in self.hum)
+        return f"{self.noise.in_words(self.interval)}{hum}"
+
+
+@dataclass(frozen=True, slots=True)
+class Whitening:
+    """Makes columns of residuals white: all of variance 1, without what hum explains."""
+
+    sensors: tuple[Sensor, ...]
+
+    def of(self, values: Floats) -> Floats:
+        """Return columns (samples, columns) whitened [-]."""
+        found = np.zeros_like(values)
+        for sensor in self.sensors:
+            for place, level, weight in zip(sensor.places, sensor.noise.levels, sensor.weights, strict=True):
+                rows = sensor.noise.shape.rows(values[place], weight)[0] / level
+                if sensor.hum:
+                    columns = hum_columns(len(weight), [one * sensor.interval for one in sensor.hum])
+                    basis = np.linalg.qr(sensor.noise.shape.rows(columns, weight)[0])[0]
+                    rows = rows - basis @ (basis.T @ rows)
+                found[place] = rows
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class WhitenedFit:
+    """Where the search with noise ended: whitened optimum, its linear model (hum in it), sensors, and rounds."""
+
+    optimum: Optimum
+    model: LinearModel
+    sensors: tuple[Sensor, ...]
+    rounds: int
+
+    @property
+    def noises(self) -> tuple[SensorNoise, ...]:
+        """The noise of each sensor."""
+        return tuple(sensor.noise for sensor in self.sensors)
+
+
+def weigh(found: Optimum, given: Sequence[frozenset[str]]) -> WhitenedFit:
+    """Return the optimum that the noise of each sensor makes of one that was found with white noise.
+
+    ``given`` has, for each experiment, the channels whose noise was given: it is not taken to be less.
+    """
+    residuals, point = found.residuals, found.point
+    fixed = is_at_bound(point, residuals.ranges)
+    near = residuals.around(point, directions_for(found.information, fixed))
+    sensors = _sensors(residuals.experiments, given)
+    for number in range(1, MAXIMUM_ROUNDS + 1):
+        sensors = tuple(_estimate_noise(one, near.of_data, number <= ESTIMATED_ROUNDS) for one in sensors)
+        model = _linear_model(near, sensors)
+        step, information = _step(near, model, sensors)
+        errors = np.sqrt(np.diag(inverse_with_root(information)[0]))
+        has_settled = bool(np.all(np.abs(step) <= SETTLED * errors))
+        if has_settled or number == MAXIMUM_ROUNDS:
+            break
+        directions = directions_for(information, is_at_bound(near.point + step, residuals.ranges))
+        further = _damp_step(near, step, directions, Whitening(sensors))
+        if further is None:
+            # Where the runs are rough no step lowers the cost any more: this is as near as one comes.
+            has_settled = bool(np.all(np.abs(step) <= ROUGH * errors))
+            break
+        near = further
+    whole = replace(residuals, whitening=Whitening(sensors))
+    optimum = Optimum(
+        residuals=whole,
+        point=near.point,
+        cost=_cost(near, Whitening(sensors)),
+        evaluations=found.evaluations + number,
+        information=information,
+        has_converged=found.has_converged and has_settled,
+    )
+    return WhitenedFit(optimum, model, sensors, number)
+
+
+def _sensors(experiments: Sequence[PreparedExperiment], given: Sequence[frozenset[str]]) -> tuple[Sensor, ...]:
+    """Return the sensors: recordings of one channel, sampled alike, share one."""
+    found: dict[tuple[str, int, bool], list[slice]] = {}
+    intervals: dict[tuple[str, int, bool], float] = {}
+    first = 0
+    for prepared, known in zip(experiments, given, strict=True):
+        gaps = np.diff(prepared.time)
+        interval = float(np.median(gaps))
+        breaks = np.flatnonzero(gaps > _GAP * interval) + 1
+        ends = [0, *(int(place) for place in breaks), len(prepared.time)]
+        for channel in prepared.channels:
+            key = (channel.name, round(np.log(interval) / _ALIKE), channel.name in known)
+            intervals.setdefault(key, interval)
+            parts = [slice(first + start, first + end) for start, end in itertools.pairwise(ends)]
+            found.setdefault(key, []).extend(part for part in parts if part.stop - part.start > 1)
+            first += len(prepared.time)
+    white = sensor_noise([np.ones(2)])
+    return tuple(
+        Sensor(key[0], intervals[key], tuple(places), key[2], white) for key, places in found.items() if places
+    )
+
+
+def _estimate_noise(sensor: Sensor, residuals: Floats, is_estimated: bool) -> Sensor:
+    """Return the sensor with its noise and hum estimated from residuals, or with its weights alone."""
+    segments = [residuals[place] for place in sensor.places]
+    hum = tuple(one / sensor.interval for one in hum_of(segments)) if is_estimated else sensor.hum
+    quiet = [without_hum(one, [frequency * sensor.interval for frequency in hum]) for one in segments]
+    noise = sensor_noise(quiet, sensor.is_given) if is_estimated else sensor.noise
+    return replace(sensor, noise=noise, hum=hum, weights=tuple(sample_weights(noise, quiet)))
+
+
+def _linear_model(near: Neighbourhood, sensors: Sequence[Sensor]) -> LinearModel:
+    """Return the linear model at a point, with a column for each sinusoid of hum in each recording."""
+    residuals, count = near.of_data, len(near.point)
+    added = []
+    for sensor in sensors:
+        for place in sensor.places if sensor.hum else ():
+            columns = np.zeros((len(residuals), 2 * len(sensor.hum)))
+            columns[place] = hum_columns(place.stop - place.start, [one * sensor.interval for one in sensor.hum])
+            added.append(columns)
+    columns = np.hstack([near.jacobian_of_data(), *added, residuals[:, None]])
+    _, deviation, has = prior_coordinates(near.residuals.ranges)
+    pull, precision = np.zeros(columns.shape[1] - 1), np.zeros(columns.shape[1] - 1)
+    pull[:count][has] = near.residuals.of_priors(near.point) / deviation[has]
+    precision[:count] = 1.0 / np.square(deviation)
+    return LinearModel(columns, tuple(one.places for one in sensors), pull, np.diag(precision))
+
+
+def _step(near: Neighbourhood, model: LinearModel, sensors: Sequence[Sensor]) -> tuple[Floats, Floats]:
+    """Return the step to the least of the whitened cost inside the bounds, and the information of the coordinates."""
+    from scipy.optimize import lsq_linear
+
+    count = len(near.point)
+    rows = whiten(model, [one.noise for one in sensors], [one.weights for one in sensors])
+    products = rows.T @ rows
+    precision, pull = products[:-1, :-1] + model.precision, products[:-1, -1] + model.pull
+    step = -solution(precision, pull)[:count]
+    information = precision[:count, :count]
+    if len(pull) > count:
+        across = precision[:count, count:]
+        information = information - across @ inverse_with_root(precision[count:, count:])[0] @ across.T
+        pull = pull[:count] - across @ solution(precision[count:, count:], pull[count:])
+    low, high = coordinate_bounds(near.residuals.ranges)
+    if np.all((near.point + step >= low) & (near.point + step <= high)):
+        return step, information
+    _, root = inverse_with_root(information)
+    room = np.minimum(low - near.point, 0.0), np.maximum(high - near.point, 0.0) + 1.0e-15
+    return np.asarray(lsq_linear(np.linalg.inv(root), -root.T @ pull, bounds=room).x), information
+
+
+def _damp_step(near: Neighbourhood, step: Floats, directions: Floats, whitening: Whitening) -> Neighbourhood | None:
+    """Return the neighbourhood after a step, halved until the cost does not rise; None where it always does."""
+    low, high = coordinate_bounds(near.residuals.ranges)
+    before = _cost(near, whitening)
+    for halving in range(_HALVINGS):
+        tried = near.residuals.around(np.clip(near.point + 0.5**halving * step, low, high), directions)
+        if _cost(tried, whitening) <= before * (1.0 + 1.0e-9):
+            return tried
+    return None
+
+
+def _cost(near: Neighbourhood, whitening: Whitening) -> float:
+    """Return half the sum of the whitened squares and of those of the priors; infinite where the run fails."""
+    if not np.isfinite(near.of_data).all():
+        return np.inf
+    left = whitening.of(near.of_data[:, None])
+    return 0.5 * float(np.sum(left * left) + np.sum(np.square(near.residuals.of_priors(near.point))))

@@ -1,22 +1,65 @@
-"""The layout of the section [trajectory] of a problem file, what it leans on, and how its texts with units are read."""
+"""The section [trajectory] of a problem file: its layout, the problem that it makes, and the outcome of that.
+
+Texts have units, scenarios and recordings go by name; the problem is in SI units. Everything that can be refused is
+refused before the search begins, and what the recordings can give is said before it.
+"""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import BaseModel, Field
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.models import NAME, STRICT, Text, Texts
+from ppafo.documents.models import NAME, STRICT, Text, Texts, validate
 from ppafo.errors import DataError, IdentificationError, UnitError, nearest_name
-from ppafo.identification.estimate import Estimate
-from ppafo.identification.source import Source, Use
-from ppafo.identification.trajectory.experiment import ALL_INPUTS
-from ppafo.identification.trajectory.problem import Loss, Scale
+from ppafo.identification.bench.result import count_of
+from ppafo.identification.estimate import Check, Estimate, Prospect, interval_factor
+from ppafo.identification.source import Source, Use, common_use, source_of
+from ppafo.identification.trajectory.fitting import TrajectoryFit, fit, noise_in, residuals_of
+from ppafo.identification.trajectory.follow_up import Candidate, Expected, Profile, expected_information, profile
+from ppafo.identification.trajectory.information import correlation, covariance, directions_for, precision
+from ppafo.identification.trajectory.problem import (
+    ALL_INPUTS,
+    FITTED_CHANNELS,
+    INPUTS,
+    TIME_OFFSET,
+    Experiment,
+    FreeParameter,
+    Loss,
+    Prior,
+    Scale,
+    Search,
+    TrajectoryProblem,
+    broken_rule,
+    declaration_of,
+    full_path,
+    ranges_of,
+    use_of,
+)
+from ppafo.identification.trajectory.residuals import (
+    FIRST_STEP,
+    Floats,
+    Residuals,
+    prior_coordinates,
+)
+from ppafo.identification.trajectory.search import is_at_bound
+from ppafo.identification.trajectory.uncertainty import FROM_PRIOR, STRONG, relative_to_number
+from ppafo.parameters import apply_overrides, build_device
+from ppafo.parameters.device import Device
 from ppafo.parameters.parameter_set import ParameterSet
-from ppafo.units import parse_quantity
+from ppafo.progress import Progress, Report
+from ppafo.signals import Recording
+from ppafo.simulation.loading import list_scenarios, load_scenario
+from ppafo.simulation.recorded.inputs import ANGLE, COMMAND, LONGEST_STEP, between_stops
+from ppafo.simulation.recorded.scenario import held_vane, replay_scenario, with_fixed_volume
+from ppafo.simulation.recorded.start import Start, samples_at_rest
+from ppafo.simulation.scenario import Scenario
+from ppafo.storage.comma_separated import read_csv
+from ppafo.units import parse_quantity, percentage
 
 _Label = Annotated[str, Field(pattern=NAME, max_length=60, description="its name, also in the names of files")]
 _Noise = dict[str, Text]
@@ -190,3 +233,372 @@ def noise_of_channels(given: Mapping[str, str], said: str) -> dict[str, float]:
             hint = nearest_name(name, _NOISE_UNITS)
             raise IdentificationError(f"{said}: noise of '{name}'{hint}: only {', '.join(_NOISE_UNITS)} have one here")
     return {name: quantity_of(f"{said}: noise.{name}", text, _NOISE_UNITS[name]) for name, text in given.items()}
+
+
+SHORTEST_STEP = 1.0e-6
+"""Seconds; a shorter step would only cost time."""
+
+
+def trajectory_from_dict(
+    content: Mapping[str, Any], folder: Path | None = None, file: str = "trajectory"
+) -> TrajectoryProblem:
+    """Return the problem in nested dictionaries laid out as the section of a file; paths in it begin in ``folder``.
+
+    Texts have their units, the problem is in SI. IdentificationError or DataError, one line that names ``file``.
+    """
+    section = validate(TrajectorySection, dict(content), file, IdentificationError)
+    home = folder or Path()
+
+    def read(item: ExperimentSection) -> Source:
+        return source_of(home / item.recording, read_csv(home / item.recording))
+
+    return trajectory_problem(section, Setting(read, home, file))
+
+
+def trajectory_problem(section: TrajectorySection, setting: Setting) -> TrajectoryProblem:
+    """Return the problem of a section. IdentificationError where it repeats what the bench settles."""
+    experiments = tuple(_experiment(item, setting) for item in section.experiments)
+    scenarios = {item.label: item.scenario for item in experiments}
+    twice = common_use(setting.used, map(use_of, experiments))
+    if twice:
+        raise IdentificationError(f"{setting.file}: {twice}; bench values are where the fit starts and what it holds")
+    parameters = [_parameter(item, scenarios, setting) for item in section.parameters]
+    nuisances = [one for item in section.experiments for one in _nuisances(item, setting)]
+    search = Search(
+        loss=section.loss,
+        other_starts=section.other_starts,
+        seed=section.seed,
+        confidence=section.confidence,
+    )
+    return TrajectoryProblem((*parameters, *nuisances), experiments, search)
+
+
+def candidates_of(section: TrajectorySection, setting: Setting, noise: Mapping[str, float]) -> tuple[Candidate, ...]:
+    """Return the experiments that could be done next; ``noise`` [rad], [Pa] by channel where none is given."""
+    found = []
+    for item in section.candidates:
+        said = f"{setting.file}: candidate '{item.label}'"
+        interval = quantity_of(f"{said}: interval", item.interval, "s")
+        if interval <= 0.0:
+            raise IdentificationError(f"{said}: interval = '{item.interval}' must be above 0")
+        scenario = _scenario(item.scenario, item.overrides, setting)
+        found.append(Candidate(item.label, scenario, noise_of_channels(item.noise, said) or noise, interval))
+    return tuple(found)
+
+
+def _experiment(item: ExperimentSection, setting: Setting) -> Experiment:
+    said = f"{setting.file}: experiment '{item.label}'"
+    source = setting.read(item)
+    if item.scenario is None:
+        made = experiment_without_scenario(item, source, setting)
+    else:
+        for name in ("held", "volume"):
+            if getattr(item, name) is not None:
+                raise IdentificationError(
+                    f"{said}: {name} and a scenario: the scenario prescribes how the vane moves; omit one of them"
+                )
+        made = Experiment(
+            label=item.label,
+            scenario=_scenario(item.scenario, item.overrides, setting),
+            recording=source.recording,
+            start=quantity_of(f"{said}: start", item.start or "0 s", "s"),
+            channels=compared_channels(item),
+            noise=noise_of_channels(item.noise, said),
+            inputs=item.inputs or (),
+            initial_state="scenario" if item.initial_state in (None, "scenario") else "recording",
+            source=source.trace,
+        )
+    if item.step is None:
+        return made
+    step = quantity_of(f"{said}: step", item.step, "s")
+    if not SHORTEST_STEP <= step <= LONGEST_STEP:
+        raise IdentificationError(
+            f"{said}: step = '{item.step}': must be from {SHORTEST_STEP:g} s to {LONGEST_STEP:g} s"
+        )
+    return replace(made, scenario=replace(made.scenario, time_step=step))
+
+
+def _scenario(name: str, overrides: tuple[str, ...], setting: Setting) -> Scenario:
+    found = name if name in list_scenarios() else str(setting.folder / name)
+    chosen = () if setting.valve is None else (f"device.valve={setting.valve}",)
+    return load_scenario(found, (*chosen, *overrides), setting.parameter_set)
+
+
+def _nuisances(item: ExperimentSection, setting: Setting) -> list[FreeParameter]:
+    """Return the numbers that are fitted to one recording only because nobody knows them exactly."""
+    names = ("pressure_1", "pressure_2") if item.initial_state == "fitted" else ()
+    found = [FreeParameter(f"initial.{name}", recordings=(item.label,)) for name in names]
+    if item.time_offset is not None:
+        said = f"{setting.file}: experiment '{item.label}': time_offset"
+        longest = quantity_of(said, item.time_offset, "s")
+        if longest <= 0.0:
+            raise IdentificationError(f"{said} = '{item.time_offset}' must be above 0")
+        found.append(FreeParameter(TIME_OFFSET, low=-longest, high=longest, recordings=(item.label,)))
+    return found
+
+
+def _parameter(item: ParameterSection, scenarios: Mapping[str, Scenario], setting: Setting) -> FreeParameter:
+    scenario = next((scenarios[label] for label in item.recordings if label in scenarios), None)
+    acting = scenario or next(iter(scenarios.values()))
+    quantity = declaration_of(item.path, acting)
+    atmosphere = acting.device.supply.atmospheric_pressure
+    said = f"{setting.file}: parameter '{item.path}'"
+
+    def number(name: str, text: str | None) -> float | None:
+        return None if text is None else quantity_of(f"{said}: {name}", text, quantity.unit, atmosphere)
+
+    prior: Prior | None = None
+    if item.prior == "bench":
+        estimate = setting.bench.get(full_path(item.path, acting))
+        if estimate is None or not estimate.is_usable:
+            have = ", ".join(path for path, one in setting.bench.items() if one.is_usable) or "none"
+            raise IdentificationError(
+                f"{said}: prior = 'bench': no procedure of this problem identified it; identified: {have}"
+            )
+        prior = Prior(estimate.value, estimate.wider_half_width / interval_factor(estimate.confidence))
+    elif item.prior is not None:
+        mean = quantity_of(f"{said}: prior.mean", item.prior.mean, quantity.unit, atmosphere)
+        prior = Prior(mean, abs(mean) * item.prior.relative)
+    return FreeParameter(
+        path=item.path,
+        start=number("start", item.start),
+        low=number("low", item.low),
+        high=number("high", item.high),
+        scale=item.scale,
+        prior=prior,
+        recordings=item.recordings,
+    )
+
+
+def experiment_without_scenario(item: ExperimentSection, source: Source, setting: Setting) -> Experiment:
+    """Return the experiment of a recording on the device of the set; it begins at the first sample by default.
+
+    IdentificationError where a scenario is needed.
+    """
+    said = f"{setting.file}: experiment '{item.label}'"
+    if setting.parameter_set is None:
+        raise IdentificationError(f"{said}: needs a scenario, because no device was given")
+    if item.initial_state == "scenario":
+        raise IdentificationError(f"{said}: initial_state = 'scenario', but it has no scenario; omit it")
+    recording = source.recording
+    first = float(recording.time[0]) if item.start is None else quantity_of(f"{said}: start", item.start, "s")
+    used = recording.between(first, float(recording.time[-1]))
+    device = build_device(apply_overrides(setting.parameter_set, item.overrides, setting.valve), setting.valve)
+    device, fixed = _fix_vane(item, device, said)
+    if COMMAND not in recording:
+        have = ", ".join(recording.names)
+        raise IdentificationError(
+            f"{said}: has no scenario, so its recording needs a channel '{COMMAND}'; it has {have}"
+        )
+    inputs = tuple(name for name in INPUTS if name in recording) if item.inputs is None else item.inputs
+    if COMMAND not in inputs:
+        raise IdentificationError(f"{said}: has no scenario, so inputs must have '{COMMAND}'")
+    start = _start_of(used, device, fixed, said)
+    motion = held_vane(start.angle) if fixed else None
+    scenario = replay_scenario(recording, device, start, used.duration, said, motion)
+    noise, channels = noise_of_channels(item.noise, said), compared_channels(item)
+    return Experiment(item.label, scenario, recording, first, channels, noise, inputs, source=source.trace)
+
+
+def compared_channels(item: ExperimentSection) -> tuple[str, ...]:
+    """Return what an experiment is compared in: as given, else all that is neither held nor followed."""
+    if item.channels is not None:
+        return item.channels
+    if item.volume is not None:
+        return ("pressure_1",)
+    is_prescribed = item.held is not None or ANGLE in (item.inputs or ())
+    return FITTED_CHANNELS[1:] if is_prescribed else FITTED_CHANNELS
+
+
+def _fix_vane(item: ExperimentSection, device: Device, said: str) -> tuple[Device, dict[str, float]]:
+    """Return the device and what of its state is known where the vane is held, or where there is none."""
+    if (item.held is not None or item.volume is not None) and ANGLE in (item.inputs or ()):
+        raise IdentificationError(f"{said}: the vane is held or absent, but inputs has '{ANGLE}': omit one of them")
+    if item.held is not None and item.volume is not None:
+        raise IdentificationError(f"{said}: held and volume: with a fixed volume there is no vane; omit one of them")
+    if item.held is not None:
+        return device, {ANGLE: quantity_of(f"{said}: held", item.held, "rad")}
+    if item.volume is None:
+        return device, {}
+    volume = quantity_of(f"{said}: volume", item.volume, "m^3")
+    if not volume > 0.0:
+        raise IdentificationError(f"{said}: volume = '{item.volume}' must be above zero")
+    known = {ANGLE: device.actuator.angle_min, "pressure_2": device.supply.atmospheric_pressure}
+    return with_fixed_volume(device, volume), known
+
+
+def _start_of(recording: Recording, device: Device, known: Mapping[str, float], said: str) -> Start:
+    """Return the mean of the samples at rest, at most 50 ms; the first one where the valve is open from the start."""
+    count = samples_at_rest(recording)
+
+    def mean(name: str) -> float:
+        if name in known:
+            return known[name]
+        if name not in recording:
+            raise IdentificationError(
+                f"{said}: there is no channel '{name}' to start from; give a scenario, which prescribes the "
+                "initial state"
+            )
+        return float(np.mean(recording[name][:count]))
+
+    angle, pressure_1, pressure_2 = (mean(name) for name in FITTED_CHANNELS)
+    rate = mean("angular_velocity") if "angular_velocity" in recording and ANGLE not in known else 0.0
+    return Start(float(between_stops(np.array([angle]), device, said)[0]), rate, pressure_1, pressure_2)
+
+
+EXCITED = 5.0
+"""Range of a channel over its noise below which nothing happens in it."""
+
+_HELD_SAMPLES = 20
+_GAP = 1.5
+
+
+def prospects_of(residuals: Residuals, search: Search) -> tuple[Prospect, ...]:
+    """Return what the recordings can give and what not, from the samples and the slopes at the start of the search."""
+    found = []
+    for prepared in residuals.experiments:
+        gaps = np.diff(prepared.time)
+        usual, longest = float(np.median(gaps)), float(gaps.max())
+        if longest > _GAP * usual:
+            text = f"a gap of {longest:.3g} s at {float(prepared.time[int(np.argmax(gaps))]):.3g} s, where samples are "
+            text += f"{usual:.3g} s apart; what lies in it is not used"
+            found.append(Prospect(f"clock of {prepared.label}", True, text))
+        for channel in prepared.channels:
+            # Whether a channel moves, and is not cut off at the limit of its sensor.
+            size, held = float(np.ptp(channel.values)) / channel.noise, _samples_at_limit(channel.values)
+            is_held, text = held > _HELD_SAMPLES, f"its range is {size:.3g} times its noise"
+            if is_held:
+                text = f"{held} consecutive samples are exactly its maximum or minimum: "
+                text += "the sensor is at its limit or stuck"
+            elif size < EXCITED:
+                text = f"its range is {size:.2g} times its noise: nothing happens in it"
+            found.append(Prospect(f"{channel.name} of {prepared.label}", size >= EXCITED and not is_held, text))
+    return (*found, *_numbers(residuals, search))
+
+
+def _samples_at_limit(values: Floats) -> int:
+    """Return the longest run of samples that all have the greatest or all have the least value."""
+    longest = 0
+    for limit in (float(values.max()), float(values.min())):
+        is_there = np.concatenate([[False], values == limit, [False]])
+        changes = np.flatnonzero(np.diff(is_there.astype(np.int8)))
+        longest = max(longest, int(np.max(changes[1::2] - changes[::2], initial=0)))
+    return longest
+
+
+def _numbers(residuals: Residuals, search: Search) -> list[Prospect]:
+    """Return for each number how well white noise of the estimated size would let it be known, at the start values."""
+    ranges, point = residuals.ranges, residuals.start
+    if not np.isfinite(residuals.of_data(point[None, :])).all():
+        return [Prospect("numbers", False, "the model diverges at the start values, so nothing can be predicted")]
+    known = precision(residuals.around(point, np.diag(np.full(len(point), FIRST_STEP))), "linear")
+    known = precision(residuals.around(point, directions_for(known, is_at_bound(point, ranges))), "linear")
+    errors, together = np.sqrt(np.diag(covariance(known))), correlation(covariance(known))
+    _, priors, _ = prior_coordinates(ranges)
+    found = []
+    for index, item in enumerate(ranges):
+        error, row = float(errors[index]), together[index]
+        fraction = relative_to_number(item, item.coordinate(item.start), interval_factor(search.confidence) * error)
+        is_prior = error > FROM_PRIOR * priors[index]
+        partners = [other.name for at, other in enumerate(ranges) if at != index and abs(row[at]) >= STRONG]
+        if is_prior:
+            text = "the recordings add little to its prior"
+        elif fraction <= search.weak:
+            text = f"with white noise alone it would be known to {percentage(fraction, 2)}"
+        else:
+            text = (
+                f"it trades off against {', '.join(partners)}"
+                if partners
+                else "the recordings are hardly sensitive to it"
+            )
+            text += "; fix it, give it a prior, or record something else"
+        found.append(Prospect(item.name, not is_prior and fraction <= search.weak, text))
+    return found
+
+
+ACCEPTABLE_FRACTION = 0.10
+"""RMS of what is left, over the range of the samples, that the paper calls acceptable (page with figure 7)."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrajectoryOutcome:
+    """The fit, the requested profiles, candidates by what they would bring, the best first, and checks.
+
+    ``beforehand`` is what the recordings could give and what not, known before the search. ``remarks`` are sentences
+    about the fit as a whole, also about where it contradicts a bench procedure.
+    """
+
+    fit: TrajectoryFit
+    profiles: tuple[Profile, ...]
+    expected: tuple[Expected, ...]
+    checks: tuple[Check, ...]
+    remarks: tuple[str, ...]
+    beforehand: tuple[Prospect, ...] = ()
+
+    @property
+    def failed(self) -> tuple[Check, ...]:
+        """The checks that did not hold."""
+        return tuple(check for check in self.checks if not check.holds)
+
+
+def solve_section(section: TrajectorySection, setting: Setting, report: Report) -> TrajectoryOutcome:
+    """Return the outcome of a section; everything that can be refused is refused before the search begins."""
+    with name_in_refusals(setting.file):
+        problem = trajectory_problem(section, setting)
+        names = [item.name for item in ranges_of(problem)]
+        paths = [full_path(path, problem.experiments[0].scenario) for path in section.profiles]
+        for typed, path in zip(section.profiles, paths, strict=True):
+            if path not in names:
+                raise IdentificationError(
+                    f"{setting.file}: profiles: '{typed}' is not fitted{nearest_name(path, names)}; fitted: "
+                    f"{', '.join(names)}"
+                )
+        candidates = candidates_of(section, setting, noise_in(problem))
+        beforehand = prospects_of(residuals_of(problem), problem.search)
+        for one in beforehand:
+            if not one.can_be_had:
+                report(Progress(f"trajectory: insufficient data: {one.name}: {one.statement}"))
+        found = fit(problem, report)
+        profiles = []
+        for number, path in enumerate(paths, start=1):
+            report(Progress(f"profile likelihood {number} of {len(paths)}: {path}"))
+            profiles.append(profile(found, path))
+        if candidates:
+            report(Progress(f"expected information of {count_of(len(candidates), 'further experiment')}"))
+        expected = expected_information(found, candidates)
+    remarks = (*found.remarks, *_contradictions(found, setting.bench))
+    return TrajectoryOutcome(found, tuple(profiles), expected, _checks(found), remarks, beforehand)
+
+
+def _contradictions(found: TrajectoryFit, bench: Mapping[str, Estimate]) -> list[str]:
+    """Return a sentence for each number whose interval does not meet that of a bench procedure."""
+    remarks = []
+    for fitted in found.estimates:
+        other = bench.get(fitted.path)
+        if other is None or not (other.is_usable and fitted.is_usable):
+            continue
+        if fitted.low > other.high or fitted.high < other.low:
+            remarks.append(
+                f"{fitted.path}: fitted to {fitted.low:.4g} to {fitted.high:.4g} {fitted.unit}, but a bench procedure "
+                f"gave {other.low:.4g} to {other.high:.4g}: one of the two models is incomplete"
+            )
+    return remarks
+
+
+def _checks(found: TrajectoryFit) -> tuple[Check, ...]:
+    worst = max(found.channels, key=lambda channel: channel.fraction)
+    left, good = percentage(worst.fraction, 2), f"{100.0 * ACCEPTABLE_FRACTION:g} %"
+    description = f"RMS at most {left} of the range in {worst.channel} of {worst.experiment}; {good} is good"
+    broken = next((text for text in (broken_rule(item.device) for item in found.scenarios) if text), "")
+    settled = found.optimum.has_converged
+    wrong = found.misfit
+    return (
+        Check(
+            "search",
+            settled,
+            f"{found.evaluations} evaluations, {'converged' if settled else 'stopped before it converged'}",
+        ),
+        Check("what is left", worst.fraction <= ACCEPTABLE_FRACTION, description),
+        Check("one model for all", not wrong, wrong or found.uncertainty.misfit.in_words),
+        Check("numbers agree", not broken, broken or "no rule of a device is broken"),
+    )

@@ -2,24 +2,171 @@
 
 Autoregressions of up to 30 samples, their order by the corrected criterion of Akaike, and white noise upon an
 Ornstein-Uhlenbeck drift compete; each may have innovations with a t distribution. The least criterion wins.
+
+A shape is that of noise whose innovations have variance 1; samples may weigh differently (``weights``, 1 for plain
+normal noise), which is how heavy tails enter: a t distribution is a normal one whose variance is itself drawn.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
-from ppafo.identification.trajectory.preparation import Floats
+from ppafo.identification.trajectory.residuals import Floats
 from ppafo.identification.trajectory.sample_loops import sample_loops
-from ppafo.identification.trajectory.whitening import (
-    AutoRegression,
-    Drift,
-    Shape,
-    from_coefficients,
-    from_reflections,
-    reflections_of,
-)
+
+_QUADRATURE = 12
+_TABLE = (1.0, 200.0, 60)
+_LEAST_VARIANCE = 1.0e-300
+
+
+@dataclass(frozen=True, slots=True)
+class AutoRegression:
+    """Noise whose samples follow from those before: ``predictors[m]`` is the best one from m samples.
+
+    ``spreads[m]`` is the standard deviation of its error over that of the longest, which is 1: the first samples of a
+    recording have few before them.
+    """
+
+    predictors: Floats
+    spreads: Floats
+
+    @property
+    def order(self) -> int:
+        """Samples from which the next is predicted."""
+        return len(self.spreads) - 1
+
+    def rows(self, values: Floats, weights: Floats) -> tuple[Floats, float]:
+        """Return whitened columns [-] (samples, columns) and the logarithm of the product of the samples' spreads."""
+        errors, found = np.empty(values.shape), np.empty(1)
+        given = np.ascontiguousarray(values), weights, self.predictors, self.spreads
+        sample_loops().prediction_errors(*given, errors, found)
+        return errors, float(found[0])
+
+    def square(self, segment: Floats, weights: Floats) -> tuple[float, float]:
+        """Return the sum of the squares of the whitened samples, and what ``rows`` returns of the spreads."""
+        errors, spread = self.rows(segment[:, None], weights)
+        return float(np.vdot(errors, errors)), spread
+
+
+@dataclass(frozen=True, slots=True)
+class Drift:
+    """White noise of variance 1 upon an Ornstein-Uhlenbeck drift.
+
+    ``ratio`` is the variance of the change of the drift from sample to sample over that of the white noise,
+    ``memory`` the fraction of it that is left after one sample. ``is_zeroed``: it begins at 0 in each recording, as
+    that of a sensor whose zero is set before; else anywhere.
+    """
+
+    ratio: float
+    memory: float
+    is_zeroed: bool = False
+
+    @property
+    def order(self) -> int:
+        """Numbers besides the level."""
+        return 2
+
+    @property
+    def stationary(self) -> float:
+        """Variance of the drift over that of the white noise [-]."""
+        return self.ratio / (1.0 - self.memory**2)
+
+    @property
+    def numbers(self) -> tuple[float, float, float]:
+        """What the loops take: memory [-], and variances of a change and of the start over that of the white noise."""
+        return self.memory, self.ratio, self.ratio if self.is_zeroed else self.stationary
+
+    def rows(self, values: Floats, weights: Floats) -> tuple[Floats, float]:
+        """Return whitened columns [-] (samples, columns) and the logarithm of the product of the samples' spreads."""
+        errors, expected, found = np.empty(values.shape), np.zeros(values.shape[1]), np.empty(1)
+        sample_loops().innovations(np.ascontiguousarray(values), weights, expected, errors, found, *self.numbers)
+        return errors, float(found[0])
+
+    def square(self, segment: Floats, weights: Floats) -> tuple[float, float]:
+        """Return the sum of the squares of the whitened samples, and what ``rows`` returns of the spreads."""
+        found = np.empty(2)
+        sample_loops().sum_of_innovations(np.ascontiguousarray(segment), weights, found, *self.numbers)
+        return float(found[0]), float(found[1])
+
+    def path(self, values: Floats, weights: Floats, normals: Floats) -> tuple[Floats, Floats]:
+        """Return the drift [unit of values], drawn given the samples, and its variance; normals of 0 give its mean."""
+        path, spread = np.empty(len(values)), np.empty(len(values))
+        sample_loops().smooth(values, 1.0 / weights, normals, path, spread, *self.numbers)
+        return path, spread
+
+    def heavy_likelihood(self, values: Floats, level: float, freedom: float) -> float:
+        """Return the log likelihood [-] of samples whose white part has a t distribution, by a sum of normal ones."""
+        weights, nodes = t_nodes(freedom)
+        found = np.empty(1)
+        sample_loops().mixture_likelihood(values / level, weights, nodes, found, *self.numbers)
+        return float(found[0]) - len(values) * math.log(level)
+
+
+Shape = AutoRegression | Drift
+
+
+def t_nodes(freedom: float) -> tuple[Floats, Floats]:
+    """Return weights [-] and precisions [-] of normal distributions whose sum is a t distribution, nearly."""
+    weights, freedoms, logarithms = _table_of_nodes()
+    place = float(np.clip(np.interp(math.log(freedom), freedoms, np.arange(len(freedoms))), 0.0, len(freedoms) - 1.001))
+    first = int(place)
+    return weights, np.exp(logarithms[first] + (place - first) * (logarithms[first + 1] - logarithms[first]))
+
+
+@cache
+def _table_of_nodes() -> tuple[Floats, Floats, Floats]:
+    """Return weights, logarithms of degrees of freedom, and logarithms of the precisions at each of them."""
+    from scipy.stats import gamma
+
+    places, weights = np.polynomial.legendre.leggauss(_QUADRATURE)
+    freedoms = np.geomspace(*_TABLE)
+    nodes = [gamma.ppf(0.5 + 0.5 * places, 0.5 * one) * 2.0 / one for one in freedoms]
+    return 0.5 * weights, np.log(freedoms), np.log(np.maximum(nodes, 1.0e-6))
+
+
+def from_reflections(reflections: Floats) -> AutoRegression:
+    """Return the autoregression with these reflection coefficients [-], all between -1 and 1 (Levinson's recursion)."""
+    order = len(reflections)
+    predictors = np.zeros((order + 1, max(order, 1)))
+    for stage, reflection in enumerate(reflections, start=1):
+        before = predictors[stage - 1, : stage - 1]
+        predictors[stage, : stage - 1] = before - reflection * before[::-1]
+        predictors[stage, stage - 1] = reflection
+    left = np.concatenate([[1.0], np.cumprod(1.0 - np.square(reflections))])
+    return AutoRegression(predictors, np.sqrt(left / left[-1]))
+
+
+def from_coefficients(coefficients: Floats) -> AutoRegression | None:
+    """Return the autoregression with these coefficients [-]; None where noise like that would grow without end."""
+    # Levinson's recursion backwards.
+    left: Floats = np.array(coefficients)
+    reflections = np.zeros(len(left))
+    for stage in range(len(left) - 1, -1, -1):
+        last = reflections[stage] = left[stage]
+        if abs(last) >= 1.0:
+            return None
+        before = left[:stage]
+        left = (before + last * before[::-1]) / (1.0 - last * last)
+    return from_reflections(reflections)
+
+
+def reflections_of(segments: list[Floats], most: int) -> tuple[Floats, Floats]:
+    """Return reflection coefficients [-] and the variance left after each, 0 to ``most`` (Burg's method, pooled)."""
+    ahead, behind = [one[1:] for one in segments], [one[:-1] for one in segments]
+    reflections, left = np.zeros(most), np.zeros(most + 1)
+    left[0] = sum(float(one @ one) for one in segments) / sum(len(one) for one in segments)
+    for stage in range(most):
+        along = sum(float(a @ b) for a, b in zip(ahead, behind, strict=True))
+        size = sum(float(a @ a + b @ b) for a, b in zip(ahead, behind, strict=True))
+        reflections[stage] = 2.0 * along / size if size > 0.0 else 0.0
+        left[stage + 1] = left[stage] * (1.0 - reflections[stage] ** 2)
+        pairs = [(a - reflections[stage] * b, b - reflections[stage] * a) for a, b in zip(ahead, behind, strict=True)]
+        ahead, behind = [a[1:] for a, _ in pairs], [b[:-1] for _, b in pairs]
+    return reflections, np.maximum(left, _LEAST_VARIANCE)
+
 
 FREEDOMS = np.array([1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0, 15.0, 25.0, 50.0, 100.0])
 """Degrees of freedom of a t distribution that are tried; more cannot be distinguished from a normal one."""
@@ -82,10 +229,17 @@ def sensor_noise(segments: Sequence[Floats], is_given: bool = False) -> SensorNo
     is_shared = bool(np.all(levels == 1.0))
     drift = max((_drift(scaled, is_zeroed) for is_zeroed in (False, True)), key=lambda one: one.likelihood)
     candidates = [_autoregression(scaled), drift]
-    if any(_tails(one, scaled)[1] > _HEAVY for one in candidates):
+    if any(_gain_of_tails(one, scaled) > _HEAVY for one in candidates):
         candidates += [_heavy_autoregression(scaled, candidates[0]), _heavy_drift(scaled, drift)]
     count = len(whole)
-    best = min(candidates, key=lambda one: _criterion_beside_drifts(one, count))
+
+    def criterion_beside_drifts(one: SensorNoise) -> float:
+        # The best of so many orders is now and then better than a drift that is there, by chance, and intervals are
+        # then too narrow: a number that an autoregression has more than a drift costs what Schwarz's criterion takes.
+        more = max(0, one.shape.order - _NUMBERS_OF_DRIFT) if isinstance(one.shape, AutoRegression) else 0
+        return _criterion(one.likelihood, one.numbers, count) + (math.log(count) - 2.0) * more
+
+    best = min(candidates, key=criterion_beside_drifts)
     return SensorNoise(best.shape, best.levels * levels, best.freedom, is_shared, False, best.likelihood, best.numbers)
 
 
@@ -143,16 +297,6 @@ def _criterion(likelihood: float, numbers: int, count: int) -> float:
     return -2.0 * likelihood + 2.0 * numbers * count / max(1.0, count - numbers - 1.0)
 
 
-def _criterion_beside_drifts(noise: SensorNoise, count: int) -> float:
-    """Return the criterion; a number that an autoregression has more than a drift costs what Schwarz's takes for it.
-
-    The best of so many orders is now and then better than a drift that is there, by chance, and intervals are then too
-    narrow.
-    """
-    more = max(0, noise.shape.order - _NUMBERS_OF_DRIFT) if isinstance(noise.shape, AutoRegression) else 0
-    return _criterion(noise.likelihood, noise.numbers, count) + (math.log(count) - 2.0) * more
-
-
 def _of(shape: Shape, level: float, parts: int, likelihood: float, freedom: float = math.inf) -> SensorNoise:
     numbers = shape.order + 1 + math.isfinite(freedom)
     return SensorNoise(shape, np.full(parts, level), freedom, likelihood=likelihood, numbers=numbers)
@@ -207,13 +351,12 @@ def _within(numbers: Floats, longest: float) -> tuple[tuple[float, float], float
     return inside, (ratio - inside[0]) ** 2 + (memory - inside[1]) ** 2
 
 
-def _tails(noise: SensorNoise, segments: Sequence[Floats]) -> tuple[float, float]:
-    """Return the best degrees of freedom of the innovations, and the log likelihood gained over normal ones."""
+def _gain_of_tails(noise: SensorNoise, segments: Sequence[Floats]) -> float:
+    """Return the log likelihood that the best t distribution of the innovations gains over a normal one."""
     errors = np.concatenate([errors_of(noise.shape, one) for one in segments]) / noise.levels[0]
     likelihoods, _ = _fit_scaled_t(errors)
-    best = int(np.argmax(likelihoods))
     normal = -0.5 * len(errors) * (math.log(2.0 * math.pi * float(np.mean(errors * errors))) + 1.0)
-    return float(FREEDOMS[best]), float(likelihoods[best] - normal)
+    return float(likelihoods.max() - normal)
 
 
 def _fit_scaled_t(errors: Floats) -> tuple[Floats, Floats]:

@@ -8,13 +8,12 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from ppafo.answers import Answer, Figure, Section, Table
-from ppafo.identification.bench.result import BenchResult, count_of
-from ppafo.identification.bench_figures import figure_3, procedure_figure
+from ppafo.identification.bench.result import BenchResult, count_of, figure_3, procedure_figure
 from ppafo.identification.estimate import Check, Estimate
 from ppafo.identification.new_set import in_set_unit
+from ppafo.identification.trajectory.fitting import TrajectoryFit
 from ppafo.identification.trajectory.follow_up import Expected, Profile
-from ppafo.identification.trajectory.outcome import TrajectoryOutcome
-from ppafo.identification.trajectory.result import TrajectoryFit
+from ppafo.identification.trajectory.section import TrajectoryOutcome
 from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.parameters.writing import parameter_set_toml
 from ppafo.questions.identify.profile_figure import profile_figure

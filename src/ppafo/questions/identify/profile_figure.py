@@ -8,7 +8,7 @@ from ppafo.answers.style import BLACK, BLUE, GREY, VERMILION, house_style, mark_
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.new_set import in_set_unit
 from ppafo.identification.trajectory.follow_up import Profile
-from ppafo.identification.trajectory.outcome import TrajectoryOutcome
+from ppafo.identification.trajectory.section import TrajectoryOutcome
 from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.signals import RecordingKind
 

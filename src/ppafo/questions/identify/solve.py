@@ -20,8 +20,8 @@ from ppafo.identification.problem import (
     window_of,
 )
 from ppafo.identification.source import Source, Use, double_use, source_of
-from ppafo.identification.trajectory.outcome import TrajectoryOutcome, solve_section
 from ppafo.identification.trajectory.section import Setting as FitSetting
+from ppafo.identification.trajectory.section import TrajectoryOutcome, solve_section
 from ppafo.parameters.device import VANE
 from ppafo.parameters.loading import load_parameter_set
 from ppafo.parameters.overrides import apply_overrides

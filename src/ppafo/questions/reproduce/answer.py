@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.typesetting import format_printed_quantity, quantity
-from ppafo.identification.bench_figures import synthetic_figure_3
+from ppafo.identification.bench.result import synthetic_figure_3
 from ppafo.questions.reproduce.claim import VERDICTS, Verdict, count_sentence, count_words, verdict_counts
 from ppafo.questions.reproduce.page import holding_torque, reproduction_page
 from ppafo.questions.reproduce.solve import Reproduction, Studies

@@ -6,7 +6,7 @@ import pytest
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory import Experiment, fit
-from ppafo.identification.trajectory.document import trajectory_from_dict
+from ppafo.identification.trajectory.section import trajectory_from_dict
 from ppafo.storage.comma_separated import write_csv
 
 

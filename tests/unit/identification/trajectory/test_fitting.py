@@ -18,10 +18,9 @@ from ppafo.identification.trajectory import (
     fit,
     search,
 )
-from ppafo.identification.trajectory.experiment import number_at, with_numbers
 from ppafo.identification.trajectory.fitting import residuals_of
-from ppafo.identification.trajectory.preparation import FIT_TOLERANCE
-from ppafo.identification.trajectory.residuals import run_with, trajectories
+from ppafo.identification.trajectory.problem import number_at, with_numbers
+from ppafo.identification.trajectory.residuals import FIT_TOLERANCE, run_with, trajectories
 from ppafo.identification.trajectory.search import Optimum
 from ppafo.signals.recording import Recording
 from ppafo.simulation.loading import load_scenario

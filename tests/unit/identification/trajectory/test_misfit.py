@@ -11,10 +11,10 @@ from benchmarks.intervals import noisy_recordings, planted_problem, two_step_res
 from benchmarks.intervals.calibration import FIVE_PARAMETERS, Task, repetition
 from ppafo.cli.main import main
 from ppafo.identification.trajectory import Experiment, FreeParameter, Prior, TrajectoryFit, TrajectoryProblem, fit
-from ppafo.identification.trajectory.experiment import with_numbers
 from ppafo.identification.trajectory.fitting import residuals_of
-from ppafo.identification.trajectory.misfit import ALARM
-from ppafo.identification.trajectory.outcome import prospects_of
+from ppafo.identification.trajectory.problem import with_numbers
+from ppafo.identification.trajectory.section import prospects_of
+from ppafo.identification.trajectory.uncertainty import ALARM
 from ppafo.questions.identify.solve import identify
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario

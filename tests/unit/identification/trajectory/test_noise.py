@@ -12,10 +12,18 @@ from benchmarks.intervals.noise_kinds import NOISE_KINDS, noise_kind
 from ppafo.identification.trajectory import Experiment, FreeParameter, TrajectoryProblem, fit
 from ppafo.identification.trajectory.information import inverse_with_root, solution
 from ppafo.identification.trajectory.posterior import LinearModel, _without_columns, draw_posterior
-from ppafo.identification.trajectory.preparation import Floats
-from ppafo.identification.trajectory.sensor_noise import SensorNoise, sensor_noise, t_likelihood
-from ppafo.identification.trajectory.weighing import hum_of
-from ppafo.identification.trajectory.whitening import AutoRegression, Drift, from_coefficients, reflections_of, t_nodes
+from ppafo.identification.trajectory.residuals import Floats
+from ppafo.identification.trajectory.search import hum_of
+from ppafo.identification.trajectory.sensor_noise import (
+    AutoRegression,
+    Drift,
+    SensorNoise,
+    from_coefficients,
+    reflections_of,
+    sensor_noise,
+    t_likelihood,
+    t_nodes,
+)
 from ppafo.signals.recording import Channel, Recording
 
 COUNT = 500

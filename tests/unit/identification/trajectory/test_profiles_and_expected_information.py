@@ -15,7 +15,7 @@ from ppafo.identification.trajectory import (
     fit,
     profile,
 )
-from ppafo.identification.trajectory.experiment import with_numbers
+from ppafo.identification.trajectory.problem import with_numbers
 from ppafo.simulation.loading import load_scenario
 
 NOISE = {"angle": 0.0017, "pressure_1": 500.0, "pressure_2": 500.0}

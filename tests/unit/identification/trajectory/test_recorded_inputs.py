@@ -9,8 +9,7 @@ import pytest
 from ppafo.errors import DataError, IdentificationError
 from ppafo.identification.trajectory import Experiment, FreeParameter, TrajectoryProblem, fit, profile
 from ppafo.identification.trajectory.fitting import residuals_of
-from ppafo.identification.trajectory.preparation import prepare
-from ppafo.identification.trajectory.residuals import trajectories
+from ppafo.identification.trajectory.residuals import prepare, trajectories
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario

@@ -18,7 +18,7 @@ from ppafo.identification.trajectory.sample_loops import (
     sum_of_innovations,
     sums_of_logs,
 )
-from ppafo.identification.trajectory.whitening import from_coefficients, from_reflections, t_nodes
+from ppafo.identification.trajectory.sensor_noise import from_coefficients, from_reflections, t_nodes
 from tests.compilers_here import modules_of
 
 COUNT, WIDTH = 60, 3

@@ -5,10 +5,20 @@ import dataclasses
 import numpy as np
 import pytest
 
-from ppafo.identification.trajectory import Experiment, FreeParameter, Search, TrajectoryFit, TrajectoryProblem, fit
+from ppafo.identification.estimate import Estimate
+from ppafo.identification.trajectory import (
+    Experiment,
+    FreeParameter,
+    Prior,
+    Search,
+    TrajectoryFit,
+    TrajectoryProblem,
+    fit,
+)
 from ppafo.identification.trajectory.follow_up import profile
 from ppafo.identification.trajectory.information import ROBUST_SCALE, loss_weights
-from ppafo.identification.trajectory.problem import Loss
+from ppafo.identification.trajectory.problem import Loss, Range
+from ppafo.identification.trajectory.uncertainty import Evidence, estimate_of
 
 PARAMETERS = (FreeParameter("valve.discharge_coefficient"), FreeParameter("foot_plate.inertia"))
 
@@ -56,3 +66,42 @@ def test_the_profile_of_a_fit_with_stray_samples_has_its_interval(experiment: Ex
     assert curve.high is not None
     assert curve.low == pytest.approx(estimate.low, abs=0.2 * estimate.half_width)
     assert curve.high == pytest.approx(estimate.high, abs=0.2 * estimate.half_width)
+
+
+DEVIATION = 0.05
+"""Standard deviation of the prior [-], in the logarithm of the number."""
+
+
+def estimate(fraction: float, inflation: float) -> Estimate:
+    """The estimate of a number whose posterior is this fraction as wide as the prior."""
+    prior = Prior(0.01, DEVIATION * 0.01)
+    item = Range("foot_plate.inertia", "foot_plate.inertia", "kg m^2", "log", 0.01, 0.001, 0.1, 1.0, prior, ())
+    error, point = fraction * DEVIATION, np.log([0.01])
+    return estimate_of(
+        Evidence(
+            ranges=(item,),
+            point=point,
+            interval=(point - 2.0 * error, point + 2.0 * error),
+            information=np.array([[1.0 / DEVIATION**2]]),
+            covariance=np.array([[error**2]]),
+            correlation=np.ones((1, 1)),
+            low=np.log([0.001]),
+            high=np.log([0.1]),
+            prior_deviation=np.array([DEVIATION]),
+            inflation=inflation,
+            residual_check="noise: white",
+            misfit="",
+            alone=("",),
+            sources=(("step.csv",),),
+            search=Search(),
+        ),
+        0,
+    )
+
+
+@pytest.mark.parametrize("inflation", [0.7, 1.0, 2.0, 10.0])
+def test_what_the_noise_widens_elsewhere_does_not_change_what_the_prior_decides(inflation: float) -> None:
+    silent, told = estimate(1.0, inflation), estimate(0.75, inflation)
+    assert silent.verdict == "not identifiable"
+    assert silent.explanation.startswith("The recordings add little to the prior, which decides the value")
+    assert told.verdict == "identified"
