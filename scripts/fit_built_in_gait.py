@@ -16,10 +16,9 @@ from pathlib import Path
 import numpy as np
 from scipy.io import loadmat
 
-from ppafo.gait.fourier import HARMONICS, FitError, fit_curve
-from ppafo.gait.gait import KNEE, Curve, Gait
-from ppafo.gait.recorded.knee import knee_position
-from ppafo.gait.writing import gait_toml
+from ppafo.gait.document import gait_toml
+from ppafo.gait.gait import HARMONICS, KNEE, Curve, FitError, Gait, fit_curve
+from ppafo.gait.recorded.walk import knee_position
 
 DIGITS = 5
 BODY_MASS = 62.0

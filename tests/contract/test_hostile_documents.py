@@ -11,7 +11,7 @@ import pytest
 from ppafo.cli.schema import FORMATS
 from ppafo.documents.json_text import MAXIMUM_LEVELS, is_nested_too_deeply, json_document
 from ppafo.errors import DataError, PpafoError
-from ppafo.gait.loading import load_gait
+from ppafo.gait.document import load_gait
 from ppafo.gait.recorded.mapping import load_map
 from ppafo.identification.problem import load_problem
 from ppafo.parameters import load_parameter_set

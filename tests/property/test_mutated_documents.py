@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ppafo.errors import PpafoError
-from ppafo.gait.loading import load_gait
+from ppafo.gait.document import load_gait
 from ppafo.parameters.bottles.bottle import load_bottle
 from ppafo.parameters.parts import load_catalogue
 from ppafo.questions.design.file import load_design

@@ -5,8 +5,7 @@ from hypothesis import strategies as st
 
 from ppafo.errors import DataError
 from ppafo.gait import Gait, load_gait
-from ppafo.gait.loading import parse_gait
-from ppafo.gait.writing import gait_toml
+from ppafo.gait.document import gait_toml, parse_gait
 
 GOOD = gait_toml(load_gait()).encode()
 PIECES = [

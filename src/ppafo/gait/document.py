@@ -1,14 +1,20 @@
-"""The layout of a gait file, and how one becomes a ``Gait``."""
+"""Gait files: their layout, how one becomes a ``Gait``, and a gait as the text of one."""
 
 import functools
+import json
+from collections.abc import Iterator
+from importlib import resources
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
 from ppafo.documents.models import NAME, make_schema, optional, table, validate
+from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, UnitError
 from ppafo.gait.gait import CURVES, REQUIRED, Curve, Gait, plain_unit
-from ppafo.units import parse_quantity, to_si
+from ppafo.gait.plausible import check_gait
+from ppafo.units import from_si, parse_quantity, to_si
 
 _MAXIMUM_HARMONICS = 40
 _SUMMARIES = {
@@ -163,3 +169,73 @@ def _curve(given: dict[str, Any], name: str, file: str) -> Curve:
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a gait file."""
     return make_schema(gait_file(), "ppafo gait")
+
+
+NORMATIVE = "falisse2019-subject1"
+"""The gait that is taken where none is named."""
+
+_FILE = TomlKind("gait", "gait", resources.files("ppafo") / "gait" / "normative", DataError)
+
+
+def list_gaits() -> tuple[str, ...]:
+    """Return the names of the gaits that come with the package."""
+    return _FILE.names()
+
+
+def load_gait(name_or_path: str | Path = NORMATIVE) -> Gait:
+    """Return a gait by its name in the package or by the path of a gait file (TOML), in SI units.
+
+    DataError where it cannot be used.
+    """
+    return parse_gait(_FILE.read(name_or_path), str(name_or_path))
+
+
+def parse_gait(content: bytes, file: str) -> Gait:
+    """Return the gait in the bytes of a gait file; ``file`` is what messages call it. DataError where it cannot be."""
+    gait = gait_of(_FILE.parse(content, label(file)), label(file))
+    check_gait(gait, label(file))
+    return gait
+
+
+WRITTEN_UNITS: dict[str, str] = {"rad": "deg"}
+"""Angles are written in degrees; every other curve in its own unit."""
+
+_DIGITS = 12
+"""Written of a coefficient; degrees made of radians carry noise behind these."""
+
+
+def gait_toml(gait: Gait) -> str:
+    """Return the text of a gait file; reading it back gives the same gait, to rounding of the angles."""
+    lines = ["schema_version = 1"]
+    texts = {"name": gait.name, "title": gait.title, "origin": gait.origin, "source": gait.source, "notes": gait.notes}
+    lines += [f"{key} = {_text(value)}" for key, value in texts.items() if value]
+    lines += ["", "[subject]", f'body_mass = "{gait.body_mass!r} kg"']
+    known = {"stature": "m", "walking_speed": "m/s", "recorded_speed": "m/s"}
+    lines += [f'{key} = "{value!r} {unit}"' for key, unit in known.items() if (value := getattr(gait, key)) is not None]
+    lines += ["", "[stride]", f'time = "{gait.stride_time!r} s"', f'stance_share = "{gait.stance_share!r}"']
+    if gait.stride_time_deviation:
+        lines.append(f'time_deviation = "{gait.stride_time_deviation!r} s"')
+    if gait.stance_share_deviation:
+        lines.append(f'stance_share_deviation = "{gait.stance_share_deviation!r}"')
+    lines.append(f"count = {gait.strides}")
+    for name, curve in gait.curves.items():
+        lines += ["", f"[{name}]", *_series(curve, CURVES[name])]
+    return "\n".join(lines) + "\n"
+
+
+def _series(curve: Curve, si_unit: str) -> Iterator[str]:
+    unit = WRITTEN_UNITS.get(si_unit, si_unit)
+
+    def number_text(value: float) -> str:
+        return repr(float(f"{from_si(value, plain_unit(unit), plain_unit(si_unit)):.{_DIGITS}g}"))
+
+    yield f"unit = {_text(unit)}"
+    yield f"mean = {number_text(curve.mean)}"
+    yield f"cosine = [{', '.join(map(number_text, curve.cosines))}]"
+    yield f"sine = [{', '.join(map(number_text, curve.sines))}]"
+    yield f"deviation = {number_text(curve.deviation)}"
+
+
+def _text(text: str) -> str:
+    """Return a basic string of TOML; what JSON escapes is escaped in the same way there, but for DEL."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -8,18 +8,22 @@
 - ``knee_forward``, ``knee_up`` [m/s^2]: acceleration of the knee in the sagittal plane, without gravity.
 
 With a flat foot theta is 90 deg plus phi. The phase counts strides from one heel strike of the foot to its next.
+At another walking speed the stride gets longer or shorter in time, and every motion in it stays.
 """
 
 import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
 from ppafo.errors import DataError, nearest_name
+from ppafo.model.elementary import sine_and_cosine
+from ppafo.signals import Channel, Recording
+from ppafo.signals.recording import Floats
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
-
-    from ppafo.signals.recording import Floats
 
 Origin = Literal["measured", "synthetic"]
 
@@ -40,7 +44,7 @@ KNEE = ("knee_forward", "knee_up")
 """Curves that are accelerations: they go with the square of the cadence."""
 
 
-def clinical_angle(angle: "Floats") -> "Floats":
+def clinical_angle(angle: Floats) -> Floats:
     """Return an ankle angle theta [rad] as people read it [rad]: 0 at neutral, dorsiflexion positive."""
     return 0.5 * math.pi - angle
 
@@ -85,8 +89,6 @@ class Curve:
 
     def derivative(self, stride_time: float) -> "Curve":
         """Return the derivative by time for a stride of this time [s]; how much strides differ in it is not known."""
-        import numpy as np
-
         angular = 2.0 * np.pi / stride_time * (1.0 + np.arange(self.harmonics))
         cosines, sines = angular * np.array(self.sines), -angular * np.array(self.cosines)
         return Curve(0.0, tuple(cosines.tolist()), tuple(sines.tolist()))
@@ -98,12 +100,8 @@ class Curve:
             self, mean=factor * self.mean, cosines=cosines, sines=sines, deviation=abs(factor) * self.deviation
         )
 
-    def values_at(self, phases: "ArrayLike") -> "Floats":
+    def values_at(self, phases: "ArrayLike") -> Floats:
         """Return the values at many phases [strides]."""
-        import numpy as np
-
-        from ppafo.model.elementary import sine_and_cosine
-
         first_sine, first_cosine = sine_and_cosine(np.asarray(phases, dtype=np.float64))
         sine, cosine = first_sine, first_cosine
         values = self.mean + 0.0 * first_cosine
@@ -164,3 +162,113 @@ class Gait:
             hint = nearest_name(name, curves)
             raise DataError(f"gait '{self.name}' has no curve '{name}'{hint}; it has {', '.join(curves)}")
         return curves[name]
+
+
+HARMONICS: dict[str, int] = {
+    "shank_angle": 6,
+    "ankle_angle": 10,
+    "ankle_moment": 10,
+    "vertical_force": 12,
+    "centre_of_pressure": 10,
+    "knee_forward": 6,
+    "knee_up": 6,
+}
+"""As many as bring the fit well below the spread between strides, and not more: each one roughens the acceleration."""
+
+
+@dataclass(frozen=True, slots=True)
+class FitError:
+    """Error of the series: root mean square and largest, in the unit of the curve."""
+
+    root_mean_square: float
+    largest: float
+
+
+def fit_curve(values: Floats, harmonics: int, deviation: float = 0.0) -> tuple[Curve, FitError]:
+    """Return the series through values at even phases from 0 to 1, both ends counted, and its errors.
+
+    All in the unit of ``values`` [SI]. DataError where there are too few values.
+    """
+    if values.size < 2 * harmonics + 2:
+        raise DataError(f"{values.size} samples are too few for {harmonics} harmonics")
+    turns = 2.0 * np.pi * np.linspace(0.0, 1.0, values.size)
+    orders = np.arange(1, harmonics + 1)
+    terms = [np.ones((values.size, 1)), np.cos(np.outer(turns, orders)), np.sin(np.outer(turns, orders))]
+    design = np.hstack(terms)
+    solution = np.linalg.lstsq(design, values, rcond=None)[0]
+    left = design @ solution - values
+    cosines, sines = solution[1 : harmonics + 1].tolist(), solution[harmonics + 1 :].tolist()
+    error = FitError(float(np.sqrt(np.mean(left**2))), float(np.max(np.abs(left))))
+    return Curve(float(solution[0]), tuple(cosines), tuple(sines), deviation), error
+
+
+LARGEST_CHANGE = 0.2
+"""Fraction of the recorded speed; further away angles and moments change too much to be left as they are."""
+
+SLOWEST_CONSTANT_WALK_RATIO = 1.03
+"""Speed [m/s] below which step length over cadence is no longer constant: Murakami and Otaka (2017),
+J Phys Ther Sci 29:819 (62 m/min)."""
+
+
+def speed_range(gait: Gait) -> tuple[float, float]:
+    """Return the lowest and highest speed [m/s] to which a gait may be scaled: 20 % about the recorded one.
+
+    Downwards it ends at 1.03 m/s too, for a gait that was recorded faster. DataError for a gait without a speed.
+    """
+    recorded = _recorded_speed(gait)
+    lowest = (1.0 - LARGEST_CHANGE) * recorded
+    return max(lowest, min(recorded, SLOWEST_CONSTANT_WALK_RATIO)), (1.0 + LARGEST_CHANGE) * recorded
+
+
+def at_speed(gait: Gait, speed: float) -> Gait:
+    """Return the gait at a walking speed [m/s]: stride time goes with speed to the power of -1/2.
+
+    That is a constant walk ratio, step length over cadence (Sekiya and Nagasaki 1998, Gait Posture 7:225). Amplitudes,
+    moments per mass, force in body weights and stance fraction stay as recorded, so only a small change is allowed. So
+    does the way of the knee about its mean speed; its acceleration goes with 1/T^2. DataError for a speed out of range.
+    """
+    recorded = _recorded_speed(gait)
+    low, high = speed_range(gait)
+    if not (math.isfinite(speed) and low * (1.0 - 1e-9) <= speed <= high * (1.0 + 1e-9)):
+        raise DataError(
+            f"gait '{gait.name}' was recorded at {recorded:g} m/s and can be scaled from {low:.3g} to {high:.3g} m/s, "
+            f"not to {speed:g} m/s; import a gait that was recorded near that speed"
+        )
+    current = gait.walking_speed or recorded
+    return replace(
+        gait,
+        walking_speed=speed,
+        recorded_speed=recorded,
+        stride_time=gait.stride_time * math.sqrt(current / speed),
+        stride_time_deviation=gait.stride_time_deviation * math.sqrt(current / speed),
+        knee_forward=gait.knee_forward and gait.knee_forward.scale(speed / current),
+        knee_up=gait.knee_up and gait.knee_up.scale(speed / current),
+    )
+
+
+def _recorded_speed(gait: Gait) -> float:
+    speed = gait.recorded_speed or gait.walking_speed
+    if speed is None:
+        raise DataError(f"gait '{gait.name}' has no walking speed, so it cannot be scaled; give one when importing it")
+    return speed
+
+
+_RATE = 200.0
+_MAXIMUM_STRIDES = 100_000
+
+
+def walk_recording(gait: Gait, strides: int, rate: float = _RATE) -> Recording:
+    """Return a number of equal strides, sampled at about ``rate`` [Hz], marked synthetic; SI units, package signs.
+
+    DataError for a number that is not plausible.
+    """
+    if not 1 <= strides <= _MAXIMUM_STRIDES:
+        raise DataError(f"the number of strides must be from 1 to {_MAXIMUM_STRIDES}, not {strides}")
+    per_stride = max(10, round(rate * gait.stride_time))
+    phase = np.arange(strides * per_stride + 1) / per_stride
+    one = np.arange(per_stride) / per_stride
+    channels = {
+        name: Channel(np.append(np.tile(curve.values_at(one), strides), curve.value(0.0)), CURVES[name])
+        for name, curve in gait.curves.items()
+    }
+    return Recording(f"{gait.name}, {strides} equal strides", phase * gait.stride_time, channels, "synthetic")

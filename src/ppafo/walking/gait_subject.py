@@ -10,7 +10,7 @@ import numpy as np
 
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
-from ppafo.gait.plausible.angles import gait_file_remarks
+from ppafo.gait.plausible import gait_file_remarks
 from ppafo.simulation.declaration import value_at
 from ppafo.simulation.reading import Reading
 from ppafo.walking.anthropometry import Build, segment_values

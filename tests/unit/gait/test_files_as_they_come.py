@@ -8,13 +8,13 @@ import pytest
 from ppafo.errors import DataError
 from ppafo.gait import Gait, load_gait, walk_recording
 from ppafo.gait.opensim_names import opensim_recording
-from ppafo.gait.plausible.loads import check_force_scale
+from ppafo.gait.plausible import check_force_scale
 from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.gait.recorded.conventions import find_convention
+from ppafo.gait.recorded.footfalls import wrap_cycle
 from ppafo.gait.recorded.mapping import AngleMap, GaitMap, ShankMap, Side
-from ppafo.gait.recorded.one_cycle import wrap_cycle
-from ppafo.gait.recorded.signal import Signal
 from ppafo.gait.recorded.table import read_table
+from ppafo.gait.recorded.walk import Signal
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
 from ppafo.storage.opensim import write_opensim

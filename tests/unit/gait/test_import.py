@@ -11,8 +11,8 @@ import pytest
 
 from ppafo.errors import DataError
 from ppafo.gait import CURVES, Gait, walk_recording
+from ppafo.gait.document import gait_toml, parse_gait
 from ppafo.gait.gait import KNEE
-from ppafo.gait.loading import parse_gait
 from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.gait.recorded.mapping import (
     AngleMap,
@@ -26,7 +26,6 @@ from ppafo.gait.recorded.mapping import (
     opensim_map,
     package_map,
 )
-from ppafo.gait.writing import gait_toml
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 
@@ -238,7 +237,7 @@ def test_the_low_pass_takes_noise_away_and_leaves_the_curve(
 
 
 def test_the_low_pass_is_at_its_half_power_where_it_says() -> None:
-    from ppafo.gait.recorded.signal import Signal, low_pass
+    from ppafo.gait.recorded.walk import Signal, low_pass
 
     time = np.arange(0.0, 20.0, 0.005)
     passed = low_pass(Signal("sine", time, np.sin(2.0 * np.pi * 6.0 * time)), 6.0)

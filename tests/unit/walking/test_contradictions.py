@@ -11,7 +11,7 @@ import pytest
 
 from ppafo.errors import DataError, ParameterError, ScenarioError
 from ppafo.gait import load_gait
-from ppafo.gait.writing import gait_toml
+from ppafo.gait.document import gait_toml
 from ppafo.walking import Configuration, list_walks, load_walk, walk, walk_population
 from ppafo.walking.contradictions import COMPRESSION
 from ppafo.walking.schema import json_schema

@@ -7,7 +7,7 @@ import pytest
 
 from ppafo.errors import ScenarioError
 from ppafo.gait import load_gait
-from ppafo.gait.writing import gait_toml
+from ppafo.gait.document import gait_toml
 from ppafo.walking import load_walk
 from ppafo.walking.gait_subject import person_remarks
 from ppafo.walking.wearer import paper_subject

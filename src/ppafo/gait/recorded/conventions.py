@@ -8,7 +8,6 @@ import numpy as np
 
 from ppafo.errors import DataError
 from ppafo.gait.recorded.c3d import PLATE
-from ppafo.gait.recorded.load_units import load_unit
 from ppafo.gait.recorded.mapping import (
     AngleMap,
     ForceMap,
@@ -64,11 +63,7 @@ def find_convention(tables: Sequence[MotionTable], side: Side, body_mass: float)
     found = [
         _of_opensim(table, side) if table.form == OPENSIM else _of_markers(table, side, body_mass) for table in tables
     ]
-    return _together(found, tables)
-
-
-def _together(found: Sequence[Convention], tables: Sequence[MotionTable]) -> Convention:
-    """Return one convention for all files: each curve from the first file that has its columns."""
+    # One convention for all files: each curve is from the first file that has its columns.
     known = {name for table in tables for name in table.columns}
     columns = {}
     for name in GaitMap.model_fields:
@@ -277,3 +272,38 @@ def _way(point: Floats) -> Floats:
 
 def _per_metre(table: MotionTable, label: str) -> float:
     return {"m": 1.0, "cm": 100.0}.get(table.units.get(f"{label}.x", ""), 1000.0)
+
+
+_FACTORS = {
+    "moment": {"N m/kg": 1.0, "N mm/kg": 1.0e-3, "N m": None, "N mm": None},
+    "force": {"N/kg": 1.0, "N": None, "": 9.8, "percent": 0.098},
+}
+"""What makes N m/kg or N/kg of a number in the unit; None where the body mass does."""
+
+_PLAUSIBLE = {"moment": (0.35, 2.6), "force": (5.5, 20.0)}
+"""Peaks of walking in N m/kg and N/kg, narrow enough for no two units to fit up to a body mass of 130 kg."""
+
+
+def load_unit(table: MotionTable, name: str, kind: str, body_mass: float) -> tuple[str, list[str]]:
+    """Return the unit of a column of ``kind`` "moment" or "force", and a remark where it is not what the file states.
+
+    The stated unit is taken where the numbers can be walking in it, else the only one in which they can.
+    """
+    values = np.abs(table.columns[name][np.isfinite(table.columns[name])])
+    stated = table.units.get(name, "")
+    peak = float(np.percentile(values, 99.5)) if values.size else 0.0
+    low, high = _PLAUSIBLE[kind]
+    fitting = []
+    for unit, factor in _FACTORS[kind].items():
+        per_mass = (1.0e-3 if unit == "N mm" else 1.0) / body_mass if factor is None else factor
+        fitting += [unit] if low <= per_mass * peak <= high else []
+    if stated in fitting or (not fitting and stated in _FACTORS[kind]):
+        return stated, []
+    if len(fitting) != 1:
+        known = ", ".join(repr(unit) for unit in _FACTORS[kind])
+        raise DataError(
+            f"{table.file}: column {name!r} reaches {peak:.4g} and its unit, {stated or 'not stated'!r}, does not fit "
+            f"a {kind} of walking; give it in a gait map: {known}"
+        )
+    was = f"the file states {stated!r}" if stated in _FACTORS[kind] else "the file does not state it"
+    return fitting[0], [f"column '{name}' was read in {fitting[0] or 'body weights'} by its size: {was}"]

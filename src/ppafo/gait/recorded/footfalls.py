@@ -1,22 +1,271 @@
-"""Where the strides of a recording come from: force, events of the file, the shank, or one cycle that wraps around."""
+"""Where the strides of a recording come from: force, events of the file, the shank, or one cycle that wraps around.
+
+Force plates do not say whose foot they carried: each contact is of the foot whose shank leans over it. A record little
+longer than a stride, which begins anywhere in it, is one cycle that wraps around.
+"""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
+from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import DataError
 from ppafo.gait.gait import REQUIRED
-from ppafo.gait.plausible.checked import SignSource
-from ppafo.gait.plausible.loads import check_force_scale
-from ppafo.gait.recorded.columns import LOADS
-from ppafo.gait.recorded.events import UNLOADED, Contact, Stride, contacts_of, strides_from_force, strides_from_shank
+from ppafo.gait.plausible import SignSource, check_force_scale
 from ppafo.gait.recorded.mapping import Side
-from ppafo.gait.recorded.one_cycle import wrap_cycle
-from ppafo.gait.recorded.signal import Signal
-from ppafo.gait.recorded.strides import strides_within
 from ppafo.gait.recorded.table import MotionTable
+from ppafo.gait.recorded.walk import LOADS, CurveColumns, Signal, low_pass, with_absence
+from ppafo.signals.recording import Floats
+
+LOADED, UNLOADED = 0.05, 0.03
+"""Body weights: above the first the foot is on the ground, below the second it is off it."""
+
+SHORTEST_CONTACT = 0.1
+"""Seconds; a shorter contact, or a shorter time off the ground, is noise of the force plate."""
+
+_SMOOTH = 6.0
+"""Hz; the shank is smoothed by this before its events are looked for."""
+_SHORTEST_STRIDE = 0.5
+"""Seconds between two heel strikes of one foot."""
+_TOP = 0.35
+"""Fraction of the range of the shank angle, from above, in which heel strikes lie."""
+_DEEPEST = np.radians(-15.0)
+"""Before the swing the shank leans back further than this."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stride:
+    """Times [s] of a heel strike, of the toe-off after it and of the next heel strike of the same foot."""
+
+    start: float
+    toe_off: float
+    end: float
+
+    @property
+    def time(self) -> float:
+        """Length [s]."""
+        return self.end - self.start
+
+    @property
+    def stance_share(self) -> float:
+        """Fraction [-] of the stride until toe-off."""
+        return (self.toe_off - self.start) / self.time
+
+
+def strides_from_force(force: Signal) -> list[Stride]:
+    """Return the whole strides in a vertical force [body weights]; thresholds with hysteresis, interpolated in time."""
+    contacts = contacts_of(force)
+    strides = []
+    for (start, toe_off), (following, _) in pairwise(contacts):
+        if start is not None and toe_off is not None and following is not None:
+            strides.append(Stride(start, toe_off, following))
+    return strides
+
+
+Contact = tuple[float | None, float | None]
+
+
+def contacts_of(force: Signal) -> list[Contact]:
+    """Return heel strike and toe-off of every contact; None at an end of the record that cuts one."""
+    # Between both thresholds the foot is as it was before.
+    decided = np.where(force.values > LOADED, 1, np.where(force.values < UNLOADED, 0, -1))
+    known = np.flatnonzero(decided >= 0)
+    before = np.maximum.accumulate(np.where(decided >= 0, np.arange(decided.size), known[0] if known.size else 0))
+    loaded = decided[before] == 1
+    edges = [0, *(np.flatnonzero(np.diff(loaded.astype(int))) + 1).tolist(), loaded.size]
+    stretches = list(pairwise(edges))
+    kept = _without_short(force.time, [(first, last) for first, last in stretches if loaded[first]])
+    size = loaded.size
+    return [
+        (
+            None if first == 0 else _crossing(force, first, LOADED),
+            None if last == size else _crossing(force, last, UNLOADED),
+        )
+        for first, last in kept
+    ]
+
+
+def _without_short(time: Floats, contacts: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Return the contacts with short breaks closed, and then without short ones."""
+    joined: list[tuple[int, int]] = []
+    for first, last in contacts:
+        if joined and time[first] - time[joined[-1][1]] < SHORTEST_CONTACT:
+            joined[-1] = joined[-1][0], last
+        else:
+            joined.append((first, last))
+    final = time.size - 1
+    at_an_end = (0, time.size)
+    return [
+        (first, last)
+        for first, last in joined
+        if first in at_an_end or last in at_an_end or time[min(last, final)] - time[first] >= SHORTEST_CONTACT
+    ]
+
+
+def _crossing(signal: Signal, index: int, level: float) -> float:
+    """Return when a line between the samples before and at ``index`` passes a level [s]."""
+    before, after = signal.values[index - 1], signal.values[index]
+    fraction = 0.5 if after == before else float(np.clip((level - before) / (after - before), 0.0, 1.0))
+    return float(signal.time[index - 1] + fraction * (signal.time[index] - signal.time[index - 1]))
+
+
+def strides_from_shank(shank: Signal) -> list[Stride]:
+    """Return the whole strides in a shank angle phi [rad], above 0 while the ankle is in front.
+
+    Heel strike is where the forward swing of the shank ends, its largest angle. Toe-off is where it leans back fastest
+    before the swing, after Aminian et al. 2002, J Biomech 35:689, who find both in a gyroscope on the shank. DataError
+    where there is no toe-off.
+    """
+    from scipy.signal import find_peaks
+
+    smooth = low_pass(shank, _SMOOTH)
+    high, low = float(np.max(smooth.values)), float(np.min(smooth.values))
+    apart = max(1, int(_SHORTEST_STRIDE * smooth.rate))
+    peaks = find_peaks(smooth.values, height=high - _TOP * (high - low), distance=apart)[0].tolist()
+    rate = np.gradient(smooth.values, smooth.time)
+    return [
+        Stride(
+            float(smooth.time[first]), float(smooth.time[_toe_off(smooth, rate, first, last)]), float(smooth.time[last])
+        )
+        for first, last in pairwise(peaks)
+    ]
+
+
+def _toe_off(shank: Signal, rate: Floats, first: int, last: int) -> int:
+    """Return the sample of the fastest lean backwards between mid-stride and the start of the swing."""
+    lowest = first + int(np.argmin(shank.values[first:last]))
+    middle = first + (lowest - first) // 2
+    if lowest - middle < 2 or shank.values[lowest] > _DEEPEST:
+        raise DataError(
+            f"{shank.file}: the shank does not lean back before the swing after {shank.time[first]:g} s, so there is "
+            "no toe-off to be found in it; give a vertical force, or correct the sign of the shank angle"
+        )
+    return middle + int(np.argmin(rate[middle:lowest]))
+
+
+_LEAST_LEAN = 0.5
+"""Share of the range of the shank angle by which the shank leans forward over its own contact; over one of the other
+foot it swings back."""
+_LEAST_LEAN_OF_PART = 0.1
+"""The same of a contact that the record cuts."""
+
+
+def force_of_plates(
+    tables: Sequence[MotionTable], names: Sequence[str], shank: Signal, body_mass: float
+) -> tuple[Signal | None, list[str]]:
+    """Return the vertical force [body weights] of one foot, summed over its contacts on plates, and remarks."""
+    total: Signal | None = None
+    chosen = []
+    for table in tables:
+        for name in [item for item in names if item in table.columns]:
+            values, _ = CurveColumns("vertical_force.unit", table, ((1.0, name),), True).in_unit(None, ("N",))
+            plate = with_absence(Signal(table.file, table.time, values / (body_mass * STANDARD_GRAVITY)))
+            own = [contact for contact in contacts_of(plate) if _is_own(contact, plate, shank)]
+            if own:
+                step = 1.0 / plate.rate
+                starts = [-np.inf if start is None else start - step for start, _ in own]
+                ends = [np.inf if end is None else end + step for _, end in own]
+                spans = zip(starts, ends, strict=True)
+                inside = np.any([(plate.time >= low) & (plate.time <= high) for low, high in spans], axis=0)
+                force = np.where(inside, plate.values, 0.0)
+                other = 0.0 if total is None else np.interp(plate.time, total.time, total.values)
+                total = Signal(table.file, table.time, force + other)
+                chosen.append(f"'{name}' ({len(own)})")
+    if total is None:
+        return None, ["vertical force: no plate carries this foot, by the lean of its shank"] if names else []
+    return total, [
+        f"vertical force: the contacts of this foot, by the lean of its shank, summed over {', '.join(chosen)}"
+    ]
+
+
+def _is_own(contact: Contact, plate: Signal, shank: Signal) -> bool:
+    start, end = (
+        plate.time[0] if contact[0] is None else contact[0],
+        plate.time[-1] if contact[1] is None else contact[1],
+    )
+    start, end = max(float(start), float(shank.time[0])), min(float(end), float(shank.time[-1]))
+    if end <= start:
+        return False
+    before, after = np.interp([start, end], shank.time, shank.values)
+    least = _LEAST_LEAN if None not in contact else _LEAST_LEAN_OF_PART
+    return bool(before - after > least * np.ptp(shank.values))
+
+
+_RATE = 200.0
+_SHORTEST = 0.5
+"""Seconds of a stride."""
+
+LONGEST = 1.5
+"""Strides that a record of one cycle has at most; a longer one has strides to count."""
+
+_MISFIT = 0.06
+"""Root mean square of what start and end may differ by where they overlap, values and rates, over their ranges; two
+strides of one healthy walk differ by 0.03."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cycle:
+    """Three times the same cycle, its ``period`` [s], and what its ends differ by as a share of the ranges."""
+
+    walk: Mapping[str, Signal]
+    period: float
+    misfit: float
+
+
+def wrap_cycle(walk: Mapping[str, Signal]) -> Cycle | None:
+    """Return a record of one cycle three times over, None where its start and end are not the same motion."""
+    start = max(walk[name].time[0] for name in REQUIRED)
+    end = min(walk[name].time[-1] for name in REQUIRED)
+    time = np.arange(start, end, 1.0 / _RATE)
+    shortest = max(_SHORTEST, (end - start) / LONGEST)
+    first = int(np.ceil(shortest * _RATE))
+    if time.size <= max(first, 3):
+        return None
+    curves = np.array(
+        [np.interp(time, walk[name].time, walk[name].values) / np.ptp(walk[name].values) for name in REQUIRED]
+    )
+    rates = np.gradient(curves, axis=1)
+    features = np.concatenate([curves, rates / np.ptp(rates, axis=1, keepdims=True)])
+    shifts = np.arange(first, time.size)
+    misfits = np.array(
+        [np.sqrt(np.mean((features[:, shift:] - features[:, : time.size - shift]) ** 2)) for shift in shifts]
+    )
+    best = int(np.argmin(misfits))
+    if misfits[best] > _MISFIT:
+        return None
+    period = float(shifts[best]) / _RATE
+    wrapped = {}
+    for name, signal in walk.items():
+        slack = 1.0 / signal.rate
+        if signal.time[0] <= start + slack and signal.time[-1] >= start + period - slack:
+            wrapped[name] = _repeat(signal, (start, float(end)), period, name in LOADS)
+    return Cycle(wrapped, period, float(misfits[best]))
+
+
+def _repeat(signal: Signal, span: tuple[float, float], period: float, is_load: bool) -> Signal:
+    """Return three periods of what lies within a span [s]; where its start and end overlap one fades into the other.
+
+    A load is taken from where the plate carried it, and a position goes on by its way.
+    """
+    start, end = span
+    count = max(2, round(period * signal.rate))
+    one = start + period * np.arange(count) / count
+    values, later = (np.interp(one + shift, signal.time, signal.values) for shift in (0.0, period))
+    overlap = min(end, float(signal.time[-1])) - start - period
+    inside = one <= start + max(overlap, 0.0)
+    way = float(np.mean((later - values)[inside])) if signal.is_position else 0.0
+    weight = np.clip((one - start) / overlap, 0.0, 1.0) if overlap > 0.0 else np.ones(count)
+    blend = weight * values + (1.0 - weight) * (later - way)
+    if is_load:
+        blend = np.where(np.abs(later) > np.abs(values), later, values)
+    turns = np.arange(3)
+    time = (turns[:, None] * period + one[None, :]).ravel()
+    whole = (turns[:, None] * way + np.where(inside, blend, values)[None, :]).ravel()
+    return replace(signal, time=time, values=np.asarray(whole, dtype=np.float64), columns=(), absent=None)
+
 
 _NEAR = 0.15
 """Seconds between a strike or an off seen in the shank and by a plate, for both to be the same."""
@@ -24,6 +273,13 @@ _ABOUT_STANCE = 0.05
 """Of the stride, at either end of the stance, which a load need not cover."""
 _COVERED = 0.9
 """Share of the rest of the stance on the plate, for the load to be that of the stride."""
+
+
+def strides_within(signal: Signal, strides: Sequence[Stride]) -> list[Stride]:
+    """Return the strides that lie within a signal, to half a sample."""
+    slack = 0.5 / signal.rate
+    return [item for item in strides if item.start >= signal.time[0] - slack and item.end <= signal.time[-1] + slack]
+
 
 LEAST_STRIDES = 2
 """Where nobody states it; a walk past a plate and one cycle have one."""
@@ -91,19 +347,14 @@ def _of_walk(
     contacts = [(a, b) for a, b in contacts_of(walk[FORCE]) if a is not None or b is not None]
     if recorded and contacts and len(usable_strides(walk, recorded)) > len(usable_strides(walk, forced)):
         return Footfalls(walk, recorded, FILE, is_overground=True)
-    moved = _strides_of_shank(walk) if contacts else []
+    moved: list[Stride] = []
+    # The force has a stride or none, and its message says more than that of the shank.
+    with suppress(DataError):
+        moved = strides_from_shank(walk[SHANK]) if contacts else []
     if len(usable_strides(walk, moved)) <= len(usable_strides(walk, forced)):
         return Footfalls(walk, forced, FORCE)
     shifted, said = _by_contacts(moved, contacts)
     return Footfalls(walk, shifted, SHANK, (said,), is_overground=True)
-
-
-def _strides_of_shank(walk: Mapping[str, Signal]) -> list[Stride]:
-    try:
-        return strides_from_shank(walk[SHANK])
-    except DataError:
-        # The force has a stride or none, and its message says more.
-        return []
 
 
 def _strides_of_file(tables: Sequence[MotionTable], side: Side) -> list[Stride]:

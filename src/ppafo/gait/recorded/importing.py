@@ -1,4 +1,4 @@
-"""Recorded files in, a gait out: tables, map, filter, strides, checks, mean curves and their series."""
+"""Recorded files in, a gait out: tables, map, gaps, filter, strides, checks, mean curves and their series."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -7,32 +7,122 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.errors import DataError
-from ppafo.gait.fourier import HARMONICS, FitError, fit_curve
-from ppafo.gait.gait import REQUIRED, Curve, Gait, Origin
-from ppafo.gait.plausible.angles import standing_tilt, zero_remarks
-from ppafo.gait.plausible.checked import MeanStride
-from ppafo.gait.plausible.loads import force_remarks
-from ppafo.gait.plausible.stride import check_plausible
-from ppafo.gait.recorded.columns import LOADS
-from ppafo.gait.recorded.drop_outs import check_constant
-from ppafo.gait.recorded.events import Stride
+from ppafo.gait.gait import HARMONICS, REQUIRED, Curve, FitError, Gait, Origin, fit_curve
+from ppafo.gait.plausible import MeanStride, SignSource, check_plausible, force_remarks, standing_tilt, zero_remarks
+from ppafo.gait.recorded.conventions import Convention, column_names, find_convention
 from ppafo.gait.recorded.footfalls import (
     LEAST_STRIDES,
     SHANK,
     Footfalls,
+    Stride,
     find_footfalls,
+    force_of_plates,
     strides_of_curve,
+    strides_within,
     usable_strides,
 )
-from ppafo.gait.recorded.knee import check_way, knee_remarks
-from ppafo.gait.recorded.mapping import GaitMap
-from ppafo.gait.recorded.noise import check_scatter, scatter_remarks
-from ppafo.gait.recorded.settings import ImportSettings, check_settings
-from ppafo.gait.recorded.signal import Signal, low_pass
-from ppafo.gait.recorded.source import Source, read_source
-from ppafo.gait.recorded.strides import CurveStatistics, mean_curve, strides_within, without_outliers
-from ppafo.gait.recorded.table import MotionTable
-from ppafo.signals.recording import Floats
+from ppafo.gait.recorded.mapping import GaitMap, ImportSettings, check_settings
+from ppafo.gait.recorded.strides import (
+    CurveStatistics,
+    check_constant,
+    check_scatter,
+    mean_curve,
+    scatter_remarks,
+    without_outliers,
+)
+from ppafo.gait.recorded.table import MotionTable, fill_gaps, read_table
+from ppafo.gait.recorded.walk import LOADS, Person, Signal, check_way, knee_remarks, low_pass, walk_signals
+from ppafo.units import format_quantity
+
+_SAME = 0.02
+"""Share by which two statements of one body mass may differ without a word."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Source:
+    """Tables, map and signals of a recording, settings with what the files say, and remarks on what was mended."""
+
+    tables: Sequence[MotionTable]
+    columns: GaitMap
+    walk: Mapping[str, Signal]
+    settings: ImportSettings
+    signs_from: SignSource
+    remarks: tuple[str, ...]
+
+
+def read_source(files: Sequence[str | Path], settings: ImportSettings) -> Source:
+    """Return the signals in recorded files; DataError names what is wrong and what to do."""
+    if not files:
+        raise DataError("no file was given; a gait needs at least the angles of shank and ankle")
+    tables = [read_table(path, settings.longest_gap, settings.start, settings.end) for path in files]
+    settings, said = _with_subject(settings, tables)
+    person = Person(settings.body_mass or 0.0, settings.stature)
+    convention = (
+        find_convention(tables, settings.side, person.body_mass)
+        if settings.columns is None
+        else Convention(settings.columns)
+    )
+    columns = convention.columns
+    if settings.ankle_neutral is not None:
+        neutral = {"neutral": format_quantity(settings.ankle_neutral, "rad")}
+        columns = columns.model_copy(update={"ankle_angle": columns.ankle_angle.model_copy(update=neutral)})
+    mapped = [getattr(columns, name) for name in GaitMap.model_fields if name != "schema_version"]
+    names = [name.removeprefix("-") for item in mapped if item is not None for name in column_names(item)]
+    tables = [fill_gaps(table, names, settings.longest_gap) for table in tables]
+    walk = walk_signals(tables, columns, person, is_default=settings.columns is None)
+    if convention.plates and "vertical_force" not in walk:
+        force, more = force_of_plates(tables, convention.plates, walk["shank_angle"], person.body_mass)
+        walk |= {} if force is None else {"vertical_force": force}
+        said += more
+    mended = [f"{Path(table.file).name}: {remark}" for table in tables for remark in table.remarks]
+    mended += _ends(walk, tables)
+    signs_from: SignSource = "columns" if settings.columns is None else "map"
+    return Source(tables, columns, walk, settings, signs_from, (*said, *convention.remarks, *mended))
+
+
+def _with_subject(settings: ImportSettings, tables: Sequence[MotionTable]) -> tuple[ImportSettings, list[str]]:
+    """Return the settings with body mass and stature that a C3D file states; what the user states wins."""
+    masses, statures = (
+        [(table.file, value) for table in tables if table.trial and (value := getattr(table.trial, name)) is not None]
+        for name in ("body_mass", "stature")
+    )
+    said = []
+    if settings.body_mass is None:
+        if not masses:
+            raise DataError(f"{tables[0].file}: does not state the body mass; give it, such as --body-mass '62 kg'")
+        file, mass = masses[0]
+        settings = replace(settings, body_mass=mass)
+        said.append(f"body mass {mass:.4g} kg, as {Path(file).name} states")
+    elif masses and abs(masses[0][1] - settings.body_mass) > _SAME * settings.body_mass:
+        said.append(
+            f"body mass {settings.body_mass:.4g} kg as stated; {Path(masses[0][0]).name} states {masses[0][1]:.4g} kg"
+        )
+    if settings.stature is None and statures:
+        settings = replace(settings, stature=statures[0][1])
+        said.append(f"stature {statures[0][1]:.4g} m, as {Path(statures[0][0]).name} states")
+    return settings, said
+
+
+def _ends(walk: Mapping[str, Signal], tables: Sequence[MotionTable]) -> list[str]:
+    """Return a remark on each motion that was not seen at an end of its file, and on loads that were not measured."""
+    spans = {table.file: (float(table.time[0]), float(table.time[-1])) for table in tables}
+    seen: dict[tuple[float, float, float, float], list[str]] = {}
+    loads: dict[int, list[str]] = {}
+    for name, signal in walk.items():
+        low, high = spans[signal.file]
+        if signal.time[0] > low or signal.time[-1] < high:
+            seen.setdefault((float(signal.time[0]), float(signal.time[-1]), low, high), []).append(name)
+        if signal.absent is not None:
+            loads.setdefault(round(100.0 * float(signal.absent.mean())), []).append(name)
+    said = [
+        f"{', '.join(names)} from {first:.4g} to {last:.4g} s: not seen in the rest of {low:.4g} to {high:.4g} s"
+        for (first, last, low, high), names in seen.items()
+    ]
+    return said + [
+        f"{', '.join(names)}: absent in {percent} % of the record, where no plate measured this foot"
+        for percent, names in loads.items()
+    ]
+
 
 LARGEST_STRIDE_CHANGE = 0.25
 """Fraction of the median stride time; a stride that differs by more has a missed event, or is not steady walking."""
@@ -75,11 +165,9 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     check_constant(walk, source.tables, strides, covered, left_out)
     smooth = walk if settings.low_pass is None else {n: low_pass(s, settings.low_pass) for n, s in walk.items()}
     curves = {name: mean_curve(name, signal, strides, covered[name]) for name, signal in smooth.items()}
-    remarks = [*source.remarks, *footfalls.remarks, *(_NOT_MEASURED.format(name) for name in unmeasured)]
+    missing = [f"{name} is left out: in no whole stride was it measured throughout the stance" for name in unmeasured]
+    remarks = [*source.remarks, *footfalls.remarks, *missing]
     return _finish(source, replace(footfalls, walk=walk), curves, (strides, left_out), remarks)
-
-
-_NOT_MEASURED = "{} is left out: in no whole stride was it measured throughout the stance"
 
 
 def _finish(
@@ -101,19 +189,16 @@ def _finish(
     gait = _gait(settings, source.tables, taken, {name: curve for name, (curve, _) in fitted.items()}, footfalls.events)
     said = [*remarks, *_remarks(curves, taken, left_out, footfalls.events)]
     said += knee_remarks(source.columns.knee, walk, settings.stature)
-    said += [*_zero_remarks(source.columns, means), *scatter_remarks(curves, errors)]
+    tilt = standing_tilt(means["shank_angle"], means["ankle_angle"])
+    sign, taken_off = source.columns.ankle_angle.sign_and_neutral()
+    # The reading of the file that would be neutral.
+    neutral = f"{float(np.degrees(taken_off)) + sign * tilt:.1f} deg"
+    said += zero_remarks(tilt, f"--ankle-neutral '{neutral}', or ankle_angle.neutral in a gait map, corrects it")
+    said += scatter_remarks(curves, errors)
     names = tuple(table.file for table in source.tables)
     return ImportedGait(
         gait, tuple(taken), tuple(left_out), curves, errors, footfalls.events, names, tuple(dict.fromkeys(said))
     )
-
-
-def _zero_remarks(columns: GaitMap, means: Mapping[str, Floats]) -> list[str]:
-    """Return what there is to say of the ankle's zero, with the reading that would be neutral."""
-    tilt = standing_tilt(means["shank_angle"], means["ankle_angle"])
-    sign, taken_off = columns.ankle_angle.sign_and_neutral()
-    neutral = float(np.degrees(taken_off)) + sign * tilt
-    return zero_remarks(tilt, f"--ankle-neutral '{neutral:.1f} deg', or ankle_angle.neutral in a gait map, corrects it")
 
 
 def _check_enough(strides: list[Stride], found: list[Stride], walk: Mapping[str, Signal], least: int) -> None:

@@ -1,17 +1,24 @@
-"""Tables of motion from OpenSim, CSV, C3D and TRC files in one form: time, and columns with the unit of the file."""
+"""Tables of motion from OpenSim, CSV, C3D and TRC files in one form: time, and columns with the unit of the file.
+
+A CSV file need not have the header ``name [unit]``: names alone or with the unit in brackets and any usual delimiter
+will do. Gaps are filled up to a length that the user states, each named.
+"""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from ppafo.errors import DataError
+from ppafo.errors import DataError, first_twice, one_line
 from ppafo.gait.recorded.c3d import Trial, read_c3d
-from ppafo.gait.recorded.plain_csv import is_plain, read_plain_csv
 from ppafo.signals.recording import Floats
+from ppafo.storage.column_map import ColumnMap, MappedChannel
 from ppafo.storage.comma_separated import read_csv
+from ppafo.storage.files import read_bytes
+from ppafo.storage.foreign import read_foreign
 from ppafo.storage.opensim import OpenSimTable, read_opensim_with_gaps
 from ppafo.storage.trc import read_trc
 
@@ -56,7 +63,9 @@ def read_table(
     elif suffix == ".csv":
         table = _of_csv(path)
     elif suffix == ".trc":
-        table = _of_trc(path)
+        trc = read_trc(path)
+        columns = {f"{name}.{axis}": xyz[row] for name, xyz in trc.markers.items() for row, axis in enumerate("xyz")}
+        table = MotionTable(str(path), TRC, trc.time, columns, dict.fromkeys(columns, trc.unit))
     elif suffix == ".c3d":
         found = read_c3d(path)
         table = MotionTable(str(path), C3D, found.time, found.columns, found.units, trial=found.trial)
@@ -66,11 +75,7 @@ def read_table(
         raise DataError(f"{table.file}: has {table.time.size} rows; a stride needs several tens")
     low = float(table.time[0] if start is None else start)
     high = float(table.time[-1] if end is None else end)
-    return _cut(_bridge_gaps(table, longest_gap, low, high), low, high)
-
-
-def _cut(table: MotionTable, low: float, high: float) -> MotionTable:
-    """Return the rows of a table between two times [s]."""
+    table = _bridge_gaps(table, longest_gap, low, high)
     inside = (table.time >= low) & (table.time <= high)
     if not inside.any():
         raise DataError(
@@ -123,12 +128,6 @@ def _of_csv(path: str | Path) -> MotionTable:
     return MotionTable(str(path), CSV, recording.time, columns, units, recording.kind)
 
 
-def _of_trc(path: str | Path) -> MotionTable:
-    found = read_trc(path)
-    columns = {f"{name}.{axis}": xyz[row] for name, xyz in found.markers.items() for row, axis in enumerate("xyz")}
-    return MotionTable(str(path), TRC, found.time, columns, dict.fromkeys(columns, found.unit))
-
-
 def _bridge_gaps(table: MotionTable, longest: float, low: float, high: float) -> MotionTable:
     """Return the table with a remark on rows missing between two times [s]; DataError where for too long."""
     steps = np.diff(table.time)
@@ -144,3 +143,82 @@ def _bridge_gaps(table: MotionTable, longest: float, low: float, high: float) ->
             )
     said = [f"rows from {table.time[i]:g} to {table.time[i + 1]:g} s are missing and were bridged" for i in jumps]
     return replace(table, remarks=(*table.remarks, *said))
+
+
+_DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab"}
+_NAME = re.compile(r"(.*?)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?")
+_TIMES = {"time": "s", "t": "s", "time_s": "s", "time_ms": "ms"}
+_LONGEST_SHOWN = 40
+
+Columns = tuple[Floats, dict[str, Floats], dict[str, str]]
+
+
+def is_plain(path: str | Path) -> bool:
+    """Tell whether the first column of a CSV file has a header without its unit in square brackets."""
+    return "[" not in re.split(r"[,;\t]", _header(path))[0]
+
+
+def read_plain_csv(path: str | Path) -> Columns:
+    """Return time [s], columns, and their units, empty where the header does not state one.
+
+    DataError names the line of what cannot be read.
+    """
+    header = _header(path)
+    delimiter = max(_DELIMITERS, key=header.count)
+    cells = [cell.strip().strip('"').strip() for cell in header.split(delimiter)]
+    pairs = [match.groups() for cell in cells if (match := _NAME.fullmatch(cell))]
+    names, units = [str(name) for name, _ in pairs], [unit or "" for _, unit in pairs]
+    if names[0].lower() not in _TIMES:
+        raise DataError(f"{path}: the first column must be 'time', it is {one_line(names[0])[:_LONGEST_SHOWN]!r}")
+    twice = first_twice(names)
+    if twice is not None or "" in names:
+        what = "a column has no name" if twice is None else f"there are two columns {one_line(twice)!r}"
+        raise DataError(f"{path}: {what}; every column needs a name of its own")
+    channels = {f"c{number}": MappedChannel(column=number + 1) for number in range(1, len(names))}
+    channels["time"] = MappedChannel(column=1, unit=units[0] or _TIMES[names[0].lower()])
+    mapped = ColumnMap(
+        delimiter=_DELIMITERS[delimiter],
+        decimal="point" if delimiter == "," or not re.search(r"\d,\d", _text(path)) else "comma",
+        channels=channels,
+    )
+    recording = read_foreign(path, mapped)
+    columns = {name: recording[f"c{number}"] for number, name in enumerate(names) if number > 0}
+    return recording.time, columns, dict(zip(names, units, strict=True))
+
+
+def _header(path: str | Path) -> str:
+    lines = (line for line in _text(path).splitlines() if line.strip() and not line.startswith("#"))
+    return next(lines, "")
+
+
+def _text(path: str | Path) -> str:
+    return read_bytes(path).decode("utf-8-sig", errors="replace")
+
+
+LONGEST_FILLED = 0.25
+"""Seconds; over a quarter of a stride no curve can be drawn through what was not seen."""
+
+
+def fill_gaps(table: MotionTable, names: Iterable[str], longest: float) -> MotionTable:
+    """Return the table with gaps of no longer than ``longest`` [s] in these columns filled by a cubic spline.
+
+    What is missing at the ends stays so, and longer gaps too: whoever uses the column refuses them.
+    """
+    from scipy.interpolate import CubicSpline
+
+    columns, said, time = dict(table.columns), [], table.time
+    for name in dict.fromkeys(names):
+        if name not in columns or longest <= 0.0:
+            continue
+        whole = columns[name].copy()
+        known = np.flatnonzero(np.isfinite(whole))
+        stretches = [(before + 1, after) for before, after in pairwise(known.tolist()) if after > before + 1]
+        short = [gap for gap in stretches if time[gap[1]] - time[gap[0] - 1] <= longest + 1e-9]
+        if not short:
+            continue
+        through = CubicSpline(time[known], whole[known])
+        for first, last in short:
+            whole[first:last] = through(time[first:last])
+            said.append(f"column '{name}': {last - first} samples from {time[first]:g} to {time[last - 1]:g} s filled")
+        columns[name] = whole
+    return replace(table, columns=columns, remarks=(*table.remarks, *said))

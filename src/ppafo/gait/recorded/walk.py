@@ -1,27 +1,347 @@
-"""A recorded walk: the curves of a gait over time, in SI units and in the signs of the package."""
+"""A recorded walk: the curves of a gait over time, in SI units and in the signs of the package.
 
-from collections.abc import Callable, Sequence
+Each is read from the one table that has its columns, from lines between markers (the lean of the shank, and the foot
+that turns against it), or, for the knee, from hip and thigh.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.gait.gait import REQUIRED
-from ppafo.gait.recorded.columns import LOADS, CurveColumns, find_columns
+from ppafo.errors import DataError, UnitError, nearest_name, one_line
+from ppafo.gait.gait import HARMONICS, REQUIRED, fit_curve
+from ppafo.gait.plausible import SignSource, other_sign
 from ppafo.gait.recorded.conventions import column_names
-from ppafo.gait.recorded.foot_markers import between_markers, foot_markers_angle
-from ppafo.gait.recorded.knee import knee_signals
 from ppafo.gait.recorded.mapping import (
     AngleMap,
     ForceMap,
     GaitMap,
+    KneeMap,
     MomentMap,
     PressureMap,
     ShankMap,
 )
-from ppafo.gait.recorded.signal import Signal, with_absence, without_ends
-from ppafo.gait.recorded.table import MotionTable
+from ppafo.gait.recorded.table import LONGEST_FILLED, OPENSIM, MotionTable
 from ppafo.signals.recording import Floats
+from ppafo.units import parse_quantity, to_si
+
+_MINIMUM_SAMPLES = 20
+_ORDER = 2
+_DOUBLE_PASS = (2.0**0.5 - 1.0) ** 0.25
+"""A filter passed twice has its -3 dB lower by this; so it is designed higher (Winter, Biomechanics, section 2.4)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Signal:
+    """Values over time [s], evenly enough sampled, of one file.
+
+    ``is_position``: a position [m], of which the gait has the acceleration.
+    ``columns`` are those of the file behind it. ``absent`` tells where a load was not measured, and counts as 0; None
+    where it always was.
+    """
+
+    file: str
+    time: Floats
+    values: Floats
+    is_position: bool = False
+    columns: tuple[str, ...] = ()
+    absent: NDArray[np.bool_] | None = None
+
+    @property
+    def rate(self) -> float:
+        """Samples per second [Hz]."""
+        return float((self.time.size - 1) / (self.time[-1] - self.time[0]))
+
+
+def without_ends(signal: Signal) -> Signal:
+    """Return a motion from its first to its last number: a marker that comes into view or leaves it."""
+    known = np.flatnonzero(np.isfinite(signal.values))
+    inside = slice(int(known[0]), int(known[-1]) + 1)
+    return replace(signal, time=signal.time[inside], values=signal.values[inside])
+
+
+def with_absence(signal: Signal) -> Signal:
+    """Return a load that is 0 where it was not measured, and that says so."""
+    absent = ~np.isfinite(signal.values)
+    return signal if not absent.any() else replace(signal, values=np.where(absent, 0.0, signal.values), absent=absent)
+
+
+def low_pass(signal: Signal, cut_off: float) -> Signal:
+    """Return the signal through a Butterworth filter passed forwards and backwards, -3 dB at ``cut_off`` [Hz].
+
+    DataError where it has too few samples.
+    """
+    from scipy.signal import butter, sosfiltfilt
+
+    if signal.time.size < _MINIMUM_SAMPLES:
+        raise DataError(f"{signal.file}: {signal.time.size} rows are too short for a stride; give a longer recording")
+    even = np.linspace(signal.time[0], signal.time[-1], signal.time.size)
+    relative = cut_off / _DOUBLE_PASS / (0.5 * signal.rate)
+    if relative >= 1.0:
+        raise DataError(
+            f"{signal.file}: cannot be low-passed at {cut_off:g} Hz: it has {signal.rate:.4g} samples a second; "
+            f"choose less than {0.5 * signal.rate * _DOUBLE_PASS:.3g} Hz"
+        )
+    sections = butter(_ORDER, relative, output="sos")
+    values = sosfiltfilt(sections, np.interp(even, signal.time, signal.values))
+    return replace(signal, time=even, values=np.asarray(values, dtype=np.float64))
+
+
+LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
+"""Where they were not measured, off a force plate, is no gap."""
+
+_KNEE = "knee_angle_"
+_LONGEST_SHOWN = 12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CurveColumns:
+    """The table of a curve, its columns with their signs, and the key that states their unit in a gait map."""
+
+    unit_key: str
+    table: MotionTable
+    terms: tuple[tuple[float, str], ...]
+    may_be_absent: bool = False
+
+    def in_unit(self, stated: str | None, si_units: Sequence[str]) -> tuple[Floats, str]:
+        """Return the sum of the terms in the first SI unit that fits, and that unit. DataError where none fits."""
+        total = np.zeros(self.table.time.size)
+        chosen = si_units[0]
+        for sign, name in self.terms:
+            values, chosen = self._column(name, stated, si_units)
+            total += sign * values
+        return total, chosen
+
+    def _column(self, name: str, stated: str | None, si_units: Sequence[str]) -> tuple[Floats, str]:
+        place = f"{self.table.file}: column {name!r}"
+        unit = stated or self.table.units[name]
+        values = self.table.columns[name]
+        if not self.may_be_absent:
+            check_finite(values, place, self.table.time)
+        if not unit:
+            raise DataError(f"{place}: the file does not state its unit; give {self.unit_key} in a gait map")
+        given = "" if unit == "-" else unit
+        problem = ""
+        for si_unit in si_units:
+            try:
+                zero, one = (to_si(number, given, si_unit) for number in (0.0, 1.0))
+            except UnitError as error:
+                problem = problem or str(error)
+                continue
+            return zero + (one - zero) * values, si_unit
+        raise DataError(f"{place} [{unit}]: {problem}")
+
+
+def check_finite(values: Floats, place: str, time: Floats) -> None:
+    """Raise DataError for a column with a gap within its ``time`` [s]; ``place`` is what the message calls it."""
+    known = np.flatnonzero(np.isfinite(values))
+    if known.size == 0:
+        raise DataError(f"{place} contains no numbers; use another file, or map another column")
+    first = int(known[0])
+    bad = first + np.flatnonzero(~np.isfinite(values[first : int(known[-1]) + 1]))
+    if bad.size:
+        row, longest = int(bad[0]), float(np.max(np.diff(time[known])))
+        needed = math.ceil(100.0 * longest - 1e-6) / 100.0
+        remedy = f"(--fill-gaps '{needed:g} s', or --start, --end)"
+        if longest > LONGEST_FILLED:
+            remedy = f"(--start, --end): {longest:.3g} s are too long to be filled here"
+        raise DataError(
+            f"{place} has a gap of {bad.size} samples, the first in row {row + 1} at {time[row]:g} s; "
+            f"fill it or cut the file there {remedy}"
+        )
+
+
+def find_columns(
+    curve: str, names: Sequence[str], tables: Sequence[MotionTable], optional: bool, is_default: bool
+) -> CurveColumns | None:
+    """Return the one table that has every column of a curve; None where it may be missing and no table has one.
+
+    The sign of the knee is detected only with the map of the package (``is_default``): a user's map states it.
+    """
+    bare = [name.removeprefix("-") for name in names]
+    holders = [table for table in tables if all(name in table.columns for name in bare)]
+    if len(holders) > 1:
+        files = " and ".join(table.file for table in holders)
+        raise DataError(f"{curve}: both {files} have the column {bare[0]!r}; give one of them, or name another column")
+    if holders:
+        signs = [-1.0 if name.startswith("-") else 1.0 for name in names]
+        terms = tuple(zip(signs, bare, strict=True))
+        if is_default and holders[0].form == OPENSIM:
+            # Where its flexion counts above 0, as in the newer OpenSim models, the knee is taken away.
+            terms = tuple(
+                (-sign if name.startswith(_KNEE) and np.nanmax(values) > -np.nanmin(values) else sign, name)
+                for sign, name in terms
+                for values in (holders[0].columns[name],)
+            )
+        return CurveColumns(f"{curve}.unit", holders[0], terms, curve in LOADS)
+    if optional and not any(name in table.columns for name in bare for table in tables):
+        return None
+    known = [name for table in tables for name in table.columns]
+    missing = next((name for name in bare if name not in known), bare[0])
+    shown = ", ".join(one_line(name) for name in known[:_LONGEST_SHOWN]) + (
+        ", ..." if len(known) > _LONGEST_SHOWN else ""
+    )
+    files = ", ".join(table.file for table in tables)
+    hint = nearest_name(missing, known)
+    why = f"there is no column {missing!r}{hint}" if missing not in known else "no file has all of its columns"
+    raise DataError(f"{curve}: {why} ({files}: {shown}); name the columns in a gait map, 'ppafo schema gait-map'")
+
+
+_SLOW = np.radians(25.0)
+"""Radians a second; a foot that turns less while the shank leans forward stands flat."""
+
+_LEAST_FLAT = 0.1
+"""Seconds of flat foot that there must be to take the zero of the angle from."""
+
+
+def between_markers(found: CurveColumns, mapped: ShankMap | AngleMap, first: str, second: str) -> tuple[Floats, Floats]:
+    """Return how far the second marker is ahead of the first and above it, in the unit of the file."""
+    place = {name: found.table.columns[name] for _, name in found.terms}
+    for name, values in place.items():
+        check_finite(values, f"{found.table.file}: column {name!r}", found.table.time)
+    axis, vertical = mapped.forward.removeprefix("-"), mapped.vertical
+    sign = -1.0 if mapped.forward.startswith("-") else 1.0
+    ahead = sign * (place[f"{second}.{axis}"] - place[f"{first}.{axis}"])
+    return ahead, place[f"{second}.{vertical}"] - place[f"{first}.{vertical}"]
+
+
+def foot_markers_angle(found: CurveColumns, mapped: AngleMap, shank: Signal) -> Signal:
+    """Return the ankle angle [rad] of a line from heel to toes: flat, 90 deg plus the shank, less the neutral one."""
+    ahead, up = between_markers(found, mapped, str(mapped.heel), str(mapped.toe))
+    pitch = Signal(found.table.file, found.table.time, np.arctan2(up, ahead))
+    seen = without_ends(pitch)
+    inside = (seen.time >= shank.time[0]) & (seen.time <= shank.time[-1])
+    time, values = seen.time[inside], seen.values[inside]
+    lean = np.interp(time, shank.time, shank.values)
+    flat = np.zeros(time.size, dtype=np.bool_)
+    if time.size >= 3:
+        flat = (np.abs(np.gradient(values, time)) < _SLOW) & (np.gradient(lean, time) < 0.0)
+    if np.count_nonzero(flat) < _LEAST_FLAT * seen.rate:
+        raise DataError(
+            f"{found.table.file}: the line from {mapped.heel!r} to {mapped.toe!r} never stands still while the "
+            "shank leans forward, so the zero of the ankle is unknown; give the angle itself in ankle_angle.terms "
+            "of a gait map"
+        )
+    sign, neutral = mapped.sign_and_neutral()
+    angle = 0.5 * np.pi + lean - (values - float(np.median(values[flat]))) - sign * neutral
+    return Signal(found.table.file, time, angle)
+
+
+THIGH_FRACTION = 0.245
+"""Hip to knee as a fraction of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th
+ed. 2009."""
+
+_LENGTHS = (0.2, 0.7)
+_FASTEST_BACK = 0.2
+"""Metres a second that a walker may lose on a treadmill, over the whole recording."""
+
+
+def knee_signals(
+    mapped: KneeMap, tables: Sequence[MotionTable], stature: float | None, is_default: bool
+) -> dict[str, Signal]:
+    """Return ``knee_forward`` and ``knee_up``, each a position [m] or an acceleration [m/s^2].
+
+    With a thigh they are the way of the hip and that of the knee about it: in the plane, with the hip where the columns
+    of the map say it is. DataError where a column, unit or length is missing or does not fit.
+    """
+    if mapped.thigh is not None and mapped.thigh_length is None and stature is None:
+        if is_default:
+            return {}
+        raise DataError("knee.thigh needs a length: give knee.thigh_length in the gait map, or the stature")
+    thigh = mapped.thigh or ()
+    found = find_columns("knee", (*mapped.forward, *mapped.up, *thigh), tables, is_default, is_default)
+    if found is None:
+        return {}
+    ends = len(mapped.forward), len(mapped.forward) + len(mapped.up)
+    forward, unit = replace(found, terms=found.terms[: ends[0]]).in_unit(mapped.unit, ("m/s^2", "m"))
+    up, other = replace(found, terms=found.terms[slice(*ends)]).in_unit(mapped.unit, ("m/s^2", "m"))
+    if mapped.thigh is not None:
+        if "m/s^2" in (unit, other):
+            raise DataError(f"{found.table.file}: knee.thigh is added to positions of the hip in m, not to m/s^2")
+        leaning = replace(found, terms=found.terms[ends[1] :], unit_key="knee.thigh_unit")
+        lean, _ = leaning.in_unit(mapped.thigh_unit, ("rad",))
+        for values, terms in ((forward, mapped.forward), (up, mapped.up)):
+            if np.ptp(values) == 0.0:
+                raise DataError(
+                    f"{found.table.file}: the hip does not move ({', '.join(terms)} is constant), and without its "
+                    "motion that of the knee is unknown; omit the stature, or knee in the gait map"
+                )
+        forward, up = knee_position(forward, up, lean, _thigh_length(mapped, stature))
+    file, time = found.table.file, found.table.time
+    columns = tuple(dict.fromkeys(name for _, name in found.terms))
+    return {
+        "knee_forward": Signal(file, time, forward, unit == "m", columns),
+        "knee_up": Signal(file, time, up, other == "m", columns),
+    }
+
+
+def knee_remarks(mapped: KneeMap | None, walk: Mapping[str, Signal], stature: float | None) -> list[str]:
+    """Return where the acceleration of the knee comes from, or why there is none; ``stature`` [m].
+
+    DataError for a length of the thigh that is not plausible.
+    """
+    if mapped is None:
+        return []
+    if "knee_forward" not in walk:
+        what = "no acceleration of the knee: it needs a length of the thigh; give --stature, or a gait map with "
+        return [f"{what}knee.thigh_length"] if mapped.thigh is not None else []
+    remarks = []
+    if mapped.thigh is not None and mapped.thigh_length is None:
+        remarks.append(
+            f"thigh of {_thigh_length(mapped, stature):.3f} m: {THIGH_FRACTION:g} of the stature (Winter 2009)"
+        )
+    if walk["knee_forward"].is_position:
+        remarks.append(
+            f"acceleration of the knee from a series of {HARMONICS['knee_forward']} harmonics of its position"
+        )
+    return remarks
+
+
+def check_way(walk: Mapping[str, Signal], signs_from: SignSource) -> None:
+    """Raise DataError for a knee that moves backwards; on a treadmill it stays about where it is."""
+    knee = walk.get("knee_forward")
+    if knee is None or not knee.is_position:
+        return
+    speed = float((knee.values[-1] - knee.values[0]) / (knee.time[-1] - knee.time[0]))
+    if speed < -_FASTEST_BACK:
+        raise DataError(
+            f"{knee.file}: the knee goes back by {-speed:.2g} m/s: knee.forward points against the "
+            "direction of walking; "
+            f"{other_sign(signs_from, 'the sign of knee.forward')}"
+        )
+
+
+def knee_position(hip_forward: Floats, hip_up: Floats, lean: Floats, thigh_length: float) -> tuple[Floats, Floats]:
+    """Return where the knee is, forward and up [m]; the thigh leans by this [rad], above 0 with the knee in front."""
+    return hip_forward + thigh_length * np.sin(lean), hip_up - thigh_length * np.cos(lean)
+
+
+def acceleration_of(position: Floats, harmonics: int, stride_time: float) -> Floats:
+    """Return the acceleration [m/s^2] of a position [m] over one stride of this time [s], at as many phases.
+
+    The mean speed is taken out, a Fourier series fitted, and the series differentiated twice.
+    """
+    phase = np.linspace(0.0, 1.0, position.size)
+    curve, _ = fit_curve(position - (position[-1] - position[0]) * phase, harmonics)
+    return curve.derivative(stride_time).derivative(stride_time).values_at(phase)
+
+
+def _thigh_length(mapped: KneeMap, stature: float | None) -> float:
+    if mapped.thigh_length is None:
+        return THIGH_FRACTION * (stature or 0.0)
+    place, (low, high) = f"knee.thigh_length = {mapped.thigh_length!r}", _LENGTHS
+    try:
+        length = parse_quantity(mapped.thigh_length, "m")
+    except UnitError as error:
+        raise DataError(f"{place}: {error}") from error
+    if not low <= length <= high:
+        raise DataError(f"{place} is not plausible; a thigh is {low:g} to {high:g} m long")
+    return length
+
 
 _RIGHT_ANGLE = 0.5 * np.pi
 
@@ -64,17 +384,12 @@ def walk_signals(
 
 def _shank(found: CurveColumns, mapped: ShankMap, _body_mass: float) -> Signal:
     if mapped.terms is None:
-        values = _marker_angle(found, mapped)
+        ahead, up = between_markers(found, mapped, str(mapped.knee), str(mapped.ankle))
+        values = np.asarray(np.arctan2(ahead, -up), dtype=np.float64)
     else:
         values, _ = found.in_unit(mapped.unit, ("rad",))
     sign = 1.0 if mapped.positive == "ankle_in_front" else -1.0
     return Signal(found.table.file, found.table.time, sign * values)
-
-
-def _marker_angle(found: CurveColumns, mapped: ShankMap) -> Floats:
-    """Return the lean of the line from knee to ankle, above 0 while the ankle is in front."""
-    ahead, up = between_markers(found, mapped, str(mapped.knee), str(mapped.ankle))
-    return np.asarray(np.arctan2(ahead, -up), dtype=np.float64)
 
 
 def _ankle(found: CurveColumns, mapped: AngleMap, _body_mass: float) -> Signal:

@@ -7,7 +7,7 @@ from typing import Any
 from ppafo.answers import Column, Figure, Section, Table
 from ppafo.answers.display_units import display_value
 from ppafo.errors import DataError
-from ppafo.gait.scaling import speed_range
+from ppafo.gait.gait import speed_range
 from ppafo.walking.comparison import Comparison
 from ppafo.walking.configuration import Configuration
 from ppafo.walking.course_segments import SegmentResult, is_whole_course
