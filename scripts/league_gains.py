@@ -36,11 +36,11 @@ from ppafo.simulation.plan import controller_parameters
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import Control, Scenario
 from ppafo.simulation.simulate import simulate_many
-from ppafo.walking import Configuration, load_walk
-from ppafo.walking.planning import plan_walk
+from ppafo.walking import load_walk
+from ppafo.walking.motion import walk_of
+from ppafo.walking.planning import law_of, plan_walk
 from ppafo.walking.posture import ankle_path
 from ppafo.walking.recorded import PHASE_ROW, REQUEST_ROW, VENTINGS_ROW
-from ppafo.walking.walk import plan_of
 
 GAS_PRICE = 1.0e3
 """N m of RMS error (in push-off where it walks) that a kilogram of gas (in a stride) is worth: 1 N m per gram."""
@@ -150,22 +150,22 @@ class WalkJudgement:
         return np.asarray(np.where(self.is_good, self.error + bought, FAILED))
 
 
-def walks_to_judge(kind: str) -> tuple[Configuration, ...]:
+def walks_to_judge(kind: str) -> tuple[Scenario, ...]:
     """The shipped wearer with a controller: an ideal valve, and a slow one with noise on the sensors."""
     valve, slow = VALVES.get(kind, ("proportional", SLOW_VALVE))
     chosen = f"controller.kind={kind}"
     return load_walk(valve, [chosen]), load_walk(valve, [chosen, *slow, *NOISE])
 
 
-def judge_walks(configuration: Configuration, settings: Mapping[str, float | Floats], walks: int) -> WalkJudgement:
+def judge_walks(configuration: Scenario, settings: Mapping[str, float | Floats], walks: int) -> WalkJudgement:
     """Walks of a configuration with other settings of its controller, SI units, each a number or an array (walks,)."""
-    run = plan_walk(replace(plan_of(configuration, SECONDS), record_interval=RECORD_INTERVAL))
-    controller = controller_parameters(configuration.controller, settings)
+    run = plan_walk(replace(configuration, duration=SECONDS, output_interval=RECORD_INTERVAL))
+    controller = controller_parameters(law_of(configuration), settings)
     ((_, batch),) = batches_of(replace(run, controller=controller), walks)
     outcome = run_batch(batch)
     rows = state_row_numbers(run)
     states = {name: outcome.states[row] for name, row in rows.items()}
-    samples = round(STRIDES * configuration.gait.stride_time / RECORD_INTERVAL)
+    samples = round(STRIDES * walk_of(configuration).gait.stride_time / RECORD_INTERVAL)
     late = outcome.record[-samples - 1 :]
     good = (states["result.failure_time"] >= NEVER_FAILED) & np.isfinite(outcome.states).all(axis=0)
     vented = states.get(VENTINGS_ROW, np.zeros(walks)) > 0.0
@@ -196,12 +196,12 @@ def _push_off_error(run: Run, rows: Mapping[str, int], record: Floats) -> Floats
     return np.asarray(np.sqrt((error**2 * pushes).sum(axis=0) / np.maximum(pushes.sum(axis=0), 1)))
 
 
-def _lowest_toes(configuration: Configuration, run: Run, rows: Mapping[str, int], record: Floats) -> Floats:
+def _lowest_toes(configuration: Scenario, run: Run, rows: Mapping[str, int], record: Floats) -> Floats:
     """Lowest toes over the ground [m] in mid-swing."""
     assert run.walk is not None, "a walk has a leg"
     timing = run.walk.timing
     phase = record[:, rows["walk.now.phase"]]
-    path = ankle_path(configuration.gait, timing, configuration.wearer)
+    path = ankle_path(walk_of(configuration).gait, timing, walk_of(configuration).wearer)
     height = path.toe_height(phase, record[:, rows["walk.now.shank"]], record[:, rows["state.angle"]])
     return np.asarray(
         np.where((phase >= timing.clearance_from) & (phase <= timing.clearance_to), height, 1.0).min(axis=0)

@@ -33,7 +33,8 @@ from ppafo.simulation.result import Result
 from ppafo.simulation.simulate import simulate
 from ppafo.units import parse_quantity
 from ppafo.walking.loading import load_walk
-from ppafo.walking.walk import WalkResult, walk
+from ppafo.walking.result import WalkResult
+from ppafo.walking.walk import walk
 from scripts.page_states import address_of, disagreements, hard_states, mutated, random_changes
 
 READY = '[data-ready="true"]'

@@ -30,14 +30,14 @@ from ppafo.errors import PpafoError
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.c_library.program import COUNTS
-from ppafo.exports.loading import load_exportable
 from ppafo.exports.wasm.description import description_of
 from ppafo.live.content import page_content, program_content
+from ppafo.loading import load_scenario
 from ppafo.parameters.graph import ATMOSPHERE_PATH, counts_from
 from ppafo.questions.sweep.chunks import drawn_values, varied_columns
 from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import plan_ensemble
-from ppafo.simulation.loading import list_scenarios, load_scenario
+from ppafo.simulation.loading import list_scenarios
 from ppafo.simulation.numbers import TIMES, with_numbers
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
@@ -45,7 +45,6 @@ from ppafo.studies.loading import load_study
 from ppafo.studies.varying import varied_path
 from ppafo.units import parse_quantity
 from ppafo.walking import list_walks
-from ppafo.walking.configuration import Configuration
 from ppafo.worlds.gym.environments import TARGETS
 from ppafo.worlds.gym.episodes import FromOutside, scenario_episodes
 from scripts.typed_words import (
@@ -191,7 +190,7 @@ def _handed(values: np.ndarray) -> _Handed:
 class BuiltLibrary:
     """The exported library of a scenario or walk, whose functions are called from here."""
 
-    def __init__(self, item: Scenario | Configuration, folder: Path) -> None:
+    def __init__(self, item: Scenario | Scenario, folder: Path) -> None:
         self.library = library_of(item)
         for file, content in library_files(self.library).items():
             (folder / file).write_bytes(content)
@@ -229,7 +228,7 @@ class BuiltLibrary:
 
 def at_library(name: str, count: int, seed: int) -> Judged:
     """Settings of an exported library in C, as FMU and plugin have them: SI units, all others as they are."""
-    found, base = Judged(), load_exportable(name)
+    found, base = Judged(), load_scenario(name)
     with tempfile.TemporaryDirectory() as folder:
         built = BuiltLibrary(base, Path(folder))
         for words in settings_of(name, count, seed):
@@ -245,7 +244,7 @@ def at_library(name: str, count: int, seed: int) -> Judged:
     return found
 
 
-def _numbers_in_si(base: Scenario | Configuration, words: Words) -> dict[str, float]:
+def _numbers_in_si(base: Scenario | Scenario, words: Words) -> dict[str, float]:
     if isinstance(base, Scenario):
         return in_si(base, words)
     declared = {path: quantity for path, (quantity, _) in numbers_of_walk(base).items()}
@@ -257,7 +256,7 @@ def _numbers_in_si(base: Scenario | Configuration, words: Words) -> dict[str, fl
 
 def at_page(name: str, count: int, seed: int) -> Judged:
     """Texts typed on the page that simulates: its script makes numbers of them, which a program is given."""
-    found, base = Judged(), load_exportable(name)
+    found, base = Judged(), load_scenario(name)
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         built = BuiltLibrary(base, folder)

@@ -15,18 +15,15 @@ from ppafo.engine.lanes import Batch
 from ppafo.engine.run import batch_of
 from ppafo.errors import PpafoError
 from ppafo.exports.c_library.walk_preparation import settings_of_walk
-from ppafo.exports.loading import load_exportable
+from ppafo.loading import load_scenario
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.graph import ATMOSPHERE_PATH
-from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import TIMES, declared_numbers, number_at, other_form
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import from_si
 from ppafo.walking import list_walks, load_walk
-from ppafo.walking.configuration import Configuration
 from ppafo.walking.planning import plan_walk
-from ppafo.walking.walk import plan_of, walk_duration
 
 UNITS: Mapping[str, Sequence[str]] = {
     "s": ("s", "ms"),
@@ -102,7 +99,7 @@ def numbers_of(scenario: Scenario) -> dict[str, tuple[Quantity, float]]:
     }
 
 
-def numbers_of_walk(walk: Configuration) -> dict[str, tuple[Quantity, float]]:
+def numbers_of_walk(walk: Scenario) -> dict[str, tuple[Quantity, float]]:
     """The same of a walk; its length is given in minutes and its record follows from that."""
     apart = ("run.duration", "run.output_interval")
     return {item.path: (item.quantity, item.value) for item in settings_of_walk(walk) if item.path not in apart}
@@ -184,7 +181,7 @@ def single(name: str, words: Words, controller: Any = None) -> "Planned | str":
     try:
         if name in list_walks():
             walk = load_walk(name, texts)
-            return planned(batch_of(plan_walk(plan_of(walk, walk_duration(walk)))))
+            return planned(batch_of(plan_walk(walk)))
         scenario = load_scenario(name, texts)
         return planned(batch_of(plan_run(scenario if controller is None else scenario.controlled_by(controller))))
     except PpafoError as error:
@@ -194,7 +191,7 @@ def single(name: str, words: Words, controller: Any = None) -> "Planned | str":
 def settings_of(name: str, count: int, seed: int) -> Iterator[dict[str, str]]:
     """Settings of a scenario, the same for every door."""
     draw = random.Random(f"{name} {seed}")
-    scenario = load_exportable(name)
+    scenario = load_scenario(name)
     known = numbers_of(scenario) if isinstance(scenario, Scenario) else numbers_of_walk(scenario)
     for _ in range(count):
         paths = drawn_paths(list(known), draw)

@@ -22,17 +22,18 @@ from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.engine.lanes import Batch, run_batch
 from ppafo.engine.rows import leaf_paths, numbers
 from ppafo.engine.run import Run, batch_of
+from ppafo.loading import reloaded
 from ppafo.model import contact as ground
 from ppafo.model.gait_sensors import Fault, GaitSensors
 from ppafo.model.plant import chamber_pressures
 from ppafo.simulation.sampled import state_row_numbers
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.comparison import with_device_off
-from ppafo.walking.configuration import Configuration
-from ppafo.walking.fixed_point import converter_of_walk
 from ppafo.walking.loading import load_walk
-from ppafo.walking.planning import plan_walk
+from ppafo.walking.motion import walk_of
+from ppafo.walking.planning import converter_of_walk, gait_sensors_of, plan_walk
 from ppafo.walking.recorded import SAFE_ROW
-from ppafo.walking.walk import plan_of
+from ppafo.walking.varying import with_duration
 
 CONFIGURATIONS = ("solenoid", "proportional", "solenoid-regulators", "proportional-regulators")
 PHASES = 20
@@ -171,17 +172,18 @@ def failing(sensors: GaitSensors, faults: Kind) -> GaitSensors:
     return sensors._replace(**changed)
 
 
-def run(configuration: Configuration, faults: list[Kind], begins: Floats) -> Runs:
+def run(configuration: Scenario, faults: list[Kind], begins: Floats) -> Runs:
     """Run a configuration with every fault from every instant [s]; ``faults`` may be one that is empty."""
-    stride = configuration.gait.stride_time
-    sound = configuration.gait_sensors
+    stride = walk_of(configuration).gait.stride_time
+    sound = gait_sensors_of(configuration)
     sensors = [
         failing(sound, {sensor: fault._replace(time=float(time)) for sensor, fault in kind.items()})
         for kind in faults
         for time in begins
     ]
-    first = replace(configuration, gait_sensors=sound._replace(heel_fault=late(LATEST)._replace(time=1.0e8)))
-    plan = plan_walk(plan_of(first, (FIRST + 1.0 + AFTER) * stride))
+    delay = LATEST * configuration.control.period
+    late_heel = ["faults.heel.kind=distorted", "faults.heel.time=1e6 s", f"faults.heel.delay={delay!r} s"]
+    plan = plan_walk(with_duration(reloaded(configuration, late_heel), (FIRST + 1.0 + AFTER) * stride))
     single = batch_of(plan)
     paths = [path for group, row in single.program.parameter_rows().items() for path in leaf_paths(row, group)]
     places = [paths.index(path) for path in leaf_paths(GaitSensors, "gait_sensors")]
@@ -242,10 +244,10 @@ def verdicts(kind_names: list[str], runs: dict[str, Runs], lowest: dict[str, flo
     return table
 
 
-def toes_of_bare(configuration: Configuration) -> float:
+def toes_of_bare(configuration: Scenario) -> float:
     """Lowest toes in mid-swing against the healthy ones [m], with the device off."""
-    stride = configuration.gait.stride_time
-    bare = plan_walk(plan_of(with_device_off(configuration), (FIRST + 1.0 + AFTER) * stride))
+    stride = walk_of(configuration).gait.stride_time
+    bare = plan_walk(with_duration(with_device_off(configuration), (FIRST + 1.0 + AFTER) * stride))
     batch = batch_of(bare)
     record = run_batch(replace(batch, clock=replace(batch.clock, record_every=RECORD_EVERY))).record
     return float(judged(bare, record, state_row_numbers(bare), np.array([FIRST * stride]), stride)[2][0])
@@ -253,7 +255,7 @@ def toes_of_bare(configuration: Configuration) -> float:
 
 def compare_arithmetics() -> None:
     """Run ``event_on_off`` on either valve, with floats and on whole numbers, and print where they differ."""
-    stride = load_walk("solenoid").gait.stride_time
+    stride = walk_of(load_walk("solenoid")).gait.stride_time
     begins, every = (FIRST + np.arange(PHASES) / PHASES) * stride, kinds()
     for valve in ("solenoid", "proportional"):
         own = ("controller.kind=event_on_off", f"device.valve={valve}")
@@ -281,7 +283,7 @@ def compare_arithmetics() -> None:
                 print(f"  {what}: {counts}, within {ends[0]:.2f} and {ends[1]:.2f} strides, {harm}")
 
 
-def steps_of_converter(configuration: Configuration) -> tuple[str, ...]:
+def steps_of_converter(configuration: Scenario) -> tuple[str, ...]:
     """Overrides that give the sensors of a walk the steps of its converter."""
     converter = converter_of_walk(configuration)
     return (
@@ -300,7 +302,7 @@ def neither(runs: Runs, floor: float) -> NDArray[np.bool_]:
 
 def main() -> None:
     """Run all and print the table."""
-    stride = load_walk("solenoid").gait.stride_time
+    stride = walk_of(load_walk("solenoid")).gait.stride_time
     begins = (FIRST + np.arange(PHASES) / PHASES) * stride
     every = kinds()
     runs, lowest = {}, {}

@@ -30,8 +30,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from ppafo.exports import wasm
 from ppafo.exports.c_library import library_of
-from ppafo.exports.loading import load_exportable
 from ppafo.exports.wasm import module_of
+from ppafo.loading import load_scenario
 from ppafo.simulation.loading import list_scenarios
 from ppafo.walking.loading import list_walks
 from tests.modules_under_node import compared, drawn, drawn_walks
@@ -50,7 +50,7 @@ def shipped_programs() -> dict[str, bytes]:
     """Files of the programs and of their index, built from the physics as it is now; two runs may share a program."""
     programs, contents = {}, {}
     for name in shipped():
-        text = wasm.source_of(library_of(load_exportable(name)))
+        text = wasm.source_of(library_of(load_scenario(name)))
         digest = wasm.digest_of(text)
         if digest not in programs:
             programs[digest] = f"{name}.wasm"
@@ -77,7 +77,7 @@ def write(is_check: bool) -> int:
 def compare(names: list[str], draws: int) -> int:
     """Print how many drawn runs of each had the bits of Python; AssertionError where one had not."""
     for name in names:
-        module = module_of(load_exportable(name))
+        module = module_of(load_scenario(name))
         settings = drawn_walks(module, draws) if name in list_walks() else drawn(module, draws)
         ended = Counter(compared(name, module, settings))
         print(
@@ -90,7 +90,7 @@ def time_programs(names: list[str]) -> int:
     """Print the table of sizes and times."""
     print("| program | kB | gzip | ready | first run | run | map | per run |\n|---|---|---|---|---|---|---|---|")
     for name in names:
-        module = module_of(load_exportable(name))
+        module = module_of(load_scenario(name))
         runs = _map(module.description["settings"], SIDE_OF_WALKS if name in list_walks() else SIDE)
         found = _timed(module.wasm, {**module.description, "runs": runs})
         size, packed = len(module.wasm) / 1e3, len(gzip.compress(module.wasm, 9)) / 1e3

@@ -18,7 +18,9 @@ from ppafo.simulation.result import Result
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate_many
 from ppafo.walking import load_walk
-from ppafo.walking.walk import WalkResult, record_interval, walk
+from ppafo.walking.result import WalkResult
+from ppafo.walking.varying import record_interval
+from ppafo.walking.walk import walk
 
 Floats = NDArray[np.float64]
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     )
     from ppafo.gait import Gait, list_gaits, load_gait
     from ppafo.live.workbench import workbench
+    from ppafo.loading import load_scenario
     from ppafo.metrics import Metric, evaluate
     from ppafo.model.sensors import Measurement
     from ppafo.parameters import ParameterSet, apply_overrides, list_sets, load_device, load_parameter_set
@@ -61,7 +62,7 @@ if TYPE_CHECKING:
     from ppafo.questions.unreported.solve import infer_settings
     from ppafo.questions.validate.solve import Validation, validate
     from ppafo.signals import Channel, Recording
-    from ppafo.simulation.loading import list_scenarios, load_scenario, scenario_from_dict
+    from ppafo.simulation.loading import list_scenarios, scenario_from_dict
     from ppafo.simulation.result import Result, Status
     from ppafo.simulation.scenario import Scenario
     from ppafo.simulation.simulate import simulate, simulate_many
@@ -181,7 +182,8 @@ _HOMES = {
     "ppafo.parameters.device": ("Device",),
     "ppafo.parameters.parts": ("Catalogue", "Part", "load_catalogue"),
     "ppafo.signals": ("Channel", "Recording"),
-    "ppafo.simulation.loading": ("list_scenarios", "load_scenario", "scenario_from_dict"),
+    "ppafo.loading": ("load_scenario",),
+    "ppafo.simulation.loading": ("list_scenarios", "scenario_from_dict"),
     "ppafo.simulation.result": ("Result", "Status"),
     "ppafo.simulation.scenario": ("Scenario",),
     "ppafo.simulation.simulate": ("simulate", "simulate_many"),

@@ -9,6 +9,7 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.walking import load_walk
+from ppafo.walking.planning import gait_sensors_of, has_ideal_sensors
 
 PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "let-it-walk.md").read_text(encoding="utf-8")
 
@@ -52,6 +53,6 @@ def test_the_walk_file_of_the_page_loads(tmp_path: Path) -> None:
     path = tmp_path / "stiff-ankle.toml"
     path.write_text(blocks("toml")[0])
     configuration = load_walk(path)
-    assert configuration.settings["push_off_start"] == pytest.approx(0.42)
-    assert configuration.gait_sensors.heel_fault.time == pytest.approx(3.0)
-    assert not configuration.has_ideal_sensors
+    assert configuration.control.settings["push_off_start"] == pytest.approx(0.42)
+    assert gait_sensors_of(configuration).heel_fault.time == pytest.approx(3.0)
+    assert not has_ideal_sensors(configuration)

@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.walking.motion import walk_of
+
 Floats = NDArray[np.float64]
 Column = list[float]
 
@@ -175,7 +177,11 @@ class Numbers(NamedTuple):
 
 def numbers_of(walk: Any) -> Numbers:
     """The numbers of a walk on its bottle."""
-    device, lines, supply = walk.configuration.device, walk.configuration.supply_lines, walk.configuration.bottle
+    device, lines, supply = (
+        walk.scenario.device,
+        walk.scenario.supply_lines,
+        walk_of(walk.scenario).bottle,
+    )
     bottle, actuator = supply.bottle, device.actuator
     valve, leak = device.valve.orifice, actuator.leak
     return Numbers(
@@ -221,7 +227,7 @@ def coil_positions(commands: Floats, wanted: Any, interval: float) -> NDArray[np
 
 def start_of(walk: Any, n: Numbers, gas: Fluid) -> Column:
     """Everything at the bottle's temperature, lines at their regulators' pressures, chambers vented."""
-    supply, angle = walk.configuration.bottle, float(walk.recording["angle"][0])
+    supply, angle = walk_of(walk.scenario).bottle, float(walk.recording["angle"][0])
     parts = [supply.temperature, supply.mass, *(supply.temperature,) * 3, 0.0]
     product = n.constant * rates([*parts, *(1.0e-6,) * 4], angle, False, False, n, gas)[1]
     lines = [n.set_1 * n.line_1 / product, n.set_2 * n.line_2 / product]

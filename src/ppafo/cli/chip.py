@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from ppafo.exports.firmware.plant import BoardsRun
     from ppafo.exports.firmware.walking.lock_step import WalkOnChip
     from ppafo.simulation.scenario import Scenario
-    from ppafo.walking.configuration import Configuration
 
 _SHOWN = {"rms_error": ("N m", 1.0), "gas_supplied": ("g", 1.0e3)}
 MOST_SAMPLES = 10_000_000
@@ -95,13 +94,13 @@ class _Told:
 
 def _one(parsed: argparse.Namespace) -> _Told:
     """Scenarios or one walk on one target."""
-    from ppafo.exports.loading import load_exportable
-    from ppafo.simulation.scenario import Scenario
+    from ppafo.loading import load_scenario
+    from ppafo.simulation.scenario import worn_kind
 
-    every = [load_exportable(name, parsed.overrides) for name in parsed.scenarios]
+    every = [load_scenario(name, parsed.overrides) for name in parsed.scenarios]
     if len(every) == 1:
-        return _scenario(every[0], parsed) if isinstance(every[0], Scenario) else _walk(every[0], parsed)
-    scenarios = [chosen for chosen in every if isinstance(chosen, Scenario)]
+        return _scenario(every[0], parsed) if worn_kind(every[0]) is None else _walk(every[0], parsed)
+    scenarios = [chosen for chosen in every if worn_kind(chosen) is None]
     if parsed.plant or parsed.samples is not None or len(scenarios) < len(every):
         raise ScenarioError(
             "several SCENARIOs: are run in turn and drawn in one figure; give one for a walk, --samples or --plant"
@@ -147,7 +146,7 @@ def _scenario(scenario: "Scenario", parsed: argparse.Namespace) -> _Told:
     return _Told(text, {"scenario": scenario.name, "target": target, **document}, agrees)
 
 
-def _walk(configuration: "Configuration", parsed: argparse.Namespace) -> _Told:
+def _walk(configuration: "Scenario", parsed: argparse.Namespace) -> _Told:
     """A walk on the chip."""
     from ppafo.exports.firmware.walking.lock_step import compare_drawn_walk, walk_on_chip
 
@@ -161,7 +160,7 @@ def _walk(configuration: "Configuration", parsed: argparse.Namespace) -> _Told:
             raise ScenarioError("--minutes: drawn samples take the place of a walk; leave out one of both")
         drawn = compare_drawn_walk(configuration, parsed.samples)
         head = f"{drawn.samples} drawn samples of the controller of {name} on the chip's simulator"
-        lines = [head, "", *_cost_lines(drawn.cost, configuration.period), _decisions(drawn, "Python")]
+        lines = [head, "", *_cost_lines(drawn.cost, configuration.control.period), _decisions(drawn, "Python")]
         lines += [f"the first: {drawn.first_difference}"] if drawn.differences else []
         text, document, agrees = "\n".join(lines), _drawn_document(drawn), not drawn.differences
     else:
@@ -170,12 +169,12 @@ def _walk(configuration: "Configuration", parsed: argparse.Namespace) -> _Told:
     return _Told(text, {"walk": name, "target": target, **document}, agrees)
 
 
-def _of_walk(found: "WalkOnChip", configuration: "Configuration") -> str:
+def _of_walk(found: "WalkOnChip", configuration: "Scenario") -> str:
     """The walk in words."""
     lines = [
         f"{configuration.name} with the controller on the chip's simulator, the lanes as the plant",
         "",
-        *_cost_lines(found.cost, configuration.period),
+        *_cost_lines(found.cost, configuration.control.period),
         _decisions(found, "the lanes"),
         f"recording   {'the same bits' if found.same_bits else 'NOT the same bits'} as without the chip",
         f"in the end  {('helps', 'lifts the foot only', 'pauses', 'has stopped')[found.level]}",

@@ -93,9 +93,9 @@ def run(parsed: argparse.Namespace) -> int:
 
 def _library(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
     from ppafo.exports.c_library import c_library
-    from ppafo.exports.loading import load_exportable
+    from ppafo.loading import load_scenario
 
-    contents = c_library(load_exportable(parsed.scenario, parsed.overrides))
+    contents = c_library(load_scenario(parsed.scenario, parsed.overrides))
     return contents, f"make -C {shlex.quote(str(parsed.out))} check"
 
 
@@ -110,11 +110,11 @@ def _controller(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
 def _unit(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
     from ppafo.exports.fmu import closed_loop, functional_unit
     from ppafo.exports.fmu.plant import plant_alone
-    from ppafo.exports.loading import load_exportable
+    from ppafo.loading import load_scenario
 
     platforms = _platforms(parsed)
     interface = {"loop": closed_loop, "plant": plant_alone}[parsed.interface]
-    contents = functional_unit(interface(load_exportable(parsed.scenario, parsed.overrides)), parsed.fmi, platforms)
+    contents = functional_unit(interface(load_scenario(parsed.scenario, parsed.overrides)), parsed.fmi, platforms)
     return contents, f"fmpy simulate {shlex.quote(str(parsed.out / next(iter(contents))))} --show-plot"
 
 
@@ -137,13 +137,14 @@ def _platforms(parsed: argparse.Namespace) -> list[str]:
 def _torque(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
     from ppafo.exports.opensim import check_strikes, opensim_files
     from ppafo.walking.loading import load_walk
+    from ppafo.walking.motion import walk_of
     from ppafo.walking.walk import walk
 
     strikes = () if parsed.strikes is None else _times(parsed.strikes)
     if parsed.strikes is not None:
         check_strikes(strikes)
     chosen = load_walk(parsed.scenario, parsed.overrides, parsed.gait)
-    few_strides = _FEW_STRIDES if chosen.course is None else None
+    few_strides = _FEW_STRIDES if walk_of(chosen).course is None else None
     result = walk(chosen, few_strides if parsed.minutes is None else parsed.minutes)
     contents = opensim_files(result, parsed.side, strikes)
     following = f"python {shlex.quote(str(parsed.out / 'add_device.py'))} MODEL.osim --out with-device.osim"

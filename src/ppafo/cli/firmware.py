@@ -40,11 +40,11 @@ def run(parsed: argparse.Namespace) -> int:
     from ppafo.exports.firmware import firmware
     from ppafo.exports.firmware.plant import plant_firmware
     from ppafo.exports.firmware.walking import walk_firmware
-    from ppafo.exports.loading import load_exportable
-    from ppafo.simulation.scenario import Scenario
+    from ppafo.loading import load_scenario
+    from ppafo.simulation.scenario import worn_kind
 
-    chosen = load_exportable(parsed.scenario, parsed.overrides)
-    if isinstance(chosen, Scenario):
+    chosen = load_scenario(parsed.scenario, parsed.overrides)
+    if worn_kind(chosen) is None:
         target = parsed.target or TARGETS[0]
         contents = (plant_firmware if parsed.plant else firmware)(chosen, target)
     else:

@@ -81,12 +81,12 @@ def run(parsed: argparse.Namespace) -> int:
     """Run the plant to its end; 1 where it was vented or diverged, 130 where Ctrl-C stopped it."""
     check_patience(parsed.patience)
     from ppafo.exports.hil.loop import stop_by_interrupt
-    from ppafo.exports.loading import load_exportable
-    from ppafo.simulation.scenario import Scenario
+    from ppafo.loading import load_scenario
+    from ppafo.simulation.scenario import worn_kind
     from ppafo.storage import check_result_folder
 
-    scenario = load_exportable(parsed.scenario, parsed.overrides)
-    if not isinstance(scenario, Scenario):
+    scenario = load_scenario(parsed.scenario, parsed.overrides)
+    if worn_kind(scenario) is not None:
         raise ScenarioError(
             f"'{scenario.name}' is a walk, and the wire carries no forces under the foot: give a scenario, or let a "
             f"simulated chip walk with 'ppafo chip {scenario.name} --set controller.arithmetic=fixed'"

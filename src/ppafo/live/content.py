@@ -14,12 +14,11 @@ from importlib.resources import files
 from typing import Any
 
 from ppafo.errors import UnitError
-from ppafo.exports.loading import Exportable
 from ppafo.exports.wasm import WasmModule
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.simulation.declaration import PRESSURE_WORDS
 from ppafo.simulation.overriding import apply_overrides, is_of_device, split_override
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.scenario import Scenario, worn_kind
 from ppafo.units import conversion, from_si, to_si
 from ppafo.version import __version__
 
@@ -60,7 +59,7 @@ _NICE = (1.0, 2.0, 2.5, 5.0, 10.0)
 class Simulated:
     """A scenario or walk and the module that simulates it; ``label`` tells it from others of its tab."""
 
-    scenario: Exportable
+    scenario: Scenario
     module: WasmModule
     label: str
 
@@ -104,13 +103,14 @@ def program_content(item: Simulated, module: str, intervals: Mapping[str, Interv
     }
 
 
-def usual_changes(scenario: Exportable) -> dict[str, str]:
+def usual_changes(scenario: Scenario) -> dict[str, str]:
     """Return the changes that a configuration of a page begins with, texts by key: a walk is short."""
-    if isinstance(scenario, Scenario):
+    if worn_kind(scenario) is None:
         return {}
-    from ppafo.walking.walk import SHORTEST_STRIDES
+    from ppafo.walking.motion import walk_of
+    from ppafo.walking.varying import SHORTEST_STRIDES
 
-    return {"run.duration": f"{max(_WALKED, math.ceil(SHORTEST_STRIDES * scenario.gait.stride_time))} s"}
+    return {"run.duration": f"{max(_WALKED, math.ceil(SHORTEST_STRIDES * walk_of(scenario).gait.stride_time))} s"}
 
 
 def _relations_of_files(told: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -134,14 +134,16 @@ def _relations_of_files(told: Mapping[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def _as_in_files(entry: Mapping[str, Any], item: Exportable) -> dict[str, Any]:
+def _as_in_files(entry: Mapping[str, Any], item: Scenario) -> dict[str, Any]:
     """A setting with what only Python knows of a walk: its stride and length, and which pressures are absolute."""
-    if not isinstance(item, Scenario) and entry["key"] == _FIRST_STRIDE:
-        return {**entry, "minimum": 0.5 * item.gait.stride_time, "maximum": 2.0 * item.gait.stride_time}
-    if not isinstance(item, Scenario) and entry["key"] == "run.duration":
-        from ppafo.walking.walk import LONGEST_MINUTES, SHORTEST_STRIDES
+    if worn_kind(item) is not None and entry["key"] in (_FIRST_STRIDE, "run.duration"):
+        from ppafo.walking.motion import walk_of
+        from ppafo.walking.varying import LONGEST_MINUTES, SHORTEST_STRIDES
 
-        shortest = SHORTEST_STRIDES * item.gait.stride_time
+        stride = walk_of(item).gait.stride_time
+        if entry["key"] == _FIRST_STRIDE:
+            return {**entry, "minimum": 0.5 * stride, "maximum": 2.0 * stride}
+        shortest = SHORTEST_STRIDES * stride
         return {**entry, "minimum": shortest, "maximum": 60.0 * LONGEST_MINUTES, "is_minimum_allowed": True}
     if entry["group"] == "controller" and entry["display"]["unit"] == "psi_g":
         return {**entry, "display": {**entry["display"], "unit": "psi_a", "zero": 0.0}}
@@ -264,7 +266,7 @@ def _shown(entry: Mapping[str, Any]) -> dict[str, str]:
     }
 
 
-def _gauge_texts(item: Exportable, settings: Iterable[Mapping[str, Any]]) -> dict[str, str]:
+def _gauge_texts(item: Scenario, settings: Iterable[Mapping[str, Any]]) -> dict[str, str]:
     """Texts of the pressures that count from the atmosphere: they move with it, as they do in Python."""
     following = {entry["key"] for entry in settings if entry["follows"]}
     gaps = {

@@ -9,11 +9,11 @@ from typing import Any
 
 from ppafo.answers import LivePart
 from ppafo.errors import PpafoError, ScenarioError
-from ppafo.exports.loading import Exportable, load_exportable
 from ppafo.exports.wasm import module_of
 from ppafo.live.content import Interval, Simulated, page_content, program_content, usual_changes, words
 from ppafo.live.page import block_of, check_start, packed_once, page_of, policy_of_block
-from ppafo.simulation.scenario import FreeMotion, Scenario
+from ppafo.loading import load_scenario
+from ppafo.simulation.scenario import FreeMotion, Scenario, vane_motion, worn_kind
 
 TITLE = "The powered ankle-foot orthosis, live"
 DEFAULT = ("torque-task-solenoid", "torque-task-proportional", "step-response", "solenoid")
@@ -62,7 +62,7 @@ def workbench(
     return page_of(title, content, modules)
 
 
-def live_part(scenarios: "Sequence[str | Exportable]") -> LivePart | None:
+def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
     """Return a part of a page with the controls that matter most; None where one of the programs cannot be had.
 
     Of scenarios with one name only the first is in it.
@@ -76,7 +76,7 @@ def live_part(scenarios: "Sequence[str | Exportable]") -> LivePart | None:
 
 
 def _content(
-    scenarios: "Sequence[str | Exportable]", overrides: Sequence[str], title: str, form: str
+    scenarios: "Sequence[str | Scenario]", overrides: Sequence[str], title: str, form: str
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Content of a page, and its modules by name; programs that are the same are there once."""
     simulated = _simulated(scenarios, overrides)
@@ -100,11 +100,11 @@ def known_intervals() -> Mapping[str, Interval]:
     return {path: (low, high) for path, (low, high) in told.items()}
 
 
-def _simulated(given: "Sequence[str | Exportable]", overrides: Sequence[str]) -> list[Simulated]:
+def _simulated(given: "Sequence[str | Scenario]", overrides: Sequence[str]) -> list[Simulated]:
     if not 1 <= len(given) <= MOST_SCENARIOS:
         raise ScenarioError(f"a workbench has 1 to {MOST_SCENARIOS} scenarios, not {len(given)}")
-    loaded = [load_exportable(item, overrides) if isinstance(item, str) else item for item in given]
-    found: dict[str, Exportable] = {}
+    loaded = [load_scenario(item, overrides) if isinstance(item, str) else item for item in given]
+    found: dict[str, Scenario] = {}
     for scenario in loaded:
         if scenario.name in found:
             raise ScenarioError(f"two scenarios are called '{scenario.name}'; a workbench tells them apart by name")
@@ -112,7 +112,7 @@ def _simulated(given: "Sequence[str | Exportable]", overrides: Sequence[str]) ->
     return [Simulated(scenario, module_of(scenario), _label(scenario)) for scenario in loaded]
 
 
-def _label(scenario: Exportable) -> str:
+def _label(scenario: Scenario) -> str:
     words_of_name = scenario.name.replace("-", " ").replace("_", " ")
     return _LABELS.get(scenario.name, words_of_name[:1].upper() + words_of_name[1:])
 
@@ -124,10 +124,10 @@ def _tabs(simulated: Sequence[Simulated]) -> list[dict[str, Any]]:
     return [_tab(title, group) for title, group in groups.items()]
 
 
-def _task(scenario: Exportable) -> str:
-    if not isinstance(scenario, Scenario):
+def _task(scenario: Scenario) -> str:
+    if worn_kind(scenario) is not None:
         return _WALK
-    motion = scenario.motion
+    motion = vane_motion(scenario)
     if isinstance(motion, FreeMotion):
         return _STEP if scenario.control.kind == "constant" else _TASKS["free"]
     return _TASKS["held" if motion.profile.kind == "constant" else "prescribed"]

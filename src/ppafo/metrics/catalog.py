@@ -1,12 +1,15 @@
 """Every metric by name. To add one: a function and its MetricKind in a module of this folder, listed in METRICS."""
 
 from ppafo.kinds import Kinds
-from ppafo.metrics import gas, motion, switching, tracking
+from ppafo.metrics import gas, motion, strides, switching, tracking
 from ppafo.metrics.metric import Metric, MetricKind
 from ppafo.signals import Recording
 
 METRICS: Kinds[MetricKind] = Kinds(
-    "ppafo.metrics", "metric", MetricKind, (*tracking.METRICS, *gas.METRICS, *switching.METRICS, *motion.METRICS)
+    "ppafo.metrics",
+    "metric",
+    MetricKind,
+    (*tracking.METRICS, *gas.METRICS, *switching.METRICS, *motion.METRICS, *strides.METRICS),
 )
 
 
@@ -14,7 +17,7 @@ def evaluate(recording: Recording) -> dict[str, Metric]:
     """Return every metric that the channels of the recording allow; one sample alone allows none."""
     found: dict[str, Metric] = {}
     for kind in METRICS.values():
-        if len(recording) < 2 or not set(kind.channels) <= set(recording.names):
+        if kind.compute is None or len(recording) < 2 or not set(kind.channels) <= set(recording.names):
             continue
         value = kind.compute(recording)
         if value is not None:

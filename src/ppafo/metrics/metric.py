@@ -12,6 +12,9 @@ from ppafo.signals.meter import MeterKind
 
 Floats = NDArray[np.float64]
 
+WALK, STEADY, REQUEST = "walk", "steady strides", "requested torque"
+"""What a metric may need beside channels: a walk, one of equal strides, a controller of it that wants a torque."""
+
 
 @dataclass(frozen=True, slots=True)
 class Metric:
@@ -47,14 +50,16 @@ class MetricKind:
     example no hold for the error on the hold. ``read(readings)`` returns the same for many runs (runs,), nan in place
     of None, from the meters in ``meters`` and the traces of the channels in ``traced``; without a trace it is plain
     arithmetic with the functions of ``model.columns``, which is translated too. It is asked only of runs that have the
-    channels.
+    channels, and what is in ``needs``. Without ``compute`` it is counted while a run goes on, and no recording of its
+    channels alone has it.
     """
 
     name: str
     unit: str
     summary: str
     channels: tuple[str, ...]
-    compute: Callable[[Recording], float | None]
+    compute: Callable[[Recording], float | None] | None
     read: Callable[[Readings], Floats]
     meters: tuple[MeterKind, ...] = ()
     traced: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()

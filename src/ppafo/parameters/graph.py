@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.model.columns import over_runs
 from ppafo.units import to_si
 
 ATMOSPHERE_PATH = "supply.atmospheric_pressure"
@@ -28,7 +29,7 @@ def itself(number: Any) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """A function of other numbers, floats or arrays (runs,), that can be translated to C.
+    """A function of other numbers, floats or arrays (runs,), which is one of floats that can be translated to C.
 
     With ``names`` it takes its sources as one mapping under these names, else one by one.
     """
@@ -40,7 +41,9 @@ class Term:
     def number(self, present: Callable[[str], Any]) -> Any:
         """Return what the function makes of what the sources are at ``present``."""
         given = [present(source) for source in self.sources]
-        return self.function(dict(zip(self.names, given, strict=True))) if self.names else self.function(*given)
+        if not self.names:
+            return given[0] if self.function is itself else over_runs(self.function, *given)
+        return over_runs(lambda *numbers: self.function(dict(zip(self.names, numbers, strict=True))), *given)
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,8 +79,8 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
     """
     document = changed.document
     reading = Reading(request.file, document, changed.paths)
-    hardware = _hardware(reading, request, changed.device)
-    device = _device(reading, hardware)
+    hardware = read_hardware(reading, request, changed.device)
+    device = read_device(reading, hardware)
     clock = read_clock(reading)
     before = Reading(request.file, request.content)
     scenario = Scenario(
@@ -117,7 +117,7 @@ def _check_actuator(reading: Reading, scenario: Scenario) -> None:
         raise _of_device(reading, error) from error
 
 
-def _hardware(reading: Reading, request: ScenarioRequest, overrides: tuple[str, ...]) -> Hardware:
+def read_hardware(reading: Reading, request: ScenarioRequest, overrides: tuple[str, ...]) -> Hardware:
     """Return the parameter set with the overrides of the file and then those of the caller."""
     section = reading.document["device"]
     valve = section.get("valve")
@@ -139,7 +139,8 @@ def set_name(name: str, folder: Path) -> str:
     return str(folder / name) if is_path and name not in list_sets() else name
 
 
-def _device(reading: Reading, hardware: Hardware) -> Device:
+def read_device(reading: Reading, hardware: Hardware) -> Device:
+    """Return the device of a parameter set with its overrides; ParameterError for what is missing or contradicts."""
     try:
         return build_device(hardware.parameter_set, hardware.valve, hardware.links)
     except ParameterError as error:

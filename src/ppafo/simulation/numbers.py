@@ -18,7 +18,7 @@ from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.effects import all_settings
 from ppafo.parameters.graph import Graph, holding, left, resolved
 from ppafo.simulation import declaration
-from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
+from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario, worn_kind
 from ppafo.simulation.supply_line import LINES, SECTION
 
 HELD_ANGLE = "motion.angle"
@@ -41,6 +41,10 @@ def chosen_path(path: str, scenario: Scenario) -> str:
 
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     """Return the declaration of every number of a scenario and its device, by path; both forms of an orifice."""
+    worn = worn_kind(scenario)
+    if worn is not None:
+        own: dict[str, Quantity] = worn.quantities(scenario)
+        return device_numbers(scenario.device) | own
     kinds = declaration.quantities(_kinds(scenario))
     return device_numbers(scenario.device) | kinds | _angle_of_held_vane(scenario)
 
@@ -142,6 +146,9 @@ def _angle_of_held_vane(scenario: Scenario) -> dict[str, Quantity]:
 def _place(path: str, scenario: Scenario) -> tuple[str, ...]:
     """Return the attributes (or keys) that lead from the scenario to a number."""
     section, _, name = path.rpartition(".")
+    worn = worn_kind(scenario)
+    if worn is not None and path in worn.places:
+        return worn.places[path]
     if path in _INITIAL:
         return (_INITIAL[path],)
     if path == HELD_ANGLE and not isinstance(scenario.motion, FreeMotion):

@@ -35,7 +35,16 @@ from ppafo.simulation.preparation import (
     step_counts,
     thermal_gas,
 )
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, PrescribedMotion, ProfileChoice, Scenario, Thermal
+from ppafo.simulation.scenario import (
+    PYTHON_CONTROLLER,
+    FreeMotion,
+    PrescribedMotion,
+    ProfileChoice,
+    Scenario,
+    Thermal,
+    vane_motion,
+    worn_kind,
+)
 
 MAXIMUM_STEPS = 1.0e9
 
@@ -156,7 +165,11 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
 
     All runs of an ensemble must ask for one program: of a valve's and the sensors' settings, each is 0 for all or none.
     """
-    device, motion, control = scenario.device, scenario.motion, scenario.control
+    worn = worn_kind(scenario)
+    if worn is not None:
+        planned: tuple[Run, tuple[Problem, ...]] = worn.plan(scenario)
+        return planned
+    device, motion, control = scenario.device, vane_motion(scenario), scenario.control
     plant = plant_parameters(device, motion.external_torque if isinstance(motion, FreeMotion) else 0.0)
     in_lanes = control.kind != PYTHON_CONTROLLER
     fixed = (
@@ -182,7 +195,7 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         pieces, plant, lambda fed: scenario_steps(scenario, fed), lambda fed: initial_state(scenario, fed)
     )
     further = () if fixed is None else fixed.problems
-    return run, (_too_many_steps(scenario, run.step, run.step_count), *further)
+    return run, (too_many_steps(scenario, run.step, run.step_count), *further)
 
 
 def scenario_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
@@ -206,7 +219,9 @@ def valve_parameters(valve: ValveModel, settings: Mapping[str, float]) -> Any:
     return over_runs(prepare, *settings.values())
 
 
-def _too_many_steps(scenario: Scenario, step: float, step_count: int) -> Problem:
+def too_many_steps(scenario: Scenario, step: float, step_count: int) -> Problem:
+    """Runs that take more steps [s] than can be waited for."""
+
     def line(run: int) -> str:
         duration, length, count = (at(number, run) for number in (scenario.duration, step, step_count))
         return (
@@ -286,10 +301,11 @@ def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> Any:
     """
     if scenario.supply_lines is not None or scenario.device.actuator.kind != VANE.name:
         return True
-    if not isinstance(scenario.motion, PrescribedMotion) or scenario.motion.profile.kind != "constant":
+    motion = scenario.motion
+    if not isinstance(motion, PrescribedMotion) or motion.profile.kind != "constant":
         return True
     stiffness = 1.0 if scenario.thermal is None else scenario.device.gas.heat_capacity_ratio
-    return np.logical_not(is_slow_held(plant, step, scenario.motion.profile.settings["level"], stiffness))
+    return np.logical_not(is_slow_held(plant, step, motion.profile.settings["level"], stiffness))
 
 
 def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
@@ -302,7 +318,7 @@ def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
 
 def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
     """Angle, angular velocity and gas at the start."""
-    motion = scenario.motion
+    motion = vane_motion(scenario)
     if isinstance(motion, FreeMotion):
         angle, rate = motion.angle, motion.angular_velocity
     else:

@@ -5,9 +5,9 @@ an object of your own in charge of the valve.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Protocol
 
 from ppafo.control.fixed.torque_laws import FIXED, FLOAT
 from ppafo.control.kind import PythonController
@@ -58,6 +58,48 @@ class PrescribedMotion:
         if self.profile.kind == "constant":
             return f"held at {math.degrees(level):.4g} deg"
         return f"prescribed, along the profile {self.profile.kind}"
+
+
+@dataclass(frozen=True, slots=True)
+class MotionKind:
+    """What a motion of a leg that wears the device brings to the runs of its scenarios, as functions of the scenario.
+
+    ``plan`` gives the run and what may be wrong with it, as ``plan_runs`` does; ``rules`` which numbers contradict each
+    other. Any number may be an array (runs,) in both. ``quantities`` declares the numbers of the scenario beside those
+    of its device, ``places`` says by path which attributes lead to those that are not where all scenarios have them.
+    ``clock(scenario, times)`` gives the clock with other times [s], which may be arrays too, and what is wrong with it.
+    ``noise`` is the sum of all levels of noise that its controller receives, ``switches`` are settings that are 0 for
+    all runs of a program or for none. ``lacks(scenario, metric)`` says why it has not what a metric needs, an empty
+    text where it has it. ``measured(scenario, run, times, rows)`` gives recording and metrics of rows (samples,) by
+    path.
+    """
+
+    name: str
+    plan: Callable[..., Any]
+    rules: Callable[..., Any]
+    quantities: Callable[..., Any]
+    places: Mapping[str, tuple[str, ...]]
+    clock: Callable[..., Any]
+    switches: Callable[..., tuple[Any, ...]]
+    noise: Callable[..., Any]
+    lacks: Callable[..., str]
+    measured: Callable[..., Any]
+
+
+class WornMotion(Protocol):
+    """The motion of a leg that wears the device, which a room above this one knows."""
+
+    @property
+    def kind(self) -> MotionKind:
+        """What it brings to the runs of its scenarios."""
+
+    @property
+    def label(self) -> str:
+        """The motion in a few words."""
+
+
+VaneMotion = FreeMotion | PrescribedMotion
+"""The motions of a vane alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +207,7 @@ class Scenario:
     duration: float
     time_step: float
     output_interval: float
-    motion: FreeMotion | PrescribedMotion
+    motion: VaneMotion | WornMotion
     initial_pressure_1: float
     initial_pressure_2: float
     control: Control
@@ -210,3 +252,16 @@ class Scenario:
                     f"'update(time, reference, measurement)', the latter returning a command from -1 to 1"
                 )
         return replace(self, control=Control(PYTHON_CONTROLLER, {}, self.control.period, controller))
+
+
+def vane_motion(scenario: Scenario) -> VaneMotion:
+    """The motion of a scenario of a vane alone; ScenarioError for a leg that wears the device."""
+    if isinstance(scenario.motion, FreeMotion | PrescribedMotion):
+        return scenario.motion
+    raise ScenarioError(f"{scenario.name}: is {scenario.motion.label}, and here a scenario without a wearer is needed")
+
+
+def worn_kind(scenario: Scenario) -> MotionKind | None:
+    """What the motion of a leg that wears the device brings, None for a vane alone."""
+    motion = scenario.motion
+    return None if isinstance(motion, FreeMotion | PrescribedMotion) else motion.kind

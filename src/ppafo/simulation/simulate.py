@@ -12,6 +12,7 @@ from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together
 from ppafo.metrics.catalog import evaluate
+from ppafo.metrics.metric import Metric
 from ppafo.model.regulator import LineState, line_pressures
 from ppafo.model.thermal import energy_per_content
 from ppafo.model.vane import gravity_torque, sliding_friction
@@ -21,7 +22,7 @@ from ppafo.simulation.loading import scenario_or_load
 from ppafo.simulation.plan import plan_run, profile_values
 from ppafo.simulation.result import Result, Status
 from ppafo.simulation.sampled import run_sampled, state_row_numbers
-from ppafo.simulation.scenario import PrescribedMotion, Scenario
+from ppafo.simulation.scenario import PrescribedMotion, Scenario, worn_kind
 from ppafo.version import __version__
 
 OPEN_LOOP = "constant"
@@ -69,11 +70,17 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     status = _status(outcome, record, rows, times)
     kept = times < (np.inf if status.time is None else status.time)
     kept[0] = True
-    recording = _recording(scenario, run, times[kept], {path: record[kept, row] for path, row in rows.items()})
+    by_path = {path: record[kept, row] for path, row in rows.items()}
+    worn = worn_kind(scenario)
+    if worn is None:
+        recording = _recording(scenario, run, times[kept], by_path)
+        metrics: Mapping[str, Metric] = evaluate(recording)
+    else:
+        recording, metrics = worn.measured(scenario, run, times[kept], by_path)
     return Result(
         scenario=scenario,
         recording=recording,
-        metrics=evaluate(recording),
+        metrics=metrics,
         status=status,
         versions={"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
         engine={"step": run.step, "steps": run.step_count, "steps_per_sample": run.steps_per_sample},

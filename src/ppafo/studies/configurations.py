@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ppafo.errors import StudyError, first_twice, nearest_name
-from ppafo.simulation.loading import load_scenario, scenario_from_dict, scenario_or_load
+from ppafo.loading import reloaded, scenario_or_load
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.study import Configuration, Study
 
@@ -60,18 +60,11 @@ def with_overrides(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
     of_object = [text for text in overrides if scenario.control.custom is not None and _SETTING.match(text)]
     if of_object:
         raise StudyError(f"override '{of_object[0]}': scenario '{scenario.name}' is controlled by a Python object")
-    if _reload(scenario, ()) != scenario:
+    if reloaded(scenario, ()) != scenario:
         raise StudyError(
             f"scenario '{scenario.name}' was changed in Python; overrides need the scenario as it is in its file"
         )
-    return _reload(scenario, overrides)
-
-
-def _reload(scenario: Scenario, more: Sequence[str]) -> Scenario:
-    origin, custom = scenario.origin, scenario.control.custom
-    every = (*origin.overrides, *more)
-    read = scenario_from_dict(origin.content, every) if origin.file is None else load_scenario(origin.file, every)
-    return read if custom is None else read.controlled_by(custom)
+    return reloaded(scenario, overrides)
 
 
 def _with_names(scenarios: Sequence[Scenario | str | Path]) -> list[tuple[str, Scenario]]:

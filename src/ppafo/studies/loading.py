@@ -9,10 +9,10 @@ from typing import Any
 
 from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice, nearest_name
+from ppafo.errors import DataError, ParameterError, ScenarioError, StudyError, UnitError, first_twice, nearest_name
+from ppafo.loading import load_scenario, placed
 from ppafo.metrics import METRICS
 from ppafo.parameters.graph import ATMOSPHERE_PATH
-from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import Above
 from ppafo.studies.noise import with_noise
@@ -149,10 +149,9 @@ def _configurations(parsed: declared.StudyFile, source: _Source) -> tuple[Config
 
 
 def _scenario(item: declared.Configuration, source: _Source) -> Any:
-    is_path = item.scenario not in list_scenarios() and (Path(item.scenario).suffix == ".toml" or "/" in item.scenario)
     try:
-        return load_scenario(str(source.folder / item.scenario) if is_path else item.scenario, item.overrides)
-    except (ScenarioError, ParameterError) as error:
+        return load_scenario(placed(item.scenario, source.folder), item.overrides)
+    except (ScenarioError, ParameterError, DataError) as error:
         raise source.refusal(f"configuration '{item.name}': {error}") from error
 
 

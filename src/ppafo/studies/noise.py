@@ -5,11 +5,12 @@ realisation: where sensors are noisy, every draw gets a noise stream of its own.
 """
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
 from ppafo.simulation.declaration import LARGEST_SEED
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.scenario import Scenario, worn_kind
 from ppafo.simulation.simulate import OPEN_LOOP
 from ppafo.studies.distributions import Floats, WholeNumbersBetween
 from ppafo.studies.sampling import Factor, permute
@@ -17,15 +18,21 @@ from ppafo.studies.study import Drawn
 
 NOISE = "sensors.seed"
 """The path by which a run is given its realisation of the noise."""
-_LEVELS = ("sensors.angle_noise", "sensors.pressure_noise")
+_LEVELS = ("sensors.angle_noise", "sensors.pressure_noise", "sensors.force_noise")
 _KEY = 1
 
 
 def is_noisy(scenarios: Iterable[Scenario], paths: Sequence[str] = ()) -> bool:
     """Tell whether a controller receives noise in any of some scenarios, or where some paths vary."""
-    closed = [item.sensors for item in scenarios if item.control.kind != OPEN_LOOP]
-    heard = any(np.any(np.asarray(sensors.angle_noise + sensors.pressure_noise) > 0.0) for sensors in closed)
+    closed = [item for item in scenarios if item.control.kind != OPEN_LOOP]
+    heard = any(np.any(np.asarray(_noise_of(item)) > 0.0) for item in closed)
     return heard or (bool(closed) and any(path in _LEVELS for path in paths))
+
+
+def _noise_of(scenario: Scenario) -> Any:
+    """Return the sum of the levels of noise of a scenario, which may be an array (runs,)."""
+    worn = worn_kind(scenario)
+    return scenario.sensors.angle_noise + scenario.sensors.pressure_noise if worn is None else worn.noise(scenario)
 
 
 def with_noise(

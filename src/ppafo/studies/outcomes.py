@@ -14,8 +14,8 @@ from ppafo.metrics import METRICS
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.progress import Progress, Report
 from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import OPEN_LOOP
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import MAXIMUM_DRAWS
 from ppafo.units import parse_quantity
@@ -84,13 +84,14 @@ def scenario_model(
 
 
 def check_metrics(metrics: Sequence[str], scenario: Scenario) -> None:
-    """Refuse a metric that does not exist, or that needs a reference where the controller follows none."""
+    """Refuse a metric that does not exist, or that needs what the scenario has not."""
     for name in metrics:
         if name not in METRICS:
             hint = nearest_name(name, METRICS)
             raise StudyError(f"there is no metric '{name}'{hint}; available: {', '.join(METRICS)}")
-        if "reference" in METRICS[name].channels and scenario.control.kind == OPEN_LOOP:
-            raise StudyError(f"scenario '{scenario.name}' has no '{name}': its controller follows no reference")
+        reason = lacking(scenario, METRICS[name])
+        if reason:
+            raise StudyError(f"scenario '{scenario.name}' has no '{name}': {reason}")
     repeated = first_twice(metrics)
     if repeated is not None:
         raise StudyError(f"the metric '{repeated}' is named twice")

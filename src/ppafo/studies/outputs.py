@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from ppafo.engine.lane_meters import TRACED
 from ppafo.errors import StudyError, UnitError, first_twice, nearest_name
 from ppafo.metrics import METRICS
+from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import OPEN_LOOP
 from ppafo.studies import declaration as declared
@@ -36,10 +37,13 @@ def valid_outputs(outputs: declared.Outputs, scenarios: Sequence[Scenario], refu
     _check_names("metrics", metrics, METRICS, refusal)
     _check_names("trajectories", outputs.trajectories, tuple(TRACED), refusal)
     _check_names("bands", outputs.bands, tuple(TRACED), refusal)
-    has_reference = any(scenario.control.kind != OPEN_LOOP for scenario in scenarios)
-    if not has_reference:
-        _check_no_reference((*outputs.trajectories, *outputs.bands), outputs.metrics, refusal)
-        metrics = tuple(name for name in metrics if "reference" not in METRICS[name].channels)
+    if all(scenario.control.kind == OPEN_LOOP for scenario in scenarios):
+        _check_no_reference((*outputs.trajectories, *outputs.bands), refusal)
+    has = {name: [lacking(scenario, METRICS[name]) for scenario in scenarios] for name in metrics}
+    missing = {name: reasons[0] for name, reasons in has.items() if all(reasons)}
+    for name, reason in missing.items() if outputs.metrics != "all" else ():
+        raise refusal(f"outputs: no scenario has '{name}': {reason}")
+    metrics = tuple(name for name in metrics if name not in missing)
     return Outputs(
         metrics=metrics,
         trajectories=outputs.trajectories,
@@ -60,12 +64,10 @@ def _check_names(key: str, given: Sequence[str], known: Collection[str], refusal
         raise refusal(f"outputs.{key}: '{repeated}' is named twice")
 
 
-def _check_no_reference(channels: Sequence[str], metrics: Sequence[str], refusal: Refusal) -> None:
-    """Refuse what needs a reference where no controller follows one; 'all' metrics are those that there are."""
-    needing = [name for name in channels if name == "reference"]
-    needing += [name for name in metrics if name in METRICS and "reference" in METRICS[name].channels]
-    if needing:
-        raise refusal(f"outputs: '{needing[0]}' needs a reference, and the controllers here follow none")
+def _check_no_reference(channels: Sequence[str], refusal: Refusal) -> None:
+    """Refuse the channel of a reference where no controller follows one."""
+    if "reference" in channels:
+        raise refusal("outputs: 'reference' needs a reference, and the controllers here follow none")
 
 
 def _interval(outputs: declared.Outputs, scenarios: Sequence[Scenario], refusal: Refusal) -> float:

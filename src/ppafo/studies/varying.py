@@ -38,6 +38,8 @@ from ppafo.studies.noise import NOISE
 from ppafo.studies.study import Axis, Drawn
 from ppafo.units import from_si, parse_quantity, split_quantity
 
+WHOLE = (NOISE, "wearer.person")
+"""Paths of numbers that name one of many: a random seed, and a person of the population."""
 _UNIT_OF_DIFFERENCE = {"Pa_a": "Pa_d"}
 _OFFSET_UNITS = ("degC", "°C")
 DEVIATIONS_IN_HALF_WIDTH = 1.959963984540054
@@ -150,15 +152,15 @@ def axis_or_distribution(item: declared.Varied, place: VariedPath) -> Axis | Dra
 
 def _check_whole(item: declared.Varied) -> None:
     """Refuse kinds that give a seed no whole numbers, and whole numbers for what is not counted."""
-    is_seed, is_whole = item.path == NOISE, item.kind == "whole_numbers"
-    if is_whole and not is_seed:
-        raise UnitError(f"kind = 'whole_numbers' is for '{NOISE}' alone; use 'choice' or 'uniform'")
-    if is_seed and item.kind not in ("grid", "list", "choice", "whole_numbers"):
-        raise UnitError(f"kind = '{item.kind}' gives no whole numbers, which a random seed needs; use 'whole_numbers'")
+    is_counted, is_whole = item.path in WHOLE, item.kind == "whole_numbers"
+    if is_whole and not is_counted:
+        raise UnitError(f"kind = 'whole_numbers' is for {' and '.join(WHOLE)} alone; use 'choice' or 'uniform'")
+    if is_counted and item.kind not in ("grid", "list", "choice", "whole_numbers"):
+        raise UnitError(f"kind = '{item.kind}' gives no whole numbers, which '{item.path}' needs; use 'whole_numbers'")
 
 
 def _all_whole(path: str, values: tuple[float, ...]) -> tuple[float, ...]:
-    broken = [value for value in values if path == NOISE and value != math.floor(value)]
+    broken = [value for value in values if path in WHOLE and value != math.floor(value)]
     if broken:
         raise UnitError(f"{broken[0]:g} must be a whole number")
     return values

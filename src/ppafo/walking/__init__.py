@@ -1,15 +1,16 @@
 """The device on a walking leg: wearer, gait, sensors and event-based control, and the results."""
 
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.comparison import Comparison, compare_walks
-from ppafo.walking.configuration import Configuration
 from ppafo.walking.loading import list_walks, load_walk
 from ppafo.walking.population import Population, walk_population
-from ppafo.walking.walk import WalkResult, walk
+from ppafo.walking.result import WalkResult
+from ppafo.walking.walk import walk
 
 __all__ = [
     "Comparison",
-    "Configuration",
     "Population",
+    "Scenario",
     "WalkResult",
     "compare_walks",
     "list_walks",

@@ -10,10 +10,14 @@ from ppafo.control.walking import event_on_off
 from ppafo.errors import SimulationError
 from ppafo.metrics import Metric
 from ppafo.model.leg import passive_torque
-from ppafo.walking.configuration import Configuration
+from ppafo.simulation.scenario import Control, Scenario
+from ppafo.walking.declaration import THRESHOLDS
 from ppafo.walking.gait_series import landing_phase
+from ppafo.walking.motion import walk_of
+from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES
-from ppafo.walking.walk import SHORTEST_STRIDES, Progress, WalkResult, silent, walk
+from ppafo.walking.varying import SHORTEST_STRIDES
+from ppafo.walking.walk import Progress, silent, walk
 from ppafo.walking.walk_metrics import healthy_positive_work, healthy_toe_height, lowest_toes
 
 Say = Callable[[str], None]
@@ -33,9 +37,7 @@ class Comparison:
         return self.with_device.status.is_completed and self.without_device.status.is_completed
 
 
-def compare_walks(
-    configuration: Configuration, minutes: float | None = None, progress: Progress = silent
-) -> Comparison:
+def compare_walks(configuration: Scenario, minutes: float | None = None, progress: Progress = silent) -> Comparison:
     """Walk ``minutes`` [min], or a whole course, with the device and with it off.
 
     ScenarioError for bad input, SimulationError where its bottle ends the walk before there is anything to compare.
@@ -50,25 +52,26 @@ def compare_walks(
 
 def _check_ending(worn: WalkResult) -> None:
     """Refuse a walk that its bottle ended within the first strides."""
-    shortest = SHORTEST_STRIDES * worn.configuration.gait.stride_time
+    shortest = SHORTEST_STRIDES * walk_of(worn.scenario).gait.stride_time
     if worn.supply is not None and worn.supply.ending.time < shortest:
         ending = worn.supply.ending
         raise SimulationError(
-            f"{worn.configuration.name} on its bottle: {ending.message}, after {ending.time:.3g} s: fewer than "
+            f"{worn.scenario.name} on its bottle: {ending.message}, after {ending.time:.3g} s: fewer than "
             f"{SHORTEST_STRIDES} strides; take a fuller, larger or warmer bottle"
         )
 
 
-def with_device_off(configuration: Configuration) -> Configuration:
+def with_device_off(configuration: Scenario) -> Scenario:
     """The same wearer and device with both chambers vented; no gas flows, so no bottle and no lines are needed."""
     name = f"{configuration.name}-off"
-    bare = replace(configuration, name=name, controller=event_on_off.OFF, settings={}, converter=None)
-    return replace(bare, supply_lines=None, bottle=None)
+    control = Control(event_on_off.OFF.name, {}, configuration.control.period)
+    motion = replace(walk_of(configuration), bottle=None, timing=THRESHOLDS)
+    return replace(configuration, name=name, control=control, motion=motion, supply_lines=None)
 
 
-def healthy_metrics(configuration: Configuration) -> dict[str, Metric]:
+def healthy_metrics(configuration: Scenario) -> dict[str, Metric]:
     """The metrics of a walk with a healthy ankle, SI units; without a moment curve there is no work."""
-    gait = configuration.gait
+    gait = walk_of(configuration).gait
     found = {
         "slap_rate": Metric(_landing_rate(configuration), "rad/s", "rate of the measured foot as it comes down"),
         "toe_clearance": Metric(0.0, "m", "0 by definition: measured from the healthy gait"),
@@ -79,22 +82,22 @@ def healthy_metrics(configuration: Configuration) -> dict[str, Metric]:
     if gait.ankle_moment is not None:
         work = healthy_positive_work(configuration)
         found["push_off_work"] = Metric(work, "J", "positive work of the ankle moment in one stride")
-        if configuration.wearer.keeps_gait >= 0.5:
+        if walk_of(configuration).wearer.keeps_gait >= 0.5:
             found["dorsiflexor_moment"] = _dorsiflexor_moment(configuration)
     return found
 
 
-def _dorsiflexor_moment(configuration: Configuration) -> Metric:
+def _dorsiflexor_moment(configuration: Scenario) -> Metric:
     """Moment of the muscles that lift the foot without any device, from the measured moment less tissue."""
-    gait, wearer = configuration.gait, configuration.wearer
+    gait, wearer = walk_of(configuration).gait, walk_of(configuration).wearer
     torque: Any = passive_torque  # plain arithmetic, of arrays too
     tissue = torque(wearer.leg(), gait.ankle_angle.values_at(PHASES))
     moment = np.maximum(tissue - wearer.body_mass * gait.curve("ankle_moment").values_at(PHASES), 0.0)
     return Metric(float(moment[:-1].mean()), "N m", "moment of the wearer's dorsiflexors, mean over the stride")
 
 
-def _landing_rate(configuration: Configuration) -> float:
+def _landing_rate(configuration: Scenario) -> float:
     """Rate of the measured foot as it comes down [rad/s], below 0; taken where a walk takes it, at the landing."""
-    gait = configuration.gait
+    gait = walk_of(configuration).gait
     phase = landing_phase(gait)
     return gait.shank_angle.rate(phase, gait.stride_time) - gait.ankle_angle.rate(phase, gait.stride_time)

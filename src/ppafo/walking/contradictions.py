@@ -1,13 +1,21 @@
-"""Settings of a walk that contradict each other: refused before the run, in one line that names both."""
+"""Settings of a walk that contradict each other: refused before the run, in one line that names both.
 
-from collections.abc import Iterator, Mapping
+Any number may be an array (runs,), one for each run of an ensemble.
+"""
 
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import ScenarioError
+from ppafo.model.columns import Problem, at, larger, smaller
 from ppafo.simulation.reading import Reading, short_quantity_text
-from ppafo.walking.configuration import Configuration
-from ppafo.walking.fixed_point import check_fixed_walk
-from ppafo.walking.planning import walking_valve
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
+from ppafo.walking.motion import walk_of
+from ppafo.walking.planning import controller_of, law_of, walking_valve
 
 _NEWTON, _RADIAN, _SECOND, _METRE, _PASCAL = "N", "rad", "s", "m", "Pa_a"
 
@@ -15,11 +23,42 @@ COMPRESSION = 1.6
 """Highest pressure in a chamber over that of the supply, with room: up to 1.38 in the shipped walks."""
 
 
-def check_walk(configuration: Configuration, reading: Reading) -> None:
-    """Raise ScenarioError with the first contradiction; ``reading`` tells how a value was given."""
-    for path, reason in _contradictions(configuration):
-        raise reading.refusal(path, reason) if _is_given(reading, path) else _of_default(reading, path, reason)
-    check_fixed_walk(configuration)
+class Contradiction(NamedTuple):
+    """A path, the runs that it contradicts another number in, and what to say of one of them."""
+
+    path: str
+    is_bad: Any
+    reason: Callable[[int], str]
+
+
+def check_walk(scenario: Scenario, reading: Reading) -> None:
+    """Raise ScenarioError with the first contradiction; ``reading`` says how a value was given."""
+    for path, is_bad, reason in _contradictions(scenario):
+        if is_bad:
+            said = reason(0)
+            raise reading.refusal(path, said) if _is_given(reading, path) else _of_default(reading, path, said)
+    for is_bad, line in controller_of(scenario)[2]:
+        if is_bad:
+            raise ScenarioError(f"{reading.file}: {line(0)}")
+
+
+def rules(scenario: Scenario) -> tuple[Problem, ...]:
+    """What contradicts what in the runs of an ensemble. ScenarioError for a walk on a bottle, which cannot vary."""
+    check_no_bottle(scenario)
+    return tuple(_problem(item) for item in _contradictions(scenario))
+
+
+def check_no_bottle(scenario: Scenario) -> None:
+    """Raise ScenarioError for a walk on a bottle, which only ``walk`` takes."""
+    if walk_of(scenario).bottle is not None:
+        raise ScenarioError(
+            f"{scenario.name}: a walk on a bottle goes by 'ppafo walk' alone, as bottle and device take turns; leave "
+            "the bottle out, or give the device lines with [supply_line]"
+        )
+
+
+def _problem(item: Contradiction) -> Problem:
+    return np.atleast_1d(item.is_bad), lambda run: f"{item.path}: {item.reason(run)}"
 
 
 def _is_given(reading: Reading, path: str) -> bool:
@@ -32,129 +71,178 @@ def _of_default(reading: Reading, path: str, reason: str) -> ScenarioError:
     return ScenarioError(f"{reading.file}: {path}, which is not given and takes its default: {reason}")
 
 
-def _contradictions(configuration: Configuration) -> Iterator[tuple[str, str]]:
-    yield from _segments(configuration)
-    yield from _valve(configuration)
-    if "load_threshold" in configuration.settings:
-        yield from _thresholds(configuration)
-        yield from _times(configuration)
-        yield from _angles(configuration)
-        yield from _gait(configuration)
-        yield from _pressures(configuration)
-    if "push_off_end" in configuration.settings:
-        yield from _push_off(configuration.settings)
-    if "peak_time" in configuration.settings:
-        yield from _profile(configuration.settings)
+def _text(number: Any, run: int, unit: str) -> str:
+    return short_quantity_text(at(number, run), unit)
 
 
-def _segments(configuration: Configuration) -> Iterator[tuple[str, str]]:
-    wearer = configuration.wearer
-    if wearer.shank_mass_centre > wearer.shank_length:
-        length = short_quantity_text(wearer.shank_length, _METRE)
-        yield "wearer.shank_mass_centre", f"lies beyond the ankle: wearer.shank_length is {length}"
-    if wearer.foot_mass_centre > wearer.toe_lever:
-        lever = short_quantity_text(wearer.toe_lever, _METRE)
-        yield "wearer.foot_mass_centre", f"lies beyond the toes: wearer.toe_lever is {lever}"
+def _contradictions(scenario: Scenario) -> Iterator[Contradiction]:
+    settings = scenario.control.settings
+    yield from _segments(scenario)
+    if scenario.control.kind == PYTHON_CONTROLLER:
+        return
+    yield from _valve(scenario, law_of(scenario))
+    if "load_threshold" in settings:
+        yield from _thresholds(settings)
+        yield from _times(scenario)
+        yield from _angles(scenario)
+        yield from _gait(scenario)
+        yield from _pressures(scenario)
+    if "push_off_end" in settings:
+        yield from _push_off(settings)
+    if "peak_time" in settings:
+        yield from _profile(settings)
 
 
-def _valve(configuration: Configuration) -> Iterator[tuple[str, str]]:
-    valve = configuration.device.valve.kind
-    if valve != "proportional" and not configuration.controller.only_switches:
-        fitting = " or ".join(sorted(kind.name for kind in WALKING_CONTROLLERS.values() if kind.only_switches))
-        remedy = f"take device.valve 'proportional', or controller.kind {fitting}"
-        yield "controller.kind", f"opens its valve gradually, which a {valve} valve cannot: {remedy}"
+def _segments(scenario: Scenario) -> Iterator[Contradiction]:
+    wearer = walk_of(scenario).wearer
+    yield Contradiction(
+        "wearer.shank_mass_centre",
+        wearer.shank_mass_centre > wearer.shank_length,
+        lambda run: f"lies beyond the ankle: wearer.shank_length is {_text(wearer.shank_length, run, _METRE)}",
+    )
+    yield Contradiction(
+        "wearer.foot_mass_centre",
+        wearer.foot_mass_centre > wearer.toe_lever,
+        lambda run: f"lies beyond the toes: wearer.toe_lever is {_text(wearer.toe_lever, run, _METRE)}",
+    )
 
 
-def _thresholds(configuration: Configuration) -> Iterator[tuple[str, str]]:
-    settings = configuration.settings
-    load, unload = settings["load_threshold"], settings["unload_threshold"]
-    if unload >= load:
-        yield (
-            "controller.unload_threshold",
-            f"must be below controller.load_threshold, which is {short_quantity_text(load, _NEWTON)}",
+def _valve(scenario: Scenario, law: ControllerKind) -> Iterator[Contradiction]:
+    valve = scenario.device.valve.kind
+    fitting = " or ".join(sorted(kind.name for kind in WALKING_CONTROLLERS.values() if kind.only_switches))
+    remedy = f"take device.valve 'proportional', or controller.kind {fitting}"
+    yield Contradiction(
+        "controller.kind",
+        valve != "proportional" and not law.only_switches,
+        lambda _run: f"opens its valve gradually, which a {valve} valve cannot: {remedy}",
+    )
+
+
+def _thresholds(settings: Mapping[str, Any]) -> Iterator[Contradiction]:
+    load = settings["load_threshold"]
+    for name, relation, is_bad in (
+        ("unload_threshold", "below", settings["unload_threshold"] >= load),
+        ("largest_force", "above", settings["largest_force"] <= load),
+    ):
+        yield Contradiction(
+            f"controller.{name}",
+            is_bad,
+            lambda run, relation=relation: (  # type: ignore[misc]
+                f"must be {relation} controller.load_threshold, which is {_text(load, run, _NEWTON)}"
+            ),
         )
-    if settings["largest_force"] <= load:
-        yield (
-            "controller.largest_force",
-            f"must be above controller.load_threshold, which is {short_quantity_text(load, _NEWTON)}",
-        )
 
 
-def _times(configuration: Configuration) -> Iterator[tuple[str, str]]:
-    settings, stride = configuration.settings, configuration.gait.stride_time
-    if not 0.5 * stride < settings["first_stride_time"] < 2.0 * stride:
-        stride_text = short_quantity_text(round(stride, 4), _SECOND)
-        yield (
-            "controller.first_stride_time",
-            f"must be between half and twice the stride of the gait, which is {stride_text}",
-        )
-    if settings["flat_from"] >= settings["flat_to"]:
-        yield "controller.flat_from", f"must be below controller.flat_to, which is {settings['flat_to']:g}"
-    delay = walking_valve(configuration.device.valve).command_delay(configuration.device.valve.settings)
+def _times(scenario: Scenario) -> Iterator[Contradiction]:
+    settings, stride, period = scenario.control.settings, walk_of(scenario).gait.stride_time, scenario.control.period
+    first = settings["first_stride_time"]
+    yield Contradiction(
+        "controller.first_stride_time",
+        np.logical_or(first <= 0.5 * stride, first >= 2.0 * stride),
+        lambda run: (
+            f"must be between half and twice the stride of the gait, which is {_text(round(stride, 4), run, _SECOND)}"
+        ),
+    )
+    yield Contradiction(
+        "controller.flat_from",
+        settings["flat_from"] >= settings["flat_to"],
+        lambda run: f"must be below controller.flat_to, which is {at(settings['flat_to'], run):g}",
+    )
+    delay = walking_valve(scenario.device.valve).command_delay(scenario.device.valve.settings)
     for name in ("fill_time", "vent_time"):
-        if settings[name] <= delay:
-            dead = short_quantity_text(delay, _SECOND)
-            yield f"controller.{name}", f"must be longer than the dead time of the valve, which is {dead}"
-    if settings["frozen_time"] <= 2.0 * configuration.period:
-        sample = short_quantity_text(configuration.period, _SECOND)
-        yield "controller.frozen_time", f"must be longer than two sample periods of the controller, {sample} each"
-
-
-def _angles(configuration: Configuration) -> Iterator[tuple[str, str]]:
-    settings, actuator = configuration.settings, configuration.device.actuator
-    low, high = settings["lowest_angle"], settings["highest_angle"]
-    if low >= high:
-        yield (
-            "controller.lowest_angle",
-            f"must be below controller.highest_angle, which is {short_quantity_text(high, _RADIAN)}",
+        yield Contradiction(
+            f"controller.{name}",
+            settings[name] <= delay,
+            lambda run: f"must be longer than the dead time of the valve, which is {_text(delay, run, _SECOND)}",
         )
-    low, high = max(low, actuator.angle_min), min(high, actuator.angle_max)
-    if not low < settings["swing_angle"] < high:
-        reach = f"{short_quantity_text(low, _RADIAN)} to {short_quantity_text(high, _RADIAN)}"
-        yield "controller.swing_angle", f"lies outside the range of sensor and device, {reach}"
+    yield Contradiction(
+        "controller.frozen_time",
+        settings["frozen_time"] <= 2.0 * period,
+        lambda run: f"must be longer than two sample periods of the controller, {_text(period, run, _SECOND)} each",
+    )
 
 
-def _gait(configuration: Configuration) -> Iterator[tuple[str, str]]:
-    gait = configuration.gait
-    if gait.vertical_force is None:
-        reason = (
+def _angles(scenario: Scenario) -> Iterator[Contradiction]:
+    settings, actuator = scenario.control.settings, scenario.device.actuator
+    low, high = settings["lowest_angle"], settings["highest_angle"]
+    yield Contradiction(
+        "controller.lowest_angle",
+        low >= high,
+        lambda run: f"must be below controller.highest_angle, which is {_text(high, run, _RADIAN)}",
+    )
+    least, most = larger(low, actuator.angle_min), smaller(high, actuator.angle_max)
+    swing = settings["swing_angle"]
+    yield Contradiction(
+        "controller.swing_angle",
+        np.logical_or(swing <= least, swing >= most),
+        lambda run: (
+            f"lies outside the range of sensor and device, {_text(least, run, _RADIAN)} to {_text(most, run, _RADIAN)}"
+        ),
+    )
+
+
+def _gait(scenario: Scenario) -> Iterator[Contradiction]:
+    gait = walk_of(scenario).gait
+    yield Contradiction(
+        "controller.kind",
+        gait.vertical_force is None,
+        lambda _run: (
             f"needs force sensors, and gait '{gait.name}' has no vertical_force; import it with the ground reaction, "
             "or take controller.kind=off"
-        )
-        yield "controller.kind", reason
+        ),
+    )
 
 
-def _pressures(configuration: Configuration) -> Iterator[tuple[str, str]]:
-    settings, supply = configuration.settings, configuration.device.supply
-    atmosphere = short_quantity_text(supply.atmospheric_pressure, _PASCAL)
-    lowest = min(supply.pressure, supply.dorsiflexion_pressure)
-    highest = max(supply.pressure, supply.dorsiflexion_pressure)
-    if settings["lowest_pressure"] >= supply.atmospheric_pressure:
-        yield "controller.lowest_pressure", f"must be below the atmosphere, which is {atmosphere}"
-    if not supply.atmospheric_pressure < settings["filled_pressure"] < lowest:
-        fed = short_quantity_text(lowest, _PASCAL)
-        yield "controller.filled_pressure", f"must be between atmosphere and supply, which are {atmosphere} and {fed}"
-    compressed = highest * COMPRESSION
-    if settings["highest_pressure"] <= compressed:
-        limit = short_quantity_text(compressed, _PASCAL)
-        yield "controller.highest_pressure", f"must be above {limit}: a moving foot compresses the gas in a chamber"
+def _pressures(scenario: Scenario) -> Iterator[Contradiction]:
+    settings, supply = scenario.control.settings, scenario.device.supply
+    room = supply.atmospheric_pressure
+    lowest = smaller(supply.pressure, supply.dorsiflexion_pressure)
+    compressed = larger(supply.pressure, supply.dorsiflexion_pressure) * COMPRESSION
+    yield Contradiction(
+        "controller.lowest_pressure",
+        settings["lowest_pressure"] >= room,
+        lambda run: f"must be below the atmosphere, which is {_text(room, run, _PASCAL)}",
+    )
+    filled = settings["filled_pressure"]
+    yield Contradiction(
+        "controller.filled_pressure",
+        np.logical_or(filled <= room, filled >= lowest),
+        lambda run: (
+            "must be between atmosphere and supply, which are "
+            f"{_text(room, run, _PASCAL)} and {_text(lowest, run, _PASCAL)}"
+        ),
+    )
+    yield Contradiction(
+        "controller.highest_pressure",
+        settings["highest_pressure"] <= compressed,
+        lambda run: f"must be above {_text(compressed, run, _PASCAL)}: a moving foot compresses the gas in a chamber",
+    )
 
 
-def _push_off(settings: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+def _push_off(settings: Mapping[str, Any]) -> Iterator[Contradiction]:
     start, end = settings["push_off_start"], settings["push_off_end"]
-    if end <= start:
-        yield "controller.push_off_end", f"must be above controller.push_off_start, which is {start:g}"
+    yield Contradiction(
+        "controller.push_off_end",
+        end <= start,
+        lambda run: f"must be above controller.push_off_start, which is {at(start, run):g}",
+    )
 
 
-def _profile(settings: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+def _profile(settings: Mapping[str, Any]) -> Iterator[Contradiction]:
     peak, rise, fall = settings["peak_time"], settings["rise_time"], settings["fall_time"]
-    if rise > peak:
-        yield "controller.rise_time", f"the torque would rise before the heel strike: controller.peak_time is {peak:g}"
-    if peak + fall > 1.0:
-        yield "controller.peak_time", f"with controller.fall_time {fall:g} the torque would end after the stride"
-    if peak < settings["push_off_start"]:
-        start = settings["push_off_start"]
-        yield (
-            "controller.peak_time",
-            f"the peak would be over before the push-off: controller.push_off_start is {start:g}",
-        )
+    start = settings["push_off_start"]
+    yield Contradiction(
+        "controller.rise_time",
+        rise > peak,
+        lambda run: f"the torque would rise before the heel strike: controller.peak_time is {at(peak, run):g}",
+    )
+    yield Contradiction(
+        "controller.peak_time",
+        peak + fall > 1.0,
+        lambda run: f"with controller.fall_time {at(fall, run):g} the torque would end after the stride",
+    )
+    yield Contradiction(
+        "controller.peak_time",
+        peak < start,
+        lambda run: f"the peak would be over before the push-off: controller.push_off_start is {at(start, run):g}",
+    )

@@ -11,9 +11,10 @@ from ppafo.metrics import Metric
 from ppafo.model.contact import FLAT, SWING
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
-from ppafo.walking.configuration import Configuration
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.course_planning import PlannedCourse, Span
 from ppafo.walking.gait_series import gait_timing
+from ppafo.walking.motion import walk_of
 
 LOADED_HEEL = 0.1
 """Body weights under the heel above which a push in plantarflexion is counted as one on a loaded heel."""
@@ -53,7 +54,7 @@ def steady_strides(planned: PlannedCourse, strikes: Floats) -> NDArray[np.bool_]
 
 
 def segment_results(
-    configuration: Configuration,
+    configuration: Scenario,
     planned: PlannedCourse,
     recording: Recording,
     works: Floats,
@@ -66,7 +67,7 @@ def segment_results(
 
 
 def _segment(
-    configuration: Configuration, span: Span, recording: Recording, works: Floats, starts: NDArray[np.intp]
+    configuration: Scenario, span: Span, recording: Recording, works: Floats, starts: NDArray[np.intp]
 ) -> SegmentResult:
     time = recording.time
     last = min(float(span.end), float(time[-1]))
@@ -74,7 +75,10 @@ def _segment(
     strikes = time[starts]
     begun = np.flatnonzero((strikes >= float(span.start)) & (strikes < last))
     gas = np.interp([float(span.start), last], time, recording["supplied_mass"])
-    heel = recording["heel_force"] > LOADED_HEEL * configuration.wearer.body_mass * configuration.wearer.leg().gravity
+    heel = (
+        recording["heel_force"]
+        > LOADED_HEEL * walk_of(configuration).wearer.body_mass * walk_of(configuration).wearer.leg().gravity
+    )
     loaded = own & heel & (recording["contact"] <= FLAT) & (recording["contact"] != SWING)
     push = recording["torque"][loaded]
     return SegmentResult(
@@ -101,9 +105,9 @@ def _helped(recording: Recording, begun: NDArray[np.intp], starts: NDArray[np.in
     return sum(not safe[edges[stride] : edges[stride + 1]].any() for stride in begun)
 
 
-def _lowest_toes(configuration: Configuration, recording: Recording, own: NDArray[np.bool_]) -> float | None:
+def _lowest_toes(configuration: Scenario, recording: Recording, own: NDArray[np.bool_]) -> float | None:
     """Lowest toes [m] where they must clear the ground: as far into each swing as for the mean stride of a walk."""
-    timing = gait_timing(configuration.gait)
+    timing = gait_timing(walk_of(configuration).gait)
     swing = recording["contact"] == SWING
     edges = np.flatnonzero(np.diff(swing.astype(np.int8))) + 1
     found = []

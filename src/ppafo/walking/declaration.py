@@ -19,6 +19,18 @@ LARGEST_SEED = 2**32 - 1
 SEED = Quantity("seed", "", "seed of noise and lost samples, a whole number", 1.0, 0.0, float(LARGEST_SEED))
 STEP = Quantity("step", "s", "largest step; 1 ms unless given", 1.0e-3, 1.0e-6, 0.01)
 
+PERSON = Quantity(
+    "person",
+    "",
+    "number of the person of the population who walks; 0: the wearer",
+    0.0,
+    0.0,
+    float(LARGEST_SEED),
+)
+DURATION = Quantity(
+    "duration", "s", "length of the walk; that of its course, else a minute unless given", None, 1.0, 3600.0
+)
+
 WALK_SENSORS = (
     *(item for item in SENSORS if item.name != "delay"),
     Quantity("force_bandwidth", "Hz", "bandwidth of the force sensors", 30.0, 0.1, 1.0e4),
@@ -28,6 +40,8 @@ WALK_SENSORS = (
     Quantity("angle_lost_share", "1", "fraction of the angle samples that are lost", 0.0, 0.0, 1.0),
     Quantity("pressure_lost_share", "1", "fraction of the pressure samples that are lost", 0.0, 0.0, 1.0),
 )
+FORCES = tuple(item.name for item in WALK_SENSORS if item not in SENSORS)
+"""Settings of sensors that no vane has."""
 ANGLE_BANDWIDTH = Quantity("angle_bandwidth", "Hz", "bandwidth of the angle sensor", None, 0.1, 1.0e6)
 PRESSURE_BANDWIDTH = Quantity("pressure_bandwidth", "Hz", "bandwidth of the pressure sensors", None, 0.1, 1.0e6)
 BANDWIDTHS = (ANGLE_BANDWIDTH, PRESSURE_BANDWIDTH)
@@ -101,11 +115,11 @@ def timing_settings(kind: str) -> tuple[Quantity, ...]:
 def quantities(controller: str, timing: str = THRESHOLDS) -> dict[str, Quantity]:
     """Return the declaration of every number that a walk file with this controller and timing can hold, by path."""
     sections = {
-        "wearer": WEARER,
+        "wearer": (*WEARER, PERSON),
         "controller": (RATE, PERIOD, *controller_settings(controller), *converter_settings(controller)),
         "timing": timing_settings(timing),
         "sensors": (*WALK_SENSORS, *BANDWIDTHS, SEED),
-        "run": (STEP,),
+        "run": (DURATION, STEP),
         "gas_model": THERMAL_GAS,
         bottle_supply.SECTION: bottle_supply.NUMBERS,
     }

@@ -13,8 +13,9 @@ from ppafo.gait import Gait
 from ppafo.gait.plausible import gait_file_remarks
 from ppafo.simulation.declaration import value_at
 from ppafo.simulation.reading import Reading
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.anthropometry import Build, segment_values
-from ppafo.walking.configuration import Configuration
+from ppafo.walking.motion import walk_of
 from ppafo.walking.wearer import WEARER, Wearer, paper_subject
 
 SHANK_SHARE = 0.246
@@ -71,8 +72,8 @@ def who_walks(wearer: Wearer, gait: Gait, origin: str) -> str:
     )
 
 
-def person_remarks(configuration: Configuration) -> list[str]:
+def person_remarks(configuration: Scenario) -> list[str]:
     """Return who walks, and what is odd about the zero of the gait's ankle."""
-    gait = configuration.gait
+    gait = walk_of(configuration).gait
     remarks = [f"remark: {text}" for text in gait_file_remarks(gait)]
-    return [who_walks(configuration.wearer, gait, configuration.wearer_origin), *remarks]
+    return [who_walks(walk_of(configuration).wearer, gait, walk_of(configuration).wearer_origin), *remarks]

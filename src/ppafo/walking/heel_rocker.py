@@ -7,6 +7,7 @@ import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.gait import Gait
+from ppafo.model.columns import over_runs
 from ppafo.signals.recording import Floats
 from ppafo.walking.gait_series import foot_angles, gait_timing, landing_phase, truncate
 from ppafo.walking.preparation import rocker_on_heel
@@ -30,7 +31,7 @@ class RockerFit(NamedTuple):
 
 def heel_rocker(gait: Gait, wearer: Wearer) -> HeelRocker:
     """The lever over the tilt of the foot, as fitted to the gait and bounded by the heel of a wearer."""
-    return rocker_on_heel(*fit_rocker(gait), wearer.heel_lever)
+    return over_runs(rocker_on_heel, *fit_rocker(gait), wearer.heel_lever)
 
 
 def fit_rocker(gait: Gait) -> RockerFit:

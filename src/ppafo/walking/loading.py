@@ -1,13 +1,13 @@
 """From a name or a file to a walk configuration; every mistake is one clear line."""
 
 import copy
-import math
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ppafo.control.fixed.torque_laws import FIXED
+from ppafo.control.fixed.torque_laws import FIXED, FLOAT
 from ppafo.control.fixed.walking_numbers import FIXED_WALKS
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import TIMINGS, load_walking_controller, walking_controllers, with_timing
@@ -16,25 +16,27 @@ from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
 from ppafo.gait import NORMATIVE, Gait, load_gait
 from ppafo.model.regulator import SupplyLines
-from ppafo.model.sensors import SensorParameters
-from ppafo.parameters import apply_overrides, build_device, load_parameter_set
+from ppafo.parameters import ParameterSet
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph
-from ppafo.parameters.parameter_set import atmospheric_pressure, links_of_set
+from ppafo.simulation.building import Hardware, ScenarioRequest, read_device, read_hardware
 from ppafo.simulation.declaration import ISOTHERMAL, PERIOD, RATE, kind_at, value_at
 from ppafo.simulation.gas_sections import assumed_lines, read_supply_lines, read_thermal
 from ppafo.simulation.overriding import device_paths, is_of_device, split_override
 from ppafo.simulation.reading import Reading
+from ppafo.simulation.scenario import Assumption, Control, MotionKind, Origin, Scenario, Sensors
 from ppafo.simulation.supply_line import SECTION as LINES
 from ppafo.walking import bottle_supply
 from ppafo.walking.bottle_supply import BottleSupply, read_bottle
-from ppafo.walking.configuration import Configuration
-from ppafo.walking.contradictions import check_walk
+from ppafo.walking.contradictions import check_walk, rules
 from ppafo.walking.course import WalkingCourse, load_course
 from ppafo.walking.declaration import (
     ARITHMETIC,
     BANDWIDTHS,
+    DURATION,
     FAULTY,
+    FORCES,
+    PERSON,
     SEED,
     STEP,
     THRESHOLDS,
@@ -47,12 +49,21 @@ from ppafo.walking.declaration import (
 )
 from ppafo.walking.following import links_of_defaults, with_default
 from ppafo.walking.gait_subject import read_wearer, wearer_origin
-from ppafo.walking.planning import course_of_walk
+from ppafo.walking.motion import WalkMotion, walk_of
+from ppafo.walking.planning import NO_REFERENCE, course_of_walk, noise, plan_walks, switches
+from ppafo.walking.result import lacks, measured
 from ppafo.walking.schema import walk_file
-from ppafo.walking.sensor_settings import FaultSettings, SensorSettings, sensors_of
+from ppafo.walking.sensor_settings import FaultSettings, SensorSettings
+from ppafo.walking.varying import (
+    PLACES,
+    clock_with,
+    duration_problems,
+    numbers_of_scenario,
+    record_interval,
+    with_duration,
+)
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
-_TURN = 2.0 * math.pi
 _TEXTS = (
     "gait",
     "course",
@@ -65,6 +76,8 @@ _TEXTS = (
     *(f"faults.{sensor}.kind" for sensor in FAULTY),
 )
 DEFAULT_PERIOD = 1.0e-3
+DEFAULT_DURATION, BOTTLE_DURATION = 60.0, 600.0
+"""Length of a walk [s], and of one on a bottle, unless given or ended by the bottle before."""
 
 
 def list_walks() -> tuple[str, ...]:
@@ -78,17 +91,20 @@ def load_walk(
     gait: str | Path | None = None,
     course: str | Path | None = None,
     bottle: str | Path | None = None,
-) -> Configuration:
-    """Return a walk configuration by its name in the package or by the path of a TOML file, in SI units.
+    parameter_set: ParameterSet | None = None,
+) -> Scenario:
+    """Return a scenario that is a walk by its name in the package or by the path of a TOML file, in SI units.
 
     ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait``,
     ``course`` and ``bottle`` replace those of the file. A gait that is named, by the file or by ``gait``, brings its
-    subject as the default wearer. ScenarioError, ParameterError or DataError for anything that cannot be used.
+    subject as the default wearer; ``parameter_set`` takes the place of the set that is named. ScenarioError,
+    ParameterError or DataError for anything that cannot be used.
     """
     file = label(str(name_or_path))
     given = tuple(overrides)
     _check_given_once(given, {"gait": gait, "course": course, bottle_supply.NAME: bottle}, file)
-    document = _apply_overrides(FILE.parse(FILE.read(name_or_path), file), given, file)
+    content = FILE.parse(FILE.read(name_or_path), file)
+    document = _apply_overrides(content, given, file)
     if bottle is not None:
         document.setdefault(bottle_supply.SECTION, {})["name"] = str(bottle)
     load_walking_controller(kind_at(document, "controller"))
@@ -96,47 +112,91 @@ def load_walk(
     reading = Reading(file, document, frozenset(split_override(text)[0] for text in given))
     folder = Path(name_or_path).parent
     law = walking_controllers()[kind_at(document, "controller")]
-    device = _device(document, [text for text in given if is_of_device(split_override(text)[0])], file)
+    of_device = tuple(text for text in given if is_of_device(split_override(text)[0]))
+    request = ScenarioRequest(file, str(name_or_path), folder, content, given, parameter_set)
+    hardware = read_hardware(reading, request, of_device)
+    device = _device(reading, hardware)
     walked = _gait(gait or document.get("gait", NORMATIVE), folder, gait is None)
     is_named = gait is not None or "gait" in document
     carried = read_bottle(reading, device, folder if bottle is None else Path())
     lines = _lines(reading, document, device, carried)
-    sensor_settings = _sensor_settings(reading)
-    gait_sensors = sensors_of(sensor_settings, _period(reading))
+    settings = _sensor_settings(reading)
     links = _links(reading, law, device)
-    configuration = Configuration(
+    _check_timing(law, reading)
+    motion = WalkMotion(
+        kind=WALK,
+        gait=walked,
+        wearer=read_wearer(reading, walked, is_named),
+        timing=_timing_kind(document),
+        forces={name: number for name, number in settings.numbers.items() if name in FORCES},
+        faults=settings.faults,
+        course=_course(course or document.get("course"), folder, course is None),
+        bottle=carried,
+        wearer_origin=wearer_origin(reading, walked, is_named),
+        person=_person(reading),
+    )
+    said = {"gait": gait, "course": course, bottle_supply.NAME: bottle}
+    more = tuple(f"{path}={_absolute(item)}" for path, item in said.items() if item is not None)
+    supply, step = device.supply, reading.number("run.step", STEP)
+    scenario = Scenario(
         name=document["name"],
         description=document.get("description", ""),
         device=device,
-        gait=walked,
-        wearer=read_wearer(reading, walked, is_named),
-        controller=_timed(law, reading),
-        settings=_settings(reading, law, device, sensor_settings, links),
-        sensors=_sensors(reading),
-        gait_sensors=gait_sensors,
-        sensor_settings=sensor_settings,
-        period=_period(reading),
-        step=reading.number("run.step", STEP),
-        assumed=_assumed(reading, carried),
-        file=str(name_or_path),
-        overrides=given,
-        supply_lines=lines,
+        duration=DEFAULT_DURATION,
+        time_step=step,
+        output_interval=record_interval(DEFAULT_DURATION),
+        motion=motion,
+        initial_pressure_1=supply.atmospheric_pressure,
+        initial_pressure_2=supply.atmospheric_pressure,
+        control=_control(reading, law, device, settings, links),
+        reference=NO_REFERENCE,
+        sensors=_sensors(reading, settings),
+        assumptions=_assumed(reading, carried),
+        origin=Origin(str(name_or_path), document["device"]["set"], hardware.valve, (*given, *more), content),
         thermal=read_thermal(reading),
-        course=_course(course or document.get("course"), folder, course is None),
-        wearer_origin=wearer_origin(reading, walked, is_named),
-        bottle=carried,
-        converter=_converter(reading, law),
+        supply_lines=lines,
         links=links,
     )
-    check_walk(configuration, reading)
-    course_of_walk(configuration)
-    return configuration
+    check_walk(scenario, reading)
+    return with_duration(scenario, _duration(reading, scenario))
 
 
-def _assumed(reading: Reading, carried: BottleSupply | None) -> dict[str, str]:
-    """Return what a walk assumes, by path: its file says it, its lines and the bottle that it hangs on."""
-    lines = {item.path: f"{item.value}, {item.note}" for item in assumed_lines(reading)}
-    return {**reading.document.get("assumed", {}), **lines, **({} if carried is None else carried.assumed)}
+def _absolute(name: str | Path) -> str:
+    """Return a name as it is and the path of a file in full, which means the same from any folder."""
+    path = Path(name)
+    return str(path.absolute()) if path.suffix == ".toml" else str(name)
+
+
+def _person(reading: Reading) -> float:
+    """Return the number of the person who walks."""
+    person = reading.number("wearer.person", PERSON)
+    if person != int(person):
+        raise reading.refusal("wearer.person", "must be a whole number")
+    return person
+
+
+def _duration(reading: Reading, scenario: Scenario) -> float:
+    """Return the length of a walk [s]: that of its file, else of its course, else a minute, or ten on a bottle."""
+    # As long as the wearer with the gait as it is takes for it, whoever walks.
+    course = course_of_walk(replace(scenario, motion=replace(walk_of(scenario), person=0.0)))
+    if value_at(reading.document, "run.duration") is not None:
+        duration = reading.number("run.duration", DURATION)
+        for is_bad, line in duration_problems(scenario, duration):
+            if is_bad:
+                raise ScenarioError(f"{reading.file}: {line(0)}")
+        return duration
+    if course is not None:
+        return float(course.duration)
+    return DEFAULT_DURATION if walk_of(scenario).bottle is None else BOTTLE_DURATION
+
+
+def _assumed(reading: Reading, carried: BottleSupply | None) -> tuple[Assumption, ...]:
+    """Return what a walk assumes: its file says it, its lines and the bottle that it hangs on."""
+    own = reading.document.get("assumed", {}) | ({} if carried is None else carried.assumed)
+    values = ((path, value_at(reading.document, path), note) for path, note in own.items())
+    found = {path: Assumption(path, "" if value is None else str(value), note) for path, value, note in values}
+    lines = {item.path: replace(item, note=f"{item.value}, {item.note}") for item in assumed_lines(reading)}
+    return tuple({**found, **lines}.values())
 
 
 def _check_given_once(overrides: tuple[str, ...], others: Mapping[str, object], file: str) -> None:
@@ -175,10 +235,10 @@ def _timing_kind(document: dict[str, Any], path: str = "", text: str = "") -> st
     return text if path == "timing.kind" else kind_at(document, "timing") or THRESHOLDS
 
 
-def _timed(law: ControllerKind, reading: Reading) -> ControllerKind:
-    """Return the controller with the timing of the file; ScenarioError where it goes by no time in the stride."""
+def _check_timing(law: ControllerKind, reading: Reading) -> None:
+    """Raise ScenarioError for a timing of a controller that goes by no time in the stride."""
     try:
-        return with_timing(law, TIMINGS[_timing_kind(dict(reading.document))])
+        with_timing(law, TIMINGS[_timing_kind(dict(reading.document))])
     except ScenarioError as error:
         raise ScenarioError(f"{reading.file}: {error}") from error
 
@@ -205,8 +265,15 @@ def _settings(
     return found
 
 
-def _converter(reading: Reading, law: ControllerKind) -> dict[str, float] | None:
-    """Return the settings of the converter [SI] of a controller on whole numbers, None where it has floats."""
+def _control(reading: Reading, law: ControllerKind, device: Device, sensors: SensorSettings, links: Graph) -> Control:
+    """Return the controller with its settings and those of its timing and its converter."""
+    settings = _settings(reading, law, device, sensors, links) | _converter(reading, law)
+    arithmetic = value_at(reading.document, ARITHMETIC) or FLOAT
+    return Control(law.name, settings, _period(reading), arithmetic=arithmetic)
+
+
+def _converter(reading: Reading, law: ControllerKind) -> dict[str, float]:
+    """Return the settings of the converter [SI] of a controller on whole numbers, none where it has floats."""
     items = converter_settings(law.name)
     if value_at(reading.document, ARITHMETIC) == FIXED:
         if _timing_kind(dict(reading.document)) != THRESHOLDS:
@@ -215,7 +282,7 @@ def _converter(reading: Reading, law: ControllerKind) -> dict[str, float] | None
     for item in items:
         if value_at(reading.document, f"controller.{item.name}") is not None:
             raise reading.refusal(f"controller.{item.name}", f'needs {ARITHMETIC} = "{FIXED}"')
-    return None
+    return {}
 
 
 def _set(document: dict[str, Any], path: str, text: str) -> None:
@@ -237,18 +304,12 @@ def _set(document: dict[str, Any], path: str, text: str) -> None:
     table[name] = int(text) if path == "sensors.seed" and text.isdecimal() and len(text) < 20 else text
 
 
-def _device(document: dict[str, Any], overrides: list[str], file: str) -> Device:
-    section = document["device"]
-    valve = section.get("valve")
+def _device(reading: Reading, hardware: Hardware) -> Device:
+    device = read_device(reading, hardware)
     try:
-        parameters = apply_overrides(load_parameter_set(section["set"]), section.get("overrides", ()), valve)
-        before = atmospheric_pressure(parameters) if overrides else None
-        parameters = apply_overrides(parameters, overrides, valve)
-        given = {split_override(text)[0] for text in overrides}
-        device = build_device(parameters, valve, links_of_set(parameters, given, before))
         device.check_vane("a walk")
     except ParameterError as error:
-        raise ParameterError(f"{file}: [device]: {one_line(error)}") from error
+        raise ParameterError(f"{reading.file}: [device]: {one_line(error)}") from error
     return device
 
 
@@ -276,14 +337,16 @@ def _gait(name: str | Path, folder: Path, relative: bool) -> Gait:
     return load_gait(folder / path if is_path and relative and not path.is_absolute() else name)
 
 
-def _sensors(reading: Reading) -> SensorParameters:
-    values = reading.section("sensors", WALK_SENSORS)
-    return SensorParameters(
+def _sensors(reading: Reading, settings: SensorSettings) -> Sensors:
+    values = settings.numbers
+    return Sensors(
         angle_noise=values["angle_noise"],
         pressure_noise=values["pressure_noise"],
         angle_quantum=values["angle_resolution"],
         pressure_quantum=values["pressure_resolution"],
-        seed=reading.number("sensors.seed", SEED),
+        seed=int(reading.number("sensors.seed", SEED)),
+        angle_bandwidth=values["angle_bandwidth"],
+        pressure_bandwidth=values["pressure_bandwidth"],
     )
 
 
@@ -311,3 +374,18 @@ def _period(reading: Reading) -> float:
     if rate is not None:
         return 1.0 / reading.number("controller.rate", RATE)
     return DEFAULT_PERIOD if period is None else reading.number("controller.period", PERIOD)
+
+
+WALK = MotionKind(
+    name="walk",
+    plan=plan_walks,
+    rules=rules,
+    quantities=numbers_of_scenario,
+    places=PLACES,
+    clock=clock_with,
+    switches=switches,
+    noise=noise,
+    lacks=lacks,
+    measured=measured,
+)
+"""The motion of a scenario that walks."""

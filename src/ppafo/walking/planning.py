@@ -1,28 +1,41 @@
-"""From a wearer, a gait, a device and a controller to a run of the engine."""
+"""From a scenario that is a walk to a run of the engine. Any number of it may be an array (runs,), one for each run."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
 
+import numpy as np
+
+from ppafo.control.controllers import switching
+from ppafo.control.fixed.walking_law import SETTINGS as CONVERTER
+from ppafo.control.fixed.walking_law import GaitConverter, gait_converter
+from ppafo.control.fixed.walking_numbers import FIXED_WALKS
 from ppafo.control.kind import ControllerKind
+from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
+from ppafo.engine.rows import leaves, rebuilt
 from ppafo.engine.run import Run, Walk
+from ppafo.engine.scheme.walking import WalkState
+from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
-from ppafo.model.gait import gait_at
+from ppafo.model.columns import Problem, at, first, over_runs, smaller, truncated, whole
+from ppafo.model.course import Course
+from ppafo.model.gait import GaitSeries, GaitTiming, gait_at
 from ppafo.model.gait_sensors import GaitSensors
 from ppafo.model.leg import LegParameters
 from ppafo.model.plant import PlantParameters
-from ppafo.model.regulator import SupplyLines
-from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves import dump
 from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.plant import plant_parameters
-from ppafo.simulation.plan import Pieces, Steps, compose_run
-from ppafo.simulation.scenario import ProfileChoice, Thermal
-from ppafo.walking.configuration import Configuration
+from ppafo.simulation.plan import Pieces, Steps, compose_run, sensor_parameters, too_many_steps
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, ProfileChoice, Scenario
 from ppafo.walking.course import WalkingCourse
 from ppafo.walking.course_planning import PlannedCourse, plan_course, standing_gait
-from ppafo.walking.gait_series import gait_series, gait_timing, strike_angle
 from ppafo.walking.heel_rocker import heel_rocker
+from ppafo.walking.motion import walk_of
+from ppafo.walking.person import Person, leg_of_person, person_of, settings_of_person
 from ppafo.walking.preparation import (
     device_share,
     longest_delay,
@@ -33,106 +46,255 @@ from ppafo.walking.preparation import (
     walk_step_counts,
     with_leg,
 )
-from ppafo.walking.wearer import Wearer, leg_parameters
+from ppafo.walking.sensor_settings import FaultSettings, SensorSettings, sensors_of
+from ppafo.walking.wearer import leg_parameters
 
 NO_REFERENCE = ProfileChoice("constant", {"level": 0.0})
 """A controller of walking makes its own."""
 
 
-@dataclass(frozen=True, slots=True)
-class WalkPlan:
-    """What a walk is made of; ``settings`` of the controller in SI; ``period`` and ``step`` [s]."""
+def plan_walk(scenario: Scenario) -> Run:
+    """The run of a walk with vented chambers, which begins at a heel strike, or on a course standing.
 
-    device: Device
-    wearer: Wearer
-    gait: Gait
-    controller: ControllerKind
-    settings: dict[str, float]
-    sensors: SensorParameters
-    gait_sensors: GaitSensors
-    has_ideal_sensors: bool
-    duration: float
-    period: float = 1.0e-3
-    step: float = 1.0e-3
-    record_interval: float = 1.0e-3
-    supply_lines: SupplyLines | None = None
-    thermal: Thermal | None = None
-    course: WalkingCourse | None = None
+    ScenarioError where it cannot be.
+    """
+    run, problems = plan_walks(scenario)
+    for is_bad, line in problems:
+        if is_bad:
+            raise ScenarioError(f"{scenario.origin.file}: {line(0)}")
+    return run
 
 
-def plan_walk(plan: WalkPlan) -> Run:
-    """The run of a walk with vented chambers, which begins at a heel strike, or on a course standing."""
-    leg = leg_parameters(plan.wearer, heel_rocker(plan.gait, plan.wearer))
-    bare = plant_parameters(plan.device)
-    walk = _walk(plan, leg, bare)
+def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
+    """The run of a walk, and what may be wrong with it; any number in both may be an array (runs,).
+
+    All runs of an ensemble must ask for one program: the settings of ``switches`` are 0 for all of them or for none.
+    """
+    motion, device, period = walk_of(scenario), fed_device(scenario), scenario.control.period
+    person = person_of(motion.gait, motion.person)
+    leg = leg_of_person(leg_parameters(motion.wearer, heel_rocker(motion.gait, motion.wearer)), person)
+    bare = plant_parameters(device)
+    sensors = gait_sensors_of(scenario)
+    planned = course_of_walk(scenario)
+    course = None if planned is None else planned.course
+    walk = Walk(
+        leg=leg,
+        share=device_share(bare, leg),
+        gait=person.series,
+        timing=person.timing,
+        sensors=sensors,
+        initial=_start(leg, person.series, person.timing, course),
+        course=course,
+    )
+    controller, settings, problems = controller_of(_fitted(scenario, person))
     pieces = Pieces(
-        device=plan.device,
-        valve=walking_valve(plan.device.valve),
-        controller=plan.controller,
-        settings=plan.settings,
+        device=device,
+        valve=walking_valve(device.valve),
+        controller=None if scenario.control.kind == PYTHON_CONTROLLER else controller,
+        settings=settings,
         reference=NO_REFERENCE,
         path=None,
-        sensors=plan.sensors,
-        has_ideal_sensors=plan.has_ideal_sensors,
-        thermal=plan.thermal,
-        supply_lines=plan.supply_lines,
-        signal_delay=longest_delay(plan.gait_sensors) * plan.period,
+        sensors=sensor_parameters(scenario),
+        has_ideal_sensors=has_ideal_sensors(scenario),
+        thermal=scenario.thermal,
+        supply_lines=scenario.supply_lines,
+        signal_delay=_of_each(longest_delay, sensors) * period,
     )
-    return compose_run(
+    run = compose_run(
         pieces,
         with_leg(bare, leg),
-        lambda plant: walk_steps(plan, plant),
+        lambda plant: walk_steps(scenario, plant),
         lambda plant: vented_state(plant, walk.initial.now.ankle, walk.initial.now.ankle_rate),
         walk,
     )
+    return run, (too_many_steps(scenario, run.step, run.step_count), *problems)
 
 
-def walk_steps(plan: WalkPlan, plant: PlantParameters) -> Steps:
+def walk_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
     """The steps of a walk: whole ones that follow the gas, as many to a sample of the controller as that asks for."""
-    lines, volume = plan.supply_lines, smallest_chamber(plant)
-    volume = volume if lines is None else min(volume, lines.volume_1, lines.volume_2)
+    lines, volume = scenario.supply_lines, _of_each(smallest_chamber, plant)
+    volume = volume if lines is None else smaller(volume, smaller(lines.volume_1, lines.volume_2))
     # Adiabatic chambers fill faster than isothermal ones, by the ratio of heat capacities.
-    stiffness = 1.0 if plan.thermal is None else plan.device.gas.heat_capacity_ratio
-    counts = walk_step_counts(plan.duration, plan.step, plan.record_interval, plan.period, plant, volume, stiffness)
+    stiffness = 1.0 if scenario.thermal is None else scenario.device.gas.heat_capacity_ratio
+    times = scenario.duration, scenario.time_step, scenario.output_interval, scenario.control.period
+    counts = walk_step_counts(*times, plant, volume, stiffness)
     return Steps(
         step=counts.step,
-        step_count=int(counts.step_count),
-        steps_per_sample=int(counts.steps_per_sample),
-        record_every=int(counts.record_every),
+        step_count=whole(counts.step_count),
+        steps_per_sample=whole(counts.steps_per_sample),
+        record_every=whole(counts.record_every),
         needs_parts=False,
     )
 
 
-def _walk(plan: WalkPlan, leg: LegParameters, bare: PlantParameters) -> Walk:
-    """The leg of a walk, at its first heel strike or standing; ``bare`` is the device without it."""
-    gait, timing = gait_series(plan.gait), gait_timing(plan.gait)
-    course = None if plan.course is None else planned_course(plan.course, plan.gait).course
+def _start(leg: LegParameters, series: GaitSeries, timing: GaitTiming, course: Course | None) -> WalkState:
+    """Where a walk begins: at a heel strike, or standing where there is a course."""
     if course is None:
-        initial = walk_from_strike(gait_at(gait, timing, leg, 0.0))
+        begun = _of_each(lambda *rows: walk_from_strike(gait_at(rows[1], rows[2], rows[0], 0.0)), leg, series, timing)
     else:
-        initial = walk_from_standing(standing_gait(leg, timing, course))
-    return Walk(
-        leg=leg,
-        share=device_share(bare, leg),
-        gait=gait,
-        timing=timing,
-        sensors=plan.gait_sensors,
-        initial=initial,
-        course=course,
-    )
+        begun = _of_each(lambda *rows: walk_from_standing(standing_gait(*rows)), leg, timing, course)
+    start: WalkState = begun
+    return start
 
 
-def planned_course(course: WalkingCourse, gait: Gait) -> PlannedCourse:
-    """A course in time, walked by the person of a gait; ScenarioError for what this gait does not allow."""
-    timing = gait_timing(gait)
-    return plan_course(course, gait, timing.frequency, timing, strike_angle(gait))
+def _of_each(function: Any, *rows: Any) -> Any:
+    """What a function makes of some NamedTuples of floats; where they have arrays (runs,), run by run."""
+    kinds, counts = [type(row) for row in rows], np.cumsum([0, *(len(leaves(row)) for row in rows)]).tolist()
+
+    def from_numbers(*numbers: float) -> Any:
+        parts = (numbers[first:last] for first, last in pairwise(counts))
+        return function(*(rebuilt(kind, part) for kind, part in zip(kinds, parts, strict=True)))
+
+    return over_runs(from_numbers, *(number for row in rows for number in leaves(row)))
 
 
-def course_of_walk(configuration: Configuration) -> PlannedCourse | None:
+def gait_sensors_of(scenario: Scenario) -> GaitSensors:
+    """The sensors of a walk with their faults, at the sample period of its controller."""
+    settings = sensor_settings(scenario)
+    names, values = tuple(settings.numbers), [*settings.numbers.values()]
+    faults = [(sensor, fault.kind, tuple(fault.numbers)) for sensor, fault in settings.faults.items()]
+    values += [value for fault in settings.faults.values() for value in fault.numbers.values()]
+
+    def made(period: float, *given: float) -> GaitSensors:
+        left = iter(given)
+        numbers = {name: next(left) for name in names}
+        own = {sensor: FaultSettings(kind, {name: next(left) for name in known}) for sensor, kind, known in faults}
+        return sensors_of(SensorSettings(numbers, own), period)
+
+    return over_runs(made, scenario.control.period, *values)
+
+
+def sensor_settings(scenario: Scenario) -> SensorSettings:
+    """What a walk states of its sensors and their faults, in SI units."""
+    sensors, motion = scenario.sensors, walk_of(scenario)
+    shared = {
+        "angle_bandwidth": sensors.angle_bandwidth,
+        "pressure_bandwidth": sensors.pressure_bandwidth,
+        "angle_noise": sensors.angle_noise,
+        "pressure_noise": sensors.pressure_noise,
+        "angle_resolution": sensors.angle_quantum,
+        "pressure_resolution": sensors.pressure_quantum,
+    }
+    return SensorSettings({**shared, **motion.forces}, motion.faults)
+
+
+def flaws(scenario: Scenario) -> tuple[Any, ...]:
+    """What makes the sensors of a walk worse than ideal ones beside faults, each 0 where it does not.
+
+    The bandwidth of the force sensors is no such flaw: every walk has it.
+    """
+    numbers = sensor_settings(scenario).numbers
+    return tuple(number for name, number in numbers.items() if name != "force_bandwidth")
+
+
+def has_ideal_sensors(scenario: Scenario) -> bool:
+    """True where nothing but the bandwidth of the force sensors stands between foot and controller."""
+    fails = any(fault.kind for fault in walk_of(scenario).faults.values())
+    return not (fails or any(first(flaw) for flaw in flaws(scenario)))
+
+
+def switches(scenario: Scenario) -> tuple[Any, ...]:
+    """Settings that are 0 for all runs of a program or for none: flaws of sensors, samples by which one is late."""
+    delays = (fault.numbers.get("delay", 0.0) for fault in walk_of(scenario).faults.values())
+    return *flaws(scenario), *(truncated(delay / scenario.control.period + 0.5) for delay in delays)
+
+
+def noise(scenario: Scenario) -> Any:
+    """The sum of what is random in the sensors of a walk: noise, and shares of samples that are lost."""
+    sensors, motion = scenario.sensors, walk_of(scenario)
+    lost = [fault.numbers.get("lost_share", 0.0) for fault in motion.faults.values()]
+    own = [number for name, number in motion.forces.items() if name == "force_noise" or name.endswith("lost_share")]
+    return sum((*own, *lost), sensors.angle_noise + sensors.pressure_noise)
+
+
+def _fitted(scenario: Scenario, person: Person) -> Scenario:
+    """The walk with the settings of its controller as they were fitted to the person."""
+    settings = settings_of_person(dict(scenario.control.settings), person)
+    return replace(scenario, control=replace(scenario.control, settings=settings))
+
+
+def law_of(scenario: Scenario) -> ControllerKind:
+    """The controller of a walk with its way to know the time in the stride, computing with floats.
+
+    A constant command is no controller of a walk in a file: an exported plant has it, whose command is handed in.
+    """
+    if scenario.control.kind == switching.CONSTANT.name:
+        return switching.CONSTANT
+    return with_timing(walking_controllers()[scenario.control.kind], TIMINGS[walk_of(scenario).timing])
+
+
+def controller_of(scenario: Scenario) -> tuple[ControllerKind | None, Mapping[str, Any], tuple[Problem, ...]]:
+    """The controller of a walk for the lanes, its settings in SI units or as whole numbers, and what may be wrong."""
+    control = scenario.control
+    if control.kind == PYTHON_CONTROLLER:
+        return None, {}, ()
+    if not control.is_fixed:
+        return law_of(scenario), control.settings, ()
+    converter, numbers = converter_of_walk(scenario), numbers_of_walk(scenario)
+    law = FIXED_WALKS[control.kind]
+    return law.kind, converter._asdict() | numbers, (_broken_bit(scenario), *_beyond(scenario, numbers))
+
+
+def converter_of_walk(scenario: Scenario) -> GaitConverter:
+    """The converter of a walk whose controller computes with whole numbers."""
+    return over_runs(gait_converter, *(scenario.control.settings[item.name] for item in CONVERTER))
+
+
+def numbers_of_walk(scenario: Scenario) -> dict[str, Any]:
+    """The whole numbers of a walk's controller by name, in floats."""
+    law, control = FIXED_WALKS[scenario.control.kind], scenario.control
+    converter, names = converter_of_walk(scenario), tuple(control.settings)
+    count = len(converter)
+
+    def prepared(period: float, *given: float) -> tuple[float, ...]:
+        settings = dict(zip(names, given[count:], strict=True))
+        found = law.prepare(settings, period, GaitConverter(*given[:count]))
+        return tuple(found[item.name] for item in law.number_quantities)
+
+    found = over_runs(prepared, control.period, *converter, *control.settings.values())
+    return dict(zip((item.name for item in law.number_quantities), found, strict=True))
+
+
+def _broken_bit(scenario: Scenario) -> Problem:
+    """A number of bits that is not whole."""
+    bits = scenario.control.settings["converter_bits"]
+    return bits % 1.0 != 0.0, lambda run: f"controller.converter_bits = {at(bits, run):g}: must be whole"
+
+
+def _beyond(scenario: Scenario, numbers: Mapping[str, Any]) -> Iterator[Problem]:
+    """Whole numbers that an integer controller cannot hold."""
+    for item in FIXED_WALKS[scenario.control.kind].number_quantities:
+        number = numbers[item.name]
+
+        def line(run: int, item: Any = item, number: Any = number) -> str:
+            return (
+                f"controller on whole numbers: {item.name} ({item.summary}) would be {at(number, run):.0f}, beyond "
+                f"{item.minimum:.0f} to {item.maximum:.0f}: take another range of the converter, a slower "
+                "controller.rate, or another setting"
+            )
+
+        yield np.logical_or(number < item.minimum, number > item.maximum), line
+
+
+def fed_device(scenario: Scenario) -> Device:
+    """The device with the gas that its supply has at the start: cold gas where it hangs on a bottle."""
+    bottle = walk_of(scenario).bottle
+    return scenario.device if bottle is None else bottle.device_at_start(scenario.device)
+
+
+def course_of_walk(scenario: Scenario) -> PlannedCourse | None:
     """The course of a walk in time, None where it has none; ScenarioError for what its gait does not allow."""
-    return None if configuration.course is None else planned_course(configuration.course, configuration.gait)
+    motion = walk_of(scenario)
+    return None if motion.course is None else planned_course(motion.course, motion.gait, motion.person)
+
+
+def planned_course(course: WalkingCourse, gait: Gait, number: Any = 0.0) -> PlannedCourse:
+    """A course in time, walked by the person with a number; ScenarioError for what the gait does not allow."""
+    person = person_of(gait, number)
+    return plan_course(course, gait, person.timing.frequency, person.timing, person.strike_angle)
 
 
 def walking_valve(valve: Valve) -> ValveModel:
     """The valve of a walking device; a proportional one has a dump valve for free motion."""
-    return dump.choose(valve.settings) if valve.kind == "proportional" else VALVES[valve.kind].choose(valve.settings)
+    settings = {name: first(value) for name, value in valve.settings.items()}
+    return dump.choose(settings) if valve.kind == "proportional" else VALVES[valve.kind].choose(settings)

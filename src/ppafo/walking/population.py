@@ -13,13 +13,16 @@ from ppafo.engine.lanes import Batch, Floats, run_batch
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED
 from ppafo.errors import ScenarioError
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.anthropometry import draw_builds
-from ppafo.walking.configuration import Configuration
 from ppafo.walking.course_planning import turns_walked
+from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.recorded import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
+from ppafo.walking.result import REMEDY
 from ppafo.walking.varied_gait import draw_gaits
-from ppafo.walking.walk import REMEDY, Progress, plan_of, silent, walk_duration
+from ppafo.walking.varying import with_duration
+from ppafo.walking.walk import Progress, lasting, silent
 from ppafo.walking.wearers_rows import batch_of_many, course_of_many
 
 MAXIMUM_WEARERS = 1_000_000
@@ -62,7 +65,7 @@ class Population:
     ``signs`` counts both by the last sign that was seen, with the most frequent first.
     """
 
-    configuration: Configuration
+    scenario: Scenario
     minutes: float
     seed: int
     traits: Mapping[str, Floats]
@@ -85,11 +88,11 @@ class Population:
         return f"{self.diverged} of {self.diverged + self.count} wearers diverged and are left out; {REMEDY}"
 
     def __repr__(self) -> str:
-        return f"Population of {self.count} wearers, {self.configuration.name}, {self.minutes:g} min: {self.message}"
+        return f"Population of {self.count} wearers, {self.scenario.name}, {self.minutes:g} min: {self.message}"
 
 
 def walk_population(
-    configuration: Configuration,
+    configuration: Scenario,
     minutes: float | None,
     wearers: int,
     seed: int = 1,
@@ -101,16 +104,18 @@ def walk_population(
     """
     if not 1 <= wearers <= MAXIMUM_WEARERS:
         raise ScenarioError(f"the number of wearers must be from 1 to {MAXIMUM_WEARERS}, not {wearers}")
-    if configuration.bottle is not None:
+    if walk_of(configuration).bottle is not None:
         raise ScenarioError("many wearers walk at a constant supply: leave out the bottle, or the number of wearers")
+    if walk_of(configuration).person:
+        raise ScenarioError("many wearers are drawn about the wearer: leave out wearer.person, or their number")
     generator = np.random.default_rng(seed)
     build = draw_builds(wearers, generator)
-    gaits = draw_gaits(configuration.gait, build.stature, generator)
+    gaits = draw_gaits(walk_of(configuration).gait, build.stature, generator)
     planned = course_of_many(configuration, gaits)
     if minutes is None and planned is not None:
         minutes = float(np.max(planned.duration)) / 60.0
-    seconds = walk_duration(configuration, minutes)
-    run = plan_walk(plan_of(configuration, seconds))
+    seconds = lasting(configuration, minutes).duration
+    run = plan_walk(with_duration(configuration, seconds))
     batch = batch_of_many(configuration, run, build, gaits, generator, planned)
     states = _run_in_groups(batch, progress)
     rows = {path: states[row] for path, row in row_numbers(batch.program.state_rows()).items()}
@@ -120,8 +125,8 @@ def walk_population(
         rows, walked * gaits.timing["frequency"] if planned is None else turns_walked(planned.course, walked)
     )
     traits = {
-        "body_mass": configuration.wearer.body_mass * build.mass,
-        "shank_length": configuration.wearer.shank_length * build.stature,
+        "body_mass": walk_of(configuration).wearer.body_mass * build.mass,
+        "shank_length": walk_of(configuration).wearer.shank_length * build.stature,
         "stride_time": gaits.stride_time,
         "stance_share": gaits.timing["toe_off"],
     }

@@ -12,11 +12,12 @@ from ppafo.model.contact import SWING
 from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix, passive_torque
 from ppafo.model.plant import chamber_pressures
 from ppafo.signals import Channel, Recording
+from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import gas_channels
-from ppafo.walking.configuration import Configuration
 from ppafo.walking.course_planning import pace_in_time
 from ppafo.walking.event_times import EVENT_ROW, FRACTION_ROW, clock_row
 from ppafo.walking.gait_series import truncate
+from ppafo.walking.motion import walk_of
 from ppafo.walking.on_bottle import UNITS, SupplyCourse
 from ppafo.walking.posture import AnklePath, ankle_path
 
@@ -35,7 +36,7 @@ REQUEST_ROW = "controller_state.request.torque"
 
 
 def recording_of_walk(
-    configuration: Configuration,
+    configuration: Scenario,
     run: Run,
     time: Floats,
     record: Mapping[str, Floats],
@@ -47,7 +48,7 @@ def recording_of_walk(
     angle, rate = record["state.angle"], record["state.angular_velocity"]
     pressure_1, pressure_2 = chamber_pressures(run.plant, angle, record["state.mass_1"], record["state.mass_2"])
     external = record["walk.external_torque"]
-    path = ankle_path(configuration.gait, run.walk.timing, configuration.wearer)
+    path = ankle_path(walk_of(configuration).gait, run.walk.timing, walk_of(configuration).wearer)
     channels: dict[str, tuple[Any, str]] = {
         "angle": (angle, "rad"),
         "angular_velocity": (rate, "rad/s"),
@@ -96,7 +97,7 @@ def _with_cold_gas(run: Run, supply: SupplyCourse, time: Floats) -> Run:
 
 
 def _course_channels(
-    configuration: Configuration, run: Run, path: AnklePath, time: Floats, record: Mapping[str, Any]
+    configuration: Scenario, run: Run, path: AnklePath, time: Floats, record: Mapping[str, Any]
 ) -> dict[str, tuple[Any, str]]:
     """What a course has beside a walk of equal strides, and the toes over ground that may rise: stairs lift the ankle.
 
@@ -104,7 +105,7 @@ def _course_channels(
     """
     assert run.walk is not None, "a walk has a leg"
     assert run.walk.course is not None, "of a course"
-    gait, pace = configuration.gait, pace_in_time(run.walk.course, time)
+    gait, pace = walk_of(configuration).gait, pace_in_time(run.walk.course, time)
     phase, shank = record["walk.now.phase"], record["walk.now.shank"]
     healthy = path.toe_height(
         phase, truncate(gait.shank_angle).values_at(phase), truncate(gait.ankle_angle).values_at(phase)

@@ -11,8 +11,9 @@ from ppafo.control.walking.signs import HELPS, LIFTS, PAUSED, SIGNS, STOPPED, Si
 from ppafo.engine.lanes import Floats
 from ppafo.simulation.declaration import PLAIN
 from ppafo.simulation.reading import WRITTEN_UNITS
+from ppafo.simulation.scenario import Scenario
 from ppafo.units import from_si
-from ppafo.walking.configuration import Configuration
+from ppafo.walking.planning import law_of
 from ppafo.walking.recorded import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
 
 _WORDS = {LIFTS: "lift-only (no push-off) from", PAUSED: "paused at", STOPPED: "stopped for good at"}
@@ -63,7 +64,7 @@ class SafetyEvent:
         }
 
 
-def safety_events(configuration: Configuration, time: Floats, record: Mapping[str, Floats]) -> tuple[SafetyEvent, ...]:
+def safety_events(configuration: Scenario, time: Floats, record: Mapping[str, Floats]) -> tuple[SafetyEvent, ...]:
     """Return the events of a walk in their order, from its rows (samples,) by path at these times [s]."""
     if SAFE_ROW not in record:
         return ()
@@ -80,16 +81,16 @@ def safety_events(configuration: Configuration, time: Floats, record: Mapping[st
 
 
 def _venting(
-    configuration: Configuration, time: float, level: float, record: Mapping[str, Floats], place: int
+    configuration: Scenario, time: float, level: float, record: Mapping[str, Floats], place: int
 ) -> SafetyEvent:
     sign = SIGNS[float(record[f"{FINDING_ROW}.sign"][place])]
-    quantities = {item.name: item for item in configuration.controller.quantities}
+    quantities = {item.name: item for item in law_of(configuration).quantities}
     return SafetyEvent(
         time=time,
         level=level,
         sign=sign,
         readings={name: float(record[f"{FINDING_ROW}.{name}"][place]) for name in sign.readings},
-        settings={name: configuration.settings[name] for name in sign.settings},
+        settings={name: configuration.control.settings[name] for name in sign.settings},
         units={name: quantities[name].unit for name in sign.settings},
         atmosphere=configuration.device.supply.atmospheric_pressure,
     )

@@ -83,6 +83,8 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
     sensors |= {item.name: optional(number_type(item), item.summary) for item in declaration.BANDWIDTHS}
     sensors["seed"] = (seed, Field(1, description=declaration.SEED.summary))
     faults = {name: optional(_fault(name), f"fault of the {name} sensor") for name in declaration.FAULTY}
+    run = {"duration": optional(number_type(declaration.DURATION), declaration.DURATION.summary)}
+    run |= quantity_fields((declaration.STEP,))
     fields: dict[str, Any] = {
         "schema_version": (Literal[1], Field(description="version of this layout")),
         "name": (str, Field(pattern=NAME, max_length=100)),
@@ -97,7 +99,7 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
         "controller": (_controller(), Field(description="what commands the valve")),
         "timing": optional(_timing(), "how the controller knows the time in the stride; thresholds unless given"),
         "wearer": optional(
-            table("Wearer", quantity_fields(WEARER)),
+            table("Wearer", quantity_fields((*WEARER, declaration.PERSON))),
             "who walks; the subject of the gait that is named, else the paper's, unless given",
         ),
         "sensors": optional(table("WalkSensors", sensors), "sensors of the controller; ideal unless given"),
@@ -109,7 +111,7 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
         bottle_supply.SECTION: optional(
             table("WalkBottle", _bottle()), "bottle that the device hangs on; a supply without end unless given"
         ),
-        "run": optional(table("WalkRun", quantity_fields((declaration.STEP,))), "how it is computed"),
+        "run": optional(table("WalkRun", run), "how long it is, and how it is computed"),
         "assumed": (
             dict[str, str],
             Field(default_factory=dict, description="assumed values, which no source gives, and why these"),

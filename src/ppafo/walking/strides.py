@@ -7,37 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.control.walking.signs import HELPS
+from ppafo.metrics.strides import PER_STRIDE
 from ppafo.signals import CHANNELS, Recording
 
 Floats = NDArray[np.float64]
 
 PHASES = np.linspace(0.0, 1.0, 101)
 """Phases from heel strike to heel strike at which curves are averaged."""
-
-SETTLING = 2
-"""First strides that are left out of averages: the controller learns the stride time in them."""
-
-
-@dataclass(frozen=True, slots=True)
-class Quantity:
-    """A quantity of every stride: unit, meaning, and the running total in the record whose gain it is."""
-
-    unit: str
-    summary: str
-    total: str
-
-
-PER_STRIDE: dict[str, Quantity] = {
-    "gas": Quantity("kg", "gas taken from the supply in one stride", "state.supplied_mass"),
-    "push_off_work": Quantity("J", "work of T_ex while the foot rolls over the toes", "walk.push_off_work"),
-    "slap_rate": Quantity(
-        "rad/s",
-        "rate of the toes as they come down after the heel, below 0; 0 where they came first",
-        "walk.slap_rates",
-    ),
-    "toe_clearance": Quantity("m", "lowest toe height in mid-swing, relative to the healthy gait", "walk.clearances"),
-    "toe_landing": Quantity("-", "1 where the toes met the ground before the heel", "walk.toe_landings"),
-}
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,15 +8,17 @@ from numpy.typing import NDArray
 from ppafo.control.walking.phases import PUSH_OFF
 from ppafo.engine.lanes import Floats
 from ppafo.metrics import Metric
+from ppafo.metrics.strides import PER_STRIDE, SETTLING
 from ppafo.signals import Recording
-from ppafo.walking.configuration import Configuration
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.gait_series import gait_timing
+from ppafo.walking.motion import walk_of
 from ppafo.walking.posture import ankle_path
-from ppafo.walking.strides import PER_STRIDE, PHASES, SETTLING, Curves, samples_of
+from ppafo.walking.strides import PHASES, Curves, samples_of
 
 
 def walk_metrics(
-    configuration: Configuration,
+    configuration: Scenario,
     recording: Recording,
     strides: Mapping[str, Floats],
     averages: Mapping[str, Curves],
@@ -50,14 +52,14 @@ def settled(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def stride_metrics(
-    configuration: Configuration,
+    configuration: Scenario,
     strides: Mapping[str, Floats],
     averages: Mapping[str, Curves],
     chosen: NDArray[np.bool_],
 ) -> dict[str, Metric]:
     """Means over the chosen strides (strides,), and what they are of a healthy ankle; ``averages`` are theirs too."""
     found = {}
-    over = "" if configuration.course is None else " over the strides at an even speed on level ground"
+    over = "" if walk_of(configuration).course is None else " over the strides at an even speed on level ground"
     for name, item in PER_STRIDE.items():
         values = strides[name][chosen]
         if name == "slap_rate":
@@ -86,9 +88,9 @@ def stride_metrics(
     return found
 
 
-def lowest_toes(configuration: Configuration, height: Floats) -> Metric:
+def lowest_toes(configuration: Scenario, height: Floats) -> Metric:
     """Lowest toes in mid-swing, where they must clear the ground, from their height [m] at ``PHASES``."""
-    timing = gait_timing(configuration.gait)
+    timing = gait_timing(walk_of(configuration).gait)
     first, last = np.searchsorted(PHASES, [timing.clearance_from, timing.clearance_to])
     return Metric(
         float(height[first:last].min()), "m", "lowest toe height above ground in mid-swing of the mean stride"
@@ -115,20 +117,20 @@ def _safety(recording: Recording) -> dict[str, Metric]:
     return {"safe_state_time": Metric(time, "s", "time at which the controller first lifted only, paused or stopped")}
 
 
-def healthy_positive_work(configuration: Configuration) -> float:
+def healthy_positive_work(configuration: Scenario) -> float:
     """Positive work [J] of the measured ankle moment in one stride of the wearer; 0 where no moment was measured."""
-    gait = configuration.gait
+    gait = walk_of(configuration).gait
     if "ankle_moment" not in gait.curves:
         return 0.0
     phases = np.linspace(0.0, 1.0, 2001)
-    moment = configuration.wearer.body_mass * gait.curve("ankle_moment").values_at(phases)
+    moment = walk_of(configuration).wearer.body_mass * gait.curve("ankle_moment").values_at(phases)
     angle = gait.ankle_angle.values_at(phases)
     power = np.maximum(moment * np.gradient(angle, phases), 0.0)
     return float(np.trapezoid(power, phases))
 
 
-def healthy_toe_height(configuration: Configuration) -> Floats:
+def healthy_toe_height(configuration: Scenario) -> Floats:
     """Toes of the healthy gait over the ground [m] at ``PHASES``."""
-    gait = configuration.gait
-    path = ankle_path(gait, gait_timing(gait), configuration.wearer)
+    gait = walk_of(configuration).gait
+    path = ankle_path(gait, gait_timing(gait), walk_of(configuration).wearer)
     return path.toe_height(PHASES % 1.0, gait.shank_angle.values_at(PHASES), gait.ankle_angle.values_at(PHASES))

@@ -17,22 +17,18 @@ from ppafo.model.elementary import sine_and_cosine
 from ppafo.model.gait import GaitTiming
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, torque_of_shank
 from ppafo.model.plant import chamber_volumes
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.anthropometry import Build, draw_bounded_normal, segment_values
-from ppafo.walking.configuration import Configuration
 from ppafo.walking.course_planning import PlannedCourse, plan_course, standing_gait
 from ppafo.walking.declaration import LARGEST_SEED
-from ppafo.walking.fixed_point import converter_of_walk
+from ppafo.walking.motion import walk_of
+from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
+from ppafo.walking.planning import converter_of_walk
 from ppafo.walking.varied_gait import VariedGaits
-
-THRESHOLD_VARIATION = 0.15
-"""Standard deviation of thresholds over their values: how a fitter sets them, and how a sensor sits. Assumed."""
-
-START_VARIATION = 0.03
-"""Standard deviation of the fraction of the stride at which the push-off begins. Assumed."""
 
 
 def batch_of_many(
-    configuration: Configuration,
+    configuration: Scenario,
     run: Run,
     build: Build,
     gaits: VariedGaits,
@@ -47,7 +43,7 @@ def batch_of_many(
     count = build.mass.size
     assert run.walk is not None, "a population walks"
     # How the heel rolls is its shape, which is that of the one leg at the size of the other.
-    leg, segments = run.walk.leg, segment_values(configuration.wearer, build)
+    leg, segments = run.walk.leg, segment_values(walk_of(configuration).wearer, build)
     segments |= {name: getattr(leg, name) * build.stature for name in ("heel_lever", "flat_heel_lever")}
     parameters, states = (np.repeat(column, count, axis=1) for column in (single.parameters, single.states))
     varied = _parameter_rows(run, segments, gaits) | _thresholds(configuration, run, count, generator)
@@ -59,14 +55,15 @@ def batch_of_many(
     return Batch(single.program, still, parameters, states)
 
 
-def course_of_many(configuration: Configuration, gaits: VariedGaits) -> PlannedCourse | None:
+def course_of_many(configuration: Scenario, gaits: VariedGaits) -> PlannedCourse | None:
     """The course of each wearer, with strides of his or her own time; None where they walk none."""
-    if configuration.course is None:
+    course = walk_of(configuration).course
+    if course is None:
         return None
     timing: Any = GaitTiming(start=0.0, **gaits.timing)  # type: ignore[arg-type]
     foot = gaits.series["shank"].at_heel_strike(timing.frequency)[0]
     foot = foot - gaits.series["ankle"].at_heel_strike(timing.frequency)[0] + 0.5 * np.pi
-    return plan_course(configuration.course, configuration.gait, timing.frequency, timing, foot - timing.ground_angle)
+    return plan_course(course, walk_of(configuration).gait, timing.frequency, timing, foot - timing.ground_angle)
 
 
 def _course_rows(planned: PlannedCourse) -> dict[str, Floats]:
@@ -95,15 +92,13 @@ def _parameter_rows(run: Run, segments: Mapping[str, Floats], gaits: VariedGaits
     return found
 
 
-def _thresholds(
-    configuration: Configuration, run: Run, count: int, generator: np.random.Generator
-) -> dict[str, Floats]:
+def _thresholds(configuration: Scenario, run: Run, count: int, generator: np.random.Generator) -> dict[str, Floats]:
     """Thresholds of an event-based controller about its settings; both of a sensor move together and stay apart."""
     is_whole = isinstance(run.controller, WalkRows)
     if not is_whole and not hasattr(run.controller, "phases"):
         return {}
     names = ("load_threshold", "unload_threshold", "push_off_start")
-    rules = configuration.settings if is_whole else run.controller.phases._asdict()
+    rules = configuration.control.settings if is_whole else run.controller.phases._asdict()
     load, unload, usual = (rules[name] for name in names)
     scale = 1.0 + THRESHOLD_VARIATION * draw_bounded_normal(generator, (count,))
     start = usual + START_VARIATION * draw_bounded_normal(generator, (count,))

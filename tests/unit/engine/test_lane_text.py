@@ -7,7 +7,7 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.walking.loading import load_walk
 from ppafo.walking.planning import plan_walk
-from ppafo.walking.walk import plan_of
+from ppafo.walking.varying import with_duration
 
 
 def test_loads_that_nothing_asks_for_are_left_out_and_what_others_need_stays() -> None:
@@ -41,7 +41,7 @@ def test_line_that_gathers_over_the_lanes_for_what_follows_the_loop_stays() -> N
 
 def test_blocks_are_as_large_as_the_first_cache_allows_and_never_less_than_a_vector() -> None:
     task = plan_run(load_scenario("torque-task-solenoid")).program
-    walk = plan_walk(plan_of(load_walk("solenoid"), 6.0)).program
+    walk = plan_walk(with_duration(load_walk("solenoid"), 6.0)).program
     assert (lanes_of(task), lanes_of(walk)) == (LANES, VECTOR)
     rows = LaneRows(walk, SourceCollector("")).aside
     assert 8 * VECTOR * rows <= FIRST_CACHE < 8 * 2 * VECTOR * rows

@@ -31,7 +31,7 @@ from ppafo.simulation.sampled import state_row_numbers
 from ppafo.walking import load_walk
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.preparation import vented_state
-from ppafo.walking.walk import plan_of
+from ppafo.walking.varying import with_duration
 
 ANGLE = 1.7
 DURATION = 0.06
@@ -179,7 +179,7 @@ def test_without_droop_and_limit_a_filling_is_that_of_a_constant_supply() -> Non
 
 def short_walk(name: str, lines: SupplyLines | None = None, overrides: tuple[str, ...] = ()) -> Run:
     """A few strides of a walk that comes with the package, perhaps with other lines or values."""
-    plan = plan_of(load_walk(name, overrides), 5.0)
+    plan = with_duration(load_walk(name, overrides), 5.0)
     return plan_walk(plan if lines is None else replace(plan, supply_lines=lines))
 
 

@@ -12,7 +12,8 @@ import pytest
 from ppafo.exports.fmu import closed_loop, functional_unit, host_platform
 from ppafo.exports.fmu.plant import plant_alone
 from ppafo.walking import load_walk
-from ppafo.walking.walk import WalkResult, walk
+from ppafo.walking.result import WalkResult
+from ppafo.walking.walk import walk
 from scripts.instances import STEP, Instance
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed (pip install -e .[dev])")

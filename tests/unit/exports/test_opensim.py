@@ -10,7 +10,8 @@ from ppafo.errors import ScenarioError
 from ppafo.exports.opensim import device_torque, opensim_files
 from ppafo.exports.opensim.add_device import read_torque
 from ppafo.storage.opensim import read_opensim
-from ppafo.walking.walk import WalkResult, walk
+from ppafo.walking.result import WalkResult
+from ppafo.walking.walk import walk
 
 
 @pytest.fixture(scope="module")

@@ -16,8 +16,8 @@ from ppafo.exports.firmware.simulators import built, missing_tools, sizes
 from ppafo.exports.firmware.walking import walk_chip, walk_firmware
 from ppafo.exports.firmware.walking.drawn import DrawnGait
 from ppafo.exports.firmware.walking.lock_step import SIGN_BITS, PythonWalkChip, compare_drawn_walk, walk_on_chip
+from ppafo.simulation.scenario import Scenario
 from ppafo.translation.widths import Interval
-from ppafo.walking.configuration import Configuration
 from ppafo.walking.loading import load_walk
 
 MISSING = missing_tools(MSP430G2553)
@@ -28,7 +28,7 @@ with_compiler = pytest.mark.skipif(
 )
 
 
-def fixed_walk(*overrides: str) -> Configuration:
+def fixed_walk(*overrides: str) -> Scenario:
     return load_walk("solenoid", (FIXED, *overrides))
 
 
@@ -97,7 +97,7 @@ def test_the_chip_decides_as_python_does_within_its_memory_and_time() -> None:
     assert found.cost.sizes.flash <= MSP430G2553.flash.size
     assert found.cost.stack > 0
     assert found.cost.sizes.data + found.cost.stack + MSP430G2553.interrupt_stack <= MSP430G2553.ram.size
-    assert 0 < found.cost.mean <= found.cost.worst <= 0.5 * MSP430G2553.clock * configuration.period
+    assert 0 < found.cost.mean <= found.cost.worst <= 0.5 * MSP430G2553.clock * configuration.control.period
 
 
 @on_chip

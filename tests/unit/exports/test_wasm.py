@@ -12,9 +12,9 @@ import pytest
 from ppafo.errors import ProgramError
 from ppafo.exports import wasm
 from ppafo.exports.c_library import library_of
-from ppafo.exports.loading import load_exportable
 from ppafo.exports.wasm import module_of
-from ppafo.simulation.loading import list_scenarios, load_scenario
+from ppafo.loading import load_scenario
+from ppafo.simulation.loading import list_scenarios
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate
 from ppafo.walking import list_walks, load_walk
@@ -98,7 +98,7 @@ def test_the_programs_of_the_package_are_those_of_its_physics() -> None:
     """The texts are compared everywhere, the bytes where the compiler is the one that made them."""
     index = json.loads((FOLDER / wasm.INDEX).read_text())
     shipped = (*list_scenarios(), *list_walks())
-    texts = {name: wasm.source_of(library_of(load_exportable(name))) for name in shipped}
+    texts = {name: wasm.source_of(library_of(load_scenario(name))) for name in shipped}
     missing = [name for name, text in texts.items() if wasm.digest_of(text) not in index["programs"]]
     assert missing == [], "python scripts/wasm_programs.py builds them anew"
     if wasm.compiler_version() != index["ziglang"]:

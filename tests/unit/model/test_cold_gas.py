@@ -21,6 +21,7 @@ from ppafo.model.source import bottle_content
 from ppafo.parameters.bottles.bottle import load_bottle
 from ppafo.parameters.bottles.fluids import load_fluid
 from ppafo.walking import load_walk
+from ppafo.walking.motion import walk_of
 
 TABLE = load_fluid("CO2").table
 PRESSURE = 446.06e3
@@ -47,7 +48,7 @@ def test_vapour_of_20_degrees_lacks_95_kj_a_kg_which_is_38_w_at_0_4_g_s(line: Is
 
 
 def test_a_regulator_that_warms_its_gas_to_the_room_gives_38_w() -> None:
-    supply = load_walk("solenoid-regulators", ["bottle.temperature=293.15 K"], bottle="paper-co2-9oz").bottle
+    supply = walk_of(load_walk("solenoid-regulators", ["bottle.temperature=293.15 K"], bottle="paper-co2-9oz")).bottle
     assert supply is not None
     model = supply.bottle.supply._replace(body=Passage(1.0, 1.0, 0.0), room_temperature=WARM)
     state = supply.start()._replace(body_temperature=WARM)
@@ -97,7 +98,7 @@ def test_warm_gas_takes_off_no_more_ice_than_there_is(line: Isobar) -> None:
 @pytest.mark.parametrize("body", [220.0, 280.0])
 def test_the_gas_that_is_offered_is_as_cold_as_the_balance_says(ice: float, body: float) -> None:
     """The hose passes its gas on as it is, so what is delivered is what comes out of the regulator."""
-    supply = load_walk("solenoid-regulators", ["bottle.temperature=280 K"], bottle="paper-co2-9oz").bottle
+    supply = walk_of(load_walk("solenoid-regulators", ["bottle.temperature=280 K"], bottle="paper-co2-9oz")).bottle
     assert supply is not None
     line, model = isobar(TABLE, 400e3), supply.bottle.supply._replace(hose=Passage(1.0, 0.0, 0.0))
     state, mass, step = supply.start()._replace(body_temperature=body, ice=ice), 0.4e-3, 0.5
@@ -110,7 +111,7 @@ def test_the_gas_that_is_offered_is_as_cold_as_the_balance_says(ice: float, body
 
 
 def test_ice_takes_from_the_gas_what_it_loses() -> None:
-    supply = load_walk("solenoid-regulators", ["bottle.temperature=280 K"], bottle="paper-co2-9oz").bottle
+    supply = walk_of(load_walk("solenoid-regulators", ["bottle.temperature=280 K"], bottle="paper-co2-9oz")).bottle
     assert supply is not None
     state = supply.start()._replace(ice=25.0e-6)
     content = bottle_content(TABLE, state.mass, supply.bottle.volume, 280.0)
@@ -135,7 +136,7 @@ QUICK = {
 @pytest.mark.parametrize("part", QUICK)
 def test_a_part_that_follows_fast_ends_between_its_neighbours(part: str) -> None:
     """Heat that flows from warm to cold makes nothing warmer than the warmest; a step that is too long would."""
-    supply = load_walk("solenoid-regulators", QUICK[part], bottle="paper-co2-9oz").bottle
+    supply = walk_of(load_walk("solenoid-regulators", QUICK[part], bottle="paper-co2-9oz")).bottle
     assert supply is not None
     table, model = supply.bottle.fluid.table, supply.bottle.supply
     state, near = supply.start(), supply.temperature
@@ -150,7 +151,7 @@ def test_a_part_that_follows_fast_ends_between_its_neighbours(part: str) -> None
 
 @pytest.mark.parametrize("share", [1.0, 1.3])
 def test_no_more_gas_is_drawn_than_the_bottle_has(share: float) -> None:
-    supply = load_walk("solenoid-regulators", ["bottle.fill=0.02"], bottle="paper-co2-9oz").bottle
+    supply = walk_of(load_walk("solenoid-regulators", ["bottle.fill=0.02"], bottle="paper-co2-9oz")).bottle
     assert supply is not None
     state, content = supply.start(), supply.offers_first().content
     with pytest.raises(SimulationError, match=r"5.1 g: set bottle\.coupling shorter"):

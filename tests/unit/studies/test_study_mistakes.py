@@ -157,7 +157,7 @@ def test_a_value_below_its_only_limit_is_told_that_limit(varying: Callable[..., 
 def test_metrics_of_tracking_need_a_reference(varying: Callable[..., Any]) -> None:
     document = varying(AREA)
     document["configurations"] = [{"name": "step", "scenario": "step-response"}]
-    assert "'rms_error' needs a reference" in refused(document)
+    assert "'rms_error': its controller follows no reference" in refused(document)
     document["outputs"] = {"metrics": "all"}
     assert "rms_error" not in load_study(document).outputs.metrics
     assert "gas_supplied" in load_study(document).outputs.metrics

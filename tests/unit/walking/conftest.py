@@ -8,34 +8,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import Run, batch_of
 from ppafo.gait import load_gait
-from ppafo.model.gait_sensors import Fault, GaitSensors
-from ppafo.model.sensors import SensorParameters
-from ppafo.simulation.loading import load_scenario
+from ppafo.model.gait_sensors import Fault
 from ppafo.simulation.sampled import state_row_numbers
-from ppafo.walking.planning import WalkPlan, plan_walk
+from ppafo.simulation.scenario import Scenario
+from ppafo.walking import load_walk
+from ppafo.walking.motion import walk_of
+from ppafo.walking.planning import plan_walk
+from ppafo.walking.sensor_settings import FaultSettings
+from ppafo.walking.varying import with_duration
 from ppafo.walking.wearer import paper_subject
-
-NO_FAULT = Fault(1.0e9, 0.0, 0.0)
-IDEAL = GaitSensors(
-    follow_rate=200.0,
-    force_noise=0.0,
-    force_quantum=0.0,
-    lost_share=0.0,
-    angle_memory=0.0,
-    pressure_memory=0.0,
-    angle_lost_share=0.0,
-    pressure_lost_share=0.0,
-    heel_fault=NO_FAULT,
-    toe_fault=NO_FAULT,
-    angle_fault=NO_FAULT,
-    pressure_1_fault=NO_FAULT,
-    pressure_2_fault=NO_FAULT,
-)
-QUIET = SensorParameters(0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class Walked:
@@ -51,24 +35,15 @@ class Walked:
         return self.outcome.record[:, self.rows[name], 0]
 
 
-def make_plan(name: str, seconds: float = 8.0) -> WalkPlan:
+def make_plan(name: str, seconds: float = 8.0) -> Scenario:
     valve = "proportional" if name == "event_proportional" else "solenoid"
-    kind = WALKING_CONTROLLERS[name]
-    return WalkPlan(
-        device=load_scenario(f"torque-task-{valve}").device,
-        wearer=paper_subject(),
-        gait=load_gait("falisse2019-subject1"),
-        controller=kind,
-        settings={item.name: float(item.default or 0.0) for item in kind.quantities},
-        sensors=QUIET,
-        gait_sensors=IDEAL,
-        has_ideal_sensors=True,
-        duration=seconds,
-    )
+    plain = load_walk(valve, [f"controller.kind={name}"])
+    walker = replace(walk_of(plain), gait=load_gait("falisse2019-subject1"), wearer=paper_subject())
+    return with_duration(replace(plain, motion=walker), seconds)
 
 
 @pytest.fixture(scope="session")
-def walk_plan() -> Callable[[str], WalkPlan]:
+def walk_plan() -> Callable[[str], Scenario]:
     return make_plan
 
 
@@ -81,8 +56,10 @@ def walked() -> Callable[[str], Walked]:
 def walked_with_fault() -> Callable[[str, str, Fault], Walked]:
     def walk(name: str, sensor: str, fault: Fault) -> Walked:
         plan = make_plan(name)
-        sensors = IDEAL._replace(**{f"{sensor}_fault": fault}, force_noise=1.0)
-        noisy = QUIET._replace(angle_noise=1.0e-4)
-        return Walked(plan_walk(replace(plan, gait_sensors=sensors, sensors=noisy, has_ideal_sensors=False)))
+        kind, period = "frozen" if fault.holds else "stuck", {"time": fault.time, "period": 0.0}
+        failing = FaultSettings(kind, period | ({} if fault.holds else {"reading": fault.reading}))
+        motion = walk_of(plan)
+        forces, faults = {**motion.forces, "force_noise": 1.0}, {**motion.faults, sensor: failing}
+        return Walked(plan_walk(replace(plan, motion=replace(motion, forces=forces, faults=faults))))
 
     return walk

@@ -12,8 +12,10 @@ import pytest
 from ppafo.errors import DataError, ParameterError, ScenarioError
 from ppafo.gait import load_gait
 from ppafo.gait.document import gait_toml
-from ppafo.walking import Configuration, list_walks, load_walk, walk, walk_population
+from ppafo.walking import list_walks, load_walk, walk, walk_population
 from ppafo.walking.contradictions import COMPRESSION
+from ppafo.walking.motion import walk_of
+from ppafo.walking.planning import gait_sensors_of, has_ideal_sensors
 from ppafo.walking.schema import json_schema
 
 MISTAKES = {
@@ -69,7 +71,7 @@ def test_supplies_that_let_no_gas_back_ask_for_room_above_their_pressure(name: s
 def test_no_shipped_walk_compresses_a_chamber_by_more_than_is_asked_for(name: str) -> None:
     result = walk(name, 0.15)
     highest = max(result.recording[chamber].max() for chamber in ("pressure_1", "pressure_2"))
-    assert 1.0 < highest / result.configuration.device.supply.pressure < 0.98 * COMPRESSION
+    assert 1.0 < highest / result.scenario.device.supply.pressure < 0.98 * COMPRESSION
 
 
 @pytest.mark.parametrize("overrides", ON_A_PROPORTIONAL_VALVE)
@@ -79,15 +81,15 @@ def test_a_mistake_with_a_proportional_valve_is_named(overrides: str) -> None:
 
 
 def test_an_on_off_controller_works_a_proportional_valve() -> None:
-    assert load_walk("proportional", ["controller.kind=event_on_off"]).controller.name == "event_on_off"
+    assert load_walk("proportional", ["controller.kind=event_on_off"]).control.kind == "event_on_off"
 
 
 def test_bandwidths_are_what_is_left_after_a_sample() -> None:
     slow = load_walk("solenoid", ["sensors.angle_bandwidth=20 Hz", "controller.rate=500 Hz"])
-    assert slow.gait_sensors.angle_memory == pytest.approx(math.exp(-2.0 * math.pi * 20.0 / 500.0))
-    assert slow.gait_sensors.pressure_memory == 0.0
-    assert not slow.has_ideal_sensors
-    assert load_walk("solenoid", ["sensors.force_bandwidth=10 Hz"]).has_ideal_sensors
+    assert gait_sensors_of(slow).angle_memory == pytest.approx(math.exp(-2.0 * math.pi * 20.0 / 500.0))
+    assert gait_sensors_of(slow).pressure_memory == 0.0
+    assert not has_ideal_sensors(slow)
+    assert has_ideal_sensors(load_walk("solenoid", ["sensors.force_bandwidth=10 Hz"]))
 
 
 @pytest.mark.parametrize("overrides", PROFILE)
@@ -113,7 +115,7 @@ def test_the_published_schema_accepts_the_shipped_walks_and_no_unknown_key() -> 
 
 
 def test_a_period_given_takes_the_place_of_the_rate_of_the_file() -> None:
-    assert load_walk("solenoid", ["controller.period=2 ms"]).period == pytest.approx(2.0e-3)
+    assert load_walk("solenoid", ["controller.period=2 ms"]).control.period == pytest.approx(2.0e-3)
 
 
 def test_unknown_names_have_a_hint() -> None:
@@ -129,7 +131,7 @@ def test_force_sensors_need_a_gait_with_a_ground_reaction(tmp_path: Path) -> Non
     path.write_text(gait_toml(bare))
     with pytest.raises(ScenarioError, match="gait 'bare' has no vertical_force; import it with the ground reaction"):
         load_walk("solenoid", gait=path)
-    assert load_walk("off", gait=path).gait.name == "bare"
+    assert walk_of(load_walk("off", gait=path)).gait.name == "bare"
 
 
 @pytest.mark.parametrize("minutes", [0.05, -1.0, 61.0, float("nan"), float("inf")])
@@ -139,8 +141,8 @@ def test_a_walk_too_short_or_too_long_is_refused(minutes: float) -> None:
 
 
 def test_overrides_beside_a_configuration_are_refused() -> None:
-    configuration: Configuration = load_walk("off")
-    with pytest.raises(ScenarioError, match="a Configuration takes them in load_walk"):
+    configuration = load_walk("off")
+    with pytest.raises(ScenarioError, match="a Scenario takes them in load_walk"):
         walk(configuration, 0.1, ["wearer.body_mass=80 kg"])
 
 

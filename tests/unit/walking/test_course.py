@@ -19,8 +19,10 @@ from ppafo.walking import load_walk, walk, walk_population
 from ppafo.walking.comparison import Comparison
 from ppafo.walking.course import WalkingCourse, list_courses, load_course
 from ppafo.walking.course_segments import course_metrics, steady_strides
+from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk, planned_course
-from ppafo.walking.walk import WalkResult, integral_of_a_stride, plan_of
+from ppafo.walking.result import WalkResult, integral_of_a_stride
+from ppafo.walking.varying import with_duration
 
 HEAD = 'schema_version = 1\nname = "tried"\n'
 STAND = '[[segment]]\nkind = "stand"\nduration = "1 s"\n'
@@ -97,10 +99,10 @@ def test_a_walk_file_names_its_course_by_a_path_beside_it(tmp_path: Path) -> Non
         'schema_version = 1\nname = "own"\ncourse = "tried.toml"\n[device]\nset = "ppafo2011"\nvalve = "solenoid"\n'
         '[controller]\nkind = "event_on_off"\n'
     )
-    course = load_walk(tmp_path / "own.toml").course
+    course = walk_of(load_walk(tmp_path / "own.toml")).course
     assert course is not None
     assert [segment.kind for segment in course.segments] == ["stand", "walk"]
-    replaced = load_walk(tmp_path / "own.toml", course="stairs").course
+    replaced = walk_of(load_walk(tmp_path / "own.toml", course="stairs")).course
     assert replaced is not None
     assert replaced.name == "stairs"
 
@@ -123,10 +125,10 @@ def test_a_walk_takes_the_nearest_whole_number_of_strides(tmp_path: Path) -> Non
 
 
 def test_a_walk_without_a_course_is_composed_without_one() -> None:
-    text = lane_source(plan_walk(plan_of(load_walk("solenoid"), 60.0)).program)
+    text = lane_source(plan_walk(with_duration(load_walk("solenoid"), 60.0)).program)
     assert "course_gait_on_course" not in text
     assert "scuff" not in text
-    with_course = lane_source(plan_walk(plan_of(load_walk("solenoid", course="stairs"), 60.0)).program)
+    with_course = lane_source(plan_walk(with_duration(load_walk("solenoid", course="stairs"), 60.0)).program)
     assert "course_gait_on_course" in with_course
     assert "model_gait_measured_at" in text
     assert "model_gait_measured_at" not in with_course
@@ -165,7 +167,7 @@ def test_in_standing_the_foot_is_flat_and_both_sensors_are_loaded(corridor: Walk
 
 
 def test_gas_is_kept_on_a_course(corridor: WalkResult) -> None:
-    run = plan_walk(plan_of(load_walk("solenoid", LENIENT, course="corridor"), 1.0))
+    run = plan_walk(with_duration(load_walk("solenoid", LENIENT, course="corridor"), 1.0))
     recording, plant = corridor.recording, run.plant
     volumes = chamber_volumes(plant, recording["angle"])  # type: ignore[arg-type]
     masses = [

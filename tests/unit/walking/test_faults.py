@@ -19,9 +19,10 @@ from ppafo.model.plant import chamber_pressures
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.units import parse_quantity
 from ppafo.walking import load_walk, walk_population
-from ppafo.walking.planning import plan_walk
+from ppafo.walking.motion import walk_of
+from ppafo.walking.planning import gait_sensors_of, plan_walk
 from ppafo.walking.recorded import SAFE_ROW
-from ppafo.walking.walk import plan_of
+from ppafo.walking.varying import with_duration
 
 PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "let-it-walk.md").read_text(encoding="utf-8")
 SECTION = PAGE.partition("## When a sensor fails")[2].partition("\n## ")[0]
@@ -56,10 +57,14 @@ VENTED = {
 
 def sensors_of(name: str, what: str) -> GaitSensors:
     """Sensors of the configuration with the fault as the table gives it, from the beginning of the walk."""
+    return gait_sensors_of(load_walk(name, fault_words(what)))
+
+
+def fault_words(what: str) -> list[str]:
     sensor, fault, _ = FAULTS[what]
     kind, _, reading = fault.partition(" at ")
     given = [f"faults.{sensor}.kind={kind}", f"faults.{sensor}.time=0 s"]
-    return load_walk(name, given + ([f"faults.{sensor}.reading={reading}"] if reading else [])).gait_sensors
+    return given + ([f"faults.{sensor}.reading={reading}"] if reading else [])
 
 
 def beginning(sensors: GaitSensors, time: float) -> GaitSensors:
@@ -92,11 +97,11 @@ class Injected:
 @lru_cache
 def injected(name: str) -> Injected:
     configuration = load_walk(name)
-    stride = configuration.gait.stride_time
+    stride = walk_of(configuration).gait.stride_time
     begins = (FIRST_FAULT + np.arange(PHASES) / PHASES) * stride
     sensors = [beginning(sensors_of(name, what), time) for what in FAULTS for time in begins.tolist()]
-    faulty = replace(configuration, gait_sensors=sensors[0])
-    run = plan_walk(plan_of(faulty, (FIRST_FAULT + 1.0 + AFTER) * stride))
+    faulty = load_walk(name, fault_words(next(iter(FAULTS))))
+    run = plan_walk(with_duration(faulty, (FIRST_FAULT + 1.0 + AFTER) * stride))
     single = batch_of(run)
     paths = [path for group, row in single.program.parameter_rows().items() for path in leaf_paths(row, group)]
     places = [paths.index(path) for path in leaf_paths(GaitSensors, "gait_sensors")]

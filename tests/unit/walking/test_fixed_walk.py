@@ -19,13 +19,14 @@ from ppafo.model.gait_sensors import Fault, GaitMeasurement, GaitSensors
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.walking.anthropometry import draw_builds
 from ppafo.walking.comparison import with_device_off
-from ppafo.walking.fixed_point import converter_of_walk
 from ppafo.walking.loading import load_walk
-from ppafo.walking.planning import plan_walk
+from ppafo.walking.motion import walk_of
+from ppafo.walking.planning import converter_of_walk, gait_sensors_of, plan_walk
 from ppafo.walking.recorded import SAFE_ROW
 from ppafo.walking.sampled import run_sampled_walk
 from ppafo.walking.varied_gait import draw_gaits
-from ppafo.walking.walk import plan_of, walk
+from ppafo.walking.varying import with_duration
+from ppafo.walking.walk import walk
 from ppafo.walking.wearers_rows import batch_of_many
 
 FIXED = "controller.arithmetic=fixed"
@@ -60,8 +61,8 @@ def test_the_thresholds_of_many_wearers_vary_on_whole_numbers_as_in_floats() -> 
         configuration = load_walk("solenoid", given)
         generator = np.random.default_rng(3)
         build = draw_builds(40, generator)
-        gaits = draw_gaits(configuration.gait, build.stature, generator)
-        run = plan_walk(plan_of(configuration, 4.0))
+        gaits = draw_gaits(walk_of(configuration).gait, build.stature, generator)
+        run = plan_walk(with_duration(configuration, 4.0))
         found = batch_of_many(configuration, run, build, gaits, generator)
         tables[name] = {path: found.parameters[row] for path, row in row_numbers(run.program.parameter_rows()).items()}
         alone = batch_of(run).parameters
@@ -80,7 +81,7 @@ def test_the_thresholds_of_many_wearers_vary_on_whole_numbers_as_in_floats() -> 
 
 
 def test_the_lanes_decide_as_python_does() -> None:
-    run = plan_walk(plan_of(load_walk("solenoid", (FIXED,)), 4.0))
+    run = plan_walk(with_duration(load_walk("solenoid", (FIXED,)), 4.0))
     inside, outside = run_batch(batch_of(run)), run_sampled_walk(run, InPython())
     rows, own = state_row_numbers(run), row_numbers(replace(run.program, controller=None).state_rows())
     for path in ("result.command", "state.angle", "state.mass_1", "state.mass_2", "state.supplied_mass"):
@@ -92,11 +93,11 @@ def found_at(configuration_overrides: tuple[str, ...], faults: list[dict[str, An
     """Times [s] at which each fault makes the controller help less, inf for never, and the levels at the end."""
     fault = ("faults.heel.kind=frozen", "faults.heel.time=99 s")
     configuration = load_walk("solenoid", (*configuration_overrides, *fault))
-    run = plan_walk(plan_of(configuration, 9.0))
+    run = plan_walk(with_duration(configuration, 9.0))
     single, rows = batch_of(run), state_row_numbers(run)
     paths = [path for group, row in single.program.parameter_rows().items() for path in leaf_paths(row, group)]
     places = [paths.index(path) for path in leaf_paths(GaitSensors, "gait_sensors")]
-    sound = configuration.gait_sensors._replace(heel_fault=configuration.gait_sensors.toe_fault)
+    sound = gait_sensors_of(configuration)._replace(heel_fault=gait_sensors_of(configuration).toe_fault)
     sensors = [sound._replace(**{f"{name}_fault": value for name, value in one.items()}) for one in faults]
     parameters = np.repeat(single.parameters, len(sensors), axis=1)
     parameters[places] = np.array([numbers(one) for one in sensors]).T
@@ -151,12 +152,10 @@ def test_what_whole_numbers_cannot_hold_is_refused(name: str, overrides: tuple[s
 
 def test_the_device_off_and_another_controller_have_no_whole_numbers() -> None:
     configuration = load_walk("solenoid", (FIXED,))
-    assert configuration.converter is not None
-    assert with_device_off(configuration).converter is None
-    assert (
-        load_walk("proportional", ("controller.kind=event_on_off", FIXED, "controller.kind=event_pid")).converter
-        is None
-    )
+    assert configuration.control.is_fixed
+    assert not with_device_off(configuration).control.is_fixed
+    given = ("controller.kind=event_on_off", FIXED, "controller.kind=event_pid")
+    assert not load_walk("proportional", given).control.is_fixed
 
 
 def test_whole_numbers_have_no_exported_library() -> None:
@@ -169,4 +168,4 @@ def test_a_late_sensor_has_no_controller_outside_the_lanes() -> None:
         "solenoid", (FIXED, "faults.heel.kind=distorted", "faults.heel.time=1 s", "faults.heel.delay=9 ms")
     )
     with pytest.raises(ScenarioError, match="no controller outside the lanes"):
-        run_sampled_walk(plan_walk(plan_of(late, 4.0)), InPython())
+        run_sampled_walk(plan_walk(with_duration(late, 4.0)), InPython())

@@ -17,8 +17,10 @@ from ppafo.model import contact as ground
 from ppafo.model.gait import gait_at
 from ppafo.model.leg import foot_inertia_about_ankle, passive_torque
 from ppafo.simulation.sampled import state_row_numbers
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.gait_series import landing_phase, truncate
 from ppafo.walking.heel_rocker import heel_rocker
+from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.wearer import Wearer, paper_subject
 
@@ -92,6 +94,10 @@ def swing_of(run: Run, begin_phase: float, steps: int) -> Run:
     )
 
 
+def worn_by(plan: Scenario, wearer: Wearer) -> Scenario:
+    return replace(plan, motion=replace(walk_of(plan), wearer=wearer))
+
+
 def angles_of(run: Run) -> np.ndarray:
     return run_batch(batch_of(run)).record[:, state_row_numbers(run)["state.angle"], 0]
 
@@ -100,15 +106,15 @@ def angles_of(run: Run) -> np.ndarray:
 def test_the_free_foot_agrees_with_an_independent_solution(walk_plan: Callable[[str], Any], share: float) -> None:
     from scipy.integrate import solve_ivp
 
-    plan = replace(walk_plan("off"), wearer=replace(paper_subject(), residual_share=share))
-    swing = swing_of(plan_walk(plan), plan.gait.stance_share, 300)
+    plan = worn_by(walk_plan("off"), replace(paper_subject(), residual_share=share))
+    swing = swing_of(plan_walk(plan), walk_of(plan).gait.stance_share, 300)
     assert swing.walk is not None
     angle = angles_of(swing)
-    judge = Judge(plan.gait, plan.wearer, swing.walk.share)
+    judge = Judge(walk_of(plan).gait, walk_of(plan).wearer, swing.walk.share)
     times = np.arange(angle.size) * swing.step
 
     def slopes(time: float, y: np.ndarray) -> list[float]:
-        return judge.slopes(plan.gait.stance_share + time / plan.gait.stride_time, y[0], y[1])
+        return judge.slopes(walk_of(plan).gait.stance_share + time / walk_of(plan).gait.stride_time, y[0], y[1])
 
     start = [swing.initial.angle, swing.initial.angular_velocity]
     solution = solve_ivp(slopes, (0.0, times[-1]), start, t_eval=times, rtol=1e-9, atol=1e-11)
@@ -117,7 +123,7 @@ def test_the_free_foot_agrees_with_an_independent_solution(walk_plan: Callable[[
 
 
 def test_a_wearer_with_all_muscles_and_no_device_walks_the_measured_gait(walk_plan: Callable[[str], Any]) -> None:
-    plan = replace(walk_plan("off"), wearer=replace(paper_subject(), residual_share=1.0))
+    plan = worn_by(walk_plan("off"), replace(paper_subject(), residual_share=1.0))
     run = plan_walk(plan)
     assert run.walk is not None
     light = replace(run.walk, share=DeviceShare(0.0, 0.0, 0.0))

@@ -10,6 +10,7 @@ from ppafo.gait import load_gait
 from ppafo.gait.document import gait_toml
 from ppafo.walking import load_walk
 from ppafo.walking.gait_subject import person_remarks
+from ppafo.walking.motion import walk_of
 from ppafo.walking.wearer import paper_subject
 
 
@@ -24,14 +25,14 @@ def gait_file(folder: Path, body_mass: float, stature: float | None = None, tilt
 def test_the_subject_of_a_named_gait_walks(tmp_path: Path) -> None:
     found = load_walk("solenoid", gait=gait_file(tmp_path, 85.07))
     paper = paper_subject()
-    assert found.wearer.body_mass == pytest.approx(85.07)
-    assert found.wearer.foot_mass == pytest.approx(paper.foot_mass * 85.07 / 72.5)
-    assert found.wearer.shank_length == paper.shank_length, "no stature: lengths stay"
+    assert walk_of(found).wearer.body_mass == pytest.approx(85.07)
+    assert walk_of(found).wearer.foot_mass == pytest.approx(paper.foot_mass * 85.07 / 72.5)
+    assert walk_of(found).wearer.shank_length == paper.shank_length, "no stature: lengths stay"
     assert person_remarks(found) == ["wearer: 85.07 kg, the subject of gait 'mine'"]
 
 
 def test_a_stature_scales_lengths_and_inertias(tmp_path: Path) -> None:
-    found = load_walk("solenoid", gait=gait_file(tmp_path, 85.07, 1.70)).wearer
+    found = walk_of(load_walk("solenoid", gait=gait_file(tmp_path, 85.07, 1.70))).wearer
     paper, taller = paper_subject(), 0.246 * 1.70 / 0.46
     assert found.shank_length == pytest.approx(0.246 * 1.70)
     assert found.toe_lever == pytest.approx(paper.toe_lever * taller)
@@ -41,10 +42,10 @@ def test_a_stature_scales_lengths_and_inertias(tmp_path: Path) -> None:
 
 def test_without_a_named_gait_the_papers_subject_walks_and_the_difference_is_said() -> None:
     found = load_walk("solenoid")
-    assert found.wearer == paper_subject()
+    assert walk_of(found).wearer == paper_subject()
     (line,) = person_remarks(found)
     assert line.startswith("wearer: 72.5 kg, the paper's subject; the subject of gait 'falisse2019-subject1' has 62 kg")
-    assert load_walk("solenoid", gait="falisse2019-subject1").wearer.body_mass == 62.0
+    assert walk_of(load_walk("solenoid", gait="falisse2019-subject1")).wearer.body_mass == 62.0
 
 
 def test_a_gait_that_the_walk_file_names_brings_its_subject_too(tmp_path: Path) -> None:
@@ -52,15 +53,15 @@ def test_a_gait_that_the_walk_file_names_brings_its_subject_too(tmp_path: Path) 
     path = tmp_path / "walk.toml"
     device = "[device]\nset = 'ppafo2011'\nvalve = 'solenoid'\n[controller]\nkind = 'event_on_off'\n"
     path.write_text("schema_version = 1\nname = 'own'\ngait = 'mine.toml'\n" + device)
-    assert load_walk(path).wearer.body_mass == 90.0
+    assert walk_of(load_walk(path)).wearer.body_mass == 90.0
     path.write_text("schema_version = 1\nname = 'own'\n" + device + "[wearer]\nbody_mass = '75 kg'\n")
-    assert load_walk(path).wearer == replace(paper_subject(), body_mass=75.0)
+    assert walk_of(load_walk(path)).wearer == replace(paper_subject(), body_mass=75.0)
 
 
 def test_a_stated_body_mass_wins_and_the_difference_is_said(tmp_path: Path) -> None:
     path = gait_file(tmp_path, 85.07)
     found = load_walk("solenoid", ["wearer.body_mass=90 kg"], gait=path)
-    assert found.wearer.body_mass == 90.0
+    assert walk_of(found).wearer.body_mass == 90.0
     assert person_remarks(found) == [
         "wearer: 90 kg, as wearer.body_mass states; the subject of gait 'mine' has 85.07 kg: moment and force of the "
         "gait are scaled by body mass"

@@ -8,6 +8,7 @@ import pytest
 from ppafo.gait import load_gait
 from ppafo.walking.comparison import compare_walks
 from ppafo.walking.loading import load_walk
+from ppafo.walking.motion import walk_of
 from ppafo.walking.population import walk_population
 from ppafo.walking.walk import walk
 
@@ -44,7 +45,8 @@ def test_a_slow_walk_is_helped_without_alarm(valve: str, sensors: str) -> None:
     slow = replace(gait, stride_time=gait.stride_time * math.sqrt(gait.walking_speed / SLOW), walking_speed=SLOW)
     for fraction in (0.0, 0.8, 1.0):
         overrides = [f"wearer.residual_share={fraction}", *SENSORS[sensors]]
-        configuration = replace(load_walk(valve, overrides), gait=slow)
+        configuration = load_walk(valve, overrides)
+        configuration = replace(configuration, motion=replace(walk_of(configuration), gait=slow))
         result = walk(configuration, MINUTES)
         assert "safe_state_time" not in result.metrics
         assert result.metrics["push_off_work"].value > 1.0

@@ -9,9 +9,9 @@ import pytest
 
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.control.walking.phases import MID_STANCE, PUSH_OFF
+from ppafo.metrics.strides import SETTLING
 from ppafo.model.command import VENT
 from ppafo.walking import WalkResult, load_walk, walk
-from ppafo.walking.strides import SETTLING
 
 MINUTES = 0.25
 LARGEST_ERROR = {

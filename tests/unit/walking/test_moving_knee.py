@@ -25,6 +25,7 @@ from ppafo.model.leg import (
 from ppafo.signals.recording import Floats
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.walking.gait_series import gait_series, gait_timing
+from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.wearer import paper_subject
 
@@ -37,8 +38,8 @@ def constant(level: float) -> Curve:
 
 def swung(plan: Any, forward: float, up: float) -> tuple[Any, Callable[[str], Floats]]:
     """A free foot without gas, friction, damping and stops after toe-off; the knee accelerates [m/s^2]."""
-    gait = replace(plan.gait, knee_forward=constant(forward), knee_up=constant(up))
-    run = plan_walk(replace(plan, gait=gait))
+    gait = replace(walk_of(plan).gait, knee_forward=constant(forward), knee_up=constant(up))
+    run = plan_walk(replace(plan, motion=replace(walk_of(plan), gait=gait)))
     walk = run.walk
     assert walk is not None
     plant = run.plant._replace(

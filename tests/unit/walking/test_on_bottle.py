@@ -15,8 +15,10 @@ from ppafo.questions.timing.solve import event_timing
 from ppafo.walking import load_walk, on_bottle, walk, walk_population
 from ppafo.walking.comparison import compare_walks, with_device_off
 from ppafo.walking.loading import FILE
+from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk
-from ppafo.walking.walk import WalkResult, plan_of
+from ppafo.walking.result import WalkResult
+from ppafo.walking.varying import with_duration
 from tests.judge import bottle as independent
 
 WALK, BOTTLE = "solenoid-regulators", "paper-co2-9oz"
@@ -48,7 +50,7 @@ def test_a_bottle_of_a_gram_ends_empty_and_its_gas_stays_what_a_gas_can_be() -> 
 
 
 def test_what_leaves_the_bottle_is_in_the_lines_or_went_into_the_device(small: WalkResult) -> None:
-    recording, configuration = small.recording, small.configuration
+    recording, configuration = small.recording, small.scenario
     lines = configuration.supply_lines
     assert lines is not None
     product = configuration.device.gas.specific_gas_constant * recording["gas_temperature"]
@@ -141,11 +143,11 @@ def test_a_walk_that_diverges_ends_so_and_says_what_was_let_through_before(
     wrong: str, good: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     chosen = load_walk(WALK, bottle=BOTTLE)
-    run = plan_walk(plan_of(chosen, 12.0))
+    run = plan_walk(with_duration(chosen, 12.0))
     rows = row_numbers(run.program.state_rows())
     monkeypatch.setattr(on_bottle, "begin_block", lambda batch: Breaking(wrong, good, rows, batch.states))
-    assert chosen.bottle is not None
-    _, course = on_bottle.run_on_bottle(run, chosen.bottle, 1.1, lambda *_: None)
+    assert walk_of(chosen).bottle is not None
+    _, course = on_bottle.run_on_bottle(run, walk_of(chosen).bottle, 1.1, lambda *_: None)
     assert course.ending.kind == "diverged"
     assert "diverged, and 255 g were left" in course.ending.message
     assert course.ending.time == pytest.approx(min(0.25, 0.1 * (good + 1)) if "failure" in wrong else 0.1 * (good + 1))
@@ -199,11 +201,11 @@ def test_a_file_that_sets_its_regulator_to_another_pressure_is_refused(tmp_path:
     with pytest.raises(ScenarioError, match=words):
         load_walk(WALK, bottle=file)
     lower = ["supply.pressure=30 psi_g", "supply.dorsiflexion_pressure=25 psi_g"]
-    assert load_walk(WALK, lower, bottle=file).bottle is not None
+    assert walk_of(load_walk(WALK, lower, bottle=file)).bottle is not None
 
 
 def test_a_bottle_of_the_package_is_set_to_the_pressure_of_the_walk_and_says_so() -> None:
-    supply = load_walk(WALK, ["supply.pressure=60 psi_g"], bottle=BOTTLE).bottle
+    supply = walk_of(load_walk(WALK, ["supply.pressure=60 psi_g"], bottle=BOTTLE)).bottle
     assert supply is not None
     told = supply.to_dict()["values"]["regulator.set_pressure"]
     assert told["value"] == pytest.approx(supply.bottle.regulator.set_pressure)
@@ -239,7 +241,7 @@ def test_many_wearers_and_an_energy_balance_have_no_bottle() -> None:
     changes = ["gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)"]
     with pytest.raises(ScenarioError, match=r"gas_model\.kind.*not with a bottle"):
         load_walk(WALK, [*changes, "gas_model.wall_area_per_volume=100 1/m"], bottle=BOTTLE)
-    assert with_device_off(configuration).bottle is None
+    assert walk_of(with_device_off(configuration)).bottle is None
 
 
 def test_a_bottle_that_ends_a_walk_within_the_first_strides_is_named_with_its_time(
@@ -250,4 +252,4 @@ def test_a_bottle_that_ends_a_walk_within_the_first_strides_is_named_with_its_ti
     ended = replace(small, supply=replace(small.supply, ending=ending))
     monkeypatch.setattr("ppafo.walking.comparison.walk", lambda *_, **__: ended)
     with pytest.raises(SimulationError, match=r"the bottle is empty, after 3\.1 s: fewer than 5 strides"):
-        compare_walks(small.configuration)
+        compare_walks(small.scenario)

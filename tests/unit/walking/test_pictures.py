@@ -17,6 +17,7 @@ from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.over_time import over_time_figure
 from ppafo.walking.figures.phases import strip_figure
 from ppafo.walking.figures.wearers import population_figure
+from ppafo.walking.motion import walk_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -104,7 +105,7 @@ def test_pictures_of_the_leg_show_a_stride_with_help_where_there_was_one() -> No
     result = failing()
     turns = last_phases(result, 2, 100)
     assert turns.size == 200
-    assert turns[-1] * result.configuration.gait.stride_time < result.events[0].time
+    assert turns[-1] * walk_of(result.scenario).gait.stride_time < result.events[0].time
     inside = np.flatnonzero((turns % 1.0 > 0.75) & (turns % 1.0 < 0.95))
     assert legs_of(result, turns).worn.toe[inside, 1].min() > -0.01
     assert result.helped[np.floor(turns[[0, -1]]).astype(int) - 1].all()

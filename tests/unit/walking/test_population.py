@@ -21,11 +21,13 @@ from ppafo.walking.anthropometry import (
     segment_values,
 )
 from ppafo.walking.gait_series import gait_timing
+from ppafo.walking.motion import walk_of
+from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.varied_gait import SERIES, SeriesOfMany, draw_gaits
-from ppafo.walking.walk import plan_of
+from ppafo.walking.varying import with_duration
 from ppafo.walking.wearer import paper_subject
-from ppafo.walking.wearers_rows import START_VARIATION, THRESHOLD_VARIATION, batch_of_many
+from ppafo.walking.wearers_rows import batch_of_many
 
 MINUTES = 0.15
 
@@ -34,10 +36,10 @@ MINUTES = 0.15
 def test_the_first_wearer_is_that_of_the_configuration(name: str) -> None:
     configuration = load_walk(name)
     people = walk_population(configuration, MINUTES, 9, seed=3)
-    run = plan_walk(plan_of(configuration, 60.0 * MINUTES))
+    run = plan_walk(with_duration(configuration, 60.0 * MINUTES))
     rows = state_row_numbers(run)
     alone = run_batch(batch_of(run)).states[:, 0]
-    strides = run.step * run.step_count / configuration.gait.stride_time
+    strides = run.step * run.step_count / walk_of(configuration).gait.stride_time
     assert people.outcomes["gas"][0] * strides == pytest.approx(alone[rows["state.supplied_mass"]], rel=1e-9)
     assert people.outcomes["push_off_work"][0] * strides == pytest.approx(alone[rows["walk.push_off_work"]], rel=1e-9)
     slaps = alone[rows["walk.slap_rates"]] / alone[rows["walk.landings"]]
@@ -66,26 +68,30 @@ def test_any_wearer_walks_as_it_would_alone() -> None:
     people = walk_population(configuration, MINUTES, count, seed=3)
     generator = np.random.default_rng(3)
     build = draw_builds(count, generator)
-    gaits = draw_gaits(configuration.gait, build.stature, generator)
+    gaits = draw_gaits(walk_of(configuration).gait, build.stature, generator)
     scale = 1.0 + THRESHOLD_VARIATION * draw_bounded_normal(generator, (count,))[index]
     start = START_VARIATION * draw_bounded_normal(generator, (count,))[index]
-    settings = dict(configuration.settings)
+    settings = dict(configuration.control.settings)
     settings |= {name: settings[name] * scale for name in ("load_threshold", "unload_threshold")}
     settings["push_off_start"] += start
-    segments = segment_values(configuration.wearer, build)
+    segments = segment_values(walk_of(configuration).wearer, build)
     gait = replace(
-        configuration.gait,
+        walk_of(configuration).gait,
         stride_time=float(gaits.stride_time[index]),
         stance_share=float(gaits.timing["toe_off"][index]),
-        **{name: varied(configuration.gait.curve(name), gaits.series[field], index) for field, name in SERIES.items()},
+        **{
+            name: varied(walk_of(configuration).gait.curve(name), gaits.series[field], index)
+            for field, name in SERIES.items()
+        },
     )
     timing = gait_timing(gait)
     for name, values in gaits.timing.items():
         assert float(values[index]) == pytest.approx(getattr(timing, name), rel=1e-9), name
-    wearer = replace(configuration.wearer, **{name: float(values[index]) for name, values in segments.items()})
-    alone = replace(configuration, wearer=wearer, gait=gait, settings=settings)
-    shared = plan_walk(plan_of(configuration, 60.0 * MINUTES))
-    run = with_heel_of(plan_walk(plan_of(alone, 60.0 * MINUTES)), shared, float(build.stature[index]))
+    wearer = replace(walk_of(configuration).wearer, **{name: float(values[index]) for name, values in segments.items()})
+    motion = replace(walk_of(configuration), wearer=wearer, gait=gait)
+    alone = replace(configuration, motion=motion, control=replace(configuration.control, settings=settings))
+    shared = plan_walk(with_duration(configuration, 60.0 * MINUTES))
+    run = with_heel_of(plan_walk(with_duration(alone, 60.0 * MINUTES)), shared, float(build.stature[index]))
     begun = batch_of_many(configuration, shared, build, gaits, np.random.default_rng(3)).states[:, index]
     paths = [path for group, row in run.program.state_rows().items() for path in leaf_paths(row, group)]
     for path, value, own in zip(paths, begun.tolist(), batch_of(run).states[:, 0].tolist(), strict=True):

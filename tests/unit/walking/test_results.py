@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ppafo.metrics.strides import PER_STRIDE, SETTLING
 from ppafo.signals import CHANNELS, Channel, Recording
 from ppafo.storage.opensim import read_opensim
 from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk
 from ppafo.walking.gait_series import NEARLY_FLAT, gait_timing
+from ppafo.walking.motion import walk_of
 from ppafo.walking.strides import (
-    PER_STRIDE,
     PHASES,
-    SETTLING,
     helped_strides,
     mean_curves,
     per_stride,
@@ -41,7 +41,7 @@ def test_numbers_of_strides_add_up_to_the_recording(name: str) -> None:
     assert strides["gas"].sum() == pytest.approx(supplied[last] - supplied[first], rel=1e-12)
     assert result.metrics["gas"].value == pytest.approx(strides["gas"][SETTLING:].mean())
     times = np.diff(result.recording.time[result.starts])
-    np.testing.assert_allclose(times, result.configuration.gait.stride_time, atol=1.5e-3)
+    np.testing.assert_allclose(times, walk_of(result.scenario).gait.stride_time, atol=1.5e-3)
 
 
 def test_the_mean_stride_is_the_mean_of_strides() -> None:
@@ -74,9 +74,9 @@ def test_channels_of_a_walk_are_known_with_their_units() -> None:
 def test_the_comparison_is_the_same_wearer_with_both_chambers_vented() -> None:
     pair = compared("solenoid")
     worn, bare = pair.with_device, pair.without_device
-    assert bare.configuration.wearer == worn.configuration.wearer
-    assert bare.configuration.device == worn.configuration.device
-    assert bare.configuration.controller.name == "off"
+    assert walk_of(bare.scenario).wearer == walk_of(worn.scenario).wearer
+    assert bare.scenario.device == worn.scenario.device
+    assert bare.scenario.control.kind == "off"
     assert (bare.recording["command"] == 2.0).all()
     assert bare.metrics["gas"].value == 0.0
     assert worn.metrics["toe_clearance"].value > bare.metrics["toe_clearance"].value + 0.05
@@ -86,7 +86,7 @@ def test_the_comparison_is_the_same_wearer_with_both_chambers_vented() -> None:
 
 
 def test_the_healthy_foot_is_judged_where_it_lands() -> None:
-    gait = load_walk("solenoid").gait
+    gait = walk_of(load_walk("solenoid")).gait
     shank, ankle = gait.shank_angle, gait.ankle_angle
     phases = np.linspace(0.0, 0.15, 15001)
     foot = shank.values_at(phases) - ankle.values_at(phases) + 0.5 * np.pi - gait_timing(gait).ground_angle
@@ -99,7 +99,7 @@ def test_the_healthy_foot_is_judged_where_it_lands() -> None:
 
 def test_the_lowest_toes_are_those_of_the_mean_stride_in_mid_swing() -> None:
     pair = compared("solenoid")
-    gait = pair.with_device.configuration.gait
+    gait = walk_of(pair.with_device.scenario).gait
     swing = (np.linspace(0.0, 1.0, 101) - gait.stance_share) / (1.0 - gait.stance_share)
     middle = (swing > 0.2) & (swing < 0.9)
     for result in (pair.with_device, pair.without_device):

@@ -8,6 +8,7 @@ import pytest
 
 from ppafo.errors import ParameterError, ScenarioError
 from ppafo.model.regulator import SupplyLines
+from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.supply_line import entries
 from ppafo.walking import load_walk, walk, walk_population
 from ppafo.walking.comparison import with_device_off
@@ -35,15 +36,19 @@ def test_what_is_not_given_has_value_origin_and_source(name: str) -> None:
     assert configuration.supply_lines == SupplyLines(3.0e6, 0.01, 1.0e-5, 6.7e7, 1.5e-3, 2.0e-6, 0.0)
     assert len(entries()) == 6
     for path, entry in entries().items():
-        assert entry.origin in configuration.assumed[f"supply_line.{path}"]
-        assert entry.source in configuration.assumed[f"supply_line.{path}"]
+        assert entry.origin in assumed_by(configuration)[f"supply_line.{path}"]
+        assert entry.source in assumed_by(configuration)[f"supply_line.{path}"]
+
+
+def assumed_by(configuration: Scenario) -> dict[str, str]:
+    return {item.path: item.note for item in configuration.assumptions}
 
 
 def test_one_value_is_enough_for_the_lines_and_is_not_called_assumed() -> None:
     configuration = load_walk("solenoid", ["supply_line.dorsiflexion.droop=2e7 Pa s/kg"])
     assert configuration.supply_lines == SupplyLines(3.0e6, 0.01, 1.0e-5, 2.0e7, 1.5e-3, 2.0e-6, 0.0)
-    assert "supply_line.dorsiflexion.droop" not in configuration.assumed
-    assert "supply_line.dorsiflexion.volume" in configuration.assumed
+    assert "supply_line.dorsiflexion.droop" not in assumed_by(configuration)
+    assert "supply_line.dorsiflexion.volume" in assumed_by(configuration)
 
 
 @pytest.mark.parametrize("override", MISTAKES)
@@ -79,7 +84,7 @@ def test_a_tenfold_droop_costs_work_and_a_smaller_step_changes_little() -> None:
     drooping = replace(base, supply_lines=base.supply_lines._replace(droop_1=10.0 * base.supply_lines.droop_1))
     found = {
         name: walk(configuration, 0.1).metrics["push_off_work"].value
-        for name, configuration in {"base": base, "fine": replace(base, step=1.0e-4), "drooping": drooping}.items()
+        for name, configuration in {"base": base, "fine": replace(base, time_step=1.0e-4), "drooping": drooping}.items()
     }
     assert found["drooping"] < 0.95 * found["base"]
     assert found["fine"] == pytest.approx(found["base"], rel=0.01)

@@ -10,7 +10,7 @@ from ppafo.metrics.gas import energy_imbalance, gas_imbalance
 from ppafo.simulation.scenario import Thermal
 from ppafo.walking import load_walk, walk, walk_population
 from ppafo.walking.planning import plan_walk
-from ppafo.walking.walk import plan_of
+from ppafo.walking.varying import with_duration
 
 WALLS = ("gas_model.kind=thermal", "gas_model.wall_area_per_volume=100 1/m")
 WARM = (*WALLS, "gas_model.heat_transfer_coefficient=50 W/(m^2 K)")
@@ -31,7 +31,7 @@ def test_a_walk_file_takes_the_gas_model_of_a_scenario(tmp_path: Path) -> None:
 
 
 def test_warm_gas_has_steps_that_follow_the_faster_chambers() -> None:
-    plain, warm = (plan_walk(plan_of(load_walk("solenoid", given), 6.0)) for given in ((), WARM))
+    plain, warm = (plan_walk(with_duration(load_walk("solenoid", given), 6.0)) for given in ((), WARM))
     assert warm.program.is_thermal
     assert not plain.program.is_thermal
     assert plain.step / warm.step >= 1.0

@@ -10,6 +10,7 @@ import pytest
 
 from ppafo.model import contact as ground
 from ppafo.model.gait_sensors import Fault
+from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk
 
 CONTROLLERS = ("off", "event_on_off", "event_proportional")
@@ -80,7 +81,7 @@ def test_metrics_at_one_kilohertz_are_within_two_per_cent(walk_plan: Callable[[s
     for name in ("event_on_off", "event_proportional"):
         found = []
         for step in (1.0e-3, 5.0e-5):
-            run = plan_walk(replace(walk_plan(name), step=step))
+            run = plan_walk(replace(walk_plan(name), time_step=step))
             rows = state_row_numbers(run)
             states = run_batch(batch_of(run)).states[:, 0]
             names = ("walk.slap_rates", "walk.push_off_work", "state.supplied_mass")
@@ -121,9 +122,9 @@ def test_a_foot_that_comes_first_with_its_toes_loads_them_and_does_not_slap(
 ) -> None:
     plan = walk_plan("off")
     # An equinus foot: stiff tissue that rests in plantarflexion.
-    wearer = replace(plan.wearer, ankle_stiffness=20.0, ankle_rest_angle=2.2)
+    wearer = replace(walk_of(plan).wearer, ankle_stiffness=20.0, ankle_rest_angle=2.2)
     lifted = walked("event_on_off")
-    stiff = type(lifted)(plan_walk(replace(plan, wearer=wearer)))
+    stiff = type(lifted)(plan_walk(replace(plan, motion=replace(walk_of(plan), wearer=wearer))))
     assert stiff["walk.toe_landings"][-1] >= 6
     # The walk begins at a heel strike with the healthy ankle.
     assert stiff["walk.landings"][-1] == 1

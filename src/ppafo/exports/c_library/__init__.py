@@ -19,16 +19,15 @@ from ppafo.exports.c_library.files import (
 )
 from ppafo.exports.c_library.preparation import following_text, links_of, preparation_of, relations_of, settings_of
 from ppafo.exports.c_library.program import Further, exported
-from ppafo.exports.loading import Exportable
 from ppafo.parameters.device import Device
 from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import Graph
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.preparation import step_counts
-from ppafo.simulation.scenario import Control, Scenario, Sensors
+from ppafo.simulation.scenario import Control, Scenario, Sensors, worn_kind
 
 if TYPE_CHECKING:
-    from ppafo.walking.configuration import Configuration
+    from ppafo.simulation.scenario import Scenario
 
 _ARRAYS = {
     "given": "SETTINGS",
@@ -48,14 +47,14 @@ _FLAWS_OF_WALK = (
 )
 
 
-def c_library(item: Exportable) -> dict[str, bytes]:
+def c_library(item: Scenario) -> dict[str, bytes]:
     """Files of a library in C by name. ProgramError for what cannot be translated, with file and line."""
     return library_files(library_of(item))
 
 
-def library_of(item: Exportable) -> Library:
+def library_of(item: Scenario) -> Library:
     """The library of a scenario or a walk."""
-    return scenario_library(item) if isinstance(item, Scenario) else walk_library(item)
+    return scenario_library(item) if worn_kind(item) is None else walk_library(item)
 
 
 def scenario_library(scenario: Scenario) -> Library:
@@ -96,7 +95,7 @@ def commanded(scenario: Scenario) -> Scenario:
     )
 
 
-def walk_library(configuration: "Configuration") -> Library:
+def walk_library(configuration: "Scenario") -> Library:
     """A library whose settings are all numbers of a walk; ScenarioError for one that cannot be exported."""
     from ppafo.exports.c_library.walk_preparation import (
         check_can_leave,
@@ -107,15 +106,13 @@ def walk_library(configuration: "Configuration") -> Library:
         settings_of_walk,
     )
     from ppafo.walking.planning import plan_walk
-    from ppafo.walking.walk import plan_of, walk_duration
 
     check_can_leave(configuration)
-    if configuration.converter is not None:
+    if configuration.control.is_fixed:
         raise ProgramError(
             f"{configuration.name}: a controller on whole numbers has no library yet; 'ppafo firmware' writes it"
         )
-    run = plan_walk(plan_of(configuration, walk_duration(configuration)))
-    program = exported(batch_of(run).program)
+    program = exported(batch_of(plan_walk(configuration)).program)
     settings, links = settings_of_walk(configuration), links_of_walk(configuration)
     failing = sensors_that_fail(configuration)
     # A sensor that fails is never ideal, whatever the settings are.

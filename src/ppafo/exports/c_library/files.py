@@ -25,7 +25,6 @@ from ppafo.simulation.scenario import PrescribedMotion, Scenario
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
-    from ppafo.walking.configuration import Configuration
     from ppafo.walking.sensor_settings import FaultSettings
 
 
@@ -363,23 +362,24 @@ def _followers(links: Graph) -> str:
     return _FOLLOWS.format(followers=", ".join(said) or "none")
 
 
-def words_of_walk(
-    configuration: "Configuration", links: Graph, failing: "Mapping[str, FaultSettings]"
-) -> dict[str, str]:
+def words_of_walk(configuration: Scenario, links: Graph, failing: "Mapping[str, FaultSettings]") -> dict[str, str]:
     """What the page of the library says of this walk: settings follow others by ``links``, some sensors ``failing``."""
     faults = [f"{sensor} `{item.kind}`" for sensor, item in failing.items()]
-    course = configuration.course
+    from ppafo.walking.motion import walk_of
+    from ppafo.walking.planning import has_ideal_sensors
+
+    gait, course = walk_of(configuration).gait, walk_of(configuration).course
     way = "stride after equal stride" if course is None else f"the course `{course.name}`, which stays as it is"
     fixed = [
-        f"the gait, `{configuration.gait.name}`: its series, its events and its stride of "
-        f"{configuration.gait.stride_time:.4g} s are numbers in the source",
+        f"the gait, `{gait.name}`: its series, its events and its stride of "
+        f"{gait.stride_time:.4g} s are numbers in the source",
         f"how it is walked: {way}",
-        f"the valve, `{configuration.device.valve.kind}`, and the controller, `{configuration.controller.name}`",
+        f"the valve, `{configuration.device.valve.kind}`, and the controller, `{configuration.control.kind}`",
         *_fixed_of_device(
             configuration.device, configuration.thermal is not None, configuration.supply_lines is not None
         ),
         f"which sensors fail, and how: {', '.join(faults) or 'none'}; and whether one is late",
-        _at_zero(configuration.device, () if configuration.has_ideal_sensors else (1.0,)),
+        _at_zero(configuration.device, () if has_ideal_sensors(configuration) else (1.0,)),
     ]
     return {
         "fixed": _listed(fixed),

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 from ppafo.engine.lane_meters import REQUEST, TRACED, walk_traces
 from ppafo.engine.lane_rows import HANDED, indent
@@ -14,8 +13,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import Collector, woven
 from ppafo.metrics.catalog import METRICS
-from ppafo.metrics.metric import Floats, Readings
-from ppafo.signals.meter import MeterKind
+from ppafo.metrics.metric import WALK, MetricKind, Readings
 from ppafo.simulation.ensemble.running import ThermalTotals, Totals, has_channels, thermal_totals, totals
 from ppafo.translation.one_run import for_one_run, one_run_collector
 
@@ -34,36 +32,12 @@ _STEPS = {WHOLE: "AT_STEP", IN_PARTS: "AT_PARTED"}
 METRICS_ENTRY = '@njit("void(float64[::1], float64[::1], float64[::1], int64, float64[::1])")'
 
 
-class MeteredMetric(Protocol):
-    """A metric that is read from meters alone: a ``MetricKind`` of no trace, or a ``StrideMetric``."""
-
-    @property
-    def name(self) -> str:
-        """Its name, also in C."""
-
-    @property
-    def unit(self) -> str:
-        """Its SI unit."""
-
-    @property
-    def summary(self) -> str:
-        """What it is."""
-
-    @property
-    def read(self) -> Callable[[Readings], Floats]:
-        """The function from meters to the value."""
-
-    @property
-    def meters(self) -> tuple[MeterKind, ...]:
-        """What goes through the samples for it."""
-
-
 @dataclass(frozen=True, slots=True)
 class ExportedProgram:
     """A program with meters for all its metrics, and traces of all its outputs."""
 
     program: Program
-    metrics: tuple[MeteredMetric, ...]
+    metrics: tuple[MetricKind, ...]
 
     @property
     def loops(self) -> dict[str, Program]:
@@ -99,13 +73,8 @@ class ExportedProgram:
 def exported(program: Program) -> ExportedProgram:
     """The program as it is exported; a metric that needs the whole course of a channel is left out."""
     missing = _missing(program)
-    metrics: tuple[MeteredMetric, ...]
-    if program.walks:
-        from ppafo.walking.stride_meters import stride_metrics_of
-
-        metrics = stride_metrics_of(program.takes_course, "reference" not in missing)
-    else:
-        metrics = tuple(kind for kind in METRICS.values() if has_channels(program, kind) and not kind.traced)
+    offered = (kind for kind in METRICS.values() if has_channels(program, kind) and not kind.traced)
+    metrics = tuple(kind for kind in offered if program.walks == (WALK in kind.needs))
     meters = dict(sorted({meter.name: meter for kind in metrics for meter in kind.meters}.items()))
     outputs = (*(name for name in TRACED if name not in missing), *walk_traces(program))
     return ExportedProgram(replace(program, meters=tuple(meters.values()), traced=outputs), metrics)

@@ -11,7 +11,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.source_text import Collector
 from ppafo.errors import ScenarioError
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
-from ppafo.exports.c_library.preparation import FLAWS, SAID, Writing, used_numbers
+from ppafo.exports.c_library.preparation import SAID, Writing, used_numbers
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait import gait_at
 from ppafo.model.gait_sensors import NOTHING_SEEN
@@ -20,13 +20,14 @@ from ppafo.parameters.graph import Follows, Graph, Term, holding
 from ppafo.simulation.declaration import PERIOD, RUN, THERMAL_GAS
 from ppafo.simulation.numbers import device_number_at, device_numbers
 from ppafo.simulation.plan import profile_parameters
+from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.supply_line import LINES, paths
-from ppafo.walking.configuration import Configuration
 from ppafo.walking.course_planning import flat_foot
 from ppafo.walking.declaration import SEED, STEP, WALK_SENSORS, fault_numbers
 from ppafo.walking.gait_series import gait_series, gait_timing
 from ppafo.walking.heel_rocker import fit_rocker
-from ppafo.walking.planning import NO_REFERENCE, planned_course
+from ppafo.walking.motion import walk_of
+from ppafo.walking.planning import NO_REFERENCE, course_of_walk, law_of, sensor_settings
 from ppafo.walking.preparation import (
     device_share,
     distorting_fault,
@@ -42,8 +43,8 @@ from ppafo.walking.preparation import (
     walk_step_counts,
     with_leg,
 )
-from ppafo.walking.sensor_settings import DISTORTED, FROZEN, NEVER, FaultSettings, SensorSettings, sensors_of
-from ppafo.walking.walk import record_interval, walk_duration
+from ppafo.walking.sensor_settings import DISTORTED, FROZEN, NEVER, FaultSettings
+from ppafo.walking.varying import record_interval
 from ppafo.walking.wearer import WEARER, leg_parameters
 
 _FORCES = ("force_bandwidth", "force_noise", "force_resolution", "lost_share")
@@ -71,22 +72,21 @@ _RELATIONS = (
 """Contradictions of a walk file between two numbers; those with a third, or with the gait, are left to the caller."""
 
 
-def check_can_leave(configuration: Configuration) -> None:
+def check_can_leave(configuration: Scenario) -> None:
     """Raise ScenarioError for a walk that has no exported form."""
-    if configuration.bottle is not None:
+    if walk_of(configuration).person:
+        raise ScenarioError(
+            f"{configuration.name}: wearer.person is drawn in Python, so a walk with one cannot be exported: leave it "
+            "out"
+        )
+    if walk_of(configuration).bottle is not None:
         raise ScenarioError(
             f"{configuration.name}: a walk on a bottle cannot be exported: bottle and device take turns in Python; "
             "leave the bottle out, or give it lines with [supply_line]"
         )
-    settings = configuration.sensor_settings
-    is_known = settings is not None and sensors_of(settings, configuration.period) == configuration.gait_sensors
-    if settings is None or not is_known or configuration.sensors[:4] != tuple(settings.numbers[name] for name in FLAWS):
-        raise ScenarioError(
-            f"{configuration.name}: its sensors are not those of its file: load it anew with load_walk to export it"
-        )
 
 
-def settings_of_walk(configuration: Configuration) -> tuple[Setting, ...]:
+def settings_of_walk(configuration: Scenario) -> tuple[Setting, ...]:
     """Every number of a walk in SI units, under the path that overrides know it by."""
     return tuple(
         Setting(c_identifier(path), path, replace(item, summary=SAID.get(path, item.summary)), value)
@@ -94,19 +94,19 @@ def settings_of_walk(configuration: Configuration) -> tuple[Setting, ...]:
     )
 
 
-def _numbers(configuration: Configuration) -> dict[str, tuple[Quantity, float]]:
+def _numbers(configuration: Scenario) -> dict[str, tuple[Quantity, float]]:
     """Declaration and value of every number of a walk, by path."""
-    device, sensors = configuration.device, _sensors(configuration)
+    device, sensors = configuration.device, sensor_settings(configuration)
     of_device = used_numbers(device, device_numbers(device))
     found = {path: (item, device_number_at(device, path)) for path, item in of_device.items()}
-    duration = walk_duration(configuration)
-    clock = {"duration": duration, "step": configuration.step, "output_interval": record_interval(duration)}
+    duration = configuration.duration
+    clock = {"duration": duration, "step": configuration.time_step, "output_interval": record_interval(duration)}
     items = {item.name: item for item in (*RUN, STEP)}
     found |= {f"run.{name}": (items[name], value) for name, value in clock.items()}
-    found |= {f"wearer.{item.name}": (item, getattr(configuration.wearer, item.name)) for item in WEARER}
-    found["controller.period"] = (PERIOD, configuration.period)
+    found |= {f"wearer.{item.name}": (item, getattr(walk_of(configuration).wearer, item.name)) for item in WEARER}
+    found["controller.period"] = (PERIOD, configuration.control.period)
     for path, item in _control(configuration).items():
-        found[path] = (item, configuration.settings[item.name])
+        found[path] = (item, configuration.control.settings[item.name])
     found |= {f"sensors.{item.name}": (item, sensors.numbers[item.name]) for item in WALK_SENSORS}
     found["sensors.seed"] = (SEED, float(configuration.sensors.seed))
     for sensor, fault in sensors.faults.items():
@@ -115,7 +115,7 @@ def _numbers(configuration: Configuration) -> dict[str, tuple[Quantity, float]]:
     return found | _gas_numbers(configuration)
 
 
-def _gas_numbers(configuration: Configuration) -> dict[str, tuple[Quantity, float]]:
+def _gas_numbers(configuration: Scenario) -> dict[str, tuple[Quantity, float]]:
     """Declaration and value of what the gas model and the lines of the supply have."""
     walls, lines = configuration.thermal, configuration.supply_lines
     found = {}
@@ -129,25 +129,20 @@ def _gas_numbers(configuration: Configuration) -> dict[str, tuple[Quantity, floa
     return found
 
 
-def _sensors(configuration: Configuration) -> SensorSettings:
-    assert configuration.sensor_settings is not None, "checked before"
-    return configuration.sensor_settings
-
-
-def sensors_that_fail(configuration: Configuration) -> dict[str, FaultSettings]:
+def sensors_that_fail(configuration: Scenario) -> dict[str, FaultSettings]:
     """Faults of a walk by the name of the sensor, without those that have none."""
-    return {sensor: item for sensor, item in _sensors(configuration).faults.items() if item.kind}
+    return {sensor: item for sensor, item in sensor_settings(configuration).faults.items() if item.kind}
 
 
-def _control(configuration: Configuration) -> dict[str, Quantity]:
+def _control(configuration: Scenario) -> dict[str, Quantity]:
     """Settings of controller and timing by path, in the order of the controller's parameters."""
-    control = configuration.controller
+    control = law_of(configuration)
     law = walking_controllers().get(control.name, control)
     own = {item.name for item in law.quantities}
     return {f"{'controller' if item.name in own else 'timing'}.{item.name}": item for item in control.quantities}
 
 
-def links_of_walk(configuration: Configuration) -> Graph:
+def links_of_walk(configuration: Scenario) -> Graph:
     """What follows other settings of a walk as long as nobody changes it."""
     known = _numbers(configuration)
     recorded = {"run.output_interval": (Follows((Term(("run.duration",), record_interval),)),)}
@@ -155,12 +150,12 @@ def links_of_walk(configuration: Configuration) -> Graph:
     return holding(links, lambda path: known[path][1])
 
 
-def relations_of_walk(configuration: Configuration) -> tuple[Relation, ...]:
+def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:
     """Settings that contradict each other, as they would in a file."""
     rules = [(path, relation, other) for path, relation, other, _ in consistency(configuration.device)]
     if configuration.supply_lines is not None:
         rules.append(("supply.dorsiflexion_pressure", "at most", "supply.pressure"))
-    if "load_threshold" in configuration.settings:
+    if "load_threshold" in configuration.control.settings:
         rules += _RELATIONS
     else:
         rules += _RELATIONS[:2]
@@ -172,7 +167,7 @@ def relations_of_walk(configuration: Configuration) -> tuple[Relation, ...]:
     )
 
 
-def preparation_of_walk(configuration: Configuration, program: Program, collector: Collector) -> str:
+def preparation_of_walk(configuration: Scenario, program: Program, collector: Collector) -> str:
     """The composed function ``prepare`` of a walk, once everything it calls is gathered."""
     writing = Writing(configuration.device, configuration.supply_lines, program, collector)
     lines = [
@@ -187,22 +182,22 @@ def preparation_of_walk(configuration: Configuration, program: Program, collecto
     return writing.text(settings_of_walk(configuration), lines)
 
 
-def _leg(configuration: Configuration, writing: Writing) -> Iterator[str]:
+def _leg(configuration: Scenario, writing: Writing) -> Iterator[str]:
     """Lines that make the leg, the gait on it, and the plant with both."""
-    add, fit = writing.add, fit_rocker(configuration.gait)
+    add, fit = writing.add, fit_rocker(walk_of(configuration).gait)
     yield f"wearer = {writing.row('Wearer', writing.section('wearer', [item.name for item in WEARER]))}"
     fitted = ", ".join(map(repr, fit))
     yield f"rocker = {add(rocker_on_heel)}({fitted}, wearer_heel_lever)"
     yield f"leg = {add(leg_parameters)}(wearer, rocker)"
     yield f"share = {add(device_share)}(bare, leg)"
     yield f"plant = {add(with_leg)}(bare, leg)"
-    yield f"gait = {writing.constant(gait_series(configuration.gait), 'gait')}"
-    yield f"gait_timing = {writing.constant(gait_timing(configuration.gait), 'gait_timing')}"
+    yield f"gait = {writing.constant(gait_series(walk_of(configuration).gait), 'gait')}"
+    yield f"gait_timing = {writing.constant(gait_timing(walk_of(configuration).gait), 'gait_timing')}"
 
 
-def _gait_sensors(configuration: Configuration, writing: Writing) -> Iterator[str]:
+def _gait_sensors(configuration: Scenario, writing: Writing) -> Iterator[str]:
     """Lines that make the sensors with their faults, and the longest time by which one is late."""
-    add, settings = writing.add, _sensors(configuration)
+    add, settings = writing.add, sensor_settings(configuration)
     for sensor, fault in settings.faults.items():
         names = writing.section(f"faults.{sensor}", [item.name for item in fault_numbers(sensor, fault.kind)])
         yield f"{sensor}_fault = {_fault(writing, fault.kind, names)}"
@@ -224,7 +219,7 @@ def _fault(writing: Writing, kind: str, names: Mapping[str, str]) -> str:
     return f"{writing.add(distorting_fault)}({given}, controller_period)"
 
 
-def _steps(configuration: Configuration, writing: Writing) -> Iterator[str]:
+def _steps(configuration: Scenario, writing: Writing) -> Iterator[str]:
     """Lines that make the steps."""
     yield f"volume = {writing.add(smallest_chamber)}(plant)"
     if configuration.supply_lines is not None:
@@ -236,26 +231,26 @@ def _steps(configuration: Configuration, writing: Writing) -> Iterator[str]:
     yield "needs_parts = False"
 
 
-def _pieces(configuration: Configuration, writing: Writing) -> Iterator[str]:
+def _pieces(configuration: Scenario, writing: Writing) -> Iterator[str]:
     """Lines that make the parameters of the controller, its noise, gas, lines and course."""
-    control = configuration.controller
+    control = law_of(configuration)
     given = [c_identifier(path) for path in _control(configuration)]
     yield f"controller = {writing.kind('controller', control, given)}"
     yield f"reference = {writing.constant(profile_parameters(NO_REFERENCE), 'reference')}"
     yield from writing.gas()
-    if configuration.course is not None:
-        course = planned_course(configuration.course, configuration.gait).course
-        yield f"walk_course = {writing.constant(course, 'walk_course')}"
+    planned = course_of_walk(configuration)
+    if planned is not None:
+        yield f"walk_course = {writing.constant(planned.course, 'walk_course')}"
 
 
-def _start(configuration: Configuration, writing: Writing) -> Iterator[str]:
+def _start(configuration: Scenario, writing: Writing) -> Iterator[str]:
     """Lines that make the states at the start: at a heel strike, or standing where there is a course."""
-    add = writing.add
-    if configuration.course is None:
+    add, planned = writing.add, course_of_walk(configuration)
+    if planned is None:
         yield f"walk = {add(walk_from_strike)}({add(gait_at)}(gait, gait_timing, leg, 0.0))"
     else:
-        first = planned_course(configuration.course, configuration.gait).course.parts[0]
-        sine, cosine = map(float, flat_foot(gait_timing(configuration.gait)))
+        first = planned.course.parts[0]
+        sine, cosine = map(float, flat_foot(gait_timing(walk_of(configuration).gait)))
         given = f"leg, gait_timing.ground_angle, {sine!r}, {cosine!r}, {first.turns!r}, {first.load!r}"
         yield f"walk = {add(walk_from_standing)}({add(standing_on)}({given}))"
     yield f"gait_seen = {writing.constant(NOTHING_SEEN, 'gait_seen')}"

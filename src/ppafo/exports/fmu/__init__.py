@@ -30,7 +30,6 @@ from ppafo.exports.templates import filled, licence, template
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.native import asked, complaint
 from ppafo.version import __version__
-from ppafo.walking.configuration import Configuration
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv")
 _ANOTHER = "install gcc, clang or 'pip install ppafo[native]' anew"
@@ -160,7 +159,7 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
     return {f"{identifier}.fmu": _archive(contents)}
 
 
-def closed_loop(item: Scenario | Configuration) -> Interface:
+def closed_loop(item: Scenario | Scenario) -> Interface:
     """The whole scenario or walk, its controller within: no inputs."""
     library = library_of(item)
     times = {setting.path: setting.value for setting in library.settings}

@@ -9,13 +9,20 @@ from ppafo.exports.c_library.files import Library, steps_source
 from ppafo.exports.c_library.walk_preparation import check_can_leave
 from ppafo.exports.fmu.description import Input, Interface
 from ppafo.model.command import VENT
-from ppafo.model.sensors import SensorParameters
 from ppafo.simulation.preparation import step_counts
-from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, ProfileChoice, Scenario
-from ppafo.walking.configuration import Configuration
-from ppafo.walking.declaration import WALK_SENSORS
-from ppafo.walking.sensor_settings import FaultSettings, SensorSettings, sensors_of
-from ppafo.walking.walk import walk_duration
+from ppafo.simulation.scenario import (
+    Control,
+    FreeMotion,
+    PrescribedMotion,
+    ProfileChoice,
+    Scenario,
+    Sensors,
+    vane_motion,
+    worn_kind,
+)
+from ppafo.walking.declaration import FORCES
+from ppafo.walking.motion import walk_of
+from ppafo.walking.sensor_settings import FaultSettings
 
 COMMAND = Input("command", "-", "command to the valve, clipped to -1 to 1; above 0 feeds chamber 1", 0.0)
 WALKING_COMMAND = Input(
@@ -42,15 +49,15 @@ _LEAD_ANGLE = """\
     rows[PARAMETER_PATH_RAMP_TIME] = 2.0 * length;"""
 
 
-def plant_alone(item: Scenario | Configuration) -> Interface:
+def plant_alone(item: Scenario | Scenario) -> Interface:
     """The plant; a free vane takes an external torque, one whose angle is prescribed takes angle and rate.
 
     That of a walk is the device on its walking leg, which takes the command alone.
     """
-    return _walking_plant(item) if isinstance(item, Configuration) else _plant(item)
+    return _plant(item) if worn_kind(item) is None else _walking_plant(item)
 
 
-def _walking_plant(configuration: Configuration) -> Interface:
+def _walking_plant(configuration: Scenario) -> Interface:
     check_can_leave(configuration)
     chosen = _walk_of_plant(configuration)
     library = walk_library(chosen)
@@ -60,8 +67,8 @@ def _walking_plant(configuration: Configuration) -> Interface:
         template="plant.c",
         time=TIME.format(motion=ON_LEG),
         tuning=TUNING,
-        step=chosen.step,
-        duration=walk_duration(configuration),
+        step=chosen.time_step,
+        duration=configuration.duration,
         outputs=tuple(name for name in library.program.outputs if name not in ("command", "reference")),
         shows_metrics=False,
         is_step_fixed=True,
@@ -116,33 +123,25 @@ def _plant(scenario: Scenario) -> Interface:
     )
 
 
-def _walk_of_plant(configuration: Configuration) -> Configuration:
+def _walk_of_plant(configuration: Scenario) -> Scenario:
     """The walk with a command that is handed in at every step, and sensors that nobody looks at."""
-    step = step_counts(1.0, configuration.step, 1.0, configuration.period).step
-    given = configuration.sensor_settings
-    assert given is not None, "checked before"
-    numbers = {item.name: item.default or 0.0 for item in WALK_SENSORS}
+    step = step_counts(1.0, configuration.time_step, 1.0, configuration.control.period).step
+    motion = walk_of(configuration)
     # The forces under the foot are among the outputs.
-    numbers["force_bandwidth"] = given.numbers["force_bandwidth"]
-    sensors = SensorSettings(numbers, {sensor: FaultSettings() for sensor in given.faults})
+    forces = dict.fromkeys(FORCES, 0.0) | {"force_bandwidth": motion.forces["force_bandwidth"]}
     return replace(
         configuration,
         name=f"{configuration.name}-plant",
         description=f"The plant alone of this walk, on its leg: {configuration.description}",
-        controller=switching.CONSTANT,
-        settings={"command": 0.0},
-        period=step,
-        step=step,
-        sensors=SensorParameters(
-            angle_noise=0.0, pressure_noise=0.0, angle_quantum=0.0, pressure_quantum=0.0, seed=1.0
-        ),
-        sensor_settings=sensors,
-        gait_sensors=sensors_of(sensors, step),
+        control=Control(switching.CONSTANT.name, {"command": 0.0}, step),
+        time_step=step,
+        sensors=Sensors(),
+        motion=replace(motion, forces=forces, faults={sensor: FaultSettings() for sensor in motion.faults}),
     )
 
 
 def _inputs(scenario: Scenario) -> tuple[Input, ...]:
-    motion = scenario.motion
+    motion = vane_motion(scenario)
     if isinstance(motion, FreeMotion):
         said = "torque T_ex on the joint, above 0 works against plantarflexion"
         return (COMMAND, Input("external_torque", "N m", said, motion.external_torque))

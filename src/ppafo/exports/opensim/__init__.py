@@ -16,8 +16,9 @@ from ppafo.gait.opensim_names import opensim_recording
 from ppafo.signals import Channel, Recording
 from ppafo.storage.opensim import opensim_bytes
 from ppafo.version import __version__
+from ppafo.walking.motion import walk_of
+from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES
-from ppafo.walking.walk import WalkResult
 
 Side = Literal["right", "left"]
 SHORTEST_STRIDE, LONGEST_STRIDE = 0.4, 5.0
@@ -30,10 +31,10 @@ def opensim_files(result: WalkResult, side: Side = "right", strikes: Sequence[fl
     ScenarioError for a walk that failed or has no stride with help, and for times that are no heel strikes.
     """
     torque = device_torque(result, side, strikes)
-    named, _ = opensim_recording(result.recording, side, result.configuration.wearer.body_mass)
+    named, _ = opensim_recording(result.recording, side, walk_of(result.scenario).wearer.body_mass)
     laid = f"The mean stride of the walk lies on {len(strikes)} heel strikes." if strikes else "Times are the walk's."
     words = {
-        "walk": result.configuration.name,
+        "walk": result.scenario.name,
         "version": __version__,
         "coordinate": coordinate_of(side),
         "span": f"{laid} The torque goes from {torque.time[0]:g} to {torque.time[-1]:g} s.",
@@ -57,12 +58,12 @@ def device_torque(result: WalkResult, side: Side = "right", strikes: Sequence[fl
     name = f"{coordinate_of(side)}_device"
     recording = result.recording
     if result.status.time is not None:
-        raise ScenarioError(f"{result.configuration.name}: {result.status.message}")
+        raise ScenarioError(f"{result.scenario.name}: {result.status.message}")
     if not strikes:
         return Recording(name, recording.time, {name: _reversed(recording["external_torque"])}, "simulated")
     check_strikes(strikes)
     if "external_torque" not in result.averages:
-        raise ScenarioError(f"{result.configuration.name}: has no whole stride with help to lay on heel strikes")
+        raise ScenarioError(f"{result.scenario.name}: has no whole stride with help to lay on heel strikes")
     mean = result.averages["external_torque"].mean
     parts = [first + PHASES[:-1] * (last - first) for first, last in pairwise(strikes)]
     time = np.append(np.concatenate(parts), strikes[-1])

@@ -54,9 +54,9 @@ from ppafo.errors import ProgramError
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.files import Library, conditions_of, run_words
 from ppafo.exports.c_library.program import IN_PARTS, TOGETHER, WHOLE, ExportedProgram, c_text, outline_of
-from ppafo.exports.loading import Exportable
 from ppafo.exports.templates import filled, template
 from ppafo.exports.wasm.description import description_of
+from ppafo.simulation.scenario import Scenario
 from ppafo.translation.native import asked, complaint
 from ppafo.version import __version__
 
@@ -207,7 +207,7 @@ class WasmModule:
     description: dict[str, Any]
 
 
-def module_of(item: Exportable) -> WasmModule:
+def module_of(item: Scenario) -> WasmModule:
     """A scenario or a walk as a module.
 
     Its program comes with the package where a shipped scenario or walk has the same one, whatever its numbers are, and

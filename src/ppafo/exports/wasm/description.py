@@ -34,7 +34,6 @@ from typing import TYPE_CHECKING, Any
 from ppafo.answers.display_units import display_unit, quantity_of_unit
 from ppafo.errors import PpafoError
 from ppafo.exports.c_library.files import OUTPUTS, Library, Setting, c_identifier
-from ppafo.exports.loading import Exportable
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, Term, itself
@@ -45,12 +44,12 @@ from ppafo.simulation.building import set_name
 from ppafo.simulation.declaration import SEED, value_at
 from ppafo.simulation.numbers import HELD_ANGLE, TIMES
 from ppafo.simulation.overriding import is_of_device, split_override
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.scenario import Scenario, worn_kind
 from ppafo.units import to_si
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
-    from ppafo.walking.configuration import Configuration
+    from ppafo.simulation.scenario import Scenario
 
 _TASK = {"origin": "task", "source": "", "note": "", "half_width": None}
 _CHANGED = {**_TASK, "origin": "changed"}
@@ -67,9 +66,9 @@ class _File:
     assumed: Mapping[str, str]
 
 
-def description_of(item: Exportable, library: Library) -> dict[str, Any]:
+def description_of(item: Scenario, library: Library) -> dict[str, Any]:
     """The description of the module of a scenario or a walk, as the beginning of this file has it."""
-    file = _file_of_scenario(item) if isinstance(item, Scenario) else _file_of_walk(item)
+    file = _file_of_scenario(item)
     keys = {setting.name: setting.path for setting in library.settings}
     origins, follows, kept = _origins(file, item.device, library), _follows(library.links), _kept(library)
     # Settings that rules make of others until they are changed by themselves; a rule has the name of its function.
@@ -90,7 +89,7 @@ def description_of(item: Exportable, library: Library) -> dict[str, Any]:
         "name": library.title,
         "title": library.description,
         "version": __version__,
-        "kind": "scenario" if isinstance(item, Scenario) else "walk",
+        "kind": "scenario" if worn_kind(item) is None else "walk",
         "document": dict(file.document),
         "overrides": list(file.overrides),
         "settings": [
@@ -122,18 +121,6 @@ def _file_of_scenario(scenario: Scenario) -> _File:
     origin = scenario.origin
     folder = Path() if origin.file is None else Path(origin.file).parent
     return _File(origin.content, folder, origin.overrides, {item.path: item.note for item in scenario.assumptions})
-
-
-def _file_of_walk(walk: "Configuration") -> _File:
-    """Read the file of a walk again; an empty document where it is not there any more."""
-    from ppafo.walking.loading import FILE, list_walks
-
-    name = walk.name if walk.name in list_walks() else walk.file
-    try:
-        document = FILE.parse(FILE.read(name), name)
-    except PpafoError:
-        document = {}
-    return _File(document, Path(walk.file).parent, walk.overrides, walk.assumed)
 
 
 def _kept(library: Library) -> dict[str, str]:

@@ -18,7 +18,7 @@ from ppafo.simulation.plan import plan_run
 from ppafo.walking import list_walks
 from ppafo.walking.loading import load_walk
 from ppafo.walking.planning import plan_walk
-from ppafo.walking.walk import plan_of
+from ppafo.walking.varying import with_duration
 
 Runner = Callable[[Batch], BatchResult]
 
@@ -71,7 +71,7 @@ def plain_batch(name: str) -> Batch:
     if name in list_scenarios():
         return batch_of(plan_run(load_scenario(name)))
     walk = load_walk(COURSES[name], course=name) if name in COURSES else load_walk(name)
-    return batch_of(plan_walk(plan_of(walk, WALKED)))
+    return batch_of(plan_walk(with_duration(walk, WALKED)))
 
 
 def drawn_batch(batch: Batch, runs: int = DRAWS, seed: int = SEED) -> Batch:

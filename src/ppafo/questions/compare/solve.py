@@ -12,10 +12,11 @@ from ppafo.errors import StudyError
 from ppafo.metrics import METRICS, Metric
 from ppafo.progress import Report
 from ppafo.questions.compare.paired import Paired, best_probabilities, compare_pairs
+from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.result import Status
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import OPEN_LOOP, simulate_many
+from ppafo.simulation.simulate import simulate_many
 from ppafo.studies.configurations import (
     Configurations,
     ConfiguredTask,
@@ -47,6 +48,11 @@ COMPARED: dict[str, int] = {
     "mechanical_work": 0,
     "gas_per_work": -1,
     "switchings": -1,
+    "gas": -1,
+    "push_off_work": 1,
+    "push_off_error": -1,
+    "toe_clearance": 1,
+    "slap_rate": 1,
 }
 """Metrics of the table: -1 where less is better, 1 where more is, 0 where neither is better as such."""
 AS_WRITTEN = "as written"
@@ -199,8 +205,7 @@ def _tasks(tasks: Mapping[str, Sequence[str]] | Sequence[tuple[str, Sequence[str
 
 def common_metrics(scenarios: list[Scenario]) -> tuple[str, ...]:
     """Return those metrics of the table that all scenarios can have: without a reference there is no error."""
-    has_reference = all(scenario.control.kind != OPEN_LOOP for scenario in scenarios)
-    return tuple(name for name in COMPARED if has_reference or "reference" not in METRICS[name].channels)
+    return tuple(name for name in COMPARED if not any(lacking(scenario, METRICS[name]) for scenario in scenarios))
 
 
 _SAME = 1.0e-9

@@ -12,13 +12,13 @@ from pydantic import BaseModel, Field
 from ppafo.documents.models import NAME, STRICT, Text, Texts, make_schema, read_model
 from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import StudyError, UnitError, first_twice, nearest_name
+from ppafo.loading import load_scenario, placed
 from ppafo.metrics.catalog import METRICS
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.parts import Catalogue, Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
 from ppafo.questions.design.search import SearchSettings
 from ppafo.questions.design.variables import Variable, VariableTable, read_variables
-from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import OPEN_LOOP
 from ppafo.studies.noise import NOISE
@@ -251,7 +251,7 @@ def _task(table: TaskTable, kinds: Sequence[str], folder: Path, file: str, whole
                 f"{file}: task '{table.name}' has no scenario for {kind} valves, but parts.valves lists one; add "
                 f"{kind} = '...' to its scenarios"
             )
-    scenarios = {kind: load_scenario(_place(table.scenarios[kind], folder), table.overrides) for kind in kinds}
+    scenarios = {kind: load_scenario(placed(table.scenarios[kind], folder), table.overrides) for kind in kinds}
     for kind, scenario in scenarios.items():
         if scenario.control.kind == OPEN_LOOP:
             raise StudyError(

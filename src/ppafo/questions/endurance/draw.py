@@ -12,6 +12,7 @@ import numpy as np
 
 from ppafo.constants import GRAMS_PER_KILOGRAM, STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, ParameterError
+from ppafo.metrics.strides import SETTLING
 from ppafo.model.chambers import chamber_1_volume, chamber_2_volume
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
@@ -19,7 +20,7 @@ from ppafo.storage.owned_folder import read_json
 from ppafo.storage.recordings import read_recording
 from ppafo.walking import WalkResult
 from ppafo.walking.course_segments import is_whole_course
-from ppafo.walking.strides import SETTLING
+from ppafo.walking.motion import walk_of
 
 PEAK_WINDOW = 0.1
 """Seconds over which the largest flow of a recording is averaged; lines and regulator even out what is shorter."""
@@ -182,14 +183,14 @@ class OtherGas:
 
 def walk_gas(result: WalkResult) -> WalkGas:
     """Return the gas of a walk."""
-    configuration, course = result.configuration, result.configuration.course
+    configuration, course = result.scenario, walk_of(result.scenario).course
     gas = result.metrics.get("gas" if course is None else "course_gas")
     actuator = configuration.device.actuator
     return WalkGas(
         configuration.name,
         result.recording,
         0.0 if gas is None else gas.value,
-        configuration.gait.stride_time if course is None else result.metrics["course_time"].value,
+        walk_of(configuration).gait.stride_time if course is None else result.metrics["course_time"].value,
         Actuator(**{name: getattr(actuator, name) for name in Actuator.__slots__}),
         course="" if course is None else course.name,
         course_time=0.0 if course is None else result.metrics["course_planned_time"].value,

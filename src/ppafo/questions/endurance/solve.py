@@ -158,7 +158,7 @@ def follow_bottle(bottle: Bottle, draw: Draw, schedule: Schedule, plan: ReusePla
 def _name(use: GasUse) -> str:
     if isinstance(use, Recording):
         return use.label
-    return use.configuration.name if isinstance(use, WalkResult) else str(use)
+    return use.scenario.name if isinstance(use, WalkResult) else str(use)
 
 
 def _endurance_of_use(

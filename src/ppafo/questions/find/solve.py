@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ppafo.answers import Solved
 from ppafo.errors import ScenarioError, StudyError, UnitError, one_line
+from ppafo.loading import scenario_or_load
 from ppafo.progress import Report
-from ppafo.simulation.loading import scenario_or_load
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.configurations import with_overrides
 from ppafo.studies.draws import Uncertainty

@@ -11,10 +11,12 @@ from ppafo.errors import SimulationError
 from ppafo.parameters import load_device
 from ppafo.parameters.chamber_volumes import PRINTED_VOLUMES, ChamberVolumes, readings
 from ppafo.questions.timing.solve import WEARERS, rms_of, timed_events, uneven_course
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.comparison import healthy_metrics
-from ppafo.walking.configuration import Configuration
 from ppafo.walking.loading import load_walk
-from ppafo.walking.walk import WalkResult, integral_of_a_stride, walk
+from ppafo.walking.motion import walk_of
+from ppafo.walking.result import WalkResult, integral_of_a_stride
+from ppafo.walking.walk import walk
 
 CHAMBERS = "chambers"
 """Stands for the unit of an argument that names a reading of the chambers' volumes."""
@@ -69,9 +71,9 @@ def _nondisabled(name: str, values: Values) -> WalkResult:
     return _walked(name, _chambers(values), (KEEPS_GAIT, *held))
 
 
-def _healthy_peak_moment(configuration: Configuration) -> float:
-    moment = configuration.gait.curve("ankle_moment").values_at(np.linspace(0.0, 1.0, 1001))
-    return configuration.wearer.body_mass * float(moment.max())
+def _healthy_peak_moment(configuration: Scenario) -> float:
+    moment = walk_of(configuration).gait.curve("ankle_moment").values_at(np.linspace(0.0, 1.0, 1001))
+    return walk_of(configuration).wearer.body_mass * float(moment.max())
 
 
 def _work_of_a_stride(result: WalkResult) -> float:
@@ -104,7 +106,7 @@ def walking_torque(values: Values) -> float:
 def dorsiflexor_share(values: Values) -> float:
     """Moment of a nondisabled wearer's dorsiflexors with the device over that without any [-], means of a stride."""
     worn = _nondisabled(PAIR, values)
-    return worn.metrics["dorsiflexor_moment"].value / healthy_metrics(worn.configuration)["dorsiflexor_moment"].value
+    return worn.metrics["dorsiflexor_moment"].value / healthy_metrics(worn.scenario)["dorsiflexor_moment"].value
 
 
 def recycling_saving(values: Values) -> float:
@@ -122,10 +124,11 @@ def recycling_work(values: Values) -> float:
 def event_reduction(wearer: str) -> float:
     """Share [-] by which state estimation lowers the error of event times of one wearer, against thresholds."""
     configuration = load_walk(PAIR, WEARERS[wearer])
-    course = uneven_course(2.0 / configuration.gait.stride_time)
+    course = uneven_course(2.0 / walk_of(configuration).gait.stride_time)
     errors = []
     for timing in ("thresholds", "estimated"):
-        walked = replace(load_walk(PAIR, (*WEARERS[wearer], f"timing.kind={timing}")), course=course)
+        walked = load_walk(PAIR, (*WEARERS[wearer], f"timing.kind={timing}"))
+        walked = replace(walked, motion=replace(walk_of(walked), course=course))
         errors.append(rms_of([event.errors for event in timed_events(walked, 1.0).values()]))
     return 1.0 - errors[1] / errors[0]
 

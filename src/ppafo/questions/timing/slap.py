@@ -25,11 +25,12 @@ from ppafo.model.contact import foot_angle
 from ppafo.model.plant import chamber_pressures, chamber_volumes
 from ppafo.parameters.device import Device, Orifice
 from ppafo.progress import Progress, Report
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.comparison import with_device_off
-from ppafo.walking.configuration import Configuration
 from ppafo.walking.loading import load_walk
+from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk
-from ppafo.walking.walk import REMEDY, plan_of
+from ppafo.walking.result import REMEDY
 
 LARGER = 4.0
 """Valves of so many times the area, chambers of one so manieth of the volume: about as far as virtual work allows."""
@@ -190,7 +191,7 @@ def shares_of(values: Mapping[frozenset[str], float], names: Sequence[str]) -> t
     return tuple(found)
 
 
-def _with(factors: Sequence[Factor], file: str, overrides: Sequence[str], gait: str | Path | None) -> Configuration:
+def _with(factors: Sequence[Factor], file: str, overrides: Sequence[str], gait: str | Path | None) -> Scenario:
     timing = tuple(text for factor in factors for text in factor.overrides)
     configuration = load_walk(file, (*overrides, AS_IT_IS, *timing), gait)
     device = configuration.device
@@ -199,11 +200,10 @@ def _with(factors: Sequence[Factor], file: str, overrides: Sequence[str], gait: 
     return replace(configuration, device=device)
 
 
-def falls_of(configuration: Configuration, strikes: Sequence[Strike]) -> Falls:
+def falls_of(configuration: Scenario, strikes: Sequence[Strike]) -> Falls:
     """Walk, and at each strike let another lane go on from its state in ``strikes``; the last lane just walks."""
-    stride = configuration.gait.stride_time
-    plan = plan_of(configuration, (FIRST_STRIKE + STRIKES) * stride)
-    run = plan_walk(replace(plan, record_interval=stride))
+    stride = walk_of(configuration).gait.stride_time
+    run = plan_walk(replace(configuration, duration=(FIRST_STRIKE + STRIKES) * stride, output_interval=stride))
     others = lanes_of(batch_of(run).program) - 1
     groups = [range(first, min(first + others, STRIKES)) for first in range(0, STRIKES, others)]
     falls = [fall for group in groups for fall in _falls_of_block(run, stride, group, strikes)]

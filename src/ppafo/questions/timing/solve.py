@@ -14,12 +14,14 @@ from ppafo.engine.run import NEVER_FAILED, batch_of
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.timing.slap import SlapStudy, slap_study
-from ppafo.walking.configuration import Configuration
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.course import Segment, WalkingCourse, list_courses, load_course
 from ppafo.walking.event_times import EVENTS, EventErrors, event_errors, known_events, true_events, within
 from ppafo.walking.loading import load_walk
-from ppafo.walking.planning import plan_walk
-from ppafo.walking.walk import REMEDY, plan_of, walk_duration
+from ppafo.walking.motion import walk_of
+from ppafo.walking.planning import course_of_walk, plan_walk
+from ppafo.walking.result import REMEDY
+from ppafo.walking.walk import lasting
 
 WEARERS = {"healthy": ("wearer.keeps_gait=1",), "impaired": ("wearer.keeps_gait=0",)}
 """A wearer whose muscles keep the measured gait, and the one of the walk file, whose foot drops."""
@@ -107,24 +109,24 @@ def event_timing(
             for way, course in ways.items():
                 tell(Progress(f"{timing}, {wearer}, {way}", len(found), len(TIMINGS) * len(WEARERS) * len(ways)))
                 walk = load_walk(configuration, (*overrides, *own, f"timing.kind={timing}"), gait)
-                walk = replace(walk, course=course)
+                walk = replace(walk, motion=replace(walk_of(walk), course=course))
                 found.append(TimedWay(wearer, way, timing, timed_events(walk, length)))
     slap = slap_study(str(configuration), (*overrides, *WEARERS["impaired"]), gait, tell)
     return Timing(str(configuration), tuple(overrides), length, tuple(found), slap)
 
 
-def ways_of(configuration: Configuration) -> dict[str, WalkingCourse | None]:
+def ways_of(configuration: Scenario) -> dict[str, WalkingCourse | None]:
     """The ways to walk: steadily, unevenly, and the courses that come with the package."""
-    if configuration.course is not None:
-        raise ScenarioError(f"{configuration.file}: course: event timing uses its own courses; remove this one")
-    if configuration.bottle is not None:
-        raise ScenarioError(f"{configuration.file}: bottle: events are timed at one supply pressure; remove it")
-    if configuration.converter is not None:
+    if walk_of(configuration).course is not None:
+        raise ScenarioError(f"{configuration.origin.file}: course: event timing uses its own courses; remove this one")
+    if walk_of(configuration).bottle is not None:
+        raise ScenarioError(f"{configuration.origin.file}: bottle: events are timed at one supply pressure; remove it")
+    if configuration.control.is_fixed:
         raise ScenarioError(
-            f"{configuration.file}: controller.arithmetic = 'fixed': events are timed for controllers in floats; "
-            "remove it"
+            f"{configuration.origin.file}: controller.arithmetic = 'fixed': events are timed for controllers in "
+            "floats; remove it"
         )
-    cadence = 2.0 / configuration.gait.stride_time
+    cadence = 2.0 / walk_of(configuration).gait.stride_time
     return {STEADY: None, UNEVEN: uneven_course(cadence)} | {name: load_course(name) for name in list_courses()}
 
 
@@ -137,10 +139,11 @@ def uneven_course(cadence: float) -> WalkingCourse:
     return WalkingCourse("uneven", "Strides of uneven time.", (*begin, *strides), "uneven")
 
 
-def timed_events(configuration: Configuration, minutes: float) -> dict[str, EventErrors]:
+def timed_events(configuration: Scenario, minutes: float) -> dict[str, EventErrors]:
     """Errors of the events of one walk of at most so many minutes; SimulationError where it diverges."""
-    longest = walk_duration(configuration, None if configuration.course is not None else minutes)
-    run = plan_walk(replace(plan_of(configuration, min(longest, 60.0 * minutes)), record_interval=1.0e-3))
+    course = course_of_walk(configuration)
+    longest = lasting(configuration, minutes).duration if course is None else float(course.duration)
+    run = plan_walk(replace(configuration, duration=min(longest, 60.0 * minutes), output_interval=1.0e-3))
     outcome = run_batch(batch_of(run))
     rows = row_numbers(run.program.state_rows())
     if outcome.states[rows["result.failure_time"], 0] < NEVER_FAILED or not np.isfinite(outcome.states).all():
@@ -151,6 +154,8 @@ def timed_events(configuration: Configuration, minutes: float) -> dict[str, Even
     true = within(true_events(record["walk.contact"]), settled)
     known = within(known_events(record), settled)
     if not known:
-        raise ScenarioError(f"{configuration.file}: controller.kind '{configuration.controller.name}' knows no events")
-    stride_time = configuration.gait.stride_time
+        raise ScenarioError(
+            f"{configuration.origin.file}: controller.kind '{configuration.control.kind}' knows no events"
+        )
+    stride_time = walk_of(configuration).gait.stride_time
     return {name: event_errors(true[name], known[name], interval, stride_time) for name in EVENTS}

@@ -11,10 +11,10 @@ from pydantic import BaseModel, Field
 from ppafo.documents.models import NAME, STRICT, Text, Texts, make_schema, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice
+from ppafo.loading import load_scenario, placed
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.questions.tune import problem as values
 from ppafo.questions.tune.problem import Problem, Spread
-from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.draws import Uncertainty, uncertainty_of
@@ -144,7 +144,7 @@ def _problem(document: dict[str, Any], file: str, folder: Path, overrides: Seque
 
     parsed = validate(TuningFile, document, file, StudyError)
     try:
-        scenario = load_scenario(_resolve(parsed.scenario, list_scenarios(), folder), (*parsed.overrides, *overrides))
+        scenario = load_scenario(placed(parsed.scenario, folder), (*parsed.overrides, *overrides))
         check_metrics(_once([*parsed.objective, *parsed.constraints]), scenario)
     except (ScenarioError, ParameterError, StudyError) as error:
         raise refusal(error) from error

@@ -17,7 +17,7 @@ from ppafo.questions.tune.search import Judgement, Runs, Start, bad_ends, judge,
 from ppafo.simulation.ensemble.columns import absolute
 from ppafo.simulation.numbers import TIMES, with_numbers
 from ppafo.simulation.result import Result
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.scenario import Scenario, worn_kind
 from ppafo.simulation.simulate import OPEN_LOOP, simulate
 from ppafo.studies.configurations import with_overrides
 from ppafo.studies.distributions import Floats
@@ -230,7 +230,7 @@ def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: 
     base = scenario_with(problem, gains)
     given = {path: column for path, column in absolute(base, draws, problem.gauge).items() if path not in TIMES}
     scenario = with_numbers(base, given)
-    if scenario.control.kind == OPEN_LOOP:
+    if scenario.control.kind == OPEN_LOOP or worn_kind(scenario) is not None:
         return Ceiling(0.0, ())
     known = runs.metrics
     lacking = np.broadcast_to(shortfall(scenario), known[problem.metrics[0]][:1].shape)

@@ -2,7 +2,6 @@
 
 import platform
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import display_value, title_with_unit
 from ppafo.live.workbench import live_part
 from ppafo.metrics import Metric
+from ppafo.metrics.strides import PER_STRIDE
 from ppafo.questions.endurance.draw import FORMAT
 from ppafo.questions.endurance.solve import Endurance
 from ppafo.questions.walk.bottle import bottle_data, bottle_files, bottle_remark, bottle_sections
@@ -20,20 +20,23 @@ from ppafo.questions.walk.volumes import volumes_data, volumes_sections
 from ppafo.questions.walk.wearers import wearers_answer
 from ppafo.signals.recording import Floats
 from ppafo.simulation.document import UNITS, plain
+from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.version import __version__
 from ppafo.walking.comparison import Comparison
-from ppafo.walking.configuration import Configuration
+from ppafo.walking.document import walk_document
 from ppafo.walking.figures.animation import animation
 from ppafo.walking.figures.legs import frames_figure
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.over_time import failures, over_time_figure
 from ppafo.walking.figures.phases import strip_figure
 from ppafo.walking.gait_subject import person_remarks
+from ppafo.walking.motion import walk_of
+from ppafo.walking.planning import law_of
+from ppafo.walking.result import WalkResult
 from ppafo.walking.safety_events import event_lines
-from ppafo.walking.strides import PER_STRIDE, PHASES
-from ppafo.walking.walk import WalkResult
+from ppafo.walking.strides import PHASES
 
 SCHEMA_VERSION = 1
 _HEAD = ("", "with", "without", "healthy")
@@ -91,20 +94,16 @@ def _pair_answer(pair: WalkPair) -> Answer:
     """Return the answer of a walk; one that diverged has numbers and no pictures, and has not passed."""
     comparison = pair.comparison
     worn, bare = comparison.with_device, comparison.without_device
-    configuration = worn.configuration
+    configuration, walked = worn.scenario, walk_of(worn.scenario)
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
     bottles = (bottle_remark(worn), _bottle(pair.life))
     remarks = [*person_remarks(configuration), *bottles, *_safety(worn), _slap(comparison), trust_remark(configuration)]
-    remarks += [
-        f"{item.configuration.name}: {item.status.message}" for item in (worn, bare) if not item.status.is_completed
-    ]
+    remarks += [f"{item.scenario.name}: {item.status.message}" for item in (worn, bare) if not item.status.is_completed]
     return Answer(
         name="walk",
         kicker=f"A walk of {float(worn.recording.time[-1]) / 60.0:.3g} min",
         title=f"Walking with {configuration.name}",
-        lead=(
-            f"{configuration.name}: {worn.status.kind}, {strides} of {configuration.gait.name}{_along(configuration)}",
-        ),
+        lead=(f"{configuration.name}: {worn.status.kind}, {strides} of {walked.gait.name}{_along(configuration)}",),
         sections=(
             Section(paragraphs=_set_up(comparison), is_detail=True),
             *course_sections(comparison),
@@ -112,9 +111,9 @@ def _pair_answer(pair: WalkPair) -> Answer:
             *bottle_sections(worn),
             *volumes_sections(pair.volumes),
             Section("How to read it", (_EXPLAINED, _LIMITS), is_detail=True),
-            *(_over_time(worn) if configuration.course is None else ()),
-            *(course_pictures(comparison) if configuration.course is not None else _pictures(comparison)),
-            *_assumptions_section(configuration.assumed),
+            *(_over_time(worn) if walked.course is None else ()),
+            *(course_pictures(comparison) if walked.course is not None else _pictures(comparison)),
+            *_assumptions_section({item.path: item.note for item in configuration.assumptions}),
         ),
         data=_data(comparison, pair.life) | {"volumes": volumes_data(pair.volumes)},
         passed=comparison.is_completed and worn.is_helped,
@@ -129,16 +128,20 @@ def _pair_answer(pair: WalkPair) -> Answer:
             **course_files(comparison),
             **bottle_files(worn),
         },
-        live=lambda: live_part([configuration, bare.configuration]),
+        live=lambda: live_part([configuration, bare.scenario]),
     )
 
 
 def _set_up(comparison: Comparison) -> tuple[str, ...]:
-    configuration = comparison.with_device.configuration
-    gait, title = configuration.gait.name, configuration.gait.title
-    changed = f"values changed for this walk: {', '.join(configuration.overrides)}" if configuration.overrides else ""
+    configuration = comparison.with_device.scenario
+    gait, title = walk_of(configuration).gait.name, walk_of(configuration).gait.title
+    changed = (
+        f"values changed for this walk: {', '.join(configuration.origin.overrides)}"
+        if configuration.origin.overrides
+        else ""
+    )
     worn = f"device '{configuration.device.name}', gait '{gait}'{f' ({title})' if title else ''}"
-    return tuple(text for text in (configuration.description, worn, configuration.controller.summary, changed) if text)
+    return tuple(text for text in (configuration.description, worn, law_of(configuration).summary, changed) if text)
 
 
 def comparison_table(comparison: Comparison) -> Table:
@@ -150,7 +153,7 @@ def comparison_table(comparison: Comparison) -> Table:
     if "push_off_work" in healthy:
         healthy["push_off_share"] = Metric(1.0, "-", "")
     worn, bare = comparison.with_device, comparison.without_device
-    person = {"body_mass": Metric(worn.configuration.wearer.body_mass, "kg", "who walks")}
+    person = {"body_mass": Metric(walk_of(worn.scenario).wearer.body_mass, "kg", "who walks")}
     vented = (worn.vented_metrics,) if worn.vented_metrics else ()
     columns = tuple(person | dict(metrics) for metrics in (worn.metrics, *vented, bare.metrics, healthy))
     head = (*_HEAD[:2], *(_VENTED,) * len(vented), *_HEAD[2:])
@@ -181,8 +184,9 @@ def _slap(comparison: Comparison) -> str:
     )
 
 
-def _along(configuration: Configuration) -> str:
-    return "" if configuration.course is None else f", course {configuration.course.name}"
+def _along(configuration: Scenario) -> str:
+    course = walk_of(configuration).course
+    return "" if course is None else f", course {course.name}"
 
 
 def _pictures(comparison: Comparison) -> tuple[Section, ...]:
@@ -203,7 +207,7 @@ def _pictures(comparison: Comparison) -> tuple[Section, ...]:
 
 def _over_time(worn: WalkResult) -> tuple[Section, ...]:
     """Return the walk over time, where something happened in it."""
-    if not worn.events and not failures(worn.configuration):
+    if not worn.events and not failures(worn.scenario):
         return ()
     return (
         Section(
@@ -260,7 +264,7 @@ def _bottle_data(life: Endurance | None) -> dict[str, Any] | None:
 
 
 def _data(comparison: Comparison, life: Endurance | None) -> dict[str, Any]:
-    configuration = comparison.with_device.configuration
+    configuration = comparison.with_device.scenario
     return {
         "format": FORMAT,
         "schema_version": SCHEMA_VERSION,
@@ -277,16 +281,8 @@ def _data(comparison: Comparison, life: Endurance | None) -> dict[str, Any]:
         "metrics_off": plain(dict(comparison.without_device.metrics)),
         "healthy": plain(dict(comparison.healthy)),
         "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
-        "configuration": _configuration_data(configuration),
+        "configuration": walk_document(configuration),
     }
-
-
-def _configuration_data(configuration: Configuration) -> dict[str, Any]:
-    """Return the configuration as data; its bottle by its values, not by the tables of its gas."""
-    own = configuration.bottle
-    document: dict[str, Any] = plain(replace(configuration, bottle=None))
-    document["controller"] = configuration.controller.name
-    return document if own is None else document | {"bottle": own.to_dict()}
 
 
 def strides_csv(result: WalkResult) -> bytes:

@@ -10,7 +10,7 @@ from ppafo.answers.display_units import quantity_text
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.walking.figures.bottle import bottle_figure, peak_torques
 from ppafo.walking.on_bottle import WALKED, SupplyCourse
-from ppafo.walking.walk import WalkResult
+from ppafo.walking.result import WalkResult
 
 _CAPTION = (
     "The supply over the walk. A regulator holds at most its set pressure, and less once the bottle has too little. "

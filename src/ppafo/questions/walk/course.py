@@ -8,11 +8,12 @@ from ppafo.answers import Column, Figure, Section, Table
 from ppafo.answers.display_units import display_value
 from ppafo.errors import DataError
 from ppafo.gait.gait import speed_range
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.comparison import Comparison
-from ppafo.walking.configuration import Configuration
 from ppafo.walking.course_segments import SegmentResult, is_whole_course
 from ppafo.walking.figures.course import course_figure
 from ppafo.walking.figures.mean_stride import walk_figure
+from ppafo.walking.motion import walk_of
 
 _HEAD = (
     Column("Segment"),
@@ -50,7 +51,7 @@ _MEAN = (
 def course_sections(comparison: Comparison) -> tuple[Section, ...]:
     """Return the table of the segments, and how to read it; nothing for a walk without a course."""
     worn, bare = comparison.with_device, comparison.without_device
-    if worn.configuration.course is None:
+    if walk_of(worn.scenario).course is None:
         return ()
     without = {segment.start: segment for segment in bare.segments}
     rows = [_row(segment, without.get(segment.start)) for segment in worn.segments]
@@ -125,7 +126,7 @@ def course_pictures(comparison: Comparison) -> tuple[Section, ...]:
 
 def course_files(comparison: Comparison) -> dict[str, Callable[[], bytes]]:
     """Return the files of a course: its segments with and without the device."""
-    if comparison.with_device.configuration.course is None:
+    if walk_of(comparison.with_device.scenario).course is None:
         return {}
     return {
         "segments.csv": lambda: segments_csv(comparison.with_device.segments),
@@ -160,18 +161,19 @@ def segments_csv(segments: tuple[SegmentResult, ...]) -> bytes:
 def course_data(comparison: Comparison) -> dict[str, Any]:
     """Return the segments as data, in SI units; nothing for a walk without a course."""
     worn, bare = comparison.with_device, comparison.without_device
-    if worn.configuration.course is None:
+    course = walk_of(worn.scenario).course
+    if course is None:
         return {}
     return {
-        "course": worn.configuration.course.name,
+        "course": course.name,
         "segments": [asdict(segment) for segment in worn.segments],
         "segments_off": [asdict(segment) for segment in bare.segments],
     }
 
 
-def trust_remark(configuration: Configuration) -> str:
+def trust_remark(configuration: Scenario) -> str:
     """Return which segments go beyond the speeds for which scaling the gait can be trusted; empty where none does."""
-    course, gait = configuration.course, configuration.gait
+    course, gait = walk_of(configuration).course, walk_of(configuration).gait
     if course is None:
         return ""
     try:

@@ -10,10 +10,11 @@ from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.endurance.solve import Endurance, endurance_of_walk
 from ppafo.questions.walk.volumes import VolumeReading, walks_by_volume
 from ppafo.questions.walk.wearers_volumes import wearers_by_volume
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking import course as courses
 from ppafo.walking.comparison import Comparison, compare_walks
-from ppafo.walking.configuration import Configuration
 from ppafo.walking.loading import FILE, load_walk
+from ppafo.walking.motion import walk_of
 from ppafo.walking.population import Population
 
 _LONG = 12.0
@@ -41,7 +42,7 @@ class Wearers(Solved):
 
 
 def walk_with_and_without(
-    configuration: Configuration | str | Path,
+    configuration: Scenario | str | Path,
     minutes: float | None = None,
     gait: str | Path | None = None,
     course: str | Path | None = None,
@@ -59,14 +60,14 @@ def walk_with_and_without(
     is an answer that has not passed.
     """
     chosen = configuration
-    if not isinstance(chosen, Configuration):
+    if not isinstance(chosen, Scenario):
         chosen = load_walk(chosen, overrides, gait, course, bottle)
     report = progress or report_nothing
     if wearers is not None:
         advance = _reporter(report, "walking", "wearers", 0.0)
         return Wearers(*wearers_by_volume(chosen, minutes, wearers, seed, advance))
     comparison = compare_walks(chosen, minutes, _reporter(report, "walking", "min", _LONG))
-    life = endurance_of_walk(comparison.with_device) if chosen.bottle is None else None
+    life = endurance_of_walk(comparison.with_device) if walk_of(chosen).bottle is None else None
     return WalkPair(comparison, life, walks_by_volume(comparison.with_device, life, minutes))
 
 
@@ -87,8 +88,8 @@ def default_folder(values: Mapping[str, Any]) -> Path:
     configuration = load_walk(
         values["configuration"], values["overrides"], values["gait"], values["course"], values["bottle"]
     )
-    along = "" if configuration.course is None else f"-{configuration.course.name}"
-    along += "" if configuration.bottle is None else f"-{configuration.bottle.bottle.name}"
+    walked, bottled = walk_of(configuration).course, walk_of(configuration).bottle
+    along = ("" if walked is None else f"-{walked.name}") + ("" if bottled is None else f"-{bottled.bottle.name}")
     return Path("out") / f"{'walk' if values['wearers'] is None else 'wearers'}-{configuration.name}{along}"
 
 

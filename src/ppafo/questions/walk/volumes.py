@@ -9,8 +9,10 @@ from ppafo.errors import DataError
 from ppafo.parameters.chamber_volumes import ChamberVolumes, other_readings, own_reading
 from ppafo.questions.endurance.draw import full_chambers, largest_flow, walk_gas
 from ppafo.questions.endurance.solve import Endurance, endurance_of_walk
+from ppafo.walking.motion import walk_of
 from ppafo.walking.on_bottle import DIVERGED, WALKED
-from ppafo.walking.walk import WalkResult, integral_of_a_stride, walk
+from ppafo.walking.result import WalkResult, integral_of_a_stride
+from ppafo.walking.walk import walk
 
 LONGEST = 1.0
 """Minutes that are walked at most with other chambers: a walk repeats itself, but for a course and on a bottle."""
@@ -57,17 +59,17 @@ def walks_by_volume(
     The walk is left alone where no gas was taken or it has no whole strides, for then nothing rests on the volume. On a
     bottle the others walk for as many ``minutes`` [min] as it was to be, each on a bottle of its own.
     """
-    actuator = result.configuration.device.actuator
+    actuator = result.scenario.device.actuator
     others, own = other_readings(actuator), own_reading(actuator)
     takes_gas = life is not None or (result.supply is not None and result.supply.regulated > 0.0)
     if not takes_gas or own is None or not others or not result.averages:
         return ()
     if result.supply is None:
         walked = float(result.recording.time[-1]) / 60.0
-        minutes = min(walked, LONGEST) if result.configuration.course is None else walked
+        minutes = min(walked, LONGEST) if walk_of(result.scenario).course is None else walked
     found = [_read(own, result, life)]
     for chambers in others:
-        configuration = result.configuration
+        configuration = result.scenario
         other = walk(replace(configuration, device=chambers.of(configuration.device)), minutes)
         if other.status.is_completed and other.averages:
             found.append(_read(chambers, other, endurance_of_walk(other) if other.supply is None else None))
@@ -77,7 +79,7 @@ def walks_by_volume(
 def _read(chambers: ChamberVolumes, result: WalkResult, life: Endurance | None) -> VolumeReading:
     recording = result.recording
     turned = integral_of_a_stride(result, recording["pressure_1"] - recording["pressure_2"])
-    torque_constant = result.configuration.device.actuator.torque_constant
+    torque_constant = result.scenario.device.actuator.torque_constant
     return VolumeReading(
         chambers=chambers,
         result=result,
@@ -143,7 +145,7 @@ def volumes_data(read: tuple[VolumeReading, ...]) -> list[Mapping[str, Any]]:
             "dead_volume_1": one.chambers.dead_volume_1,
             "dead_volume_2": one.chambers.dead_volume_2,
             "gas_per_stride": one.result.metrics["gas"].value,
-            "stride_time": one.result.configuration.gait.stride_time,
+            "stride_time": walk_of(one.result.scenario).gait.stride_time,
             "peak_flow": _peak_flow(one),
             "full_chambers": _full(one.result),
             "gas_work": one.gas_work,

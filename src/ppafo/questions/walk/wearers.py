@@ -10,13 +10,14 @@ from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import display_value, title_with_unit
 from ppafo.questions.walk.wearers_volumes import wearers_volumes_data, wearers_volumes_sections
 from ppafo.signals.recording import Floats
-from ppafo.simulation.document import UNITS, plain
+from ppafo.simulation.document import UNITS
 from ppafo.version import __version__
 from ppafo.walking.anthropometry import CORRELATION, MASS_VARIATION, MAXIMUM_DEVIATIONS, STATURE_VARIATION
+from ppafo.walking.document import walk_document
 from ppafo.walking.figures.wearers import SHOWN, population_figure
 from ppafo.walking.gait_subject import person_remarks
+from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
 from ppafo.walking.population import OUTCOMES, TRAITS, Number, Population
-from ppafo.walking.wearers_rows import START_VARIATION, THRESHOLD_VARIATION
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 FORMAT = "ppafo wearers"
@@ -29,7 +30,7 @@ _CAPTION = (
 
 def wearers_answer(population: Population, volumes: Mapping[str, Population]) -> Answer:
     """Return the answer of many wearers; no figure where every walk diverged."""
-    configuration = population.configuration
+    configuration = population.scenario
     tables = {**population.outcomes, **population.traits}
     head = (Column(""), *(Column(f"{100.0 * fraction:.0f} %") for fraction in QUANTILES))
     rows = [
@@ -70,7 +71,7 @@ def _cells(values: Floats, quantity: str, digits: int) -> list[str | None]:
 
 
 def _data(population: Population) -> dict[str, Any]:
-    configuration = population.configuration
+    configuration = population.scenario
     return {
         "format": FORMAT,
         "schema_version": SCHEMA_VERSION,
@@ -93,7 +94,7 @@ def _data(population: Population) -> dict[str, Any]:
         },
         **all_quantiles(population),
         "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
-        "configuration": plain(configuration) | {"controller": configuration.controller.name},
+        "configuration": walk_document(configuration),
     }
 
 

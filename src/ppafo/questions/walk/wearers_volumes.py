@@ -11,7 +11,8 @@ from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.parameters.chamber_volumes import other_readings, own_reading
 from ppafo.questions.endurance.draw import draw_of_numbers
 from ppafo.questions.endurance.solve import WITHOUT_REST, follow_bottle
-from ppafo.walking.configuration import Configuration
+from ppafo.simulation.scenario import Scenario
+from ppafo.walking.motion import walk_of
 from ppafo.walking.population import Population, walk_population
 from ppafo.walking.walk import Progress
 
@@ -36,7 +37,7 @@ _QUANTILES = (0.05, 0.5, 0.95)
 
 
 def wearers_by_volume(
-    configuration: Configuration, minutes: float | None, wearers: int, seed: int, progress: Progress
+    configuration: Scenario, minutes: float | None, wearers: int, seed: int, progress: Progress
 ) -> tuple[Population, Mapping[str, Population]]:
     """Return the wearers, and all readings of their chambers by name; {} for chambers of its own or without gas."""
     population = walk_population(configuration, minutes, wearers, seed, progress)
@@ -44,7 +45,7 @@ def wearers_by_volume(
     own = own_reading(actuator)
     if own is None or not population.count or not float(np.median(population.outcomes["gas"])) > 0.0:
         return population, {}
-    shorter = minutes if configuration.course is not None else min(population.minutes, LONGEST)
+    shorter = minutes if walk_of(configuration).course is not None else min(population.minutes, LONGEST)
     found = {own.name: population}
     for chambers in other_readings(actuator):
         other = replace(configuration, device=chambers.of(configuration.device))

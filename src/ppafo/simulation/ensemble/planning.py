@@ -16,13 +16,13 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters.effects import switches_of
 from ppafo.simulation.clock import Clock
 from ppafo.simulation.ensemble.columns import Columns, TimeTexts, clock_of, clock_with, time_texts, varied_scenario
-from ppafo.simulation.ensemble.rules import RULES, Rule
+from ppafo.simulation.ensemble.rules import Rule, rules_of
 from ppafo.simulation.numbers import TIMES
 from ppafo.simulation.plan import plan_runs
 from ppafo.simulation.reading import limits
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.scenario import Scenario, worn_kind
 
-_SEED = "sensors.seed"
+_WHOLE = ("sensors.seed", "wearer.person")
 
 
 @final
@@ -68,7 +68,7 @@ def screen_columns(columns: Columns) -> Screen:
         screen.refuse(*_out_of_range(screen.columns, path))
     if screen.members.size:
         _read_clocks(screen)
-    for rule in RULES:
+    for rule in rules_of(worn_kind(columns.base)):
         _keep(screen, rule)
     return screen
 
@@ -87,12 +87,12 @@ def _out_of_range(columns: Columns, path: str) -> Problem:
         given = f"{path} = {values[run]:.9g} {unit}".rstrip()
         if not np.isfinite(values[run]):
             return f"{given}: is not a finite number"
-        if path == _SEED and values[run] != np.floor(values[run]):
+        if path in _WHOLE and values[run] != np.floor(values[run]):
             return f"{given}: must be a whole number"
         return f"{given}: {quantity.summary or quantity.name} must be {limits(quantity, STANDARD_ATMOSPHERE)}"
 
     is_good = _within(values, quantity)
-    return ~(is_good & (values == np.floor(values)) if path == _SEED else is_good), line
+    return ~(is_good & (values == np.floor(values)) if path in _WHOLE else is_good), line
 
 
 def _read_clocks(screen: Screen) -> None:
@@ -102,6 +102,12 @@ def _read_clocks(screen: Screen) -> None:
         screen.clock = clock_of(screen.columns.base)
         return
     base = screen.columns.base
+    worn = worn_kind(base)
+    if worn is not None:
+        screen.clock, problems = worn.clock(base, times)
+        for is_bad, line in problems:
+            screen.refuse(is_bad, line)
+        return
     given = time_texts(base)
     rows, places = np.unique(np.stack(list(times.values()), axis=1), axis=0, return_inverse=True)
     places = places.reshape(-1)
@@ -170,7 +176,9 @@ def _plan_batches(screen: Screen, places: Members) -> list[tuple[Members, Batch]
 
 def _of_one_program(scenario: Scenario, runs: int) -> list[Members]:
     """Places of the runs, those together that have the same effects and zeros in the same settings."""
-    settings: tuple[Any, ...] = (*scenario.device.valve.settings.values(), *scenario.sensors.flaws)
+    worn = worn_kind(scenario)
+    own = scenario.sensors.flaws if worn is None else worn.switches(scenario)
+    settings: tuple[Any, ...] = (*scenario.device.valve.settings.values(), *own)
     varied_settings = [setting > 0.0 for setting in settings if isinstance(setting, np.ndarray)]
     varied_settings += [is_on for is_on in switches_of(scenario.device).values() if isinstance(is_on, np.ndarray)]
     if not varied_settings:

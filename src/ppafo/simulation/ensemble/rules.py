@@ -16,7 +16,7 @@ from ppafo.simulation.motion import TOLERANCE, profile_problem
 from ppafo.simulation.numbers import HELD_ANGLE
 from ppafo.simulation.plan import profile_bounds
 from ppafo.simulation.reading import quantity_text
-from ppafo.simulation.scenario import FreeMotion, ProfileChoice, Scenario
+from ppafo.simulation.scenario import FreeMotion, MotionKind, ProfileChoice, Scenario, vane_motion
 
 Rule = Callable[[Scenario], tuple[Problem, ...]]
 """What may be wrong with a scenario that represents many runs."""
@@ -72,7 +72,7 @@ def _without_growth(scenario: Scenario) -> tuple[Problem, ...]:
 
 def _beyond_the_stops(scenario: Scenario) -> tuple[Problem, ...]:
     """A vane that begins, is held or is to move beyond the stops."""
-    actuator, motion = scenario.device.actuator, scenario.motion
+    actuator, motion = scenario.device.actuator, vane_motion(scenario)
     profile = ProfileChoice("constant", {"level": motion.angle}) if isinstance(motion, FreeMotion) else motion.profile
     lowest, highest = profile_bounds(profile)
     lower, upper = actuator.angle_min - TOLERANCE, actuator.angle_max + TOLERANCE
@@ -138,12 +138,7 @@ def _second_regulator_above_the_first(scenario: Scenario) -> tuple[Problem, ...]
     return ((np.atleast_1d(supply.dorsiflexion_pressure > supply.pressure), line),)
 
 
-RULES: tuple[Rule, ...] = (
-    _inconsistent,
-    _misshapen,
-    _beyond_the_table,
-    _without_growth,
-    _beyond_the_stops,
-    _too_late,
-    _second_regulator_above_the_first,
-)
+def rules_of(worn: MotionKind | None) -> tuple[Rule, ...]:
+    """The rules for a leg that wears the device, or for a vane alone."""
+    own: tuple[Rule, ...] = (_beyond_the_stops, _too_late) if worn is None else (worn.rules,)
+    return _inconsistent, _misshapen, _beyond_the_table, _without_growth, *own, _second_regulator_above_the_first

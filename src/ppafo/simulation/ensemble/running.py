@@ -7,6 +7,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from ppafo.control.kind import PythonController
+from ppafo.engine.lane_meters import REQUEST as REQUEST_ROW
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import Batch, BatchResult, Floats, run_blocks
 from ppafo.engine.metering import add_meters, group_of, meters_of
@@ -15,10 +16,12 @@ from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.errors import ScenarioError
 from ppafo.metrics.gas import ENERGIES
-from ppafo.metrics.metric import MetricKind, Readings
+from ppafo.metrics.metric import REQUEST, STEADY, WALK, MetricKind, Readings
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
 from ppafo.model.thermal import energy_per_content
 from ppafo.simulation.sampled import run_in_turn
+from ppafo.simulation.scenario import Scenario, worn_kind
+from ppafo.simulation.simulate import OPEN_LOOP
 
 REFERENCE = "reference"
 _WITH_ENERGY_BALANCE = frozenset({"temperature_1", "temperature_2", *ENERGIES})
@@ -212,9 +215,31 @@ def _totals(program: Program, parameters: Floats, states: Floats) -> dict[str, F
 
 
 def has_channels(program: Program, kind: MetricKind) -> bool:
-    """True where runs of a program have the channels of a metric."""
+    """True where runs of a program have the channels of a metric, and what else it needs."""
     missing = frozenset() if program.is_thermal else _WITH_ENERGY_BALANCE
-    return not missing.intersection(kind.channels) and (program.has_reference or REFERENCE not in kind.channels)
+    # A walk follows no reference: what its controller wants in each phase of the gait is a number of its state.
+    has_reference = program.has_reference and not program.walks
+    has = {
+        WALK: program.walks,
+        STEADY: not program.takes_course,
+        REQUEST: REQUEST_ROW in row_numbers(program.state_rows()),
+    }
+    return (
+        not missing.intersection(kind.channels)
+        and (has_reference or REFERENCE not in kind.channels)
+        and all(has[need] for need in kind.needs)
+    )
+
+
+def lacking(scenario: Scenario, kind: MetricKind) -> str:
+    """Why no run of a scenario has what a metric needs, an empty text where it has."""
+    worn = worn_kind(scenario)
+    if worn is not None:
+        return worn.lacks(scenario, kind)
+    if WALK in kind.needs:
+        return "it needs a walk"
+    is_open = scenario.control.kind == OPEN_LOOP
+    return "its controller follows no reference" if is_open and REFERENCE in kind.channels else ""
 
 
 def _meter_batch(plain: Batch, request: Request) -> _MeteredBatch:

@@ -12,7 +12,8 @@ from ppafo.model.command import VENTS_ABOVE
 from ppafo.walking.comparison import Comparison
 from ppafo.walking.figures.legs import DRAGS, GHOST, Legs, drags, draw_ground, last_phases, leg_artists, legs_of
 from ppafo.walking.figures.mean_stride import WITH, WITHOUT
-from ppafo.walking.walk import WalkResult
+from ppafo.walking.motion import walk_of
+from ppafo.walking.result import WalkResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -80,7 +81,7 @@ def animation(comparison: Comparison) -> bytes:
             cursor.axes.draw_artist(cursor)
             cursor.axes.draw_artist(lamp)
             images.append(_image(canvas))
-        return _gif(images, comparison.with_device.configuration.gait.stride_time)
+        return _gif(images, walk_of(comparison.with_device.scenario).gait.stride_time)
 
 
 def _stage(comparison: Comparison, turns: np.ndarray) -> "tuple[Figure, list[_Scene], Any, Any]":
@@ -99,7 +100,7 @@ def _stage(comparison: Comparison, turns: np.ndarray) -> "tuple[Figure, list[_Sc
     lamp = traces.text(
         0.995, 1.24, "", transform=traces.transAxes, ha="right", va="center", fontsize=9, bbox=box, animated=True
     )
-    name = comparison.with_device.configuration.name
+    name = comparison.with_device.scenario.name
     figure.text(
         0.012,
         0.985,
@@ -130,12 +131,12 @@ def _scene(axes: "Axes", result: WalkResult, turns: np.ndarray, label: str, colo
 
 
 def _traces(axes: "Axes", result: WalkResult, turns: np.ndarray) -> None:
-    recording, configuration = result.recording, result.configuration
+    recording, configuration = result.recording, result.scenario
     fine = np.linspace(turns[0], turns[-1], 400)
     atmosphere = configuration.device.supply.atmospheric_pressure
     names = (("pressure_1", "plantarflexion", CHAMBER_1), ("pressure_2", "dorsiflexion", CHAMBER_2))
     for channel, name, colour in names:
-        values = np.interp(fine * configuration.gait.stride_time, recording.time, recording[channel])
+        values = np.interp(fine * walk_of(configuration).gait.stride_time, recording.time, recording[channel])
         axes.plot(fine - turns[0], (values - atmosphere) / PASCALS_PER_PSI, color=colour, linewidth=1.3, label=name)
     axes.set_xlim(0.0, turns[-1] - turns[0])
     axes.set_ylim(top=max(10.0, axes.get_ylim()[1]))
@@ -149,7 +150,7 @@ def _traces(axes: "Axes", result: WalkResult, turns: np.ndarray) -> None:
 
 
 def _commands(result: WalkResult, turns: np.ndarray) -> np.ndarray:
-    times = turns * result.configuration.gait.stride_time
+    times = turns * walk_of(result.scenario).gait.stride_time
     return result.recording["command"][np.searchsorted(result.recording.time, times, side="right") - 1]
 
 

@@ -9,7 +9,7 @@ from ppafo.answers.display_units import axis_unit, display_value, display_values
 from ppafo.answers.layout import Margins, figure_of_panels
 from ppafo.answers.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, house_style, label_lines, mark_kind
 from ppafo.signals.recording import Floats
-from ppafo.walking.walk import WalkResult
+from ppafo.walking.result import WalkResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,7 +53,7 @@ def bottle_figure(result: WalkResult) -> "Figure":
             axes.axvline(ending.time / scale, color=VERMILION, linewidth=1.0)
         grid[-1].set_xlabel(f"Time ({unit})")
         grid[-1].set_xlim(0.0, 1.005 * end / scale)
-        title = f"{result.configuration.name} on {result.supply.supply.bottle.name}"
+        title = f"{result.scenario.name} on {result.supply.supply.bottle.name}"
         figure.text(0.12 / _WIDTH, 1.0 - 0.12 / height, title, va="top", fontsize=13, fontweight="bold")
         figure.text(0.12 / _WIDTH, 0.1 / height, "\n".join(remarks), va="bottom", fontsize=9, color=VERMILION)
         mark_kind(figure, result.recording.kind)

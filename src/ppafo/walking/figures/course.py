@@ -8,7 +8,8 @@ from ppafo.answers.layout import Margins, figure_of_panels
 from ppafo.answers.style import BLACK, GREY, house_style, mark_kind
 from ppafo.gait.gait import clinical_angle
 from ppafo.walking.figures.mean_stride import WITH, WITHOUT
-from ppafo.walking.walk import WalkResult
+from ppafo.walking.motion import walk_of
+from ppafo.walking.result import WalkResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -141,8 +142,8 @@ def _segment_names(axes: "Axes", worn: WalkResult) -> None:
 
 
 def _head(figure: "Figure", worn: WalkResult, height: float) -> None:
-    course = worn.configuration.course
-    title = f"{worn.configuration.name}, course {'' if course is None else course.name}"
+    course = walk_of(worn.scenario).course
+    title = f"{worn.scenario.name}, course {'' if course is None else course.name}"
     figure.text(0.12 / _WIDTH, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
     remark = "blue: with the device; orange: without it; red line: the controller helps less"
     figure.text(0.12 / _WIDTH, 1.0 - 0.34 / height, remark, ha="left", va="top", fontsize=8.5, color=GREY)

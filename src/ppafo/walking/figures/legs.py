@@ -11,8 +11,9 @@ from ppafo.signals.recording import Floats
 from ppafo.walking.comparison import Comparison
 from ppafo.walking.figures.mean_stride import WITH, WITHOUT
 from ppafo.walking.gait_series import gait_timing
+from ppafo.walking.motion import walk_of
 from ppafo.walking.posture import Posture, ankle_path
-from ppafo.walking.walk import WalkResult
+from ppafo.walking.result import WalkResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,9 +45,9 @@ class Legs:
 
 def legs_of(result: WalkResult, turns: Floats) -> Legs:
     """Return the legs of a walk at running phases [strides], counted from the start of the recording."""
-    configuration, recording = result.configuration, result.recording
-    gait = configuration.gait
-    path = ankle_path(gait, gait_timing(gait), configuration.wearer)
+    configuration, recording = result.scenario, result.recording
+    gait = walk_of(configuration).gait
+    path = ankle_path(gait, gait_timing(gait), walk_of(configuration).wearer)
     times = turns * gait.stride_time
     shank, angle, healthy = (
         np.interp(times, recording.time, recording[name]) for name in ("shank_angle", "angle", "healthy_angle")
@@ -59,7 +60,7 @@ def last_phases(result: WalkResult, strides: int, per_stride: int) -> Floats:
 
     They are the last ones in a row that had help, where there are as many.
     """
-    last = int(result.recording.time[-1] / result.configuration.gait.stride_time + 1.0e-6)
+    last = int(result.recording.time[-1] / walk_of(result.scenario).gait.stride_time + 1.0e-6)
     count = min(strides, max(1, last - 1))
     last = _last_helped(result.helped, last, count)
     return np.asarray(last - count + np.arange(count * per_stride) / per_stride)
@@ -141,7 +142,7 @@ def frames_figure(comparison: Comparison) -> "Figure":
         _row(rows[0], comparison.without_device, "without the device", WITHOUT)
         _row(rows[1], comparison.with_device, "with the device", WITH)
         width, height = _STRIP_SIZE
-        name = comparison.with_device.configuration.name
+        name = comparison.with_device.scenario.name
         figure.text(0.12 / width, 1 - 0.12 / height, f"{name}: one stride", ha="left", va="top", fontweight="bold")
         remark = "grey outline: the healthy foot; cross: toes more than 1 cm below ground; percent of the stride below"
         figure.text(0.12 / width, 1 - 0.36 / height, remark, ha="left", va="top", fontsize=9, color=GREY)

@@ -12,7 +12,8 @@ from ppafo.constants import PASCALS_PER_PSI
 from ppafo.gait.gait import clinical_angle
 from ppafo.metrics import Metric
 from ppafo.signals import Recording
-from ppafo.walking.configuration import Configuration
+from ppafo.simulation.scenario import Scenario
+from ppafo.walking.motion import walk_of
 from ppafo.walking.strides import PHASES, Curves
 from ppafo.walking.walk_metrics import healthy_toe_height
 
@@ -52,7 +53,7 @@ class Strides(Protocol):
     """What is drawn of a walk."""
 
     @property
-    def configuration(self) -> Configuration:
+    def scenario(self) -> Scenario:
         """Who walks with what."""
 
     @property
@@ -87,7 +88,7 @@ def walk_figure(walks: Mapping[str, Strides]) -> "Figure":
 
 
 def _background(axes: "Axes", result: Strides, panel: _Panel) -> None:
-    fraction = 100.0 * result.configuration.gait.stance_share
+    fraction = 100.0 * walk_of(result.scenario).gait.stance_share
     axes.axvspan(0.0, fraction, color=STANCE, zorder=0, linewidth=0.0)
     if panel.level is not None:
         axes.axhline(panel.level, color=GREY, linewidth=0.8)
@@ -100,7 +101,7 @@ def _draw(axes: "Axes", panel: _Panel, result: Strides, name: str, colour: str) 
     pressures = len(panel.channels) > 1
     if not result.averages or (pressures and not np.any(result.recording["supplied_mass"])):
         return
-    atmosphere = result.configuration.device.supply.atmospheric_pressure
+    atmosphere = result.scenario.device.supply.atmospheric_pressure
     for channel, style in zip(panel.channels, ("-", (0, (4, 2))), strict=False):
         curves = result.averages[channel]
         factor, zero = (1.0 / PASCALS_PER_PSI, atmosphere) if pressures else (panel.factor, 0.0)
@@ -111,19 +112,19 @@ def _draw(axes: "Axes", panel: _Panel, result: Strides, name: str, colour: str) 
 
 
 def _healthy(angle: "Axes", toes: "Axes", result: Strides) -> None:
-    gait = result.configuration.gait
+    gait = walk_of(result.scenario).gait
     look: dict[str, Any] = {"color": HEALTHY, "linewidth": 1.2, "linestyle": (0, (1, 1.2)), "label": "healthy gait"}
     curve = _DEGREES * clinical_angle(gait.ankle_angle.values_at(PHASES))
     angle.plot(_PERCENT, curve, **look)
     band = _DEGREES * gait.ankle_angle.deviation
     angle.fill_between(_PERCENT, curve - band, curve + band, color=GREY, alpha=0.15, linewidth=0.0)
-    toes.plot(_PERCENT, 100.0 * healthy_toe_height(result.configuration), **look)
+    toes.plot(_PERCENT, 100.0 * healthy_toe_height(result.scenario), **look)
 
 
 def _head(figure: "Figure", axes: "Axes", result: Strides, height: float) -> None:
-    configuration = result.configuration
+    configuration = result.scenario
     counted = result.metrics["strides"].value
-    title = f"{configuration.name}: {configuration.gait.name}, {counted:.0f} strides"
+    title = f"{configuration.name}: {walk_of(configuration).gait.name}, {counted:.0f} strides"
     figure.text(0.12 / _WIDTH, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
     handles, labels = axes.get_legend_handles_labels()
     place = (0.1 / _WIDTH, 1.0 - 0.3 / height)

@@ -10,9 +10,10 @@ from ppafo.answers.style import BLACK, BLUE, GREY, VERMILION, house_style, mark_
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.control.walking.signs import HELPS, LIFTS, PAUSED, STOPPED
 from ppafo.signals.recording import Floats
-from ppafo.walking.configuration import Configuration
+from ppafo.simulation.scenario import Scenario
+from ppafo.walking.planning import gait_sensors_of
+from ppafo.walking.result import WalkResult
 from ppafo.walking.sensor_settings import NEVER
-from ppafo.walking.walk import WalkResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,9 +35,9 @@ _LONG = 120.0
 _FAULT_SUFFIX = "_fault"
 
 
-def failures(configuration: Configuration) -> dict[str, float]:
+def failures(configuration: Scenario) -> dict[str, float]:
     """Return when which sensor fails [s], by its name; {} where all are sound."""
-    sensors = configuration.gait_sensors._asdict()
+    sensors = gait_sensors_of(configuration)._asdict()
     return {
         name.removesuffix(_FAULT_SUFFIX): fault.time
         for name, fault in sensors.items()
@@ -63,7 +64,7 @@ def over_time_figure(result: WalkResult) -> "Figure":
         level.set_xlim(0.0, float(time[-1]))
         _marks(grid[0][0], [row[0] for row in grid], result, scale)
         width, height = _SIZE
-        title = f"{result.configuration.name}: the whole walk"
+        title = f"{result.scenario.name}: the whole walk"
         figure.text(0.12 / width, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
         mark_kind(figure, recording.kind)
         return figure
@@ -98,7 +99,7 @@ def _marks(top: "Axes", rows: "list[Axes]", result: WalkResult, scale: float) ->
         if event.sign is not None:
             for axes in rows[:3]:
                 axes.axvline(event.time / scale, color=VERMILION, linewidth=0.9)
-    for sensor, begin in failures(result.configuration).items():
+    for sensor, begin in failures(result.scenario).items():
         if begin < result.recording.time[-1]:
             for axes in rows[:3]:
                 axes.axvline(begin / scale, color=GREY, linestyle="--", linewidth=0.9)

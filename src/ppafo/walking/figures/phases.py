@@ -14,8 +14,8 @@ from ppafo.model.command import VENTS_ABOVE
 from ppafo.signals.recording import Floats
 from ppafo.walking.figures.legs import GHOST, draw_ground, last_phases, leg_artists, legs_of
 from ppafo.walking.figures.mean_stride import WITH
+from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES, times_of_phases
-from ppafo.walking.walk import WalkResult
 from ppafo.walking.walk_metrics import settled
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def strip_figure(result: WalkResult) -> "Figure":
         rows[4].set_xlabel("Stride (%)")
         rows[4].set_xlim(0.0, 100.0)
         width, height = _SIZE
-        title = f"{result.configuration.name}: functional tasks of the paper's figure 1A over the stride"
+        title = f"{result.scenario.name}: functional tasks of the paper's figure 1A over the stride"
         figure.text(0.12 / width, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
         remark = "height of each colour: fraction of strides"
         figure.text(0.12 / width, 1.0 - 0.34 / height, remark, ha="left", va="top", fontsize=8.5, color=GREY)
@@ -157,7 +157,7 @@ def _legs(axes: "Axes", result: WalkResult) -> None:
 
 
 def _pressures(axes: "Axes", result: WalkResult) -> None:
-    atmosphere = result.configuration.device.supply.atmospheric_pressure
+    atmosphere = result.scenario.device.supply.atmospheric_pressure
     for channel, name, colour in (
         ("pressure_1", "plantarflexion", CHAMBER_1),
         ("pressure_2", "dorsiflexion", CHAMBER_2),

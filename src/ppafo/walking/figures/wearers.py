@@ -46,7 +46,7 @@ def population_figure(population: Population) -> "Figure":
         for axes, (trait, outcome) in zip((grid[2], grid[5]), _PAIRS, strict=True):
             _scatter(axes, population, trait, outcome)
         width, height = _SIZE
-        title = f"{population.configuration.name}: {population.count} wearers, {population.minutes:.3g} min each"
+        title = f"{population.scenario.name}: {population.count} wearers, {population.minutes:.3g} min each"
         figure.text(0.12 / width, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
         remark = "lines: 5th, 50th and 95th percentiles; dot: the wearer of the configuration"
         figure.text(0.12 / width, 1.0 - 0.36 / height, remark, ha="left", va="top", fontsize=9, color=GREY)

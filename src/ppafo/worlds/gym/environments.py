@@ -15,7 +15,7 @@ from ppafo.errors import ScenarioError, SimulationError, nearest_name
 from ppafo.parameters.device import Device
 from ppafo.simulation.loading import load_scenario
 from ppafo.walking.loading import load_walk
-from ppafo.walking.walk import walk_duration
+from ppafo.walking.walk import lasting
 from ppafo.worlds.gym.episodes import Episodes, Ranges, scenario_episodes, walk_episodes
 from ppafo.worlds.gym.kernel import Environments, Flags, Judging, Places, Seen
 from ppafo.worlds.gym.tasks import BAR, LONGEST_SINCE, TASKS, Task
@@ -91,7 +91,7 @@ class World:
             if varied:
                 raise ScenarioError(f"vary: {', '.join(varied)}: a walk draws wearers and gaits, and no numbers")
             walk = load_walk(file, words)
-            seconds = walk_duration(walk, (WALKING_TIME if duration is None else duration) / 60.0)
+            seconds = lasting(walk, (WALKING_TIME if duration is None else duration) / 60.0).duration
             self.episodes = walk_episodes(walk, randomise, seconds)
         else:
             words = words if duration is None else (*words, f"run.duration={float(duration)!r} s")

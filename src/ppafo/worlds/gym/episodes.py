@@ -28,10 +28,10 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.studies.varying import VariedPath, in_its_unit, varied_path
 from ppafo.units import parse_quantity
 from ppafo.walking.anthropometry import draw_builds
-from ppafo.walking.configuration import Configuration
+from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.varied_gait import draw_gaits
-from ppafo.walking.walk import plan_of
+from ppafo.walking.varying import with_duration
 from ppafo.walking.wearers_rows import batch_of_many
 from ppafo.worlds.gym.kernel import Columns, episode_program
 from ppafo.worlds.gym.tasks import Goal
@@ -214,7 +214,7 @@ def _repeated(columns: Columns, count: int) -> Columns:
 class WalkEpisodes:
     """Episodes of a walk; ``randomise`` draws another wearer with another gait for each."""
 
-    configuration: Configuration
+    configuration: Scenario
     run: Run
     program: Program
     clock: Clock
@@ -234,7 +234,7 @@ class WalkEpisodes:
             columns.parameters[:, place], columns.states[:, place] = batch.parameters[:, 1], batch.states[:, 1]
         return columns, np.zeros((0, len(generators)))
 
-    def shown(self, drawn: Floats) -> Configuration:  # noqa: ARG002 - a wearer is no list of numbers
+    def shown(self, drawn: Floats) -> Scenario:  # noqa: ARG002 - a wearer is no list of numbers
         """Return the walk before anything is drawn."""
         return self.configuration
 
@@ -243,26 +243,28 @@ class WalkEpisodes:
         seed = float(generator.integers(0, LARGEST_SEED))
         run = replace(self.run, sensors=self.run.sensors._replace(seed=seed))
         build = draw_builds(2, generator)
-        gaits = draw_gaits(self.configuration.gait, build.stature, generator)
+        gaits = draw_gaits(walk_of(self.configuration).gait, build.stature, generator)
         return batch_of_many(self.configuration, run, build, gaits, generator)
 
 
-def walk_episodes(configuration: Configuration, randomise: bool, seconds: float) -> WalkEpisodes:
+def walk_episodes(configuration: Scenario, randomise: bool, seconds: float) -> WalkEpisodes:
     """Return the episodes of a walk of some length [s]; the profile of its controller is the torque that is asked for.
 
     ScenarioError for a walk with a course or a bottle, or whose controller has no profile.
     """
     for name in ("course", "bottle"):
-        if getattr(configuration, name) is not None:
-            raise ScenarioError(f"{configuration.file}: {name}: an environment does not support it; leave it out")
-    settings = configuration.settings
+        if getattr(walk_of(configuration), name) is not None:
+            raise ScenarioError(
+                f"{configuration.origin.file}: {name}: an environment does not support it; leave it out"
+            )
+    settings = configuration.control.settings
     if not set(TorqueProfile._fields) <= set(settings):
-        kind = configuration.controller.name
+        kind = configuration.control.kind
         raise ScenarioError(
-            f"{configuration.file}: controller.kind = '{kind}' has no torque profile; event_pid has one"
+            f"{configuration.origin.file}: controller.kind = '{kind}' has no torque profile; event_pid has one"
         )
     goal = Goal(angle=0.0, profile=TorqueProfile(**{name: settings[name] for name in TorqueProfile._fields}))
-    planned = plan_walk(plan_of(configuration, seconds))
+    planned = plan_walk(with_duration(configuration, seconds))
     run = replace(planned, program=replace(planned.program, controller=None), controller=())
     batch = batch_of(run)
     program, clock = episode_program(batch)

@@ -24,7 +24,6 @@ from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.plan import Pieces, Steps, compose_run
 from ppafo.simulation.scenario import ProfileChoice, Scenario
 from ppafo.storage.opensim import OpenSimTable, read_opensim
-from ppafo.walking.configuration import Configuration
 from ppafo.walking.planning import NO_REFERENCE, walking_valve
 from ppafo.walking.preparation import vented_state
 
@@ -151,7 +150,7 @@ class DeviceAtAnkle:
     (``model.command.VENT``). The supply does not end, whatever a walk hangs on. ScenarioError for times that cannot be.
     """
 
-    def __init__(self, item: Scenario | Configuration, period: float = 1.0e-3, duration: float = 60.0) -> None:
+    def __init__(self, item: Scenario, period: float = 1.0e-3, duration: float = 60.0) -> None:
         if not SHORTEST_PERIOD <= period <= LONGEST_PERIOD:
             raise ScenarioError(f"a step of {period:g} s: must be {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s")
         if not period <= duration <= LONGEST:
@@ -246,7 +245,7 @@ def to_model(angle: float) -> float:
     return _NEUTRAL - angle
 
 
-def _run_of(item: Scenario | Configuration, period: float, steps: int) -> Run:
+def _run_of(item: Scenario, period: float, steps: int) -> Run:
     """The run of valve and gas under a command from outside, on a straight path of the angle for each step."""
     path = {"start_level": _NEUTRAL, "level": _NEUTRAL, "ramp_start": 0.0, "ramp_time": 2.0 * period}
     pieces = Pieces(

@@ -134,7 +134,11 @@ def test_a_folder_that_says_too_little_is_refused(tmp_path: Path, content: str, 
         ("metrics.gas", None, "has no number at 'metrics.gas.value'"),
         ("metrics.gas.value", -1.0, "'metrics.gas.value' is -1, which is impossible for a walk"),
         ("metrics.gas.value", 10**400, "has no number at 'metrics.gas.value'"),
-        ("configuration.gait.stride_time", 0, "'configuration.gait.stride_time' is 0, which is impossible for a walk"),
+        (
+            "configuration.gait.stride_time",
+            0,
+            "'walk_of(configuration).gait.stride_time' is 0, which is impossible for a walk",
+        ),
         ("configuration.gait", [], "has no number at 'configuration.gait.stride_time'"),
         (
             "configuration.device.actuator.dead_volume_1",

@@ -9,6 +9,7 @@ import pytest
 from ppafo.questions.timing.slap import FIRST_STRIKE, STRIKES, Falls, falls_of, shares_of
 from ppafo.walking import load_walk, walk
 from ppafo.walking.comparison import with_device_off
+from ppafo.walking.motion import walk_of
 
 CONFIGURATION = load_walk("solenoid")
 
@@ -37,7 +38,7 @@ def test_a_foot_that_is_given_its_own_state_comes_down_as_it_walks(own: Falls) -
     imposed = falls_of(CONFIGURATION, own.strikes)
     assert imposed.walked == own.walked
     assert imposed.imposed == pytest.approx(own.walked, rel=1e-9)
-    strides = walk("solenoid", (FIRST_STRIKE + STRIKES + 1.5) * CONFIGURATION.gait.stride_time / 60.0).strides
+    strides = walk("solenoid", (FIRST_STRIKE + STRIKES + 1.5) * walk_of(CONFIGURATION).gait.stride_time / 60.0).strides
     # A stride of the table begins with the second strike, for the first one is where the walk begins.
     walked = strides["slap_rate"][FIRST_STRIKE - 1 : FIRST_STRIKE - 1 + STRIKES]
     assert own.walked == pytest.approx(float(walked.mean()), rel=1e-9)

@@ -15,11 +15,11 @@ from ppafo.exports.firmware import MOST_TICKS, PRELUDE, TICK, defined_numbers, m
 from ppafo.exports.firmware.catalog import MSP430G2553
 from ppafo.exports.templates import filled, licence, template
 from ppafo.simulation.reading import quantity_text
+from ppafo.simulation.scenario import Scenario
 from ppafo.translation.c99 import c_source, documents_of
 from ppafo.version import __version__
-from ppafo.walking.configuration import Configuration
 from ppafo.walking.declaration import ARITHMETIC, quantities
-from ppafo.walking.fixed_point import converter_of_walk, numbers_of_walk
+from ppafo.walking.planning import converter_of_walk, numbers_of_walk
 
 _TEMPLATES = (
     "Makefile",
@@ -47,17 +47,17 @@ class WalkChip(NamedTuple):
         return rebuilt(self.law.numbers, [int(value) for value in self.numbers.values()])
 
 
-def walk_chip(configuration: Configuration) -> WalkChip:
+def walk_chip(configuration: Scenario) -> WalkChip:
     """The integer controller of a walk whose arithmetic is fixed.
 
     ScenarioError where it is not, or where the chip's timer or converter cannot do what it asks for.
     """
-    name, period, given = configuration.name, configuration.period, configuration.converter
-    if given is None:
-        if configuration.controller.name in FIXED_WALKS:
+    name, period, given = configuration.name, configuration.control.period, configuration.control.settings
+    if not configuration.control.is_fixed:
+        if configuration.control.kind in FIXED_WALKS:
             raise ScenarioError(f"{name}: the controller computes with floats; set {ARITHMETIC}=fixed")
         raise ScenarioError(
-            f"{name}: the controller '{configuration.controller.name}' has no form on whole numbers; those that have "
+            f"{name}: the controller '{configuration.control.kind}' has no form on whole numbers; those that have "
             f"one: {', '.join(FIXED_WALKS)}"
         )
     if given["converter_bits"] > MSP430G2553.converter_bits:
@@ -71,12 +71,12 @@ def walk_chip(configuration: Configuration) -> WalkChip:
             f"{name}: controller.period = {period:.9g} s: on the chip a multiple of 0.125 ms, "
             f"up to {MOST_TICKS // 2 * TICK:.3g} s"
         )
-    law = FIXED_WALKS[configuration.controller.name]
+    law = FIXED_WALKS[configuration.control.kind]
     numbers = numbers_of_walk(configuration)
     return WalkChip(law=law, numbers=numbers, converter=converter_of_walk(configuration), ticks=ticks)
 
 
-def walk_firmware(configuration: Configuration, target: str = WALK_TARGETS[0]) -> dict[str, bytes]:
+def walk_firmware(configuration: Scenario, target: str = WALK_TARGETS[0]) -> dict[str, bytes]:
     """Files of the firmware of a walk's controller, by name. ScenarioError where it has no integer form."""
     if target not in WALK_TARGETS:
         raise ScenarioError(f"{configuration.name}: a walk's firmware is for {', '.join(WALK_TARGETS)}, not '{target}'")
@@ -139,16 +139,16 @@ def _written(row: Any) -> str:
     return "{" + ", ".join(_written(item) if isinstance(item, tuple) else str(item) for item in row) + "}"
 
 
-def _words(configuration: Configuration, chip: WalkChip, target: str) -> dict[str, str]:
+def _words(configuration: Scenario, chip: WalkChip, target: str) -> dict[str, str]:
     """What fills the templates."""
-    given, converter = configuration.converter or {}, chip.converter
+    given, converter = configuration.control.settings, chip.converter
     return {
         "title": configuration.name,
         "description": configuration.description,
         "kind": chip.law.name,
         "target": target,
         "version": __version__,
-        "period": quantity_text(configuration.period, "s"),
+        "period": quantity_text(configuration.control.period, "s"),
         "force_zero": f"{given['force_zero']:.6g} N",
         "force_range": f"{given['force_range']:.6g} N",
         "force_step": f"{converter.force_step:.3g} N",
@@ -161,9 +161,9 @@ def _words(configuration: Configuration, chip: WalkChip, target: str) -> dict[st
     }
 
 
-def _parameters(configuration: Configuration, chip: WalkChip) -> str:
+def _parameters(configuration: Scenario, chip: WalkChip) -> str:
     """The header with every number of the law, its unit, meaning and origin."""
-    bits = int((configuration.converter or {})["converter_bits"])
+    bits, period = int(configuration.control.settings["converter_bits"]), configuration.control.period
     lines = [
         f"/* Numbers of the controller '{chip.law.name}' of the walk {configuration.name}, ppafo {__version__}, from:",
         *(f" *   {line}" for line in _origins(configuration)),
@@ -171,15 +171,15 @@ def _parameters(configuration: Configuration, chip: WalkChip) -> str:
         "#ifndef PPAFO_PARAMETERS_H",
         "#define PPAFO_PARAMETERS_H",
         "",
-        f"#define CONTROLLER_TICKS {chip.ticks}u /* of 125 us in a sample period of {configuration.period:.9g} s */",
+        f"#define CONTROLLER_TICKS {chip.ticks}u /* of 125 us in a sample period of {period:.9g} s */",
         f"#define CONTROLLER_BITS {bits} /* of the converter; counts are of 14 bits */",
     ]
     return "\n".join([*lines, *defined_numbers(chip.law.number_quantities, chip.numbers), "", "#endif", ""])
 
 
-def _origins(configuration: Configuration) -> Iterator[str]:
+def _origins(configuration: Scenario) -> Iterator[str]:
     """Settings that the numbers come from, each with unit and value in SI units."""
-    declared = quantities(configuration.controller.name)
-    yield f"period {configuration.period:.9g} s (controller.rate or controller.period of {configuration.name})"
-    for name, value in {**configuration.settings, **(configuration.converter or {})}.items():
+    declared = quantities(configuration.control.kind)
+    yield f"period {configuration.control.period:.9g} s (controller.rate or controller.period of {configuration.name})"
+    for name, value in configuration.control.settings.items():
         yield f"{name} {value:.9g} {declared[f'controller.{name}'].unit} (controller.{name})".replace("  ", " ")

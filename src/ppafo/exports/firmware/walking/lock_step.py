@@ -17,11 +17,12 @@ from ppafo.exports.firmware.walking.drawn import gait_readings
 from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import GaitMeasurement
 from ppafo.simulation.sampled import state_row_numbers
-from ppafo.walking.configuration import Configuration
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.recorded import SAFE_ROW
 from ppafo.walking.sampled import run_sampled_walk
-from ppafo.walking.walk import plan_of, walk_duration
+from ppafo.walking.varying import with_duration
+from ppafo.walking.walk import lasting
 
 _INSIDE = ("controller_state.", "gait_seen.")
 """What only the lanes keep: state of their controller, and the last readings."""
@@ -83,13 +84,13 @@ class WalkOnChip:
     gas: float
 
 
-def walk_on_chip(configuration: Configuration, minutes: float | None = None) -> WalkOnChip:
+def walk_on_chip(configuration: Scenario, minutes: float | None = None) -> WalkOnChip:
     """Walk with the controller on the chip's simulator, in virtual time, and once more in the lanes.
 
     ScenarioError where the controller has no integer form, SimulationError where a tool is missing.
     """
     chip = walk_chip(configuration)
-    run = plan_walk(plan_of(configuration, walk_duration(configuration, minutes)))
+    run = plan_walk(with_duration(configuration, lasting(configuration, minutes).duration))
     with chip_simulator(walk_firmware(configuration), MSP430G2553) as (simulator, image):
         law = ChipOfWalk(simulator, chip.converter)
         outside = run_sampled_walk(run, law)
@@ -107,7 +108,7 @@ def walk_on_chip(configuration: Configuration, minutes: float | None = None) -> 
     return WalkOnChip(cost, len(law.decisions), differ, same, level, gas)
 
 
-def compare_drawn_walk(configuration: Configuration, samples: int, seed: int = 1) -> Comparison:
+def compare_drawn_walk(configuration: Scenario, samples: int, seed: int = 1) -> Comparison:
     """Give drawn readings of a gait to the chip's simulator and to Python, with a reset before every episode."""
     chip = walk_chip(configuration)
     given = gait_readings(chip.converter, samples, seed)

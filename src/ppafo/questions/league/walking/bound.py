@@ -25,6 +25,7 @@ from ppafo.questions.league.walking.solver import FREE, Guess, StrideOptimum, St
 from ppafo.questions.league.walking.stride import stride_of
 from ppafo.questions.league.walking.task import WalkingTask
 from ppafo.translation.plant_rates import check_without_opensim
+from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk
 
 CLEAR = 0.0
@@ -64,7 +65,7 @@ class BoundSearch:
         configuration = task.configuration("off", valve)
         self._task, self._valve, self.grid = task, valve, grid
         self._run: Run = plan_walk(ideal_plan(task, configuration))
-        self._toes: Toes = toes_of(configuration.gait, configuration.wearer)
+        self._toes: Toes = toes_of(walk_of(configuration).gait, walk_of(configuration).wearer)
         self._near: Guess = guess_from_walk(task)
 
     def solver(self, landing: float, intervals: int, lag: float = 0.0) -> StrideSolver:

@@ -44,8 +44,8 @@ class WalkingContest:
         configuration = task.configuration(entrant.kind, entrant.valve, entrant.overrides)
         return Standing(
             entrant=entrant,
-            settings=dict(configuration.settings),
-            period=configuration.period,
+            settings=dict(configuration.control.settings),
+            period=configuration.control.period,
             measures=walk_measures(task, configuration),
             robustness=draw_measures(task, configuration, draws, seed, progress) if draws else None,
             command=self._command(entrant),

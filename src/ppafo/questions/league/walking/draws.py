@@ -16,13 +16,14 @@ from ppafo.questions.league.draws import NOISE_DRAWS, SEED, draw_factors, draw_s
 from ppafo.questions.league.standing import Robustness
 from ppafo.questions.league.walking.measures import Toes, course_of, last_strides, measures, toes_of
 from ppafo.questions.league.walking.task import WalkingTask
+from ppafo.simulation.scenario import Scenario
 from ppafo.studies.noise import other_noise
 from ppafo.walking.anthropometry import Build, draw_builds
-from ppafo.walking.configuration import Configuration
-from ppafo.walking.planning import plan_walk
+from ppafo.walking.motion import walk_of
+from ppafo.walking.planning import has_ideal_sensors, plan_walk
 from ppafo.walking.preparation import vented_state, with_leg
 from ppafo.walking.varied_gait import VariedGaits, draw_gaits
-from ppafo.walking.walk import plan_of
+from ppafo.walking.varying import with_duration
 from ppafo.walking.wearers_rows import batch_of_many
 
 NUMBERS_AT_ONCE = 4.0e7
@@ -52,18 +53,18 @@ class DrawnWearers:
     batch: Batch
 
 
-def draw_wearers(configuration: Configuration, run: Run, count: int, seed: int = SEED) -> DrawnWearers:
+def draw_wearers(configuration: Scenario, run: Run, count: int, seed: int = SEED) -> DrawnWearers:
     """Wearers drawn around that of a configuration, who is the first; for every controller the same."""
     # Not the stream of their devices, with which wearers would go hand in hand.
     generator = np.random.default_rng([seed, _WEARERS])
     build = draw_builds(count, generator)
-    gaits = draw_gaits(configuration.gait, build.stature, generator)
+    gaits = draw_gaits(walk_of(configuration).gait, build.stature, generator)
     return DrawnWearers(build, gaits, batch_of_many(configuration, run, build, gaits, generator))
 
 
 def draw_measures(
     task: WalkingTask,
-    configuration: Configuration,
+    configuration: Scenario,
     draws: int,
     seed: int = SEED,
     progress: Report = report_nothing,
@@ -72,17 +73,17 @@ def draw_measures(
 
     Each walk has its own noise where the sensors are noisy.
     """
-    run = plan_walk(plan_of(configuration, task.seconds))
+    run = plan_walk(with_duration(configuration, task.seconds))
     wearers = draw_wearers(configuration, run, draws, seed)
     plants = draw_plants(configuration, run, draw_factors(draws, seed))
     batch = _with_devices(run, wearers.batch, plants)
-    is_noisy = not configuration.has_ideal_sensors
+    is_noisy = not has_ideal_sensors(configuration)
     if is_noisy:
         batch = _with_noise(batch, draw_seeds(draws, seed))
-    toes = toes_of(configuration.gait, configuration.wearer)
+    toes = toes_of(walk_of(configuration).gait, walk_of(configuration).wearer)
     found: list[dict[str, float] | None] = []
     for part in _groups(batch):
-        progress(Progress(configuration.controller.name, part.start, draws, noun="draws"))
+        progress(Progress(configuration.control.kind, part.start, draws, noun="draws"))
         found += _measure_draws(task, run, wearers, plants, toes, batch, part)
     again: list[dict[str, float] | None] = []
     if is_noisy:
@@ -99,7 +100,7 @@ def _with_noise(batch: Batch, seeds: Floats) -> Batch:
     return Batch(batch.program, batch.clock, parameters, batch.states[:, : seeds.size])
 
 
-def draw_plants(configuration: Configuration, run: Run, factors: Floats) -> list[PlantParameters]:
+def draw_plants(configuration: Scenario, run: Run, factors: Floats) -> list[PlantParameters]:
     """The plant of a configuration with each of the devices that rows of ``factors`` (draws, uncertainties) make."""
     assert run.walk is not None, "a league walks"
     devices = [scale_device(configuration.device, row.tolist()) for row in factors]

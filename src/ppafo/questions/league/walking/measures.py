@@ -19,13 +19,15 @@ from ppafo.model.gait import GaitTiming
 from ppafo.model.plant import PlantParameters, chamber_pressures
 from ppafo.questions.league.walking.stride import free_window, push_off_window
 from ppafo.questions.league.walking.task import WalkingTask
-from ppafo.walking.configuration import Configuration
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.event_times import EVENTS, TOO_FAR, Samples, event_errors, known_events, true_events, within
 from ppafo.walking.gait_series import gait_timing, truncate
+from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.posture import AnklePath, ankle_path
 from ppafo.walking.recorded import SAFE_ROW
-from ppafo.walking.walk import REMEDY, plan_of
+from ppafo.walking.result import REMEDY
+from ppafo.walking.varying import with_duration
 from ppafo.walking.wearer import Wearer
 
 MEASURES = {
@@ -144,22 +146,24 @@ def course_of(
     )
 
 
-def walk_course(task: WalkingTask, configuration: Configuration) -> Course:
+def walk_course(task: WalkingTask, configuration: Scenario) -> Course:
     """The course of a walk, every sample of it; SimulationError where it diverges."""
-    run = plan_walk(plan_of(configuration, task.seconds))
+    run = plan_walk(with_duration(configuration, task.seconds))
     assert run.walk is not None, "a league walks"
     outcome = run_batch(batch_of(run))
     rows = row_numbers(run.program.state_rows())
     final = outcome.states[:, 0]
     if final[rows["result.failure_time"]] < NEVER_FAILED or not np.isfinite(final).all():
-        raise SimulationError(f"{configuration.controller.name} diverged; {REMEDY}")
+        raise SimulationError(f"{configuration.control.kind} diverged; {REMEDY}")
     record = {name: outcome.record[:, row, 0] for name, row in rows.items()}
-    return course_of(record, run.plant, run.walk.timing, toes_of(configuration.gait, configuration.wearer))
+    return course_of(
+        record, run.plant, run.walk.timing, toes_of(walk_of(configuration).gait, walk_of(configuration).wearer)
+    )
 
 
-def walk_measures(task: WalkingTask, configuration: Configuration) -> dict[str, float]:
+def walk_measures(task: WalkingTask, configuration: Scenario) -> dict[str, float]:
     """The measures of the settled strides; SimulationError where the walk diverges."""
-    run = plan_walk(plan_of(configuration, task.seconds))
+    run = plan_walk(with_duration(configuration, task.seconds))
     assert run.walk is not None, "a league walks"
     course = walk_course(task, configuration)
     return measures(course, task.profile, run.walk.timing, last_strides(course.phase))

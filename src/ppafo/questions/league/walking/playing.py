@@ -16,9 +16,10 @@ from ppafo.questions.league.walking.measures import course_of, measures, toes_of
 from ppafo.questions.league.walking.programme import MODES
 from ppafo.questions.league.walking.solver import StrideOptimum
 from ppafo.questions.league.walking.task import WalkingTask
-from ppafo.walking.configuration import Configuration
-from ppafo.walking.planning import WalkPlan, plan_walk
-from ppafo.walking.walk import plan_of
+from ppafo.simulation.scenario import Scenario
+from ppafo.walking.motion import walk_of
+from ppafo.walking.planning import plan_walk
+from ppafo.walking.varying import with_duration
 
 STEP = 1.0e-4
 """Step [s] of a played stride: short enough for an interval to be shared out between the ways of the valve."""
@@ -33,9 +34,9 @@ class PlayedStride:
     height: float
 
 
-def ideal_plan(task: WalkingTask, configuration: Configuration) -> WalkPlan:
+def ideal_plan(task: WalkingTask, configuration: Scenario) -> Scenario:
     """The plan of a walk with a valve that follows at once and constant supply pressures: what the bound is for."""
-    plan = plan_of(configuration, task.seconds)
+    plan = with_duration(configuration, task.seconds)
     valve = plan.device.valve
     ideal = Valve(valve.kind, valve.orifice, dict.fromkeys(valve.settings, 0.0))
     return replace(plan, device=replace(plan.device, valve=ideal), supply_lines=None)
@@ -45,8 +46,9 @@ def play_stride(task: WalkingTask, valve: str, optimum: StrideOptimum) -> Played
     """What the engine makes of an optimal stride that begins at its heel strike."""
     configuration = task.configuration("off", valve)
     plan = ideal_plan(task, configuration)
-    period = plan.gait.stride_time
-    run = plan_walk(replace(plan, duration=period + STEP, period=STEP, step=STEP, record_interval=STEP))
+    walked = walk_of(plan)
+    period, control = walked.gait.stride_time, replace(plan.control, period=STEP)
+    run = plan_walk(replace(plan, control=control, duration=period + STEP, time_step=STEP, output_interval=STEP))
     run = replace(run, program=replace(run.program, controller=None), controller=())
     assert run.walk is not None, "a stride is walked"
     timing = run.walk.timing
@@ -55,7 +57,7 @@ def play_stride(task: WalkingTask, valve: str, optimum: StrideOptimum) -> Played
     record = replay(_from_strike(run, optimum), StepInputs(command, {})).record[:, :, 0]
     rows = row_numbers(run.program.state_rows())
     channels = {name: record[:, row] for name, row in rows.items()}
-    course = course_of(channels, run.plant, timing, toes_of(plan.gait, plan.wearer))
+    course = course_of(channels, run.plant, timing, toes_of(walked.gait, walked.wearer))
     found = measures(course, task.profile, timing, [slice(0, round(period / run.step))])
     return PlayedStride(found["torque_error"], found["gas"], found["toe_height"])
 

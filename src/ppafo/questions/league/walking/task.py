@@ -11,9 +11,10 @@ from ppafo.control.walking.signs import SAFETY_QUANTITIES
 from ppafo.errors import ScenarioError, nearest_name, one_line
 from ppafo.simulation.declaration import PERIOD, RATE
 from ppafo.simulation.overriding import split_override
-from ppafo.walking.configuration import Configuration
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.loading import load_walk
-from ppafo.walking.walk import walk_duration
+from ppafo.walking.motion import walk_of
+from ppafo.walking.walk import lasting
 
 CONFIGURATION = "proportional"
 MINUTES = 0.2
@@ -64,7 +65,7 @@ class WalkingTask:
         ]
         return (f"controller.kind={kind}", f"device.valve={valve}", *kept, *own)
 
-    def configuration(self, kind: str, valve: str, own: Sequence[str] = ()) -> Configuration:
+    def configuration(self, kind: str, valve: str, own: Sequence[str] = ()) -> Scenario:
         """The walk of one controller on one valve; ScenarioError or ParameterError where it cannot be."""
         return load_walk(self.file, self.overrides_for(kind, valve, own), self.gait)
 
@@ -88,26 +89,27 @@ def walking_task(
     for_all = [override for override in own if split_override(override)[0] not in _PUSH_OFF]
     judged = _with_profile(file, [*for_all, *desired], gait)
     told = _with_profile(file, [*desired, *own], gait)
-    if judged.course is not None:
+    if walk_of(judged).course is not None:
         raise ScenarioError(f"{file}: course: a league compares equal strides; leave the course away")
-    if judged.bottle is not None:
+    if walk_of(judged).bottle is not None:
         raise ScenarioError(f"{file}: bottle: a league compares strides at one supply pressure; leave the bottle away")
     profile, told_profile = (
-        TorqueProfile(**{name: walk.settings[name] for name in TorqueProfile._fields}) for walk in (judged, told)
+        TorqueProfile(**{name: walk.control.settings[name] for name in TorqueProfile._fields})
+        for walk in (judged, told)
     )
     if profile.peak_torque <= 0.0:
         raise ScenarioError("desired.peak_torque: a league needs a desired torque; give one above 0 N m")
-    latest = judged.gait.stance_share - SHORTEST_PUSH_OFF
+    latest = walk_of(judged).gait.stance_share - SHORTEST_PUSH_OFF
     if profile.peak_time - profile.rise_time > latest:
         raise ScenarioError(
             f"desired.peak_time: the torque begins at {profile.peak_time - profile.rise_time:g} of the stride, "
-            f"too late for a push-off that ends at {judged.gait.stance_share:g}; at most {latest:g}"
+            f"too late for a push-off that ends at {walk_of(judged).gait.stance_share:g}; at most {latest:g}"
         )
-    seconds = walk_duration(judged, minutes)
+    seconds = lasting(judged, minutes).duration
     return WalkingTask(str(file), None if gait is None else str(gait), tuple(own), profile, seconds, told_profile)
 
 
-def _with_profile(file: str | Path, overrides: Sequence[str], gait: str | Path | None) -> Configuration:
+def _with_profile(file: str | Path, overrides: Sequence[str], gait: str | Path | None) -> Scenario:
     """Return the walk of the controller whose settings say what torque is wanted."""
     return load_walk(file, [f"controller.kind={PROFILE_KIND}", f"device.valve={PROFILE_VALVE}", *overrides], gait)
 

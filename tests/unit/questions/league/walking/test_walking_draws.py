@@ -10,14 +10,14 @@ from ppafo.questions.league.walking.draws import CHANGED, draw_measures, draw_pl
 from ppafo.questions.league.walking.measures import MEASURES, walk_measures
 from ppafo.questions.league.walking.task import walking_task
 from ppafo.walking.planning import plan_walk
-from ppafo.walking.walk import plan_of
+from ppafo.walking.varying import with_duration
 
 TASK = walking_task(minutes=0.1)
 WALKED = TASK.configuration("event_proportional", "proportional")
 
 
 def test_the_uncertainties_change_what_is_written_into_the_engine_and_nothing_else() -> None:
-    run = plan_walk(plan_of(WALKED, TASK.seconds))
+    run = plan_walk(with_duration(WALKED, TASK.seconds))
     count = len(UNCERTAINTIES)
     plants = draw_plants(WALKED, run, np.ones((count, count)) + 0.1 * np.eye(count))
     changed = {name for plant in plants for name in plant._fields if getattr(plant, name) != getattr(run.plant, name)}

@@ -13,6 +13,7 @@ from ppafo.questions.league.walking.contest import WalkingContest
 from ppafo.questions.league.walking.presentation import clear_fraction, safe_states
 from ppafo.questions.league.walking.task import walking_task
 from ppafo.walking.loading import load_walk
+from ppafo.walking.planning import law_of
 
 BY_NAME = {entrant.name: entrant for entrant in WALKING_ENTRANTS}
 CHOSEN = tuple(BY_NAME[name] for name in ("off", "event_on_off-solenoid", "event_proportional"))
@@ -70,7 +71,7 @@ def test_the_command_of_a_standing_walks_it_again(small: League) -> None:
     parsed = build_parser("walk").parse_args(words[1:])
     again = load_walk(parsed.configuration, parsed.overrides, parsed.gait)
     own = walking_task(minutes=0.1).configuration(standing.entrant.kind, standing.entrant.valve)
-    assert (again.controller, again.settings) == (own.controller, standing.settings)
+    assert (law_of(again), again.control.settings) == (law_of(own), standing.settings)
     assert again.device == own.device
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from ppafo.metrics.strides import METER, PER_STRIDE, SETTLING, Strides
 from ppafo.signals.meter import Course, WalkSample
-from ppafo.walking.stride_meters import METER, Strides
-from ppafo.walking.strides import PER_STRIDE, SETTLING, per_stride, stride_starts
+from ppafo.walking.strides import per_stride, stride_starts
 
 NO_COURSE = Course(*[0.0] * len(Course._fields))
 SAMPLES = 80

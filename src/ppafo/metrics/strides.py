@@ -1,6 +1,7 @@
 """Metrics of a walk stride by stride, without a recording: one meter that goes through the samples once.
 
-What is counted is that of ``walking/strides.py`` and ``walking/walk_metrics.py``; tests hold both together.
+What is counted is that of ``walking/strides.py`` and ``walking/walk_metrics.py``, which count it in a recording with
+its mean curves; tests hold both together.
 """
 
 import math
@@ -10,10 +11,34 @@ from typing import NamedTuple
 
 from ppafo.control.walking.phases import PUSH_OFF
 from ppafo.control.walking.signs import HELPS
-from ppafo.metrics.metric import Floats, Readings
+from ppafo.metrics.metric import REQUEST, STEADY, WALK, Floats, MetricKind, Readings
 from ppafo.model.columns import choose, larger, root
 from ppafo.signals.meter import Course, MeterKind, WalkSample
-from ppafo.walking.strides import PER_STRIDE, SETTLING
+
+SETTLING = 2
+"""First strides that are left out of averages: the controller learns the stride time in them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A quantity of every stride: unit, meaning, and the running total in the record whose gain it is."""
+
+    unit: str
+    summary: str
+    total: str
+
+
+PER_STRIDE: dict[str, Quantity] = {
+    "gas": Quantity("kg", "gas taken from the supply in one stride", "state.supplied_mass"),
+    "push_off_work": Quantity("J", "work of T_ex while the foot rolls over the toes", "walk.push_off_work"),
+    "slap_rate": Quantity(
+        "rad/s",
+        "rate of the toes as they come down after the heel, below 0; 0 where they came first",
+        "walk.slap_rates",
+    ),
+    "toe_clearance": Quantity("m", "lowest toe height in mid-swing, relative to the healthy gait", "walk.clearances"),
+    "toe_landing": Quantity("-", "1 where the toes met the ground before the heel", "walk.toe_landings"),
+}
 
 NOT_YET = -1.0
 """Time of what has not happened."""
@@ -154,17 +179,6 @@ def count(counted: Counted, stride: StrideNow, sample: WalkSample) -> Counted:
 METER = MeterKind("strides", Strides, _start, _update)
 
 
-@dataclass(frozen=True, slots=True)
-class StrideMetric:
-    """A metric of a walk: ``read`` takes it from the meters, nan where there is none, plain arithmetic alone."""
-
-    name: str
-    unit: str
-    summary: str
-    read: Callable[[Readings], Floats]
-    meters: tuple[MeterKind, ...] = (METER,)
-
-
 def mean_of(total: Floats, count: Floats) -> Floats:
     """A sum over how many there are, in its unit; nan for none."""
     found: Floats = choose(count > 0.0, total / larger(count, 1.0), math.nan)
@@ -238,41 +252,40 @@ def _safe_time(readings: Readings) -> Floats:
     return found
 
 
-def _mean(name: str, read: Callable[[Readings], Floats]) -> StrideMetric:
+def _kind(name: str, unit: str, summary: str, read: Callable[[Readings], Floats], *needs: str) -> MetricKind:
+    return MetricKind(name, unit, summary, (), None, read, (METER,), needs=(WALK, *needs))
+
+
+def _mean(name: str, read: Callable[[Readings], Floats]) -> MetricKind:
+    """A mean over the strides with help, without the first ones; on a course it would be over other strides."""
     item = PER_STRIDE[name]
-    return StrideMetric(name, item.unit, f"{item.summary}, mean", read)
+    return _kind(name, item.unit, f"{item.summary}, mean", read, STEADY)
 
 
-MEANS = (
+METRICS = (
     _mean("gas", _gas),
     _mean("push_off_work", _work),
     _mean("slap_rate", _slap_rate),
     _mean("toe_clearance", _clearance),
     _mean("toe_landing", _landing),
-    StrideMetric("counted_strides", "-", "strides over which the means are taken", _counted),
-)
-"""Over the strides with help, without the first ones; on a course they would be over other strides than these."""
-TRACKING = (
-    StrideMetric("push_off_error", "N m", "RMS of requested torque less actuator torque in push-off", _push_off_error),
-)
-"""Over the same strides, of a controller that wants a torque."""
-COUNTS = (
-    StrideMetric("strides", "-", "whole strides of the walk", _whole),
-    StrideMetric("helped_strides", "-", "whole strides with help from strike to strike", _helped),
-    StrideMetric(
+    _kind("counted_strides", "-", "strides over which the means are taken", _counted, STEADY),
+    _kind(
+        "push_off_error",
+        "N m",
+        "RMS of requested torque less actuator torque in push-off",
+        _push_off_error,
+        STEADY,
+        REQUEST,
+    ),
+    _kind("strides", "-", "whole strides of the walk", _whole),
+    _kind("helped_strides", "-", "whole strides with help from strike to strike", _helped),
+    _kind(
         "vented_strides",
         "-",
         "whole strides with less help (lifted only, paused or stopped) in at least a part of them",
         _vented,
     ),
-    StrideMetric("total_gas", "kg", "gas taken from the supply in the whole walk", _total_gas),
-    StrideMetric(
-        "safe_state_time", "s", "time at which the controller first lifted only, paused or stopped", _safe_time
-    ),
+    _kind("total_gas", "kg", "gas taken from the supply in the whole walk", _total_gas),
+    _kind("safe_state_time", "s", "time at which the controller first lifted only, paused or stopped", _safe_time),
 )
-
-
-def stride_metrics_of(takes_course: bool, has_request: bool) -> tuple[StrideMetric, ...]:
-    """Metrics of ``walk_metrics`` that need neither a mean curve nor the healthy gait, of a walk of some kind."""
-    over_strides = () if takes_course else MEANS + (TRACKING if has_request else ())
-    return over_strides + COUNTS
+"""Those of ``walk_metrics`` that need neither a mean curve nor the healthy gait."""

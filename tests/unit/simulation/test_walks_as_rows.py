@@ -1,0 +1,140 @@
+"""A row of columns of a walk has the bits of the single walk: 12 walks, courses and faults by 12 rows."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ppafo.engine.run import batch_of
+from ppafo.errors import ScenarioError
+from ppafo.loading import reloaded
+from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.ensemble.columns import check_columns
+from ppafo.simulation.ensemble.planning import plan_ensemble
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.scenario import Scenario
+from ppafo.walking import load_walk, walk
+
+ROWS = 12
+LATE = ("faults.toe.kind=distorted", "faults.toe.time=2 s", "faults.toe.delay=20 ms", "faults.toe.gain=0.9")
+THERMAL = ("gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)")
+WALKS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "solenoid": ("solenoid", ()),
+    "off": ("off", ()),
+    "proportional": ("proportional", ()),
+    "learning": ("proportional-learning", ()),
+    "recycling": ("solenoid-recycling", ()),
+    "lines": ("proportional-regulators", ()),
+    "lines, slow": ("solenoid-regulators", ("controller.rate=500 Hz",)),
+    "timed": ("proportional", ("timing.kind=estimated", "sensors.pressure_bandwidth=40 Hz")),
+    "whole numbers": ("solenoid", ("controller.arithmetic=fixed",)),
+    "course": ("proportional", ("course=first-steps",)),
+    "late toes": ("solenoid", LATE),
+    "thermal": ("proportional", (*THERMAL, "gas_model.wall_area_per_volume=100 1/m", "sensors.force_noise=2 N")),
+}
+VARIED: dict[str, tuple[float, float, str]] = {
+    "supply.pressure": (0.95, 1.15, "Pa_a"),
+    "supply.dorsiflexion_pressure": (0.7, 0.9, "Pa_a"),
+    "supply.atmospheric_pressure": (0.9, 1.02, "Pa_a"),
+    "valve.delay": (0.5, 1.5, "s"),
+    "wearer.body_mass": (0.8, 1.3, "kg"),
+    "wearer.shank_length": (0.9, 1.1, "m"),
+    "wearer.heel_lever": (0.6, 1.4, "m"),
+    "wearer.ankle_stiffness": (0.5, 2.0, "N m/rad"),
+    "controller.push_off_start": (0.9, 1.05, ""),
+    "controller.period": (0.6, 1.4, "s"),
+    "sensors.pressure_bandwidth": (0.5, 2.0, "Hz"),
+    "sensors.force_bandwidth": (0.5, 2.0, "Hz"),
+    "faults.toe.delay": (0.2, 1.5, "s"),
+    "faults.toe.gain": (0.8, 1.2, ""),
+    "run.duration": (0.95, 1.5, "s"),
+    "run.step": (0.5, 1.5, "s"),
+    "gas_model.heat_transfer_coefficient": (0.5, 2.0, "W/(m^2 K)"),
+    "supply_line.plantarflexion.volume": (0.5, 2.0, "m^3"),
+}
+
+
+def columns_of(scenario: Scenario, seed: int) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Columns of five numbers that a walk has, drawn about what it has, and their units."""
+    from ppafo.simulation.numbers import declared_numbers, number_at
+
+    known, draw = declared_numbers(scenario), np.random.default_rng(seed)
+    clock = {"run.duration": scenario.duration, "run.step": 1.0e-3, "controller.period": scenario.control.period}
+    usual = {path: clock[path] if path in clock else number_at(scenario, path) for path in VARIED if path in known}
+    paths = [path for path in VARIED if usual.get(path, 0.0) > 0.0]
+    chosen = sorted(draw.choice(len(paths), 5, replace=False).tolist())
+    found = {path: usual[path] * draw.uniform(*VARIED[path][:2], ROWS) for path in (paths[place] for place in chosen)}
+    return found, {path: VARIED[path][2] for path in found}
+
+
+@pytest.mark.parametrize("name", WALKS)
+def test_a_row_of_columns_has_the_bits_of_the_single_walk(name: str) -> None:
+    file, words = WALKS[name]
+    base = load_walk(file, [*words, *(() if "course" in name else ("run.duration=6 s",))])
+    columns, units = columns_of(base, len(name))
+    plan = plan_ensemble(check_columns(base, columns))
+    rows: dict[int, Any] = dict(plan.reasons)
+    for members, batch in plan.batches:
+        for place, row in enumerate(members.tolist()):
+            clock = batch.clock
+            rows[row] = (batch.program, clock, batch.parameters[:, place], batch.states[:, place])
+    assert len(plan.reasons) < ROWS / 2, plan.reasons
+    for row in range(ROWS):
+        if row in plan.reasons:
+            continue
+        single = reloaded(base, [f"{path}={float(values[row])!r} {units[path]}" for path, values in columns.items()])
+        alone = batch_of(plan_run(single))
+        program, clock, parameters, states = rows[row]
+        assert (program, clock) == (alone.program, alone.clock), row
+        np.testing.assert_array_equal(parameters, alone.parameters[:, 0], err_msg=str(row))
+        np.testing.assert_array_equal(states, alone.states[:, 0], err_msg=str(row))
+
+
+def test_metrics_of_rows_are_those_of_the_walks_alone() -> None:
+    base = load_walk("proportional", ["run.duration=8 s"])
+    columns = {"supply.dorsiflexion_pressure": np.array([2.5e5, 3.1e5]), "wearer.body_mass": np.array([60.0, 90.0])}
+    names = ("gas", "push_off_work", "toe_clearance", "counted_strides", "total_gas", "push_off_error", "strides")
+    found = run_ensemble(base, columns, names)
+    for row in range(2):
+        words = [f"supply.dorsiflexion_pressure={columns['supply.dorsiflexion_pressure'][row].item()!r} Pa_a"]
+        alone = walk(reloaded(base, [*words, f"wearer.body_mass={columns['wearer.body_mass'][row].item()!r} kg"]))
+        for name in names:
+            assert found.metrics[name][row] == pytest.approx(alone.metrics[name].value, rel=2.0e-14), name
+
+
+def test_a_walk_that_contradicts_itself_is_refused_and_the_others_go_on() -> None:
+    base = load_walk("solenoid", ["run.duration=6 s"])
+    found = run_ensemble(base, {"controller.load_threshold": np.array([60.0, 25.0])}, ["strides"])
+    assert found.status.tolist() == [0, 2]
+    assert "must be below controller.load_threshold, which is 25 N" in found.reasons[1]
+
+
+@pytest.mark.parametrize("name", ["solenoid", "course", "whole numbers"])
+def test_a_person_of_the_population_walks_in_a_row_as_alone(name: str) -> None:
+    file, words = WALKS[name]
+    base = load_walk(file, [*words, *(() if "course" in name else ("run.duration=6 s",))])
+    persons = np.array([0.0, 3.0, 17.0, 4.0e9])
+    plan = plan_ensemble(check_columns(base, {"wearer.person": persons}))
+    assert not plan.reasons
+    ((members, batch),) = plan.batches
+    for place, row in enumerate(members.tolist()):
+        alone = batch_of(plan_run(reloaded(base, [f"wearer.person={persons[row]:.0f}"])))
+        np.testing.assert_array_equal(batch.parameters[:, place], alone.parameters[:, 0], err_msg=str(row))
+        np.testing.assert_array_equal(batch.states[:, place], alone.states[:, 0], err_msg=str(row))
+    usual = batch_of(plan_run(base))
+    np.testing.assert_array_equal(batch.parameters[:, members.tolist().index(0)], usual.parameters[:, 0])
+
+
+def test_a_person_is_healthy_as_his_or_her_own_gait_is() -> None:
+    own = walk("off", overrides=["wearer.person=5", "run.duration=8 s", "wearer.keeps_gait=1"])
+    usual = walk("off", overrides=["run.duration=8 s"])
+    assert own.metrics["angle_difference"].value < 0.02, "who keeps the gait keeps that of the person"
+    assert own.metrics["healthy_positive_work"].value != usual.metrics["healthy_positive_work"].value
+
+
+@pytest.mark.parametrize(("words", "reason"), [("wearer.person=0.5", "must be a whole number")])
+def test_half_a_person_does_not_walk(words: str, reason: str) -> None:
+    with pytest.raises(ScenarioError, match=reason):
+        load_walk("off", [words])
+    found = run_ensemble(load_walk("off", ["run.duration=6 s"]), {"wearer.person": np.array([0.5, 1.0])}, ["strides"])
+    assert found.status.tolist() == [2, 0]
