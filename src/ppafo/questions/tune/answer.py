@@ -7,10 +7,11 @@ from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import display_value, title_with_unit
 from ppafo.answers.shown_metrics import metric_quantity
 from ppafo.questions.tune.figure import search_figure, task_figure
-from ppafo.questions.tune.problem import Constraint
+from ppafo.questions.tune.problem import Constraint, Problem
 from ppafo.questions.tune.search import agreement, keeps
 from ppafo.questions.tune.solve import FRESH_DRAWS, Setting, Tuning
 from ppafo.simulation.document import plain
+from ppafo.simulation.scenario import worn_kind
 from ppafo.studies.intervals import fraction_text
 from ppafo.units import percentage
 
@@ -33,7 +34,7 @@ def answer_of(tuning: Tuning) -> Answer:
             Section("Gains", table=_gains(tuning)),
             Section("Before and after", table=_metrics(tuning), figure=task),
             Section("The search", remarks=tuple(remarks(tuning)), figure=course),
-            Section("To use the gains", code=f"ppafo simulate {problem.scenario.name} {_options(tuning)}"),
+            Section("To use the gains", code=f"ppafo {_verb(problem)} {problem.scenario.name} {_options(tuning)}"),
         ),
         data=_data(tuning),
         passed=tuning.after.is_feasible,
@@ -149,6 +150,11 @@ def _violations_on_fresh(tuning: Tuning) -> list[str]:
     return [*broken, *([f"{percentage(lacking, 2)} of the runs fail or lack a metric"] if values and lacking else [])]
 
 
+def _verb(problem: Problem) -> str:
+    """Return the command, and the function, that runs the scenario once."""
+    return "simulate" if worn_kind(problem.scenario) is None else "walk"
+
+
 def _options(tuning: Tuning) -> str:
     """Return the gains as options of a command."""
     return " ".join(f'--set "{line}"' for line in (*tuning.problem.overrides, *tuning.lines))
@@ -157,10 +163,11 @@ def _options(tuning: Tuning) -> str:
 def _overrides(tuning: Tuning) -> str:
     """Return the gains for a command line, a study file and Python."""
     lines = (*tuning.problem.overrides, *tuning.lines)
-    listed = ", ".join(f'"{line}"' for line in lines)
+    listed, verb = ", ".join(f'"{line}"' for line in lines), _verb(tuning.problem)
+    given = "" if verb == "simulate" else "overrides="
     return (
         f"# {verdict(tuning)}\n\n# on the command line\n{_options(tuning)}\n\n# in a study file\noverrides = "
-        f"[{listed}]\n\n# in Python\nppafo.simulate({tuning.problem.scenario.name!r}, [{listed}])\n"
+        f"[{listed}]\n\n# in Python\nppafo.{verb}({tuning.problem.scenario.name!r}, {given}[{listed}])\n"
     )
 
 
