@@ -32,6 +32,7 @@ class Composer(ast.NodeTransformer):
 
     ``rows_of`` says which rows of effects a function that was added needs: each call hands them over before its own
     arguments. ``needed`` has those that this function must be handed in its turn, because it has no such parameter.
+    ``stands_for`` says which class a declared row has in this module.
     """
 
     def __init__(
@@ -40,11 +41,13 @@ class Composer(ast.NodeTransformer):
         add: Callable[[Any], str],
         note: Callable[[Mapping[str, Any], str, Any], None],
         rows_of: Callable[[str], tuple[str, ...]] = lambda _name: (),
+        stands_for: Callable[[Any], Any] = lambda row: row,
     ) -> None:
         self.function = function
         self.add = add
         self.note = note
         self.rows_of = rows_of
+        self.stands_for = stands_for
         self.local = frozenset(function.__code__.co_varnames)
         self.kinds: dict[str, Any] = dict(function.__annotations__)
         self.given = frozenset(_parameters(function.__code__))
@@ -178,7 +181,7 @@ class Composer(ast.NodeTransformer):
 
     def fields_of(self, node: ast.expr) -> tuple[Any, list[ast.Attribute]]:
         """The class of a row and an expression for each of its fields. ProgramError where the class is not declared."""
-        row, owner = self.row_of(node), node
+        row, owner = self.stands_for(self.row_of(node)), node
         while isinstance(owner, ast.Attribute):
             owner = owner.value
         if row is None or not isinstance(owner, ast.Name):

@@ -86,7 +86,8 @@ class Outline:
 
     def _declared(self, item: Any) -> list[str]:
         """Rows that the annotations of a function or a row name: ``_replace`` and ``each`` write out their fields."""
-        return [self._described(kind) for kind in item.__annotations__.values() if is_row(kind)]
+        kinds = (kind for kind in item.__annotations__.values() if is_row(kind))
+        return [self._described(self.links.get((kind, "_replace"), kind)) for kind in kinds]
 
     def _function(self, function: FunctionType) -> str:
         code, named_defaults = function.__code__, dict(function.__kwdefaults__ or {})

@@ -84,7 +84,10 @@ class Collector(Protocol):
 
     @property
     def links(self) -> dict[Any, Any]:
-        """Functions that stand for others; those under a pair stand for its second inside its first alone."""
+        """What stands for others: under a pair of functions for its second inside its first alone.
+
+        Under a row and ``"_replace"`` is the class that ``row._replace`` makes.
+        """
 
     @property
     def effects(self) -> dict[Any, tuple[str, ...]]:
@@ -168,7 +171,9 @@ class SourceCollector:
         if any(known.function is function for known in self.functions):
             raise refusal(file, tree, f"'{function.__name__}' calls itself, which cannot be compiled")
         self.functions.append(made)
-        composer = Composer(function, lambda item: self._add_inside(function, item), self._note, self._rows_of)
+        composer = Composer(
+            function, lambda item: self._add_inside(function, item), self._note, self._rows_of, self._stands_for
+        )
         arguments = tree.args
         asked = self.effects.get(function, ())
         if asked:
@@ -204,6 +209,9 @@ class SourceCollector:
                 f"{place_of(function)}: '{item.__name__}' is the law of an effect: call its place instead"
             )
         return self.add(item)
+
+    def _stands_for(self, row: Any) -> Any:
+        return self.links.get((row, "_replace"), row)
 
     def _rows_of(self, name: str) -> tuple[str, ...]:
         return self.needs.get(name, ())

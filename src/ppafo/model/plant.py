@@ -40,40 +40,6 @@ class PlantParameters(NamedTuple):
     relieving: float
 
 
-def plant_with(
-    plant: PlantParameters,
-    supply_pressure: float,
-    dorsiflexion_pressure: float,
-    leak_conductance: float,
-    leak_curve: FlowCurve,
-) -> PlantParameters:
-    """The plant with other supply pressures [Pa] and another leak [kg/(s Pa)], all else as it is."""
-    return PlantParameters(
-        gas_product=plant.gas_product,
-        torque_constant=plant.torque_constant,
-        volume_per_angle=plant.volume_per_angle,
-        angle_min=plant.angle_min,
-        angle_max=plant.angle_max,
-        dead_volume_1=plant.dead_volume_1,
-        dead_volume_2=plant.dead_volume_2,
-        restitution=plant.restitution,
-        static_torque=plant.static_torque,
-        dynamic_torque=plant.dynamic_torque,
-        viscous_damping=plant.viscous_damping,
-        inertia=plant.inertia,
-        gravity_torque=plant.gravity_torque,
-        external_torque=plant.external_torque,
-        supply_pressure=supply_pressure,
-        dorsiflexion_pressure=dorsiflexion_pressure,
-        atmospheric_pressure=plant.atmospheric_pressure,
-        valve_conductance=plant.valve_conductance,
-        leak_conductance=leak_conductance,
-        valve_curve=plant.valve_curve,
-        leak_curve=leak_curve,
-        relieving=plant.relieving,
-    )
-
-
 class PlantState(NamedTuple):
     """Angle [rad], angular velocity [rad/s], gas in the chambers [kg]; gas totals [kg] since the start of the run.
 

@@ -55,7 +55,9 @@ def plant_parameters(device: Device, external_torque: float = 0.0) -> PlantParam
     plant = plant_with(device, valve, restriction(device.actuator.leak, device.gas, ratio), external_torque)
     if ACTUATORS[device.actuator.kind].model.shape is None:
         return plant
-    return cast(PlantParameters, plant_in_shape(plant, *shape_and_growth(device)))
+    return cast(
+        PlantParameters, plant_in_shape(plant, ACTUATORS[device.actuator.kind].model, *shape_and_growth(device))
+    )
 
 
 def shape_and_growth(device: Device) -> tuple[Any, Any]:

@@ -49,29 +49,11 @@ def device_share(plant: PlantParameters, leg: LegParameters) -> DeviceShare:
 
 def with_leg(plant: PlantParameters, leg: LegParameters) -> PlantParameters:
     """The plant with the foot's inertia and the ankle's damping; its own gravity is accounted for in the leg."""
-    return PlantParameters(
-        gas_product=plant.gas_product,
-        torque_constant=plant.torque_constant,
-        volume_per_angle=plant.volume_per_angle,
-        angle_min=plant.angle_min,
-        angle_max=plant.angle_max,
-        dead_volume_1=plant.dead_volume_1,
-        dead_volume_2=plant.dead_volume_2,
-        restitution=plant.restitution,
-        static_torque=plant.static_torque,
-        dynamic_torque=plant.dynamic_torque,
+    return plant._replace(
         viscous_damping=plant.viscous_damping + leg.ankle_damping,
         inertia=plant.inertia + foot_inertia_about_ankle(leg),
         gravity_torque=0.0,
         external_torque=0.0,
-        supply_pressure=plant.supply_pressure,
-        dorsiflexion_pressure=plant.dorsiflexion_pressure,
-        atmospheric_pressure=plant.atmospheric_pressure,
-        valve_conductance=plant.valve_conductance,
-        leak_conductance=plant.leak_conductance,
-        valve_curve=plant.valve_curve,
-        leak_curve=plant.leak_curve,
-        relieving=plant.relieving,
     )
 
 

@@ -1,7 +1,7 @@
 """Chambers that a valve joins with each other: the leak between them is as wide as that valve stands open."""
 
 from ppafo.model.orifice import FlowCurve
-from ppafo.model.plant import PlantParameters, plant_with
+from ppafo.model.plant import PlantParameters
 
 
 def plant_with_joined_chambers(plant: PlantParameters, opening: float) -> PlantParameters:
@@ -13,7 +13,7 @@ def plant_with_joined_chambers(plant: PlantParameters, opening: float) -> PlantP
     conductance = plant.leak_conductance + joining
     share = joining / max(conductance, 1.0e-30)
     curve = mean_curve(plant.leak_curve, plant.valve_curve, share)
-    return plant_with(plant, plant.supply_pressure, plant.dorsiflexion_pressure, conductance, curve)
+    return plant._replace(leak_conductance=conductance, leak_curve=curve)
 
 
 def mean_curve(first: FlowCurve, second: FlowCurve, share: float) -> FlowCurve:

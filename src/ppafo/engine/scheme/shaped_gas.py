@@ -5,7 +5,6 @@ vane's chambers, it calls those of its actuator. ``chambers_at``, ``pressures_at
 stand for the kind's own.
 """
 
-from collections.abc import Callable
 from typing import Any
 
 from ppafo.engine.scheme.pneumatics import (
@@ -17,14 +16,14 @@ from ppafo.engine.scheme.pneumatics import (
     solve_stage,
 )
 from ppafo.engine.scheme.stage_flows import SlopedFlows
-from ppafo.model.actuators.kind import ActuatorModel, Chambers, ShapedPlant, shaped_plant_with
+from ppafo.model.actuators.kind import ActuatorModel, Chambers, ShapedPlant
 from ppafo.model.actuators.vane import MODEL as VANE
 from ppafo.model.plant import (
+    PlantParameters,
     PlantState,
     chamber_pressures,
     chamber_volumes,
     driving_torque,
-    plant_with,
     pressures_per_mass,
 )
 from ppafo.model.sensors import Measurement
@@ -102,7 +101,7 @@ def begin_shaped_gas(
     return MovingGas(StillGas(linear=linear, first=first, end_1=end_1, end_2=end_2), drift)
 
 
-def links_of(actuator: ActuatorModel) -> dict[Callable[..., Any], Callable[..., Any]]:
+def links_of(actuator: ActuatorModel) -> dict[Any, Any]:
     """What a program with this actuator calls in place of the functions of the vane; nothing for the vane."""
     if actuator is VANE:
         return {}
@@ -114,5 +113,5 @@ def links_of(actuator: ActuatorModel) -> dict[Callable[..., Any], Callable[..., 
         chamber_volumes: rest_volumes,
         pressures_per_mass: rest_pressures_per_mass,
         driving_torque: shaped_driving_torque,
-        plant_with: shaped_plant_with,
+        (PlantParameters, "_replace"): actuator.plant,
     }

@@ -29,7 +29,6 @@ from ppafo.model.plant import (
     ThermalParameters,
     ThermalState,
     chamber_volumes,
-    plant_with,
 )
 from ppafo.model.ports import PortFlowSlopes
 from ppafo.model.regulator import LineState, LineStep, SupplyLines, line_pressures, step_lines
@@ -47,7 +46,7 @@ class FedGas(NamedTuple):
 def plant_at_line_pressures(plant: PlantParameters, lines: SupplyLines, state: LineState) -> PlantParameters:
     """The plant with the pressures of its lines in place of those that the regulators are set to."""
     pressure_1, pressure_2 = line_pressures(lines, plant.gas_product, state)
-    return plant_with(plant, pressure_1, pressure_2, plant.leak_conductance, plant.leak_curve)
+    return plant._replace(supply_pressure=pressure_1, dorsiflexion_pressure=pressure_2)
 
 
 def lines_after(

@@ -15,10 +15,11 @@ from ppafo.engine.scheme.parts import Pace
 from ppafo.engine.source_text import Collector, woven
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
 from ppafo.exports.c_library.program import COUNTS
-from ppafo.model.actuators.kind import Range, mean_growth, plant_in_shape
+from ppafo.model.actuators.kind import Range, mean_growth
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.catalog import ordered_effects
 from ppafo.model.gas import specific_gas_constant
+from ppafo.model.plant import PlantParameters
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.catalog import VALVES
@@ -180,7 +181,11 @@ class Writing:
         yield f"shape = {add(model.prepare)}({self.row('ActuatorSettings', settings)}, stops{measured})"
         gauge = f"{vane}.supply_pressure - {vane}.atmospheric_pressure"
         yield f"growth = {add(mean_growth)}(shape, stops, {gauge}, {add(model.chambers)})"
-        yield f"{name} = {add(plant_in_shape)}({vane}, shape, growth)"
+        fields = [
+            "growth" if field in ("torque_constant", "volume_per_angle") else f"{vane}.{field}"
+            for field in PlantParameters._fields
+        ]
+        yield f"{name} = {add(model.plant)}({', '.join(fields)}, shape)"
 
     def _restriction(self, section: str, orifice: Any) -> str:
         """An orifice with the gas, in the form that it has."""

@@ -7,10 +7,9 @@ that d tau/dp = dV/dangle: what the gas gives as p dV the shaft gets. A kind is 
 from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, get_type_hints
+from typing import Any, NamedTuple, Protocol, get_type_hints
 
 from ppafo.model.declaration import Quantity
-from ppafo.model.orifice import FlowCurve
 from ppafo.model.plant import PlantParameters
 
 
@@ -71,36 +70,40 @@ class ActuatorKind:
     problem: Callable[[Mapping[str, float], Range], str]
 
 
-class ShapedPlant(NamedTuple):
-    """A plant whose actuator is no vane: ``PlantParameters`` with the numbers of its kind.
+class ShapedPlant(Protocol):
+    """A plant whose actuator is no vane: ``PlantParameters`` with the numbers of its kind. What a kind may ask of it.
 
     ``volume_per_angle`` is the mean growth of chamber 1 between the stops and ``torque_constant`` the same number:
     what scales errors, and what laws that were made for a vane believe.
     """
 
-    gas_product: float
-    torque_constant: float
-    volume_per_angle: float
-    angle_min: float
-    angle_max: float
-    dead_volume_1: float
-    dead_volume_2: float
-    restitution: float
-    static_torque: float
-    dynamic_torque: float
-    viscous_damping: float
-    inertia: float
-    gravity_torque: float
-    external_torque: float
-    supply_pressure: float
-    dorsiflexion_pressure: float
-    atmospheric_pressure: float
-    valve_conductance: float
-    leak_conductance: float
-    valve_curve: FlowCurve
-    leak_curve: FlowCurve
-    relieving: float
-    shape: Any
+    @property
+    def shape(self) -> Any:
+        """The numbers of the kind."""
+
+    @property
+    def gas_product(self) -> float:
+        """R T / M [J/kg]."""
+
+    @property
+    def supply_pressure(self) -> float:
+        """Pressure of the supply of chamber 1 [Pa]."""
+
+    @property
+    def dorsiflexion_pressure(self) -> float:
+        """Pressure of the supply of chamber 2 [Pa]."""
+
+    @property
+    def atmospheric_pressure(self) -> float:
+        """Pressure of the atmosphere [Pa]."""
+
+    @property
+    def gravity_torque(self) -> float:
+        """Largest gravity torque [N m]."""
+
+    @property
+    def external_torque(self) -> float:
+        """Torque T_ex [N m]."""
 
 
 class AtRest(NamedTuple):
@@ -118,81 +121,17 @@ def mean_growth(shape: Any, stops: Range, gauge: float, chambers: Callable[..., 
     return (last - first) / max(stops.angle_max - stops.angle_min, 1.0e-9)
 
 
-def shaped_plant(
-    plant: Any,
-    shape: Any,
-    growth: float,
-    supply_pressure: float,
-    dorsiflexion_pressure: float,
-    leak_conductance: float,
-    leak_curve: FlowCurve,
-) -> ShapedPlant:
-    """A plant with a shape, its mean growth [m^3/rad], supply pressures [Pa] and leak [kg/(s Pa)]; the rest stays."""
-    return ShapedPlant(
-        gas_product=plant.gas_product,
-        torque_constant=growth,
-        volume_per_angle=growth,
-        angle_min=plant.angle_min,
-        angle_max=plant.angle_max,
-        dead_volume_1=plant.dead_volume_1,
-        dead_volume_2=plant.dead_volume_2,
-        restitution=plant.restitution,
-        static_torque=plant.static_torque,
-        dynamic_torque=plant.dynamic_torque,
-        viscous_damping=plant.viscous_damping,
-        inertia=plant.inertia,
-        gravity_torque=plant.gravity_torque,
-        external_torque=plant.external_torque,
-        supply_pressure=supply_pressure,
-        dorsiflexion_pressure=dorsiflexion_pressure,
-        atmospheric_pressure=plant.atmospheric_pressure,
-        valve_conductance=plant.valve_conductance,
-        leak_conductance=leak_conductance,
-        valve_curve=plant.valve_curve,
-        leak_curve=leak_curve,
-        relieving=plant.relieving,
-        shape=shape,
-    )
-
-
-def plant_in_shape(plant: PlantParameters, shape: Any, growth: float) -> ShapedPlant:
-    """The plant of another kind from that of a vane with the same stops, gas and orifices."""
-    return shaped_plant(
-        plant,
-        shape,
-        growth,
-        plant.supply_pressure,
-        plant.dorsiflexion_pressure,
-        plant.leak_conductance,
-        plant.leak_curve,
-    )
-
-
-def shaped_plant_with(
-    plant: ShapedPlant,
-    supply_pressure: float,
-    dorsiflexion_pressure: float,
-    leak_conductance: float,
-    leak_curve: FlowCurve,
-) -> ShapedPlant:
-    """The plant with other supply pressures [Pa] and another leak [kg/(s Pa)], all else as it is."""
-    return shaped_plant(
-        plant,
-        plant.shape,
-        plant.volume_per_angle,
-        supply_pressure,
-        dorsiflexion_pressure,
-        leak_conductance,
-        leak_curve,
-    )
+def plant_in_shape(plant: PlantParameters, model: ActuatorModel, shape: Any, growth: float) -> Any:
+    """The plant of another kind from that of a vane with the same stops, gas and orifices; mean growth [m^3/rad]."""
+    return model.plant(*plant._replace(torque_constant=growth, volume_per_angle=growth), shape)
 
 
 def _plant_with(shape: type) -> type:
-    """``ShapedPlant`` with the shape of one kind: one class for each, which stands under the same name in a program."""
+    """A plant with the shape of one kind: one class for each, which stands under the same name in a program."""
     if shape not in _PLANTS:
         make: Any = namedtuple
-        row = make(ShapedPlant.__name__, ShapedPlant._fields)
-        row.__annotations__ = get_type_hints(ShapedPlant, include_extras=True) | {"shape": shape}
+        row = make("ShapedPlant", (*PlantParameters._fields, "shape"))
+        row.__annotations__ = get_type_hints(PlantParameters, include_extras=True) | {"shape": shape}
         _PLANTS[shape] = row
     return _PLANTS[shape]
 
