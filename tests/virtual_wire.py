@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from ppafo.exports.hil.packets import BEGIN, OVER, VENTED, Answer, Reader, Sample, answer_bytes, sample_bytes, value_of
+from ppafo.exports.hil.wire import BEGIN, OVER, VENTED, Answer, Reader, Sample, answer_bytes, sample_bytes, value_of
 
 Fault = Callable[[random.Random, float, bytes], list[tuple[float, bytes]]]
 """What becomes of a packet that would arrive at a time [s]: packets with their times."""
@@ -54,7 +54,7 @@ class ProportionalLaw:
         pass
 
     def update(self, time: float, reference: float, measurement: object) -> float:
-        from ppafo.exports.hil.packets import count_of
+        from ppafo.exports.hil.wire import count_of
 
         error = count_of("reference", reference) - count_of("torque", measurement.torque)  # type: ignore[attr-defined]
         return value_of("command", max(-1_000_000, min(1_000_000, error // 2)))

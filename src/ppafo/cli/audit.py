@@ -4,14 +4,7 @@ import argparse
 import textwrap
 from typing import TYPE_CHECKING, Any
 
-from ppafo.cli.output import (
-    EXIT_CHECK_FAILED,
-    EXIT_GOOD,
-    add_output_arguments,
-    add_override_argument,
-    check_output,
-    deliver,
-)
+from ppafo.cli import output
 
 if TYPE_CHECKING:
     from ppafo.parameters import ParameterSet
@@ -27,8 +20,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "names", metavar="SET", nargs="+", help="name of a set, or a .toml file; several are shown side by side"
     )
-    add_override_argument(parser)
-    add_output_arguments(parser)
+    output.add_override_argument(parser)
+    output.add_output_arguments(parser)
 
 
 def run(parsed: argparse.Namespace) -> int:
@@ -36,15 +29,15 @@ def run(parsed: argparse.Namespace) -> int:
     from ppafo.parameters import apply_overrides, load_parameter_set
     from ppafo.parameters.audit import audit
 
-    check_output(parsed)
+    output.check_output(parsed)
     sets = [apply_overrides(load_parameter_set(name), parsed.overrides) for name in parsed.names]
     found = [(parameter_set, audit(parameter_set)) for parameter_set in sets]
     documents = [_document(*one, parsed.overrides) for one in found]
     if len(found) == 1:
-        deliver(f"audit-{sets[0].name}", _text(*found[0]), documents[0], parsed)
+        output.deliver(f"audit-{sets[0].name}", _text(*found[0]), documents[0], parsed)
     else:
-        deliver("audit", _table(found), {"sets": documents}, parsed)
-    return EXIT_CHECK_FAILED if any(_counts(findings)["error"] for _, findings in found) else EXIT_GOOD
+        output.deliver("audit", _table(found), {"sets": documents}, parsed)
+    return output.EXIT_CHECK_FAILED if any(_counts(findings)["error"] for _, findings in found) else output.EXIT_GOOD
 
 
 def _document(parameter_set: "ParameterSet", findings: "list[Finding]", overrides: list[str]) -> dict[str, Any]:

@@ -5,7 +5,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from ppafo.cli.output import EXIT_GOOD, add_output_arguments, check_output, deliver
+from ppafo.cli import output
 from ppafo.errors import SimulationError
 
 _DAY = 86400.0
@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     orders = parser.add_mutually_exclusive_group()
     orders.add_argument("--warm", action="store_true", help="compile the models of the scenarios of the package")
     orders.add_argument("--clear", action="store_true", help="remove all compiled models")
-    add_output_arguments(parser)
+    output.add_output_arguments(parser)
 
 
 def run(parsed: argparse.Namespace) -> int:
@@ -24,7 +24,7 @@ def run(parsed: argparse.Namespace) -> int:
     from ppafo.engine.cache import cache_folder, clear, refusal
     from ppafo.engine.kept import clear_kept
 
-    check_output(parsed)
+    output.check_output(parsed)
     folder = cache_folder()
     cleared = clear_kept(folder) + clear(folder) if parsed.clear and folder is not None else 0
     why_not = "" if parsed.clear else refusal(folder)
@@ -36,8 +36,21 @@ def run(parsed: argparse.Namespace) -> int:
 
         compile_models(list_scenarios())
     document = _document(folder, why_not) | ({"freed": cleared} if parsed.clear else {})
-    deliver("cache", "\n".join(_lines(document)), document, parsed)
-    return EXIT_GOOD
+    lines = [f"folder: {document['folder'] or 'none'}"]
+    if document["not_used"]:
+        lines.append(f"not used: {document['not_used']}")
+    if "freed" in document:
+        lines.append(f"removed: {_megabytes(document['freed'])}")
+    lines.append(f"programs: {len(document['programs'])}, {_megabytes(document['size'])}")
+    if document["made_from_programs"]:
+        lines.append(f"texts of programs and their forms for pages: {_megabytes(document['made_from_programs'])}")
+    lines += [
+        f"  {item['name']}  {_megabytes(item['size']):>8}  last used {_days(item['unused_days'])}"
+        for item in document["programs"]
+    ]
+    limits = f"{document['kept_unused_days']:.0f} days unused, or above {_megabytes(document['most_bytes'])} in all"
+    output.deliver("cache", "\n".join([*lines, f"removed by themselves: after {limits}"]), document, parsed)
+    return output.EXIT_GOOD
 
 
 def _document(folder: Path | None, why_not: str) -> dict[str, Any]:
@@ -58,23 +71,6 @@ def _document(folder: Path | None, why_not: str) -> dict[str, Any]:
             for program in programs
         ],
     }
-
-
-def _lines(document: dict[str, Any]) -> list[str]:
-    lines = [f"folder: {document['folder'] or 'none'}"]
-    if document["not_used"]:
-        lines.append(f"not used: {document['not_used']}")
-    if "freed" in document:
-        lines.append(f"removed: {_megabytes(document['freed'])}")
-    lines.append(f"programs: {len(document['programs'])}, {_megabytes(document['size'])}")
-    if document["made_from_programs"]:
-        lines.append(f"texts of programs and their forms for pages: {_megabytes(document['made_from_programs'])}")
-    lines += [
-        f"  {item['name']}  {_megabytes(item['size']):>8}  last used {_days(item['unused_days'])}"
-        for item in document["programs"]
-    ]
-    limits = f"{document['kept_unused_days']:.0f} days unused, or above {_megabytes(document['most_bytes'])} in all"
-    return [*lines, f"removed by themselves: after {limits}"]
 
 
 def _megabytes(size: int) -> str:

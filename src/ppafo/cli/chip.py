@@ -5,14 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ppafo.cli.output import (
-    EXIT_CHECK_FAILED,
-    EXIT_GOOD,
-    add_output_arguments,
-    add_override_argument,
-    check_output,
-    deliver,
-)
+from ppafo.cli import output
 from ppafo.control.fixed.torque_laws import PLANT_TARGETS, TARGETS, WALK_TARGETS
 from ppafo.errors import ScenarioError
 
@@ -21,7 +14,7 @@ if TYPE_CHECKING:
 
     from ppafo.exports.firmware.lock_step import ChipRun, Comparison, Cost
     from ppafo.exports.firmware.plant import BoardsRun
-    from ppafo.exports.firmware.walking.lock_step import WalkOnChip
+    from ppafo.exports.firmware.walking import WalkOnChip
     from ppafo.simulation.scenario import Scenario
 
 _SHOWN = {"rms_error": ("N m", 1.0), "gas_supplied": ("g", 1.0e3)}
@@ -60,8 +53,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help=f"compare every integer controller on every target instead (with {SAMPLES_OF_TABLE} samples each)",
     )
-    add_override_argument(parser)
-    add_output_arguments(parser)
+    output.add_override_argument(parser)
+    output.add_output_arguments(parser)
 
 
 def run(parsed: argparse.Namespace) -> int:
@@ -76,10 +69,10 @@ def run(parsed: argparse.Namespace) -> int:
         raise ScenarioError("--plant and --samples: give one of them; drawn samples have no plant")
     if not parsed.table and not parsed.scenarios:
         raise ScenarioError("give a SCENARIO, or --table; see 'ppafo chip --help'")
-    check_output(parsed)
+    output.check_output(parsed)
     told = _table(parsed) if parsed.table else _one(parsed)
-    deliver("chip", told.text, told.document, parsed, told.draw)
-    return EXIT_GOOD if told.agrees else EXIT_CHECK_FAILED
+    output.deliver("chip", told.text, told.document, parsed, told.draw)
+    return output.EXIT_GOOD if told.agrees else output.EXIT_CHECK_FAILED
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,98 +91,134 @@ def _one(parsed: argparse.Namespace) -> _Told:
     from ppafo.simulation.scenario import worn_kind
 
     every = [load_scenario(name, parsed.overrides) for name in parsed.scenarios]
-    if len(every) == 1:
-        return _scenario(every[0], parsed) if worn_kind(every[0]) is None else _walk(every[0], parsed)
     scenarios = [chosen for chosen in every if worn_kind(chosen) is None]
-    if parsed.plant or parsed.samples is not None or len(scenarios) < len(every):
+    if len(every) == 1 and not scenarios:
+        return _walk(every[0], parsed)
+    if len(every) > 1 and (parsed.plant or parsed.samples is not None or len(scenarios) < len(every)):
         raise ScenarioError(
             "several SCENARIOs: are run in turn and drawn in one figure; give one for a walk, --samples or --plant"
         )
-    return _runs(scenarios, parsed)
-
-
-def _target_of(scenario: "Scenario", parsed: argparse.Namespace) -> str:
-    target: str = parsed.target or TARGETS[0]
+    target = parsed.target or TARGETS[0]
     if target not in TARGETS or parsed.minutes is not None:
-        raise ScenarioError(f"{scenario.name}: {', '.join(WALK_TARGETS)} and --minutes are for walks")
-    return target
+        raise ScenarioError(f"{scenarios[0].name}: {', '.join(WALK_TARGETS)} and --minutes are for walks")
+    if parsed.plant:
+        return _boards(scenarios[0], target, parsed.plant)
+    if parsed.samples is None:
+        return _runs(scenarios, target)
+    from ppafo.exports.firmware.lock_step import compare_drawn
+
+    found = compare_drawn(scenarios[0], parsed.samples, target=target)
+    about = {"scenario": scenarios[0].name, "target": target}
+    return _drawn(found, scenarios[0].name, scenarios[0].control.period, about)
 
 
-def _runs(scenarios: "Sequence[Scenario]", parsed: argparse.Namespace) -> _Told:
+def _runs(scenarios: "Sequence[Scenario]", target: str) -> _Told:
     """Scenarios with the chip in charge, one after the other, and their figure."""
     from ppafo.exports.firmware.lock_step import chip_figure, run_on_chip
 
-    found = [run_on_chip(scenario, _target_of(scenario, parsed)) for scenario in scenarios]
-    documents = [{"scenario": one.scenario.name, "target": one.cost.target.name, **_run_document(one)} for one in found]
+    found = [run_on_chip(scenario, target) for scenario in scenarios]
+    texts, documents = [], []
+    for one in found:
+        metrics = {name: one.chip.metrics[name].value for name in _SHOWN if name in one.chip.metrics}
+        lines = [
+            f"{one.scenario.name} with the controller on the chip's simulator, the lanes as the plant",
+            "",
+            *_cost_lines(one.cost, one.scenario.control.period),
+            *_compared_lines(one),
+            *(f"{name:<12} {value * _SHOWN[name][1]:.4f} {_SHOWN[name][0]}" for name, value in metrics.items()),
+        ]
+        texts.append("\n".join(lines))
+        documents.append(
+            {
+                "scenario": one.scenario.name,
+                "target": one.cost.target.name,
+                **_compared(one),
+                "same_bits": one.same_bits,
+                **_cost_document(one.cost),
+                "metrics": metrics,
+            }
+        )
     return _Told(
-        "\n\n".join(map(_of_run, found)),
+        "\n\n".join(texts),
         documents[0] if len(documents) == 1 else {"runs": documents},
         all(one.same_bits and not one.differences for one in found),
         lambda: chip_figure(found),
     )
 
 
-def _scenario(scenario: "Scenario", parsed: argparse.Namespace) -> _Told:
-    """A scenario on the chip."""
-    from ppafo.exports.firmware.lock_step import compare_drawn
+def _drawn(found: "Comparison", name: str, period: float, about: dict[str, Any]) -> _Told:
+    """Drawn samples on the chip and in Python."""
+    lines = [
+        f"{found.samples} drawn samples of the controller of {name} on the chip's simulator",
+        "",
+        *_cost_lines(found.cost, period),
+        f"decisions   {found.samples}, {found.differences} other than those of the integer controller in Python",
+        *([f"the first: {found.first_difference}"] if found.differences else []),
+    ]
+    document = {**about, **_compared(found), **_cost_document(found.cost)}
+    return _Told("\n".join(lines), document, not found.differences)
+
+
+def _boards(scenario: "Scenario", target: str, plant: str) -> _Told:
+    """A scenario with its controller on one board and its plant on another."""
     from ppafo.exports.firmware.plant import run_on_two_boards
 
-    target = _target_of(scenario, parsed)
-    if parsed.plant:
-        both = run_on_two_boards(scenario, target, parsed.plant)
-        text, document, agrees = _of_boards(both, target), _boards_document(both), not both.differences
-    elif parsed.samples is None:
-        return _runs((scenario,), parsed)
-    else:
-        drawn = compare_drawn(scenario, parsed.samples, target=target)
-        text, document, agrees = _of_drawn(scenario, drawn), _drawn_document(drawn), not drawn.differences
-    return _Told(text, {"scenario": scenario.name, "target": target, **document}, agrees)
+    found = run_on_two_boards(scenario, target, plant)
+    board = found.plant
+    share = found.worst / board.clock / scenario.control.period
+    lines = [
+        f"{scenario.name} with the controller on a simulated {target}, the plant on a simulated {board.name}",
+        "",
+        f"plant       {found.sizes.flash} bytes of flash, {found.sizes.data} of data, {found.stack} of stack",
+        f"a sample    {found.worst} {board.counted} at worst, {found.mean:.0f} on average; "
+        f"at one cycle each {share:.2%} of a sample at {board.clock / 1.0e6:g} MHz",
+        f"samples     {found.samples}, {found.differences} with other bits than in the lanes",
+        f"compared    {', '.join(found.compared)}",
+        *([f"the first: {found.first_difference}"] if found.differences else []),
+    ]
+    work = {f"worst_{board.counted}": found.worst, f"mean_{board.counted}": found.mean}
+    document = {
+        "scenario": scenario.name,
+        "target": target,
+        **_compared(found),
+        "compared": list(found.compared),
+        "plant": {"target": board.name, **found.sizes._asdict(), "stack": found.stack, **work},
+    }
+    return _Told("\n".join(lines), document, not found.differences)
 
 
 def _walk(configuration: "Scenario", parsed: argparse.Namespace) -> _Told:
     """A walk on the chip."""
-    from ppafo.exports.firmware.walking.lock_step import compare_drawn_walk, walk_on_chip
+    from ppafo.exports.firmware.walking import compare_drawn_walk, walk_on_chip
 
     name, target = configuration.name, parsed.target or WALK_TARGETS[0]
     if parsed.plant:
         raise ScenarioError(f"{name}: --plant is for scenarios; the plant of a walk is the lanes")
     if target not in WALK_TARGETS:
         raise ScenarioError(f"{name}: a walk's controller runs on {', '.join(WALK_TARGETS)}, not on '{target}'")
+    about = {"walk": name, "target": target}
     if parsed.samples is not None:
         if parsed.minutes is not None:
             raise ScenarioError("--minutes: drawn samples take the place of a walk; leave out one of both")
-        drawn = compare_drawn_walk(configuration, parsed.samples)
-        head = f"{drawn.samples} drawn samples of the controller of {name} on the chip's simulator"
-        lines = [head, "", *_cost_lines(drawn.cost, configuration.control.period), _decisions(drawn, "Python")]
-        lines += [f"the first: {drawn.first_difference}"] if drawn.differences else []
-        text, document, agrees = "\n".join(lines), _drawn_document(drawn), not drawn.differences
-    else:
-        found = walk_on_chip(configuration, WALK_MINUTES if parsed.minutes is None else parsed.minutes)
-        text, document, agrees = _of_walk(found, configuration), _walk_document(found), found.same_bits
-    return _Told(text, {"walk": name, "target": target, **document}, agrees)
-
-
-def _of_walk(found: "WalkOnChip", configuration: "Scenario") -> str:
-    """The walk in words."""
+        return _drawn(compare_drawn_walk(configuration, parsed.samples), name, configuration.control.period, about)
+    found = walk_on_chip(configuration, WALK_MINUTES if parsed.minutes is None else parsed.minutes)
     lines = [
-        f"{configuration.name} with the controller on the chip's simulator, the lanes as the plant",
+        f"{name} with the controller on the chip's simulator, the lanes as the plant",
         "",
         *_cost_lines(found.cost, configuration.control.period),
-        _decisions(found, "the lanes"),
-        f"recording   {'the same bits' if found.same_bits else 'NOT the same bits'} as without the chip",
+        *_compared_lines(found),
         f"in the end  {('helps', 'lifts the foot only', 'pauses', 'has stopped')[found.level]}",
-        f"gas         {found.gas * 1.0e3:.4f} g",
+        f"gas         {found.gas * 1.0e3:.4g} g",
     ]
-    return "\n".join(lines)
-
-
-def _decisions(found: "WalkOnChip | Comparison", place: str) -> str:
-    return f"decisions   {found.samples}, {found.differences} other than those of the integer controller in {place}"
-
-
-def _walk_document(found: "WalkOnChip") -> dict[str, Any]:
-    told = {"samples": found.samples, "differences": found.differences, "same_bits": found.same_bits}
-    return {**told, **_cost_document(found.cost), "level": found.level, "gas": found.gas}
+    document = {
+        **about,
+        **_compared(found),
+        "same_bits": found.same_bits,
+        **_cost_document(found.cost),
+        "level": found.level,
+        "gas": found.gas,
+    }
+    return _Told("\n".join(lines), document, found.same_bits)
 
 
 def _table(parsed: argparse.Namespace) -> _Told:
@@ -199,7 +228,6 @@ def _table(parsed: argparse.Namespace) -> _Told:
     lines = ["| target | controller | flash | data + stack | worst and mean | drawn samples | other decisions |"]
     lines.append("|---|---|---|---|---|---|---|")
     documents = []
-    agrees = True
     targets = TARGETS if parsed.target is None else (parsed.target,)
     for row in table_rows(targets, parsed.samples or SAMPLES_OF_TABLE):
         found, own = row.found, {"target": row.target.name, "controller": row.law.replace("`", "")}
@@ -212,60 +240,19 @@ def _table(parsed: argparse.Namespace) -> _Told:
             f"| {row.target.name} | {row.law} | {cost.sizes.flash:,} | {cost.sizes.data} + {cost.stack} "
             f"| {cost.worst:,}, {cost.mean:,.0f} {row.target.counted} | {found.samples:,} | {found.differences} |"
         )
-        documents.append({**own, **_drawn_document(found)})
-        agrees = agrees and not found.differences
-    return _Told("\n".join(lines), {"rows": documents}, agrees)
+        documents.append({**own, **_compared(found), **_cost_document(cost)})
+    return _Told("\n".join(lines), {"rows": documents}, not any(item.get("differences") for item in documents))
 
 
-def _of_run(found: "ChipRun") -> str:
-    """The run in words."""
-    lines = [
-        f"{found.scenario.name} with the controller on the chip's simulator, the lanes as the plant",
-        "",
-        *_cost_lines(found.cost, found.scenario.control.period),
+def _compared(found: "ChipRun | WalkOnChip | Comparison | BoardsRun") -> dict[str, Any]:
+    return {"samples": found.samples, "differences": found.differences}
+
+
+def _compared_lines(found: "ChipRun | WalkOnChip") -> list[str]:
+    return [
         f"decisions   {found.samples}, {found.differences} other than those of the integer controller in the lanes",
         f"recording   {'the same bits' if found.same_bits else 'NOT the same bits'} as without the chip",
-        *(
-            f"{name:<12} {found.chip.metrics[name].value * factor:.4f} {unit}"
-            for name, (unit, factor) in _SHOWN.items()
-            if name in found.chip.metrics
-        ),
     ]
-    return "\n".join(lines)
-
-
-def _of_drawn(scenario: "Scenario", found: "Comparison") -> str:
-    """The comparison in words."""
-    lines = [
-        f"{found.samples} drawn samples of the controller of {scenario.name} on the chip's simulator",
-        "",
-        *_cost_lines(found.cost, scenario.control.period),
-        f"decisions   {found.samples}, {found.differences} other than those of the integer controller in Python",
-    ]
-    return "\n".join([*lines, *([f"the first: {found.first_difference}"] if found.differences else [])])
-
-
-def _of_boards(found: "BoardsRun", target: str) -> str:
-    """The run of two boards in words."""
-    plant, name = found.plant, found.scenario.name
-    share = found.worst / plant.clock / found.scenario.control.period
-    lines = [
-        f"{name} with the controller on a simulated {target}, the plant on a simulated {plant.name}",
-        "",
-        f"plant       {found.sizes.flash} bytes of flash, {found.sizes.data} of data, {found.stack} of stack",
-        f"a sample    {found.worst} {plant.counted} at worst, {found.mean:.0f} on average; "
-        f"at one cycle each {share:.2%} of a sample at {plant.clock / 1.0e6:g} MHz",
-        f"samples     {found.samples}, {found.differences} with other bits than in the lanes",
-        f"compared    {', '.join(found.compared)}",
-    ]
-    return "\n".join([*lines, *([f"the first: {found.first_difference}"] if found.differences else [])])
-
-
-def _boards_document(found: "BoardsRun") -> dict[str, Any]:
-    work = {f"worst_{found.plant.counted}": found.worst, f"mean_{found.plant.counted}": found.mean}
-    plant = {"target": found.plant.name, **found.sizes._asdict(), "stack": found.stack, **work}
-    compared = {"samples": found.samples, "differences": found.differences, "compared": list(found.compared)}
-    return {**compared, "plant": plant}
 
 
 def _cost_lines(cost: "Cost", period: float) -> list[str]:
@@ -291,13 +278,3 @@ def _cost_document(cost: "Cost") -> dict[str, Any]:
         f"worst_{cost.target.counted}": cost.worst,
         f"mean_{cost.target.counted}": cost.mean,
     }
-
-
-def _run_document(found: "ChipRun") -> dict[str, Any]:
-    metrics = {name: found.chip.metrics[name].value for name in _SHOWN if name in found.chip.metrics}
-    compared = {"samples": found.samples, "differences": found.differences, "same_bits": found.same_bits}
-    return {**compared, **_cost_document(found.cost), "metrics": metrics}
-
-
-def _drawn_document(found: "Comparison") -> dict[str, Any]:
-    return {"samples": found.samples, "differences": found.differences, **_cost_document(found.cost)}

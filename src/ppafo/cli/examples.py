@@ -8,7 +8,7 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path, PurePosixPath
 
-from ppafo.cli.output import EXIT_GOOD, add_json_argument, print_result
+from ppafo.cli import output
 from ppafo.errors import DataError, nearest_name
 
 _FOLDER = resources.files("ppafo") / "examples"
@@ -51,7 +51,7 @@ def _contents(folder: Traversable, path: PurePosixPath) -> list[tuple[PurePosixP
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     parser.add_argument("name", metavar="NAME", nargs="?", help="the example to write; default: list them")
-    add_json_argument(parser)
+    output.add_json_argument(parser)
     parser.add_argument("--out", metavar="DIR", type=Path, help="the new folder; default NAME")
 
 
@@ -64,7 +64,7 @@ def run(parsed: argparse.Namespace) -> int:
         width = max(map(len, examples))
         lines = [f"{name:<{width}}  {example.summary}" for name, example in examples.items()]
         document = {"examples": [{"name": name, **_document(example)} for name, example in examples.items()]}
-        print_result(
+        output.print_result(
             "\n".join([*lines, "", "ppafo examples NAME writes one into a new folder."]), document, parsed.json
         )
     elif parsed.name not in examples:
@@ -72,7 +72,7 @@ def run(parsed: argparse.Namespace) -> int:
         raise DataError(f"there is no example '{parsed.name}'{hint}; available: {', '.join(examples)}")
     else:
         _write(parsed.name, examples[parsed.name], parsed.out or Path(parsed.name), parsed.json)
-    return EXIT_GOOD
+    return output.EXIT_GOOD
 
 
 def _write(name: str, example: Example, folder: Path, as_json: bool) -> None:
@@ -87,7 +87,7 @@ def _write(name: str, example: Example, folder: Path, as_json: bool) -> None:
     lines += [f"needs: {example.needs}"] if example.needs else []
     lines += ["run there:", *(f"  {command}" for command in example.commands)]
     document = {"name": name, "folder": str(folder), "files": [str(path) for path in files], **_document(example)}
-    print_result("\n".join(lines), document, as_json)
+    output.print_result("\n".join(lines), document, as_json)
 
 
 def _document(example: Example) -> dict[str, object]:

@@ -7,14 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ppafo.cli.output import (
-    EXIT_GOOD,
-    add_json_argument,
-    add_override_argument,
-    check_output,
-    print_result,
-    write_files,
-)
+from ppafo.cli import output
 from ppafo.errors import DataError
 from ppafo.questions.question import minutes
 
@@ -58,8 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for parser_of_one, said in parsers:
         noun = "WALK" if parser_of_one is torque else "SCENARIO"
         parser_of_one.add_argument("scenario", metavar=noun, help=said)
-        add_override_argument(parser_of_one)
-        add_json_argument(parser_of_one)
+        output.add_override_argument(parser_of_one)
+        output.add_json_argument(parser_of_one)
         parser_of_one.add_argument("--out", metavar="DIR", type=Path, required=True, help="the folder to write")
 
 
@@ -82,13 +75,13 @@ def _add_torque(actions: Any) -> argparse.ArgumentParser:
 
 def run(parsed: argparse.Namespace) -> int:
     """Write the files of a scenario for another tool, and say what to do next."""
-    check_output(parsed)
+    output.check_output(parsed)
     ways = {"c": _library, "controller": _controller, "fmu": _unit, "mujoco": _plugin, "opensim": _torque}
     contents, following = ways[parsed.action](parsed)
-    write_files(parsed, contents)
+    output.write_files(parsed, contents)
     document = {"folder": str(parsed.out), "files": list(contents), "next": following}
-    print_result(f"written: {parsed.out} ({', '.join(contents)}); next: {following}", document, parsed.json)
-    return EXIT_GOOD
+    output.print_result(f"written: {parsed.out} ({', '.join(contents)}); next: {following}", document, parsed.json)
+    return output.EXIT_GOOD
 
 
 def _library(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
@@ -108,8 +101,7 @@ def _controller(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
 
 
 def _unit(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
-    from ppafo.exports.fmu import closed_loop, functional_unit
-    from ppafo.exports.fmu.plant import plant_alone
+    from ppafo.exports.fmu import closed_loop, functional_unit, plant_alone
     from ppafo.loading import load_scenario
 
     platforms = _platforms(parsed)

@@ -4,14 +4,7 @@ import argparse
 import shlex
 from pathlib import Path
 
-from ppafo.cli.output import (
-    EXIT_GOOD,
-    add_json_argument,
-    add_override_argument,
-    check_output,
-    print_result,
-    write_files,
-)
+from ppafo.cli import output
 from ppafo.control.fixed.torque_laws import PLANT_TARGETS, TARGETS, WALK_TARGETS
 from ppafo.errors import ScenarioError
 
@@ -29,14 +22,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help=f"write a scenario's plant instead of the controller ({', '.join(PLANT_TARGETS)})",
     )
-    add_override_argument(parser)
-    add_json_argument(parser)
+    output.add_override_argument(parser)
+    output.add_json_argument(parser)
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="the folder to write")
 
 
 def run(parsed: argparse.Namespace) -> int:
     """Write the firmware of the controller of a scenario or a walk, or of a plant, and say what to do next."""
-    check_output(parsed)
+    output.check_output(parsed)
     from ppafo.exports.firmware import firmware
     from ppafo.exports.firmware.plant import plant_firmware
     from ppafo.exports.firmware.walking import walk_firmware
@@ -52,8 +45,8 @@ def run(parsed: argparse.Namespace) -> int:
             raise ScenarioError(f"{chosen.name}: --plant is for scenarios; of a walk the controller alone is written")
         target = parsed.target or WALK_TARGETS[0]
         contents = walk_firmware(chosen, target)
-    write_files(parsed, contents)
+    output.write_files(parsed, contents)
     following = f"make -C {shlex.quote(str(parsed.out))}"
     document = {"folder": str(parsed.out), "target": target, "files": list(contents), "next": following}
-    print_result(f"written: {parsed.out} ({', '.join(contents)}); next: {following}", document, parsed.json)
-    return EXIT_GOOD
+    output.print_result(f"written: {parsed.out} ({', '.join(contents)}); next: {following}", document, parsed.json)
+    return output.EXIT_GOOD

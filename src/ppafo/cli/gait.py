@@ -4,15 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ppafo.cli.output import (
-    EXIT_GOOD,
-    add_json_argument,
-    add_output_arguments,
-    check_new_file,
-    check_output,
-    deliver_answer,
-    print_result,
-)
+from ppafo.cli import output
 from ppafo.errors import DataError, UnitError
 
 if TYPE_CHECKING:
@@ -25,22 +17,22 @@ _SIDES = ("right", "left")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
-    add_json_argument(_action(actions, "list", "list the gaits that come with the package"))
+    output.add_json_argument(_action(actions, "list", "list the gaits that come with the package"))
     showing = _action(actions, "show", "show and draw a gait")
     showing.add_argument("gait", metavar="GAIT", help="name of a gait, or a gait file (.toml)")
     showing.add_argument("--speed", metavar="SPEED", help="walking speed to scale to, such as '1.2 m/s'")
-    add_output_arguments(showing)
+    output.add_output_arguments(showing)
     _add_import_arguments(_action(actions, "import", "make a gait from recorded files (.mot, .sto, .csv, .c3d, .trc)"))
     recording = _action(actions, "record", "write some strides of a gait as a synthetic recording")
     recording.add_argument("gait", metavar="GAIT", help="name of a gait, or a gait file (.toml)")
     recording.add_argument("--strides", metavar="N", default="10", help="number of strides; default 10")
-    add_json_argument(recording)
+    output.add_json_argument(recording)
     recording.add_argument("--out", metavar="FILE", type=Path, required=True, help="the .csv file to write")
     exporting = _action(actions, "export", "write a recording or result as .sto for OpenSim")
     exporting.add_argument("recording", metavar="RECORDING", type=Path, help="a .csv or .nc file, or a result folder")
     exporting.add_argument("--body-mass", metavar="MASS", help="for moments and forces per mass, such as '62 kg'")
     exporting.add_argument("--side", metavar="right|left", default="right", help="which foot it was; default right")
-    add_json_argument(exporting)
+    output.add_json_argument(exporting)
     exporting.add_argument("--out", metavar="FILE", type=Path, required=True, help="the .sto file to write")
 
 
@@ -83,7 +75,7 @@ def _add_import_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--name", metavar="NAME", default="imported-gait", help="name of the gait and of its file")
     parser.add_argument("--title", metavar="TEXT", default="", help="one line: who walks, and how")
-    add_output_arguments(parser)
+    output.add_output_arguments(parser)
 
 
 def run(parsed: argparse.Namespace) -> int:
@@ -99,14 +91,14 @@ def _list(parsed: argparse.Namespace) -> int:
     width = max(map(len, titles))
     lines = [f"{name:<{width}}  {title}" for name, title in titles.items()]
     document = {"gaits": [{"name": name, "title": title} for name, title in titles.items()]}
-    print_result("\n".join(lines), document, parsed.json)
-    return EXIT_GOOD
+    output.print_result("\n".join(lines), document, parsed.json)
+    return output.EXIT_GOOD
 
 
 def _show(parsed: argparse.Namespace) -> int:
     from ppafo.gait import at_speed, load_gait
 
-    check_output(parsed)
+    output.check_output(parsed)
     gait = load_gait(parsed.gait)
     if parsed.speed is not None:
         gait = at_speed(gait, _quantity("--speed", parsed.speed, "m/s"))
@@ -133,7 +125,7 @@ def _import(parsed: argparse.Namespace) -> int:
         longest_gap=_optional("--fill-gaps", parsed.fill_gaps, "s") or 0.0,
         ankle_neutral=_optional("--ankle-neutral", parsed.ankle_neutral, "rad"),
     )
-    check_output(parsed)
+    output.check_output(parsed)
     imported = import_gait(parsed.files, settings)
     return _deliver(imported.gait, imported, parsed)
 
@@ -165,7 +157,7 @@ def _optional(option: str, text: str | None, si_unit: str) -> float | None:
 def _deliver(gait: "Gait", imported: "ImportedGait | None", parsed: argparse.Namespace) -> int:
     from ppafo.gait.answer import gait_answer
 
-    return deliver_answer(gait_answer(gait, imported), parsed)
+    return output.deliver_answer(gait_answer(gait, imported), parsed)
 
 
 def _record(parsed: argparse.Namespace) -> int:
@@ -174,12 +166,12 @@ def _record(parsed: argparse.Namespace) -> int:
 
     if parsed.out.suffix.lower() != ".csv":
         raise DataError(f"--out {parsed.out}: a recording is written as .csv")
-    check_new_file(parsed.out)
+    output.check_new_file(parsed.out)
     recording = walk_recording(load_gait(parsed.gait), _whole("--strides", parsed.strides))
     write_csv(parsed.out, recording)
     document = {"file": str(parsed.out), "samples": len(recording), "channels": list(recording.names)}
-    print_result(f"written: {parsed.out} ({len(recording)} samples, synthetic)", document, parsed.json)
-    return EXIT_GOOD
+    output.print_result(f"written: {parsed.out} ({len(recording)} samples, synthetic)", document, parsed.json)
+    return output.EXIT_GOOD
 
 
 def _export(parsed: argparse.Namespace) -> int:
@@ -191,11 +183,13 @@ def _export(parsed: argparse.Namespace) -> int:
     mass = _optional("--body-mass", parsed.body_mass, "kg")
     if parsed.out.suffix.lower() != ".sto":
         raise DataError(f"--out {parsed.out}: the name must end in .sto")
-    check_new_file(parsed.out)
+    output.check_new_file(parsed.out)
     recording, missing = opensim_recording(read_recording(parsed.recording), parsed.side, mass)
     write_opensim(parsed.out, recording)
     names = list(recording.names)
     document = {"file": str(parsed.out), "samples": len(recording), "channels": names, "left_out": list(missing)}
     said = f"\nleft out: {', '.join(missing)}, which are per body mass: give --body-mass" if missing else ""
-    print_result(f"written: {parsed.out} ({len(recording)} samples: {', '.join(names)}){said}", document, parsed.json)
-    return EXIT_GOOD
+    output.print_result(
+        f"written: {parsed.out} ({len(recording)} samples: {', '.join(names)}){said}", document, parsed.json
+    )
+    return output.EXIT_GOOD

@@ -5,19 +5,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ppafo.cli.output import (
-    EXIT_CHECK_FAILED,
-    EXIT_GOOD,
-    add_json_argument,
-    add_override_argument,
-    blame_out_option,
-    load_drawing,
-    print_result,
-    tell,
-)
+from ppafo.cli import output
 from ppafo.errors import ScenarioError
-from ppafo.exports.hil.packets import HIGHEST_RATE, LOWEST_RATE, RATE
-from ppafo.exports.hil.ports import DEFAULT_BAUD, FORMS
+from ppafo.exports.hil.wire import DEFAULT_BAUD, FORMS, HIGHEST_RATE, LOWEST_RATE, RATE
 
 if TYPE_CHECKING:
     from ppafo.exports.hil.run import HardwareRun
@@ -55,8 +45,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=_DEFAULT_PATIENCE,
         help=f"how long the controller is called, in seconds (default: {_DEFAULT_PATIENCE:g})",
     )
-    add_override_argument(parser)
-    add_json_argument(parser)
+    output.add_override_argument(parser)
+    output.add_json_argument(parser)
     parser.add_argument("--out", metavar="DIR", type=Path, help="result folder; default out/NAME-hil of the scenario")
 
 
@@ -92,28 +82,54 @@ def run(parsed: argparse.Namespace) -> int:
             f"simulated chip walk with 'ppafo chip {scenario.name} --set controller.arithmetic=fixed'"
         )
     folder = parsed.out if parsed.out is not None else Path("out") / f"{scenario.name}-hil"
-    with blame_out_option():
+    with output.blame_out_option():
         check_result_folder(folder)
     with stop_by_interrupt() as is_stopped:
         found = _run(parsed, scenario, is_stopped)
-        load_drawing()
+        output.load_drawing()
         from ppafo.answers.recording_figure import figure_files
 
         found.save(folder, figure_files(found.plot_signals()))
-    print_result(_text(found, parsed.port, folder), _document(found, parsed.port, folder), parsed.json)
+    from ppafo.answers.shown_metrics import metrics_lines
+
+    result = found.result
+    lines = metrics_lines(result.metrics, result.scenario.device.supply.atmospheric_pressure)
+    ended = "stopped" if found.exchange.is_stopped else "vented" if found.exchange.vented else result.status.kind
+    text = "\n".join(
+        [
+            f"{result.scenario.name} at {parsed.port}: {ended}",
+            "",
+            found.text(),
+            "",
+            *lines,
+            "",
+            f"written: {folder} (recording.nc, recording.csv, log.csv, link.json, run.json, figures)",
+        ]
+    )
+    from ppafo.simulation.document import plain
+
+    document = {
+        "scenario": found.result.scenario.name,
+        "port": parsed.port,
+        "status": plain(found.result.status),
+        "link": found.document(),
+        "metrics": {name: plain(metric) for name, metric in found.result.metrics.items()},
+        "folder": str(folder),
+    }
+    output.print_result(text, document, parsed.json)
     if found.exchange.is_stopped:
         print(f"ppafo: stopped at {found.exchange.vented_at:.6g} s and vented; {folder} is whole", file=sys.stderr)
         return EXIT_INTERRUPTED
     if not found.is_good:
         said = found.exchange.vented or found.result.status.message
         print(f"ppafo: {scenario.name}: {said}", file=sys.stderr)
-    return EXIT_GOOD if found.is_good else EXIT_CHECK_FAILED
+    return output.EXIT_GOOD if found.is_good else output.EXIT_CHECK_FAILED
 
 
 def _run(parsed: argparse.Namespace, scenario: "Scenario", is_stopped: Any) -> "HardwareRun":
     from ppafo.exports.hil.loop import LockStep, RealTime
-    from ppafo.exports.hil.ports import open_port
     from ppafo.exports.hil.run import check_baud, plant_of, run_plant
+    from ppafo.exports.hil.wire import open_port
 
     port = open_port(parsed.port, parsed.baud)
     try:
@@ -122,7 +138,7 @@ def _run(parsed: argparse.Namespace, scenario: "Scenario", is_stopped: Any) -> "
         plant = plant_of(scenario, parsed.rate)
         if plant.period > scenario.control.period * (1.0 + _SAME):
             print(f"ppafo: {_slower(plant.period, scenario.control.period, parsed.rate)}", file=sys.stderr, flush=True)
-        tell(f"calling the controller at {parsed.port}")
+        output.tell(f"calling the controller at {parsed.port}")
         return run_plant(
             plant,
             port,
@@ -140,35 +156,3 @@ def _slower(apart: float, period: float, rate: int) -> str:
         f"every {period * _PER_THOUSAND:.4g} ms; it has the wrong gains unless it was exported for this rate: give "
         f"--set controller.rate={rate}Hz here and to 'ppafo export controller'"
     )
-
-
-def _text(found: "HardwareRun", port: str, folder: Path) -> str:
-    from ppafo.answers.shown_metrics import metrics_lines
-
-    result = found.result
-    lines = metrics_lines(result.metrics, result.scenario.device.supply.atmospheric_pressure)
-    ended = "stopped" if found.exchange.is_stopped else "vented" if found.exchange.vented else result.status.kind
-    return "\n".join(
-        [
-            f"{result.scenario.name} at {port}: {ended}",
-            "",
-            found.text(),
-            "",
-            *lines,
-            "",
-            f"written: {folder} (recording.nc, recording.csv, log.csv, link.json, run.json, figures)",
-        ]
-    )
-
-
-def _document(found: "HardwareRun", port: str, folder: Path) -> dict[str, Any]:
-    from ppafo.simulation.document import plain
-
-    return {
-        "scenario": found.result.scenario.name,
-        "port": port,
-        "status": plain(found.result.status),
-        "link": found.document(),
-        "metrics": {name: plain(metric) for name, metric in found.result.metrics.items()},
-        "folder": str(folder),
-    }

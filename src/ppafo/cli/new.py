@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
-from ppafo.cli.output import EXIT_GOOD, add_json_argument, print_result
+from ppafo.cli import output
 from ppafo.errors import DataError, nearest_name, one_line
 
 _SUFFIX = ".toml"
@@ -82,7 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--from", dest="source", metavar="SOURCE", help="copy this one: a shipped name, or a .toml file"
     )
-    add_json_argument(parser)
+    output.add_json_argument(parser)
     parser.add_argument("--out", metavar="FILE", type=Path, help="the .toml file to write; default NAME.toml")
 
 
@@ -115,8 +115,8 @@ def run(parsed: argparse.Namespace) -> int:
             path.unlink(missing_ok=True)
     command = kind.command.replace("FILE", shlex.quote(str(path))).replace("NAME", parsed.name)
     document = {"kind": parsed.kind, "name": parsed.name, "file": str(path), "next": command}
-    print_result(f"written: {path}; next: {command}", document, parsed.json)
-    return EXIT_GOOD
+    output.print_result(f"written: {path}; next: {command}", document, parsed.json)
+    return output.EXIT_GOOD
 
 
 def _content(kind: str, source: str | None, name: str, path: Path) -> str:

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ppafo.cli.output import EXIT_GOOD, add_json_argument, check_new_file, load_drawing, print_result
+from ppafo.cli import output
 from ppafo.errors import DataError, reason
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ _NAMED = 6
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     parser.add_argument("folder", metavar="DIR", type=Path, help="a result folder written by ppafo")
-    add_json_argument(parser)
+    output.add_json_argument(parser)
     parser.add_argument(
         "--out", metavar="FILE", type=Path, help="a .png, .svg or .pdf file; default figure.png and figure.svg in DIR"
     )
@@ -38,9 +38,9 @@ def run(parsed: argparse.Namespace) -> int:
         allowed = ", ".join(f".{name}" for name in FIGURE_FORMATS)
         raise DataError(f"--out {parsed.out}: the name must end in one of {allowed}")
     if parsed.out is not None:
-        check_new_file(parsed.out)
+        output.check_new_file(parsed.out)
     names = _names(parsed.folder)
-    load_drawing()
+    output.load_drawing()
     drawn = _draw_folder(parsed.folder, names)
     if not drawn:
         return _say_what_is_there(parsed, names)
@@ -60,8 +60,8 @@ def run(parsed: argparse.Namespace) -> int:
         }
         add_to_marked_folder(parsed.folder, files)
         written = [str(parsed.folder / name) for name in files]
-    print_result(f"written: {', '.join(written)}", {"files": written}, parsed.json)
-    return EXIT_GOOD
+    output.print_result(f"written: {', '.join(written)}", {"files": written}, parsed.json)
+    return output.EXIT_GOOD
 
 
 def _names(folder: Path) -> list[str]:
@@ -152,7 +152,7 @@ def _say_what_is_there(parsed: argparse.Namespace, names: list[str]) -> int:
     said = f"{parsed.folder}: the result of 'ppafo {command}' {has}; open {parsed.folder / opened}"
     if parsed.out is not None:
         raise DataError(f"--out {parsed.out}: nothing is drawn anew: {said}")
-    print_result(
+    output.print_result(
         said, {"files": [], "command": command, "figures": pictures, "open": str(parsed.folder / opened)}, parsed.json
     )
-    return EXIT_GOOD
+    return output.EXIT_GOOD

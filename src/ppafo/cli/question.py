@@ -8,15 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from ppafo.cli.output import (
-    EXIT_GOOD,
-    add_json_argument,
-    add_output_arguments,
-    check_output,
-    deliver_answer,
-    load_drawing,
-    print_result,
-)
+from ppafo.cli import output
 from ppafo.documents.toml_text import TomlKind
 from ppafo.progress import ProgressLine
 from ppafo.questions.question import Question, load_name
@@ -28,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser, question: Question) -> None:
         argument.add_to(parser)
     if question.library:
         parser.add_argument("--list", action="store_true", help="list the files that come with the package")
-    (add_json_argument if question.fills_folder else add_output_arguments)(parser)
+    (output.add_json_argument if question.fills_folder else output.add_output_arguments)(parser)
 
 
 def run(parsed: argparse.Namespace, question: Question) -> int:
@@ -47,24 +39,24 @@ def run(parsed: argparse.Namespace, question: Question) -> int:
             ]
             rows = rows if question.listing else [[row[0], row[-1]] for row in rows]
             plural = f"{library.noun[:-1]}ies" if library.noun.endswith("y") else f"{library.noun}s"
-            print_result("\n".join(align_columns(rows, len(rows[0]))), {plural: listed}, parsed.json)
-            return EXIT_GOOD
+            output.print_result("\n".join(align_columns(rows, len(rows[0]))), {plural: listed}, parsed.json)
+            return output.EXIT_GOOD
         _check_named(parsed, question, library)
     solve = question.solver()
     values = {argument.parameter: getattr(parsed, argument.parameter) for argument in question.arguments}
     if question.fills_folder:
-        load_drawing()
+        output.load_drawing()
     else:
         if parsed.out is None and question.default_folder:
             parsed.out = load_name(question.default_folder)(values)
-        check_output(parsed)
+        output.check_output(parsed)
     with progress_line() as progress:
         if "progress" in inspect.signature(solve).parameters:
             values["progress"] = progress
         solved = solve(**values).answer()
     if question.fills_folder:
-        return deliver_answer(solved, parsed, filled=solved.data["folder"])
-    return deliver_answer(solved, parsed)
+        return output.deliver_answer(solved, parsed, filled=solved.data["folder"])
+    return output.deliver_answer(solved, parsed)
 
 
 @contextmanager

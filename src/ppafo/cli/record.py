@@ -6,16 +6,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ppafo.cli import output
 from ppafo.cli.hil import EXIT_INTERRUPTED, PORT_HELP, add_baud_argument, check_patience
-from ppafo.cli.output import (
-    EXIT_CHECK_FAILED,
-    EXIT_GOOD,
-    add_json_argument,
-    blame_out_option,
-    check_new_file,
-    print_result,
-    tell,
-)
 from ppafo.errors import DataError, UnitError
 
 if TYPE_CHECKING:
@@ -38,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=_DEFAULT_PATIENCE,
         help=f"end, or give up, after so many seconds without a sample (default: {_DEFAULT_PATIENCE:g})",
     )
-    add_json_argument(parser)
+    output.add_json_argument(parser)
     parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="the .csv file to write")
 
 
@@ -46,32 +38,45 @@ def run(parsed: argparse.Namespace) -> int:
     """Record until the bench or a person ends it; 1 where the port broke, 130 where Ctrl-C stopped it."""
     check_patience(parsed.patience)
     duration = _seconds(parsed.duration)
-    check_new_file(parsed.out)
+    output.check_new_file(parsed.out)
     if parsed.out.suffix != ".csv":
         raise DataError(f"--out {parsed.out}: must end in .csv")
     from ppafo.storage.files import check_files_can_be_added
 
-    with blame_out_option():
+    with output.blame_out_option():
         check_files_can_be_added(parsed.out.parent, [parsed.out.name])
     from ppafo.exports.hil.loop import stop_by_interrupt
-    from ppafo.exports.hil.ports import open_port
     from ppafo.exports.hil.recording import record
+    from ppafo.exports.hil.wire import open_port
     from ppafo.storage.comma_separated import write_csv
 
     port = open_port(parsed.port, parsed.baud, listens=True)
     try:
-        tell(f"listening at {parsed.port}")
+        output.tell(f"listening at {parsed.port}")
         with stop_by_interrupt() as is_stopped:
             found = record(port, parsed.out.stem, duration, parsed.patience, is_stopped)
             write_csv(parsed.out, found.recording)
         is_broken = bool(port.failure)
     finally:
         port.close()
-    print_result(_text(found, parsed.out), _document(found, parsed.out), parsed.json)
+    from ppafo.exports.hil.wire import described_refusals
+
+    recording = found.recording
+    others = [*found.ignored.items(), ("of somebody else", found.strangers)]
+    text = "\n".join(
+        [
+            f"{len(recording)} samples over {recording.duration:.6g} s, {recording.kind}: {', '.join(recording.names)}",
+            f"lost     {found.lost} samples between the first and the last",
+            f"dropped  {described_refusals(found.refused, others)}",
+            f"ended    by {found.ended}",
+            f"written: {parsed.out}",
+        ]
+    )
+    output.print_result(text, _document(found, parsed.out), parsed.json)
     if found.is_stopped:
         print(f"ppafo: stopped; {parsed.out} is whole", file=sys.stderr)
         return EXIT_INTERRUPTED
-    return EXIT_CHECK_FAILED if is_broken else EXIT_GOOD
+    return output.EXIT_CHECK_FAILED if is_broken else output.EXIT_GOOD
 
 
 def _seconds(text: str | None) -> float | None:
@@ -86,22 +91,6 @@ def _seconds(text: str | None) -> float | None:
     if not (seconds > 0.0 and math.isfinite(seconds)):
         raise UnitError(f"--duration {text}: must be above 0 s")
     return seconds
-
-
-def _text(found: "Recorded", path: Path) -> str:
-    from ppafo.exports.hil.packets import described_refusals
-
-    recording = found.recording
-    others = [*found.ignored.items(), ("of somebody else", found.strangers)]
-    return "\n".join(
-        [
-            f"{len(recording)} samples over {recording.duration:.6g} s, {recording.kind}: {', '.join(recording.names)}",
-            f"lost     {found.lost} samples between the first and the last",
-            f"dropped  {described_refusals(found.refused, others)}",
-            f"ended    by {found.ended}",
-            f"written: {path}",
-        ]
-    )
 
 
 def _document(found: "Recorded", path: Path) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from ppafo.cli.output import EXIT_GOOD, add_json_argument, add_override_argument, blame_out_option, print_result
+from ppafo.cli import output
 from ppafo.errors import ParameterError
 
 _DEFAULT_OUT = Path("out") / "rig"
@@ -15,7 +15,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     listing = actions.add_parser(
         "list", help="list experiments and presets", description="List experiments and presets."
     )
-    add_json_argument(listing)
+    output.add_json_argument(listing)
     recording = actions.add_parser(
         "record",
         help="run an experiment on the virtual rig",
@@ -30,8 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--device", metavar="SET", default="ppafo2011", help="parameter set or .toml file; default ppafo2011"
     )
     recording.add_argument("--valve", metavar="NAME", help="valve of the parameter set; default: its default valve")
-    add_override_argument(recording)
-    add_json_argument(recording)
+    output.add_override_argument(recording)
+    output.add_json_argument(recording)
     recording.add_argument(
         "--out", metavar="DIR", type=Path, default=_DEFAULT_OUT, help="folder of the recording; default out/rig"
     )
@@ -59,8 +59,8 @@ def _list(parsed: argparse.Namespace) -> int:
         "experiments": [{"name": name, "summary": summary} for name, summary in experiments.items()],
         "presets": [{"name": name, "title": title} for name, title in presets.items()],
     }
-    print_result("\n".join(lines), document, parsed.json)
-    return EXIT_GOOD
+    output.print_result("\n".join(lines), document, parsed.json)
+    return output.EXIT_GOOD
 
 
 def _record(parsed: argparse.Namespace) -> int:
@@ -69,15 +69,15 @@ def _record(parsed: argparse.Namespace) -> int:
 
     find_experiment(parsed.experiment)
     seed = _whole_number(parsed.seed)
-    with blame_out_option():
+    with output.blame_out_option():
         check_rig_folder(parsed.out, parsed.experiment)
     made = record(parsed.experiment, parsed.preset, seed, parsed.device, parsed.overrides, parsed.valve)
     files = write_rig_recording(parsed.out, made)
     counted = f"{len(made.recording)} samples of {', '.join(made.recording.names)}"
     text = f"{parsed.experiment}: {NOTICE}\n{counted}\nwritten: {parsed.out} ({', '.join(files)})"
     document = {"folder": str(parsed.out), "files": list(files), **made.truth}
-    print_result(text, document, parsed.json)
-    return EXIT_GOOD
+    output.print_result(text, document, parsed.json)
+    return output.EXIT_GOOD
 
 
 def _whole_number(text: str) -> int:

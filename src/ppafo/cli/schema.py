@@ -3,7 +3,7 @@
 import argparse
 import importlib
 
-from ppafo.cli.output import EXIT_GOOD, add_output_arguments, check_output, deliver
+from ppafo.cli import output
 from ppafo.errors import DataError, nearest_name
 
 FORMATS: dict[str, str] = {
@@ -30,7 +30,7 @@ FORMATS: dict[str, str] = {
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     parser.add_argument("format", metavar="NAME", help=f"one of: {', '.join(FORMATS)}")
-    add_output_arguments(parser)
+    output.add_output_arguments(parser)
 
 
 def run(parsed: argparse.Namespace) -> int:
@@ -38,8 +38,8 @@ def run(parsed: argparse.Namespace) -> int:
     if parsed.format not in FORMATS:
         hint = nearest_name(parsed.format, FORMATS)
         raise DataError(f"there is no file format '{parsed.format}'{hint}; available: {', '.join(FORMATS)}")
-    check_output(parsed)
+    output.check_output(parsed)
     document = importlib.import_module(FORMATS[parsed.format]).json_schema()
     parsed.json = True
-    deliver(f"{parsed.format}.schema", "", document, parsed)
-    return EXIT_GOOD
+    output.deliver(f"{parsed.format}.schema", "", document, parsed)
+    return output.EXIT_GOOD

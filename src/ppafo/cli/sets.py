@@ -4,7 +4,7 @@ import argparse
 import textwrap
 from typing import TYPE_CHECKING, Any
 
-from ppafo.cli.output import EXIT_GOOD, add_output_arguments, add_override_argument, check_output, deliver
+from ppafo.cli import output
 
 if TYPE_CHECKING:
     from ppafo.parameters import ParameterSet
@@ -16,7 +16,7 @@ _COLUMNS = ("path", "value", "unit", "origin", "source")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
-    add_output_arguments(parser)
+    output.add_output_arguments(parser)
     actions = parser.add_subparsers(dest="action", metavar="ACTION")
     show = actions.add_parser(
         "show",
@@ -25,18 +25,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         argument_default=argparse.SUPPRESS,
     )
     show.add_argument("name", metavar="SET", help="name of a set, or a .toml file")
-    add_override_argument(show)
-    add_output_arguments(show)
+    output.add_override_argument(show)
+    output.add_output_arguments(show)
 
 
 def run(parsed: argparse.Namespace) -> int:
     """List the sets, or show one."""
-    check_output(parsed)
+    output.check_output(parsed)
     if parsed.action == "show":
         _show(parsed)
     else:
         _list(parsed)
-    return EXIT_GOOD
+    return output.EXIT_GOOD
 
 
 def _list(parsed: argparse.Namespace) -> None:
@@ -46,14 +46,14 @@ def _list(parsed: argparse.Namespace) -> None:
     width = max(len(item.name) for item in sets)
     text = "\n".join(f"{item.name:<{width}}  {item.title}" for item in sets)
     document = {"sets": [{"name": item.name, "title": item.title, "valves": dict(item.valve_kinds)} for item in sets]}
-    deliver("sets", text, document, parsed)
+    output.deliver("sets", text, document, parsed)
 
 
 def _show(parsed: argparse.Namespace) -> None:
     from ppafo.parameters import apply_overrides, load_parameter_set
 
     parameter_set = apply_overrides(load_parameter_set(parsed.name), parsed.overrides)
-    deliver(parameter_set.name, _text(parameter_set), _document(parameter_set), parsed)
+    output.deliver(parameter_set.name, _text(parameter_set), _document(parameter_set), parsed)
 
 
 def _document(parameter_set: "ParameterSet") -> dict[str, Any]:

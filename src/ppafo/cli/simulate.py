@@ -3,22 +3,14 @@
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from ppafo.cli.output import (
-    EXIT_CHECK_FAILED,
-    EXIT_GOOD,
-    add_json_argument,
-    add_override_argument,
-    blame_out_option,
-    load_drawing,
-    print_result,
-)
+from ppafo.cli import output
 from ppafo.documents.json_text import json_text
 from ppafo.errors import ScenarioError
 
 if TYPE_CHECKING:
-    from ppafo.answers import Answer, Table
+    from ppafo.answers import Answer
     from ppafo.simulation.check import Check
     from ppafo.simulation.result import Result
 
@@ -30,14 +22,14 @@ FIGURE = "figure"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     parser.add_argument("scenario", metavar="SCENARIO", nargs="?", help="name of a scenario, or a .toml file")
-    add_override_argument(parser)
+    output.add_override_argument(parser)
     parser.add_argument("--list", action="store_true", help="list the scenarios that come with the package")
     parser.add_argument(
         "--check",
         action="store_true",
         help="run again with half the error and from a start moved by 1e-7, and report which metrics it determines",
     )
-    add_json_argument(parser)
+    output.add_json_argument(parser)
     parser.add_argument(
         "--out", metavar="DIR", type=Path, help="result folder with the report; default out/NAME of the scenario"
     )
@@ -54,13 +46,13 @@ def run(parsed: argparse.Namespace) -> int:
 
     scenario = load_scenario(parsed.scenario, parsed.overrides)
     folder = parsed.out if parsed.out is not None else DEFAULT_FOLDER / scenario.name
-    with blame_out_option():
+    with output.blame_out_option():
         check_result_folder(folder)
     from ppafo.simulation.simulate import simulate
 
     result = simulate(scenario)
     check = result.check() if parsed.check and result.status.is_completed else None
-    load_drawing()
+    output.load_drawing()
     from ppafo.answers.page import page_of
     from ppafo.answers.recording_figure import figure_files
     from ppafo.answers.writing import REPORT
@@ -69,11 +61,21 @@ def run(parsed: argparse.Namespace) -> int:
     report = page_of(_answer(result, check), {FIGURE: figures[f"{FIGURE}.svg"]})
     checked = {} if check is None else {CHECK_FILE: f"{json_text(check.document())}\n".encode()}
     result.save(folder, {**figures, REPORT: report, **checked})
-    print_result(_text(result, check, folder), _document(result, check, folder), parsed.json)
+    from ppafo.simulation.document import plain
+
+    metrics = {name: plain(metric) for name, metric in result.metrics.items()}
+    document = {
+        "scenario": result.scenario.name,
+        "status": plain(result.status),
+        "metrics": metrics,
+        **({} if check is None else {"check": check.document()}),
+        "folder": str(folder),
+    }
+    output.print_result(_text(result, check, folder), document, parsed.json)
     if result.status.is_completed:
-        return EXIT_GOOD if check is None or check.is_determined else EXIT_CHECK_FAILED
+        return output.EXIT_GOOD if check is None or check.is_determined else output.EXIT_CHECK_FAILED
     print(f"ppafo: {scenario.name}: {result.status.message}", file=sys.stderr)
-    return EXIT_CHECK_FAILED
+    return output.EXIT_CHECK_FAILED
 
 
 def _answer(result: "Result", check: "Check | None") -> "Answer":
@@ -85,23 +87,6 @@ def _answer(result: "Result", check: "Check | None") -> "Answer":
     device = f"device '{scenario.device.name}', valve '{scenario.device.valve_name}'"
     changed = f"; values changed for this run: {', '.join(scenario.origin.overrides)}"
     figure = Figure(FIGURE, "What the device does over time. Pressures count from the atmosphere.", result.plot)
-    return Answer(
-        name="run",
-        kicker=f"A run of {scenario.duration:g} s",
-        title=scenario.name,
-        lead=(" ".join(scenario.description.split()), f"{device}{changed if scenario.origin.overrides else ''}"),
-        sections=(
-            Section(remarks=() if status.is_completed else (f"The run {status.message}",)),
-            Section("Metrics", table=_metrics_table(result)),
-            Section("Over time", figure=figure),
-            Section() if check is None else Section("What the run determines", code=repr(check)),
-        ),
-        data={},
-        live=lambda: live_part([scenario]),
-    )
-
-
-def _metrics_table(result: "Result") -> "Table":
     from ppafo.answers import Column, Table
     from ppafo.answers.shown_metrics import metric_level, metric_words
 
@@ -111,7 +96,22 @@ def _metrics_table(result: "Result") -> "Table":
         (metric_words(name), f"{value:.4g} {unit}".strip(), result.metrics[name].summary)
         for name, (value, unit) in shown.items()
     ]
-    return Table((Column("Metric"), Column("Value"), Column("What it is")), tuple(rows), left=3)
+    return Answer(
+        name="run",
+        kicker=f"A run of {scenario.duration:g} s",
+        title=scenario.name,
+        lead=(" ".join(scenario.description.split()), f"{device}{changed if scenario.origin.overrides else ''}"),
+        sections=(
+            Section(remarks=() if status.is_completed else (f"The run {status.message}",)),
+            Section(
+                "Metrics", table=Table((Column("Metric"), Column("Value"), Column("What it is")), tuple(rows), left=3)
+            ),
+            Section("Over time", figure=figure),
+            Section() if check is None else Section("What the run determines", code=repr(check)),
+        ),
+        data={},
+        live=lambda: live_part([scenario]),
+    )
 
 
 def _list(parsed: argparse.Namespace) -> int:
@@ -121,8 +121,8 @@ def _list(parsed: argparse.Namespace) -> int:
     width = max(len(name) for name in summaries)
     text = "\n".join(f"{name:<{width}}  {' '.join(summary.split())}" for name, summary in summaries.items())
     document = {"scenarios": [{"name": name, "description": summary} for name, summary in summaries.items()]}
-    print_result(text, document, parsed.json)
-    return EXIT_GOOD
+    output.print_result(text, document, parsed.json)
+    return output.EXIT_GOOD
 
 
 def _text(result: "Result", check: "Check | None", folder: Path) -> str:
@@ -134,16 +134,3 @@ def _text(result: "Result", check: "Check | None", folder: Path) -> str:
     written = ", ".join(files if check is None else [*files, CHECK_FILE])
     lines = metrics_lines(result.metrics, result.scenario.device.supply.atmospheric_pressure)
     return "\n".join([head, "", *lines, "", *checked, f"written: {folder} ({written})"])
-
-
-def _document(result: "Result", check: "Check | None", folder: Path) -> dict[str, Any]:
-    from ppafo.simulation.document import plain
-
-    metrics = {name: plain(metric) for name, metric in result.metrics.items()}
-    return {
-        "scenario": result.scenario.name,
-        "status": plain(result.status),
-        "metrics": metrics,
-        **({} if check is None else {"check": check.document()}),
-        "folder": str(folder),
-    }

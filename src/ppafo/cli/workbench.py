@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from ppafo.cli.output import EXIT_GOOD, add_json_argument, add_override_argument, check_new_file, print_result
+from ppafo.cli import output
 
 DEFAULT_FILE = Path("out") / "workbench.html"
 
@@ -16,8 +16,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="*",
         help="names of scenarios and walks, or .toml files; default: the torque task, step response and a walk",
     )
-    add_override_argument(parser)
-    add_json_argument(parser)
+    output.add_override_argument(parser)
+    output.add_json_argument(parser)
     parser.add_argument(
         "--out", metavar="FILE", type=Path, default=DEFAULT_FILE, help=f"the page to write; default {DEFAULT_FILE}"
     )
@@ -30,10 +30,12 @@ def run(parsed: argparse.Namespace) -> int:
     from ppafo.storage.files import write_file
 
     if not is_page(parsed.out):
-        check_new_file(parsed.out)
+        output.check_new_file(parsed.out)
     scenarios = parsed.scenarios or list(DEFAULT)
     page = workbench(scenarios, parsed.overrides)
     write_file(parsed.out, page)
     document = {"file": str(parsed.out), "bytes": len(page), "scenarios": scenarios}
-    print_result(f"written: {parsed.out} ({len(page) / 1e3:.0f} kB, {', '.join(scenarios)})", document, parsed.json)
-    return EXIT_GOOD
+    output.print_result(
+        f"written: {parsed.out} ({len(page) / 1e3:.0f} kB, {', '.join(scenarios)})", document, parsed.json
+    )
+    return output.EXIT_GOOD

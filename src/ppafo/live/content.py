@@ -195,9 +195,12 @@ def _setting(entry: Mapping[str, Any], gauge: Mapping[str, str], intervals: Mapp
         interval is not None and not interval[0] <= entry["value"] <= interval[1]
     )
     is_initial = key in ("initial.pressure_1", "initial.pressure_2")
+    # ``sensors.angle_noise`` is the angle noise of the sensors.
+    said = entry["name"].replace("_", " ")
+    prefix = {"sensors": "Sensors: ", "supply_line": "Line: "}.get(entry["group"].partition(".")[0], "")
     return {
         "key": key,
-        "label": words()["labels"].get(key, _called(entry["group"], entry["name"])),
+        "label": words()["labels"].get(key, f"{prefix}{said}" if prefix else said[:1].upper() + said[1:]),
         "unit": _bare(entry["unit"]),
         "shown": _typed(_bare(entry["display"]["unit"]), entry["unit"]),
         "low": entry["minimum"],
@@ -221,13 +224,6 @@ def _setting(entry: Mapping[str, Any], gauge: Mapping[str, str], intervals: Mapp
 def _bare(unit: str) -> str:
     """A unit as it is typed; a plain number has none."""
     return "" if unit == "1" else unit
-
-
-def _called(group: str, name: str) -> str:
-    """A name from a key: ``sensors.angle_noise`` is the angle noise of the sensors."""
-    said = name.replace("_", " ")
-    prefix = {"sensors": "Sensors: ", "supply_line": "Line: "}.get(group.partition(".")[0], "")
-    return f"{prefix}{said}" if prefix else said[:1].upper() + said[1:]
 
 
 def _slider(entry: Mapping[str, Any]) -> Interval:

@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.exports.fmu import functional_unit, host_platform
-from ppafo.exports.fmu.plant import plant_alone
+from ppafo.exports.fmu import functional_unit, host_platform, plant_alone
 from ppafo.signals.recording import Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate

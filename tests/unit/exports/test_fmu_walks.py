@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.exports.fmu import closed_loop, functional_unit, host_platform
-from ppafo.exports.fmu.plant import plant_alone
+from ppafo.exports.fmu import closed_loop, functional_unit, host_platform, plant_alone
 from ppafo.walking import load_walk
 from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import walk

@@ -12,7 +12,7 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.exports.hil.example import example_controller
-from ppafo.exports.hil.packets import Sample, sample_bytes
+from ppafo.exports.hil.wire import Sample, sample_bytes
 from ppafo.simulation.loading import load_scenario
 from tests.example_board import COMPILER, SENT, WHOLE, built, plug, running
 from tests.virtual_wire import free_port

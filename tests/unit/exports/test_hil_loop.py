@@ -13,8 +13,8 @@ from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil.loop import BROKEN, NOT_SOUND, SILENT, STOPPED, Bench, LockStep, RealTime, Row
-from ppafo.exports.hil.packets import OVER, VENTED, Answer, Sample, answer_bytes
 from ppafo.exports.hil.run import HardwareRun, Plant, check_baud, longest_silence, plant_of, run_plant
+from ppafo.exports.hil.wire import OVER, VENTED, Answer, Sample, answer_bytes
 from ppafo.model.command import VENT
 from ppafo.model.sensors import Measurement
 from ppafo.parameters.device import Device

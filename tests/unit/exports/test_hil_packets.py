@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ppafo.exports.hil.packets import (
+from ppafo.exports.hil.wire import (
     ANSWER,
     CHANNELS,
     FULL_COMMAND,

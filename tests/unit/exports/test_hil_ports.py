@@ -22,8 +22,7 @@ from hypothesis import strategies as st
 from ppafo.cli.main import main
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil.example import example_controller
-from ppafo.exports.hil.packets import Answer, Reader, Sample, answer_bytes, sample_bytes
-from ppafo.exports.hil.ports import open_port
+from ppafo.exports.hil.wire import Answer, Reader, Sample, answer_bytes, open_port, sample_bytes
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate
 from ppafo.storage import read_recording

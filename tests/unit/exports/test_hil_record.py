@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from ppafo.cli.main import main
 from ppafo.errors import DataError
-from ppafo.exports.hil.packets import COMPUTED, OVER, WRAP, Answer, Sample, answer_bytes, count_of, sample_bytes
 from ppafo.exports.hil.recording import Recorded, record
+from ppafo.exports.hil.wire import COMPUTED, OVER, WRAP, Answer, Sample, answer_bytes, count_of, sample_bytes
 from ppafo.storage import read_recording
 from ppafo.storage.comma_separated import write_csv
 from tests.virtual_wire import free_port, sending_bench

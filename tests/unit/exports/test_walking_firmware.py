@@ -13,9 +13,15 @@ from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports.firmware import proof
 from ppafo.exports.firmware.catalog import MSP430G2553
 from ppafo.exports.firmware.simulators import built, missing_tools, sizes
-from ppafo.exports.firmware.walking import walk_chip, walk_firmware
+from ppafo.exports.firmware.walking import (
+    SIGN_BITS,
+    PythonWalkChip,
+    compare_drawn_walk,
+    walk_chip,
+    walk_firmware,
+    walk_on_chip,
+)
 from ppafo.exports.firmware.walking.drawn import DrawnGait
-from ppafo.exports.firmware.walking.lock_step import SIGN_BITS, PythonWalkChip, compare_drawn_walk, walk_on_chip
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.widths import Interval
 from ppafo.walking.loading import load_walk
@@ -114,7 +120,7 @@ def test_a_walk_with_a_failing_heel_sensor_and_the_chip_in_charge_has_the_bits_o
 @on_chip
 def test_a_chip_with_other_numbers_is_found_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     wrong = walk_firmware(fixed_walk("controller.push_off_end=0.5"))
-    monkeypatch.setattr("ppafo.exports.firmware.walking.lock_step.walk_firmware", lambda _: wrong)
+    monkeypatch.setattr("ppafo.exports.firmware.walking.walk_firmware", lambda _: wrong)
     found = compare_drawn_walk(fixed_walk(), 3000)
     assert found.differences > 0
     assert "on the chip" in found.first_difference

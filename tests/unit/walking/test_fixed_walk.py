@@ -12,8 +12,7 @@ from ppafo.engine.rows import leaf_paths, numbers, row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports.c_library import c_library
-from ppafo.exports.firmware.walking import walk_chip
-from ppafo.exports.firmware.walking.lock_step import PythonWalkChip
+from ppafo.exports.firmware.walking import PythonWalkChip, walk_chip
 from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import Fault, GaitMeasurement, GaitSensors
 from ppafo.simulation.sampled import state_row_numbers

@@ -9,7 +9,7 @@ at 32 full commands.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from ppafo.control.controllers.feedback import PID as FLOAT_PID
 from ppafo.control.controllers.switching import ON_OFF as FLOAT_ON_OFF
@@ -20,7 +20,8 @@ from ppafo.control.fixed.whole_numbers import (
     LARGEST_FRACTION,
     LARGEST_READING,
     MOST_PLACES,
-    OF_CONVERTER,
+    OF_LIMITS,
+    OF_STEPS,
     Limits,
     Readings,
     Steps,
@@ -48,69 +49,36 @@ WALK_TARGETS = ("msp430g2553",)
 """And those that an integer controller of walking can be written for: the smallest has no room for it."""
 
 
-class WholeLaw(Protocol):
-    """A law on whole numbers as the proof and the translation take it: of a torque task, or of a walk."""
-
-    @property
-    def name(self) -> str:
-        """That of the controller whose form it is."""
-
-    @property
-    def sample(self) -> Callable[..., Any]:
-        """The law: command in steps and next state, from numbers, state and readings."""
-
-    @property
-    def numbers(self) -> type:
-        """The NamedTuple class of what it is given."""
-
-    @property
-    def readings(self) -> type:
-        """That of what the converter shows."""
-
-    @property
-    def state_ranges(self) -> Mapping[str, tuple[int, int]]:
-        """Lowest and highest of every number of the state, by its own name."""
-
-    @property
-    def number_quantities(self) -> tuple[Quantity, ...]:
-        """Declarations of the whole numbers that the law is given, in order."""
-
-
 @dataclass(frozen=True, slots=True)
 class FixedLaw:
-    """The integer form of a controller of the catalogue.
+    """The integer form of a controller of the catalogue, of a torque task or of a walk.
 
     ``kind`` runs it in the lanes: its update reads the converter, calls ``sample`` and gives the command back as a
-    number from -1 to 1. ``sample(numbers, state, readings)`` is the law itself, on whole numbers only: the command in
-    steps and the next state. ``numbers`` is the NamedTuple class of what it is given, whose ranges are those of the
-    quantities of ``kind`` after the ones of the converter. ``state_ranges`` has those of each field of the state.
+    number from -1 to 1, or ``VENT``. ``sample(numbers, state, readings)`` is the law itself, on whole numbers only: the
+    command in steps and the next state. ``numbers`` and ``readings`` are the NamedTuple classes of what it is given;
+    ``number_quantities`` declare the numbers, in order. The state ``begins`` so, and ``state_ranges`` has lowest and
+    highest of every number of it, by its own name.
 
-    ``prepare(settings, period, torque_step)`` makes the parameters of ``kind`` without the converter, and
-    ``largest(settings, period, torque_step)`` is the largest part of their range that any of them takes, above 1
-    where the settings cannot be held.
+    ``prepare`` makes the numbers: of a torque law ``(settings, period, torque_step)`` those after the limits of its
+    readings, of a walking law ``(settings, period, converter)`` all by name, which may not be within their ranges yet.
+    ``largest(settings, period, torque_step)`` is the largest part of its range that any number of a torque law takes,
+    above 1 where the settings cannot be held.
     """
 
     kind: ControllerKind
     sample: Callable[..., Any]
     numbers: type
+    number_quantities: tuple[Quantity, ...]
+    begins: Any
     state_ranges: Mapping[str, tuple[int, int]]
-    prepare: Callable[[Mapping[str, float], float, float], Any]
-    largest: Callable[[Mapping[str, float], float, float], float]
+    prepare: Callable[[Mapping[str, float], float, Any], Any]
+    readings: type = Readings
+    largest: Callable[[Mapping[str, float], float, float], float] = lambda _settings, _period, _step: 0.0
 
     @property
     def name(self) -> str:
         """That of the controller whose form it is."""
         return self.kind.name
-
-    @property
-    def readings(self) -> type:
-        """What the converter shows."""
-        return Readings
-
-    @property
-    def number_quantities(self) -> tuple[Quantity, ...]:
-        """Declarations of the whole numbers that the law is given, in order."""
-        return self.kind.quantities[len(OF_CONVERTER) - 2 :]
 
 
 class OnOffNumbers(NamedTuple):
@@ -203,40 +171,37 @@ def prepare_dead_zone(settings: Mapping[str, float], period: float, torque_step:
     return (*counts, float(int(settings["opening"] * COMMAND_STEPS + 0.5)))
 
 
-def largest_on_off(settings: Mapping[str, float], period: float, torque_step: float) -> float:
-    """Nothing that a number could not hold."""
-    return 0.0
-
-
 def largest_dead_zone(settings: Mapping[str, float], period: float, torque_step: float) -> float:
     """The dead zone over what its number can hold [-]."""
     return settings["dead_zone"] / torque_step / LARGEST_READING
 
 
 _READING, _STEPS = float(LARGEST_READING), float(COMMAND_STEPS)
+_DEAD_ZONE_NUMBERS = (
+    *OF_LIMITS,
+    Quantity("dead_zone", "", "error at which the valve opens, in counts", None, 0.0, _READING),
+    Quantity("release", "", "error at which it closes again, in counts", None, 0.0, _READING),
+    Quantity("opening", "", "command while it is open, in steps", None, 0.0, _STEPS),
+)
 ON_OFF = FixedLaw(
     kind=replace(
         FLOAT_ON_OFF,
-        quantities=OF_CONVERTER,
+        quantities=(*OF_STEPS, *OF_LIMITS),
         parameters=OnOffRows,
         initial=each(float, OnOffCounts(1)),
         update=on_off_update,
     ),
     sample=on_off_sample,
     numbers=OnOffNumbers,
+    number_quantities=OF_LIMITS,
+    begins=OnOffCounts(1),
     state_ranges={"sound": (0, 1)},
     prepare=prepare_on_off,
-    largest=largest_on_off,
 )
 DEAD_ZONE = FixedLaw(
     kind=replace(
         FLOAT_DEAD_ZONE,
-        quantities=(
-            *OF_CONVERTER,
-            Quantity("dead_zone", "", "error at which the valve opens, in counts", None, 0.0, _READING),
-            Quantity("release", "", "error at which it closes again, in counts", None, 0.0, _READING),
-            Quantity("opening", "", "command while it is open, in steps", None, 0.0, _STEPS),
-        ),
+        quantities=(*OF_STEPS, *_DEAD_ZONE_NUMBERS),
         parameters=DeadZoneRows,
         initial=each(float, DeadZoneCounts(0, 1)),
         update=dead_zone_update,
@@ -244,6 +209,8 @@ DEAD_ZONE = FixedLaw(
     ),
     sample=dead_zone_sample,
     numbers=DeadZoneNumbers,
+    number_quantities=_DEAD_ZONE_NUMBERS,
+    begins=DeadZoneCounts(0, 1),
     state_ranges={"direction": (-1, 1), "sound": (0, 1)},
     prepare=prepare_dead_zone,
     largest=largest_dead_zone,
@@ -355,30 +322,32 @@ def largest_pid(settings: Mapping[str, float], period: float, torque_step: float
 
 
 _FRACTION, _PLACES = float(LARGEST_FRACTION), float(MOST_PLACES)
+_PID_NUMBERS = (
+    *OF_LIMITS,
+    Quantity("proportional", "", "k_p: part of a step for a count of the error", None, 0.0, _FRACTION),
+    Quantity("proportional_places", "", "and the places it is shifted right by", None, 0.0, _PLACES),
+    Quantity("integral", "", "k_i: fine parts for a count of the error at each sample", None, 0.0, _FRACTION),
+    Quantity("integral_places", "", "and the places it is shifted right by", None, 0.0, _PLACES),
+    Quantity("derivative", "", "k_d: part of a step for a change of the error", None, 0.0, _FRACTION),
+    Quantity("derivative_places", "", "and the places it is shifted right by", None, 0.0, _PLACES),
+    Quantity("filter_share", "", "share of a change that the slope takes at once, in 1/2^15", None, 0.0, _FRACTION),
+    Quantity("anti_windup", "", "share of the excess that is pulled back, in 1/2^15", None, 0.0, _FRACTION),
+)
+_PID_BEGINS = PidCounts(integral=0, error=0, slope=0, started=0, sound=1)
 _ERROR = LARGEST_READING + LARGEST_READING
 PID = FixedLaw(
     kind=replace(
         FLOAT_PID,
-        quantities=(
-            *OF_CONVERTER,
-            Quantity("proportional", "", "k_p: part of a step for a count of the error", None, 0.0, _FRACTION),
-            Quantity("proportional_places", "", "and the places it is shifted right by", None, 0.0, _PLACES),
-            Quantity("integral", "", "k_i: fine parts for a count of the error at each sample", None, 0.0, _FRACTION),
-            Quantity("integral_places", "", "and the places it is shifted right by", None, 0.0, _PLACES),
-            Quantity("derivative", "", "k_d: part of a step for a change of the error", None, 0.0, _FRACTION),
-            Quantity("derivative_places", "", "and the places it is shifted right by", None, 0.0, _PLACES),
-            Quantity(
-                "filter_share", "", "share of a change that the slope takes at once, in 1/2^15", None, 0.0, _FRACTION
-            ),
-            Quantity("anti_windup", "", "share of the excess that is pulled back, in 1/2^15", None, 0.0, _FRACTION),
-        ),
+        quantities=(*OF_STEPS, *_PID_NUMBERS),
         parameters=PidRows,
-        initial=each(float, PidCounts(integral=0, error=0, slope=0, started=0, sound=1)),
+        initial=each(float, _PID_BEGINS),
         update=pid_update,
         restart=None,
     ),
     sample=pid_sample,
     numbers=PidNumbers,
+    number_quantities=_PID_NUMBERS,
+    begins=_PID_BEGINS,
     state_ranges={
         "integral": (-LARGEST_INTEGRAL, LARGEST_INTEGRAL),
         "error": (-_ERROR, _ERROR),

@@ -19,7 +19,7 @@ from ppafo.control.fixed.whole_numbers import (
     fraction_of,
     nearest_fraction_of,
 )
-from ppafo.control.walking import phases, readings, signs
+from ppafo.control.walking import phases, signs
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait_sensors import GaitMeasurement
 
@@ -412,7 +412,7 @@ def next_emptying(numbers: EmptyingNumbers, last: EmptyingCounts, vented: int, g
 
 BOTH = 2
 """Sensors that are loaded where the foot stands on heel and toes."""
-LATE_STRIDES: int = int(readings.LATE_STRIDES)
+LATE_STRIDES: int = int(signs.LATE_STRIDES)
 MOST_STRIDES = 1000
 """Strides that are counted, of those on the toes and of good ones."""
 FALLS_BITS = 5

@@ -3,40 +3,14 @@
 Settings become counts, samples and fractions of 15 bits. The lanes keep whole numbers in floats.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
 
-from ppafo.control.fixed.walking_law import (
-    HALVES,
-    LATE_FORCES,
-    LONGEST,
-    MOST_LATE,
-    MOST_STRIDES,
-    OF_CONVERTER,
-    PUSH_OFF,
-    SEVERAL,
-    STOPPED,
-    STRIDE_SHARE,
-    TOP,
-    EmptyingCounts,
-    GaitConverter,
-    GaitReadings,
-    LandingCounts,
-    PhaseCounts,
-    PressureCounts,
-    SafetyCounts,
-    SensorCounts,
-    SwitchCounts,
-    TraceCounts,
-    WalkCounts,
-    WalkNumbers,
-    read_gait,
-    sample,
-)
+from ppafo.control.fixed import walking_law
+from ppafo.control.fixed.torque_laws import FixedLaw
 from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, FRACTION_BITS, LARGEST_FRACTION, each
-from ppafo.control.kind import ControllerKind
-from ppafo.control.walking import readings, safety
+from ppafo.control.walking import safety, signs
 from ppafo.control.walking.event_on_off import EVENT_ON_OFF as FLOAT_KIND
 from ppafo.control.walking.safety import START as SAFETY_START
 from ppafo.control.walking.safety import Finding, later_finding
@@ -50,11 +24,11 @@ ROUNDING = 1.0e-6
 
 
 def _count(name: str, summary: str) -> Quantity:
-    return Quantity(name, "", f"{summary}, in counts", None, 0.0, float(TOP))
+    return Quantity(name, "", f"{summary}, in counts", None, 0.0, float(walking_law.TOP))
 
 
 def _samples(name: str, summary: str) -> Quantity:
-    return Quantity(name, "", f"{summary}, in samples", None, 0.0, float(LONGEST))
+    return Quantity(name, "", f"{summary}, in samples", None, 0.0, float(walking_law.LONGEST))
 
 
 def _stride_share(name: str, summary: str) -> Quantity:
@@ -66,7 +40,7 @@ def _share(name: str, summary: str) -> Quantity:
 
 
 def _strides(name: str, summary: str) -> Quantity:
-    return Quantity(name, "", summary, None, 0.0, float(MOST_STRIDES))
+    return Quantity(name, "", summary, None, 0.0, float(walking_law.MOST_STRIDES))
 
 
 NUMBERS = (
@@ -76,7 +50,14 @@ NUMBERS = (
     _count("load", "a force sensor counts as loaded above this"),
     _count("unload", "and as unloaded below this"),
     _samples("debounce", "a change of load counts when it has lasted this long"),
-    Quantity("first_stride", "", "stride time until one is measured, in halves of a sample", None, 0.0, float(HALVES)),
+    Quantity(
+        "first_stride",
+        "",
+        "stride time until one is measured, in halves of a sample",
+        None,
+        0.0,
+        float(walking_law.HALVES),
+    ),
     _share("stride_weight", "weight of a new stride in the moving average"),
     _stride_share("push_off_start", "start of the push-off"),
     _count("lowest_force", "a force below this is no reading"),
@@ -127,41 +108,43 @@ NUMBERS = (
 """Every number of ``event_on_off.WalkNumbers``, in order."""
 
 
-def whole_numbers(settings: Mapping[str, float], period: float, converter: GaitConverter) -> dict[str, float]:
+def whole_numbers(
+    settings: Mapping[str, float], period: float, converter: walking_law.GaitConverter
+) -> dict[str, float]:
     """Whole numbers by name, not yet limited, for settings in SI units and a sample period [s]."""
     angle, force, pressure = (
         step / converter.scale for step in (converter.angle_step, converter.force_step, converter.pressure_step)
     )
     steps = {
-        "moves": readings.MOVES / force,
-        "turns": readings.TURNS / angle,
-        "fades": readings.FADES * period / angle,
-        "turned_up": readings.TURNED_UP / angle,
-        "turns_down": readings.TURNS_DOWN / angle,
-        "is_flat": readings.IS_FLAT / angle,
-        "rises": readings.RISES / pressure,
-        "compresses": readings.COMPRESSES / angle,
+        "moves": signs.MOVES / force,
+        "turns": signs.TURNS / angle,
+        "fades": signs.FADES * period / angle,
+        "turned_up": signs.TURNED_UP / angle,
+        "turns_down": signs.TURNS_DOWN / angle,
+        "is_flat": signs.IS_FLAT / angle,
+        "rises": signs.RISES / pressure,
+        "compresses": signs.COMPRESSES / angle,
     }
     strides = {
-        name: settings[name] * STRIDE_SHARE
+        name: settings[name] * walking_law.STRIDE_SHARE
         for name in ("push_off_end", "push_off_start", "longest_phase", "flat_from", "flat_to", "shortest_swing")
     }
     shares = {
         "steady": safety.STEADY * SHARE,
-        "dwells": readings.DWELLS * STRIDE_SHARE,
-        "turns_back": readings.TURNS_BACK * STRIDE_SHARE,
-        "lands": readings.LANDS * STRIDE_SHARE,
+        "dwells": signs.DWELLS * walking_law.STRIDE_SHARE,
+        "turns_back": signs.TURNS_BACK * walking_law.STRIDE_SHARE,
+        "lands": signs.LANDS * walking_law.STRIDE_SHARE,
         "stride_weight": settings["stride_weight"] * SHARE,
-        "slow_share": period / (period + readings.SLOW_TIME) * SHARE,
-        "fall_share": period / (period + readings.FALL_TIME) * SHARE,
+        "slow_share": period / (period + signs.SLOW_TIME) * SHARE,
+        "fall_share": period / (period + signs.FALL_TIME) * SHARE,
     }
-    counted = {name: min(settings[name], MOST_STRIDES) for name in ("most_toe_strides", "resume_strides")}
+    counted = {name: min(settings[name], walking_law.MOST_STRIDES) for name in ("most_toe_strides", "resume_strides")}
     found = _levels(settings, period, converter) | steps | strides | shares | counted
     rounded = {name: float(int(value + 0.5)) for name, value in found.items()} | _times(settings, period)
     return {item.name: rounded[item.name] for item in NUMBERS}
 
 
-def _levels(settings: Mapping[str, float], period: float, converter: GaitConverter) -> dict[str, float]:
+def _levels(settings: Mapping[str, float], period: float, converter: walking_law.GaitConverter) -> dict[str, float]:
     """Readings in counts that others are compared with; a limit is within what the converter can show."""
     forces = {
         "load": settings["load_threshold"],
@@ -169,18 +152,18 @@ def _levels(settings: Mapping[str, float], period: float, converter: GaitConvert
         "lowest_force": settings["lowest_force"],
         "largest_force": settings["largest_force"],
         "largest_drop": settings["largest_drop"],
-        "gone": readings.GONE * settings["largest_drop"],
+        "gone": signs.GONE * settings["largest_drop"],
     }
     angles = {name: settings[name] for name in ("lowest_angle", "highest_angle", "lowest_flat_angle")}
     angles |= {
         "highest_flat_angle": settings["highest_flat_angle"],
         "lifts_above": settings["swing_angle"] + settings["band"],
         "lets_go_below": settings["swing_angle"] - settings["band"],
-        "squeezes": readings.SQUEEZING_ANGLE,
+        "squeezes": signs.SQUEEZING_ANGLE,
         "toes_late": settings["highest_toe_off_angle"],
-        "toes_in_time": settings["highest_toe_off_angle"] - readings.IN_TIME,
+        "toes_in_time": settings["highest_toe_off_angle"] - signs.IN_TIME,
     }
-    pressures = {"filled": settings["filled_pressure"], "thin": readings.THIN}
+    pressures = {"filled": settings["filled_pressure"], "thin": signs.THIN}
     pressures |= {name: settings[name] for name in ("lowest_pressure", "highest_pressure")}
     found = {name: (value - converter.force_zero) / converter.force_step for name, value in forces.items()}
     found |= {name: value / converter.angle_step for name, value in angles.items()}
@@ -189,7 +172,7 @@ def _levels(settings: Mapping[str, float], period: float, converter: GaitConvert
     for name in ends & set(found):
         found[name] = min(max(found[name], 1.0), converter.top - 1.0)
     # Who samples slowly may miss how a force goes: no reading is above the largest.
-    found["largest_drop"] = found["largest_drop"] if period < readings.QUICK_PERIOD else converter.top
+    found["largest_drop"] = found["largest_drop"] if period < signs.QUICK_PERIOD else converter.top
     return {name: value * converter.scale for name, value in found.items()}
 
 
@@ -197,16 +180,16 @@ def _times(settings: Mapping[str, float], period: float) -> dict[str, float]:
     """Times in samples: those that must be passed rounded down, those that must be reached rounded up."""
     passed = {
         "frozen": settings["frozen_time"],
-        "thin_time": readings.THIN_TIME,
+        "thin_time": signs.THIN_TIME,
         "fill": settings["fill_time"],
         "vent": settings["vent_time"],
         "late_vent": safety.LATE * settings["vent_time"],
         "stands_up": safety.STANDS_UP,
-        "lasts": readings.LASTS,
+        "lasts": signs.LASTS,
         "follow": settings["follow_time"],
     }
     found = {name: float(int(time / period + ROUNDING)) for name, time in passed.items()}
-    reached = {"debounce": settings["debounce"], "shown": settings["follow_time"] + readings.SHOWN}
+    reached = {"debounce": settings["debounce"], "shown": settings["follow_time"] + signs.SHOWN}
     found |= {name: float(-int(-(time / period - ROUNDING) // 1)) for name, time in reached.items()}
     return found | {"first_stride": float(int(2.0 * settings["first_stride_time"] / period + 0.5))}
 
@@ -214,8 +197,8 @@ def _times(settings: Mapping[str, float], period: float) -> dict[str, float]:
 class WalkRows(NamedTuple):
     """The converter, and the numbers of the law."""
 
-    converter: GaitConverter
-    numbers: WalkNumbers
+    converter: walking_law.GaitConverter
+    numbers: walking_law.WalkNumbers
 
 
 class PhaseShown(NamedTuple):
@@ -237,7 +220,7 @@ class WalkStateRows(NamedTuple):
 
     phase: PhaseShown
     safety: SafetyShown
-    counts: WalkCounts
+    counts: walking_law.WalkCounts
 
 
 def update(
@@ -245,8 +228,8 @@ def update(
 ) -> tuple[float, WalkStateRows]:
     """Command [-] that ``sample`` gives for what the converter shows: 1, -1 or ``VENT``."""
     before = each(int, state.counts)
-    readings = read_gait(parameters.converter, measurement)
-    steps, after = sample(each(int, parameters.numbers), before, readings)
+    readings = walking_law.read_gait(parameters.converter, measurement)
+    steps, after = walking_law.sample(each(int, parameters.numbers), before, readings)
     command = float(steps) / COMMAND_STEPS if steps != 0 else VENT
     vents = after.safety.level > before.safety.level
     shown = SafetyShown(
@@ -257,18 +240,18 @@ def update(
     return command, WalkStateRows(PhaseShown(float(after.phase.phase)), shown, each(float, after))
 
 
-_TRACE = TraceCounts(last=0, still=0, slow=0)
-START_COUNTS = WalkCounts(
-    phase=PhaseCounts(
+_TRACE = walking_law.TraceCounts(last=0, still=0, slow=0)
+START_COUNTS = walking_law.WalkCounts(
+    phase=walking_law.PhaseCounts(
         phase=0,
-        heel=SwitchCounts(0, 0),
-        toe=SwitchCounts(0, 0),
+        heel=walking_law.SwitchCounts(0, 0),
+        toe=walking_law.SwitchCounts(0, 0),
         spell=0,
         since_strike=0,
         stride=0,
         strikes=0,
     ),
-    safety=SafetyCounts(
+    safety=walking_law.SafetyCounts(
         level=0,
         sign=0,
         good_strides=0,
@@ -278,31 +261,31 @@ START_COUNTS = WalkCounts(
         steady=0,
         side=0,
         held=0,
-        seen=SensorCounts(_TRACE, _TRACE, _TRACE),
-        landing=LandingCounts(lowest=0, mark=0, late=0, late_toes=0),
-        emptying=EmptyingCounts(lowest=0, angle=0, rising=0),
-        slow=PressureCounts(0, 0),
+        seen=walking_law.SensorCounts(_TRACE, _TRACE, _TRACE),
+        landing=walking_law.LandingCounts(lowest=0, mark=0, late=0, late_toes=0),
+        emptying=walking_law.EmptyingCounts(lowest=0, angle=0, rising=0),
+        slow=walking_law.PressureCounts(0, 0),
         thin=0,
     ),
     lifting=0,
 )
 """Nothing seen yet."""
 
-_BIT, _TIME, _READING = (0, 1), (0, LONGEST), (0, TOP)
+_BIT, _TIME, _READING = (0, 1), (0, walking_law.LONGEST), (0, walking_law.TOP)
 STATE_RANGES = {
-    "phase": (0, PUSH_OFF),
+    "phase": (0, walking_law.PUSH_OFF),
     "loaded": _BIT,
     "against": _TIME,
     "spell": _TIME,
     "since_strike": _TIME,
-    "stride": (0, HALVES),
-    "strikes": (0, SEVERAL),
-    "level": (0, STOPPED),
-    "sign": (0, LATE_FORCES),
-    "good_strides": (-1, MOST_STRIDES),
+    "stride": (0, walking_law.HALVES),
+    "strikes": (0, walking_law.SEVERAL),
+    "level": (0, walking_law.STOPPED),
+    "sign": (0, walking_law.LATE_FORCES),
+    "good_strides": (-1, walking_law.MOST_STRIDES),
     "heel_seen": _BIT,
     "toe_seen": _BIT,
-    "toe_strides": (0, MOST_STRIDES),
+    "toe_strides": (0, walking_law.MOST_STRIDES),
     "steady": _BIT,
     "side": (-1, 1),
     "held": _TIME,
@@ -311,8 +294,8 @@ STATE_RANGES = {
     "slow": _READING,
     "lowest": _READING,
     "mark": _READING,
-    "late": (0, MOST_LATE),
-    "late_toes": (0, MOST_LATE),
+    "late": (0, walking_law.MOST_LATE),
+    "late_toes": (0, walking_law.MOST_LATE),
     "angle": _READING,
     "rising": _TIME,
     "first": _READING,
@@ -323,48 +306,21 @@ STATE_RANGES = {
 """Lowest and highest of every number of ``WalkCounts``, by its own name."""
 
 
-@dataclass(frozen=True, slots=True)
-class FixedWalk:
-    """The integer form of a walking controller.
-
-    ``kind`` runs it in the lanes. ``sample(numbers, state, readings)`` is the law itself, on whole numbers only:
-    command in steps, 0 to vent, and the next state. ``prepare(settings, period, converter)`` makes the whole numbers by
-    name, in the order of ``number_quantities``, which may not be within their ranges yet.
-    """
-
-    kind: ControllerKind
-    sample: Callable[..., Any]
-    numbers: type
-    readings: type
-    begins: Any
-    state_ranges: Mapping[str, tuple[int, int]]
-    number_quantities: tuple[Quantity, ...]
-    prepare: Callable[[Mapping[str, float], float, GaitConverter], dict[str, float]]
-
-    @property
-    def name(self) -> str:
-        """That of the controller whose form it is."""
-        return self.kind.name
-
-
-EVENT_ON_OFF = FixedWalk(
-    kind=ControllerKind(
-        name=FLOAT_KIND.name,
-        summary=FLOAT_KIND.summary,
-        source=FLOAT_KIND.source,
-        quantities=(*OF_CONVERTER, *NUMBERS),
+EVENT_ON_OFF = FixedLaw(
+    kind=replace(
+        FLOAT_KIND,
+        quantities=(*walking_law.OF_CONVERTER, *NUMBERS),
         parameters=WalkRows,
         initial=WalkStateRows(PhaseShown(0.0), SafetyShown(0.0, 0.0, SAFETY_START.finding), each(float, START_COUNTS)),
         update=update,
-        only_switches=True,
     ),
-    sample=sample,
-    numbers=WalkNumbers,
-    readings=GaitReadings,
+    sample=walking_law.sample,
+    numbers=walking_law.WalkNumbers,
+    readings=walking_law.GaitReadings,
     begins=START_COUNTS,
     state_ranges=STATE_RANGES,
     number_quantities=NUMBERS,
     prepare=whole_numbers,
 )
-FIXED_WALKS: dict[str, FixedWalk] = {EVENT_ON_OFF.name: EVENT_ON_OFF}
+FIXED_WALKS: dict[str, FixedLaw] = {EVENT_ON_OFF.name: EVENT_ON_OFF}
 """Walking controllers that have an integer form, by name."""

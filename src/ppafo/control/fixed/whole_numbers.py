@@ -129,13 +129,15 @@ class Readings(NamedTuple):
     pressure_2: int
 
 
-OF_CONVERTER = (
+OF_STEPS = (
     Quantity("pressure_step", "Pa_d", "pressure of one count", None, 0.0),
     Quantity("torque_step", "N m", "torque of one count", None, 0.0),
+)
+OF_LIMITS = (
     Quantity("top", "", "largest reading of the converter", None, 0.0, float(LARGEST_READING)),
     Quantity("middle", "", "reading that stands for a reference of 0 N m", None, 0.0, float(2 ** (MOST_BITS - 1))),
 )
-"""The numbers of ``Converter``, in order."""
+"""The numbers of ``Converter``, in order: its steps, and then its limits."""
 
 
 def converter_of(bits: float, pressure_range: float, torque_constant: float) -> Converter:

@@ -15,20 +15,8 @@ Signs are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep
 
 from typing import NamedTuple
 
-from ppafo.control.walking import readings, signs
+from ppafo.control.walking import signs
 from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState
-from ppafo.control.walking.readings import (
-    AIRBORNE,
-    HALF,
-    LASTS,
-    LATE_STRIDES,
-    NOT_EMPTYING,
-    NOTHING_READ,
-    Emptying,
-    Landing,
-    LastReadings,
-)
-from ppafo.control.walking.signs import HELPS, LIFTS, NO_SIGN, PAUSED, STOPPED, SafetyRules, first_sign
 from ppafo.model.command import VENT, VENTS_ABOVE
 from ppafo.model.gait_sensors import GaitMeasurement
 
@@ -76,30 +64,30 @@ class SafetyState(NamedTuple):
     good_strides: float
     ventings: float
     finding: Finding
-    readings: LastReadings
-    landing: Landing
+    readings: signs.LastReadings
+    landing: signs.Landing
     stance: Stance
     toe_strides: float
     steady: float
     valve_times: ValveTimes
-    emptying: Emptying
+    emptying: signs.Emptying
     slow_pressure_1: float
     slow_pressure_2: float
     thin: float
 
 
 START = SafetyState(
-    level=HELPS,
+    level=signs.HELPS,
     good_strides=0.0,
     ventings=0.0,
-    finding=Finding(sign=NO_SIGN, heel_force=0.0, toe_force=0.0, angle=0.0, pressure_1=0.0, pressure_2=0.0),
-    readings=NOTHING_READ,
-    landing=AIRBORNE,
+    finding=Finding(sign=signs.NO_SIGN, heel_force=0.0, toe_force=0.0, angle=0.0, pressure_1=0.0, pressure_2=0.0),
+    readings=signs.NOTHING_READ,
+    landing=signs.AIRBORNE,
     stance=Stance(heel_seen=0.0, toe_seen=0.0, together=0.0, apart=0.0),
     toe_strides=0.0,
     steady=0.0,
     valve_times=ValveTimes(0.0, 0.0, 0.0),
-    emptying=NOT_EMPTYING,
+    emptying=signs.NOT_EMPTYING,
     slow_pressure_1=0.0,
     slow_pressure_2=0.0,
     thin=0.0,
@@ -135,32 +123,32 @@ def next_stance(last: Stance, before: PhaseState, phase: PhaseState, period: flo
     )
 
 
-def gait_sign(rules: SafetyRules, before: PhaseState, phase: PhaseState, stance: Stance) -> float:
+def gait_sign(rules: signs.SafetyRules, before: PhaseState, phase: PhaseState, stance: Stance) -> float:
     """The sign of forces that do not follow each other as in a gait, at any pace."""
     longest = rules.longest_phase * phase.stride_time
     endless = max(phase.in_phase if phase.phase == SWING else 0.0, stance.apart) > longest
     stays = (before.phase != SWING) & (phase.phase != SWING) & (before.since_strike > longest)
     returns = (phase.heel.loaded > before.heel.loaded) | (phase.toe.loaded > before.toe.loaded)
     skips_toes = (before.phase == LANDING) & (phase.phase == SWING) & (phase.strikes > 1.5)
-    found = signs.NO_TOES if skips_toes else NO_SIGN
+    found = signs.NO_TOES if skips_toes else signs.NO_SIGN
     found = signs.RESTLESS if stays & returns else found
     return signs.ENDLESS_PHASE if endless else found
 
 
-def steady_sign(rules: SafetyRules, before: PhaseState, phase: PhaseState, angle: float) -> float:
+def steady_sign(rules: signs.SafetyRules, before: PhaseState, phase: PhaseState, angle: float) -> float:
     """The sign of forces or an angle [rad] that do not fit a stride after one that took the usual time."""
     flat = phase.since_strike > rules.flat_from * phase.stride_time
     flat = flat & (phase.since_strike < rules.flat_to * phase.stride_time)
     enters = (before.phase == SWING) & (phase.phase != SWING)
     short = enters & (before.in_phase < rules.shortest_swing * phase.stride_time)
     bent = (angle < rules.lowest_flat_angle) | (angle > rules.highest_flat_angle)
-    found = signs.NO_HEEL if flat & (phase.heel.loaded < 0.5) else NO_SIGN
+    found = signs.NO_HEEL if flat & (phase.heel.loaded < 0.5) else signs.NO_SIGN
     found = signs.SHORT_SWING if short else found
     found = signs.FLAT_ANGLE if flat & bent & (min(phase.heel.loaded, phase.toe.loaded) > 0.5) else found
     return signs.NOT_FLAT if flat & (phase.toe.loaded < 0.5) else found
 
 
-def valve_sign(rules: SafetyRules, now: SafetyState, phase: PhaseState, measurement: GaitMeasurement) -> float:
+def valve_sign(rules: signs.SafetyRules, now: SafetyState, phase: PhaseState, measurement: GaitMeasurement) -> float:
     """The sign of a pressure that is not what the valve was told long enough.
 
     A foot in the air or on its toes presses gas out of a vented chamber: those are judged while it stands flat. There
@@ -171,11 +159,11 @@ def valve_sign(rules: SafetyRules, now: SafetyState, phase: PhaseState, measurem
     no_rise_1 = (valve_times.filling_1 > rules.fill_time) & (measurement.pressure_1 < rules.filled_pressure)
     no_rise_2 = (valve_times.filling_2 > rules.fill_time) & (measurement.pressure_2 < rules.filled_pressure)
     stands = (phase.phase == MID_STANCE) & (phase.heel.loaded > 0.5)
-    left = readings.holds_pressure(rules, measurement.pressure_1, now.slow_pressure_1)
-    left = left | readings.holds_pressure(rules, measurement.pressure_2, now.slow_pressure_2)
+    left = signs.holds_pressure(rules, measurement.pressure_1, now.slow_pressure_1)
+    left = left | signs.holds_pressure(rules, measurement.pressure_2, now.slow_pressure_2)
     late = (valve_times.venting > LATE * rules.vent_time) & (measurement.pressure_2 > rules.filled_pressure)
     no_fall = stands & ((valve_times.venting > rules.vent_time) & left | late)
-    found = signs.NO_FALL if no_fall | (now.emptying.rising > LASTS) else NO_SIGN
+    found = signs.NO_FALL if no_fall | (now.emptying.rising > signs.LASTS) else signs.NO_SIGN
     return signs.NO_RISE if no_rise_1 | no_rise_2 else found
 
 
@@ -185,25 +173,27 @@ def next_good_strides(state: SafetyState, before: PhaseState, phase: PhaseState,
     -1 after a sign, so that the rest of its stride does not count.
     """
     enters = (before.phase == SWING) & (phase.phase != SWING)
-    usual = (before.since_strike > HALF * phase.stride_time) & (before.since_strike < phase.stride_time / HALF)
+    usual = (before.since_strike > signs.HALF * phase.stride_time) & (
+        before.since_strike < phase.stride_time / signs.HALF
+    )
     good = usual & (min(state.stance.heel_seen, state.stance.toe_seen) > 0.5)
     counted = (state.good_strides + 1.0 if good else 0.0) if enters else state.good_strides
-    return -1.0 if sign > NO_SIGN else counted
+    return -1.0 if sign > signs.NO_SIGN else counted
 
 
-def level_after(rules: SafetyRules, state: SafetyState, good_strides: float, together: float) -> float:
+def level_after(rules: signs.SafetyRules, state: SafetyState, good_strides: float, together: float) -> float:
     """The level after good strides in a row, and heel and toes on the ground for a time [s]; a stop lasts.
 
     A swing without end is that of who sits: standing up shows that both forces are sound.
     """
-    resting = (state.level == PAUSED) & (state.finding.sign == signs.ENDLESS_PHASE)
-    resumes = (state.level < STOPPED) & (good_strides >= rules.resume_strides)
-    lifted = LIFTS if (state.level == PAUSED) & (good_strides >= LIFT_STRIDES) else state.level
-    return HELPS if resumes | (resting & (together > STANDS_UP)) else lifted
+    resting = (state.level == signs.PAUSED) & (state.finding.sign == signs.ENDLESS_PHASE)
+    resumes = (state.level < signs.STOPPED) & (good_strides >= rules.resume_strides)
+    lifted = signs.LIFTS if (state.level == signs.PAUSED) & (good_strides >= LIFT_STRIDES) else state.level
+    return signs.HELPS if resumes | (resting & (together > STANDS_UP)) else lifted
 
 
 def remembered(
-    rules: SafetyRules,
+    rules: signs.SafetyRules,
     state: SafetyState,
     before: PhaseState,
     phase: PhaseState,
@@ -211,7 +201,7 @@ def remembered(
     period: float,
 ) -> SafetyState:
     """The state with what the signs remember of a sample of ``period`` [s]; the level is as it was."""
-    seen = readings.next_readings(state.readings, measurement, before, phase, period)
+    seen = signs.next_readings(state.readings, measurement, before, phase, period)
     enters = (before.phase == SWING) & (phase.phase != SWING)
     on_toes = (state.stance.heel_seen < 0.5) & (before.strikes > 0.5)
     usual = abs(before.since_strike - phase.stride_time) < STEADY * phase.stride_time
@@ -219,20 +209,20 @@ def remembered(
     vented = state.valve_times.filling_1 + state.valve_times.venting
     return state._replace(
         readings=seen,
-        landing=readings.next_landing(rules, state.landing, seen, before, phase, steady, period),
+        landing=signs.next_landing(rules, state.landing, seen, before, phase, steady, period),
         stance=next_stance(state.stance, before, phase, period),
         toe_strides=(state.toe_strides + 1.0 if on_toes else 0.0) if enters else state.toe_strides,
         steady=steady,
-        emptying=readings.next_emptying(rules, state.emptying, vented, measurement, period),
-        slow_pressure_1=readings.next_slow_pressure(state.slow_pressure_1, measurement.pressure_1, period),
-        slow_pressure_2=readings.next_slow_pressure(state.slow_pressure_2, measurement.pressure_2, period),
-        thin=readings.next_thin(state.thin, measurement, period),
+        emptying=signs.next_emptying(rules, state.emptying, vented, measurement, period),
+        slow_pressure_1=signs.next_slow_pressure(state.slow_pressure_1, measurement.pressure_1, period),
+        slow_pressure_2=signs.next_slow_pressure(state.slow_pressure_2, measurement.pressure_2, period),
+        thin=signs.next_thin(state.thin, measurement, period),
     )
 
 
 def found_sign(
-    rules: SafetyRules,
-    last: LastReadings,
+    rules: signs.SafetyRules,
+    last: signs.LastReadings,
     now: SafetyState,
     before: PhaseState,
     phase: PhaseState,
@@ -240,19 +230,19 @@ def found_sign(
     period: float,
 ) -> float:
     """The sign of a sample that comes first in ``signs``; ``last`` are the readings before it, ``now`` remembers it."""
-    late = max(now.landing.late, now.landing.late_toes) > LATE_STRIDES
-    sign = signs.LATE_FORCES if late else NO_SIGN
+    late = max(now.landing.late, now.landing.late_toes) > signs.LATE_STRIDES
+    sign = signs.LATE_FORCES if late else signs.NO_SIGN
     sign = signs.TOE_STRIDES if now.toe_strides > rules.most_toe_strides else sign
-    sign = first_sign(steady_sign(rules, before, phase, measurement.angle), sign) if now.steady > 0.5 else sign
-    sign = first_sign(gait_sign(rules, before, phase, now.stance), sign)
-    sign = first_sign(readings.still_sign(rules, now.readings, before, phase), sign)
-    sign = first_sign(readings.gone_sign(rules, last, measurement, period), sign)
-    sign = first_sign(readings.range_sign(rules, measurement, now.thin), sign)
-    return first_sign(valve_sign(rules, now, phase, measurement), sign)
+    sign = signs.first_sign(steady_sign(rules, before, phase, measurement.angle), sign) if now.steady > 0.5 else sign
+    sign = signs.first_sign(gait_sign(rules, before, phase, now.stance), sign)
+    sign = signs.first_sign(signs.still_sign(rules, now.readings, before, phase), sign)
+    sign = signs.first_sign(signs.gone_sign(rules, last, measurement, period), sign)
+    sign = signs.first_sign(signs.range_sign(rules, measurement, now.thin), sign)
+    return signs.first_sign(valve_sign(rules, now, phase, measurement), sign)
 
 
 def monitor(
-    rules: SafetyRules,
+    rules: signs.SafetyRules,
     state: SafetyState,
     before: PhaseState,
     phase: PhaseState,
@@ -292,8 +282,8 @@ def feed_time(since: float, opening: float, period: float) -> float:
 
 def permits(state: SafetyState, phase: float) -> bool:
     """True where the device may act in a phase: a push needs a heel that was loaded in this stance and has risen."""
-    pushes = (state.level < LIFTS) & (state.stance.heel_seen > 0.5)
-    return (state.level < PAUSED) & (pushes | (phase != PUSH_OFF))
+    pushes = (state.level < signs.LIFTS) & (state.stance.heel_seen > 0.5)
+    return (state.level < signs.PAUSED) & (pushes | (phase != PUSH_OFF))
 
 
 def safe_command(state: SafetyState, phase: float, command: float, period: float) -> tuple[float, SafetyState]:

@@ -1,14 +1,22 @@
-"""The signs by which a controller of walking helps less: what each is, and whether it lifts only, pauses or stops.
+"""The signs by which a controller of walking helps less, and how they show in the readings.
 
-Where the heel is missed the foot is still held up in the swing, and not pushed. A pause vents both chambers, for what
-walking does too: help comes back after some good strides. A stop is for what only a fault does: it is for good. A sign
-is a number in the lanes, and 0 is none.
+Each sign lifts only, pauses or stops. Where the heel is missed the foot is still held up in the swing, and not pushed.
+A pause vents both chambers, for what walking does too: help comes back after some good strides. A stop is for what only
+a fault does: it is for good. A sign is a number in the lanes, and 0 is none.
+
+Readings show a sign as such where they are out of range, gone at once, the same while others move, or late. Where
+forces come late the ankle tells. A foot on its heel turns down until it is flat, and up from then on: one that has
+turned up before the heel is seen, and does so until the toes are, was on the ground long before.
+
+Signs are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep the lanes from running side by side.
 """
 
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, lifts
 from ppafo.model.declaration import PRESSURE_LAG, VALVE_LAG, Quantity
+from ppafo.model.gait_sensors import GaitMeasurement
 
 HELPS = 0.0
 LIFTS = 1.0
@@ -193,3 +201,300 @@ SAFETY_QUANTITIES = (
     ),
     Quantity("highest_toe_off_angle", "rad", "no ankle has more while its toes still carry", 2.06, -10.0, 10.0),
 )
+
+
+class LastReadings(NamedTuple):
+    """Last readings of heel, toe [N] and angle [rad], how long each stayed the same [s], and each filtered.
+
+    Only time in which another sensor moves, or the wearer steps, counts as time in which one stayed the same; for the
+    angle only since the strike before, for a foot that hangs or sits may show one angle for long.
+    """
+
+    heel_force: float
+    toe_force: float
+    angle: float
+    heel_unchanged: float
+    toe_unchanged: float
+    angle_unchanged: float
+    slow_heel: float
+    slow_toe: float
+    slow_angle: float
+
+
+class Landing(NamedTuple):
+    """Lowest ankle angle of this swing, or since the strike [rad]; highest after it, which fades; strikes in doubt.
+
+    ``in_doubt`` is the angle of a strike [rad], 0 where the foot lands in time; ``late`` are late ones in a row, and
+    ``late_toes`` push-offs in a row at whose end the foot had turned down as it does in the air only.
+    """
+
+    lowest: float
+    highest: float
+    in_doubt: float
+    late: float
+    late_toes: float
+
+
+class Emptying(NamedTuple):
+    """Lowest pressure of chamber 2 since it was joined to the atmosphere [Pa], angle then [rad], how long above [s]."""
+
+    lowest: float
+    angle: float
+    rising: float
+
+
+AIRBORNE = Landing(lowest=0.0, highest=0.0, in_doubt=0.0, late=0.0, late_toes=0.0)
+NOT_EMPTYING = Emptying(lowest=0.0, angle=0.0, rising=0.0)
+NOTHING_READ = LastReadings(
+    heel_force=0.0,
+    toe_force=0.0,
+    angle=0.0,
+    heel_unchanged=0.0,
+    toe_unchanged=0.0,
+    angle_unchanged=0.0,
+    slow_heel=0.0,
+    slow_toe=0.0,
+    slow_angle=0.0,
+)
+
+SLOW_TIME = 0.08
+"""Time constant [s] of the slow readings: a step has faded from them when a sensor counts as frozen."""
+
+MOVES, TURNS = 40.0, 0.04
+"""A force [N] and an angle [rad] move that are further than this from their slow reading: not those of who stands."""
+
+IN_TIME = 0.06
+"""Angle [rad] below ``highest_toe_off_angle``, 3.4 deg, up to which toes that are seen to leave the ground do so in
+time: between both nothing is known. A dropped foot that nobody pushes turns down in the air too, but more slowly."""
+
+GONE = 0.1
+"""What is left of a force that is gone, as a fraction of ``largest_drop``."""
+
+QUICK_PERIOD = 0.005
+"""Sample period [s] above which a force may be gone within a sample: toes leave the ground in some 0.1 s."""
+
+SQUEEZING_ANGLE = 2.09
+"""Ankle angle [rad] from which a foot may squeeze a full chamber 2 to any pressure: 30 deg in plantarflexion."""
+
+TURNED_UP = 0.05
+"""Angle [rad] by which a foot has turned up when a strike is seen that is in doubt, 2.9 deg, less what fades of it.
+
+Of 480 wearers with good sensors the most in two strides in a row is 2.4.
+"""
+
+FADES = 0.35
+"""Rate [rad/s] at which the highest angle of a swing fades, 20 deg/s: a foot that lands nearly flat turns up about as
+slowly in the air before, and several times as fast once it is flat."""
+
+TURNS_DOWN, IS_FLAT = 0.01, 0.026
+"""Angles [rad]: a foot that turns down by more lands now, one that turns up by more until the toes load is flat.
+
+One that is still lifted as it strikes turns up first, and then down: by more than the second angle it lands now too.
+"""
+
+LATE_STRIDES = 1.5
+"""More strides in a row than this are late: the last step of a walk may be flat too."""
+
+RISES, LASTS = 1.2e4, 2.5e-3
+"""Pressure [Pa], more than one step of a converter of 1 psi, and time [s], of a rise that is not noise."""
+
+SHOWN = 0.1
+"""Time [s] after ``follow_time`` in which a vented chamber is watched: a foot that then moves pumps gas about."""
+
+COMPRESSES = 0.02
+"""Angle in plantarflexion [rad] from which the ankle compresses chamber 2 by enough to raise its pressure."""
+
+THIN, THIN_TIME = 6.0e4, 0.12
+"""Pressure [Pa] below which no chamber stays for longer than this time [s]: a moving foot may lower one so for less."""
+
+FALL_TIME = 0.03
+"""Time constant [s] of the slow pressures, which tell whether a reading falls."""
+
+FALLS = 0.03
+"""A reading falls that is below the slow one by more than this fraction: a venting chamber at 140 kPa by 0.1."""
+
+DWELLS, TURNS_BACK = 0.235, 0.35
+"""Fractions of the stride in which a force and an ankle angle may stay within a step of their converter: in a usual
+stride the first one is ``frozen_time``, and slow strides turn back slowly."""
+
+LANDS = 0.3
+"""Fraction of the stride in which who comes down on the heel is stepping, and may then stand on it."""
+
+MOST = 0.75
+"""Fraction of a stride after which an angle has been the same for all of it, less where nothing else moved."""
+
+HALF = 0.5
+"""A stride of less than this fraction of the stride time, or of more than its inverse, is not a good one."""
+
+
+def time_unchanged(last: float, reading: float, since: float, moves: bool, period: float) -> float:
+    """How long a reading has been the same to the last bit [s] while something else ``moves``."""
+    kept = since + period if moves else since
+    return kept if reading == last else 0.0
+
+
+def slow_reading(last: float, reading: float, is_first: bool, period: float) -> float:
+    """A reading filtered with ``SLOW_TIME``, in its unit; the first one counts at once."""
+    followed = last + (reading - last) * period / (period + SLOW_TIME)
+    return reading if is_first else followed
+
+
+def next_readings(
+    last: LastReadings, measurement: GaitMeasurement, before: PhaseState, phase: PhaseState, period: float
+) -> LastReadings:
+    """The last readings after a sample, taken every ``period`` [s]; ``before`` and ``phase`` are its phases.
+
+    Who stands with heel and toes on the ground has no moving sensor, and the steps of a converter then hold a reading
+    for long: a sensor is still only while another one moves. On the toes alone nobody stands still, and nobody lands
+    for long; on the heel alone somebody stands whose toes the device holds up.
+    """
+    is_first = last.angle == 0.0
+    same_angle = min(last.angle_unchanged, before.since_strike)
+    slow_heel = slow_reading(last.slow_heel, measurement.heel_force, is_first, period)
+    slow_toe = slow_reading(last.slow_toe, measurement.toe_force, is_first, period)
+    slow_angle = slow_reading(last.slow_angle, measurement.angle, is_first, period)
+    lands = (phase.phase == LANDING) & (phase.in_phase < LANDS * phase.stride_time)
+    steps = (phase.heel.loaded < 0.5) | lands
+    heel_moves = abs(measurement.heel_force - slow_heel) > MOVES
+    toe_moves = abs(measurement.toe_force - slow_toe) > MOVES
+    turns = abs(measurement.angle - slow_angle) > TURNS
+    beside_heel, beside_toe, beside_angle = (
+        toe_moves | turns | steps,
+        heel_moves | turns | steps,
+        heel_moves | toe_moves | steps,
+    )
+    return LastReadings(
+        heel_force=measurement.heel_force,
+        toe_force=measurement.toe_force,
+        angle=measurement.angle,
+        heel_unchanged=time_unchanged(
+            last.heel_force, measurement.heel_force, last.heel_unchanged, beside_heel, period
+        ),
+        toe_unchanged=time_unchanged(last.toe_force, measurement.toe_force, last.toe_unchanged, beside_toe, period),
+        angle_unchanged=time_unchanged(last.angle, measurement.angle, same_angle, beside_angle, period),
+        slow_heel=slow_heel,
+        slow_toe=slow_toe,
+        slow_angle=slow_angle,
+    )
+
+
+def next_thin(last: float, measurement: GaitMeasurement, period: float) -> float:
+    """How long the lower pressure has been below ``THIN`` [s]."""
+    return last + period if min(measurement.pressure_1, measurement.pressure_2) < THIN else 0.0
+
+
+def range_sign(rules: SafetyRules, measurement: GaitMeasurement, thin: float) -> float:
+    """The sign of a reading that no foot and no chamber gives; one is thin for a time [s]."""
+    force = max(measurement.heel_force, measurement.toe_force) > rules.largest_force
+    force = force | (min(measurement.heel_force, measurement.toe_force) < rules.lowest_force)
+    angle = (measurement.angle < rules.lowest_angle) | (measurement.angle > rules.highest_angle)
+    squeezed = measurement.angle > SQUEEZING_ANGLE
+    pressure = min(measurement.pressure_1, measurement.pressure_2) < rules.lowest_pressure
+    pressure = pressure | (thin > THIN_TIME) | (measurement.pressure_1 > rules.highest_pressure)
+    pressure = pressure | ((measurement.pressure_2 > rules.highest_pressure) & (not squeezed))
+    found = PRESSURE_RANGE if pressure else NO_SIGN
+    found = ANGLE_RANGE if angle else found
+    return FORCE_RANGE if force else found
+
+
+def is_gone(rules: SafetyRules, last: float, force: float) -> bool:
+    """True where a force [N] was large one sample ago and is nearly none now."""
+    return (last > rules.largest_drop) & (force < GONE * rules.largest_drop)
+
+
+def gone_sign(rules: SafetyRules, last: LastReadings, measurement: GaitMeasurement, period: float) -> float:
+    """The sign of a loose contact: a foot takes many samples of ``period`` [s] to leave the ground."""
+    gone = is_gone(rules, last.heel_force, measurement.heel_force)
+    gone = gone | is_gone(rules, last.toe_force, measurement.toe_force)
+    return FORCE_GONE if gone & (period < QUICK_PERIOD) else NO_SIGN
+
+
+def still_sign(rules: SafetyRules, readings: LastReadings, before: PhaseState, phase: PhaseState) -> float:
+    """The sign of a reading that does not change while another sensor moves, a fault where that one shows a step.
+
+    An unloaded force sensor shows the same for long, and so does the angle of a foot that is held up.
+    """
+    longest = max(rules.frozen_time, DWELLS * phase.stride_time)
+    heel = (readings.heel_unchanged > longest) & (phase.heel.loaded > 0.5)
+    toe = (readings.toe_unchanged > longest) & (phase.toe.loaded > 0.5)
+    # At the strike the angle may have been the same for all of a slow swing.
+    angle = min(readings.angle_unchanged, phase.since_strike) > max(rules.frozen_time, TURNS_BACK * phase.stride_time)
+    whole = (before.phase == SWING) & (phase.phase != SWING)
+    whole = whole & (before.since_strike > HALF * phase.stride_time) & (before.since_strike < phase.stride_time / HALF)
+    found = STILL_ANGLE if angle & (not lifts(phase.phase)) else NO_SIGN
+    found = STILL_TOE if toe else found
+    found = STILL_HEEL if heel else found
+    found = FROZEN_ANGLE if whole & (readings.angle_unchanged > MOST * before.since_strike) else found
+    found = FROZEN_TOE if toe & (phase.heel.loaded != before.heel.loaded) else found
+    return FROZEN_HEEL if heel & (phase.toe.loaded != before.toe.loaded) else found
+
+
+def next_late_toes(rules: SafetyRules, last: float, angle: float, before: PhaseState, phase: PhaseState) -> float:
+    """Push-offs in a row that ended late, after a sample with an ankle angle [rad].
+
+    Toes that still carry hold the foot. In the air one that is pushed turns down until its stop, within 60 ms.
+    """
+    leaves = (before.phase == PUSH_OFF) & (phase.phase == SWING)
+    counted = last + 1.0 if angle > rules.highest_toe_off_angle else last
+    counted = 0.0 if angle < rules.highest_toe_off_angle - IN_TIME else counted
+    return counted if leaves else last
+
+
+def next_landing(
+    rules: SafetyRules,
+    last: Landing,
+    readings: LastReadings,
+    before: PhaseState,
+    phase: PhaseState,
+    steady: float,
+    period: float,
+) -> Landing:
+    """The landing after a sample of ``period`` [s].
+
+    A strike is in doubt where the foot has turned up already, in a ``steady`` walk (1).
+    A foot that is lifted turns up in the air too, but down again on its heel.
+    """
+    angle, swings = readings.angle, phase.phase == SWING
+    lower = (swings != (before.phase == SWING)) | (angle < last.lowest)
+    highest = max(last.highest - FADES * period, angle) if swings else last.highest
+    strikes = (before.phase == SWING) & (phase.phase == LANDING)
+    turned_up = max(last.highest, readings.slow_angle) - angle > TURNED_UP
+    in_doubt = (angle if turned_up & (steady > 0.5) else 0.0) if strikes else last.in_doubt
+    lands = (angle > in_doubt + TURNS_DOWN) | ((phase.phase == LANDING) & (not lower) & (angle > last.lowest + IS_FLAT))
+    is_late = (before.phase == LANDING) & (last.in_doubt - angle > IS_FLAT)
+    flat = lifts(before.phase) & (phase.phase == MID_STANCE)
+    return Landing(
+        lowest=angle if lower else last.lowest,
+        highest=angle if lower else highest,
+        in_doubt=0.0 if lands else in_doubt,
+        late=(last.late + 1.0 if is_late else 0.0) if flat else last.late,
+        late_toes=next_late_toes(rules, last.late_toes, angle, before, phase),
+    )
+
+
+def next_slow_pressure(last: float, pressure: float, period: float) -> float:
+    """Slow pressure [Pa] after a sample, taken every ``period`` [s]."""
+    return last + (pressure - last) * period / (period + FALL_TIME)
+
+
+def holds_pressure(rules: SafetyRules, pressure: float, slow: float) -> bool:
+    """True where a vented chamber shows a pressure [Pa] that does not fall."""
+    return (pressure > rules.filled_pressure) & (slow <= (1.0 + FALLS) * pressure)
+
+
+def next_emptying(
+    rules: SafetyRules, last: Emptying, vented: float, measurement: GaitMeasurement, period: float
+) -> Emptying:
+    """Chamber 2 after a sample of ``period`` [s], joined to the atmosphere for ``vented`` [s].
+
+    It has no source then, and only the ankle could compress it: a pressure that rises shows what was before.
+    """
+    pressure, angle = measurement.pressure_2, measurement.angle
+    lower = (vented <= rules.follow_time) | (pressure < last.lowest)
+    rises = (pressure > max(last.lowest + RISES, rules.filled_pressure)) & (vented < rules.follow_time + SHOWN)
+    rises = rises & (angle < min(last.angle + COMPRESSES, SQUEEZING_ANGLE))
+    return Emptying(
+        lowest=pressure if lower else last.lowest,
+        angle=angle if lower else last.angle,
+        rising=last.rising + period if rises & (not lower) else 0.0,
+    )

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ppafo.engine.program import Program
 from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError
 from ppafo.exports.c_library.files import (
@@ -65,6 +64,13 @@ def scenario_library(scenario: Scenario) -> Library:
         )
     program = exported(batch_of(plan_run(scenario)).program)
     settings, links = settings_of(scenario), links_of(scenario)
+    of_sensors = [
+        (("sensors_delay",), program.program.late_signals),
+        (_FLAWS, not program.program.ideal_sensors),
+        (_BANDWIDTHS, program.program.slow_sensors),
+    ]
+    # Another program where samples lie between steps and did not, or the other way round.
+    interval = "prepared->counts[COUNT_INTERVAL]"
     return Library(
         title=scenario.name,
         description=" ".join(scenario.description.split()),
@@ -72,8 +78,8 @@ def scenario_library(scenario: Scenario) -> Library:
         settings=settings,
         relations=relations_of(scenario),
         preparation=_preparing(settings),
-        switches=_switches(scenario.device, _of_sensors(program.program)),
-        other_program=(_samples_elsewhere(program.program),),
+        switches=_switches(scenario.device, of_sensors),
+        other_program=(f"({interval} != (double)(int64_t){interval}) != {_truth(program.program.samples_inside)}",),
         words=words_of(scenario, links),
         further=lambda collector: preparation_of(scenario, program.program, collector),
         following=_following(settings, links),
@@ -154,21 +160,6 @@ def _switches(device: Device, others: Iterable[tuple[Sequence[str], bool]]) -> t
         ([c_identifier(f"{effect.section}.{name}") for name in effect.switch], True) for effect in effects_of(device)
     ]
     return tuple(Switch(tuple(names), is_above) for names, is_above in (*of_valve, *of_effects, *others))
-
-
-def _of_sensors(program: Program) -> list[tuple[Sequence[str], bool]]:
-    """The settings of the sensors of a scenario that do so."""
-    return [
-        (("sensors_delay",), program.late_signals),
-        (_FLAWS, not program.ideal_sensors),
-        (_BANDWIDTHS, program.slow_sensors),
-    ]
-
-
-def _samples_elsewhere(program: Program) -> str:
-    """True in C where samples lie between steps and did not, or the other way round."""
-    interval = "prepared->counts[COUNT_INTERVAL]"
-    return f"({interval} != (double)(int64_t){interval}) != {_truth(program.samples_inside)}"
 
 
 def _truth(value: bool) -> str:

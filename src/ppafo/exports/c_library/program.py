@@ -1,8 +1,17 @@
-"""The composed module of an exported scenario: its lane loop for one run, its metrics, the way from settings there."""
+"""The composed module of an exported scenario: its lane loop for one run, its metrics, the way from settings there.
 
+What prepares and judges runs takes settings by their names as text, and numbers that may be columns of
+``model.columns``. For one run a name is a field, no number is a column, and a function over runs is called as it is.
+"""
+
+import ast
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import FunctionType
+from typing import Any
+
+import numpy as np
 
 from ppafo.engine.lane_meters import REQUEST, TRACED, walk_traces
 from ppafo.engine.lane_rows import HANDED, indent
@@ -11,11 +20,69 @@ from ppafo.engine.links import link_program
 from ppafo.engine.outline import Outline
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
-from ppafo.engine.source_text import Collector, woven
+from ppafo.engine.source_text import Collector, SourceCollector, woven
 from ppafo.metrics.catalog import METRICS
 from ppafo.metrics.metric import WALK, MetricKind, Readings
+from ppafo.model.columns import over_runs
 from ppafo.simulation.ensemble.running import ThermalTotals, Totals, has_channels, thermal_totals, totals
-from ppafo.translation.one_run import for_one_run, one_run_collector
+
+
+def one_run_collector(decorator: str) -> SourceCollector:
+    """A collector that also takes functions that Python applies to columns."""
+    return SourceCollector(decorator, for_one_run)
+
+
+def for_one_run(function: FunctionType, tree: ast.FunctionDef) -> ast.FunctionDef:
+    """The definition of a function for one run."""
+    tree = _ForOneRun(function.__globals__).visit(tree)
+    return ast.fix_missing_locations(tree)
+
+
+class _ForOneRun(ast.NodeTransformer):
+    """Rewrites one definition; ``scope`` has the names that it sees."""
+
+    def __init__(self, scope: dict[str, Any]) -> None:
+        self.scope = scope
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        """``settings["delay"]`` is a field."""
+        self.generic_visit(node)
+        name = self.value_of(node.slice)
+        return ast.copy_location(ast.Attribute(node.value, name, node.ctx), node) if isinstance(name, str) else node
+
+    def visit_Call(self, node: ast.Call) -> ast.expr:
+        """A function over runs is called for this one."""
+        self.generic_visit(node)
+        if self.value_of(node.func) is not over_runs:
+            return node
+        return ast.copy_location(ast.Call(node.args[0], node.args[1:], node.keywords), node)
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
+        """What is done for a column is left away."""
+        self.generic_visit(node)
+        return node.orelse if self.asks_for_column(node.test) else node
+
+    def visit_If(self, node: ast.If) -> ast.stmt | list[ast.stmt]:
+        """What is done for a column is left away."""
+        self.generic_visit(node)
+        return node.orelse if self.asks_for_column(node.test) else node
+
+    def asks_for_column(self, node: ast.expr) -> bool:
+        """True for a test of whether numbers are columns."""
+        if isinstance(node, ast.BoolOp):
+            return isinstance(node.op, ast.Or) and all(map(self.asks_for_column, node.values))
+        if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name) or node.func.id != "isinstance":
+            return False
+        return self.value_of(node.args[1]) is np.ndarray
+
+    def value_of(self, node: ast.expr) -> Any:
+        """What a name, an attribute of one or a text stands for; None for anything else."""
+        if isinstance(node, ast.Constant):
+            return node.value
+        if isinstance(node, ast.Name):
+            return self.scope.get(node.id)
+        return getattr(self.value_of(node.value), node.attr, None) if isinstance(node, ast.Attribute) else None
+
 
 COUNTS = ("interval", "steps", "steps_per_sample", "signal_delay", "command_delay", "needs_parts")
 """Numbers of the steps of a run: steps from one sample to the next, in all, to a sample of the controller; delays.

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, get_type_hints
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.fixed.torque_laws import FIXED_LAWS, TARGETS, FixedLaw, WholeLaw
+from ppafo.control.fixed.torque_laws import FIXED_LAWS, TARGETS, FixedLaw
 from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, LARGEST_READING, SETTINGS, Converter, Readings
 from ppafo.engine.composed_names import is_row
 from ppafo.engine.rows import is_number, leaf_paths, members, rebuilt
@@ -27,7 +27,7 @@ from ppafo.version import __version__
 PRELUDE = "prelude_whole.h"
 
 
-def proof(law: WholeLaw, numbers: Sequence[Quantity] | None = None) -> Narrowed:
+def proof(law: FixedLaw, numbers: Sequence[Quantity] | None = None) -> Narrowed:
     """The typed functions of a law in 16 and 32 bits, and the range of the command and of the next state.
 
     For every number within what ``numbers`` (those of the law) declare, every state within the ranges of the law and
@@ -35,16 +35,14 @@ def proof(law: WholeLaw, numbers: Sequence[Quantity] | None = None) -> Narrowed:
     """
     collector = SourceCollector("")
     entry = collector.add(law.sample)
-    parameters = (
-        _typed_row(law.numbers, collector),
-        _typed_row(state_type(law), collector),
-        _typed_row(law.readings, collector),
-    )
+    state = type(law.begins)
+    parameters = tuple(_typed_row(row, collector) for row in (law.numbers, state, law.readings))
     module = walk_module(collector.text(), {entry: parameters})
-    declared = iter(numbers or law.number_quantities)
+    declared = (Interval(int(item.minimum), int(item.maximum)) for item in numbers or law.number_quantities)
+    own_names = (path.rpartition(".")[2] for path in leaf_paths(state, ""))
     given: dict[str, Range] = {
-        "numbers": _nested(law.numbers, map(_range, declared)),
-        "state": _nested(state_type(law), (Interval(*law.state_ranges[name]) for name in _leaf_names(state_type(law)))),
+        "numbers": _nested(law.numbers, declared),
+        "state": _nested(state, (Interval(*law.state_ranges[name]) for name in own_names)),
         "readings": (Interval(0, LARGEST_READING),) * len(members(law.readings)),
     }
     found = narrowed(module, given)
@@ -59,17 +57,20 @@ def is_within(found: Range, allowed: Range) -> bool:
     return hull(found, allowed) == allowed
 
 
-def controller_source(law: FixedLaw) -> str:
-    """The law in C, with a state of its own and the numbers of ``parameters.h``."""
+def law_source(law: FixedLaw, title: str, asked: tuple[str, str, str], told: Mapping[str, str]) -> str:
+    """The law in C, with a state of its own and the numbers of ``parameters.h``.
+
+    ``asked`` are the parameters of a sample, the name of the readings that are made of them, and their values; ``told``
+    has heads of functions that tell something of the state, and what.
+    """
     collector = SourceCollector("")
     entry = collector.add(law.sample)
     documents = documents_of(collector)
-    title = f"The controller '{law.name}' of ppafo {__version__} on whole numbers. Not to be edited."
-    text = c_source(proof(law).module, documents, title, prelude=PRELUDE)
-    numbers, state, readings = (collector.add(item) for item in (law.numbers, state_type(law), Readings))
-    names = [macro(item) for item in law.number_quantities]
-    given = ", ".join(["{" + ", ".join(names[:2]) + "}", *names[2:]])
-    begin = ", ".join(str(int(value)) for value in law.kind.initial)
+    text = c_source(proof(law).module, documents, f"{title} Not to be edited.", prelude=PRELUDE)
+    numbers, state, readings = (collector.add(item) for item in (law.numbers, type(law.begins), law.readings))
+    given = rebuilt(law.numbers, [macro(item) for item in law.number_quantities])
+    parameters, name, values = asked
+    functions = "\n".join(f"{head}(void)\n{{\n    return {value};\n}}\n" for head, value in told.items())
     return f"""#include "controller.h"
 
 #include "parameters.h"
@@ -79,24 +80,25 @@ static {state} state;
 
 void controller_begin(void)
 {{
-    static const {state} begin = {{{begin}}};
+    static const {state} begin = {_written(law.begins)};
     state = begin;
 }}
 
-int16_t controller_sample(int16_t reference, int16_t pressure_1, int16_t pressure_2)
+int16_t controller_sample({parameters})
 {{
-    static const {numbers} numbers = {{{given}}};
-    const {readings} readings = {{reference, pressure_1, pressure_2}};
-    const {entry}_result result = {entry}(numbers, state, readings);
+    static const {numbers} numbers = {_written(given)};
+    const {readings} {name} = {{{values}}};
+    const {entry}_result result = {entry}(numbers, state, {name});
     state = result.item_1;
     return result.item_0;
 }}
 
-bool controller_is_sound(void)
-{{
-    return state.sound == 1;
-}}
-"""
+{functions}"""
+
+
+def _written(row: Any) -> str:
+    """A NamedTuple as C initialises it, nested ones in their place."""
+    return "{" + ", ".join(_written(item) if isinstance(item, tuple) else str(item) for item in row) + "}"
 
 
 def macro(item: Quantity) -> str:
@@ -104,34 +106,41 @@ def macro(item: Quantity) -> str:
     return f"CONTROLLER_{item.name.upper()}"
 
 
-def defined_numbers(quantities: Iterable[Quantity], numbers: Mapping[str, float]) -> list[str]:
-    """Lines of ``parameters.h`` that define the numbers of a law, and refuse one beyond its range."""
-    lines = []
-    for item in quantities:
+def parameters_header(
+    said: str, origins: Iterable[str], clock: str, law: FixedLaw, numbers: Mapping[str, float]
+) -> str:
+    """``parameters.h``: every number of a law, its unit, meaning and origin; one beyond its range is refused in C."""
+    lines = [
+        f"/* Numbers of {said} from:",
+        *(f" *   {line}" for line in origins),
+        " * Every number must stay within its range: for that the arithmetic is proved not to overflow. */",
+        "#ifndef PPAFO_PARAMETERS_H",
+        "#define PPAFO_PARAMETERS_H",
+        "",
+        clock,
+    ]
+    for item in law.number_quantities:
         number = int(numbers[item.name])
         lines.append(f"#define {macro(item)} {number} /* {item.summary}; {item.minimum:g} to {item.maximum:g} */")
         lines += [f"#if {macro(item)} < {item.minimum:.0f} || {macro(item)} > {item.maximum:.0f}"]
         lines += [f'#error "{macro(item)} is beyond its range"', "#endif"]
-    return lines
+    return "\n".join([*lines, "", "#endif", ""])
 
 
-def state_type(law: WholeLaw) -> Any:
-    """The NamedTuple class of the state of a law, which its function says."""
-    return get_type_hints(law.sample)["state"]
+def ticks_of(name: str, period: float) -> int:
+    """Pulses of the timer in a sample period [s]; ScenarioError where there is no whole number of them."""
+    ticks = round(period / TICK)
+    if not 1 <= ticks <= MOST_TICKS // 2 or abs(ticks * TICK - period) > 1.0e-9 * period:
+        raise ScenarioError(
+            f"{name}: controller.period = {period:.9g} s: on the chip a multiple of 0.125 ms, "
+            f"up to {MOST_TICKS // 2 * TICK:.3g} s"
+        )
+    return ticks
 
 
 def _nested(row: type, ranges: Iterator[Interval]) -> Range:
     """The ranges of a NamedTuple, nested ones in their place."""
     return tuple(next(ranges) if is_number(kind) else _nested(kind, ranges) for _, kind in members(row))
-
-
-def _leaf_names(row: type) -> Iterator[str]:
-    """Own names of all numbers of a NamedTuple, in order."""
-    return (path.rpartition(".")[2] for path in leaf_paths(row, ""))
-
-
-def _range(item: Quantity) -> Interval:
-    return Interval(int(item.minimum), int(item.maximum))
 
 
 def _typed_row(kind: Any, collector: SourceCollector) -> Row:
@@ -172,12 +181,7 @@ def chip_controller(scenario: Scenario) -> ChipController:
             f"{', '.join(FIXED_LAWS)}"
         )
     plan_run(scenario)
-    ticks = round(control.period / TICK)
-    if not 1 <= ticks <= MOST_TICKS // 2 or abs(ticks * TICK - control.period) > 1.0e-9 * control.period:
-        raise ScenarioError(
-            f"{scenario.name}: controller.period = {control.period:.9g} s: on the chip a multiple of 0.125 ms, "
-            f"up to {MOST_TICKS // 2 * TICK:.3g} s"
-        )
+    ticks = ticks_of(scenario.name, control.period)
     constant = plant_parameters(scenario.device, 0.0).torque_constant
     found = fixed_controller(scenario, constant, profile_bounds(scenario.reference))
     converter = rebuilt(Converter, [found.numbers[name] for name in Converter._fields])
@@ -210,20 +214,20 @@ def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
     words["wiring"] = filled(template("firmware", chosen.wiring), words).rstrip()
     texts = {name: filled(template("firmware", name), words) for name in (*_TEMPLATES, *chosen.templates)}
     texts["LICENSE"] = licence()
-    texts["controller.c"] = controller_source(chip.law)
+    texts["controller.c"] = law_source(
+        chip.law,
+        f"The controller '{chip.law.name}' of ppafo {__version__} on whole numbers.",
+        (", ".join(f"int16_t {name}" for name in Readings._fields), "readings", ", ".join(Readings._fields)),
+        {"bool controller_is_sound": "state.sound == 1"},
+    )
     control = scenario.control
-    lines = [
-        f"/* Numbers of the controller '{chip.law.name}' of {scenario.name}, made by ppafo {__version__} from:",
-        *(f" *   {line}" for line in _origins(scenario)),
-        " * Every number must stay within its range: for that the arithmetic is proved not to overflow. */",
-        "#ifndef PPAFO_PARAMETERS_H",
-        "#define PPAFO_PARAMETERS_H",
-        "",
-        f"#define CONTROLLER_TICKS {chip.ticks}u /* of 125 us in a sample period of {control.period:.9g} s */",
+    texts["parameters.h"] = parameters_header(
+        f"the controller '{chip.law.name}' of {scenario.name}, made by ppafo {__version__}",
+        _origins(scenario),
+        f"#define CONTROLLER_TICKS {chip.ticks}u /* of 125 us in a sample period of {control.period:.9g} s */\n"
         f"#define CONTROLLER_BITS {int(control.settings[SETTINGS[0].name])} /* of the converter */",
-    ]
-    texts["parameters.h"] = "\n".join(
-        [*lines, *defined_numbers(chip.law.number_quantities, chip.numbers), "", "#endif", ""]
+        chip.law,
+        chip.numbers,
     )
     return {name: text.encode() for name, text in sorted(texts.items())}
 

@@ -10,9 +10,10 @@ import numpy as np
 from ppafo.answers.layout import Margins, figure_of_panels
 from ppafo.answers.style import BLACK, BLUE, VERMILION, WANTED, house_style, mark_kind
 from ppafo.control.fixed.torque_laws import TARGETS
-from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, Converter, Limits, Readings, read
+from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, Converter, Readings, read
+from ppafo.engine.rows import rebuilt
 from ppafo.errors import SimulationError
-from ppafo.exports.firmware import ChipController, chip_controller, firmware, state_type
+from ppafo.exports.firmware import ChipController, chip_controller, firmware
 from ppafo.exports.firmware.catalog import target_of
 from ppafo.exports.firmware.simulators import (
     ChipSimulator,
@@ -59,15 +60,13 @@ class PythonChip:
 
     def __init__(self, chip: ChipController) -> None:
         self.law = chip.law
-        names = [item.name for item in chip.law.number_quantities]
-        top, middle, *others = (int(chip.numbers[name]) for name in names)
-        self.numbers = chip.law.numbers(Limits(top, middle), *others)
-        self.state: Any = None
-        self.begin()
+        given = [int(chip.numbers[item.name]) for item in chip.law.number_quantities]
+        self.numbers: Any = rebuilt(chip.law.numbers, given)
+        self.state: Any = chip.law.begins
 
     def begin(self) -> None:
         """Forget everything."""
-        self.state = state_type(self.law)(*map(int, self.law.kind.initial))
+        self.state = self.law.begins
 
     def sample(self, readings: Readings) -> tuple[int, int]:
         """Command in steps, and 1 while all readings have been sound."""

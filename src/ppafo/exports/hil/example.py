@@ -2,7 +2,7 @@
 
 from ppafo.errors import ScenarioError
 from ppafo.exports.firmware import chip_controller, firmware
-from ppafo.exports.hil.packets import MICROSECONDS
+from ppafo.exports.hil.wire import MICROSECONDS
 from ppafo.exports.templates import filled, template
 from ppafo.simulation.scenario import Scenario
 from ppafo.version import __version__

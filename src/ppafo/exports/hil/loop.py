@@ -17,24 +17,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol, final
 
 from ppafo.errors import ScenarioError
-from ppafo.exports.hil.packets import (
-    BEGIN,
-    COMPUTED,
-    FULL_COMMAND,
-    MICROSECONDS,
-    OVER,
-    UNSOUND,
-    VENTED,
-    WRAP,
-    Answer,
-    Packet,
-    Reader,
-    Sample,
-    count_of,
-    described_refusals,
-    sample_bytes,
-)
-from ppafo.exports.hil.ports import Port
+from ppafo.exports.hil import wire
 from ppafo.model.command import VENT
 from ppafo.simulation.sampled import SampledRun
 
@@ -62,17 +45,17 @@ class Pace(Protocol):
     def late(self, due: float) -> float:
         """By how much a time [s] that was listened for has been missed [s]."""
 
-    def call(self, seconds: float, port: Port, take: Take) -> None:
+    def call(self, seconds: float, port: wire.Port, take: Take) -> None:
         """Hand over what comes in for some seconds, or until what is waited for is there."""
 
-    def listen(self, until: float, port: Port, take: Take) -> None:
+    def listen(self, until: float, port: wire.Port, take: Take) -> None:
         """Hand over what comes in until a time [s], or until what is waited for is there."""
 
-    def rest(self, until: float, port: Port, take: Take) -> None:
+    def rest(self, until: float, port: wire.Port, take: Take) -> None:
         """Hand over what comes in until a time [s]."""
 
 
-def _listen_for(seconds: float, clock: Callable[[], float], port: Port, take: Take) -> None:
+def _listen_for(seconds: float, clock: Callable[[], float], port: wire.Port, take: Take) -> None:
     """Hand over what comes in for some seconds of a clock, or until ``take`` has what it waits for.
 
     What has come in while the computer slept through the end is handed over too.
@@ -85,7 +68,7 @@ def _listen_for(seconds: float, clock: Callable[[], float], port: Port, take: Ta
     _drain(port, take)
 
 
-def _drain(port: Port, take: Take) -> None:
+def _drain(port: wire.Port, take: Take) -> None:
     """Hand over what has come in, or as much as a plant can wait for."""
     for _ in range(_AT_ONCE):
         data = port.receive(0.0)
@@ -125,15 +108,15 @@ class RealTime:
             self._start += missed
         return missed
 
-    def call(self, seconds: float, port: Port, take: Take) -> None:
+    def call(self, seconds: float, port: wire.Port, take: Take) -> None:
         """Hand over what comes in for some seconds, or until what is waited for is there."""
         _listen_for(seconds, self._clock, port, take)
 
-    def listen(self, until: float, port: Port, take: Take) -> None:
+    def listen(self, until: float, port: wire.Port, take: Take) -> None:
         """Hand over what comes in until a time [s], or until what is waited for is there."""
         _listen_for(until - self.now(), self._clock, port, take)
 
-    def rest(self, until: float, port: Port, take: Take) -> None:
+    def rest(self, until: float, port: wire.Port, take: Take) -> None:
         """Hand over what comes in until a time [s]."""
         while (left := until - self.now()) > 0.0:
             data = port.receive(left)
@@ -166,16 +149,16 @@ class LockStep:
         self._now = due
         return 0.0
 
-    def call(self, seconds: float, port: Port, take: Take) -> None:
+    def call(self, seconds: float, port: wire.Port, take: Take) -> None:
         """Hand over what comes in for some seconds, or until what is waited for is there."""
         _listen_for(seconds, self._clock, port, take)
 
-    def listen(self, until: float, port: Port, take: Take) -> None:
+    def listen(self, until: float, port: wire.Port, take: Take) -> None:
         """Hand over what comes in until what is waited for is there."""
         del until
         _listen_for(self._patience, self._clock, port, take)
 
-    def rest(self, until: float, port: Port, take: Take) -> None:
+    def rest(self, until: float, port: wire.Port, take: Take) -> None:
         """Hand over what has come in."""
         del until
         _drain(port, take)
@@ -262,9 +245,9 @@ class Judge:
         self.vented = ""
         self.ignored: Counter[str] = Counter()
 
-    def take(self, packet: Packet) -> None:
+    def take(self, packet: wire.Packet) -> None:
         """Look at a good packet that came in."""
-        if not isinstance(packet, Answer):
+        if not isinstance(packet, wire.Answer):
             self.ignored["no answer"] += 1
         elif packet.run != self.run:
             self.ignored["of another run"] += 1
@@ -276,9 +259,9 @@ class Judge:
             self.ignored["too late"] += 1
         else:
             self.answered = packet.sequence
-            self.command = packet.command / FULL_COMMAND
+            self.command = packet.command / wire.FULL_COMMAND
             self.controller_time = packet.time
-            if packet.flags & UNSOUND:
+            if packet.flags & wire.UNSOUND:
                 self.vent(NOT_SOUND)
 
     @property
@@ -323,13 +306,13 @@ class Exchange:
 class Bench:
     """A plant at the wire, whose samples are ``period`` [s] apart; ``run`` is the number of the run, of 16 bits."""
 
-    def __init__(self, plant: SampledRun, period: float, port: Port, pace: Pace, run: int) -> None:
+    def __init__(self, plant: SampledRun, period: float, port: wire.Port, pace: Pace, run: int) -> None:
         self.plant = plant
         self.port = port
         self.pace = pace
         self.period = period
         self.judge = Judge(run, period)
-        self.reader = Reader(port.is_stream)
+        self.reader = wire.Reader(port.is_stream)
         self.taken = 0
         self.rows: list[Row] = []
         self._answered_at = 0.0
@@ -344,7 +327,7 @@ class Bench:
         if not self._call(patience, is_stopped):
             if is_stopped():
                 raise KeyboardInterrupt("interrupted before a controller answered; nothing is written")
-            heard = described_refusals(self.reader.refused, self.judge.ignored.items())
+            heard = wire.described_refusals(self.reader.refused, self.judge.ignored.items())
             failed = f"; {self.port.failure}" if self.port.failure else ""
             raise ScenarioError(f"no controller answers within {patience:g} s; came in: {heard}{failed}")
         self.pace.begin()
@@ -355,7 +338,7 @@ class Bench:
                 late = self.pace.late(self.plant.taken * self.period)
                 sent = self.pace.now()
                 self.judge.sent = self.plant.taken
-                self.port.send(sample_bytes(self._shown))
+                self.port.send(wire.sample_bytes(self._shown))
             self._exchange(sent, late)
         stopped = self._is_going_on
         if stopped:
@@ -379,8 +362,8 @@ class Bench:
     def _call(self, patience: float, is_stopped: Callable[[], bool]) -> bool:
         """Send the first sample until it is answered; false where it was not."""
         self.judge.sent = 0
-        self._show(BEGIN)
-        first = sample_bytes(self._shown)
+        self._show(wire.BEGIN)
+        first = wire.sample_bytes(self._shown)
         for _ in range(max(1, math.ceil(patience / _CALL_INTERVAL))):
             self.port.send(first)
             self.pace.call(_CALL_INTERVAL, self.port, self._take)
@@ -447,12 +430,12 @@ class Bench:
             "pressure_2": seen.pressure_2,
             "torque": seen.torque,
         }
-        self._shown = Sample(
-            flags=flags | (VENTED if self.judge.vented else 0) | COMPUTED,
+        self._shown = wire.Sample(
+            flags=flags | (wire.VENTED if self.judge.vented else 0) | wire.COMPUTED,
             run=self.judge.run,
             sequence=plant.taken,
-            time=round(plant.taken * self.period * MICROSECONDS) % WRAP,
-            counts={name: count_of(name, value) for name, value in shown.items()},
+            time=round(plant.taken * self.period * wire.MICROSECONDS) % wire.WRAP,
+            counts={name: wire.count_of(name, value) for name, value in shown.items()},
         )
 
     def _vent_to_the_end(self) -> None:
@@ -477,6 +460,6 @@ class Bench:
 
     def _say_over(self) -> None:
         """Tell the controller that the run is over."""
-        packet = sample_bytes(self._shown._replace(flags=self._shown.flags & ~BEGIN | OVER))
+        packet = wire.sample_bytes(self._shown._replace(flags=self._shown.flags & ~wire.BEGIN | wire.OVER))
         for _ in range(LAST_PACKETS):
             self.port.send(packet)

@@ -9,24 +9,13 @@ from typing import final
 import numpy as np
 
 from ppafo.errors import DataError
-from ppafo.exports.hil.packets import (
-    COMPUTED,
-    MICROSECONDS,
-    OVER,
-    WRAP,
-    Packet,
-    Reader,
-    Sample,
-    described_refusals,
-    value_of,
-)
-from ppafo.exports.hil.ports import Port
+from ppafo.exports.hil import wire
 from ppafo.signals import CHANNELS as KNOWN
 from ppafo.signals import Channel, Recording
 
 MOST_SAMPLES = 5_000_000
 _LISTENING = 0.1
-_HALF = WRAP // 2
+_HALF = wire.WRAP // 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,16 +39,16 @@ class Collector:
     """Samples of one run of a bench, by number; the first one says which run, and which channels."""
 
     def __init__(self) -> None:
-        self.samples: dict[int, Sample] = {}
+        self.samples: dict[int, wire.Sample] = {}
         self.ignored: Counter[str] = Counter()
         self.is_over = False
-        self._first: Sample | None = None
+        self._first: wire.Sample | None = None
         self._newest = 0
         self._elapsed = 0
 
-    def take(self, packet: Packet) -> bool:
+    def take(self, packet: wire.Packet) -> bool:
         """Look at a good packet; true where it is a new sample."""
-        if not isinstance(packet, Sample):
+        if not isinstance(packet, wire.Sample):
             self.ignored["no sample"] += 1
             return False
         first = self._first
@@ -72,7 +61,7 @@ class Collector:
         if packet.run != first.run:
             self.ignored["of another run"] += 1
             return False
-        self.is_over = self.is_over or bool(packet.flags & OVER)
+        self.is_over = self.is_over or bool(packet.flags & wire.OVER)
         if packet.counts.keys() != first.counts.keys():
             self.ignored["with other channels"] += 1
             return False
@@ -90,14 +79,14 @@ class Collector:
     @property
     def duration(self) -> float:
         """Time of the bench from its first sample to the newest [s]."""
-        return max(0, self._elapsed) / MICROSECONDS
+        return max(0, self._elapsed) / wire.MICROSECONDS
 
     def recording(self, label: str) -> tuple[Recording, int]:
         """The samples in order as a recording, and how many between the first and the last never came.
 
         A sample whose time does not go on from the one before is left out and counted.
         """
-        kept: list[Sample] = []
+        kept: list[wire.Sample] = []
         times: list[int] = []
         for number in sorted(self.samples):
             sample = self.samples[number]
@@ -108,21 +97,21 @@ class Collector:
             times.append(moment)
             kept.append(sample)
         names = list(kept[0].counts)
-        values = {name: np.array([value_of(name, sample.counts[name]) for sample in kept]) for name in names}
+        values = {name: np.array([wire.value_of(name, sample.counts[name]) for sample in kept]) for name in names}
         channels = {name: Channel(values[name], KNOWN[name].unit) for name in names}
-        computed = any(sample.flags & COMPUTED for sample in kept)
-        time_axis = (np.array(times, dtype=np.float64) - times[0]) / MICROSECONDS
+        computed = any(sample.flags & wire.COMPUTED for sample in kept)
+        time_axis = (np.array(times, dtype=np.float64) - times[0]) / wire.MICROSECONDS
         lost = max(self.samples) - min(self.samples) + 1 - len(self.samples)
         return Recording(label, time_axis, channels, "simulated" if computed else "measured"), lost
 
 
 def _difference(later: int, earlier: int) -> int:
     """How far a number of 32 bits is behind another one, which may have gone on from 0 between them."""
-    return (later - earlier + _HALF) % WRAP - _HALF
+    return (later - earlier + _HALF) % wire.WRAP - _HALF
 
 
 def record(
-    port: Port,
+    port: wire.Port,
     label: str,
     duration: float | None,
     patience: float,
@@ -133,7 +122,7 @@ def record(
 
     ``patience`` [s] is how long silence lasts. DataError where no sample came.
     """
-    reader, collector = Reader(port.is_stream), Collector()
+    reader, collector = wire.Reader(port.is_stream), Collector()
     heard = clock()
     ended = ""
     while not ended:
@@ -144,15 +133,14 @@ def record(
     if not collector.samples:
         if is_stopped():
             raise KeyboardInterrupt("interrupted before a sample came; nothing is written")
-        raise DataError(
-            f"no sample came within {patience:g} s; what came in: "
-            f"{described_refusals(reader.refused, [*collector.ignored.items(), ('of somebody else', port.strangers)])}"
-        )
+        others = [*collector.ignored.items(), ("of somebody else", port.strangers)]
+        came = wire.described_refusals(reader.refused, others)
+        raise DataError(f"no sample came within {patience:g} s; what came in: {came}")
     recording, lost = collector.recording(label)
     return Recorded(recording, lost, reader.refused, collector.ignored, port.strangers, ended, is_stopped())
 
 
-def _why_ended(collector: Collector, port: Port, duration: float | None, is_silent: bool, is_stopped: bool) -> str:
+def _why_ended(collector: Collector, port: wire.Port, duration: float | None, is_silent: bool, is_stopped: bool) -> str:
     """What ends a recording now; empty while it goes on."""
     if is_stopped:
         return "stopped"

@@ -26,9 +26,8 @@ from ppafo.engine.lanes import load_program
 from ppafo.engine.loading import chosen_compiler
 from ppafo.engine.run import Run, batch_of
 from ppafo.errors import ScenarioError
+from ppafo.exports.hil import wire
 from ppafo.exports.hil.loop import Bench, Exchange, Pace, Row, without_collections
-from ppafo.exports.hil.packets import HIGHEST_RATE, LOWEST_RATE, MICROSECONDS, RATE, described_refusals, sample_length
-from ppafo.exports.hil.ports import BITS_OF_A_BYTE, Port
 from ppafo.model.valves import dump
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.result import Result
@@ -60,10 +59,10 @@ class Plant:
         return SampledRun(batch_of(self.run), self.module)
 
 
-def plant_of(scenario: Scenario, rate: int = RATE) -> Plant:
+def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
     """The plant of a scenario, whose command is given ``rate`` times a second; a proportional valve can be dumped."""
-    if not LOWEST_RATE <= rate <= HIGHEST_RATE:
-        raise ScenarioError(f"--rate {rate}: must be {LOWEST_RATE} to {HIGHEST_RATE} samples per second")
+    if not wire.LOWEST_RATE <= rate <= wire.HIGHEST_RATE:
+        raise ScenarioError(f"--rate {rate}: must be {wire.LOWEST_RATE} to {wire.HIGHEST_RATE} samples per second")
     period = 1.0 / rate
     chosen = replace(
         scenario,
@@ -80,11 +79,11 @@ def plant_of(scenario: Scenario, rate: int = RATE) -> Plant:
 
 def check_baud(baud: int, rate: int) -> None:
     """Refuse a serial line that cannot carry the samples."""
-    needed = sample_length(CHANNELS_SENT) * BITS_OF_A_BYTE * rate
+    needed = wire.sample_length(CHANNELS_SENT) * wire.BITS_OF_A_BYTE * rate
     if baud < needed:
         raise ScenarioError(
             f"--baud {baud}: {rate} samples per second need {needed} baud; take a faster line or a lower --rate, "
-            f"here at most {baud // (sample_length(CHANNELS_SENT) * BITS_OF_A_BYTE)}"
+            f"here at most {baud // (wire.sample_length(CHANNELS_SENT) * wire.BITS_OF_A_BYTE)}"
         )
 
 
@@ -206,7 +205,7 @@ class HardwareRun:
                 if exchange.is_real_time
                 else ("time       in lock step with the answers",)
             ),
-            f"dropped    {described_refusals(exchange.refused, others)}",
+            f"dropped    {wire.described_refusals(exchange.refused, others)}",
             f"machine    {machine.cores} cores{loads}; {machine.system}, Python {machine.python}",
             f"plant      {self.plant.compiled_by}",
         ]
@@ -263,9 +262,9 @@ class HardwareRun:
 
 def run_hardware(
     scenario: Scenario,
-    port: Port,
+    port: wire.Port,
     pace: Callable[[float], Pace],
-    rate: int = RATE,
+    rate: int = wire.RATE,
     patience: float = 10.0,
     is_stopped: Callable[[], bool] = lambda: False,
     run: int | None = None,
@@ -280,7 +279,7 @@ def run_hardware(
 
 def run_plant(
     plant: Plant,
-    port: Port,
+    port: wire.Port,
     pace: Callable[[float], Pace],
     patience: float = 10.0,
     is_stopped: Callable[[], bool] = lambda: False,
@@ -333,7 +332,7 @@ def log_bytes(rows: Sequence[Row]) -> bytes:
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(LOG_COLUMNS)
     for row in rows:
-        stamp = "" if row.controller_time is None else repr(row.controller_time / MICROSECONDS)
+        stamp = "" if row.controller_time is None else repr(row.controller_time / wire.MICROSECONDS)
         times = ("" if value is None else repr(value) for value in (row.sent_late, row.answered_after))
         writer.writerow([row.sequence, repr(row.due), *times, repr(row.command), stamp, int(row.is_vented)])
     return buffer.getvalue().encode()

@@ -90,7 +90,16 @@ def program_of(library: Library) -> bytes:
 
     Neither the text nor a module is made twice on a computer.
     """
-    digest = kept("digest", _made_from(library), lambda: digest_of(source_of(library)).encode()).decode()
+    # What decides the translation unit: what its functions are made from, and what translates them.
+    names = [item.name for item in library.settings]
+    outline = _unit(library, outline_of(library.program, names, library.further, LANES))
+    translators = [*(files("ppafo.translation").iterdir()), *(files("ppafo.exports.c_library").iterdir()), __file__]
+    hashes = sorted(f"{Path(str(file)).name} {file_hash(str(file))}" for file in translators)
+    digest = kept(
+        "digest",
+        "\n".join([__version__, *hashes, *FLAGS, template("wasm", "math.h"), outline]),
+        lambda: digest_of(source_of(library)).encode(),
+    ).decode()
     prebuilt = prebuilt_programs().get(digest)
     if prebuilt is not None:
         return _programs().joinpath(prebuilt).read_bytes()
@@ -102,15 +111,6 @@ def source_of(library: Library) -> str:
     """The translation unit of a library. Values of settings are not in it: other numbers, same program."""
     names = [item.name for item in library.settings]
     return _unit(library, c_text(library.program, _TITLE, names, library.further, LANES))
-
-
-def _made_from(library: Library) -> str:
-    """What decides the translation unit of a library: what its functions are made from, and what translates them."""
-    names = [item.name for item in library.settings]
-    outline = _unit(library, outline_of(library.program, names, library.further, LANES))
-    translators = [*(files("ppafo.translation").iterdir()), *(files("ppafo.exports.c_library").iterdir()), __file__]
-    hashes = sorted(f"{Path(str(file)).name} {file_hash(str(file))}" for file in translators)
-    return "\n".join([__version__, *hashes, *FLAGS, template("wasm", "math.h"), outline])
 
 
 def _unit(library: Library, functions: str) -> str:

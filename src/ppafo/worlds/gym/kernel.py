@@ -91,6 +91,7 @@ def _step(rows: LaneRows, task: Task) -> list[str]:
         f"{name} = {whole.get(name, f'all_{name}')}[block * {height}:(block + 1) * {height}]"
         for name, height in heights.items()
     ]
+    late = "late = (now - signal_delay) % signal_history.shape[1]"
     body = [
         *parts,
         "first = block * states.shape[1]",
@@ -100,15 +101,10 @@ def _step(rows: LaneRows, task: Task) -> list[str]:
         "        place = min(first + lane, actions.shape[0] - 1)",
         f"        {rows.cells['result.command']} = {given}",
         f"    {call}",
-        *_places(rows),
+        *([late] if rows.program.late_signals else []),
         *rows.over_lanes(_observed(rows, task)),
     ]
     return [f"for block in range(all_states.shape[0] // {heights['states']}):", *indent(body)]
-
-
-def _places(rows: LaneRows) -> list[str]:
-    late = "late = (now - signal_delay) % signal_history.shape[1]"
-    return [late] if rows.program.late_signals else []
 
 
 def _observed(rows: LaneRows, task: Task) -> list[str]:

@@ -125,7 +125,9 @@ def ankle_muscles(
     if (low_pass is not None and not low_pass > 0.0) or every < 1:
         raise DataError(f"low_pass = {low_pass}, every = {every}: must be above 0 Hz or None, and 1 or more")
     start, end = float(torque.time[0]), float(torque.time[-1])
-    task = _Task(Path(motion).resolve(), _loads_file(loads), low_pass, every, start, end)
+    if not Path(loads).is_file():
+        raise DataError(f"{loads}: there is no such file; give external loads of OpenSim (.xml)")
+    task = _Task(Path(motion).resolve(), Path(loads).resolve(), low_pass, every, start, end)
     bare = load_model(model)
     _check_fit(bare, task, coordinate, motion)
     names = muscles_across(bare, coordinate)
@@ -173,12 +175,6 @@ class _Solved:
     forces: Mapping[str, Floats]
     activations: Mapping[str, Floats]
     reserve: Floats
-
-
-def _loads_file(path: str | Path) -> Path:
-    if not Path(path).is_file():
-        raise DataError(f"{path}: there is no such file; give external loads of OpenSim (.xml)")
-    return Path(path).resolve()
 
 
 def _check_fit(model: Any, task: "_Task", coordinate: str, motion: str | Path) -> None:

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from ppafo.control.walking import phases, readings, safety, signs
+from ppafo.control.walking import phases, safety, signs
 from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, Switch
 from ppafo.control.walking.safety import Finding, SafetyState, Stance, ValveTimes
 from ppafo.control.walking.signs import SAFETY_QUANTITIES, SafetyRules
@@ -182,9 +182,9 @@ def test_a_large_force_that_is_gone_within_a_sample_stops_and_one_that_falls_qui
     name: str, sensor: str
 ) -> None:
     def after(force: float, period: float = PERIOD) -> float:
-        last = readings.NOTHING_READ._replace(**{name: 500.0})
+        last = signs.NOTHING_READ._replace(**{name: 500.0})
         seen = GOOD._replace(**{name: force})
-        return readings.gone_sign(RULES, last, seen, period)
+        return signs.gone_sign(RULES, last, seen, period)
 
     assert after(0.0) == signs.FORCE_GONE
     assert signs.level_of(signs.FORCE_GONE) == signs.STOPPED

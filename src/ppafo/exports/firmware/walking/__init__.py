@@ -1,25 +1,39 @@
-"""The controller of a walk as firmware: translated C, a thin layer for an MSP430G2553, make file and page."""
+"""The controller of a walk as firmware for an MSP430G2553, and on the chip's simulator beside the same in Python."""
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from ppafo.control.fixed.torque_laws import WALK_TARGETS
-from ppafo.control.fixed.walking_law import GaitConverter
-from ppafo.control.fixed.walking_numbers import FIXED_WALKS, FixedWalk
+import numpy as np
+
+from ppafo.control.fixed.torque_laws import WALK_TARGETS, FixedLaw
+from ppafo.control.fixed.walking_law import GaitConverter, GaitReadings, WalkCounts, read_gait
+from ppafo.control.fixed.walking_numbers import FIXED_WALKS
+from ppafo.control.fixed.whole_numbers import COMMAND_STEPS
 from ppafo.control.walking.signs import SIGNS
-from ppafo.engine.rows import rebuilt
-from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.lanes import run_batch
+from ppafo.engine.rows import rebuilt, row_numbers
+from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
-from ppafo.exports.firmware import MOST_TICKS, PRELUDE, TICK, defined_numbers, macro, proof, state_type
+from ppafo.exports.firmware import TICK, law_source, parameters_header, ticks_of
 from ppafo.exports.firmware.catalog import MSP430G2553
+from ppafo.exports.firmware.lock_step import Comparison, Cost, compare_with, cost_of
+from ppafo.exports.firmware.simulators import ChipSimulator, Decision, chip_simulator
+from ppafo.exports.firmware.walking.drawn import gait_readings
 from ppafo.exports.templates import filled, licence, template
+from ppafo.model.command import VENT
+from ppafo.model.gait_sensors import GaitMeasurement
 from ppafo.simulation.reading import quantity_text
+from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import Scenario
-from ppafo.translation.c99 import c_source, documents_of
 from ppafo.version import __version__
 from ppafo.walking.declaration import ARITHMETIC, quantities
-from ppafo.walking.planning import converter_of_walk, numbers_of_walk
+from ppafo.walking.planning import converter_of_walk, numbers_of_walk, plan_walk
+from ppafo.walking.recorded import SAFE_ROW
+from ppafo.walking.sampled import run_sampled_walk
+from ppafo.walking.varying import with_duration
+from ppafo.walking.walk import lasting
 
 _TEMPLATES = (
     "Makefile",
@@ -36,7 +50,7 @@ _TEMPLATES = (
 class WalkChip(NamedTuple):
     """The integer controller of a walk: law, whole numbers by name, converter, ticks of a sample."""
 
-    law: FixedWalk
+    law: FixedLaw
     numbers: Mapping[str, float]
     converter: GaitConverter
     ticks: int
@@ -65,12 +79,7 @@ def walk_chip(configuration: Scenario) -> WalkChip:
             f"{name}: controller.converter_bits = {given['converter_bits']:g}: the converter of the chip has "
             f"{MSP430G2553.converter_bits}"
         )
-    ticks = round(period / TICK)
-    if not 1 <= ticks <= MOST_TICKS // 2 or abs(ticks * TICK - period) > 1.0e-9 * period:
-        raise ScenarioError(
-            f"{name}: controller.period = {period:.9g} s: on the chip a multiple of 0.125 ms, "
-            f"up to {MOST_TICKS // 2 * TICK:.3g} s"
-        )
+    ticks = ticks_of(name, period)
     law = FIXED_WALKS[configuration.control.kind]
     numbers = numbers_of_walk(configuration)
     return WalkChip(law=law, numbers=numbers, converter=converter_of_walk(configuration), ticks=ticks)
@@ -85,58 +94,22 @@ def walk_firmware(configuration: Scenario, target: str = WALK_TARGETS[0]) -> dic
     texts = {name: filled(template("firmware.walking", name), words) for name in _TEMPLATES}
     texts |= {name: template("firmware", name) for name in ("msp430.h", "start_msp430.c")}
     texts["LICENSE"] = licence()
-    texts["controller.c"] = walk_source(chip.law)
-    texts["parameters.h"] = _parameters(configuration, chip)
+    texts["controller.c"] = law_source(
+        chip.law,
+        f"The walking controller '{chip.law.name}' of ppafo {__version__} on whole numbers.",
+        ("controller_readings readings", "given", ", ".join(f"readings.{name}" for name in GaitReadings._fields)),
+        {"int16_t controller_level": "state.safety.level", "int16_t controller_sign": "state.safety.sign"},
+    )
+    bits, period = int(configuration.control.settings["converter_bits"]), configuration.control.period
+    texts["parameters.h"] = parameters_header(
+        f"the controller '{chip.law.name}' of the walk {configuration.name}, ppafo {__version__},",
+        _origins(configuration),
+        f"#define CONTROLLER_TICKS {chip.ticks}u /* of 125 us in a sample period of {period:.9g} s */\n"
+        f"#define CONTROLLER_BITS {bits} /* of the converter; counts are of 14 bits */",
+        chip.law,
+        chip.numbers,
+    )
     return {name: text.encode() for name, text in sorted(texts.items())}
-
-
-def walk_source(law: FixedWalk) -> str:
-    """The law in C, with a state of its own and the numbers of ``parameters.h``."""
-    collector = SourceCollector("")
-    entry = collector.add(law.sample)
-    documents = documents_of(collector)
-    title = f"The walking controller '{law.name}' of ppafo {__version__} on whole numbers. Not to be edited."
-    text = c_source(proof(law).module, documents, title, prelude=PRELUDE)
-    numbers, state, readings = (collector.add(item) for item in (law.numbers, state_type(law), law.readings))
-    given = rebuilt(law.numbers, [macro(item) for item in law.number_quantities])
-    fields = ", ".join(f"readings.{name}" for name in law.readings.__annotations__)
-    return f"""#include "controller.h"
-
-#include "parameters.h"
-
-{text}
-static {state} state;
-
-void controller_begin(void)
-{{
-    static const {state} begin = {_written(law.begins)};
-    state = begin;
-}}
-
-int16_t controller_sample(controller_readings readings)
-{{
-    static const {numbers} numbers = {_written(given)};
-    const {readings} given = {{{fields}}};
-    const {entry}_result result = {entry}(numbers, state, given);
-    state = result.item_1;
-    return result.item_0;
-}}
-
-int16_t controller_level(void)
-{{
-    return state.safety.level;
-}}
-
-int16_t controller_sign(void)
-{{
-    return state.safety.sign;
-}}
-"""
-
-
-def _written(row: Any) -> str:
-    """A NamedTuple as C initialises it, nested ones in their place."""
-    return "{" + ", ".join(_written(item) if isinstance(item, tuple) else str(item) for item in row) + "}"
 
 
 def _words(configuration: Scenario, chip: WalkChip, target: str) -> dict[str, str]:
@@ -161,25 +134,100 @@ def _words(configuration: Scenario, chip: WalkChip, target: str) -> dict[str, st
     }
 
 
-def _parameters(configuration: Scenario, chip: WalkChip) -> str:
-    """The header with every number of the law, its unit, meaning and origin."""
-    bits, period = int(configuration.control.settings["converter_bits"]), configuration.control.period
-    lines = [
-        f"/* Numbers of the controller '{chip.law.name}' of the walk {configuration.name}, ppafo {__version__}, from:",
-        *(f" *   {line}" for line in _origins(configuration)),
-        " * Every number must stay within its range: for that the arithmetic is proved not to overflow. */",
-        "#ifndef PPAFO_PARAMETERS_H",
-        "#define PPAFO_PARAMETERS_H",
-        "",
-        f"#define CONTROLLER_TICKS {chip.ticks}u /* of 125 us in a sample period of {period:.9g} s */",
-        f"#define CONTROLLER_BITS {bits} /* of the converter; counts are of 14 bits */",
-    ]
-    return "\n".join([*lines, *defined_numbers(chip.law.number_quantities, chip.numbers), "", "#endif", ""])
-
-
 def _origins(configuration: Scenario) -> Iterator[str]:
     """Settings that the numbers come from, each with unit and value in SI units."""
     declared = quantities(configuration.control.kind)
     yield f"period {configuration.control.period:.9g} s (controller.rate or controller.period of {configuration.name})"
     for name, value in configuration.control.settings.items():
         yield f"{name} {value:.9g} {declared[f'controller.{name}'].unit} (controller.{name})".replace("  ", " ")
+
+
+_INSIDE = ("controller_state.", "gait_seen.")
+"""What only the lanes keep: state of their controller, and the last readings."""
+
+SIGN_BITS = 8
+"""A chip tells its level above these bits of a word, and its sign in them."""
+
+
+class PythonWalkChip:
+    """The integer controller of a walk in Python, as the chip computes it."""
+
+    def __init__(self, chip: WalkChip) -> None:
+        self.law, self.numbers = chip.law, chip.of_law
+        self.state: WalkCounts = chip.law.begins
+
+    def begin(self) -> None:
+        """Forget everything."""
+        self.state = self.law.begins
+
+    def sample(self, readings: GaitReadings) -> tuple[int, int]:
+        """Command in steps, and level and sign in one word."""
+        command, self.state = self.law.sample(self.numbers, self.state, readings)
+        return command, (self.state.safety.level << SIGN_BITS) + self.state.safety.sign
+
+
+class ChipOfWalk:
+    """The simulated chip as a controller of a walk; it keeps the decision of every sample."""
+
+    def __init__(self, simulator: ChipSimulator, converter: GaitConverter) -> None:
+        self.simulator = simulator
+        self.converter = converter
+        self.decisions: list[Decision] = []
+
+    def reset(self) -> None:
+        """Reset the processor."""
+        self.simulator.begin()
+        self.decisions.clear()
+
+    def update(self, measurement: GaitMeasurement) -> float:
+        """Command from -1 to 1, or ``VENT``, from what the converter shows."""
+        found = self.simulator.sample(read_gait(self.converter, measurement))
+        self.decisions.append(found)
+        return found.command / COMMAND_STEPS if found.command else VENT
+
+
+@dataclass(frozen=True, slots=True)
+class WalkOnChip:
+    """A walk with the chip's simulator in charge, and the same with the integer controller in the lanes.
+
+    ``differences`` are samples of the recording at which the commands differ; ``same_bits`` is true where all that is
+    no state of a controller is the same. ``level`` is that of the chip at the end.
+    """
+
+    cost: Cost
+    samples: int
+    differences: int
+    same_bits: bool
+    level: int
+    gas: float
+
+
+def walk_on_chip(configuration: Scenario, minutes: float | None = None) -> WalkOnChip:
+    """Walk with the controller on the chip's simulator, in virtual time, and once more in the lanes.
+
+    ScenarioError where the controller has no integer form, SimulationError where a tool is missing.
+    """
+    chip = walk_chip(configuration)
+    run = plan_walk(with_duration(configuration, lasting(configuration, minutes).duration))
+    with chip_simulator(walk_firmware(configuration), MSP430G2553) as (simulator, image):
+        law = ChipOfWalk(simulator, chip.converter)
+        outside = run_sampled_walk(run, law)
+        cost = cost_of(MSP430G2553, image, simulator.stack(), law.decisions)
+    inside = run_batch(batch_of(run))
+    rows = state_row_numbers(run)
+    shared = [path for path in rows if not path.startswith(_INSIDE)]
+    own = row_numbers(replace(run.program, controller=None).state_rows())
+    both = ((outside, own), (inside, rows))
+    mine, theirs = (one.record[:, [places[path] for path in shared], 0] for one, places in both)
+    differ = int(np.count_nonzero(mine[:, shared.index("result.command")] != theirs[:, shared.index("result.command")]))
+    level = law.decisions[-1].is_sound >> SIGN_BITS
+    same = bool(np.array_equal(mine, theirs) and level == inside.record[-1, rows[SAFE_ROW], 0])
+    gas = float(mine[-1, shared.index("state.supplied_mass")])
+    return WalkOnChip(cost, len(law.decisions), differ, same, level, gas)
+
+
+def compare_drawn_walk(configuration: Scenario, samples: int, seed: int = 1) -> Comparison:
+    """Give drawn readings of a gait to the chip's simulator and to Python, with a reset before every episode."""
+    chip = walk_chip(configuration)
+    given = gait_readings(chip.converter, samples, seed)
+    return compare_with(PythonWalkChip(chip), given, samples, walk_firmware(configuration), MSP430G2553)
