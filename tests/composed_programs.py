@@ -9,6 +9,7 @@ from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.program import Program
 from ppafo.engine.replay import RECORDED_ANGLE
 from ppafo.metrics import METRICS
+from ppafo.model.effects.catalog import EFFECTS
 from ppafo.model.valves import dump
 from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveModel
@@ -54,7 +55,9 @@ def drawn_programs(count: int, seed: int = 1) -> Iterator[Program]:
             ideal_sensors=draw.random() < 0.5,
             late_commands=draw.random() < 0.3,
             late_signals=not walks and draw.random() < 0.3,
-            slow_sensors=not walks and draw.random() < 0.3,
+            effects=tuple(
+                item for item in EFFECTS.values() if not (walks and item.section == "sensors") and draw.random() < 0.3
+            ),
             is_thermal=draw.random() < 0.4,
             walks=walks,
             takes_course=walks and draw.random() < 0.5,

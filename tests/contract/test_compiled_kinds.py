@@ -15,11 +15,13 @@ from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.cache import load_generated
 from ppafo.engine.entries import HEADER
 from ppafo.engine.numba_compiler import NumbaCompiler
-from ppafo.engine.rows import numbers, rebuild
+from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.engine.source_text import SourceCollector
 from ppafo.metrics import METRICS
+from ppafo.model.effects.catalog import EFFECTS
+from ppafo.model.effects.kind import Moment
 from ppafo.model.gait_sensors import Fault, GaitMeasurement, GaitSeen, GaitSensors, measure_gait
-from ppafo.model.sensors import Measurement, SensorParameters, SensorRates, SensorState, follow_signals, measure
+from ppafo.model.sensors import Measurement, SensorParameters, measure
 from ppafo.model.valves.catalog import VALVES
 from ppafo.signals.meter import Course, MeterKind, Sample
 
@@ -101,7 +103,7 @@ def valves(draw: random.Random) -> Iterator[Entry]:
 
 
 def sensors(draw: random.Random) -> Iterator[Entry]:
-    """Sensors of the torque task, slow ones, and those of a walk with noise, lost samples and faults."""
+    """Sensors of the torque task, and those of a walk with noise, lost samples and faults."""
     noisy = SensorParameters(0.01, 500.0, 0.002, 300.0, 12345.0)
     fault = Fault(0.02, 1.0, 0.0)
     gait = GaitSensors(
@@ -109,8 +111,8 @@ def sensors(draw: random.Random) -> Iterator[Entry]:
         *(fault, Fault(0.01, 0.0, 0.0, 1.0, 0.8, 5.0, 90.0, 0.3, 0.7, 0.2, 0.02), *(Fault(9.0, 0.0, 1.0),) * 2),
         Fault(0.03, 0.0, 2e5),
     )
-    shown, slow = GaitSeen(*(0.0,) * 8), SensorState(1.3, 1e5, 1e5, 1.3, 1e5, 1e5)
-    readings, walking, following = [], [], []
+    shown = GaitSeen(*(0.0,) * 8)
+    readings, walking = [], []
     for sample in range(50):
         now = draw.uniform(0.9, 1.8), draw.uniform(1e5, 4e5), draw.uniform(1e5, 4e5)
         readings.append((noisy, *now, 2.5e-5, sample))
@@ -118,11 +120,24 @@ def sensors(draw: random.Random) -> Iterator[Entry]:
             (noisy, gait, shown, *now, draw.uniform(0, 400), draw.uniform(0, 400), 2.5e-5, 1e-3 * sample, sample)
         )
         _, shown = measure_gait(*walking[-1])
-        following.append((SensorRates(300.0, 0.0 if sample % 2 else 600.0), slow, *now, 1e-3))
-        slow = follow_signals(*following[-1])
     yield Entry("measure", measure, readings)
     yield Entry("measure_gait", measure_gait, walking)
-    yield Entry("follow_signals", follow_signals, following)
+
+
+def effects(draw: random.Random) -> Iterator[Entry]:
+    """States of effects, and laws that call no place of another."""
+
+    def numbers(row: Any) -> Any:
+        return rebuild(row, [draw.uniform(0.5, 2.0) for _ in leaf_paths(row, "")])
+
+    for effect in EFFECTS.values():
+        if effect.state is None:
+            continue
+        row, state = effect.parameters, effect.state.row
+        moments = [(numbers(row), numbers(state), numbers(Moment), numbers(Moment), 1e-3) for _ in range(50)]
+        yield Entry(f"{effect.name}_start", effect.state.start, [(given[0], given[2]) for given in moments])
+        yield Entry(f"{effect.name}_advance", effect.state.advance, moments)
+        yield Entry(f"{effect.name}_slopes", effect.state.slopes, [given[:3] for given in moments])
 
 
 def meters(draw: random.Random) -> Iterator[Entry]:
@@ -150,7 +165,7 @@ def meters(draw: random.Random) -> Iterator[Entry]:
 
 def entries() -> list[Entry]:
     """All that there is, drawn anew in the same way each time; a new entry of one part moves no draw of another."""
-    parts = (controllers, profiles, valves, sensors, meters)
+    parts = (controllers, profiles, valves, sensors, effects, meters)
     return [entry for part in parts for entry in part(random.Random(f"20261 {part.__name__}"))]
 
 

@@ -17,6 +17,7 @@ import ppafo
 from ppafo.cli.main import main
 from ppafo.engine.reference.agreement import compare_with_reference
 from ppafo.engine.run import batch_of
+from ppafo.errors import ScenarioError
 from ppafo.exports.c_library import c_library, library_of
 from ppafo.exports.c_library.files import c_identifier
 from ppafo.exports.fmu import closed_loop, functional_unit
@@ -40,6 +41,7 @@ from tests.modules_under_node import compared, drawn
 AREA = "effects.mesh.area"
 NARROW = f"{AREA}=4 mm^2"
 NAME, SHORT = "step-response", ("run.duration=0.3 s",)
+ICE = ("effects.ice.blockage_per_gas=3e4 1/kg", "effects.ice.melting_time=30 ms")
 EXAMPLE = files("ppafo.examples") / "add-an-effect"
 
 
@@ -144,7 +146,7 @@ def test_a_linear_model_has_it_as_a_difference_of_two_runs_has() -> None:
 @pytest.mark.parametrize("name", [NAME, "proportional"])
 def test_an_exported_library_makes_the_numbers_of_a_run_that_python_makes(name: str, tmp_path: Path) -> None:
     is_walk = name == "proportional"
-    walked: Any = load_walk("proportional", [NARROW]) if is_walk else load_scenario(name, (*SHORT, NARROW))
+    walked: Any = load_walk("proportional", [NARROW, *ICE]) if is_walk else load_scenario(name, (*SHORT, NARROW, *ICE))
     library = library_of(walked)
     places = {item.path: place for place, item in enumerate(library.settings)}
     assert {AREA, "effects.mesh.discharge_coefficient"} <= set(places)
@@ -197,7 +199,7 @@ def test_a_unit_has_its_settings_and_the_bits_of_python(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
 def test_the_page_has_its_words_and_the_bits_of_python() -> None:
-    module = module_of(load_scenario(NAME, (*SHORT, NARROW)))
+    module = module_of(load_scenario(NAME, (*SHORT, NARROW, *ICE)))
     (entry,) = [item for item in module.description["settings"] if item["key"] == AREA]
     assert entry["description"] == "open area of the mesh, 0 for none"
     assert AREA not in words()["labels"], "a page needs no words of its own for it"
@@ -205,6 +207,12 @@ def test_the_page_has_its_words_and_the_bits_of_python() -> None:
 
 
 def test_it_walks() -> None:
-    without, narrow = (walk(load_walk("proportional", texts), 0.1) for texts in ((), (NARROW,)))
-    assert narrow.status.is_completed
-    assert slower(narrow, without)
+    without, narrow, iced = (walk(load_walk("proportional", texts), 0.1) for texts in ((), (NARROW,), (NARROW, *ICE)))
+    for one, other in ((narrow, without), (iced, narrow)):
+        assert one.status.is_completed
+        assert slower(one, other)
+
+
+def test_a_walk_on_a_bottle_refuses_effects_in_one_line() -> None:
+    with pytest.raises(ScenarioError, match=r"effects \('mesh'\) do not follow the temperature of a bottle"):
+        walk(load_walk("proportional", [NARROW, "bottle.name=paper-co2-9oz"]), 0.1)

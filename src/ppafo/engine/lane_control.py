@@ -5,8 +5,9 @@ from ppafo.engine.scheme.parts import SAME_INSTANT
 from ppafo.engine.scheme.pneumatics import held_pressures
 from ppafo.engine.scheme.shaped_gas import seen_with_torque, torque_at
 from ppafo.model.gait_sensors import GaitMeasurement, late_measurement, measure_gait, samples_late
+from ppafo.model.places import shown_signals
 from ppafo.model.plant import chamber_pressures
-from ppafo.model.sensors import Measurement, follow_signals, measure
+from ppafo.model.sensors import Measurement, measure
 from ppafo.model.vane import actuator_torque
 
 SIGNALS = ("angle", "pressure_1", "pressure_2")
@@ -72,9 +73,15 @@ def torque_line(rows: LaneRows, angle: str) -> str:
 
 def current_readings(rows: LaneRows) -> list[str]:
     """Lines that make what the sensors show at the present."""
-    if not rows.program.slow_sensors:
-        return ["angle = state.angle", *present_pressures(rows)]
-    return [rows.load("sensor_state"), *[f"{name} = sensor_state.{name}" for name in SIGNALS]]
+    return ["angle = state.angle", *present_pressures(rows), *as_shown(rows)]
+
+
+def as_shown(rows: LaneRows) -> list[str]:
+    """Line that makes signals as the sensors show them, where an effect acts there."""
+    if not any(shown_signals in effect.laws for effect in rows.program.effects):
+        return []
+    signals = ", ".join(SIGNALS)
+    return [f"{signals} = {rows.add(shown_signals)}({signals})"]
 
 
 def present_pressures(rows: LaneRows) -> list[str]:
@@ -135,26 +142,20 @@ def signals_before_start(rows: LaneRows) -> list[str]:
     ]
 
 
-def sense_end(rows: LaneRows, flag: str = "") -> list[str]:
-    """What slow sensors show at the end of a step or part, and what late ones look at in it.
+def sense_end(rows: LaneRows) -> list[str]:
+    """What late sensors look at in a step or part, at its end, with the states that effects have then.
 
     A signal that is late by a fraction of a step is looked at by that much before its end, at ``look_at`` [s].
     """
-    program = rows.program
-    if not (program.slow_sensors or program.late_signals) or program.walks:
+    if not rows.program.late_signals or rows.program.walks:
         return []
-    lines = [f"pressure_1, pressure_2 = {pressures_of(rows, 'after')}", "angle = after.angle"]
-    if program.slow_sensors:
-        following = f"{rows.add(follow_signals)}(sensor_rates, sensor_state, angle, pressure_1, pressure_2, length)"
-        lines += [rows.load("sensor_rates"), rows.load("sensor_state"), f"sensed = {following}"]
-        lines += [*rows.store("sensor_state", "sensed", flag), *[f"{name} = sensed.{name}" for name in SIGNALS]]
-    return [*lines, *look(rows)]
+    states = [f"{name} = {name}_after" for name in rows.program.effect_states]
+    now = [f"pressure_1, pressure_2 = {pressures_of(rows, 'after')}", "angle = after.angle"]
+    return [*states, *now, *as_shown(rows), *look()]
 
 
-def look(rows: LaneRows) -> list[str]:
+def look() -> list[str]:
     """Lines that keep what late sensors look at."""
-    if not rows.program.late_signals:
-        return []
     return [
         f"looks = taken and abs(before + length - look_at) <= {SAME_INSTANT!r}",
         *[

@@ -1,6 +1,7 @@
 """What the lanes do for the gas of a step: the valve, the flows of both stages, and the stages themselves."""
 
 from ppafo.engine.lane_control import present_pressures
+from ppafo.engine.lane_effects import chambers_of, states_ahead
 from ppafo.engine.lane_rows import LaneRows
 from ppafo.engine.scheme import joined_chambers, pneumatics, shaped_gas, stage_flows, supply_lines, thermal_gas
 
@@ -26,20 +27,17 @@ def pass_gas(rows: LaneRows) -> list[str]:
     gas = chambers_of(rows)
     still = gas if program.keeps_volumes else f"{gas}.still"
     ends = f"{add(thermal_gas.end_pressures)}(plant, {gas})" if program.is_thermal else f"{still}.end_1, {still}.end_2"
+    connected = connect(rows, "gas.lines.after")
     return [
         rows.load("gas"),
         rows.load("shown"),
-        *connect(rows, "gas.lines.after"),
+        *states_ahead(rows, connected),
+        *connected,
         f"pressure_1, pressure_2 = {ends}",
         f"passing = {add(stage_flows.stage_flows)}"
         f"(plant, pressure_1, pressure_2, port_1, port_2, {add(program.valve.port_flow)})",
         *rows.keep("passing"),
     ]
-
-
-def chambers_of(rows: LaneRows) -> str:
-    """What the first stage of the chambers is called."""
-    return "gas.chambers" if rows.program.has_lines else "gas"
 
 
 def connect(rows: LaneRows, line_state: str) -> list[str]:

@@ -6,6 +6,7 @@ switches, a late command arrives, the vane meets a stop, a sample is due, or its
 that are through wait, masked, and no lane sees another.
 """
 
+from ppafo.engine import lane_effects
 from ppafo.engine.lane_control import sense_end
 from ppafo.engine.lane_gas import begin_gas, feed, open_valve, pass_gas
 from ppafo.engine.lane_rows import HANDED, LaneRows, RarePhase, count_lanes, indent
@@ -218,17 +219,17 @@ def lead(rows: LaneRows) -> list[str]:
 def finish(rows: LaneRows) -> list[str]:
     """The state at the end of a step or part, unless the part is refused; and the first time at which a run failed."""
     program, add = rows.program, rows.add
-    lines = [*with_gas(rows), *end_motion(rows), *with_work(rows)]
+    lines = [*with_gas(rows), *end_motion(rows), *with_work(rows), *lane_effects.advance_states(rows)]
     if not program.is_parted:
         return [*lines, *store_all(rows, ""), *judge(rows), *sense_end(rows)]
     lines += [rows.load("next_valve"), *([rows.load("next_lines")] if program.has_lines else [])]
     if not program.is_adaptive:
         flag = "" if program.parts_are_rare else "taken"
-        stored = [*store_all(rows, flag), *judge(rows, flag), *sense_end(rows, flag)]
+        stored = [*store_all(rows, flag), *judge(rows, flag), *sense_end(rows)]
         return [f"taken = {rows.remaining} > 0.0", *lines, *stored, *add_up(rows)]
     return [
         *lines,
-        "error = max(error, gas_error) / timing.tolerance",
+        f"error = max({', '.join(['error', 'gas_error', *lane_effects.state_errors(rows)])}) / timing.tolerance",
         f"error = error if {positive(rows)} else {parts.MAXIMUM_ERROR!r}",
         f"refused = {add(parts.is_refused)}(error, length) and not result.failure_time <= time",
         f"next_length = {add(parts.next_pace)}(pace, error, length, refused, timing.step).length",
@@ -237,7 +238,7 @@ def finish(rows: LaneRows) -> list[str]:
         "taken = active and not refused",
         *store_all(rows, "taken"),
         *judge(rows, "taken"),
-        *sense_end(rows, "taken"),
+        *sense_end(rows),
         *add_up(rows),
     ]
 
@@ -289,6 +290,8 @@ def store_all(rows: LaneRows, flag: str) -> list[str]:
         lines += rows.store("masses", "warmed", flag)
     if rows.program.walks:
         lines += rows.store("walk", "walk_after", flag)
+    for state in rows.program.effect_states:
+        lines += rows.store(state, f"{state}_after", flag)
     if rows.program.is_parted:
         lines += rows.store("valve_state", "next_valve", flag)
         lines += rows.store("line_state", "next_lines", flag) if rows.program.has_lines else []
@@ -320,7 +323,7 @@ def judge(rows: LaneRows, flag: str = "") -> list[str]:
     waits = f"not {flag} or " if flag else ""
     return [
         f"possible = {waits}(abs(after.angular_velocity) < {IMPOSSIBLE_RATE} and min({gas}) > 0.0 "
-        f"and max({gas}) < {IMPOSSIBLE_MASS})",
+        f"and max({gas}) < {IMPOSSIBLE_MASS}{lane_effects.states_are_possible(rows)})",
         "failed = result.failure_time if possible else min(result.failure_time, time + length)",
         f"{rows.cells['result.failure_time']} = failed",
     ]

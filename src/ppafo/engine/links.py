@@ -1,14 +1,17 @@
 """What the pieces of a program put in the place of functions of the model: the actuator's own, and laws of effects."""
 
-from collections.abc import Mapping, Sequence
+import math
+from collections import namedtuple
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from ppafo.engine.program import Program
 from ppafo.engine.scheme.shaped_gas import links_of
-from ppafo.engine.source_text import Collector
+from ppafo.engine.source_text import Collector, SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.model.effects.kind import Effect, effect_problem, laws_in_order
+from ppafo.model.places import shown_signals
 
 
 def link_program(program: Program, collector: Collector) -> None:
@@ -23,7 +26,7 @@ def link_program(program: Program, collector: Collector) -> None:
     bare = replace(program, effects=())
     taken = {*bare.parameter_rows(), *bare.state_rows(), *bare.step_rows()}
     for effect in program.effects:
-        if effect.name in taken:
+        if taken & set(effect.rows):
             raise ProgramError(f"effect '{effect.name}': other rows of a program have this name; it needs another")
     link_effects(program.effects, collector, own)
 
@@ -40,4 +43,28 @@ def link_effects(effects: Sequence[Effect], collector: Collector, own: Mapping[A
     for key, stands in laws_in_order(effects).items():
         collector.links[key] = (own or {}).get(stands, stands)
     for effect in effects:
-        collector.effects.update(dict.fromkeys(effect.laws.values(), (effect.name,)))
+        for law in effect.laws.values():
+            asked = law.__code__.co_varnames[: law.__code__.co_argcount]
+            collector.effects[law] = tuple(row for row in effect.rows if row in asked)
+
+
+Show = Callable[[Mapping[str, Any], float, float, float], tuple[float, float, float]]
+"""From states of effects by name, an angle [rad] and two absolute pressures [Pa] to what the sensors show of these."""
+
+
+def shown_by(effects: Sequence[Effect], rows: Sequence[Any]) -> Show | None:
+    """Return what sensors show, as Python calls it, with effects and their rows; None where they show the truth."""
+    if not any(shown_signals in effect.laws for effect in effects):
+        return None
+    given = {effect.name: row for effect, row in zip(effects, rows, strict=True)}
+    collector = SourceCollector("")
+    link_effects(effects, collector)
+    name = collector.add(shown_signals)
+    scope: dict[str, Any] = {"math": math, "namedtuple": namedtuple}
+    exec(collector.text(), scope)
+    composed, needed = scope[name], collector.needs[name]
+
+    def show(states: Mapping[str, Any], *signals: float) -> Any:
+        return composed(*((given | dict(states))[row] for row in needed), *signals)
+
+    return show

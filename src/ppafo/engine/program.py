@@ -20,13 +20,13 @@ from ppafo.model.actuators.kind import ActuatorModel
 from ppafo.model.actuators.vane import MODEL as VANE
 from ppafo.model.course import Course as WalkCourse
 from ppafo.model.course import Marks
-from ppafo.model.effects.kind import Effect
+from ppafo.model.effects.kind import Effect, State
 from ppafo.model.gait import GaitNow, GaitPlace, GaitSeries, GaitTiming
 from ppafo.model.gait_sensors import GaitSeen, GaitSensors
 from ppafo.model.leg import LegParameters
 from ppafo.model.plant import PlantState, ThermalParameters, ThermalState
 from ppafo.model.regulator import LineState, SupplyLines
-from ppafo.model.sensors import SensorParameters, SensorRates, SensorState
+from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
 from ppafo.signals.meter import Course, MeterKind
 
@@ -71,7 +71,7 @@ class Program:
 
     ``angle`` None leaves the vane free, otherwise that profile prescribes it. ``controller`` None leaves the command
     to the caller, sample by sample. ``ideal_sensors`` False adds noise and quantisation of the signals,
-    ``slow_sensors`` True a bandwidth and ``late_signals`` True a delay. ``late_readings`` True lets sensors of a walk
+    ``late_signals`` True a delay. ``late_readings`` True lets sensors of a walk
     be whole samples late. ``late_commands`` True adds a dead time before the valve. ``is_thermal`` True gives the gas
     an energy balance instead of a constant temperature. ``walks`` True puts the device on a walking leg, whose foot is
     free or where the ground and a gait lead it (``angle`` is None then;
@@ -96,7 +96,6 @@ class Program:
     walks: bool = False
     takes_course: bool = False
     has_lines: bool = False
-    slow_sensors: bool = False
     is_adaptive: bool = False
     samples_inside: bool = False
     meters: tuple[MeterKind, ...] = ()
@@ -120,14 +119,23 @@ class Program:
             **({"gait_timing": GaitTiming, "gait_sensors": GaitSensors} if self.walks else {}),
             **({"walk_course": WalkCourse} if self.takes_course else {}),
             **({"lines": SupplyLines} if self.has_lines else {}),
-            **({"sensor_rates": SensorRates} if self.slow_sensors else {}),
-            **self.effect_rows,
+            **{effect.name: effect.parameters for effect in self.effects},
         }
 
     @property
     def effect_rows(self) -> dict[str, type]:
-        """Groups of rows of the effects, by their names."""
-        return {effect.name: effect.parameters for effect in self.effects}
+        """Groups of rows that the laws of effects may ask for, by their names: parameters, and states."""
+        return {effect.name: effect.parameters for effect in self.effects} | self.effect_states
+
+    @property
+    def stated(self) -> dict[str, State]:
+        """States of the effects that have one, by the names of the effects."""
+        return {effect.name: effect.state for effect in self.effects if effect.state is not None}
+
+    @property
+    def effect_states(self) -> dict[str, type]:
+        """Groups of rows of the states of effects, by their names."""
+        return {f"{name}_state": kind.row for name, kind in self.stated.items()}
 
     def state_rows(self) -> dict[str, type]:
         """Groups of state rows of this program, in order."""
@@ -140,7 +148,7 @@ class Program:
             "controller_state": NoParameters if self.controller is None else type(self.controller.initial),
             **({"walk": WalkState, "gait_seen": GaitSeen} if self.walks else {}),
             **({"line_state": LineState} if self.has_lines else {}),
-            **({"sensor_state": SensorState} if self.slow_sensors else {}),
+            **self.effect_states,
             "course": Course if self.follows_reference else NoParameters,
             **{group: kind.state for group, kind in self.meter_groups.items()},
             **({"start": LaneStart} if self.starts_apart else {}),

@@ -1,7 +1,7 @@
 """One run as values: what both the lanes and the reference solver are given."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,18 +12,19 @@ from ppafo.engine.lane_step import MAXIMUM_PARTS
 from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_batch
 from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program
 from ppafo.engine.reference.derivative import ExactOrifice
-from ppafo.engine.rows import table
+from ppafo.engine.rows import leaves, rebuilt, table
 from ppafo.engine.scheme.ankle_torque import DeviceShare
 from ppafo.engine.scheme.parts import Pace
 from ppafo.engine.scheme.walking import WalkState
-from ppafo.model.columns import larger, truncated
+from ppafo.model.columns import larger, over_runs, truncated
 from ppafo.model.course import Course
+from ppafo.model.effects.kind import Moment, State
 from ppafo.model.gait import GaitSeries, GaitTiming
 from ppafo.model.gait_sensors import NOTHING_SEEN, GaitSensors
 from ppafo.model.leg import LegParameters
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, chamber_pressures
 from ppafo.model.regulator import LineState, SupplyLines
-from ppafo.model.sensors import SensorParameters, SensorRates, SensorState
+from ppafo.model.sensors import SensorParameters
 
 Members = NDArray[np.intp]
 Floats = NDArray[np.float64]
@@ -91,7 +92,6 @@ class Run:
     tolerance: float = 1.0
     walk: Walk | None = None
     lines: Lines | None = None
-    sensor_rates: SensorRates | NoParameters = field(default_factory=NoParameters)
     effects: tuple[Any, ...] = ()
 
     @property
@@ -126,13 +126,13 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     plant, valve = [run.plant, run.thermal], [run.valve]
     walk, walk_states = _walk_groups(run.walk)
     lines, line_states = ([], []) if run.lines is None else ([run.lines.parameters], [run.lines.initial])
-    rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, run.sensor_rates, *run.effects]
+    rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, *run.effects]
     parameters = table([timing, *plant, *valve, *rest], runs)
     controller_state = NoParameters() if program.controller is None else program.controller.initial
     # The gas begins at the reference temperature, where its true mass is what the state counts.
     masses = initial_masses(run.initial) if program.is_thermal else NoParameters()
     result = LaneResult(command=0.0, failure_time=NEVER_FAILED, too_many_parts=0.0)
-    further = [*walk_states, *line_states, initial_sensors(run)]
+    further = [*walk_states, *line_states, *states_at_start(run)]
     states = table(
         [result, Pace(run.step), run.initial, masses, program.valve.initial(), controller_state, *further], runs
     )
@@ -185,34 +185,45 @@ def initial_masses(initial: PlantState) -> ThermalState:
     )
 
 
-def initial_sensors(run: Run) -> SensorState | NoParameters:
-    """Slow sensors that show what is true at the start of a run; nothing where there are none."""
-    if not run.program.slow_sensors:
-        return NoParameters()
-    if run.program.has_shape:
-        initial = run.initial
-        pressures = pressures_of(run.program.actuator, run.plant, initial.angle, initial.mass_1, initial.mass_2)
-        return SensorState(
-            angle=initial.angle,
-            pressure_1=pressures[0],
-            pressure_2=pressures[1],
-            true_angle=initial.angle,
-            true_pressure_1=pressures[0],
-            true_pressure_2=pressures[1],
-        )
-    return sensors_at_start(run.plant, run.initial)
+def states_at_start(run: Run) -> list[Any]:
+    """States of the effects of a run at its beginning, in the order of the program; of columns for each run."""
+    initial, program = run.initial, run.program
+    if not program.effect_states:
+        return []
+    pressures = pressures_of(program.actuator, run.plant, initial.angle, initial.mass_1, initial.mass_2)
+    now = _at_rest(initial, *pressures)
+    return [
+        _started(effect.state, effect.parameters, row, now)
+        for effect, row in zip(program.effects, run.effects, strict=True)
+        if effect.state is not None
+    ]
 
 
-def sensors_at_start(plant: PlantParameters, initial: PlantState) -> SensorState:
-    """Slow sensors that show what is true in a state."""
+def _started(state: State, parameters: type, row: Any, now: Moment) -> Any:
+    given = leaves(row)
+
+    def alone(*values: float) -> Any:
+        return state.start(rebuilt(parameters, values[: len(given)]), rebuilt(Moment, values[len(given) :]))
+
+    return over_runs(alone, *given, *now)
+
+
+def moment_at_start(plant: PlantParameters, initial: PlantState) -> Moment:
+    """What effects see of the plant in its initial state."""
     pressure_1, pressure_2 = chamber_pressures(plant, initial.angle, initial.mass_1, initial.mass_2)
-    return SensorState(
+    return _at_rest(initial, pressure_1, pressure_2)
+
+
+def _at_rest(initial: PlantState, pressure_1: float, pressure_2: float) -> Moment:
+    """The moment of a state with absolute pressures [Pa], before anything flows."""
+    return Moment(
         angle=initial.angle,
+        angular_velocity=initial.angular_velocity,
         pressure_1=pressure_1,
         pressure_2=pressure_2,
-        true_angle=initial.angle,
-        true_pressure_1=pressure_1,
-        true_pressure_2=pressure_2,
+        supplied_flow=0.0,
+        vented_flow=0.0,
+        command=0.0,
     )
 
 

@@ -13,3 +13,8 @@ def way_in(conductance: float) -> float:
 def way_out(conductance: float) -> float:
     """Conductance [kg/(s Pa)] from a chamber to the atmosphere, from that of the open valve. Equation (8)."""
     return conductance
+
+
+def shown_signals(angle: float, pressure_1: float, pressure_2: float) -> tuple[float, float, float]:
+    """Angle [rad] and absolute pressures [Pa] as the sensors of a controller show them, before noise and rounding."""
+    return angle, pressure_1, pressure_2

@@ -32,24 +32,6 @@ class SensorParameters(NamedTuple):
     seed: float
 
 
-class SensorRates(NamedTuple):
-    """Rates [1/s] at which the angle sensor and the pressure sensors follow, 2 pi times the bandwidth; 0: at once."""
-
-    angle: float
-    pressure: float
-
-
-class SensorState(NamedTuple):
-    """Angle [rad] and absolute pressures [Pa] as the sensors show them, and as they truly are."""
-
-    angle: float
-    pressure_1: float
-    pressure_2: float
-    true_angle: float
-    true_pressure_1: float
-    true_pressure_2: float
-
-
 def decay_factors(rate: float, step: float) -> tuple[float, float]:
     """exp(-rate step) and its mean over the step [-], by series at a small fraction of it, doubled up to the whole."""
     whole = rate * step
@@ -69,20 +51,6 @@ def follow(rate: float, step: float, shown: float, before: float, now: float) ->
     """What a first-order sensor shows after a step [s] in which the truth runs straight, in its own unit; exact."""
     kept, mean = decay_factors(rate, step)
     return kept * shown + (mean - kept) * before + (1.0 - mean) * now if rate > 0.0 else now
-
-
-def follow_signals(
-    rates: SensorRates, sensed: SensorState, angle: float, pressure_1: float, pressure_2: float, step: float
-) -> SensorState:
-    """What the sensors show after a step [s] that leads to an angle [rad] and two absolute pressures [Pa]."""
-    return SensorState(
-        angle=follow(rates.angle, step, sensed.angle, sensed.true_angle, angle),
-        pressure_1=follow(rates.pressure, step, sensed.pressure_1, sensed.true_pressure_1, pressure_1),
-        pressure_2=follow(rates.pressure, step, sensed.pressure_2, sensed.true_pressure_2, pressure_2),
-        true_angle=angle,
-        true_pressure_1=pressure_1,
-        true_pressure_2=pressure_2,
-    )
 
 
 def mix_bits(value: int) -> int:

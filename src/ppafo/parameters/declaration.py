@@ -12,7 +12,7 @@ from types import MappingProxyType
 from ppafo.model.actuators.catalog import ACTUATORS
 from ppafo.model.actuators.vane import KIND as VANE
 from ppafo.model.declaration import Quantity
-from ppafo.model.effects.catalog import EFFECTS
+from ppafo.model.effects.catalog import device_effects
 from ppafo.model.effects.kind import Effect
 from ppafo.model.valves.catalog import VALVES
 
@@ -129,7 +129,7 @@ def members(section: str, actuator_kind: str) -> tuple[Quantity, ...]:
 
 def quantities(valve_kinds: Mapping[str, str], actuator_kind: str = VANE.name) -> Mapping[str, Quantity]:
     """Return every number's declaration by dotted path, for a set with such valves, by name, and such an actuator."""
-    return _by_path(tuple(valve_kinds.items()), actuator_kind, tuple(EFFECTS.values()))
+    return _by_path(tuple(valve_kinds.items()), actuator_kind, device_effects())
 
 
 @functools.lru_cache(maxsize=32)
@@ -142,7 +142,7 @@ def _by_path(
 def _declare(valve_kinds: Iterable[tuple[str, str]], actuator_kind: str) -> Iterator[Quantity]:
     for section in SECTIONS:
         yield from (_at(section, member) for member in members(section, actuator_kind))
-    for effect in EFFECTS.values():
+    for effect in device_effects():
         yield from (_at(effect.section, member) for member in effect.quantities)
     for name, kind in valve_kinds:
         yield from (_at(f"valves.{name}", member) for member in ORIFICE + VALVES[kind].quantities)

@@ -17,7 +17,7 @@ from ppafo.model.actuators.catalog import ACTUATORS
 from ppafo.model.actuators.table import Table
 from ppafo.model.actuators.vane import KIND as VANE
 from ppafo.model.declaration import Quantity
-from ppafo.model.effects.catalog import EFFECTS, find_effects
+from ppafo.model.effects.catalog import EFFECTS, device_effects, find_effects
 from ppafo.model.effects.kind import SECTION
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters import declaration
@@ -91,7 +91,7 @@ def _sections() -> dict[str, Any]:
             "Effects",
             {
                 effect.name: optional(_section(f"{_capital(effect.name)}Effect", effect.quantities), effect.summary)
-                for effect in EFFECTS.values()
+                for effect in device_effects()
             },
         ),
         "reported": _section("Reported", declaration.REPORTED, reported),

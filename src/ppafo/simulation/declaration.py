@@ -14,6 +14,7 @@ from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
 from ppafo.errors import KindError, ScenarioError
 from ppafo.kinds import Kinds
 from ppafo.model.declaration import Quantity
+from ppafo.model.effects.bandwidth import EFFECT as BANDWIDTH
 from ppafo.simulation import supply_line
 
 LARGEST_SEED = 2**32 - 1
@@ -45,8 +46,7 @@ AT_REST = "atmosphere"
 
 SENSORS = (
     Quantity("delay", "s", "age of a measurement when the controller uses it", 0.0, 0.0, 1.0e6),
-    Quantity("angle_bandwidth", "Hz", "bandwidth of the angle sensor, 0 for an instant one", 0.0, 0.0, 1.0e6),
-    Quantity("pressure_bandwidth", "Hz", "bandwidth of the pressure sensors, 0 for instant ones", 0.0, 0.0, 1.0e6),
+    *BANDWIDTH.quantities,
     Quantity("angle_noise", "rad", "standard deviation of the measured angle", 0.0, 0.0, 10.0),
     Quantity("pressure_noise", "Pa_d", "standard deviation of the measured pressures", 0.0, 0.0, 1.0e8),
     Quantity("angle_resolution", "rad", "step of the measured angle", 0.0, 0.0, 10.0),

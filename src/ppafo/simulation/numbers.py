@@ -9,7 +9,7 @@ from typing import Any
 
 from ppafo.control.controllers import switching
 from ppafo.model.declaration import Quantity
-from ppafo.model.effects.catalog import EFFECTS
+from ppafo.model.effects.catalog import device_effects
 from ppafo.model.effects.kind import SECTION as EFFECT_SETTINGS
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.valves.catalog import VALVES
@@ -57,7 +57,7 @@ def device_numbers(device: Device) -> dict[str, Quantity]:
         for item in members(section, device.actuator.kind)
     }
     found |= {f"actuator.leak.{item.name}": item for item in ORIFICE}
-    found |= {f"{effect.section}.{item.name}": item for effect in EFFECTS.values() for item in effect.quantities}
+    found |= {f"{effect.section}.{item.name}": item for effect in device_effects() for item in effect.quantities}
     return found | {f"valve.{item.name}": item for item in (*ORIFICE, *VALVES[device.valve.kind].quantities)}
 
 

@@ -19,7 +19,7 @@ from ppafo.model.actuators.vane import KIND as VANE
 from ppafo.model.columns import Problem, at, first, over_runs, whole
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters
 from ppafo.model.regulator import SupplyLines
-from ppafo.model.sensors import SensorParameters, SensorRates
+from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
@@ -29,7 +29,6 @@ from ppafo.simulation.fixed_point import fixed_controller
 from ppafo.simulation.preparation import (
     is_slow_held,
     lines_at_start,
-    rates_of_sensors,
     state_at_start,
     state_with_volumes,
     step_counts,
@@ -66,7 +65,8 @@ class Pieces:
     """What any run is made of, scenario or walk; numbers in SI units, which may be arrays (runs,).
 
     Without a ``path`` the vane is free; without a ``controller`` the caller sets the command. ``thermal`` and
-    ``supply_lines`` None stand for gas that keeps its temperature and for constant supply pressures.
+    ``supply_lines`` None stand for gas that keeps its temperature and for constant supply pressures. ``sections`` hold
+    settings of effects beside those of the device, by section.
     """
 
     device: Device
@@ -80,7 +80,7 @@ class Pieces:
     thermal: Thermal | None
     supply_lines: SupplyLines | None
     signal_delay: Any = 0.0
-    sensor_rates: SensorRates | NoParameters = field(default_factory=NoParameters)
+    sections: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,8 +131,7 @@ def compose_run(pieces: Pieces, plant: PlantParameters, rule: StepRule, start: S
         needs_parts=steps.needs_parts,
         walk=walk,
         lines=initial_lines(plant, pieces.supply_lines),
-        sensor_rates=pieces.sensor_rates,
-        effects=effect_rows(pieces.device),
+        effects=effect_rows(pieces.device, pieces.sections),
     )
 
 
@@ -153,10 +152,9 @@ def _program(pieces: Pieces, steps: Steps, walk: Walk | None, has_delay: bool) -
         walks=walk is not None,
         takes_course=walk is not None and walk.course is not None,
         has_lines=pieces.supply_lines is not None,
-        slow_sensors=isinstance(pieces.sensor_rates, SensorRates),
         is_adaptive=bool(first(steps.needs_parts)),
         samples_inside=bool(first(steps.record_every % 1.0)),
-        effects=effects_of(pieces.device),
+        effects=effects_of(pieces.device, pieces.sections),
     )
 
 
@@ -189,7 +187,7 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         thermal=scenario.thermal,
         supply_lines=scenario.supply_lines,
         signal_delay=scenario.sensors.delay,
-        sensor_rates=sensor_rates(scenario),
+        sections=scenario.effect_sections,
     )
     run = compose_run(
         pieces, plant, lambda fed: scenario_steps(scenario, fed), lambda fed: initial_state(scenario, fed)
@@ -266,14 +264,6 @@ def sensor_parameters(scenario: Scenario) -> SensorParameters:
         pressure_quantum=sensors.pressure_quantum,
         seed=sensors.seed,
     )
-
-
-def sensor_rates(scenario: Scenario) -> SensorRates | NoParameters:
-    """How fast the sensors follow, where one has a bandwidth; bandwidths may be arrays (runs,)."""
-    sensors = scenario.sensors
-    if not any(first(bandwidth) > 0.0 for bandwidth in sensors.bandwidths):
-        return NoParameters()
-    return rates_of_sensors(sensors.angle_bandwidth, sensors.pressure_bandwidth)
 
 
 def controller_parameters(kind: ControllerKind, settings: Mapping[str, Any]) -> Any:

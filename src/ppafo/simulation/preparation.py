@@ -3,7 +3,6 @@
 Pure functions of one run, or of columns of runs: Python plans with them, and an exported library has them in C.
 """
 
-import math
 from typing import Any, NamedTuple
 
 from ppafo.engine.refinement import is_slow
@@ -11,7 +10,6 @@ from ppafo.model.chambers import chamber_mass
 from ppafo.model.columns import Number, choose, larger, rounded_up, smaller, truncated
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_volumes
 from ppafo.model.regulator import LineState, SupplyLines
-from ppafo.model.sensors import SensorRates
 from ppafo.model.thermal import wall_exchange
 from ppafo.parameters.device import Gas
 from ppafo.simulation.scenario import Thermal
@@ -99,9 +97,3 @@ def lines_at_start(plant: PlantParameters, lines: SupplyLines) -> LineState:
         mass_2=chamber_mass(plant.dorsiflexion_pressure, lines.volume_2, plant.gas_product),
         regulated_mass=0.0,
     )
-
-
-def rates_of_sensors(angle_bandwidth: float, pressure_bandwidth: float) -> SensorRates:
-    """How fast sensors with some bandwidths [Hz] follow."""
-    turn = 2.0 * math.pi
-    return SensorRates(angle=turn * angle_bandwidth, pressure=turn * pressure_bandwidth)

@@ -9,8 +9,8 @@ import numpy as np
 
 from ppafo.control.kind import PythonController
 from ppafo.engine.actuator_values import seen_with_torque
-from ppafo.engine.lane_control import SIGNALS
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, load_program, samples_in
+from ppafo.engine.links import shown_by
 from ppafo.engine.metering import group_of
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import Run
@@ -117,17 +117,21 @@ def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measu
     program, per_sample = batch.program, batch.clock.steps_per_sample
     rows = row_numbers(program.state_rows())
     plant, sensors, actuator = _group(batch, "plant"), _group(batch, "sensors"), program.actuator
+    groups = program.state_rows()
+    show = shown_by(program.effects, [_group(batch, effect.name) for effect in program.effects])
 
     def see(sample: int) -> Measurement:
         state = block.states[:, 0]
         if program.late_signals and sample > 0:
             angle, pressure_1, pressure_2 = block.late_signals(sample * per_sample)[:, 0]
-        elif program.slow_sensors:
-            angle, pressure_1, pressure_2 = (float(state[rows[f"sensor_state.{name}"]]) for name in SIGNALS)
         else:
             angle = float(state[rows["state.angle"]])
             masses = float(state[rows["state.mass_1"]]), float(state[rows["state.mass_2"]])
             pressure_1, pressure_2 = actuator.pressures(plant, angle, *masses)
+            if show is not None:
+                values = state.tolist()
+                states = {name: group_of(name, groups, values) for name in program.effect_states}
+                angle, pressure_1, pressure_2 = show(states, angle, pressure_1, pressure_2)
         if program.ideal_sensors:
             return Measurement(
                 angle=angle,

@@ -137,11 +137,6 @@ class Sensors:
         noise, steps = (self.angle_noise, self.pressure_noise), (self.angle_quantum, self.pressure_quantum)
         return self.delay, *noise, *steps, self.angle_bandwidth, self.pressure_bandwidth
 
-    @property
-    def bandwidths(self) -> tuple[float, float]:
-        """Bandwidths of the angle sensor and the pressure sensors [Hz], 0 for one that follows at once."""
-        return self.angle_bandwidth, self.pressure_bandwidth
-
 
 @dataclass(frozen=True, slots=True)
 class Control:
@@ -228,6 +223,11 @@ class Scenario:
             f"  controller  {self.control.label}\n"
             f"  duration    {self.duration:g} s, in steps of at most {self.time_step:g} s"
         )
+
+    @property
+    def effect_sections(self) -> dict[str, Any]:
+        """Settings of effects beside those of the device, by section."""
+        return {"sensors": self.sensors}
 
     @property
     def graph(self) -> Graph:

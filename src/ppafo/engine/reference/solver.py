@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from ppafo.engine.actuator_values import driving_torque_of
 from ppafo.engine.entries import with_arrays
 from ppafo.engine.lanes import samples_in
+from ppafo.engine.links import shown_by
 from ppafo.engine.loading import load_source
-from ppafo.engine.program import NoParameters
 from ppafo.engine.reference import vane_mode
 from ppafo.engine.reference.sampling import SAME_TIME, SampledControl, Signals, solve_segment
 from ppafo.engine.reference.source import (
@@ -20,8 +20,8 @@ from ppafo.engine.reference.source import (
     right_hand_side_source,
     unknowns_before_valve,
 )
-from ppafo.engine.rows import numbers, rebuild
-from ppafo.engine.run import Run, initial_sensors
+from ppafo.engine.rows import leaf_paths, numbers, rebuild
+from ppafo.engine.run import Run, states_at_start
 from ppafo.errors import SimulationError
 
 Floats = NDArray[np.float64]
@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 MASS_TOLERANCE = 1e-15
 TOLERANCES = (1e-11, 1e-10, *(MASS_TOLERANCE,) * 5)
 VALVE_TOLERANCE = 1e-11
-SIGNAL_TOLERANCES = (1e-10, 1e-4, 1e-4)
+STATE_TOLERANCE = 1e-10
 MAXIMUM_STEPS = 200_000
 
 
@@ -67,7 +67,6 @@ def load_right_hand_side(run: Run) -> RightHandSide:
         run.leak_orifice,
         run.valve,
         run.path,
-        run.sensor_rates,
         *run.effects,
     )
     parameters = np.array([number for group in groups for number in numbers(group)])
@@ -95,9 +94,10 @@ class _Solution:
     def __init__(self, run: Run, tolerance: float) -> None:
         self.run = run
         masses = [run.initial.mass_1, run.initial.mass_2] if run.program.is_thermal else []
-        shown = numbers(initial_sensors(run))[:3]
-        self.y = np.array([*numbers(run.initial), *masses, *shown, *numbers(run.program.valve.initial())])
+        stated = [number for state in states_at_start(run) for number in numbers(state)]
+        self.y = np.array([*numbers(run.initial), *masses, *stated, *numbers(run.program.valve.initial())])
         self.valve_from = unknowns_before_valve(run.program)
+        self.show = shown_by(run.program.effects, run.effects)
         self.command = 0.0
         self.way = self.rest_mode() if run.program.angle is None else 0.0
         if self.y[1] != 0.0 and run.program.angle is None:
@@ -132,13 +132,13 @@ class _Solution:
         roots.terminal = [True, True]
         roots.direction = [-1, -1]
         gas_count = gas_unknowns(self.run.program) - PLANT_UNKNOWNS
-        shown = SIGNAL_TOLERANCES if self.run.program.slow_sensors else ()
+        stated = (STATE_TOLERANCE,) * (self.valve_from - gas_unknowns(self.run.program))
         valve_count = self.y.size - self.valve_from
         free = self.run.program.angle is None
         return CVODE(
             slopes,
             rtol=tolerance,
-            atol=np.array(TOLERANCES + (MASS_TOLERANCE,) * gas_count + shown + (VALVE_TOLERANCE,) * valve_count),
+            atol=np.array(TOLERANCES + (MASS_TOLERANCE,) * gas_count + stated + (VALVE_TOLERANCE,) * valve_count),
             eventsfn=roots if free else None,
             num_events=2 if free else 0,
             max_num_steps=MAXIMUM_STEPS,
@@ -185,12 +185,14 @@ class _Solution:
         angle = self.y[0] if run.program.angle is None else run.program.angle.value(run.path, self.time)[0]
         pressure_1, pressure_2 = run.program.actuator.pressures(run.plant, angle, self.y[2], self.y[3])
         signals = float(angle), float(pressure_1), float(pressure_2)
-        rates = run.sensor_rates
-        if isinstance(rates, NoParameters):
+        if self.show is None:
             return signals
-        shown: Signals = tuple(self.y[self.valve_from - 3 : self.valve_from].tolist())
-        seen_angle = shown[0] if rates.angle > 0.0 else signals[0]
-        return (seen_angle, *(shown if rates.pressure > 0.0 else signals)[1:])
+        states, first = {}, gas_unknowns(run.program)
+        for name, row in run.program.effect_states.items():
+            count = len(leaf_paths(row, name))
+            states[name] = rebuild(row, self.y[first : first + count])
+            first += count
+        return self.show(states, *signals)
 
     def advance_to(self, end: float, next_sample: int) -> None:
         """Integrate to the next sample over all that happens on the way."""

@@ -15,8 +15,8 @@ from ppafo.engine.reference.derivative import (
 )
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import SourceCollector, woven
+from ppafo.model.effects.kind import Moment
 from ppafo.model.plant import ThermalParameters, chamber_pressures
-from ppafo.model.sensors import SensorRates
 
 PLANT_UNKNOWNS = 7
 
@@ -27,8 +27,8 @@ def gas_unknowns(program: Program) -> int:
 
 
 def unknowns_before_valve(program: Program) -> int:
-    """Unknowns before those of the valve: those of plant and gas, and what slow sensors show."""
-    return gas_unknowns(program) + (3 if program.slow_sensors else 0)
+    """Unknowns before those of the valve: those of plant and gas, and states of effects."""
+    return gas_unknowns(program) + sum(len(leaf_paths(row, name)) for name, row in program.effect_states.items())
 
 
 ARRAYS, NUMBERS = ("y", "slopes", "parameters"), ("t", "command", "way")
@@ -44,8 +44,7 @@ def parameter_groups(program: Program) -> dict[str, type]:
         "leak_orifice": ExactOrifice,
         "valve": program.valve.parameters,
         "path": NoParameters if program.angle is None else program.angle.parameters,
-        "sensor_rates": SensorRates if program.slow_sensors else NoParameters,
-        **program.effect_rows,
+        **{effect.name: effect.parameters for effect in program.effects},
     }
 
 
@@ -53,7 +52,7 @@ def right_hand_side_source(program: Program) -> str:
     """Source of the module whose ``fill(y, slopes, parameters, t, command, way)`` writes the slopes of all unknowns.
 
     The unknowns are angle, angular velocity, both masses, the three gas totals, the true masses of gas with an energy
-    balance, what slow sensors show of angle and pressures, and the state of the valve.
+    balance, the states of effects, and the state of the valve.
     """
     collector = SourceCollector(INLINE)
     link_program(program, collector)
@@ -64,7 +63,10 @@ def right_hand_side_source(program: Program) -> str:
             cells[path] = f"parameters[{len(cells)}]"
     valve_paths = leaf_paths(program.valve.state, "valve_state")
     cells |= {path: f"y[{unknowns_before_valve(program) + number}]" for number, path in enumerate(valve_paths)}
-    groups = parameter_groups(program) | {"valve_state": program.valve.state}
+    states = program.effect_states
+    state_paths = [path for name, row in states.items() for path in leaf_paths(row, name)]
+    cells |= {path: f"y[{gas_unknowns(program) + number}]" for number, path in enumerate(state_paths)}
+    groups = parameter_groups(program) | {"valve_state": program.valve.state} | states
     lines = [f"{name} = {row_expression(row, name, cells, add)}" for name, row in groups.items()]
     lines += [f"openings = {add(program.valve.instant)}(valve, valve_state, command)"]
     if program.angle is None:
@@ -87,12 +89,15 @@ def right_hand_side_source(program: Program) -> str:
         f"slopes[{unknowns_before_valve(program) + number}] = {path.replace('valve_state', 'moves', 1)}"
         for number, path in enumerate(valve_paths)
     ]
-    if program.slow_sensors:
-        truths = (("angle", "angle"), ("pressure", "pressure_1"), ("pressure", "pressure_2"))
-        lines += [
-            f"slopes[{place}] = sensor_rates.{sensor} * ({truth} - y[{place}])"
-            for place, (sensor, truth) in enumerate(truths, gas_unknowns(program))
-        ]
+    if program.stated:
+        seen = "angle, rate, pressure_1, pressure_2, gas.supplied, gas.vented, command"
+        lines.append(f"now = {add(Moment)}({seen})")
+    for name, kind in program.stated.items():
+        lines.append(f"{name}_state_moves = {add(kind.slopes)}({name}, {name}_state, now)")
+    lines += [
+        f"slopes[{place}] = {path.replace('.', '_moves.', 1)}"
+        for place, path in enumerate(state_paths, gas_unknowns(program))
+    ]
     fill = entry_text(
         "fill", dict.fromkeys(ARRAYS, ARRAY) | dict.fromkeys(NUMBERS, FLOAT), woven(lines, collector.needs)
     )

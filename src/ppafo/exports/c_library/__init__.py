@@ -18,6 +18,7 @@ from ppafo.exports.c_library.files import (
 )
 from ppafo.exports.c_library.preparation import following_text, links_of, preparation_of, relations_of, settings_of
 from ppafo.exports.c_library.program import Further, exported
+from ppafo.model.effects.catalog import ordered_effects
 from ppafo.parameters.device import Device
 from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import Graph
@@ -35,10 +36,9 @@ _ARRAYS = {
     "prepared->counts": "COUNTS",
 }
 """What the function from settings to the numbers of a run is handed, and how many there are of each."""
-_BANDWIDTHS = ("sensors_angle_bandwidth", "sensors_pressure_bandwidth")
 _FLAWS = (
     *("sensors_angle_noise", "sensors_pressure_noise", "sensors_angle_resolution", "sensors_pressure_resolution"),
-    *_BANDWIDTHS,
+    *("sensors_angle_bandwidth", "sensors_pressure_bandwidth"),
 )
 _FLAWS_OF_WALK = (
     *("sensors_force_noise", "sensors_force_resolution", "sensors_lost_share"),
@@ -67,7 +67,11 @@ def scenario_library(scenario: Scenario) -> Library:
     of_sensors = [
         (("sensors_delay",), program.program.late_signals),
         (_FLAWS, not program.program.ideal_sensors),
-        (_BANDWIDTHS, program.program.slow_sensors),
+        *(
+            ([c_identifier(f"{effect.section}.{name}") for name in effect.switch], effect in program.program.effects)
+            for effect in ordered_effects()
+            if effect.section == "sensors"
+        ),
     ]
     # Another program where samples lie between steps and did not, or the other way round.
     interval = "prepared->counts[COUNT_INTERVAL]"

@@ -10,14 +10,14 @@ from ppafo.engine.lane_rows import indent
 from ppafo.engine.program import LaneResult, LaneTiming, Program
 from ppafo.engine.replay import RECORDED_ANGLE, Segment
 from ppafo.engine.rows import leaf_paths, numbers, row_expression
-from ppafo.engine.run import NEVER_FAILED, initial_masses, sensors_at_start, whole_and_rest
+from ppafo.engine.run import NEVER_FAILED, initial_masses, moment_at_start, whole_and_rest
 from ppafo.engine.scheme.parts import Pace
 from ppafo.engine.source_text import Collector, woven
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
 from ppafo.exports.c_library.program import COUNTS
 from ppafo.model.actuators.kind import Range, mean_growth
 from ppafo.model.declaration import Quantity
-from ppafo.model.effects.catalog import ordered_effects
+from ppafo.model.effects.catalog import device_effects
 from ppafo.model.gas import specific_gas_constant
 from ppafo.model.plant import PlantParameters
 from ppafo.model.regulator import SupplyLines
@@ -37,7 +37,6 @@ from ppafo.simulation.numbers import HELD_ANGLE, TIMES, declared_numbers, links_
 from ppafo.simulation.preparation import (
     is_slow_held,
     lines_at_start,
-    rates_of_sensors,
     state_at_start,
     state_with_volumes,
     step_counts,
@@ -238,6 +237,10 @@ class Writing:
             yield f"controller_state = {self.constant(program.controller.initial, 'controller_state')}"
         if program.has_lines:
             yield f"line_state = {add(lines_at_start)}(plant, lines)"
+        if program.stated:
+            yield f"at_start = {add(moment_at_start)}(plant, state)"
+        for name, kind in program.stated.items():
+            yield f"{name}_state = {add(kind.start)}({name}, at_start)"
 
 
 SAID = {
@@ -322,7 +325,7 @@ def used_numbers(device: Device, declared: Mapping[str, Quantity]) -> dict[str, 
     is_on = effects_of(device)
     unused |= {
         f"{effect.section}.{item.name}"
-        for effect in ordered_effects()
+        for effect in device_effects()
         if effect not in is_on
         for item in effect.quantities
     }
@@ -365,9 +368,6 @@ def _pieces(scenario: Scenario, writing: Writing) -> Iterator[str]:
     elif isinstance(scenario.motion, PrescribedMotion):
         held = {"level": "motion_angle"} if program.is_held else {}
         yield f"path = {_kind(writing, 'motion.profile', PROFILES[scenario.motion.profile.kind], held)}"
-    if program.slow_sensors:
-        rates = "sensors_angle_bandwidth, sensors_pressure_bandwidth"
-        yield f"sensor_rates = {writing.add(rates_of_sensors)}({rates})"
     yield from writing.gas()
 
 
@@ -402,5 +402,3 @@ def _start(scenario: Scenario, writing: Writing) -> Iterator[str]:
     else:
         yield f"state = {add(state_at_start)}(plant, {', '.join(moved)}, {given})"
     yield from writing.start()
-    if program.slow_sensors:
-        yield f"sensor_state = {add(sensors_at_start)}(plant, state)"

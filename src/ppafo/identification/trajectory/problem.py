@@ -10,7 +10,7 @@ import numpy as np
 from ppafo.errors import IdentificationError, first_twice, nearest_name
 from ppafo.identification.source import Use, double_use
 from ppafo.model.declaration import Quantity
-from ppafo.model.effects.catalog import EFFECTS, find_effects
+from ppafo.model.effects.catalog import device_effects, find_effects
 from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.declaration import AREA_FORM, SECTIONS, SONIC_FORM
 from ppafo.parameters.device import Device, Orifice
@@ -174,7 +174,7 @@ def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     """Return every number that can be fitted in this scenario, with its declaration, by path."""
     device = scenario.device
     found = {f"{section}.{item.name}": item for section in _DEVICE_SECTIONS for item in SECTIONS[section]}
-    found |= {f"{effect.section}.{item.name}": item for effect in EFFECTS.values() for item in effect.quantities}
+    found |= {f"{effect.section}.{item.name}": item for effect in device_effects() for item in effect.quantities}
     orifices = device.actuator.leak, device.valve.orifice
     leak, opening = (AREA_FORM if isinstance(orifice, Orifice) else SONIC_FORM for orifice in orifices)
     found |= {f"actuator.leak.{item.name}": item for item in leak}

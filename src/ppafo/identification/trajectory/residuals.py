@@ -289,7 +289,7 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
         valve=valve_parameters(base.program.valve, settings),
         command_delay=delay,
         lines=initial_lines(plant, scenario.supply_lines),
-        effects=effect_rows(device),
+        effects=effect_rows(device, scenario.effect_sections),
     )
 
 

@@ -1,14 +1,13 @@
 """The effects that a device can have. To add one: a module beside this file and one line here, or an entry point."""
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable
 
 from ppafo.errors import KindError, one_line
 from ppafo.kinds import Kinds
-from ppafo.model.effects import silencer
+from ppafo.model.effects import bandwidth, ice, silencer
 from ppafo.model.effects.kind import SECTION, Effect, effect_problem
 
-_OWN = (silencer.EFFECT,)
+_OWN = (silencer.EFFECT, ice.EFFECT, bandwidth.EFFECT)
 EFFECTS: Kinds[Effect] = Kinds("ppafo.effects", "effect", Effect, _OWN)
 
 
@@ -34,6 +33,6 @@ def ordered_effects() -> tuple[Effect, ...]:
     return (*_OWN, *others)
 
 
-def effects_that_are_on(settings: Mapping[str, Mapping[str, Any]]) -> tuple[Effect, ...]:
-    """Return the effects that are on with some settings [SI] by name, in the order in which they act."""
-    return tuple(effect for effect in ordered_effects() if effect.is_on(settings.get(effect.name, effect.defaults())))
+def device_effects() -> tuple[Effect, ...]:
+    """Return the effects whose settings stand in parameter sets, in the order in which they act."""
+    return tuple(effect for effect in ordered_effects() if effect.is_of_device)

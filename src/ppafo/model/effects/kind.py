@@ -5,15 +5,50 @@ know an effect by this value alone; none of them names one.
 """
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from ppafo.errors import ProgramError
 from ppafo.model.declaration import Quantity
 
 SECTION = "effects"
 """Section of a parameter set, and begin of the paths, that hold the settings of effects."""
+
+
+class Moment(NamedTuple):
+    """What an effect with a state sees of the plant: angle [rad], its rate [rad/s], absolute pressures [Pa].
+
+    Flows [kg/s] from the supplies and to the atmosphere, and the command that the valve has [-]. At both ends of a step
+    that is done the flows are their means over it.
+    """
+
+    angle: float
+    angular_velocity: float
+    pressure_1: float
+    pressure_2: float
+    supplied_flow: float
+    vented_flow: float
+    command: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class State:
+    """Numbers of an effect that change: ``row``, a NamedTuple of floats, and how it changes.
+
+    ``start(row, now)`` makes it of the effect's row and the plant at the beginning. ``advance(row, state, before,
+    after, step)`` brings it over a step [s] between two instants. ``slopes(row, state, now)`` are its rates in
+    continuous time: the reference solver integrates them, and the second stage of a step has ``state + step * slopes``
+    where a law acts on the gas. ``tolerances`` has for each number the error of one step that is allowed, for which
+    ``advance`` less ``state + step * slopes`` stands; without any, as where ``advance`` is exact, the state shortens no
+    step.
+    """
+
+    row: type
+    start: Callable[..., Any]
+    advance: Callable[..., Any]
+    slopes: Callable[..., Any]
+    tolerances: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,6 +66,8 @@ class Effect:
     and its row by the effect's name as a further parameter, which whoever calls the place then hands on. A law that
     calls its own place gets the law of the effect before, or the place as it is without effects.
 
+    ``state`` says how the effect's own numbers change, which laws ask for as ``NAME_state``; None where it has none.
+
     ``source`` says where law and numbers are from, ``equation`` is its line of the equations; ``symbols`` are lines of
     the nomenclature: symbol, name in the code, unit, meaning.
     """
@@ -45,11 +82,28 @@ class Effect:
     source: str = ""
     equation: str = ""
     symbols: tuple[tuple[str, str, str, str], ...] = ()
+    state: State | None = None
+    section_of_files: str = ""
 
     @property
     def section(self) -> str:
-        """Where its settings stand in a parameter set, and what their paths begin with."""
-        return f"{SECTION}.{self.name}"
+        """Where its settings stand in files, and what their paths begin with: a parameter set unless it says so."""
+        return self.section_of_files or f"{SECTION}.{self.name}"
+
+    @property
+    def is_of_device(self) -> bool:
+        """Whether its settings stand in a parameter set, beside the numbers of the device."""
+        return not self.section_of_files
+
+    @property
+    def state_name(self) -> str:
+        """Name of its state among the rows of a program, and the parameter by which laws ask for it."""
+        return f"{self.name}_state"
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """Names of the rows that its laws may ask for."""
+        return (self.name,) if self.state is None else (self.name, self.state_name)
 
     def defaults(self) -> dict[str, float]:
         """Settings [SI] of a device that says nothing of the effect."""
@@ -79,22 +133,27 @@ def equation_lines(effect: Effect) -> list[str]:
 
 def effect_problem(effect: Effect) -> str:
     """Return what is wrong with an effect as a value, in words; empty where nothing is."""
-    lowest = {item.name: item.minimum for item in effect.quantities}
+    return next(_problems(effect), "")
+
+
+def _problems(effect: Effect) -> Iterator[str]:
     if not effect.name.isidentifier():
-        return "its name is the parameter by which laws ask for its row, and must be an identifier"
-    missing = [item.name for item in effect.quantities if item.default is None]
-    if missing:
-        return f"'{missing[0]}' has no default: a device that says nothing of an effect must be without it"
-    unknown = [name for name in effect.switch if lowest.get(name) != 0.0]
-    if unknown or not effect.switch:
-        return f"switch names '{unknown[0]}', which is no quantity with a minimum of 0" if unknown else "has no switch"
+        yield "its name is the parameter by which laws ask for its row, and must be an identifier"
+    for item in effect.quantities:
+        if item.default is None:
+            yield f"'{item.name}' has no default: a device that says nothing of an effect must be without it"
+    lowest = {item.name: item.minimum for item in effect.quantities}
+    if not effect.switch:
+        yield "has no switch"
+    for name in effect.switch:
+        if lowest.get(name) != 0.0:
+            yield f"switch names '{name}', which is no quantity with a minimum of 0"
     if effect.is_on(effect.defaults()):
-        return "its defaults leave it on: a device that says nothing of an effect must be without it"
+        yield "its defaults leave it on: a device that says nothing of an effect must be without it"
     for place, law in effect.laws.items():
-        given, taken = _parameters(place), [name for name in _parameters(law) if name != effect.name]
+        given, taken = _parameters(place), [name for name in _parameters(law) if name not in effect.rows]
         if taken != given:
-            return f"{law.__name__}({', '.join(taken)}) must take ({', '.join(given)}), as {place.__name__} does"
-    return ""
+            yield f"{law.__name__}({', '.join(taken)}) must take ({', '.join(given)}), as {place.__name__} does"
 
 
 def laws_in_order(effects: Sequence[Effect]) -> dict[Any, Any]:

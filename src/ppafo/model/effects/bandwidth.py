@@ -1,0 +1,87 @@
+"""Sensors that follow with a bandwidth: what a controller sees lags behind, each signal by a first order."""
+
+import math
+from typing import Any, NamedTuple
+
+from ppafo.model.declaration import Quantity
+from ppafo.model.effects.kind import Effect, Moment, State
+from ppafo.model.places import shown_signals
+from ppafo.model.sensors import follow
+
+
+class SensorRates(NamedTuple):
+    """Rates [1/s] at which the angle sensor and the pressure sensors follow, 2 pi times the bandwidth; 0: at once."""
+
+    angle: float
+    pressure: float
+
+
+class SensorState(NamedTuple):
+    """Angle [rad] and absolute pressures [Pa] as the sensors show them."""
+
+    angle: float
+    pressure_1: float
+    pressure_2: float
+
+
+def prepare(settings: Any, _device: Any) -> SensorRates:
+    """How fast sensors with some bandwidths [Hz] follow."""
+    turn = 2.0 * math.pi
+    return SensorRates(angle=turn * settings["angle_bandwidth"], pressure=turn * settings["pressure_bandwidth"])
+
+
+def as_they_show(
+    angle: float, pressure_1: float, pressure_2: float, bandwidth: SensorRates, bandwidth_state: SensorState
+) -> tuple[float, float, float]:
+    """Angle [rad] and absolute pressures [Pa] that the sensors show; a sensor without a bandwidth shows the truth."""
+    follows_angle, follows_pressure = bandwidth.angle > 0.0, bandwidth.pressure > 0.0
+    true_angle, true_1, true_2 = shown_signals(angle, pressure_1, pressure_2)
+    return (
+        bandwidth_state.angle if follows_angle else true_angle,
+        bandwidth_state.pressure_1 if follows_pressure else true_1,
+        bandwidth_state.pressure_2 if follows_pressure else true_2,
+    )
+
+
+def start(_bandwidth: SensorRates, now: Moment) -> SensorState:
+    """Sensors that show what is true."""
+    return SensorState(angle=now.angle, pressure_1=now.pressure_1, pressure_2=now.pressure_2)
+
+
+def advance(
+    bandwidth: SensorRates, bandwidth_state: SensorState, before: Moment, after: Moment, step: float
+) -> SensorState:
+    """What the sensors show after a step [s] in which the truth runs straight; exact."""
+    pressure = bandwidth.pressure
+    return SensorState(
+        angle=follow(bandwidth.angle, step, bandwidth_state.angle, before.angle, after.angle),
+        pressure_1=follow(pressure, step, bandwidth_state.pressure_1, before.pressure_1, after.pressure_1),
+        pressure_2=follow(pressure, step, bandwidth_state.pressure_2, before.pressure_2, after.pressure_2),
+    )
+
+
+def slopes(bandwidth: SensorRates, bandwidth_state: SensorState, now: Moment) -> SensorState:
+    """Rates of what the sensors show [rad/s, Pa/s]."""
+    return SensorState(
+        angle=bandwidth.angle * (now.angle - bandwidth_state.angle),
+        pressure_1=bandwidth.pressure * (now.pressure_1 - bandwidth_state.pressure_1),
+        pressure_2=bandwidth.pressure * (now.pressure_2 - bandwidth_state.pressure_2),
+    )
+
+
+EFFECT = Effect(
+    name="bandwidth",
+    summary="Sensors that follow by a first order.",
+    quantities=(
+        Quantity("angle_bandwidth", "Hz", "bandwidth of the angle sensor, 0 for an instant one", 0.0, 0.0, 1.0e6),
+        Quantity("pressure_bandwidth", "Hz", "bandwidth of the pressure sensors, 0 for instant ones", 0.0, 0.0, 1.0e6),
+    ),
+    parameters=SensorRates,
+    prepare=prepare,
+    switch=("angle_bandwidth", "pressure_bandwidth"),
+    laws={shown_signals: as_they_show},
+    source="a first-order lag, exact between two instants",
+    equation="dy/dt = 2 pi f (x - y)",
+    state=State(row=SensorState, start=start, advance=advance, slopes=slopes),
+    section_of_files="sensors",
+)

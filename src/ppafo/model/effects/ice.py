@@ -1,0 +1,69 @@
+"""Ice at the exhaust of the valve: cold gas lets moisture freeze there, which narrows the way and melts again."""
+
+from typing import Any, NamedTuple
+
+from ppafo.model.declaration import Quantity
+from ppafo.model.effects.kind import Effect, Moment, State
+from ppafo.model.places import way_out
+from ppafo.model.sensors import decay_factors
+
+
+class Ice(NamedTuple):
+    """Blockage per gas that leaves [1/kg], and the rate at which it melts [1/s]."""
+
+    blockage_per_gas: float
+    melting: float
+
+
+class IceState(NamedTuple):
+    """Blockage [-]: the way is 1 / (1 + blockage) of what it was."""
+
+    blockage: float
+
+
+def prepare(settings: Any, _device: Any) -> Ice:
+    """How ice grows and melts."""
+    return Ice(blockage_per_gas=settings["blockage_per_gas"], melting=1.0 / settings["melting_time"])
+
+
+def narrowed(conductance: float, ice_state: IceState) -> float:
+    """Conductance [kg/(s Pa)] of the way out with ice in it; ``C / (1 + s)``."""
+    return way_out(conductance / (1.0 + max(ice_state.blockage, 0.0)))
+
+
+def start(_ice: Ice, _now: Moment) -> IceState:
+    """No ice."""
+    return IceState(0.0)
+
+
+def advance(ice: Ice, ice_state: IceState, _before: Moment, after: Moment, step: float) -> IceState:
+    """Blockage [-] after a step [s] with the mean flow in it: ``ds/dt = g m' - s / tau``, solved exactly."""
+    kept, mean = decay_factors(ice.melting, step)
+    return IceState(kept * ice_state.blockage + step * mean * ice.blockage_per_gas * max(after.vented_flow, 0.0))
+
+
+def slopes(ice: Ice, ice_state: IceState, now: Moment) -> IceState:
+    """Rate of the blockage [1/s]."""
+    return IceState(ice.blockage_per_gas * max(now.vented_flow, 0.0) - ice.melting * ice_state.blockage)
+
+
+EFFECT = Effect(
+    name="ice",
+    summary="Ice at the exhaust of the valve, which grows with the gas that leaves and melts.",
+    quantities=(
+        Quantity("blockage_per_gas", "1/kg", "blockage per gas that leaves, 0 for none", 0.0, 0.0, 1.0e6),
+        Quantity("melting_time", "s", "time constant with which it melts", 30.0, 1.0e-3, 1.0e6),
+    ),
+    parameters=Ice,
+    prepare=prepare,
+    switch=("blockage_per_gas",),
+    laws={way_out: narrowed},
+    source="assumed: the simplest balance of growth and melting, to be fitted to a valve",
+    equation="C = C_v / (1 + s), ds/dt = g m'_out - s / tau",
+    symbols=(
+        ("g", "blockage_per_gas", "1/kg", "blockage of the exhaust by ice per gas that leaves"),
+        ("1/tau", "melting", "1/s", "rate at which ice at the exhaust melts"),
+        ("s", "blockage", "-", "blockage of the exhaust by ice"),
+    ),
+    state=State(row=IceState, start=start, advance=advance, slopes=slopes, tolerances=(1.0e-4,)),
+)

@@ -1,0 +1,123 @@
+"""An effect whose state acts back on the gas keeps the order of the step; its error bounds steps, and it can fail."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import pytest
+
+from ppafo.engine.reference.agreement import compare_with_reference
+from ppafo.engine.reference.solver import solve_reference
+from ppafo.model.declaration import Quantity
+from ppafo.model.effects.catalog import EFFECTS
+from ppafo.model.effects.kind import Effect, Moment, State
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.simulate import simulate
+
+ICE = ("effects.ice.blockage_per_gas=3e4 1/kg", "effects.ice.melting_time=30 ms")
+VENTING = (
+    *("controller.kind=constant", "controller.command=-0.5", "controller.rate=125 Hz", "initial.pressure_1=40 psi_g"),
+    *("motion.angle=130 deg", "run.duration=0.2 s", "run.output_interval=4 ms"),
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "texts"),
+    [
+        ("step-response", ICE),
+        ("step-response", (*ICE, "effects.silencer.sonic_conductance=1e-8 m^3/(s Pa)")),
+        ("torque-task-solenoid", (*ICE, "motion.kind=free", "run.duration=0.5 s")),
+        (
+            "step-response",
+            (
+                *("gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)", *ICE),
+                *("gas_model.wall_area_per_volume=100 1/m", "run.duration=0.3 s"),
+            ),
+        ),
+    ],
+)
+def test_ice_in_the_lanes_is_that_of_the_reference_solver(name: str, texts: tuple[str, ...]) -> None:
+    agreement = compare_with_reference(plan_run(load_scenario(name, texts)))
+    assert agreement.angle < 2e-4
+    assert agreement.worst_pressure < 1e-3
+
+
+def test_a_state_that_acts_on_the_gas_leaves_the_step_its_second_order() -> None:
+    reference, errors = None, []
+    for step in ("2 ms", "0.25 ms"):
+        run = plan_run(load_scenario("torque-task-proportional", (*VENTING, *ICE, f"run.step={step}")))
+        whole = replace(run, needs_parts=False)
+        reference = reference or solve_reference(whole)
+        errors.append(compare_with_reference(whole, reference).pressure_1_rms)
+    assert errors[0] / errors[1] > 0.8 * 8**2
+
+
+def test_the_error_of_a_state_shortens_steps() -> None:
+    run = plan_run(
+        load_scenario("step-response", ("effects.ice.blockage_per_gas=1e6 1/kg", "effects.ice.melting_time=3 ms"))
+    )
+    (ice,) = run.program.effects
+    assert ice.state is not None
+    reference, errors = solve_reference(run), []
+    for tolerances in ((), (1e-6,)):
+        effect = replace(ice, state=replace(ice.state, tolerances=tolerances))
+        own = replace(run, program=replace(run.program, effects=(effect,)))
+        errors.append(compare_with_reference(own, reference).worst_pressure)
+    assert errors[1] < 0.5 * errors[0]
+
+
+class Runaway(NamedTuple):
+    """A rate [1/s]."""
+
+    rate: float
+
+
+class Amount(NamedTuple):
+    """What grows [-]."""
+
+    amount: float
+
+
+def prepared(settings: Any, _device: Any) -> Runaway:
+    """The rate."""
+    return Runaway(settings["rate"])
+
+
+def started(_runaway: Runaway, _now: Moment) -> Amount:
+    """One."""
+    return Amount(1.0)
+
+
+def advanced(runaway: Runaway, runaway_state: Amount, _before: Moment, _after: Moment, step: float) -> Amount:
+    """More than any float in a few steps."""
+    grown = runaway_state.amount * (1.0 + step * runaway.rate)
+    return Amount(grown * grown * grown)
+
+
+def grows(runaway: Runaway, runaway_state: Amount, _now: Moment) -> Amount:
+    """Its rate [1/s]."""
+    return Amount(runaway.rate * runaway_state.amount)
+
+
+@pytest.fixture
+def _runaway() -> Iterator[None]:
+    EFFECTS["runaway"] = Effect(
+        name="runaway",
+        summary="A state that leaves what is possible.",
+        quantities=(Quantity("rate", "1/s", "rate", 0.0, 0.0, 1e6),),
+        parameters=Runaway,
+        prepare=prepared,
+        switch=("rate",),
+        laws={},
+        state=State(row=Amount, start=started, advance=advanced, slopes=grows),
+    )
+    yield
+    del EFFECTS["runaway"]
+
+
+@pytest.mark.usefixtures("_runaway")
+def test_a_state_that_leaves_what_is_possible_ends_the_run_with_a_status() -> None:
+    result = simulate(load_scenario("step-response", ["effects.runaway.rate=1e5 1/s"]))
+    assert not result.status.is_completed
+    assert "diverged" in str(result.status)
