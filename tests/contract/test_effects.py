@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ppafo.exports.fmu.binaries import host_platform
 
 import ppafo
 from ppafo.cli.main import main
@@ -20,7 +19,7 @@ from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
 from ppafo.exports.c_library import c_library, library_of
 from ppafo.exports.c_library.files import c_identifier
-from ppafo.exports.fmu import closed_loop, functional_unit
+from ppafo.exports.fmu import closed_loop, functional_unit, host_platform
 from ppafo.exports.wasm import module_of
 from ppafo.identification.trajectory.problem import declaration_of
 from ppafo.identification.trajectory.problem import with_numbers as with_fitted
