@@ -12,7 +12,7 @@ from ppafo.engine.lanes import BatchResult, Floats
 from ppafo.engine.program import LaneResult
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run
 from ppafo.gait.opensim_names import opensim_recording
-from ppafo.metrics import Metric
+from ppafo.metrics import METRICS, Metric, evaluate
 from ppafo.metrics.metric import REQUEST, STEADY, MetricKind
 from ppafo.signals import Recording
 from ppafo.simulation.result import Status
@@ -106,7 +106,9 @@ def measured(
     """Recording and metrics of a walk from its rows (samples,) by path, at these times [s]."""
     check_no_bottle(scenario)
     result = _walk_result(scenario, run, time, record, Status("completed"), None)
-    return result.recording, result.metrics
+    of_recording = evaluate(result.recording)
+    offered = {name: metric for name, metric in of_recording.items() if not lacks(scenario, METRICS[name])}
+    return result.recording, {**offered, **result.metrics}
 
 
 def lacks(scenario: Scenario, kind: MetricKind) -> str:

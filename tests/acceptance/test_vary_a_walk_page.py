@@ -1,0 +1,91 @@
+"""What the page on varying walks shows is found, and each point of a study is the single walk of its settings."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ppafo
+from ppafo.loading import load_scenario
+from ppafo.questions.find.solve import find
+from ppafo.questions.montecarlo.solve import monte_carlo
+from ppafo.questions.tune.file import load_tuning
+from ppafo.questions.tune.problem import Effort
+from ppafo.questions.tune.solve import tune
+from ppafo.simulation.ensemble import run_ensemble
+from ppafo.studies.configurations import with_overrides
+from ppafo.studies.loading import load_study
+from ppafo.walking import walk
+
+PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "vary-a-walk.md").read_text(encoding="utf-8")
+
+
+def test_the_pressure_of_the_page_lifts_the_foot_as_the_walk_alone_says() -> None:
+    given = ["run.duration=20 s"]
+    found = find(
+        "proportional", "supply.dorsiflexion_pressure=20..48 psi_g", "toe_clearance >= -18 mm", False, 16, given
+    )
+    assert found.value is not None
+    shown = re.search(r"dorsiflexion_pressure = ([\d.]+) psi_g", PAGE)
+    assert shown is not None
+    assert (found.value - 101325.0) / 6894.757 == pytest.approx(float(shown[1]), abs=1.0e-3)
+    alone = walk("proportional", overrides=[*given, f"supply.dorsiflexion_pressure={found.value!r} Pa_a"])
+    assert alone.metrics["toe_clearance"].value == pytest.approx(found.metric_at(found.value), rel=1.0e-12)
+
+
+def test_a_point_of_the_sweep_is_the_single_walk() -> None:
+    study = load_study("gas-of-a-stride")
+    (axis,) = study.axes
+    assert [item.name for item in study.configurations] == ["solenoid", "proportional"]
+    level = axis.values[3]
+    for item in study.configurations:
+        columns = {axis.path: np.array([level])}
+        found = run_ensemble(item.scenario, columns, study.outputs.metrics)
+        alone = walk(item.scenario.name, overrides=["run.duration=20 s", f"{axis.path}={level!r} Pa_a"])
+        for name in study.outputs.metrics:
+            assert found.metrics[name][0] == pytest.approx(alone.metrics[name].value, rel=1.0e-12), name
+
+
+def test_a_person_of_a_study_is_the_one_of_that_number() -> None:
+    base = load_study("wearers").configurations[0].scenario
+    found = run_ensemble(base, {"wearer.person": np.array([0.0, 17.0])}, ["toe_clearance", "gas"])
+    for row, person in enumerate((0, 17)):
+        alone = walk("proportional", overrides=["run.duration=10 s", f"wearer.person={person}"])
+        for name in ("toe_clearance", "gas"):
+            assert found.metrics[name][row] == pytest.approx(alone.metrics[name].value, rel=1.0e-12)
+    assert np.ptp(found.metrics["gas"]) > 0.01 * found.metrics["gas"][0]
+
+
+def test_the_probability_over_wearers_is_that_of_the_draws_below_the_limit() -> None:
+    found = monte_carlo("wearers", "toe_clearance", "probability above -18 mm", "0.5", first_draws=64, draws=64)
+    above = found.outcomes.metrics["toe_clearance"] > -0.018
+    assert found.last.interval.value == pytest.approx(above.mean(), abs=0.02)
+    assert 0.3 < above.mean() < 0.9
+
+
+def test_the_push_off_is_tuned_for_the_bad_end_of_people() -> None:
+    problem = load_tuning("push-off")
+    assert problem.spread is not None
+    assert (problem.spread.fraction, problem.spread.study) == (0.9, "wearers")
+    quick = replace(problem, spread=replace(problem.spread, draws=4), effort=Effort(1, 2, 2, 1))
+    tuned = tune(quick)
+    alone = walk(with_overrides(problem.scenario, problem.lines(tuned.after.gains)))
+    assert tuned.after.result.metrics["push_off_work"].value == alone.metrics["push_off_work"].value
+
+
+def test_the_python_of_the_page_runs() -> None:
+    (text,) = re.findall(r"^```python\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
+    made: dict[str, object] = {}
+    exec(text, made)
+    assert isinstance(made["found"].metrics["gas"], np.ndarray)  # type: ignore[attr-defined]
+
+
+def test_simulate_and_compare_take_a_walk() -> None:
+    scenario = load_scenario("proportional", ["run.duration=8 s"])
+    result = ppafo.simulate(scenario)
+    alone = walk(scenario)
+    assert result.metrics["gas"].value == alone.metrics["gas"].value
+    assert {"gas_supplied", "largest_pressure"} <= set(result.metrics)
+    assert "rms_error" not in result.metrics
