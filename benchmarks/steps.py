@@ -81,7 +81,7 @@ def steps_of_run(scenario: str, folder: Path) -> list[dict[str, Any]]:
     step("figure", lambda: load("ppafo.answers.recording_figure")[0].figure_files(result.plot()))
     answer = command._answer(result, None)
     drawn = {command.FIGURE: state["figure"][f"{command.FIGURE}.svg"]}
-    step("page, the part that simulates included", lambda: load("ppafo.answers.page")[0].page_of(answer, drawn))
+    step("page, the part that simulates included", lambda: load("ppafo.answers.writing")[0].page_of(answer, drawn))
     step("files", lambda: result.save(folder, {**state["figure"], "report.html": state[found[-1]["step"]]}))
     return found
 

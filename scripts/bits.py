@@ -32,8 +32,19 @@ from ppafo.engine.lanes import Batch, run_batch
 from ppafo.engine.loading import BACKEND_VARIABLE, NUMBA
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import SimulationError
-from ppafo.questions.bits.runs import Runner, digest, drawn_batch, failures, hashes_of, names, plain_batch
-from ppafo.questions.bits.solve import GOLDEN, Hashes, golden_hashes, new_golden_hashes
+from ppafo.questions.bits.solve import (
+    GOLDEN,
+    Hashes,
+    Runner,
+    digest,
+    drawn_batch,
+    failures,
+    golden_hashes,
+    hashes_of,
+    names,
+    new_golden_hashes,
+    plain_batch,
+)
 from ppafo.translation.c99 import FLAGS, program_source, translated
 from ppafo.translation.native import build, compiler, run_native
 from scripts.other_machines import MACHINES, on_other_machine

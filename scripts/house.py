@@ -4,7 +4,8 @@
     python scripts/house.py path/to/src/ppafo    another one, such as that of an older commit
 
 A room is a folder of the package. Lines are all lines of Python. Imports under TYPE_CHECKING and inside functions count
-as others do. A circle is a set of modules that import each other. The package itself, which names what is public, is
+as others do, and so does a module that is named in a text, alone or as ``module:name``, because it is imported by that
+name later. A circle is a set of modules that import each other. The package itself, which names what is public, is
 left out of circles; which modules import it is counted apart.
 """
 
@@ -57,6 +58,11 @@ def _imported(path: Path, names: Mapping[str, Path]) -> set[str]:
             dotted = {f"{node.module}.{alias.name}" for alias in node.names}
             inside = dotted & names.keys()
             found |= inside | ({node.module} if dotted - inside else set())
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            # A package that is named alone may be where files of data lie.
+            named, is_of_module, _ = node.value.partition(":")
+            if "." in named and named in names and (is_of_module or names[named].stem != "__init__"):
+                found.add(named)
     return found
 
 

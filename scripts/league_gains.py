@@ -28,9 +28,9 @@ from ppafo.engine.lanes import Floats, run_batch
 from ppafo.engine.run import NEVER_FAILED, Run, batches_of
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.model.plant import chamber_pressures
-from ppafo.questions.league.draws import draw_devices, draw_factors, draw_seeds, with_noise
+from ppafo.questions.league.standing import draw_devices, draw_factors, draw_seeds, with_noise
 from ppafo.questions.tune.problem import Effort
-from ppafo.questions.tune.search import search
+from ppafo.questions.tune.solve import search
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import controller_parameters
 from ppafo.simulation.sampled import state_row_numbers
@@ -65,7 +65,7 @@ DEVICE_SEED = 2
 DEVICES = 8
 PERIOD = 1.0e-3
 EFFORT = Effort(starts=1, generations=16, candidates_per_gain=8, seed=1)
-WALKING_EFFORT = replace(EFFORT, generations=80)
+WALKING_EFFORT = EFFORT.model_copy(update={"generations": 80})
 
 SLOW_VALVE = (
     "valve.spool_frequency=20 Hz",

@@ -34,7 +34,7 @@ from ppafo.exports.wasm.description import description_of
 from ppafo.live.content import page_content, program_content
 from ppafo.loading import load_scenario
 from ppafo.parameters.graph import ATMOSPHERE_PATH, counts_from
-from ppafo.questions.sweep.chunks import drawn_values, varied_columns
+from ppafo.questions.sweep.manifest import drawn_values, varied_columns
 from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import plan_ensemble
 from ppafo.simulation.loading import list_scenarios

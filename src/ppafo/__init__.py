@@ -38,27 +38,36 @@ if TYPE_CHECKING:
     from ppafo.parameters.device import Device
     from ppafo.parameters.parts import Catalogue, Part, load_catalogue
     from ppafo.questions.bits.solve import bits
-    from ppafo.questions.compare.solve import Comparison, compare
-    from ppafo.questions.design.file import load_design
-    from ppafo.questions.design.solve import Design, design
-    from ppafo.questions.endurance.solve import Endurance, endurance, endurance_of_walk
+    from ppafo.questions.compare.answer import Comparison
+    from ppafo.questions.compare.solve import compare
+    from ppafo.questions.design.answer import Design
+    from ppafo.questions.design.problem import load_design
+    from ppafo.questions.design.solve import design
+    from ppafo.questions.endurance.answer import Endurance
+    from ppafo.questions.endurance.solve import endurance, endurance_of_walk
     from ppafo.questions.find.solve import Found, find
-    from ppafo.questions.identify.solve import Identification, identify
-    from ppafo.questions.league.solve import League, league
-    from ppafo.questions.linearise.solve import LinearModel, linearise
-    from ppafo.questions.montecarlo.estimate import MonteCarlo
-    from ppafo.questions.montecarlo.solve import monte_carlo
+    from ppafo.questions.identify.answer import Identification
+    from ppafo.questions.identify.solve import identify
+    from ppafo.questions.league.answer import League
+    from ppafo.questions.league.solve import league
+    from ppafo.questions.linearise.answer import LinearModel
+    from ppafo.questions.linearise.solve import linearise
+    from ppafo.questions.montecarlo.solve import MonteCarlo, monte_carlo
     from ppafo.questions.parts.solve import Parts, parts
-    from ppafo.questions.reproduce.solve import Reproduction, reproduce
-    from ppafo.questions.sensitivity.analyse import Sensitivity
-    from ppafo.questions.sensitivity.solve import sensitivity
-    from ppafo.questions.size.file import load_sizing
-    from ppafo.questions.size.solve import Sizing, size
-    from ppafo.questions.sweep.results import StudyResults, load_study_results
+    from ppafo.questions.reproduce.answer import Reproduction
+    from ppafo.questions.reproduce.solve import reproduce
+    from ppafo.questions.sensitivity.solve import Sensitivity, sensitivity
+    from ppafo.questions.size.answer import Sizing
+    from ppafo.questions.size.problem import load_sizing
+    from ppafo.questions.size.solve import size
+    from ppafo.questions.sweep.answer import StudyResults
+    from ppafo.questions.sweep.results import load_study_results
     from ppafo.questions.sweep.solve import sweep
-    from ppafo.questions.timing.solve import Timing, event_timing
-    from ppafo.questions.tune.file import list_tunings, load_tuning
-    from ppafo.questions.tune.solve import Tuning, tune
+    from ppafo.questions.timing.answer import Timing
+    from ppafo.questions.timing.solve import event_timing
+    from ppafo.questions.tune.answer import Tuning
+    from ppafo.questions.tune.problem import list_tunings, load_tuning
+    from ppafo.questions.tune.solve import tune
     from ppafo.questions.unreported.solve import infer_settings
     from ppafo.questions.validate.solve import Validation, validate
     from ppafo.signals import Channel, Recording
@@ -195,23 +204,21 @@ _HOMES = {
     "ppafo.questions.reproduce.solve": ("Reproduction", "reproduce"),
     "ppafo.questions.bits.solve": ("bits",),
     "ppafo.questions.compare.solve": ("Comparison", "compare"),
-    "ppafo.questions.design.file": ("load_design",),
+    "ppafo.questions.design.problem": ("load_design",),
     "ppafo.questions.design.solve": ("Design", "design"),
     "ppafo.questions.endurance.solve": ("Endurance", "endurance", "endurance_of_walk"),
     "ppafo.questions.league.solve": ("League", "league"),
     "ppafo.questions.find.solve": ("Found", "find"),
     "ppafo.questions.linearise.solve": ("LinearModel", "linearise"),
-    "ppafo.questions.montecarlo.estimate": ("MonteCarlo",),
-    "ppafo.questions.montecarlo.solve": ("monte_carlo",),
+    "ppafo.questions.montecarlo.solve": ("MonteCarlo", "monte_carlo"),
     "ppafo.questions.parts.solve": ("Parts", "parts"),
-    "ppafo.questions.size.file": ("load_sizing",),
+    "ppafo.questions.size.problem": ("load_sizing",),
     "ppafo.questions.size.solve": ("Sizing", "size"),
-    "ppafo.questions.sensitivity.analyse": ("Sensitivity",),
-    "ppafo.questions.sensitivity.solve": ("sensitivity",),
+    "ppafo.questions.sensitivity.solve": ("Sensitivity", "sensitivity"),
     "ppafo.questions.unreported.solve": ("infer_settings",),
     "ppafo.questions.validate.solve": ("Validation", "validate"),
     "ppafo.questions.timing.solve": ("Timing", "event_timing"),
-    "ppafo.questions.tune.file": ("list_tunings", "load_tuning"),
+    "ppafo.questions.tune.problem": ("list_tunings", "load_tuning"),
     "ppafo.questions.tune.solve": ("Tuning", "tune"),
     "ppafo.walking": ("compare_walks", "list_walks", "load_walk", "walk", "walk_population"),
 }

@@ -6,7 +6,7 @@ The code of walks, which is much, is loaded only where one is asked for.
 from collections.abc import Iterable
 from pathlib import Path
 
-from ppafo.documents.toml_text import label
+from ppafo.documents.toml_text import beside, label
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.parameters import ParameterSet
 from ppafo.simulation import loading as of_vanes
@@ -58,8 +58,7 @@ def scenario_or_load(scenario: Scenario | str | Path, overrides: Iterable[str] =
 
 def placed(name: str, folder: Path) -> str:
     """Return the name of a shipped scenario or walk, or the path of a file, relative ones from a folder."""
-    is_path = Path(name).suffix == ".toml" or "/" in name
-    return str(folder / name) if is_path and name not in of_vanes.list_scenarios() else name
+    return beside(name, folder, of_vanes.list_scenarios())
 
 
 def reloaded(scenario: Scenario, more: Iterable[str]) -> Scenario:

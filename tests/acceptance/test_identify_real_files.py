@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.questions.identify.solve import Identification, identify
+from ppafo.questions.identify.answer import Identification
+from ppafo.questions.identify.solve import identify
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "identify-from-raw-files.md"
 KNOWN_AREA = 5.1875e-4

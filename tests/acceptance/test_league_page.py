@@ -9,8 +9,7 @@ import pytest
 
 import ppafo
 from ppafo.cli.main import build_parser, main
-from ppafo.questions.league.entrants import ENTRANTS, WALKING_ENTRANTS
-from ppafo.questions.league.learning import learn
+from ppafo.questions.league.standing import ENTRANTS, WALKING_ENTRANTS, learn
 from ppafo.questions.league.walking.measures import walk_measures
 from ppafo.questions.league.walking.task import walking_task
 

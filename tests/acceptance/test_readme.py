@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.answers.text import text_of
+from ppafo.answers.writing import text_of
 from ppafo.cli.main import COMMANDS, build_parser, main
 from ppafo.engine.reference.agreement import compare_with_reference
 from ppafo.questions.bits.solve import golden_hashes
-from ppafo.questions.reproduce.solve import Reproduction, Studies, reproduce
+from ppafo.questions.reproduce.answer import Reproduction, Studies
+from ppafo.questions.reproduce.solve import reproduce
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from scripts.bits import TARGETS, title_of

@@ -14,8 +14,8 @@ import pytest
 from ppafo.cli.main import main
 from ppafo.progress import Report
 from ppafo.questions.reproduce import solve as study
+from ppafo.questions.reproduce.answer import Reproduction
 from ppafo.questions.reproduce.bench import bench_study
-from ppafo.questions.reproduce.solve import Reproduction
 from ppafo.storage import read_csv
 
 # Spelled out once more on purpose: other programs read these identifiers and this order.

@@ -11,12 +11,11 @@ import ppafo
 from ppafo.loading import load_scenario
 from ppafo.questions.find.solve import find
 from ppafo.questions.montecarlo.solve import monte_carlo
-from ppafo.questions.tune.file import load_tuning
-from ppafo.questions.tune.problem import Effort
+from ppafo.questions.tune.problem import Effort, load_tuning
 from ppafo.questions.tune.solve import tune
 from ppafo.simulation.ensemble import run_ensemble
-from ppafo.studies.configurations import with_overrides
 from ppafo.studies.loading import load_study
+from ppafo.studies.study import with_overrides
 from ppafo.walking import walk
 
 PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "vary-a-walk.md").read_text(encoding="utf-8")

@@ -17,12 +17,12 @@ from ppafo.identification.problem import load_problem
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.bottles.bottle import load_bottle
 from ppafo.parameters.parts import load_catalogue
-from ppafo.questions.design.file import read_design_file
+from ppafo.questions.design.problem import read_design_file
 from ppafo.questions.endurance.draw import read_walk_gas
 from ppafo.questions.reproduce.publication import load_publication
-from ppafo.questions.size.file import read_sizing_file
+from ppafo.questions.size.problem import read_sizing_file
 from ppafo.questions.sweep.results import load_study_results
-from ppafo.questions.tune.file import load_tuning
+from ppafo.questions.tune.problem import load_tuning
 from ppafo.rig.folder import check_rig_folder
 from ppafo.rig.preset import load_preset
 from ppafo.simulation.loading import load_scenario, scenario_from_dict

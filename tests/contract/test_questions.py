@@ -6,11 +6,10 @@ import typing
 import pytest
 
 import ppafo
-from ppafo.answers import Solved
 from ppafo.cli.main import build_parser
 from ppafo.documents.toml_text import TomlKind
 from ppafo.questions.catalogue import QUESTIONS, question
-from ppafo.questions.question import load_name
+from ppafo.questions.question import Solved, load_name
 
 NAMES = list(QUESTIONS)
 NO_VERB_OF_ITS_OWN = {
@@ -50,8 +49,7 @@ def test_defaults_of_the_command_are_those_of_the_verb(name: str) -> None:
 def test_what_a_question_comes_to_answers_draws_saves_and_becomes_data(name: str) -> None:
     for kind in solved_types(name):
         assert issubclass(kind, Solved)
-        home = f"{kind.__module__.rpartition('.')[0]}.answer"
-        assert list(inspect.signature(load_name(f"{home}:answer_of")).parameters)
+        assert list(inspect.signature(load_name(f"{kind.__module__}:answer_of")).parameters)
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in NO_VERB_OF_ITS_OWN])

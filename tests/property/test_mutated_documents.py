@@ -15,9 +15,9 @@ from ppafo.errors import PpafoError
 from ppafo.gait.document import load_gait
 from ppafo.parameters.bottles.bottle import load_bottle
 from ppafo.parameters.parts import load_catalogue
-from ppafo.questions.design.file import load_design
-from ppafo.questions.size.file import load_sizing
-from ppafo.questions.tune.file import load_tuning
+from ppafo.questions.design.problem import load_design
+from ppafo.questions.size.problem import load_sizing
+from ppafo.questions.tune.problem import load_tuning
 from ppafo.rig.preset import load_preset
 from ppafo.studies.loading import load_study
 from ppafo.walking.loading import load_walk

@@ -2,8 +2,9 @@
 
 import pytest
 
+from ppafo.questions.reproduce.answer import Reproduction
 from ppafo.questions.reproduce.claim import Claim
-from ppafo.questions.reproduce.solve import Reproduction, reproduce
+from ppafo.questions.reproduce.solve import reproduce
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.answers.layout import Margins, figure_of_panels
 from ppafo.answers.style import (
     ACTUAL,
     CHAMBER_1,
@@ -17,6 +16,8 @@ from ppafo.answers.style import (
     ORANGE,
     VERMILION,
     WANTED,
+    Margins,
+    figure_of_panels,
     house_style,
     label_lines,
     mark_kind,
@@ -34,17 +35,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FIGURE_FORMATS = ("png", "svg", "pdf")
-
 _WIDTH, _LEFT, _RIGHT = 7.2, 0.62, 0.2
 _PANEL, _GAP, _TOP, _BOTTOM, _REMARK_LINE = 1.15, 0.42, 0.75, 0.55, 0.17
 """Inches."""
-
 _REMARK_WIDTH = 100
 _HEADROOM = 0.06
 _MAXIMUM_TICKS = 5
 _NO_ATMOSPHERE = 1e9
 """Pa absolute."""
-
 _LONGEST_SHOWN = 60
 
 

@@ -55,7 +55,7 @@ def _counts(findings: "list[Finding]") -> dict[str, int]:
 
 def _table(found: "list[tuple[ParameterSet, list[Finding]]]") -> str:
     """Return a row for each finding and a column for each set, with how serious it is there."""
-    from ppafo.answers.text import align_columns
+    from ppafo.answers.writing import align_columns
 
     columns = [{finding.id: _verdict(finding) for finding in findings} for _, findings in found]
     names = dict.fromkeys(name for column in columns for name in column)

@@ -90,7 +90,7 @@ def run(parsed: argparse.Namespace) -> int:
         from ppafo.answers.recording_figure import figure_files
 
         found.save(folder, figure_files(found.plot_signals()))
-    from ppafo.answers.shown_metrics import metrics_lines
+    from ppafo.answers.display_units import metrics_lines
 
     result = found.result
     lines = metrics_lines(result.metrics, result.scenario.device.supply.atmospheric_pressure)

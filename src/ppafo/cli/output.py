@@ -105,7 +105,7 @@ def deliver_answer(answer: "Answer", parsed: argparse.Namespace, filled: str | N
 
     ``filled`` is a folder that has the files already.
     """
-    from ppafo.answers.text import text_of
+    from ppafo.answers.writing import text_of
 
     text, folder = text_of(answer), filled
     if filled is None and parsed.out is not None:

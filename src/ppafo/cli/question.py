@@ -28,7 +28,7 @@ def run(parsed: argparse.Namespace, question: Question) -> int:
     if question.library:
         library = load_name(question.library)
         if parsed.list:
-            from ppafo.answers.text import align_columns
+            from ppafo.answers.writing import align_columns
 
             listed: list[dict[str, Any]] = (
                 load_name(question.listing)() if question.listing else _words_of_files(library)

@@ -53,9 +53,8 @@ def run(parsed: argparse.Namespace) -> int:
     result = simulate(scenario)
     check = result.check() if parsed.check and result.status.is_completed else None
     output.load_drawing()
-    from ppafo.answers.page import page_of
     from ppafo.answers.recording_figure import figure_files
-    from ppafo.answers.writing import REPORT
+    from ppafo.answers.writing import REPORT, page_of
 
     figures = figure_files(result.plot())
     report = page_of(_answer(result, check), {FIGURE: figures[f"{FIGURE}.svg"]})
@@ -88,7 +87,7 @@ def _answer(result: "Result", check: "Check | None") -> "Answer":
     changed = f"; values changed for this run: {', '.join(scenario.origin.overrides)}"
     figure = Figure(FIGURE, "What the device does over time. Pressures count from the atmosphere.", result.plot)
     from ppafo.answers import Column, Table
-    from ppafo.answers.shown_metrics import metric_level, metric_words
+    from ppafo.answers.display_units import metric_level, metric_words
 
     zero = result.scenario.device.supply.atmospheric_pressure
     shown = {name: metric_level(metric.value, metric.unit, zero) for name, metric in result.metrics.items()}
@@ -126,7 +125,7 @@ def _list(parsed: argparse.Namespace) -> int:
 
 
 def _text(result: "Result", check: "Check | None", folder: Path) -> str:
-    from ppafo.answers.shown_metrics import metrics_lines
+    from ppafo.answers.display_units import metrics_lines
 
     head = f"{result.scenario.name}: {result.status.kind}"
     checked = [] if check is None else [repr(check), ""]

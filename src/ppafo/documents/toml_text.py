@@ -2,7 +2,7 @@
 
 import copy
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources.abc import Traversable
@@ -15,6 +15,12 @@ from ppafo.errors import PpafoError, nearest_name, one_line, reason
 
 _SUFFIX = ".toml"
 _LONGEST_LABEL, _KEPT_AT_EACH_END = 200, 60
+
+
+def beside(name: str, folder: Path, known: Collection[str] = ()) -> str:
+    """Return a name of the package as it is, and a path relative to the file that names it as one from here."""
+    is_path = name not in known and (Path(name).suffix == ".toml" or "/" in name)
+    return str(folder / name) if is_path else name
 
 
 @dataclass(frozen=True, slots=True)

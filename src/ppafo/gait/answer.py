@@ -10,8 +10,7 @@ import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import display_unit, display_value, display_values, quantity_of_unit
-from ppafo.answers.layout import Margins, figure_of_panels
-from ppafo.answers.style import BLACK, BLUE, GREY, ORANGE, house_style, mark_kind
+from ppafo.answers.style import BLACK, BLUE, GREY, ORANGE, Margins, figure_of_panels, house_style, mark_kind
 from ppafo.gait.document import gait_toml
 from ppafo.gait.gait import CURVES, Gait, clinical_angle, plain_unit
 from ppafo.gait.recorded.footfalls import Stride

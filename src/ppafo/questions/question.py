@@ -1,14 +1,19 @@
-"""What a question declares so that it is a command, a Python verb and a page: words only, nothing is loaded."""
+"""What a question declares so that it is a command, a Python verb and a page, and what it can do once it is solved."""
 
 import argparse
 import importlib
 import math
 import re
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from ppafo.answers import Solved
+from ppafo.answers import Answer
+
+if TYPE_CHECKING:
+    import matplotlib.figure
 
 _NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|nan|inf)", re.ASCII)
 
@@ -49,6 +54,36 @@ class Argument:
             options["action"] = self.action
         words = self.words if self.words[0].startswith("-") else (self.parameter,)
         parser.add_argument(*words, **options)
+
+
+class Solved:
+    """What a solved question can do, whichever it is; ``answer_of`` of the module that defines its class answers it."""
+
+    __slots__ = ()
+
+    def answer(self) -> Answer:
+        """Return the answer: sections for people, data for programs."""
+        answer: Answer = sys.modules[type(self).__module__].answer_of(self)
+        return answer
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what ``--json`` prints, as plain data in SI."""
+        return dict(self.answer().data)
+
+    def plot(self, name: str | None = None) -> "matplotlib.figure.Figure":
+        """Return a figure of the answer, the first unless named; LookupError where it has none of that name."""
+        figures = {figure.name: figure for figure in self.answer().figures}
+        chosen = figures.get(name or next(iter(figures), ""))
+        drawn = None if chosen is None else chosen.draw()
+        if drawn is None or isinstance(drawn, bytes):
+            raise LookupError(f"there is no figure '{name or ''}'; available: {', '.join(figures) or 'none'}")
+        return drawn
+
+    def save(self, folder: str | Path) -> None:
+        """Write text, JSON, page and figures into a folder: absent, empty or an earlier answer, else DataError."""
+        from ppafo.answers.writing import write_answer
+
+        write_answer(self.answer(), Path(folder))
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from ppafo.answers.shown_metrics import metric_change, metric_level
-from ppafo.answers.text import align_columns
+from ppafo.answers.display_units import metric_change, metric_level
+from ppafo.answers.writing import align_columns
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.simulation.document import plain
 

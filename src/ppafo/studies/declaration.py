@@ -15,7 +15,6 @@ MAXIMUM_RUNS_OF_CHUNK = 1_000_000
 LARGEST_SEED = 2**32 - 1
 MAXIMUM_GRID_VALUES = 1_000_000
 DEFAULT_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-
 _Value = Annotated[str | float | int, Field(description="text with unit; a plain number if there is no unit")]
 _Values = Annotated[tuple[_Value, ...], Field(strict=False, min_length=1)]
 _Path = Annotated[Text, Field(description="what is varied: a path as for --set, such as 'supply.pressure'")]

@@ -147,3 +147,124 @@ class WholeNumbersBetween:
     def values(self, uniform: Floats) -> Floats:
         """Return the value at each probability of the cumulated weights."""
         return np.minimum(np.floor(self.minimum + (self.maximum - self.minimum + 1.0) * uniform), self.maximum)
+
+
+FEWEST_EFFECTIVE = 50.0
+"""Draws that must carry a mean before its interval by the central limit theorem is believed to half a percent."""
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """An estimate and the ends of its confidence interval, all in one unit; an end may be infinite."""
+
+    value: float
+    low: float
+    high: float
+
+    @property
+    def width(self) -> float:
+        """Distance of the two ends."""
+        return self.high - self.low
+
+
+def replicates_interval(values: Floats, replicates: int, confidence: float) -> Interval:
+    """Return the mean with Student's interval from the spread between replicates.
+
+    Value j belongs to replicate j % ``replicates``; nan has no value. Without a value in every replicate the ends are
+    infinite.
+    """
+    from scipy.special import stdtrit
+
+    known = np.isfinite(values)
+    parts = [values[number::replicates][known[number::replicates]] for number in range(replicates)]
+    mean = float(np.mean(values[known])) if known.any() else math.nan
+    if min(part.size for part in parts) == 0:
+        return Interval(mean, -math.inf, math.inf)
+    error = float(np.std([np.mean(part) for part in parts], ddof=1)) / math.sqrt(replicates)
+    reach = float(stdtrit(replicates - 1, 0.5 + 0.5 * confidence)) * error
+    return Interval(mean, mean - reach, mean + reach)
+
+
+def jackknife_reach(left_out: Floats, confidence: float) -> Floats:
+    """Return the half width of the interval of an estimate from independent replicates, by Student's distribution.
+
+    ``left_out`` (replicates, ...) is the estimate without each of them in turn (Tukey's jackknife), so that an
+    estimate may be a ratio or a quantile of all replicates together.
+    """
+    from scipy.special import stdtrit
+
+    count = len(left_out)
+    away = left_out - np.mean(left_out, axis=0)
+    error = np.sqrt((count - 1.0) / count * np.sum(away**2, axis=0))
+    return np.asarray(float(stdtrit(count - 1, 0.5 + 0.5 * confidence)) * error)
+
+
+def effective_sample_size(values: Floats) -> float:
+    """Return how many draws determine the mean: their number over the square of their skewness, at most their number.
+
+    An interval by the central limit theorem misses the mean by about a quarter of the inverse of this more often than
+    it says (Hall, The Bootstrap and Edgeworth Expansion, 1992, section 2.6). 1 where a single draw decides.
+    """
+    away = values - np.mean(values)
+    square = float(np.mean(away**2))
+    if square == 0.0:
+        return float(values.size)
+    skewness = float(np.mean(away**3)) / square**1.5
+    return float(values.size / max(1.0, skewness**2))
+
+
+def noise_interval(values: Floats, others: Floats, confidence: float) -> Interval | None:
+    """Return the fraction of the variance that is due to noise, with its interval; None where nothing varies.
+
+    ``values`` and ``others`` (draws,) are the same draws with two independent noise streams: half the mean square of
+    their difference is the variance within a draw. The interval is that of a ratio of means by the delta method.
+    """
+    from scipy.special import ndtri
+
+    both = np.isfinite(values) & np.isfinite(others)
+    first, second = values[both], others[both]
+    if first.size < 2:
+        return None
+    mean = 0.5 * float(np.mean(first + second))
+    within = 0.5 * (first - second) ** 2
+    whole = 0.5 * ((first - mean) ** 2 + (second - mean) ** 2)
+    scale = float(np.mean(whole))
+    if scale == 0.0:
+        return None
+    share = float(np.mean(within)) / scale
+    error = math.sqrt(float(np.mean((within - share * whole) ** 2)) / first.size) / scale
+    reach = float(ndtri(0.5 + 0.5 * confidence)) * error
+    return Interval(*(min(1.0, max(0.0, value)) for value in (share, share - reach, share + reach)))
+
+
+def fraction_interval(hits: int, draws: int, confidence: float) -> Interval:
+    """Return a fraction with the exact interval of Clopper and Pearson (1934)."""
+    from scipy.special import betaincinv
+
+    tail = 0.5 - 0.5 * confidence
+    low = float(betaincinv(hits, draws - hits + 1, tail)) if hits > 0 else 0.0
+    high = float(betaincinv(hits + 1, draws - hits, 1.0 - tail)) if hits < draws else 1.0
+    return Interval(hits / draws, low, high)
+
+
+def quantile_interval(values: Floats, share: float, confidence: float) -> Interval:
+    """Return a quantile with the interval of two order statistics, which holds for any distribution.
+
+    The number of draws below the quantile is binomial (David and Nagaraja, Order Statistics, section 7.1). An end is
+    infinite where there are too few draws for it.
+    """
+    from scipy.stats import binom
+
+    ordered, tail = np.sort(values), 0.5 - 0.5 * confidence
+    lower = int(binom.ppf(tail, values.size, share))
+    upper = int(binom.ppf(1.0 - tail, values.size, share)) + 1
+    return Interval(
+        float(np.quantile(ordered, share)),
+        float(ordered[lower - 1]) if lower >= 1 else -math.inf,
+        float(ordered[upper - 1]) if upper <= values.size else math.inf,
+    )
+
+
+def fraction_text(fraction: Interval) -> str:
+    """Return a fraction with its interval in percent."""
+    return f"{100.0 * fraction.value:.3g} % [{100.0 * fraction.low:.3g}, {100.0 * fraction.high:.3g}]"

@@ -15,10 +15,8 @@ from ppafo.metrics import METRICS
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import Above
-from ppafo.studies.noise import with_noise
-from ppafo.studies.outputs import valid_outputs
-from ppafo.studies.sampling import MAXIMUM_SOBOL_DIMENSIONS, Factor, cholesky_factor, correlation_matrix
-from ppafo.studies.study import Axis, Configuration, Drawn, Sample, Study
+from ppafo.studies.sampling import MAXIMUM_SOBOL_DIMENSIONS, Factor, cholesky_factor, correlation_matrix, with_noise
+from ppafo.studies.study import Axis, Configuration, Drawn, Sample, Study, valid_outputs
 from ppafo.studies.varying import VariedPath, axis_or_distribution, in_its_unit, stated_normal, texts_of, varied_path
 
 STUDY_FILES = TomlKind("study", "study", resources.files("ppafo") / "studies" / "library", StudyError)
@@ -46,7 +44,11 @@ def load_study(
     else:
         source = _Source(label(str(study)), Path(study).parent, STUDY_FILES.read(study))
         document = STUDY_FILES.parse(source.text, source.file)
-    changed = _apply_overrides(_with_kinds(document), overrides, {"runs": draws, "seed": seed}, source.file)
+    tables = document.get("vary")
+    for table in tables if isinstance(tables, list | tuple) else ():
+        if isinstance(table, dict) and "same_as" in table:
+            table.setdefault("kind", "same_as")
+    changed = _apply_overrides(document, overrides, {"runs": draws, "seed": seed}, source.file)
     return _build(changed, source)
 
 
@@ -61,15 +63,6 @@ class _Source:
     def refusal(self, text: object) -> StudyError:
         """Return an error that names the file."""
         return StudyError(f"{self.file}: {text}")
-
-
-def _with_kinds(document: dict[str, Any]) -> dict[str, Any]:
-    """Return the document; a table that has ``same_as`` needs no kind beside it."""
-    tables = document.get("vary")
-    for table in tables if isinstance(tables, list | tuple) else ():
-        if isinstance(table, dict) and "same_as" in table:
-            table.setdefault("kind", "same_as")
-    return document
 
 
 def _apply_overrides(
@@ -97,7 +90,11 @@ def _parse(document: Mapping[str, Any], file: str) -> declared.StudyFile:
 
 def _build(document: dict[str, Any], source: _Source) -> Study:
     parsed = _parse(document, source.file)
-    configurations = _configurations(parsed, source)
+    names = [item.name for item in parsed.configurations]
+    repeated = first_twice(names)
+    if repeated is not None:
+        raise source.refusal(f"there are two configurations named '{repeated}'; give each its own name")
+    configurations = tuple(Configuration(item.name, _scenario(item, source)) for item in parsed.configurations)
     _check_requests(parsed, source)
     _check_set_or_varied(parsed, source)
     places = {item.path: _place(item, configurations, parsed, source) for item in parsed.vary}
@@ -138,14 +135,6 @@ def _check_set_or_varied(parsed: declared.StudyFile, source: _Source) -> None:
                     f"configuration '{each.name}': '{item.path}' is both set and varied, so the set value would be "
                     "ignored; omit one, or restrict the [[vary]] to the other configurations with 'only'"
                 )
-
-
-def _configurations(parsed: declared.StudyFile, source: _Source) -> tuple[Configuration, ...]:
-    names = [item.name for item in parsed.configurations]
-    repeated = first_twice(names)
-    if repeated is not None:
-        raise source.refusal(f"there are two configurations named '{repeated}'; give each its own name")
-    return tuple(Configuration(item.name, _scenario(item, source)) for item in parsed.configurations)
 
 
 def _scenario(item: declared.Configuration, source: _Source) -> Any:

@@ -11,15 +11,18 @@ Correlations are those of normal scores: a Gaussian copula, which leaves each di
 
 import threading
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.studies.distributions import Floats
-from ppafo.studies.study import Sample
+from ppafo.simulation.declaration import LARGEST_SEED
+from ppafo.simulation.scenario import Scenario, worn_kind
+from ppafo.simulation.simulate import OPEN_LOOP
+from ppafo.studies.distributions import Floats, WholeNumbersBetween
+from ppafo.studies.study import Drawn, Sample
 
 Words = NDArray[np.uint64]
 Factor = tuple[tuple[float, ...], ...]
@@ -151,3 +154,43 @@ def correlate(uniform: Floats, factor: Factor) -> Floats:
         columns.append(total)
     smallest = 2.0**-53
     return np.asarray(np.clip(ndtr(np.stack(columns, axis=1)), smallest, 1.0 - smallest))
+
+
+NOISE = "sensors.seed"
+"""The path by which a run is given its realisation of the noise."""
+_NOISE_LEVELS = ("sensors.angle_noise", "sensors.pressure_noise", "sensors.force_noise")
+_KEY = 1
+
+
+def is_noisy(scenarios: Iterable[Scenario], paths: Sequence[str] = ()) -> bool:
+    """Tell whether a controller receives noise in any of some scenarios, or where some paths vary."""
+    closed = [item for item in scenarios if item.control.kind != OPEN_LOOP]
+    heard = any(np.any(np.asarray(_noise_of(item)) > 0.0) for item in closed)
+    return heard or (bool(closed) and any(path in _NOISE_LEVELS for path in paths))
+
+
+def _noise_of(scenario: Scenario) -> Any:
+    """Return the sum of the levels of noise of a scenario, which may be an array (runs,)."""
+    worn = worn_kind(scenario)
+    return scenario.sensors.angle_noise + scenario.sensors.pressure_noise if worn is None else worn.noise(scenario)
+
+
+def with_noise(
+    drawn: tuple[Drawn, ...], scores: Factor | None, scenarios: Iterable[Scenario], paths: Sequence[str]
+) -> tuple[tuple[Drawn, ...], Factor | None]:
+    """Return distributions and factor with the noise last among them, independent of the others, if there is any.
+
+    ``paths`` are all that vary; a seed among them is left as it is.
+    """
+    if NOISE in paths or not is_noisy(scenarios, paths):
+        return drawn, scores
+    noise = Drawn(NOISE, WholeNumbersBetween(0.0, float(LARGEST_SEED)))
+    if scores is None:
+        return (*drawn, noise), None
+    alone = (*(0.0,) * len(drawn), 1.0)
+    return (*drawn, noise), (*((*row, 0.0) for row in scores), alone)
+
+
+def other_noise(seeds: Floats) -> Floats:
+    """Return for each seed that of another stream."""
+    return permute(seeds.astype(np.uint64), LARGEST_SEED + 1, _KEY, 0).astype(np.float64)

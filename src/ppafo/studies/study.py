@@ -1,12 +1,89 @@
 """A study as frozen values in SI units, and which run has which configuration, grid point and draw."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import re
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Literal
 
+from ppafo.engine.lane_meters import TRACED
+from ppafo.errors import StudyError, UnitError, first_twice, nearest_name
+from ppafo.loading import reloaded, scenario_or_load
+from ppafo.metrics import METRICS
+from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import OPEN_LOOP
+from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import Distribution
-from ppafo.studies.outputs import Outputs
+from ppafo.units import parse_quantity
+
+Refusal = Callable[[object], StudyError]
+
+
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """Metrics, channels kept for every run and as bands, time between two samples [s], quantiles from 0 to 1."""
+
+    metrics: tuple[str, ...]
+    trajectories: tuple[str, ...]
+    bands: tuple[str, ...]
+    every: float
+    quantiles: tuple[float, ...]
+
+    @property
+    def traces(self) -> tuple[str, ...]:
+        """Every channel that is needed over time, each once."""
+        return tuple(dict.fromkeys((*self.trajectories, *self.bands)))
+
+
+def valid_outputs(outputs: declared.Outputs, scenarios: Sequence[Scenario], refusal: Refusal) -> Outputs:
+    """Return the outputs in SI units; an error that ``refusal`` makes for a name that does not exist."""
+    metrics = tuple(METRICS) if outputs.metrics == "all" else tuple(outputs.metrics)
+    _check_names("metrics", metrics, METRICS, refusal)
+    _check_names("trajectories", outputs.trajectories, tuple(TRACED), refusal)
+    _check_names("bands", outputs.bands, tuple(TRACED), refusal)
+    channels = (*outputs.trajectories, *outputs.bands)
+    if "reference" in channels and all(scenario.control.kind == OPEN_LOOP for scenario in scenarios):
+        raise refusal("outputs: 'reference' needs a reference, and the controllers here follow none")
+    has = {name: [lacking(scenario, METRICS[name]) for scenario in scenarios] for name in metrics}
+    missing = {name: reasons[0] for name, reasons in has.items() if all(reasons)}
+    for name, reason in missing.items() if outputs.metrics != "all" else ():
+        raise refusal(f"outputs: no scenario has '{name}': {reason}")
+    metrics = tuple(name for name in metrics if name not in missing)
+    return Outputs(
+        metrics=metrics,
+        trajectories=outputs.trajectories,
+        bands=outputs.bands,
+        every=_interval(outputs, scenarios, refusal),
+        quantiles=tuple(sorted(set(outputs.quantiles))),
+    )
+
+
+def _check_names(key: str, given: Sequence[str], known: Collection[str], refusal: Refusal) -> None:
+    for name in given:
+        if name not in known:
+            what = "metric" if key == "metrics" else "channel"
+            hint = nearest_name(name, known)
+            raise refusal(f"outputs.{key}: there is no {what} '{name}'{hint}; available: {', '.join(known)}")
+    repeated = first_twice(given)
+    if repeated is not None:
+        raise refusal(f"outputs.{key}: '{repeated}' is named twice")
+
+
+def _interval(outputs: declared.Outputs, scenarios: Sequence[Scenario], refusal: Refusal) -> float:
+    try:
+        every = parse_quantity(outputs.every, "s")
+    except UnitError as error:
+        raise refusal(f"outputs.every = {outputs.every!r}: {error}") from error
+    if not (outputs.trajectories or outputs.bands):
+        return every
+    shortest = min(scenario.duration for scenario in scenarios)
+    if not 0.0 < every <= shortest:
+        raise refusal(
+            f"outputs.every = {outputs.every!r} must be more than 0 s and at most run.duration, {shortest:g} s"
+        )
+    return every
+
 
 SamplingMethod = Literal["random", "latin_hypercube", "sobol"]
 
@@ -111,3 +188,77 @@ class Study:
 def with_followers(columns: Mapping[str, Any], same: Mapping[str, str]) -> dict[str, Any]:
     """Return the columns, and beside them those of the paths that follow one of them."""
     return {**columns, **{path: columns[other] for path, other in same.items() if other in columns}}
+
+
+_SETTING = re.compile(r"\s*controller\.(?!rate|period)")
+Configurations = Mapping[str, Scenario | str | Path] | Sequence[Scenario | str | Path]
+
+
+@dataclass(frozen=True, slots=True)
+class ConfiguredTask:
+    """A configuration on a task: the two names and the scenario."""
+
+    task: str
+    configuration: str
+    scenario: Scenario
+
+
+def choose_configurations(
+    configurations: Configurations | None, study: Study | None, overrides: Sequence[str]
+) -> tuple[Configuration, ...]:
+    """Return what is compared: the given scenarios, else those of the study; at least two, each with its own name."""
+    if configurations is None:
+        if study is None:
+            raise StudyError("nothing to compare: give scenarios, a study, or both")
+        found = study.configurations
+    else:
+        _check_no_restriction(study)
+        pairs = configurations.items() if isinstance(configurations, Mapping) else _with_names(configurations)
+        found = tuple(Configuration(name, scenario_or_load(item)) for name, item in pairs)
+    if len(found) < 2:
+        raise StudyError(f"a comparison needs at least two configurations, there is {len(found)}")
+    return tuple(replace(item, scenario=with_overrides(item.scenario, overrides)) for item in found)
+
+
+def valid_baseline(name: str | None, names: Sequence[str]) -> str:
+    """Return the configuration that all others are compared with; the first by default."""
+    if name is not None and name not in names:
+        raise StudyError(
+            f"baseline: no configuration '{name}'{nearest_name(name, names)}; available: {', '.join(names)}"
+        )
+    return name if name is not None else names[0]
+
+
+def with_overrides(scenario: Scenario, overrides: Sequence[str]) -> Scenario:
+    """Return a scenario with overrides; StudyError where it was changed in Python, which would be lost.
+
+    A Python object that controls it stays in charge.
+    """
+    if not overrides:
+        return scenario
+    of_object = [text for text in overrides if scenario.control.custom is not None and _SETTING.match(text)]
+    if of_object:
+        raise StudyError(f"override '{of_object[0]}': scenario '{scenario.name}' is controlled by a Python object")
+    if reloaded(scenario, ()) != scenario:
+        raise StudyError(
+            f"scenario '{scenario.name}' was changed in Python; overrides need the scenario as it is in its file"
+        )
+    return reloaded(scenario, overrides)
+
+
+def _with_names(scenarios: Sequence[Scenario | str | Path]) -> list[tuple[str, Scenario]]:
+    """Return scenarios by their own names; StudyError where two are called the same."""
+    found = [scenario_or_load(item) for item in scenarios]
+    names = [scenario.name for scenario in found]
+    repeated = first_twice(names)
+    if repeated is not None:
+        raise StudyError(f"two of the scenarios are named '{repeated}'; give them different names in a study file")
+    return list(zip(names, found, strict=True))
+
+
+def _check_no_restriction(study: Study | None) -> None:
+    if study is not None and study.only:
+        path, names = next(iter(study.only.items()))
+        raise StudyError(
+            f"study '{study.name}': '{path}' varies only in {', '.join(names)}; compare the study's own configurations"
+        )

@@ -34,7 +34,7 @@ from ppafo.studies.distributions import (
     UniformBetween,
     WholeNumbersBetween,
 )
-from ppafo.studies.noise import NOISE
+from ppafo.studies.sampling import NOISE
 from ppafo.studies.study import Axis, Drawn
 from ppafo.units import from_si, parse_quantity, split_quantity
 
@@ -44,7 +44,6 @@ _UNIT_OF_DIFFERENCE = {"Pa_a": "Pa_d"}
 _OFFSET_UNITS = ("degC", "°C")
 DEVIATIONS_IN_HALF_WIDTH = 1.959963984540054
 """Standard deviations of a normal distribution in the half width of its 95 % interval."""
-
 _STATED_DIFFERENCES = {"psi_g": "psi_d", "psi_a": "psi_d", "degC": "K", "°C": "K"}
 
 
@@ -141,22 +140,17 @@ def texts_of(item: declared.Varied) -> list[object]:
 
 def axis_or_distribution(item: declared.Varied, place: VariedPath) -> Axis | Drawn:
     """Return what a table asks for; UnitError with the key where a value is not usable or contradicts another."""
-    _check_whole(item)
+    is_counted, is_whole = item.path in WHOLE, item.kind == "whole_numbers"
+    if is_whole and not is_counted:
+        raise UnitError(f"kind = 'whole_numbers' is for {' and '.join(WHOLE)} alone; use 'choice' or 'uniform'")
+    if is_counted and item.kind not in ("grid", "list", "choice", "whole_numbers"):
+        raise UnitError(f"kind = '{item.kind}' gives no whole numbers, which '{item.path}' needs; use 'whole_numbers'")
     if isinstance(item, declared.Grid):
         return Axis(item.path, _all_whole(item.path, _grid(item, place)))
     if isinstance(item, declared.Listed):
         levels = tuple(_level("values", value, place) for value in item.values)
         return Axis(item.path, _all_whole(item.path, levels))
     return Drawn(item.path, _DISTRIBUTIONS[item.kind](item, place))
-
-
-def _check_whole(item: declared.Varied) -> None:
-    """Refuse kinds that give a seed no whole numbers, and whole numbers for what is not counted."""
-    is_counted, is_whole = item.path in WHOLE, item.kind == "whole_numbers"
-    if is_whole and not is_counted:
-        raise UnitError(f"kind = 'whole_numbers' is for {' and '.join(WHOLE)} alone; use 'choice' or 'uniform'")
-    if is_counted and item.kind not in ("grid", "list", "choice", "whole_numbers"):
-        raise UnitError(f"kind = '{item.kind}' gives no whole numbers, which '{item.path}' needs; use 'whole_numbers'")
 
 
 def _all_whole(path: str, values: tuple[float, ...]) -> tuple[float, ...]:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from ppafo.answers.display_units import metrics_lines
 from ppafo.answers.recording_figure import draw_stored_result, figure_files, recording_figure
-from ppafo.answers.shown_metrics import metrics_lines
 from ppafo.answers.style import house_style, render_figure
 from ppafo.errors import DataError
 from ppafo.metrics import Metric

@@ -2,7 +2,7 @@
 
 import pytest
 
-from ppafo.answers.typesetting import format_printed_quantity, quantity, sentence, typeset, with_paths_as_code
+from ppafo.answers.writing import format_printed_quantity, quantity, sentence, typeset, with_paths_as_code
 
 SPACE, TIMES, MINUS = "\N{NO-BREAK SPACE}", "\N{MULTIPLICATION SIGN}", "\N{MINUS SIGN}"
 APOSTROPHE, DASH = "\N{RIGHT SINGLE QUOTATION MARK}", "\N{EN DASH}"

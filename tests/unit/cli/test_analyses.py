@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.studies import outcomes
+from ppafo.studies import draws
 
 STUDY = "torque-task-uncertainty"
 SHORT = ["--set", "run.duration=0.3 s"]
@@ -135,7 +135,7 @@ def test_an_interruption_leaves_nothing(
     def interrupted(*_words: object, **_more: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(outcomes, "run_ensemble", interrupted)
+    monkeypatch.setattr(draws, "run_ensemble", interrupted)
     for words in commands(tuning).values():
         assert main([*words, "--out", str(tmp_path / "out")]) == 130
         assert not (tmp_path / "out").exists()

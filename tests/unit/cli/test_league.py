@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import build_parser, main
-from ppafo.questions.league.draws import SEED
-from ppafo.questions.league.entrants import ENTRANTS, WALKING_ENTRANTS
 from ppafo.questions.league.solve import DRAWS
+from ppafo.questions.league.standing import ENTRANTS, SEED, WALKING_ENTRANTS
 from ppafo.questions.league.walking import bound, contest
 from ppafo.questions.league.walking.task import CONFIGURATION
 from ppafo.storage.owned_folder import MARK

@@ -7,14 +7,14 @@ from types import ModuleType
 
 import pytest
 
-from ppafo.answers.text import text_of
-from ppafo.answers.writing import files_of
+from ppafo.answers.writing import files_of, text_of
 from ppafo.cli.main import main
 from ppafo.errors import PpafoError
 from ppafo.identification.problem import json_schema, parse_problem
 from ppafo.parameters.loading import load_device, load_parameter_set, parse_parameter_set
 from ppafo.parameters.writing import parameter_set_toml
-from ppafo.questions.identify.solve import Identification, identify
+from ppafo.questions.identify.answer import Identification
+from ppafo.questions.identify.solve import identify
 from ppafo.storage import write_csv
 
 HEAD = 'schema_version = 1\nname = "twin"\ndevice.set = "ppafo2011"\n'

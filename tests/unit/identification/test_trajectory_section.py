@@ -10,8 +10,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from ppafo.answers.text import text_of
-from ppafo.answers.writing import files_of
+from ppafo.answers.writing import files_of, text_of
 from ppafo.cli.main import main
 from ppafo.errors import PpafoError
 from ppafo.identification.problem import json_schema
@@ -19,7 +18,8 @@ from ppafo.identification.source import Use, common_use
 from ppafo.parameters.device import Orifice
 from ppafo.parameters.loading import load_device, parse_parameter_set
 from ppafo.parameters.writing import parameter_set_toml
-from ppafo.questions.identify.solve import Identification, identify
+from ppafo.questions.identify.answer import Identification
+from ppafo.questions.identify.solve import identify
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate

@@ -13,8 +13,8 @@ from ppafo.model.actuators.table import bases_at, level_of
 from ppafo.parameters.actuator_table import read_actuator_table, table_of
 from ppafo.parameters.loading import load_device, load_parameter_set, parse_parameter_set
 from ppafo.parameters.writing import parameter_set_toml
-from ppafo.questions.league.lower_bound import check_bounded
-from ppafo.questions.tune.search import shortfall
+from ppafo.questions.league.bound import check_bounded
+from ppafo.questions.tune.solve import shortfall
 from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import screen_columns
 from ppafo.simulation.loading import load_scenario

@@ -6,10 +6,9 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.errors import ScenarioError
-from ppafo.questions.reproduce.computations import COMPUTATIONS
-from ppafo.questions.reproduce.publication import FILE, load_publication
-from ppafo.questions.reproduce.solve import Studies, reproduce
-from ppafo.questions.reproduce.studies import judge, list_studies, study_names
+from ppafo.questions.reproduce.answer import Studies
+from ppafo.questions.reproduce.publication import COMPUTATIONS, FILE, judge, list_studies, load_publication, study_names
+from ppafo.questions.reproduce.solve import reproduce
 
 PUBLISHED = {
     "jrrd-2011": {9.0: "N m"},

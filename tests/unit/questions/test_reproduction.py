@@ -10,13 +10,18 @@ import pytest
 from ppafo.errors import PpafoError, SimulationError
 from ppafo.parameters.audit.evidence import Evidence
 from ppafo.questions.reproduce import solve as study
-from ppafo.questions.reproduce.arithmetic import arithmetic_claims
-from ppafo.questions.reproduce.bench import bench_study
-from ppafo.questions.reproduce.claim import VERDICTS, Claim, count_sentence, verdict_counts
-from ppafo.questions.reproduce.measured import measured_claims
-from ppafo.questions.reproduce.printed import Printed, load_printed
-from ppafo.questions.reproduce.solve import EXPERIMENTS, ORDER, PROPORTIONAL, SOLENOID, STEP, Reproduction, reproduce
-from ppafo.questions.reproduce.synthetic import SyntheticEvidence
+from ppafo.questions.reproduce.answer import PROPORTIONAL, SOLENOID, STEP, Reproduction
+from ppafo.questions.reproduce.bench import SyntheticEvidence, bench_study, measured_claims
+from ppafo.questions.reproduce.claim import (
+    VERDICTS,
+    Claim,
+    Printed,
+    arithmetic_claims,
+    count_sentence,
+    load_printed,
+    verdict_counts,
+)
+from ppafo.questions.reproduce.solve import EXPERIMENTS, ORDER, reproduce
 from ppafo.questions.reproduce.torque_task import torque_task_observations
 from ppafo.simulation.result import Result, Status
 

@@ -6,17 +6,14 @@ import re
 
 import pytest
 
-from ppafo.answers.text import text_of
-from ppafo.answers.typesetting import typeset
+from ppafo.answers.writing import text_of, typeset
 from ppafo.identification.bench.result import synthetic_figure_3
 from ppafo.live.page import bundled, digest
-from ppafo.questions.reproduce.answer import answer_of
-from ppafo.questions.reproduce.page import holding_torque, reproduction_page
-from ppafo.questions.reproduce.solve import Reproduction, reproduce
-from ppafo.questions.reproduce.step_response import Levels
-from ppafo.questions.reproduce.step_response_figure import step_response_figure
-from ppafo.questions.reproduce.synthetic import NoEvidence, SyntheticEvidence
-from ppafo.questions.reproduce.torque_task_figure import torque_task_figure
+from ppafo.questions.reproduce.answer import Reproduction, answer_of, holding_torque, reproduction_page
+from ppafo.questions.reproduce.bench import NoEvidence, SyntheticEvidence
+from ppafo.questions.reproduce.solve import reproduce
+from ppafo.questions.reproduce.step_response import Levels, step_response_figure
+from ppafo.questions.reproduce.torque_task import torque_task_figure
 
 LEVELS = Levels(480536.0, 101325.0)
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError
-from ppafo.questions.identify.trajectory_figure import correlation_figure, trajectory_fit_figure
+from ppafo.questions.identify.answer import correlation_figure, trajectory_fit_figure
 from ppafo.signals.recording import Channel, Recording, RecordingKind
 
 TIME = np.linspace(0.0, 1.0, 101)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.answers.shown_metrics import metric_change
+from ppafo.answers.display_units import metric_change
 from ppafo.cli.main import main
 from ppafo.errors import SimulationError
 from ppafo.model.sensors import Measurement

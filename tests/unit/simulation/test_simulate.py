@@ -24,7 +24,7 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PrescribedMotion, ProfileChoice, Scenario
 from ppafo.simulation.simulate import REMEDY, simulate, simulate_many
-from ppafo.walking.walk import _status as walk_status
+from ppafo.walking.result import _status as walk_status
 
 CHANNELS = {
     "angle",

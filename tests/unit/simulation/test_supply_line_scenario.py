@@ -9,7 +9,7 @@ from ppafo.metrics.gas import energy_imbalance, gas_imbalance
 from ppafo.model.orifice import orifice_flow
 from ppafo.model.plant import chamber_volumes
 from ppafo.model.regulator import SupplyLines
-from ppafo.questions.league.lower_bound import check_bounded
+from ppafo.questions.league.bound import check_bounded
 from ppafo.simulation.document import scenario_document
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario

@@ -1,12 +1,28 @@
-"""Draws: one stream, with correlations, the same in any pieces."""
+"""Draws, what comes of them, and their intervals."""
 
+import math
 from typing import Any
 
 import numpy as np
 import pytest
 
 from ppafo.errors import StudyError
-from ppafo.studies.draws import choose_configuration, study_of, uncertainty_in, uncertainty_of
+from ppafo.progress import Progress
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.simulate import simulate
+from ppafo.studies.distributions import effective_sample_size, fraction_interval, quantile_interval, replicates_interval
+from ppafo.studies.draws import (
+    Outcomes,
+    Tally,
+    check_failures,
+    check_metrics,
+    choose_configuration,
+    join,
+    scenario_model,
+    study_of,
+    uncertainty_in,
+    uncertainty_of,
+)
 from ppafo.studies.loading import load_study
 
 
@@ -83,3 +99,97 @@ def test_a_grid_has_no_probability() -> None:
 def test_a_study_that_is_loaded_takes_no_overrides() -> None:
     with pytest.raises(StudyError, match="takes no overrides"):
         study_of(load_study(study()), ["valve.area=11 mm^2"])
+
+
+SHORT = ("run.duration=0.2 s",)
+
+
+def test_each_run_gives_what_it_gives_alone() -> None:
+    scenario = load_scenario("torque-task-proportional", SHORT)
+    outcomes = scenario_model(scenario, ["rms_error", "gas_supplied"])({"valve.area": np.array([10e-6, 12e-6])})
+    alone = simulate("torque-task-proportional", [*SHORT, "valve.area=12 mm^2"]).metrics
+    assert outcomes.metrics["rms_error"][1] == pytest.approx(alone["rms_error"].value, rel=1e-9)
+    assert outcomes.metrics["gas_supplied"][1] == pytest.approx(alone["gas_supplied"].value, rel=1e-9)
+    assert outcomes.failures == 0
+
+
+def test_a_run_that_is_refused_is_a_failure_with_its_reason() -> None:
+    scenario = load_scenario("torque-task-proportional", SHORT)
+    outcomes = scenario_model(scenario, ["rms_error"])({"valve.area": np.array([10e-6, -1.0, 12e-6])})
+    assert outcomes.failed.tolist() == [False, True, False]
+    assert np.isnan(outcomes.metrics["rms_error"][1])
+    assert "valve.area" in outcomes.reason
+    with pytest.raises(StudyError, match=r"trial: 1 of 3 runs failed \(33.3 %\), more than the 10 %.*valve.area"):
+        check_failures(outcomes, 0.1, "trial")
+    check_failures(outcomes, 0.34, "trial")
+
+
+def test_metrics_are_checked_before_anything_runs() -> None:
+    closed, opened = load_scenario("torque-task-proportional"), load_scenario("step-response")
+    with pytest.raises(StudyError, match="no metric 'rms_eror', did you mean 'rms_error'"):
+        check_metrics(["rms_eror"], closed)
+    with pytest.raises(StudyError, match="has no 'rms_error': its controller follows no reference"):
+        check_metrics(["rms_error"], opened)
+    with pytest.raises(StudyError, match="'peak_error' is named twice"):
+        check_metrics(["peak_error", "peak_error"], closed)
+
+
+def test_pieces_are_joined_with_the_first_reason() -> None:
+    def piece(failed: bool, reason: str) -> Outcomes:
+        return Outcomes({"x": np.array([1.0])}, np.array([failed]), reason)
+
+    whole = join([piece(False, ""), piece(True, "first"), piece(True, "second")])
+    assert (whole.runs, whole.failures, whole.reason) == (3, 2, "first")
+
+
+def test_progress_grows_where_there_are_more_runs_than_were_thought() -> None:
+    seen: list[Progress] = []
+    tally = Tally(100, seen.append)
+    for runs in (100, 100, 200):
+        tally.add(runs, 1)
+    assert [(item.total, item.done, item.failed) for item in seen] == [(100, 100, 1), (200, 200, 2), (400, 400, 3)]
+
+
+def test_the_interval_of_a_mean_is_the_one_of_student_over_replicates() -> None:
+    from scipy import stats
+
+    values = np.random.default_rng(1).normal(3.0, 2.0, 64)
+    interval = replicates_interval(values, 4, 0.9)
+    known = stats.ttest_1samp([values[number::4].mean() for number in range(4)], 0.0).confidence_interval(0.9)
+    assert (interval.low, interval.high) == pytest.approx((known.low, known.high), rel=1e-12)
+    assert interval.value == pytest.approx(values.mean())
+    assert replicates_interval(values[:3], 4, 0.9).width == math.inf
+
+
+def test_one_large_draw_carries_a_mean_alone_and_normal_draws_all_do() -> None:
+    random = np.random.default_rng(1)
+    assert effective_sample_size(np.array([0.0] * 499 + [1.0])) == pytest.approx(1.0, rel=0.01)
+    assert effective_sample_size(random.normal(size=500)) == 500.0
+    assert effective_sample_size(random.exponential(size=100_000)) == pytest.approx(25_000, rel=0.2)
+    assert effective_sample_size(np.ones(7)) == 7.0
+
+
+@pytest.mark.parametrize(("hits", "draws"), [(0, 40), (3, 40), (40, 40), (250, 1000)])
+def test_the_interval_of_a_share_is_the_exact_one(hits: int, draws: int) -> None:
+    from scipy import stats
+
+    interval = fraction_interval(hits, draws, 0.95)
+    known = stats.binomtest(hits, draws).proportion_ci(0.95, "exact")
+    assert (interval.low, interval.high) == pytest.approx((known.low, known.high), abs=1e-12)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.5, 0.9])
+def test_the_interval_of_a_quantile_holds_it_often_enough_and_not_by_much(share: float) -> None:
+    from scipy import stats
+
+    random = np.random.default_rng(2)
+    truth = stats.expon.ppf(share)
+    intervals = [quantile_interval(random.exponential(size=200), share, 0.9) for _ in range(2000)]
+    held = np.mean([interval.low <= truth <= interval.high for interval in intervals])
+    assert 0.89 <= held <= 0.95
+
+
+def test_a_quantile_that_few_draws_cannot_bound_has_an_open_end() -> None:
+    interval = quantile_interval(np.arange(20.0), 0.99, 0.95)
+    assert interval.high == math.inf
+    assert interval.width == math.inf

@@ -11,15 +11,12 @@ import pytest
 import ppafo
 from ppafo.errors import StudyError
 from ppafo.questions.compare.solve import compare
-from ppafo.questions.montecarlo.estimate import StoppingRule, draw_until
-from ppafo.questions.montecarlo.statistic import Mean, Quantile
-from ppafo.questions.sweep.chunks import drawn_values
-from ppafo.studies.distributions import Floats, NormalAround
-from ppafo.studies.draws import Uncertainty, uncertainty_of
-from ppafo.studies.intervals import noise_interval
+from ppafo.questions.montecarlo.solve import Statistic, StoppingRule, draw_until, mean_of, quantile_of
+from ppafo.questions.sweep.manifest import drawn_values
+from ppafo.studies.distributions import Floats, NormalAround, noise_interval
+from ppafo.studies.draws import Outcomes, Uncertainty, uncertainty_of
 from ppafo.studies.loading import load_study
-from ppafo.studies.noise import NOISE, other_noise, with_noise
-from ppafo.studies.outcomes import Outcomes
+from ppafo.studies.sampling import NOISE, other_noise, with_noise
 from ppafo.studies.study import Drawn
 
 NOISY = ["run.duration=0.3 s", "sensors.pressure_noise=5 kPa_d"]
@@ -128,8 +125,8 @@ def test_a_share_of_noise_and_both_ends_are_between_nothing_and_all() -> None:
     assert 0.0 <= share.low <= share.value <= share.high <= 1.0
 
 
-@pytest.mark.parametrize("statistic", [Mean("N m"), Quantile("N m", 0.5)])
-def test_monte_carlo_says_how_much_is_noise(statistic: Mean | Quantile) -> None:
+@pytest.mark.parametrize("statistic", [mean_of("N m"), quantile_of("N m", 0.5)])
+def test_monte_carlo_says_how_much_is_noise(statistic: Statistic) -> None:
     from scipy import stats
 
     def model(columns: Mapping[str, Floats]) -> Outcomes:

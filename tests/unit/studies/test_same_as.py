@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import StudyError
-from ppafo.questions.sweep.chunks import drawn_values, varied_columns
+from ppafo.questions.sweep.manifest import drawn_values, varied_columns
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import with_numbers

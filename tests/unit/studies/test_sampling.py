@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.questions.sweep.chunks import chunk, chunk_count, drawn_values
+from ppafo.questions.sweep.manifest import chunk, chunk_count, drawn_values
 from ppafo.studies.distributions import (
     Distribution,
     LogNormalAround,

@@ -14,7 +14,6 @@ from ppafo.studies.varying import _DISTRIBUTIONS
 AREA = {"path": "valve.area", "kind": "uniform", "minimum": "10 mm^2", "maximum": "12 mm^2"}
 LEAK = AREA | {"path": "actuator.leak.area"}
 CD = {"path": "valve.discharge_coefficient", "kind": "uniform", "minimum": 0.1, "maximum": 0.2}
-
 CONTRADICTIONS = [
     ({"kind": "uniform", "minimum": "12 mm^2", "maximum": "10 mm^2"}, "minimum = '12 mm^2' must be less than maximum"),
     ({"kind": "uniform", "minimum": "10 mm^2", "maximum": "10 mm^2"}, "must be less than maximum = '10 mm^2'"),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from ppafo.answers.text import text_of
+from ppafo.answers.writing import text_of
 from ppafo.questions.walk.answer import comparison_table
 from ppafo.questions.walk.wearers import wearers_answer
 from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk, walk_population

@@ -22,7 +22,7 @@ import numpy as np
 import ppafo
 import ppafo.worlds.gym
 from ppafo.model.sensors import Measurement
-from ppafo.questions.league.entrants import ENTRANTS, Entrant
+from ppafo.questions.league.standing import ENTRANTS, Entrant
 
 SCENARIO = "torque-task-moving-ankle"
 HARDWARE = [

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from ppafo.answers.layout import Margins, figure_of_panels
-from ppafo.answers.style import BLACK, BLUE, VERMILION, WANTED, house_style, mark_kind
+from ppafo.answers.style import BLACK, BLUE, VERMILION, WANTED, Margins, figure_of_panels, house_style, mark_kind
 from ppafo.control.fixed.torque_laws import TARGETS
 from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, Converter, Readings, read
 from ppafo.engine.rows import rebuilt

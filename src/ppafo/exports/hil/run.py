@@ -18,9 +18,8 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ppafo.answers.layout import Margins, figure_of_free_panels
 from ppafo.answers.recording_figure import recording_figure
-from ppafo.answers.style import ACTUAL, VERMILION, house_style, render_figure
+from ppafo.answers.style import ACTUAL, VERMILION, Margins, figure_of_free_panels, house_style, render_figure
 from ppafo.documents.json_text import json_text
 from ppafo.engine.lanes import load_program
 from ppafo.engine.loading import chosen_compiler

@@ -1,18 +1,237 @@
 """The answer of a comparison: a table for each task, the statistics of pairs, error against gas, the changes."""
 
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.display_units import display_difference, display_unit
-from ppafo.answers.shown_metrics import metric_column, metric_quantity
+from ppafo.answers.display_units import (
+    display_difference,
+    display_unit,
+    display_values,
+    metric_column,
+    metric_quantity,
+    metric_title,
+    metric_words,
+)
+from ppafo.answers.style import (
+    BLACK,
+    COLOURS,
+    GREY,
+    Margins,
+    figure_of_free_panels,
+    house_style,
+    label_lines,
+    mark_kind,
+)
 from ppafo.live.workbench import live_part
-from ppafo.questions.compare.figure import change_figure, has_changes, has_errors, pareto_figure
-from ppafo.questions.compare.paired import Paired, pareto_front
-from ppafo.questions.compare.solve import COMPARED, Case, Comparison
+from ppafo.metrics import Metric
+from ppafo.questions.compare.paired import Paired, best_probabilities, compare_pairs, pareto_front
+from ppafo.questions.question import Solved
 from ppafo.simulation.document import plain
-from ppafo.studies.intervals import FEWEST_EFFECTIVE, Interval, fraction_text
+from ppafo.simulation.result import Status
+from ppafo.simulation.scenario import Scenario
+from ppafo.studies.distributions import FEWEST_EFFECTIVE, Floats, Interval, fraction_text
+from ppafo.studies.draws import Outcomes
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+    from matplotlib.axes import Axes
+
+COMPARED: dict[str, int] = {
+    "rms_error": -1,
+    "rms_error_ramp": -1,
+    "rms_error_hold": -1,
+    "peak_error": -1,
+    "gas_supplied": -1,
+    "mechanical_work": 0,
+    "gas_per_work": -1,
+    "switchings": -1,
+    "gas": -1,
+    "push_off_work": 1,
+    "push_off_error": -1,
+    "toe_clearance": 1,
+    "slap_rate": 1,
+}
+"""Metrics of the table: -1 where less is better, 1 where more is, 0 where neither is better as such."""
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A configuration on a task: its metrics by name, how the run ended, and its runs over the draws, if any.
+
+    ``renoised`` are the first draws again, each with another noise stream; None where no controller receives noise.
+    """
+
+    task: str
+    configuration: str
+    scenario: Scenario
+    metrics: Mapping[str, Metric]
+    status: Status
+    outcomes: Outcomes | None
+    renoised: Outcomes | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison(Solved):
+    """All cases, task by task in the order of the configurations, one of which is the ``baseline``.
+
+    ``draws`` is 0 without uncertainty; ``varied`` are the uncertain paths but the noise; ``confidence`` is that of
+    the intervals.
+    """
+
+    metrics: tuple[str, ...]
+    configurations: tuple[str, ...]
+    baseline: str
+    tasks: Mapping[str, tuple[str, ...]]
+    cases: tuple[Case, ...]
+    draws: int
+    seed: int
+    varied: tuple[str, ...]
+    confidence: float
+
+    def of_task(self, task: str) -> tuple[Case, ...]:
+        """Return the cases of a task."""
+        return tuple(case for case in self.cases if case.task == task)
+
+    def pairs(self, task: str, configuration: str) -> list[Paired]:
+        """Return the statistics of a configuration against the baseline on a task; none without uncertainty."""
+        baseline, other = (self._case(task, name) for name in (self.baseline, configuration))
+        first, second = baseline.outcomes, other.outcomes
+        if first is None or second is None:
+            return []
+        again: dict[str, tuple[Floats, Floats]] = {}
+        if baseline.renoised is not None and other.renoised is not None:
+            sides = (baseline.renoised.metrics, other.renoised.metrics)
+            again = {name: (sides[0][name], sides[1][name]) for name in self.metrics}
+        found = [
+            compare_pairs(
+                name, first.metrics[name], second.metrics[name], COMPARED[name], self.confidence, again.get(name)
+            )
+            for name in self.metrics
+        ]
+        return [item for item in found if item is not None]
+
+    def best(self, task: str, metric: str) -> dict[str, Interval]:
+        """Return the probability of each configuration to be the best in a metric on a task."""
+        drawn = [self._case(task, name).outcomes for name in self.configurations]
+        values: list[Floats] = [item.metrics[metric] for item in drawn if item is not None]
+        if len(values) < len(drawn) or not COMPARED[metric]:
+            return {}
+        return dict(
+            zip(self.configurations, best_probabilities(values, COMPARED[metric], self.confidence), strict=False)
+        )
+
+    def _case(self, task: str, configuration: str) -> Case:
+        return next(case for case in self.of_task(task) if case.configuration == configuration)
+
+
+_MARKS = "osD^vP"
+_ERROR, _GAS = "rms_error", "gas_supplied"
+_MAXIMUM_DOTS = 1500
+_WIDTH, _PANEL = 7.2, 2.9
+_MARGINS = Margins(left=0.75, right=0.2, top=0.55, bottom=0.55, row_gap=0.95, column_gap=0.6)
+_BINS = 40
+_SHOWN = (0.5, 99.5)
+"""Percentiles between which changes are drawn: a few far ones would make all others one bar."""
+
+
+def has_errors(comparison: Comparison) -> bool:
+    """Tell whether there is an error to draw: controllers without a reference have none."""
+    return _ERROR in comparison.metrics
+
+
+def has_changes(comparison: Comparison) -> bool:
+    """Tell whether there are draws whose changes can be drawn."""
+    return comparison.draws > 0 and has_errors(comparison)
+
+
+def pareto_figure(comparison: Comparison) -> "matplotlib.figure.Figure":
+    """Return error against gas, a panel for each task."""
+    tasks = list(comparison.tasks)
+    height = _MARGINS.top + len(tasks) * _PANEL + (len(tasks) - 1) * _MARGINS.row_gap + _MARGINS.bottom
+    with house_style():
+        figure, grid = figure_of_free_panels((_WIDTH, height), _MARGINS, len(tasks), 1)
+        for task, (axes,) in zip(tasks, grid, strict=True):
+            _draw_pareto(axes, comparison, task)
+        mark_kind(figure, "simulated")
+        return figure
+
+
+def change_figure(comparison: Comparison) -> "matplotlib.figure.Figure":
+    """Return histograms of the change against the baseline, error left and gas right."""
+    tasks = list(comparison.tasks)
+    height = _MARGINS.top + len(tasks) * 2.2 + (len(tasks) - 1) * _MARGINS.row_gap + _MARGINS.bottom
+    with house_style():
+        figure, grid = figure_of_free_panels((_WIDTH, height), _MARGINS, len(tasks), 2)
+        for task, row in zip(tasks, grid, strict=True):
+            for metric, axes in zip((_ERROR, _GAS), row, strict=True):
+                _draw_change(axes, comparison, task, metric)
+            row[0].set_ylabel("Draws")
+        mark_kind(figure, "simulated")
+        return figure
+
+
+def _draw_pareto(axes: "Axes", comparison: Comparison, task: str) -> None:
+    cases = [case for case in comparison.of_task(task) if case.status.is_completed]
+    points = np.array([_point(case) for case in cases]).reshape(-1, 2)
+    for number, case in enumerate(cases):
+        colour, mark = COLOURS[number % len(COLOURS)], _MARKS[number % len(_MARKS)]
+        if case.outcomes is not None:
+            gas = _in_display_unit(case.outcomes.metrics[_GAS][:_MAXIMUM_DOTS], _GAS)
+            error = _in_display_unit(case.outcomes.metrics[_ERROR][:_MAXIMUM_DOTS], _ERROR)
+            axes.plot(gas, error, ".", color=colour, alpha=0.18, markersize=4, markeredgewidth=0)
+        axes.plot(*points[number], mark, color=colour, markersize=8, markeredgecolor="white", label=case.configuration)
+    front = points[pareto_front(points)]
+    front = front[np.argsort(front[:, 0])]
+    axes.plot(front[:, 0], front[:, 1], "-", color=GREY, linewidth=1.0, zorder=1)
+    axes.set_xlabel(metric_title(_GAS))
+    axes.set_ylabel(metric_title(_ERROR))
+    axes.set_title(f"Task: {task}")
+    axes.margins(0.08)
+    label_lines(axes)
+
+
+def _point(case: Case) -> tuple[float, float]:
+    gas, error = (_in_display_unit(np.array([case.metrics[name].value]), name)[0] for name in (_GAS, _ERROR))
+    return float(gas), float(error)
+
+
+def _in_display_unit(values: Floats, name: str) -> Floats:
+    return display_values(values, metric_quantity(name))
+
+
+def _draw_change(axes: "Axes", comparison: Comparison, task: str, metric: str) -> None:
+    cases = {case.configuration: case for case in comparison.of_task(task)}
+    baseline = cases[comparison.baseline]
+    for number, name in enumerate(comparison.configurations):
+        own, first = cases[name].outcomes, baseline.outcomes
+        if name == comparison.baseline or own is None or first is None:
+            continue
+        colour = COLOURS[number % len(COLOURS)]
+        change = _change(first.metrics[metric], own.metrics[metric])
+        if change.size == 0:
+            continue
+        reach = np.percentile(change, _SHOWN)
+        axes.hist(change, bins=_BINS, range=(reach[0], reach[1]), color=colour, alpha=0.55, label=name)
+        if metric in baseline.metrics and metric in cases[name].metrics:
+            nominal = _change(np.array([baseline.metrics[metric].value]), np.array([cases[name].metrics[metric].value]))
+            for value in nominal:
+                axes.axvline(value, color=colour, linestyle="--", linewidth=1.2)
+    axes.axvline(0.0, color=BLACK, linewidth=0.8)
+    axes.set_xlabel(f"{metric_words(metric)} against {comparison.baseline} (%)")
+    axes.set_title(f"Task: {task}" if metric == _ERROR else "")
+    if metric == _GAS:
+        label_lines(axes)
+
+
+def _change(baseline: Floats, other: Floats) -> Floats:
+    both = np.isfinite(baseline) & np.isfinite(other) & (baseline != 0.0)
+    return np.asarray(100.0 * (other[both] - baseline[both]) / np.abs(baseline[both]))
+
 
 _PAIRED_HEAD = (
     "metric",
@@ -22,7 +241,6 @@ _PAIRED_HEAD = (
     "mean difference",
     "probability of being better",
 )
-
 _READING = (
     "The intervals of the mean difference and of the probability show how precisely the draws estimate them; they "
     "shrink with more draws. The change from 5 to 95 % of the draws shows the effect of the uncertain values; it "
@@ -38,24 +256,6 @@ def answer_of(comparison: Comparison) -> Answer:
     """Return the answer of a comparison."""
     names = comparison.configurations
     explained = (_READING,) if comparison.draws else ()
-    return Answer(
-        name="compare",
-        kicker="Comparison",
-        title=" and ".join(names) if len(names) == 2 else f"{len(names)} configurations against {comparison.baseline}",
-        lead=(lead(comparison),),
-        sections=(
-            *(section for task in comparison.tasks for section in _task_sections(comparison, task)),
-            *_figures(comparison),
-            Section(remarks=tuple(all_remarks(comparison))),
-            Section("How to read it", explained, is_detail=True) if explained else Section(),
-        ),
-        data=_data(comparison),
-        passed=all(case.status.is_completed for case in comparison.cases),
-        live=lambda: live_part([case.scenario for case in comparison.cases]),
-    )
-
-
-def _figures(comparison: Comparison) -> list[Section]:
     pareto = (
         "Marks: the nominal device; dots: draws. The line joins the configurations that no other beats in "
         "both error and gas."
@@ -68,7 +268,31 @@ def _figures(comparison: Comparison) -> list[Section]:
     if has_changes(comparison):
         drawn = Figure("change", change, lambda: change_figure(comparison))
         sections.append(Section("Spread of the change", figure=drawn, is_detail=True))
-    return sections
+    return Answer(
+        name="compare",
+        kicker="Comparison",
+        title=" and ".join(names) if len(names) == 2 else f"{len(names)} configurations against {comparison.baseline}",
+        lead=(lead(comparison),),
+        sections=(
+            *(section for task in comparison.tasks for section in _task_sections(comparison, task)),
+            *sections,
+            Section(remarks=tuple(all_remarks(comparison))),
+            Section("How to read it", explained, is_detail=True) if explained else Section(),
+        ),
+        data={
+            "units": "SI: N m, kg, J; fractions from 0 to 1",
+            "configurations": list(comparison.configurations),
+            "baseline": comparison.baseline,
+            "draws": comparison.draws,
+            "seed": comparison.seed,
+            "remarks": all_remarks(comparison),
+            "varied": list(comparison.varied),
+            "confidence": comparison.confidence,
+            "tasks": [_task_document(comparison, task) for task in comparison.tasks],
+        },
+        passed=all(case.status.is_completed for case in comparison.cases),
+        live=lambda: live_part([case.scenario for case in comparison.cases]),
+    )
 
 
 def _task_sections(comparison: Comparison, task: str) -> list[Section]:
@@ -157,36 +381,21 @@ def best_sentences(comparison: Comparison, task: str) -> list[str]:
     ]
 
 
-def _data(comparison: Comparison) -> dict[str, Any]:
-    return {
-        "units": "SI: N m, kg, J; fractions from 0 to 1",
-        "configurations": list(comparison.configurations),
-        "baseline": comparison.baseline,
-        "draws": comparison.draws,
-        "seed": comparison.seed,
-        "remarks": all_remarks(comparison),
-        "varied": list(comparison.varied),
-        "confidence": comparison.confidence,
-        "tasks": [_task_document(comparison, task) for task in comparison.tasks],
-    }
-
-
 def _others(comparison: Comparison) -> list[str]:
     return [name for name in comparison.configurations if name != comparison.baseline]
 
 
 def _paired_row(item: Paired, baseline: float, other: float) -> list[str]:
     quantity = metric_quantity(item.metric)
-    difference = [display_difference(value, quantity) for value in _ends(item.difference)]
+    difference = [
+        display_difference(value, quantity)
+        for value in (item.difference.value, item.difference.low, item.difference.high)
+    ]
     nominal = _percent((other - baseline) / abs(baseline)) if baseline else ""
     spread = f"{_percent(item.change)} ({_percent(item.change_low)} to {_percent(item.change_high)})"
     better = "" if item.better is None else "equal in all" if item.equal == 1.0 else _probability(item.better)
     shown = f"{difference[0]:+.3g} [{difference[1]:+.3g}, {difference[2]:+.3g}]"
     return [item.metric, display_unit(quantity), nominal, "" if math.isnan(item.change) else spread, shown, better]
-
-
-def _ends(interval: Interval) -> Sequence[float]:
-    return (interval.value, interval.low, interval.high)
 
 
 def _percent(fraction: float) -> str:
@@ -239,11 +448,17 @@ def _skewness_warnings(comparison: Comparison, task: str) -> list[str]:
 
 def _task_document(comparison: Comparison, task: str) -> dict[str, Any]:
     cases = comparison.of_task(task)
+    goals = ("rms_error", "gas_supplied")
+    points = np.array(
+        [[case.metrics[name].value if name in case.metrics else np.nan for name in goals] for case in cases]
+    )
     return {
         "task": task,
         "overrides": list(comparison.tasks[task]),
         "cases": [_case_document(case) for case in cases],
-        "pareto_front": _front(cases),
+        "pareto_front": [
+            case.configuration for case, is_front in zip(cases, pareto_front(points), strict=True) if is_front
+        ],
         "pairs": {name: [plain(item) for item in comparison.pairs(task, name)] for name in _others(comparison)},
         "best": {
             name: {key: plain(fraction) for key, fraction in comparison.best(task, name).items()}
@@ -260,14 +475,3 @@ def _case_document(case: Case) -> dict[str, Any]:
         "metrics": {name: plain(metric) for name, metric in case.metrics.items() if name in COMPARED},
         "failed_draws": case.outcomes.failures if case.outcomes is not None else 0,
     }
-
-
-def _front(cases: Sequence[Case]) -> list[str]:
-    """Return the configurations that no other beats in both error and gas."""
-    import numpy as np
-
-    goals = ("rms_error", "gas_supplied")
-    points = np.array(
-        [[case.metrics[name].value if name in case.metrics else np.nan for name in goals] for case in cases]
-    )
-    return [case.configuration for case, is_front in zip(cases, pareto_front(points), strict=True) if is_front]

@@ -1,4 +1,4 @@
-"""Statistics of pairs: the same draw of all uncertain values, run in two configurations (common random numbers)."""
+"""Paired comparisons: differences from a baseline with intervals, the probability of being best, the Pareto front."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,18 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import REPLICATES
-from ppafo.studies.intervals import (
+from ppafo.studies.distributions import (
+    Floats,
     Interval,
     effective_sample_size,
     fraction_interval,
     noise_interval,
     replicates_interval,
 )
+from ppafo.studies.draws import REPLICATES
 
 Masks = NDArray[np.bool_]
-
 OUTER_QUANTILES = (0.05, 0.95)
 """The quantiles over the draws that tables show beside a median."""
 
@@ -45,6 +44,16 @@ class Paired:
     equal: float
     effective_size: float
     noise: Interval | None = None
+
+
+def pareto_front(points: Floats) -> Masks:
+    """Return which points (points, goals) are not dominated: no other is at least as low in all goals, lower in one."""
+    front = np.zeros(len(points), dtype=np.bool_)
+    for row, point in enumerate(points):
+        if np.all(np.isfinite(point)):
+            is_dominating = np.all(points <= point, axis=1) & np.any(points < point, axis=1)
+            front[row] = not bool(np.any(is_dominating))
+    return front
 
 
 def compare_pairs(
@@ -98,13 +107,3 @@ def best_probabilities(values: Sequence[Floats], better: int, confidence: float)
         return []
     is_best = table == np.max(table, axis=0)
     return [fraction_interval(int(np.count_nonzero(row)), draws, confidence) for row in is_best]
-
-
-def pareto_front(points: Floats) -> Masks:
-    """Return which points (points, goals) are not dominated: no other is at least as low in all goals, lower in one."""
-    front = np.zeros(len(points), dtype=np.bool_)
-    for row, point in enumerate(points):
-        if np.all(np.isfinite(point)):
-            is_dominating = np.all(points <= point, axis=1) & np.any(points < point, axis=1)
-            front[row] = not bool(np.any(is_dominating))
-    return front

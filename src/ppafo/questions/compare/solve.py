@@ -7,54 +7,37 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.answers import Solved
 from ppafo.errors import StudyError
-from ppafo.metrics import METRICS, Metric
+from ppafo.metrics import METRICS
 from ppafo.progress import Report
-from ppafo.questions.compare.paired import Paired, best_probabilities, compare_pairs
+from ppafo.questions.compare.answer import COMPARED, Case, Comparison
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import number_at
-from ppafo.simulation.result import Status
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate_many
-from ppafo.studies.configurations import (
-    Configurations,
-    ConfiguredTask,
-    choose_configurations,
-    valid_baseline,
-    with_overrides,
-)
-from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import Uncertainty, study_of, uncertainty_of, with_new_noise
-from ppafo.studies.intervals import Interval
-from ppafo.studies.noise import NOISE
-from ppafo.studies.outcomes import (
+from ppafo.studies.draws import (
     Outcomes,
     Tally,
+    Uncertainty,
     check_confidence,
     check_draws,
     check_failures,
     check_fraction,
     scenario_model,
+    study_of,
+    uncertainty_of,
+    with_new_noise,
 )
-from ppafo.studies.study import Study
+from ppafo.studies.sampling import NOISE
+from ppafo.studies.study import (
+    Configurations,
+    ConfiguredTask,
+    Study,
+    choose_configurations,
+    valid_baseline,
+    with_overrides,
+)
 
-COMPARED: dict[str, int] = {
-    "rms_error": -1,
-    "rms_error_ramp": -1,
-    "rms_error_hold": -1,
-    "peak_error": -1,
-    "gas_supplied": -1,
-    "mechanical_work": 0,
-    "gas_per_work": -1,
-    "switchings": -1,
-    "gas": -1,
-    "push_off_work": 1,
-    "push_off_error": -1,
-    "toe_clearance": 1,
-    "slap_rate": 1,
-}
-"""Metrics of the table: -1 where less is better, 1 where more is, 0 where neither is better as such."""
 AS_WRITTEN = "as written"
 """What the task of a configuration is called where no other is requested."""
 DEFAULT_DRAWS = 4096
@@ -62,78 +45,7 @@ FEWEST_DRAWS = 32
 DEFAULT_SEED = 1
 NOISE_DRAWS = 512
 """Draws that are run once more with other noise, at most."""
-
 Source = Study | str | Path | Mapping[str, Any]
-
-
-@dataclass(frozen=True, slots=True)
-class Case:
-    """A configuration on a task: its metrics by name, how the run ended, and its runs over the draws, if any.
-
-    ``renoised`` are the first draws again, each with another noise stream; None where no controller receives noise.
-    """
-
-    task: str
-    configuration: str
-    scenario: Scenario
-    metrics: Mapping[str, Metric]
-    status: Status
-    outcomes: Outcomes | None
-    renoised: Outcomes | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Comparison(Solved):
-    """All cases, task by task in the order of the configurations, one of which is the ``baseline``.
-
-    ``draws`` is 0 without uncertainty; ``varied`` are the uncertain paths but the noise; ``confidence`` is that of
-    the intervals.
-    """
-
-    metrics: tuple[str, ...]
-    configurations: tuple[str, ...]
-    baseline: str
-    tasks: Mapping[str, tuple[str, ...]]
-    cases: tuple[Case, ...]
-    draws: int
-    seed: int
-    varied: tuple[str, ...]
-    confidence: float
-
-    def of_task(self, task: str) -> tuple[Case, ...]:
-        """Return the cases of a task."""
-        return tuple(case for case in self.cases if case.task == task)
-
-    def pairs(self, task: str, configuration: str) -> list[Paired]:
-        """Return the statistics of a configuration against the baseline on a task; none without uncertainty."""
-        baseline, other = (self._case(task, name) for name in (self.baseline, configuration))
-        first, second = baseline.outcomes, other.outcomes
-        if first is None or second is None:
-            return []
-        again: dict[str, tuple[Floats, Floats]] = {}
-        if baseline.renoised is not None and other.renoised is not None:
-            sides = (baseline.renoised.metrics, other.renoised.metrics)
-            again = {name: (sides[0][name], sides[1][name]) for name in self.metrics}
-        found = [
-            compare_pairs(
-                name, first.metrics[name], second.metrics[name], COMPARED[name], self.confidence, again.get(name)
-            )
-            for name in self.metrics
-        ]
-        return [item for item in found if item is not None]
-
-    def best(self, task: str, metric: str) -> dict[str, Interval]:
-        """Return the probability of each configuration to be the best in a metric on a task."""
-        drawn = [self._case(task, name).outcomes for name in self.configurations]
-        values: list[Floats] = [item.metrics[metric] for item in drawn if item is not None]
-        if len(values) < len(drawn) or not COMPARED[metric]:
-            return {}
-        return dict(
-            zip(self.configurations, best_probabilities(values, COMPARED[metric], self.confidence), strict=False)
-        )
-
-    def _case(self, task: str, configuration: str) -> Case:
-        return next(case for case in self.of_task(task) if case.configuration == configuration)
 
 
 def compare(

@@ -9,5 +9,5 @@ QUESTION = Question(
         SEED,
         THREADS,
     ),
-    library="ppafo.questions.design.file:FILE",
+    library="ppafo.questions.design.problem:FILE",
 )

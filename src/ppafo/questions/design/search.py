@@ -1,26 +1,214 @@
-"""The search for a front: an even sample of all designs, then generations of differential evolution.
-
-Kukkonen and Lampinen, GDE3: the third evolution step of generalized differential evolution, 2005; variation of the
-choice of parts as in a genetic algorithm. Why so: docs/decisions/0006.
-"""
+"""Search for designs that no other dominates: what dominates what, how a generation follows from the last."""
 
 import time
+from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, Field
 
+from ppafo.documents.models import STRICT
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.questions.design.front import (
-    Candidates,
-    Floats,
-    Worth,
-    evenly_spread,
-    hypervolume,
-    non_dominated,
-    survivors,
-)
+
+Floats = NDArray[np.float64]
+Choices = NDArray[np.int64]
+MAXIMUM_SHOWN = 12
+_CHUNK = 512
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidates:
+    """``choice`` (candidates,) counts from 0; ``places`` (candidates, variables) are from 0 to 1."""
+
+    choice: Choices
+    places: Floats
+
+    def __len__(self) -> int:
+        """Return the number of candidates."""
+        return self.choice.size
+
+    def at(self, members: NDArray[np.bool_] | NDArray[np.intp]) -> "Candidates":
+        """Return some of the candidates."""
+        return Candidates(self.choice[members], self.places[members])
+
+    def with_more(self, more: "Candidates") -> "Candidates":
+        """Return these candidates and then the others."""
+        return Candidates(np.concatenate([self.choice, more.choice]), np.concatenate([self.places, more.places]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Worth:
+    """What candidates are worth.
+
+    ``objectives`` (candidates, objectives) are to be small; nan where a candidate could not be evaluated. ``violation``
+    (candidates,) is 0 where all constraints are kept, infinite where a run failed.
+    """
+
+    objectives: Floats
+    violation: Floats
+
+    @property
+    def is_feasible(self) -> NDArray[np.bool_]:
+        """Which candidates satisfy all constraints."""
+        return np.asarray(self.violation == 0.0)
+
+    def at(self, members: NDArray[np.bool_] | NDArray[np.intp]) -> "Worth":
+        """Return the worth of some of the candidates."""
+        return Worth(self.objectives[members], self.violation[members])
+
+    def with_more(self, more: "Worth") -> "Worth":
+        """Return this and then the other."""
+        return Worth(
+            np.concatenate([self.objectives, more.objectives]), np.concatenate([self.violation, more.violation])
+        )
+
+
+def evenly_spread(count: int, choices: int, variables: int, seed: int) -> Candidates:
+    """Return candidates of a scrambled Sobol sequence; a choice is one more dimension, so that each is met as often."""
+    from scipy.stats import qmc
+
+    sequence = qmc.Sobol(variables + 1, rng=np.random.default_rng(seed))
+    points = sequence.random_base2(max(0, int(np.ceil(np.log2(count)))))[:count]
+    return Candidates(np.minimum((points[:, 0] * choices).astype(np.int64), choices - 1), points[:, 1:])
+
+
+def dominance(first: Worth, second: Worth) -> NDArray[np.bool_]:
+    """Return (first, second): True where a point of the first dominates one of the second.
+
+    Of two points of which not both satisfy the constraints, the one that violates them less dominates.
+    """
+    a, b = first.objectives[:, None, :], second.objectives[None, :, :]
+    is_better = np.all(a <= b, axis=2) & np.any(a < b, axis=2)
+    both = first.is_feasible[:, None] & second.is_feasible[None, :]
+    violates_less = first.violation[:, None] < second.violation[None, :]
+    return np.where(both, is_better, violates_less)
+
+
+def non_dominated(worth: Worth) -> NDArray[np.bool_]:
+    """Return which points (points,) no other dominates; equal points all stay."""
+    kept = np.ones(worth.violation.size, dtype=bool)
+    for start in range(0, kept.size, _CHUNK):
+        # What is dominated cannot be needed to dominate others: its dominator dominates them too.
+        members = np.flatnonzero(kept)
+        part = np.arange(start, min(start + _CHUNK, kept.size))
+        kept[part] &= ~dominance(worth.at(members), worth.at(part)).any(axis=0)
+    return kept
+
+
+def ranks(worth: Worth) -> NDArray[np.int64]:
+    """Return the rank (points,): 0 for the points that none dominates, 1 for those that only these dominate, ..."""
+    matrix = dominance(worth, worth)
+    counts = matrix.sum(axis=0)
+    found = np.full(counts.size, -1, dtype=np.int64)
+    rank = 0
+    while np.any(found < 0):
+        front = (found < 0) & (counts == 0)
+        found[front] = rank
+        counts = counts - matrix[front].sum(axis=0)
+        rank += 1
+    return found
+
+
+def crowding(objectives: Floats) -> Floats:
+    """Return the crowding distance (points,) [-]: how far apart a point's neighbours are; infinite at the ends."""
+    count = objectives.shape[0]
+    distance = np.zeros(count)
+    for column in objectives.T:
+        order = np.argsort(column, kind="stable")
+        span = column[order[-1]] - column[order[0]]
+        distance[order[[0, -1]]] = np.inf
+        if span > 0.0 and count > 2:
+            distance[order[1:-1]] += (column[order[2:]] - column[order[:-2]]) / span
+    return distance
+
+
+def survivors(worth: Worth, count: int) -> NDArray[np.intp]:
+    """Return the places of the ``count`` best points: lower ranks first, then the less crowded of the last front."""
+    rank = ranks(worth)
+    order = np.empty(0, dtype=np.intp)
+    for value in range(int(rank.max()) + 1):
+        front = np.flatnonzero(rank == value)
+        if order.size + front.size > count:
+            apart = crowding(np.nan_to_num(worth.objectives[front]))
+            front = front[np.argsort(-apart, kind="stable")]
+        order = np.concatenate([order, front])[:count]
+    return order
+
+
+def hypervolume(points: Floats, reference: Floats) -> float:
+    """Return the volume that points (points, 3) dominate up to a reference point (3,); all objectives to be small.
+
+    The points are taken in order of the third objective; between two of them the dominated area in the plane of the
+    other two, bounded by a staircase, stays the same.
+    """
+    inside = points[(points < reference).all(axis=1)]
+    if inside.size == 0:
+        return 0.0
+    ordered = inside[inside[:, 2].argsort(kind="stable")]
+    heights = [*ordered[:, 2].tolist(), float(reference[2])]
+    stairs = _Staircase(float(reference[0]), float(reference[1]))
+    volume = area = 0.0
+    for (x, y, height), above in zip(ordered.tolist(), heights[1:], strict=True):
+        area += stairs.add(x, y)
+        volume += area * (above - height)
+    return volume
+
+
+class _Staircase:
+    """Points of a plane of which none dominates another: x grows, y falls."""
+
+    def __init__(self, right: float, top: float) -> None:
+        self._right, self._top = right, top
+        self._x: list[float] = []
+        self._y: list[float] = []
+
+    def add(self, x: float, y: float) -> float:
+        """Add a point and return the area that it dominates and no point before it did."""
+        place = bisect_left(self._x, x)
+        left_height = self._y[place - 1] if place else self._top
+        if left_height <= y or (place < len(self._x) and self._x[place] == x and self._y[place] <= y):
+            return 0.0
+        area, start, height, end = 0.0, x, left_height, place
+        while end < len(self._x) and self._y[end] >= y:
+            area += (self._x[end] - start) * (height - y)
+            start, height, end = self._x[end], self._y[end], end + 1
+        stop = self._x[end] if end < len(self._x) else self._right
+        area += (stop - start) * (height - y)
+        self._x[place:end], self._y[place:end] = [x], [y]
+        return area
+
+
+def fractions(objectives: Floats) -> Floats:
+    """Return objectives (points, objectives) as fractions: 0 the best value on the front, 1 the worst."""
+    lowest, highest = objectives.min(axis=0), objectives.max(axis=0)
+    span = np.where(highest > lowest, highest - lowest, 1.0)
+    return np.asarray((objectives - lowest) / span)
+
+
+def knee(objectives: Floats) -> int:
+    """Return the place of the design with the smallest sum of fractions.
+
+    What any other design gains in some objectives it loses at least as much of in the rest, counted in fractions.
+    """
+    return int(np.argmin(fractions(objectives).sum(axis=1)))
+
+
+def representatives(objectives: Floats, most: int = MAXIMUM_SHOWN) -> tuple[int, ...]:
+    """Return places of designs that stand for the front, in its order.
+
+    The best of each objective and the knee first, then always the one farthest from all that are there.
+    """
+    scaled = fractions(objectives)
+    chosen = list(dict.fromkeys([*np.argmin(objectives, axis=0).tolist(), knee(objectives)]))[:most]
+    distance = np.min([np.linalg.norm(scaled - scaled[place], axis=1) for place in chosen], axis=0)
+    while len(chosen) < min(most, objectives.shape[0]) and distance.max() > 0.0:
+        chosen.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.linalg.norm(scaled - scaled[chosen[-1]], axis=1))
+    return tuple(sorted(chosen))
+
 
 SCALES = (0.1, 0.6)
 """Smallest and largest fraction of a difference of two designs that is added to a third."""
@@ -30,17 +218,26 @@ OTHER_PARTS = 0.1
 """Fraction of the children that try parts at random; half of the others take those of the changed design."""
 PATIENCE = 10
 """Generations over which the hypervolume has to grow."""
+LARGEST_SEED = 2**32 - 1
 
 
-@dataclass(frozen=True, slots=True)
-class SearchSettings:
-    """Designs of the initial even sample and of each generation, the most generations, relative tolerance, seed."""
+class SearchTable(BaseModel):
+    """How long to search."""
 
-    screening: int
-    population: int
-    generations: int
-    tolerance: float
-    seed: int
+    model_config = STRICT
+
+    screening: Annotated[
+        int, Field(ge=16, le=100_000, description="number of evenly spread designs in the first generation")
+    ] = 4096
+    population: Annotated[int, Field(ge=16, le=4096, description="number of designs in each later generation")] = 256
+    generations: Annotated[int, Field(ge=0, le=10_000, description="maximum number of generations")] = 80
+    tolerance: Annotated[
+        float,
+        Field(ge=0.0, lt=1.0, description="stop when the hypervolume grows by less than this over 10 generations"),
+    ] = 1.0e-3
+    seed: Annotated[
+        int, Field(ge=0, le=LARGEST_SEED, description="random seed; the same seed gives the same designs")
+    ] = 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,7 +258,7 @@ Evaluate = Callable[[Candidates], Worth]
 
 
 def search_front(
-    evaluate: Evaluate, choices: int, variables: int, settings: SearchSettings, progress: Report = report_nothing
+    evaluate: Evaluate, choices: int, variables: int, settings: SearchTable, progress: Report = report_nothing
 ) -> Front:
     """Return the front of a problem with ``choices`` combinations of parts and ``variables`` numbers.
 
@@ -91,7 +288,7 @@ def search_front(
     return Front(found, worth, tuple(growth), _has_settled(growth, settings.tolerance))
 
 
-def _progress(growth: list[tuple[int, float]], settings: SearchSettings, elapsed: float) -> Progress:
+def _progress(growth: list[tuple[int, float]], settings: SearchTable, elapsed: float) -> Progress:
     designs, fraction = growth[-1]
     most = settings.screening + settings.generations * settings.population
     return Progress(f"hypervolume {fraction:.2f}", designs, most, elapsed=elapsed, noun="designs")

@@ -1,92 +1,220 @@
 """Carries out a design study: problem in, front with table, knee and doubts out."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ppafo.answers import Solved
 from ppafo.answers.display_units import change_text
 from ppafo.errors import StudyError
+from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.parameters.parts import Part
 from ppafo.progress import Report, report_nothing
-from ppafo.questions.design.evaluation import (
+from ppafo.questions.design.answer import SHOWN_OBJECTIVES, Design, DesignPoint, objective_table
+from ppafo.questions.design.problem import (
+    DEAD_VOLUME,
     FRESH_STREAMS,
+    GAS,
+    OBJECTIVES,
+    OWN,
     SEARCHED_STREAMS,
-    Evaluation,
-    Judged,
-    noise_streams,
-    values_of,
+    SIZE,
+    DesignProblem,
+    Task,
+    load_design,
+    with_seed,
 )
-from ppafo.questions.design.file import GAS, DesignProblem, load_design, with_seed
-from ppafo.questions.design.front import Candidates, Floats, knee, non_dominated, representatives
-from ppafo.questions.design.search import Front, search_front
+from ppafo.questions.design.search import (
+    Candidates,
+    Floats,
+    Front,
+    Worth,
+    knee,
+    non_dominated,
+    representatives,
+    search_front,
+)
+from ppafo.simulation.ensemble import COMPLETED, run_ensemble
+from ppafo.simulation.numbers import TIMES, declared_numbers, moving_together, number_at
+from ppafo.simulation.scenario import Scenario
+from ppafo.studies.draws import Uncertainty
+from ppafo.studies.sampling import NOISE, with_noise
 
-SHOWN_OBJECTIVES = {"error": "torque", "gas": "gas mass", "mass": "part mass"}
-"""What a design is judged by, with the kind of quantity as which a person is shown it."""
+Members = NDArray[np.intp]
+SUPPLIES = (PRESSURE_PATH, SECOND_PRESSURE_PATH, ATMOSPHERE_PATH)
+"""What decides about the pressures that parts must stand."""
+_MAXIMUM_REASONS = 20
+_CHUNK = 16_384
+"""Runs handed to the lanes at once: enough to fill them, little enough memory."""
 
 
-@dataclass(frozen=True, slots=True)
-class DesignPoint:
-    """A design that no other design found beats: parts, chosen numbers [SI] by path, error [N m], gas and mass [kg].
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """What candidates are worth over all streams of noise, and what each task says of them.
 
-    ``tasks`` has error and gas of each task by its name. Where sensors are noisy all are means over ``FRESH_STREAMS``
-    new streams of noise, and ``spread`` has the standard deviations of error and gas from one stream to another.
+    ``tasks`` has the metrics (streams, candidates) by name for each task, ``error`` and ``gas`` (streams, candidates)
+    their weighted means over the tasks [N m], [kg]. There is one stream where no sensor is noisy.
     """
 
-    valve: Part
-    actuator: Part
-    numbers: Mapping[str, float]
-    error: float
-    gas: float
-    mass: float
-    tasks: Mapping[str, tuple[float, float]]
-    spread: tuple[float, float] | None = None
-
-    @property
-    def objectives(self) -> tuple[float, float, float]:
-        """Error [N m], gas per task [kg], mass [kg]."""
-        return self.error, self.gas, self.mass
+    worth: Worth
+    tasks: tuple[Mapping[str, Floats], ...]
+    error: Floats
+    gas: Floats
 
 
-@dataclass(frozen=True, slots=True)
-class Design(Solved):
-    """The result of a design study.
+@final
+class Evaluation:
+    """Evaluates candidates of a problem and remembers how many runs that took and why some failed.
 
-    ``front`` is in order of error. ``shown`` are places in it that stand for all of it in a table, ``knee`` is the
-    place of the suggestion and ``reason`` states why. ``growth`` has pairs of designs evaluated and hypervolume [-];
-    ``failures`` maps the reason of a failed run to the task it failed in. ``streams`` is how many new streams of noise
-    the front was judged over, 0 without noise, and ``fallen`` how many of its designs did not stand there.
+    ``seeds`` (streams,) name the streams of noise that every candidate meets, the same for all; none where no
+    controller receives noise.
     """
 
-    problem: DesignProblem
-    front: tuple[DesignPoint, ...]
-    shown: tuple[int, ...]
-    knee: int
-    reason: str
-    growth: tuple[tuple[int, float], ...]
-    settled: bool
-    designs: int
-    runs: int
-    failed: int
-    failures: Mapping[str, str]
-    seconds: float
-    streams: int = 0
-    fallen: int = 0
+    def __init__(self, problem: DesignProblem, threads: int | None = None) -> None:
+        self.problem = problem
+        self.runs = 0
+        self.failed = 0
+        self.reasons: dict[str, str] = {}
+        self.seeds = noise_streams(problem, 0, SEARCHED_STREAMS)
+        self._threads = threads
+        own = (item.name for item in problem.constraints if item.name not in OBJECTIVES)
+        self._metrics = tuple(dict.fromkeys([problem.error, GAS, *own]))
 
-    @property
-    def doubtful(self) -> tuple[tuple[Part, str], ...]:
-        """Figures that are quoted or assumed, of the parts on the front and of those that every design carries."""
-        used = {part.name for point in self.front for part in (point.valve, point.actuator)}
-        used |= {part.name for part in self.problem.carried}
-        return tuple((part, name) for part in self.problem.parts if part.name in used for name in part.doubtful)
+    def __call__(self, candidates: Candidates) -> Worth:
+        """Return objectives (error [N m], gas [kg], mass [kg]) and the violation of the constraints."""
+        return self.judge(candidates, self.seeds).worth
+
+    def judge(self, candidates: Candidates, seeds: Floats) -> Judged:
+        """Return what candidates are worth over streams of noise: means of error and gas, constraints kept in each."""
+        problem = self.problem
+        metrics = tuple(self.metrics(task, candidates, seeds) for task in problem.tasks)
+        weights = [task.weight for task in problem.tasks]
+        error, gas = (
+            np.sum([weight * found[name] for weight, found in zip(weights, metrics, strict=True)], axis=0)
+            for name in (problem.error, GAS)
+        )
+        objectives = np.stack([error.mean(axis=0), gas.mean(axis=0), self.masses(candidates)], axis=1)
+        worth = Worth(objectives, self._violation(candidates, objectives, metrics))
+        return Judged(worth, metrics, error, gas)
+
+    def metrics(self, task: Task, candidates: Candidates, seeds: Floats) -> dict[str, Floats]:
+        """Return the metrics (streams, candidates) of a task by name; nan where a run failed."""
+        streams = max(1, seeds.size)
+        found = {name: np.full((streams, len(candidates)), np.nan) for name in self._metrics}
+        for valve, members in self._by_valve(candidates):
+            scenario = task.scenarios[valve.kind]
+            for start in range(0, members.size, max(1, _CHUNK // streams)):
+                part = members[start : start + max(1, _CHUNK // streams)]
+                self._run(task, scenario, candidates.at(part), part, seeds, found)
+        return found
+
+    def masses(self, candidates: Candidates) -> Floats:
+        """Return the mass [kg] (candidates,) of all that is carried."""
+        problem = self.problem
+        valves = np.array([item.valve.full_mass for item in problem.combinations])
+        actuators = np.array([item.actuator.full_mass for item in problem.combinations])
+        size = values_of(problem, candidates).get(SIZE, np.ones(len(candidates)))
+        fixed = problem.other_mass + sum(part.full_mass for part in problem.carried)
+        return np.asarray(valves[candidates.choice] + size * actuators[candidates.choice] + fixed)
+
+    def _by_valve(self, candidates: Candidates) -> list[tuple[Part, Members]]:
+        """Return each valve with its candidates: those of one valve have one kind and one form of orifice."""
+        names = np.array([item.valve.name for item in self.problem.combinations])[candidates.choice]
+        valves = {item.valve.name: item.valve for item in self.problem.combinations}
+        return [(valves[str(name)], np.flatnonzero(names == name)) for name in np.unique(names)]
+
+    def _run(
+        self,
+        task: Task,
+        scenario: Scenario,
+        candidates: Candidates,
+        members: Members,
+        seeds: Floats,
+        found: dict[str, Floats],
+    ) -> None:
+        columns = design_columns(self.problem, scenario, candidates)
+        streams = max(1, seeds.size)
+        if seeds.size:
+            columns = {path: np.tile(values, streams) for path, values in columns.items()}
+            columns[NOISE] = np.repeat(seeds, members.size)
+        result = run_ensemble(scenario, columns, self._metrics, threads=self._threads)
+        for name, values in result.metrics.items():
+            found[name][:, members] = values.reshape(streams, members.size)
+        self.runs += streams * members.size
+        self.failed += int(np.count_nonzero(result.status != COMPLETED))
+        for reason in list(result.reasons.values())[: _MAXIMUM_REASONS - len(self.reasons)]:
+            self.reasons.setdefault(reason, task.name)
+
+    def _violation(self, candidates: Candidates, objectives: Floats, metrics: Sequence[Mapping[str, Floats]]) -> Floats:
+        total = np.zeros(len(candidates))
+        own: Mapping[str, Floats] = dict(zip(OBJECTIVES, objectives.T[:, None, :], strict=True))
+        for item in self.problem.constraints:
+            series = [own[item.name]] if item.name in own else [found[item.name] for found in metrics]
+            for values in series:
+                beyond = _excess(values, item.most, 1.0) + _excess(values, item.least, -1.0)
+                total += beyond.max(axis=0)
+        total += self._over_rating(candidates)
+        return np.where(np.isfinite(objectives).all(axis=1) & np.isfinite(total), total, np.inf)
+
+    def _over_rating(self, candidates: Candidates) -> Floats:
+        """Return by what fraction (candidates,) the highest supply pressure is above what the parts are made for."""
+        problem = self.problem
+        ratings = np.array(
+            [
+                min(
+                    part.values.get("largest_pressure", np.inf)
+                    for part in (item.valve, item.actuator, *problem.carried)
+                )
+                for item in problem.combinations
+            ]
+        )[candidates.choice]
+        chosen = values_of(problem, candidates)
+        highest = np.zeros(len(candidates))
+        for task in problem.tasks:
+            for scenario in task.scenarios.values():
+                found = moving_together(scenario, {path: chosen[path] for path in SUPPLIES if path in chosen})
+                for path in SUPPLIES[:2]:
+                    highest = np.maximum(highest, found.get(path, number_at(scenario, path)))
+        return np.asarray(np.maximum(0.0, highest / ratings - 1.0))
 
 
-def objective_table(front: tuple[DesignPoint, ...]) -> Floats:
-    """Return the objectives of designs, (designs, 3)."""
-    return np.array([point.objectives for point in front]).reshape(-1, 3)
+def _excess(values: Floats, limit: float | None, sign: float) -> Floats:
+    """Return by what fraction of a limit values are beyond it, each; 0 where they keep it or there is none."""
+    if limit is None:
+        return np.zeros_like(values)
+    return np.maximum(0.0, sign * (values - limit) / max(abs(limit), 1.0e-12))
+
+
+def noise_streams(problem: DesignProblem, first: int, count: int) -> Floats:
+    """Return the seeds of streams of noise, from number ``first`` on; none where no controller receives noise."""
+    scenarios = [scenario for task in problem.tasks for scenario in task.scenarios.values()]
+    noise = Uncertainty(with_noise((), None, scenarios, [item.path for item in problem.variables])[0])
+    return noise.random_columns(first, count, problem.search.seed)[NOISE] if noise.has_noise else np.zeros(0)
+
+
+def values_of(problem: DesignProblem, candidates: Candidates) -> dict[str, Floats]:
+    """Return the chosen numbers (candidates,) in SI, by path."""
+    return {item.path: item.value(candidates.places[:, index]) for index, item in enumerate(problem.variables)}
+
+
+def design_columns(problem: DesignProblem, scenario: Scenario, candidates: Candidates) -> dict[str, Floats]:
+    """Return the columns of candidates that have one valve and run in one scenario."""
+    chosen = values_of(problem, candidates)
+    combinations = [problem.combinations[choice] for choice in candidates.choice.tolist()]
+    count = len(candidates)
+    columns = {path: np.full(count, number) for path, number in combinations[0].valve.model_numbers.items()}
+    size = chosen.get(SIZE, np.ones(count))
+    for name in ("torque_constant", "volume_per_angle"):
+        columns[f"actuator.{name}"] = size * np.array([item.actuator.values[name] for item in combinations])
+    if DEAD_VOLUME in chosen:
+        columns |= {f"{DEAD_VOLUME}_{chamber}": chosen[DEAD_VOLUME] for chamber in (1, 2)}
+    known = declared_numbers(scenario)
+    columns |= {path: values for path, values in chosen.items() if path not in OWN and (path in known or path in TIMES)}
+    return columns
 
 
 def design(
@@ -169,14 +297,12 @@ def _points(problem: DesignProblem, candidates: Candidates, judged: Judged) -> t
             gas=float(objectives[row, 1]),
             mass=float(objectives[row, 2]),
             tasks={name: (float(error[row]), float(gas[row])) for name, (error, gas) in means.items()},
-            spread=_spread(judged, row) if is_noisy else None,
+            spread=(float(judged.error[:, row].std(ddof=1)), float(judged.gas[:, row].std(ddof=1)))
+            if is_noisy
+            else None,
         )
         for row in range(len(candidates))
     )
-
-
-def _spread(judged: Judged, row: int) -> tuple[float, float]:
-    return float(judged.error[:, row].std(ddof=1)), float(judged.gas[:, row].std(ddof=1))
 
 
 def _applies(problem: DesignProblem, candidates: Candidates, row: int, path: str) -> bool:

@@ -1,24 +1,163 @@
 """The answer about a bottle: how long it lasts and why it ends, its values with their sources; several side by side."""
 
-from dataclasses import asdict
-from typing import Any
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.display_units import display_value, quantity_text
+from ppafo.answers.display_units import axis_unit, display_value, display_values, quantity_text
+from ppafo.answers.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    VERMILION,
+    Margins,
+    figure_of_panels,
+    house_style,
+    label_lines,
+    mark_kind,
+)
 from ppafo.model.cold_gas import heat_to_warm
+from ppafo.model.exhaust_reuse import ReuseBalance, ReuseCycle, reuse_balance
 from ppafo.model.source import bottle_content
+from ppafo.parameters.bottles.bottle import Bottle
 from ppafo.questions.endurance.discharge import Discharge
-from ppafo.questions.endurance.figure import endurance_figure
-from ppafo.questions.endurance.reuse import GIVEN, Reuse
-from ppafo.questions.endurance.solve import Endurance, Endurances
+from ppafo.questions.endurance.draw import Draw, Schedule
+from ppafo.questions.question import Solved
+from ppafo.signals.recording import Floats
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.units import format_quantity
 from ppafo.version import __version__
 
-FORMAT = "ppafo endurance"
+if TYPE_CHECKING:
+    import matplotlib.figure
+    from matplotlib.axes import Axes
 
+GIVEN = "given"
+
+
+@dataclass(frozen=True, slots=True)
+class Reuse:
+    """A cycle with a reservoir, and where its pressures and volumes come from, by name."""
+
+    cycle: ReuseCycle
+    origins: Mapping[str, str]
+
+    @property
+    def balance(self) -> ReuseBalance:
+        """The masses of a cycle once the reservoir has settled."""
+        return reuse_balance(self.cycle)
+
+
+@dataclass(frozen=True, slots=True)
+class Endurance(Solved):
+    """The request and its result.
+
+    ``discharge`` is the requested course; ``without_reuse`` the same without reuse, where there is one.
+    ``steps_when_warm`` is the number of steps that a bottle which stays at room temperature gives: what cooling costs.
+    ``is_of_course`` is true where a step is a course, ``is_whole`` unless the walk ended before it did. ``others`` is
+    the same for a walk or a run with other readings of the paper's chambers, by their names.
+    """
+
+    bottle: Bottle
+    draw: Draw
+    schedule: Schedule
+    discharge: Discharge
+    reuse: Reuse | None
+    without_reuse: Discharge | None
+    steps_when_warm: float
+    is_of_course: bool = False
+    others: Mapping[str, "Endurance"] = field(default_factory=dict)
+    is_whole: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Endurances(Solved):
+    """Several gas uses on the same bottle, by name."""
+
+    uses: Mapping[str, Endurance]
+
+
+_WIDTH, _LEFT, _RIGHT = 7.2, 0.62, 0.2
+_PANEL, _GAP, _TOP, _BOTTOM, _REMARK_LINE = 1.5, 0.45, 0.75, 0.62, 0.17
+"""Inches."""
+_REMARK_WIDTH = 105
+_PANELS = 3
+
+
+def endurance_figure(found: Endurance) -> "matplotlib.figure.Figure":
+    """Return the figure of the requested course; below it stands how it ended."""
+    recording = found.discharge.recording
+    minutes = display_values(recording.time, "duration")
+    remarks = textwrap.wrap(f"End: {found.discharge.ending.message}.", _REMARK_WIDTH)
+    bottom = _BOTTOM + _REMARK_LINE * len(remarks)
+    height = _TOP + _PANELS * _PANEL + (_PANELS - 1) * _GAP + bottom
+    with house_style():
+        figure, rows = figure_of_panels((_WIDTH, height), Margins(_LEFT, _RIGHT, _TOP, bottom, _GAP), _PANELS)
+        grid = [axes for (axes,) in rows]
+        _draw_temperature(grid[0], found, minutes)
+        _draw_bottle_pressure(grid[1], found, minutes)
+        _draw_mass(grid[2], found, minutes)
+        for axes in grid:
+            axes.locator_params(axis="y", nbins=5)
+        grid[-1].set_xlabel(f"Time ({axis_unit('duration')})")
+        grid[-1].set_xlim(0.0, float(minutes[-1]))
+        figure.text(0.12 / _WIDTH, 1.0 - 0.12 / height, _title(found), va="top", fontsize=13, fontweight="bold")
+        figure.text(0.12 / _WIDTH, 0.1 / height, "\n".join(remarks), va="bottom", fontsize=9, color=VERMILION)
+        mark_kind(figure, recording.kind)
+        return figure
+
+
+def _title(found: Endurance) -> str:
+    gas, time = quantity_text(found.draw.mass_per_step, "gas mass"), quantity_text(found.draw.step_time, "time")
+    return f"{found.bottle.name}: {gas} per step of {time}"
+
+
+def _draw_temperature(axes: "Axes", found: Endurance, minutes: Floats) -> None:
+    recording = found.discharge.recording
+    axes.axhline(
+        display_value(found.bottle.room_temperature, "temperature"),
+        color=GREY,
+        linestyle=":",
+        linewidth=1.2,
+        label="room",
+    )
+    axes.plot(minutes, display_values(recording["wall_temperature"], "temperature"), color=ORANGE, label="wall")
+    axes.plot(minutes, display_values(recording["bottle_temperature"], "temperature"), color=BLUE, label="content")
+    axes.set_title(f"Temperature of the bottle ({axis_unit('temperature')})")
+    label_lines(axes)
+
+
+def _draw_bottle_pressure(axes: "Axes", found: Endurance, minutes: Floats) -> None:
+    regulator = found.bottle.regulator
+    pressure = found.discharge.recording["bottle_pressure"]
+    needed = regulator.set_pressure + regulator.pressure_margin
+    axes.axhline(display_value(needed, "pressure"), color=VERMILION, linestyle="--", linewidth=1.2, label="needed")
+    axes.plot(minutes, display_values(pressure, "pressure"), color=BLUE, label="bottle")
+    axes.set_ylim(0.0, 1.06 * display_value(float(np.max(pressure)), "pressure"))
+    axes.set_title(f"Pressure in the bottle ({axis_unit('pressure')})")
+    label_lines(axes)
+
+
+def _draw_mass(axes: "Axes", found: Endurance, minutes: Floats) -> None:
+    recording = found.discharge.recording
+    names: Sequence[tuple[str, str, str]] = (
+        ("bottle_mass", "total gas", BLUE),
+        ("liquid_mass", "liquid", GREEN),
+    )
+    for name, label, colour in names:
+        if name in recording:
+            axes.plot(minutes, display_values(recording[name], "gas mass"), color=colour, label=label)
+    axes.set_ylim(0.0, 1.06 * display_value(found.bottle.mass, "gas mass"))
+    axes.set_title(f"Left in the bottle ({axis_unit('gas mass')})")
+    label_lines(axes)
+
+
+FORMAT = "ppafo endurance"
 _LEFT_OUT = (
     "Not in the model: a regulator that its gas cools or ices (`ppafo walk --bottle` has it), liquid carried out with "
     "the vapour, a bottle held upside down, leaking connections, and ice on the outside of the bottle."
@@ -44,6 +183,12 @@ def answer_of(found: Endurance | Endurances) -> Answer:
 
 def _answer_of_one(found: Endurance) -> Answer:
     figure = Figure("endurance", _CAPTION, lambda: endurance_figure(found))
+    head = tuple(map(Column, ("value", "", "origin", "source")))
+    rows = tuple(
+        (path, format_quantity(entry.value, entry.unit), entry.origin, entry.source)
+        for path, entry in found.bottle.entries.items()
+    )
+    properties = f"Gas properties: {found.bottle.fluid.source}."
     return Answer(
         name="endurance",
         kicker="Endurance",
@@ -52,7 +197,7 @@ def _answer_of_one(found: Endurance) -> Answer:
         sections=(
             Section(table=Table((), tuple(_facts(found)))),
             Section("The bottle over time", figure=figure, remarks=(_LEFT_OUT,), is_detail=True),
-            _values_section(found),
+            Section("Values", table=Table(head, rows, left=4), remarks=(properties,), is_detail=True),
             *([] if found.reuse is None else [_reuse_section(found.reuse)]),
         ),
         data=_data(found),
@@ -157,16 +302,6 @@ def _dry_since(course: Discharge) -> str:
     if not dry.size:
         return f"no, {_gas(float(liquid[-1]))} left"
     return f"after {_minutes(float(course.recording.time[dry[0]]))}"
-
-
-def _values_section(found: Endurance) -> Section:
-    head = tuple(map(Column, ("value", "", "origin", "source")))
-    rows = tuple(
-        (path, format_quantity(entry.value, entry.unit), entry.origin, entry.source)
-        for path, entry in found.bottle.entries.items()
-    )
-    properties = f"Gas properties: {found.bottle.fluid.source}."
-    return Section("Values", table=Table(head, rows, left=4), remarks=(properties,), is_detail=True)
 
 
 def _reuse_section(reused: Reuse) -> Section:

@@ -3,13 +3,13 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.errors import ParameterError, SimulationError
-from ppafo.model.fluid_table import has_liquid
+from ppafo.model.fluid_table import densest_gas, has_liquid
 from ppafo.model.source import (
     BottleContent,
     BottleState,
@@ -18,12 +18,88 @@ from ppafo.model.source import (
     content_energy,
     content_temperature,
     delivered_pressure,
+    pressure_reserve,
+    regulator_flow_limit,
 )
 from ppafo.parameters.bottles.bottle import Bottle
 from ppafo.questions.endurance.draw import Draw, Schedule
-from ppafo.questions.endurance.ending import Ending, Stop, ending, flow_limit, frozen_below, reserve
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
+
+EndKind = Literal["empty", "too cold", "frozen", "time is up"]
+Stop = Literal["supply", "frozen", "time"]
+"""What stopped a run: the supply pressure was not maintained, the table ended in the cold, the time was over."""
+_NEXT_TO_NOTHING = 0.01
+"""Fraction of a full bottle: less than this left to be had from a warm bottle is called empty."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """How a run ended: kind, a sentence, mass left [kg], and the part of it [kg] that a warm bottle would give."""
+
+    kind: EndKind
+    message: str
+    mass_left: float
+    usable_when_warm: float
+
+
+def reserve(bottle: Bottle, draw: Draw, pressure: float, temperature: float) -> float:
+    """Return the margin of a bottle at its largest flow, as a fraction: below 0 the supply pressure is lost.
+
+    The smaller of two: pressure above what the regulator needs, and flow above the largest one.
+    """
+    to_spare = pressure_reserve(bottle.regulator, pressure, draw.peak_flow) / bottle.regulator.set_pressure
+    return min(to_spare, flow_limit(bottle, pressure, temperature) / draw.peak_flow - 1.0)
+
+
+def flow_limit(bottle: Bottle, pressure: float, temperature: float) -> float:
+    """Return the largest flow [kg/s] that the regulator passes at a pressure [Pa] and temperature [K] in the bottle."""
+    gas_constant = bottle.fluid.table.gas_constant
+    return regulator_flow_limit(bottle.regulator, pressure, temperature, bottle.heat_capacity_ratio, gas_constant)
+
+
+def smallest_mass_when_warm(bottle: Bottle, draw: Draw) -> float:
+    """Return the mass of gas [kg] with which the bottle, at room temperature, just holds the supply pressure."""
+    table, room = bottle.fluid.table, bottle.room_temperature
+    low, high = 0.0, min(bottle.mass, bottle.volume * densest_gas(table, room))
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        pressure = bottle_content(table, middle, bottle.volume, room).pressure
+        if reserve(bottle, draw, pressure, room) < 0.0:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def frozen_below(bottle: Bottle) -> float:
+    """Return the temperature [K] at which the liquid freezes, or below which the table knows nothing of the gas."""
+    return bottle.fluid.table.temperatures[0]
+
+
+def ending(bottle: Bottle, draw: Draw, mass: float, content: BottleContent, stopped_by: Stop) -> Ending:
+    """Return the ending for what stopped a run: the supply pressure, the cold end of the table, or the time.
+
+    A bottle that would still do at room temperature is too cold, any other is empty.
+    """
+    usable = max(0.0, mass - smallest_mass_when_warm(bottle, draw))
+    left = f"{mass * GRAMS_PER_KILOGRAM:.3g} g are left"
+    warm = f"{usable * GRAMS_PER_KILOGRAM:.3g} g of this would be usable at room temperature"
+    if stopped_by == "time":
+        return Ending(
+            "time is up", f"the supply pressure was maintained for the whole requested time; {left}", mass, usable
+        )
+    if stopped_by == "frozen":
+        cold = "the liquid begins to freeze (dry ice)" if has_liquid(bottle.fluid.table) else "the gas is too cold"
+        return Ending("frozen", f"{cold}, and the property table ends here; {left}, {warm}", mass, usable)
+    to_spare = pressure_reserve(bottle.regulator, content.pressure, draw.peak_flow) / bottle.regulator.set_pressure
+    is_pressure = to_spare <= flow_limit(bottle, content.pressure, content.temperature) / draw.peak_flow - 1.0
+    short = "maintain the supply pressure" if is_pressure else "drive the largest flow through the regulator"
+    why = f"its pressure is too low to {short}"
+    if usable > _NEXT_TO_NOTHING * bottle.mass:
+        return Ending("too cold", f"the bottle is too cold: {why}; {left}, {warm}", mass, usable)
+    return Ending("empty", f"the bottle is empty: {why}, and would be also when warm; {left}", mass, usable)
+
 
 MAXIMUM_STRETCHES = 2000
 SAMPLES = 1001
@@ -87,23 +163,6 @@ def discharge(bottle: Bottle, draw: Draw, schedule: Schedule) -> Discharge:
     Steps are a second long and bottles cool in minutes, so the mean stands for the pulses; the regulator is judged by
     the largest flow. SimulationError where the solver fails.
     """
-    _check(schedule)
-    _check_flow(bottle, draw)
-    start = full_bottle(bottle)
-    stretches: list[Stretch] = []
-    time, values, walking = 0.0, start, True
-    reason: Stop | None = None
-    while reason is None:
-        length = schedule.longest if schedule.rest == 0.0 else (schedule.walk if walking else schedule.rest)
-        end = min(time + length, schedule.longest)
-        stretch = solve_stretch(bottle, draw, time, end, values, walking)
-        stretches.append(stretch)
-        time, values, walking = stretch.end, stretch.last, not walking
-        reason = stretch.stopped_by or ("time" if time >= schedule.longest else None)
-    return _gather(bottle, draw, stretches, start, reason)
-
-
-def _check(schedule: Schedule) -> None:
     for name, value, least in (("walk", schedule.walk, 1.0), ("longest", schedule.longest, 1.0)):
         if not least <= value < float("inf"):
             raise ParameterError(f"{name} must be at least {least:g} s and finite, it is {value:g} s")
@@ -114,9 +173,6 @@ def _check(schedule: Schedule) -> None:
             f"walking {schedule.walk:g} s and resting {schedule.rest:g} s over {schedule.longest:g} s are more "
             f"than {MAXIMUM_STRETCHES} periods: choose longer periods, or a smaller longest time"
         )
-
-
-def _check_flow(bottle: Bottle, draw: Draw) -> None:
     content = bottle_content(bottle.fluid.table, bottle.mass, bottle.volume, bottle.room_temperature)
     if reserve(bottle, draw, content.pressure, content.temperature) <= 0.0:
         most = flow_limit(bottle, content.pressure, content.temperature) * GRAMS_PER_KILOGRAM
@@ -124,17 +180,20 @@ def _check_flow(bottle: Bottle, draw: Draw) -> None:
             f"even the full bottle cannot maintain the supply pressure at the largest flow, "
             f"{draw.peak_flow * GRAMS_PER_KILOGRAM:.3g} g/s: its regulator passes {most:.3g} g/s (regulator.area)"
         )
-
-
-def _gather(
-    bottle: Bottle,
-    draw: Draw,
-    stretches: list[Stretch],
-    start: Floats,
-    reason: Stop,
-) -> Discharge:
+    energy = content_energy(bottle.fluid.table, bottle.mass, bottle.volume, bottle.room_temperature)
+    start = np.array([bottle.mass, energy, bottle.room_temperature, 0.0, 0.0, 0.0])
+    stretches: list[Stretch] = []
+    time, values, walking = 0.0, start, True
+    reason: Stop | None = None
+    while reason is None:
+        length = schedule.longest if schedule.rest == 0.0 else (schedule.walk if walking else schedule.rest)
+        end = min(time + length, schedule.longest)
+        stretch = solve_stretch(bottle, draw, time, end, values, walking)
+        stretches.append(stretch)
+        time, values, walking = stretch.end, stretch.last, not walking
+        reason = stretch.stopped_by or ("time" if time >= schedule.longest else None)
     last = stretches[-1].last
-    walking = sum(stretch.end - stretch.start for stretch in stretches if stretch.draw > 0.0)
+    walked = sum(stretch.end - stretch.start for stretch in stretches if stretch.draw > 0.0)
     change = last - start
     balance = Balance(
         drawn_mass=float(last[3]),
@@ -145,9 +204,9 @@ def _gather(
         wall_energy_change=float(change[2]) * bottle.wall.wall_heat_capacity,
     )
     return Discharge(
-        walking_time=walking,
+        walking_time=walked,
         total_time=stretches[-1].end,
-        steps=walking / draw.step_time,
+        steps=walked / draw.step_time,
         ending=ending(bottle, draw, float(last[0]), content_of(bottle, float(last[0]), float(last[1])), reason),
         balance=balance,
         bottle=bottle,
@@ -181,12 +240,6 @@ def _recording(bottle: Bottle, stretches: Sequence[Stretch]) -> Recording:
     return Recording(f"bottle {bottle.name}", times, named, kind="simulated")
 
 
-def full_bottle(bottle: Bottle) -> Floats:
-    """Return the solution at the start: a full bottle at the temperature of the room."""
-    energy = content_energy(bottle.fluid.table, bottle.mass, bottle.volume, bottle.room_temperature)
-    return np.array([bottle.mass, energy, bottle.room_temperature, 0.0, 0.0, 0.0])
-
-
 def content_of(bottle: Bottle, mass: float, energy: float) -> BottleContent:
     """Return what the bottle holds with a mass [kg] of an energy [J]."""
     table = bottle.fluid.table
@@ -198,11 +251,29 @@ def solve_stretch(bottle: Bottle, draw: Draw, start: float, end: float, values: 
     from scipy.integrate import solve_ivp
 
     flow = draw.mean_flow if walking else 0.0
-    events = _events(bottle, draw)[: 2 if walking else 1]
-    if walking and events[1](start, values) <= 0.0:
+
+    def rates(_time: float, y: Floats) -> list[float]:
+        state = BottleState(float(y[0]), float(y[1]), float(y[2]))
+        content = content_of(bottle, state.mass, state.energy)
+        now = bottle_rates(content, state, flow, bottle.wall, bottle.room_temperature)
+        inside = (now.mass_rate, now.content_energy_rate, now.wall_temperature_rate)
+        return [*inside, flow, now.outflow_power, now.room_heat]
+
+    def kelvins_above_freezing(_time: float, y: Floats) -> float:
+        return content_of(bottle, float(y[0]), float(y[1])).temperature - frozen_below(bottle) - _ABOVE_FREEZING
+
+    def to_spare(_time: float, y: Floats) -> float:
+        content = content_of(bottle, float(y[0]), float(y[1]))
+        return reserve(bottle, draw, content.pressure, content.temperature)
+
+    if walking and to_spare(start, values) <= 0.0:
         return Stretch(start, start, flow, lambda _times: values, values, "supply")
+    events: list[Any] = [kelvins_above_freezing, *([to_spare] if walking else [])]
+    for event in events:
+        # It ends the stretch where it falls through 0.
+        event.terminal, event.direction = True, -1.0
     solution = solve_ivp(
-        _rates(bottle, flow),
+        rates,
         (start, end),
         values,
         method="LSODA",
@@ -216,32 +287,3 @@ def solve_stretch(bottle: Bottle, draw: Draw, start: float, end: float, values: 
     stopped: Stop = "frozen" if len(solution.t_events[0]) else "supply"
     last = np.asarray(solution.y[:, -1])
     return Stretch(start, float(solution.t[-1]), flow, solution.sol, last, stopped if solution.status == 1 else None)
-
-
-def _rates(bottle: Bottle, flow: float) -> Callable[[float, Floats], list[float]]:
-    """Return the right-hand side for mass, energy, wall temperature, and the sums of what crossed the border."""
-
-    def rates(_time: float, y: Floats) -> list[float]:
-        state = BottleState(float(y[0]), float(y[1]), float(y[2]))
-        content = content_of(bottle, state.mass, state.energy)
-        now = bottle_rates(content, state, flow, bottle.wall, bottle.room_temperature)
-        inside = (now.mass_rate, now.content_energy_rate, now.wall_temperature_rate)
-        return [*inside, flow, now.outflow_power, now.room_heat]
-
-    return rates
-
-
-def _events(bottle: Bottle, draw: Draw) -> list[Any]:
-    """Return what ends a stretch where it falls through 0: kelvins above freezing, and what the supply has to spare."""
-
-    def above_freezing(_time: float, y: Floats) -> float:
-        return content_of(bottle, float(y[0]), float(y[1])).temperature - frozen_below(bottle) - _ABOVE_FREEZING
-
-    def to_spare(_time: float, y: Floats) -> float:
-        content = content_of(bottle, float(y[0]), float(y[1]))
-        return reserve(bottle, draw, content.pressure, content.temperature)
-
-    events: list[Any] = [above_freezing, to_spare]
-    for event in events:
-        event.terminal, event.direction = True, -1.0
-    return events

@@ -11,30 +11,33 @@ from typing import Any
 import numpy as np
 
 from ppafo.constants import GRAMS_PER_KILOGRAM, STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, ParameterError
+from ppafo.errors import DataError, ParameterError, PpafoError
 from ppafo.metrics.strides import SETTLING
 from ppafo.model.chambers import chamber_1_volume, chamber_2_volume
+from ppafo.parameters.chamber_volumes import other_readings
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
+from ppafo.simulation.document import scenario_document
+from ppafo.simulation.loading import scenario_from_dict
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
+from ppafo.simulation.simulate import simulate
 from ppafo.storage.owned_folder import read_json
 from ppafo.storage.recordings import read_recording
+from ppafo.storage.result_folder import RUN_FILE, read_document
 from ppafo.walking import WalkResult
 from ppafo.walking.course_segments import is_whole_course
 from ppafo.walking.motion import walk_of
 
 PEAK_WINDOW = 0.1
 """Seconds over which the largest flow of a recording is averaged; lines and regulator even out what is shorter."""
-
 _MAXIMUM_FALLEN = 0.1
 """Fraction of the gas used that may flow back: it waits in the line before the valve, and the next step takes it."""
-
 WALK_FILE = "walk.json"
 FORMAT = "ppafo walk"
 _VOLUMES = ("volume_per_angle", "dead_volume_1", "dead_volume_2")
 _STRIDE_KEYS = ("gas", "gas_per_stride", "stride_time")
 _COURSE_KEYS = ("course_gas", "gas_of_course", "course_time")
 """Metric of the gas of a step, and what the readings of the chambers call that gas and the time of a step."""
-
 _CHANNELS = ("angle", "pressure_1", "pressure_2", "supplied_mass")
 _LEAST = 1.0e-12
 """Gas [kg] by which a walk that takes none may come out below 0: rounding of its totals."""
@@ -330,3 +333,33 @@ def _fullest(pressure: Floats, volume: Floats, strides: list[tuple[int, int]]) -
     """Return pressure and volume where a chamber holds the most gas, mean over strides from sample to sample."""
     places = [first + int(np.argmax(pressure[first:last] * volume[first:last])) for first, last in strides]
     return float(pressure[places].mean()), float(volume[places].mean())
+
+
+def other_draws(recording: str | Path, step_time: float | None) -> dict[str, Draw]:
+    """Return the gas use of a result folder with the other chambers, by name; {} where it cannot be run again.
+
+    That is a file without a folder, a law in Python, chambers of its own, or a device that has changed since.
+    """
+    folder = Path(recording)
+    if not (folder / RUN_FILE).is_file():
+        return {}
+    scenario = _again(read_document(folder).get("scenario"))
+    if scenario is None:
+        return {}
+    found = {}
+    for chambers in other_readings(scenario.device.actuator):
+        result = simulate(replace(scenario, device=chambers.of(scenario.device)))
+        if result.status.is_completed:
+            found[chambers.name] = draw_of_recording(result.recording, step_time)
+    return found
+
+
+def _again(document: Any) -> Scenario | None:
+    """Return the scenario of a result as what it was made from, None unless that gives the same device."""
+    try:
+        origin = document["origin"]
+        scenario = scenario_from_dict(origin["content"], origin["overrides"])
+    except (KeyError, TypeError, PpafoError):
+        return None
+    same = scenario_document(scenario)["device"] == document.get("device")
+    return scenario if same and scenario.control.kind != PYTHON_CONTROLLER else None

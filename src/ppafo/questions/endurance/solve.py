@@ -1,15 +1,22 @@
 """How long one bottle lasts for a gas use, with and without reuse of the exhaust; for several uses side by side."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from ppafo.answers import Solved
-from ppafo.errors import DataError, ParameterError
+from ppafo.constants import GRAMS_PER_KILOGRAM, STANDARD_ATMOSPHERE
+from ppafo.errors import DataError, ParameterError, UnitError, nearest_name, one_line
+from ppafo.model.chambers import chamber_1_volume, chamber_2_volume
+from ppafo.model.declaration import Quantity
+from ppafo.model.exhaust_reuse import ReuseCycle
+from ppafo.parameters import load_device
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle, load_bottle
-from ppafo.questions.endurance.discharge import Discharge, discharge
+from ppafo.parameters.declaration import is_within
+from ppafo.questions.endurance.answer import GIVEN, Endurance, Endurances, Reuse
+from ppafo.questions.endurance.discharge import discharge, smallest_mass_when_warm
 from ppafo.questions.endurance.draw import (
     Draw,
+    FullChambers,
     OtherGas,
     Schedule,
     WalkGas,
@@ -18,52 +25,121 @@ from ppafo.questions.endurance.draw import (
     draw_of_walk,
     full_chambers,
     is_walk_folder,
+    other_draws,
     read_walk_gas,
     walk_gas,
 )
-from ppafo.questions.endurance.ending import smallest_mass_when_warm
-from ppafo.questions.endurance.other_chambers import other_draws
-from ppafo.questions.endurance.reuse import Reuse, ReusePlan, parse_reuse
-from ppafo.questions.endurance.reuse import reuse as reuse_exhaust
 from ppafo.signals import Recording
 from ppafo.storage.recordings import read_recording
+from ppafo.units import parse_quantity
 from ppafo.walking import WalkResult
+
+REUSE = (
+    Quantity("reservoir_volume", "m^3", "volume of the reservoir between the chambers", minimum=0.0, maximum=0.1),
+    Quantity("exhaust_pressure", "Pa_a", "pressure of the plantarflexion chamber when it vents", 0.0, 1e4, 5e6),
+    Quantity("fill_pressure", "Pa_a", "pressure that dorsiflexion needs", 0.0, 1e4, 5e6),
+    Quantity("exhaust_volume", "m^3", "volume of the plantarflexion chamber when it vents", 0.0, 1e-7, 1e-2),
+    Quantity("fill_volume", "m^3", "volume of the other chamber when it is filled", 0.0, 1e-7, 1e-2),
+)
+_BY_NAME = {item.name: item for item in REUSE}
+PAPER_DEVICE = "ppafo2011"
+TOE_OFF_ANGLE, NEUTRAL_ANGLE = "110 deg", "90 deg"
+"""Where the chambers vent and fill unless their volumes are given: 20 deg of plantarflexion at toe-off, and the
+neutral angle at which the paper holds the foot in swing."""
+_DEFAULT = "the regulator's pressure, and the paper's device at toe-off and in neutral position"
+
+
+def check_reuse(reused: Reuse, mass_per_step: float) -> None:
+    """Refuse a cycle that does not belong to a gas use of ``mass_per_step`` [kg] a step without a reservoir.
+
+    ParameterError for pressures below the atmosphere, and for chambers that hold more than the step takes.
+    """
+    for name in ("exhaust_pressure", "fill_pressure"):
+        if getattr(reused.cycle, name) < reused.cycle.atmospheric_pressure:
+            raise ParameterError(f"--reuse {name}: must be at least the atmospheric pressure")
+    balance = reused.balance
+    filled = balance.exhausted_mass + balance.returned_mass + balance.topped_up_mass
+    if filled > mass_per_step:
+        raise ParameterError(
+            f"--reuse: the chambers take {filled * GRAMS_PER_KILOGRAM:.3g} g per step at these pressures and volumes, "
+            f"more than the {mass_per_step * GRAMS_PER_KILOGRAM:.3g} g of the gas use; give the exhaust_pressure, "
+            "fill_pressure, exhaust_volume and fill_volume of that gas use"
+        )
+
+
+def parse_reuse(
+    texts: Iterable[str],
+    bottle: Bottle,
+    chambers: FullChambers | None = None,
+    atmosphere: float = STANDARD_ATMOSPHERE,
+) -> Reuse:
+    """Return the cycle of texts such as ``reservoir_volume=50 cm^3``; the reservoir must be given.
+
+    What is not given of the chambers is that of ``chambers``, of a walk. Without a walk pressures are the regulator's
+    and volumes those of the paper's device at toe-off and in neutral. The device lets gas out into ``atmosphere`` [Pa
+    absolute], from which gauge pressures count.
+    """
+    values: dict[str, float] = {}
+    for text in texts:
+        name, separator, quantity = (part.strip() for part in one_line(text).partition("="))
+        if name not in _BY_NAME or not separator:
+            known = ", ".join(_BY_NAME)
+            raise ParameterError(
+                f"--reuse {name}: is not of the form NAME=VALUE{nearest_name(name, _BY_NAME)}; names are {known}"
+            )
+        if name in values:
+            raise ParameterError(f"--reuse {name}: given twice; give it once")
+        values[name] = _value(_BY_NAME[name], quantity, atmosphere)
+    if "reservoir_volume" not in values:
+        raise ParameterError(
+            "--reuse: give at least the volume of the reservoir, for example --reuse 'reservoir_volume=50 cm^3'"
+        )
+    found, origin = (_defaults(bottle), _DEFAULT) if chambers is None else _chamber_values(chambers)
+    cycle = ReuseCycle(
+        **(found | values),
+        atmospheric_pressure=atmosphere,
+        gas_product=bottle.fluid.table.gas_constant * bottle.room_temperature,
+    )
+    return Reuse(cycle, {item.name: GIVEN if item.name in values else origin for item in REUSE})
+
+
+def _value(quantity: Quantity, text: str, atmosphere: float) -> float:
+    try:
+        value = parse_quantity(text, quantity.unit, atmosphere)
+    except UnitError as error:
+        raise ParameterError(f"--reuse {quantity.name}={text}: {error}") from error
+    if not is_within(value, quantity):
+        raise ParameterError(
+            f"--reuse {quantity.name}={text}: {quantity.summary} must be from {quantity.minimum:g} to "
+            f"{quantity.maximum:g} {quantity.unit}"
+        )
+    return value
+
+
+def _chamber_values(chambers: FullChambers) -> tuple[dict[str, float], str]:
+    """Return pressures and volumes of the chambers at their fullest, and the words for where they come from."""
+    names = ("exhaust_pressure", "exhaust_volume", "fill_pressure", "fill_volume")
+    return {name: getattr(chambers, name) for name in names}, f"from the walk, mean over {chambers.strides} strides"
+
+
+def _defaults(bottle: Bottle) -> dict[str, float]:
+    actuator = load_device(PAPER_DEVICE).actuator
+    toe_off, neutral = (parse_quantity(text, "rad") for text in (TOE_OFF_ANGLE, NEUTRAL_ANGLE))
+    return {
+        "exhaust_pressure": bottle.regulator.set_pressure,
+        "fill_pressure": bottle.regulator.set_pressure,
+        "exhaust_volume": chamber_1_volume(
+            toe_off, actuator.angle_min, actuator.volume_per_angle, actuator.dead_volume_1
+        ),
+        "fill_volume": chamber_2_volume(neutral, actuator.angle_max, actuator.volume_per_angle, actuator.dead_volume_2),
+    }
+
 
 GasUse = str | Path | Recording | WalkResult
 """A file, a result folder, the folder of a walk, or what was read or returned of them."""
-
 _STEP_TIME = 1.1
 _LONGEST = 24.0 * 3600.0
 WITHOUT_REST = Schedule(_LONGEST, 0.0, _LONGEST)
-
-
-@dataclass(frozen=True, slots=True)
-class Endurance(Solved):
-    """The request and its result.
-
-    ``discharge`` is the requested course; ``without_reuse`` the same without reuse, where there is one.
-    ``steps_when_warm`` is the number of steps that a bottle which stays at room temperature gives: what cooling costs.
-    ``is_of_course`` is true where a step is a course, ``is_whole`` unless the walk ended before it did. ``others`` is
-    the same for a walk or a run with other readings of the paper's chambers, by their names.
-    """
-
-    bottle: Bottle
-    draw: Draw
-    schedule: Schedule
-    discharge: Discharge
-    reuse: Reuse | None
-    without_reuse: Discharge | None
-    steps_when_warm: float
-    is_of_course: bool = False
-    others: Mapping[str, "Endurance"] = field(default_factory=dict)
-    is_whole: bool = True
-
-
-@dataclass(frozen=True, slots=True)
-class Endurances(Solved):
-    """Several gas uses on the same bottle, by name."""
-
-    uses: Mapping[str, Endurance]
 
 
 def endurance(
@@ -139,9 +215,10 @@ def _other(bottle: Bottle, other: OtherGas, schedule: Schedule, changes: tuple[s
     return follow_bottle(bottle, other.draw, schedule)
 
 
-def follow_bottle(bottle: Bottle, draw: Draw, schedule: Schedule, plan: ReusePlan | None = None) -> Endurance:
-    """Return how long a full bottle lasts; ``plan`` takes the gas that a reservoir gives back off every step."""
-    reused = None if plan is None else reuse_exhaust(plan, draw.mass_per_step)
+def follow_bottle(bottle: Bottle, draw: Draw, schedule: Schedule, reused: Reuse | None = None) -> Endurance:
+    """Return how long a full bottle lasts; ``reused`` takes the gas that a reservoir gives back off every step."""
+    if reused is not None:
+        check_reuse(reused, draw.mass_per_step)
     taken = draw if reused is None else draw.less(reused.balance.returned_mass)
     usable = bottle.mass - smallest_mass_when_warm(bottle, taken)
     return Endurance(

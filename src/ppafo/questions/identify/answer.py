@@ -1,26 +1,271 @@
 """The answer of an identification: estimates and checks in the units of the set, the new set, the figures."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from ppafo.answers import Answer, Figure, Section, Table
+from ppafo.answers.style import (
+    ACTUAL,
+    BLACK,
+    BLUE,
+    CHAMBER_1,
+    CHAMBER_2,
+    GREY,
+    VERMILION,
+    Margins,
+    figure_of_panels,
+    house_style,
+    mark_kind,
+)
+from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
+from ppafo.errors import DataError
 from ppafo.identification.bench.result import BenchResult, count_of, figure_3, procedure_figure
-from ppafo.identification.estimate import Check, Estimate
-from ppafo.identification.new_set import in_set_unit
+from ppafo.identification.estimate import Check, Estimate, Prospect
+from ppafo.identification.new_set import NewSet, in_set_unit
 from ppafo.identification.trajectory.fitting import TrajectoryFit
 from ppafo.identification.trajectory.follow_up import Expected, Profile
 from ppafo.identification.trajectory.section import TrajectoryOutcome
 from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.parameters.writing import parameter_set_toml
-from ppafo.questions.identify.profile_figure import profile_figure
-from ppafo.questions.identify.solve import Beforehand, Identification
-from ppafo.questions.identify.trajectory_figure import correlation_figure, trajectory_fit_figure
-from ppafo.signals import RecordingKind
+from ppafo.questions.question import Solved
+from ppafo.signals import Recording, RecordingKind
+from ppafo.signals.recording import Floats
 from ppafo.simulation.document import plain
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True, slots=True)
+class Beforehand:
+    """What the recordings of a procedure can give and what not, said before anything was fitted."""
+
+    procedure: str
+    prospects: tuple[Prospect, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Identification(Solved):
+    """The outcome of a problem: what could be had, results in the order of making, the set before and after."""
+
+    name: str
+    beforehand: tuple[Beforehand, ...]
+    results: tuple[BenchResult, ...]
+    trajectory: TrajectoryOutcome | None
+    before: ParameterSet
+    new_set: NewSet
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """All estimates of all procedures, those of the trajectory fit last."""
+        fitted = () if self.trajectory is None else self.trajectory.fit.estimates
+        return (*_bench_estimates(self.results), *fitted)
+
+    @property
+    def is_good(self) -> bool:
+        """Whether every check holds and the new set makes a device where the old one did."""
+        fitted = () if self.trajectory is None else self.trajectory.failed
+        return not self.new_set.problem and not fitted and not any(result.failed for result in self.results)
+
+
+_COLUMNS = 3
+_PROFILE_WIDTH, _HEIGHT = 2.75, 2.35
+_LEFT, _RIGHT, _TOP, _BOTTOM, _COLUMN_GAP, _ROW_GAP = 0.62, 0.25, 0.82, 0.55, 0.5, 0.85
+"""Inches."""
+_MAXIMUM_SHOWN = 1.9
+"""Largest rise that a panel shows, in thresholds."""
+
+
+def profile_figure(outcome: TrajectoryOutcome, before: ParameterSet, kind: RecordingKind) -> "matplotlib.figure.Figure":
+    """Return a panel for each profile, numbers in the units of the set that the fit started from."""
+    import matplotlib.figure
+
+    profiles = outcome.profiles
+    columns = min(_COLUMNS, len(profiles))
+    rows = -(-len(profiles) // columns)
+    width = max(_LEFT + _RIGHT + columns * _PROFILE_WIDTH + (columns - 1) * _COLUMN_GAP, 6.2)
+    height = _TOP + _BOTTOM + rows * _HEIGHT + (rows - 1) * _ROW_GAP
+    with house_style():
+        figure = matplotlib.figure.Figure(figsize=(width, height))
+        for index, one in enumerate(profiles):
+            row, column = divmod(index, columns)
+            left = _LEFT + column * (_PROFILE_WIDTH + _COLUMN_GAP)
+            bottom = height - _TOP - _HEIGHT - row * (_HEIGHT + _ROW_GAP)
+            axes = figure.add_axes((left / width, bottom / height, _PROFILE_WIDTH / width, _HEIGHT / height))
+            _draw_profile(axes, one, outcome.fit.estimate(one.path), before)
+            if column == 0:
+                axes.set_ylabel("Rise of the misfit (-)")
+        confidence = outcome.fit.problem.search.confidence
+        _label(figure, confidence)
+        mark_kind(figure, kind)
+        return figure
+
+
+def _draw_profile(axes: "Axes", one: Profile, estimate: Estimate, before: ParameterSet) -> None:
+    numbers = np.array([in_set_unit(float(number), one.path, one.unit, before)[0] for number in one.numbers])
+    value, unit = in_set_unit(estimate.value, one.path, one.unit, before)
+    axes.plot(*_smooth(numbers, one.rises), color=BLUE, linewidth=1.4)
+    axes.plot(numbers, one.rises, "o", color=BLUE, markersize=4)
+    axes.axhline(one.threshold, color=GREY, linewidth=1.0, linestyle=(0, (4, 3)))
+    for side in (one.low, one.high):
+        if side is not None:
+            axes.axvline(in_set_unit(side, one.path, one.unit, before)[0], color=VERMILION, linewidth=1.0)
+    axes.plot([value], [0.0], "|", color=BLACK, markersize=12)
+    axes.set_ylim(0.0, _MAXIMUM_SHOWN * one.threshold)
+    axes.set_title(one.path, fontsize=9.5)
+    axes.set_xlabel(f"({unit})" if unit not in ("", "-") else "")
+    axes.locator_params(axis="x", nbins=3)
+    axes.ticklabel_format(axis="x", useOffset=False)
+
+
+def _smooth(numbers: "np.ndarray", rises: "np.ndarray") -> "tuple[np.ndarray, np.ndarray]":
+    """Return a curve through the points whose signed square root is piecewise straight: a parabola stays one."""
+    roots = np.sqrt(rises) * np.where(np.arange(len(rises)) < int(np.argmin(rises)), -1.0, 1.0)
+    fine = np.linspace(numbers[0], numbers[-1], 200)
+    return fine, np.square(np.interp(fine, numbers, roots))
+
+
+def _label(figure: "matplotlib.figure.Figure", confidence: float) -> None:
+    from matplotlib.lines import Line2D
+
+    height, width = figure.get_figheight(), figure.get_figwidth()
+    figure.text(0.12 / width, 1.0 - 0.12 / height, "Profile likelihood", ha="left", va="top", fontweight="bold")
+    handles = [
+        Line2D([], [], color=BLUE, marker="o", markersize=4, label="all other numbers refitted"),
+        Line2D([], [], color=GREY, linestyle=(0, (4, 3)), linewidth=1.0, label=f"threshold of {100.0 * confidence:g}%"),
+        Line2D([], [], color=VERMILION, linewidth=1.0, label="interval"),
+    ]
+    place = (0.02 / width, 1.0 - 0.3 / height)
+    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=place, ncols=3, handlelength=1.6)
+
+
+_TRAJECTORY_WIDTH, _VALUES, _LEFT_OVER = 7.2, 1.5, 0.62
+_MARGINS = Margins(left=0.78, right=0.2, top=0.62, bottom=0.52, row_gap=0.36, label=0.58)
+_MATRIX_CELL, _LETTER, _MATRIX_TOP = 0.62, 0.08, 0.5
+"""Inches."""
+_DOT, _SAMPLE = 1.6, 3.6
+_MAXIMUM_DOTS = 90
+"""Samples shown beside the line; what is left is shown of all."""
+_KIND_WORDS = {"measured": "measured", "simulated": "simulated samples", "synthetic": "synthetic measurement"}
+_NAMED = 0.3
+"""Correlations from this size on are written into their cell."""
+
+
+@dataclass(frozen=True, slots=True)
+class _ChannelPanel:
+    """How a channel is drawn: channel, title, units, values per SI unit, zero in SI units, colour."""
+
+    channel: str
+    title: str
+    unit: str
+    unit_of_difference: str
+    factor: float
+    zero: float
+    colour: str
+
+
+def trajectory_fit_figure(
+    measurement: Recording, model: Recording, atmosphere: float = STANDARD_ATMOSPHERE
+) -> "matplotlib.figure.Figure":
+    """Return samples, model and residuals of one experiment over time, two panels for each channel that was fitted.
+
+    Both recordings have the same times. Gauge pressure counts from ``atmosphere`` [Pa absolute].
+    """
+    if not np.array_equal(measurement.time, model.time):
+        raise DataError(f"{model.label}: is not at the times of {measurement.label}")
+    shown = [one for one in _channels(atmosphere) if one.channel in measurement]
+    with house_style():
+        heights = [_VALUES, _LEFT_OVER] * len(shown)
+        rows = 2 * len(shown)
+        height = sum(heights) + (rows - 1) * _MARGINS.row_gap + _MARGINS.top + _MARGINS.bottom
+        figure, grid = figure_of_panels((_TRAJECTORY_WIDTH, height), _MARGINS, rows, heights=heights)
+        panels = [axes for (axes,) in grid]
+        for one, values, left in zip(shown, panels[::2], panels[1::2], strict=True):
+            _draw_trajectory(one, (values, left), measurement, model)
+        panels[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1, handlelength=1.6)
+        panels[-1].set_xlabel("Time (s)")
+        panels[-1].set_xlim(measurement.time[0], measurement.time[-1])
+        inch = 1.0 / height
+        figure.text(
+            0.12 / _TRAJECTORY_WIDTH, 1.0 - 0.12 * inch, measurement.label, ha="left", va="top", fontweight="bold"
+        )
+        mark_kind(figure, measurement.kind)
+        return figure
+
+
+def correlation_figure(
+    names: Sequence[str], correlation: Floats, kind: RecordingKind = "measured"
+) -> "matplotlib.figure.Figure":
+    """Return the correlation matrix of estimates as a picture; strong colours are numbers that trade off.
+
+    ``kind`` is that of the recordings.
+    """
+    import matplotlib.figure
+
+    count = len(names)
+    name_width = 0.45 + _LETTER * max(len(name) for name in names)
+    width, height = name_width + count * _MATRIX_CELL + 0.2, _MATRIX_TOP + count * _MATRIX_CELL + 0.35
+    with house_style():
+        figure = matplotlib.figure.Figure(figsize=(width, height))
+        place = (name_width / width, 0.35 / height, count * _MATRIX_CELL / width, count * _MATRIX_CELL / height)
+        axes = figure.add_axes(place)
+        axes.imshow(correlation, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
+        axes.grid(visible=False)
+        axes.set_yticks(range(count), [f"{name}  {index + 1}" for index, name in enumerate(names)])
+        axes.set_xticks(range(count), [str(index + 1) for index in range(count)])
+        for row, column in np.argwhere(np.abs(correlation) >= _NAMED):
+            if row != column:
+                number = float(correlation[row, column])
+                colour = "white" if abs(number) > 0.6 else BLACK
+                axes.text(int(column), int(row), f"{number:+.2f}", ha="center", va="center", fontsize=8.5, color=colour)
+        figure.text(
+            0.12 / width, 1.0 - 0.12 / height, "Correlation of the estimates", ha="left", va="top", fontweight="bold"
+        )
+        mark_kind(figure, kind)
+        return figure
+
+
+def _channels(atmosphere: float) -> tuple[_ChannelPanel, ...]:
+    degrees, gauge = float(np.degrees(1.0)), 1.0 / PASCALS_PER_PSI
+    return (
+        _ChannelPanel("angle", "Vane angle", "deg", "deg", degrees, 0.0, ACTUAL),
+        _ChannelPanel("pressure_1", "Pressure in chamber 1", "psig", "psi", gauge, atmosphere, CHAMBER_1),
+        _ChannelPanel("pressure_2", "Pressure in chamber 2", "psig", "psi", gauge, atmosphere, CHAMBER_2),
+    )
+
+
+def _draw_trajectory(one: _ChannelPanel, panels: "tuple[Axes, Axes]", measurement: Recording, model: Recording) -> None:
+    values, left = panels
+    samples, fitted = (one.factor * (recording[one.channel] - one.zero) for recording in (measurement, model))
+    some = slice(None, None, -(-measurement.time.size // _MAXIMUM_DOTS))
+    times, word = measurement.time[some], _KIND_WORDS[measurement.kind]
+    values.plot(
+        times,
+        samples[some],
+        "o",
+        color=BLACK,
+        markersize=_SAMPLE,
+        markerfacecolor="none",
+        markeredgewidth=0.7,
+        label=word,
+    )
+    values.plot(measurement.time, fitted, color=one.colour, linewidth=1.2, label="model")
+    values.set_title(f"{one.title} ({one.unit})")
+    left.plot(measurement.time, fitted - samples, ".", color=one.colour, markersize=_DOT)
+    left.axhline(0.0, color=GREY, linewidth=0.8)
+    largest = 1.1 * float(np.max(np.abs(fitted - samples))) or 1.0
+    left.set_ylim(-largest, largest)
+    left.set_title(f"model minus sample ({one.unit_of_difference})", fontsize=9)
+    left.locator_params(axis="y", nbins=3)
+
 
 _NO_VALUE = "no value"
 _MINIMUM_DIGITS, _MAXIMUM_DIGITS = 4, 9
@@ -34,6 +279,9 @@ def answer_of(identification: Identification) -> Answer:
     files = {f"{name}.toml": lambda: parameter_set_toml(new_set.parameter_set).encode()}
     if fitted is not None:
         files[POSTERIOR] = partial(_posterior, fitted.fit)
+    kinds = {result.kind for result in identification.results}
+    if identification.trajectory is not None:
+        kinds.add(kind_of_fit(identification.trajectory.fit))
     return Answer(
         name="identify",
         kicker="Identification",
@@ -46,19 +294,24 @@ def answer_of(identification: Identification) -> Answer:
             Section(paragraphs=(f"new set '{name}': {_count_sentence(identification)}", *problem)),
             *(Section(figure=figure, is_detail=True) for figure in _figures(identification)),
         ),
-        data=_data(identification),
+        data={
+            "problem": identification.name,
+            "started_from": identification.before.name,
+            "is_good": identification.is_good,
+            "beforehand": [plain(item) for item in identification.beforehand],
+            "procedures": [_procedure_data(result) for result in identification.results],
+            **_trajectory_data(identification.trajectory),
+            "new_set": {
+                "file": f"{identification.name}.toml",
+                "identified": list(identification.new_set.written),
+                "fitted": list(identification.new_set.fitted),
+                "problem": identification.new_set.problem,
+            },
+        },
         passed=identification.is_good,
-        kind=_kind(identification),
+        kind=next((kind for kind in _KINDS if kind in kinds), "measured"),
         files=files,
     )
-
-
-def _kind(identification: Identification) -> RecordingKind:
-    """Return the kind of all recordings together: one synthetic recording makes the whole synthetic."""
-    kinds = {result.kind for result in identification.results}
-    if identification.trajectory is not None:
-        kinds.add(kind_of_fit(identification.trajectory.fit))
-    return next((kind for kind in _KINDS if kind in kinds), "measured")
 
 
 def _count_sentence(identification: Identification) -> str:
@@ -192,24 +445,6 @@ def kind_of_fit(fit: TrajectoryFit) -> RecordingKind:
     return next(kind for kind in _KINDS if kind in kinds)
 
 
-def _data(identification: Identification) -> dict[str, Any]:
-    """Return the outcome as plain data in SI units; a value that could not be found is null."""
-    return {
-        "problem": identification.name,
-        "started_from": identification.before.name,
-        "is_good": identification.is_good,
-        "beforehand": [plain(item) for item in identification.beforehand],
-        "procedures": [_procedure_data(result) for result in identification.results],
-        **_trajectory_data(identification.trajectory),
-        "new_set": {
-            "file": f"{identification.name}.toml",
-            "identified": list(identification.new_set.written),
-            "fitted": list(identification.new_set.fitted),
-            "problem": identification.new_set.problem,
-        },
-    }
-
-
 def _procedure_data(result: BenchResult) -> dict[str, Any]:
     return {
         "procedure": result.procedure,
@@ -247,7 +482,10 @@ def _trajectory_data(outcome: TrajectoryOutcome | None) -> dict[str, Any]:
             "beforehand": [plain(item) for item in outcome.beforehand],
             "remarks": list(outcome.remarks),
             "checks": [plain(item) for item in outcome.checks],
-            "profiles": [_profile_data(item) for item in outcome.profiles],
+            "profiles": [
+                {**plain(item), "numbers": item.numbers.tolist(), "rises": item.rises.tolist()}
+                for item in outcome.profiles
+            ],
             "next_experiments": [plain(item) for item in outcome.expected],
         }
     }
@@ -273,5 +511,5 @@ def _recording(fit: TrajectoryFit, index: int) -> dict[str, Any]:
     }
 
 
-def _profile_data(one: Profile) -> dict[str, Any]:
-    return {**plain(one), "numbers": one.numbers.tolist(), "rises": one.rises.tolist()}
+def _bench_estimates(results: Iterable[BenchResult]) -> list[Estimate]:
+    return [estimate for result in results for estimate in result.estimates]

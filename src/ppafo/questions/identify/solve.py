@@ -1,13 +1,10 @@
 """From a problem to a parameter set: read the recordings, apply the procedures in order, put the values in."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ppafo.answers import Solved
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.result import BenchResult
-from ppafo.identification.estimate import Estimate, Prospect
 from ppafo.identification.new_set import NewSet, with_estimates
 from ppafo.identification.problem import (
     PROCEDURES,
@@ -21,46 +18,15 @@ from ppafo.identification.problem import (
 )
 from ppafo.identification.source import Source, Use, double_use, source_of
 from ppafo.identification.trajectory.section import Setting as FitSetting
-from ppafo.identification.trajectory.section import TrajectoryOutcome, solve_section
+from ppafo.identification.trajectory.section import solve_section
 from ppafo.parameters.device import VANE
 from ppafo.parameters.loading import load_parameter_set
 from ppafo.parameters.overrides import apply_overrides
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, chosen_valve
 from ppafo.progress import Progress, Report, report_nothing
+from ppafo.questions.identify.answer import Beforehand, Identification, _bench_estimates
 from ppafo.storage.foreign import read_foreign
 from ppafo.storage.recordings import read_recording
-
-
-@dataclass(frozen=True, slots=True)
-class Beforehand:
-    """What the recordings of a procedure can give and what not, said before anything was fitted."""
-
-    procedure: str
-    prospects: tuple[Prospect, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Identification(Solved):
-    """The outcome of a problem: what could be had, results in the order of making, the set before and after."""
-
-    name: str
-    beforehand: tuple[Beforehand, ...]
-    results: tuple[BenchResult, ...]
-    trajectory: TrajectoryOutcome | None
-    before: ParameterSet
-    new_set: NewSet
-
-    @property
-    def estimates(self) -> tuple[Estimate, ...]:
-        """All estimates of all procedures, those of the trajectory fit last."""
-        fitted = () if self.trajectory is None else self.trajectory.fit.estimates
-        return (*_bench_estimates(self.results), *fitted)
-
-    @property
-    def is_good(self) -> bool:
-        """Whether every check holds and the new set makes a device where the old one did."""
-        fitted = () if self.trajectory is None else self.trajectory.failed
-        return not self.new_set.problem and not fitted and not any(result.failed for result in self.results)
 
 
 def identify(problem: str | Path, progress: Report = report_nothing) -> Identification:
@@ -86,8 +52,30 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
             f"{file}: identification is made for a vane, and '{before.name}' has an actuator '{before.actuator_kind}'"
         )
     current, results = before, list[BenchResult]()
-    tasks = _tasks(problem, folder, file, before)
-    used = _uses(tasks, before, valve, file)
+    tasks = [
+        _Task(
+            item,
+            tuple(_source(folder, name, item.columns, problem, before) for name in item.recordings),
+            f"{file}: procedure {number}, {item.kind}",
+        )
+        for number, item in sorted(
+            enumerate(problem.procedure, start=1), key=lambda pair: PROCEDURES.index(pair[1].kind)
+        )
+    ]
+    found: list[Use] = []
+    for kind in PROCEDURES:
+        uses = [
+            Use(f"recording {number} of procedure {kind}", source.trace, source.recording, frozenset(), *times)
+            for task in tasks
+            if task.item.kind == kind
+            for times in [window_of(task.item, Setting(before, valve, task.place))]
+            for number, source in enumerate(task.sources, start=1)
+        ]
+        twice = double_use(uses)
+        if twice:
+            raise IdentificationError(f"{file}: {twice}")
+        found += uses
+    used = tuple(found)
     beforehand = tuple(_look(task, Setting(before, valve, task.place), progress) for task in tasks)
     for task in tasks:
         result = run_procedure(task.sources, task.item, Setting(current, valve, task.place))
@@ -119,50 +107,12 @@ class _Task:
     place: str
 
 
-def _tasks(problem: ProblemFile, folder: Path, file: str, before: ParameterSet) -> list[_Task]:
-    """Return the procedures in the recommended order, all recordings read; two of one kind stay in the file's order."""
-    return [
-        _Task(
-            item,
-            tuple(_source(folder, name, item.columns, problem, before) for name in item.recordings),
-            f"{file}: procedure {number}, {item.kind}",
-        )
-        for number, item in sorted(enumerate(problem.procedure, start=1), key=lambda pair: _place(pair[1]))
-    ]
-
-
-def _uses(tasks: list[_Task], before: ParameterSet, valve: str, file: str) -> tuple[Use, ...]:
-    """Return how the procedures use their recordings; refuse samples that two of one kind have in common."""
-    found: list[Use] = []
-    for kind in PROCEDURES:
-        uses = [
-            Use(f"recording {number} of procedure {kind}", source.trace, source.recording, frozenset(), *times)
-            for task in tasks
-            if task.item.kind == kind
-            for times in [window_of(task.item, Setting(before, valve, task.place))]
-            for number, source in enumerate(task.sources, start=1)
-        ]
-        twice = double_use(uses)
-        if twice:
-            raise IdentificationError(f"{file}: {twice}")
-        found += uses
-    return tuple(found)
-
-
 def _look(task: _Task, setting: Setting, report: Report) -> Beforehand:
     found = Beforehand(task.item.kind, prospects_of(task.sources, task.item, setting))
     missing = [prospect for prospect in found.prospects if not prospect.can_be_had]
     for prospect in missing:
         report(Progress(f"{found.procedure}: insufficient data: {prospect.name}: {prospect.statement}"))
     return found
-
-
-def _bench_estimates(results: Iterable[BenchResult]) -> list[Estimate]:
-    return [estimate for result in results for estimate in result.estimates]
-
-
-def _place(item: ProcedureProblem) -> int:
-    return PROCEDURES.index(item.kind)
 
 
 def _base_set(problem: ProblemFile, folder: Path) -> ParameterSet:

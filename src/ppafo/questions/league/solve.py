@@ -2,52 +2,18 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
-from ppafo.answers import Solved
 from ppafo.errors import ParameterError, ScenarioError, SimulationError
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.questions.league.draws import SEED
-from ppafo.questions.league.entrants import Entrant
-from ppafo.questions.league.standing import Bound, Bounded, Contest, Standing
-from ppafo.questions.league.torque_contest import TASK, torque_contest
+from ppafo.questions.league.answer import Contest, League
+from ppafo.questions.league.standing import SEED, Bound, Bounded, Entrant, Standing
+from ppafo.questions.league.torque import TASK, torque_contest
 from ppafo.questions.league.walking.contest import WalkingContest
 from ppafo.questions.league.walking.task import MINUTES, walking_task
 
 DRAWS = 100
 MAXIMUM_DRAWS = 100_000
-
-
-@dataclass(frozen=True, slots=True)
-class League(Solved):
-    """All standings in order of their error; ``bounds`` by valve, or why there are none in ``without_bound``.
-
-    ``absent`` gives by name why an entrant could not play.
-    """
-
-    contest: Contest
-    standings: tuple[Standing, ...]
-    absent: Mapping[str, str]
-    draws: int
-    seed: int
-    bounds: Mapping[str, Bounded[Bound]]
-    without_bound: str
-
-    def error_above_least(self, standing: Standing) -> float | None:
-        """Return the RMS error [N m] above the minimum that its valve can have; None without a bound."""
-        error, bounded = standing.measures.get(self.contest.error), self.bounds.get(standing.entrant.valve)
-        return None if bounded is None or error is None else max(0.0, error - bounded.bound.least_error.rms_error)
-
-    def least_gas(self, standing: Standing) -> float | None:
-        """Return the minimum gas [kg] for what an entrant reached with its valve; None without a bound."""
-        bounded = self.bounds.get(standing.entrant.valve)
-        return None if bounded is None else bounded.least_gas.get(standing.entrant.name)
-
-    def gas_above_least(self, standing: Standing) -> float | None:
-        """Return the gas [kg] above that; None without a bound."""
-        gas, least = standing.measures.get(self.contest.gas), self.least_gas(standing)
-        return None if gas is None or least is None else gas - least
 
 
 def league(

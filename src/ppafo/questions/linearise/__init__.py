@@ -4,13 +4,11 @@ import argparse
 
 from ppafo.questions.question import SET, Argument, Question, quantity
 
-EQUILIBRIUM = "equilibrium"
-
 
 def point(text: str) -> float | str:
     """Return a time [s], or ``equilibrium``; ArgumentTypeError for any other text."""
-    if text.strip() == EQUILIBRIUM:
-        return EQUILIBRIUM
+    if text.strip() == "equilibrium":
+        return "equilibrium"
     try:
         return quantity("s")(text)
     except argparse.ArgumentTypeError as error:
@@ -28,7 +26,7 @@ QUESTION = Question(
             "value of the reference",
             metavar="TIME",
             type=point,
-            default=EQUILIBRIUM,
+            default="equilibrium",
         ),
         SET,
     ),

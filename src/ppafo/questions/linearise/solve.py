@@ -1,7 +1,6 @@
 """The linear model of a scenario's plant near one point, with exact derivatives of the text that the lanes step."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from importlib.util import find_spec
 from numbers import Real
 from pathlib import Path
@@ -9,124 +8,32 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.answers import Solved
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
-from ppafo.errors import ScenarioError, nearest_name, one_line
+from ppafo.errors import ScenarioError
 from ppafo.model.orifice import FlowCurve
-from ppafo.questions.linearise import EQUILIBRIUM
-from ppafo.questions.linearise.plant import UNITS, VALVE, Plant, answers_to_command, plant_of
-from ppafo.questions.linearise.point import Point, equilibrium, openings_at, point_at
+from ppafo.questions.linearise.answer import ON_THE_EDGE, Delays, Edge, LinearModel, Variable
+from ppafo.questions.linearise.point import (
+    UNITS,
+    VALVE,
+    Plant,
+    Point,
+    answers_to_command,
+    equilibrium,
+    openings_at,
+    plant_of,
+    point_at,
+)
 from ppafo.simulation.loading import scenario_or_load
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.plant_rates import check_without_opensim
 
+EQUILIBRIUM = "equilibrium"
 MISSING_CASADI = "a linear model needs CasADi: pip install ppafo[control]"
-MISSING_CONTROL = "a system for python-control needs the package control: pip install ppafo[control]"
-ON_THE_EDGE = 1.0e-6
-"""Two sides of a comparison that differ by less than this, over the larger one, lie on an edge of the model."""
 EQUAL = 1.0e-12
 """Two sides that differ by less than this, over the larger one, are equal."""
-
 DEAF = "no small change of the command changes it (dead band, slew limit, beyond full): the command's column is 0"
-
-
-@dataclass(frozen=True, slots=True)
-class Variable:
-    """A state, input or output: its name, unit in SI, and value at the point."""
-
-    name: str
-    unit: str
-    value: float
-
-
-@dataclass(frozen=True, slots=True)
-class Edge:
-    """A comparison whose two numbers are equal at the point: where it stands, and whether it counts as true.
-
-    On the other side of it the plant may have another linear model.
-    """
-
-    place: str
-    is_true: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Delays:
-    """What the linear model leaves out [s]: dead time of the valve, age of measurements, sample period."""
-
-    command: float
-    signals: float
-    period: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LinearModel(Solved):
-    """The plant of a scenario near one point, x' = A x + B u, y = C x + D u, for differences from the point in SI.
-
-    ``a`` (states, states), ``b`` (states, inputs), ``c`` (outputs, states), ``d`` (outputs, inputs); ``rates``
-    (states,) are x' at the point itself, 0 in a steady state. ``time`` [s] is None for a steady state. ``sides`` say in
-    words which side of each limit of the plant was taken, ``edges`` where the point lies on one.
-    """
-
-    scenario: Scenario
-    time: float | None
-    states: tuple[Variable, ...]
-    inputs: tuple[Variable, ...]
-    outputs: tuple[Variable, ...]
-    a: Floats
-    b: Floats
-    c: Floats
-    d: Floats
-    rates: Floats
-    sides: Mapping[str, str]
-    edges: tuple[Edge, ...]
-    delays: Delays
-
-    @property
-    def is_steady(self) -> bool:
-        """True for a model about a steady state."""
-        return self.time is None
-
-    @property
-    def poles(self) -> "np.ndarray[Any, np.dtype[np.complex128]]":
-        """Poles [1/s], the slowest first."""
-        found = np.linalg.eigvals(self.a).astype(np.complex128)
-        return found[np.argsort(np.abs(found))]
-
-    def response(self, frequencies: Floats, output: str = "torque", source: str = "command") -> Any:
-        """Frequency response (frequencies,) of an output to an input, complex, in SI; frequencies [Hz].
-
-        ScenarioError for a name that is no output or input.
-        """
-        row, column = _place(output, self.outputs, "output"), _place(source, self.inputs, "input")
-        eye = np.eye(len(self.states))
-        return np.array(
-            [
-                self.c[row] @ np.linalg.solve(2.0j * np.pi * frequency * eye - self.a, self.b[:, column])
-                + self.d[row, column]
-                for frequency in np.asarray(frequencies, dtype=np.float64).ravel().tolist()
-            ]
-        )
-
-    def to_control(self) -> Any:
-        """Return the model as a ``control.StateSpace`` with its names; ScenarioError without the extra ``control``."""
-        if find_spec("control") is None:
-            raise ScenarioError(MISSING_CONTROL)
-        import control
-
-        names = {kind: [item.name for item in getattr(self, kind)] for kind in ("states", "inputs", "outputs")}
-        return control.ss(self.a, self.b, self.c, self.d, name=self.scenario.name.replace("-", "_"), **names)
-
-
-def _place(name: str, items: Sequence[Variable], kind: str) -> int:
-    """Number of a variable; ScenarioError for a name that is none."""
-    names = [item.name for item in items]
-    if name not in names:
-        hint = nearest_name(name, names)
-        raise ScenarioError(f"the linear model has no {kind} '{one_line(name)}'{hint}; there are: {', '.join(names)}")
-    return names.index(name)
 
 
 def linearise(
@@ -143,23 +50,18 @@ def linearise(
     check_without_opensim()
     chosen = scenario_or_load(scenario, overrides)
     run = plan_run(chosen)
-    _check(chosen, run)
+    if chosen.supply_lines is not None:
+        raise ScenarioError(f"{chosen.name}: linear models are for constant supplies; omit [supply_line]")
+    chosen.device.check_vane("a linear model")
+    if not answers_to_command(run):
+        raise ScenarioError(
+            f"{chosen.name}: valve '{chosen.device.valve_name}' is on or off: its flow has no derivative by the "
+            "command; set device.valve to one that opens in proportion"
+        )
     if at != EQUILIBRIUM and not isinstance(at, Real):
         raise ScenarioError(f"{chosen.name}: --at '{at}' is neither a time nor '{EQUILIBRIUM}'")
     point = equilibrium(chosen) if isinstance(at, str) else point_at(chosen, at)
     return _model(chosen, run, point)
-
-
-def _check(scenario: Scenario, run: Run) -> None:
-    """Refuse what has no linear model; ScenarioError."""
-    if scenario.supply_lines is not None:
-        raise ScenarioError(f"{scenario.name}: linear models are for constant supplies; omit [supply_line]")
-    scenario.device.check_vane("a linear model")
-    if not answers_to_command(run):
-        raise ScenarioError(
-            f"{scenario.name}: valve '{scenario.device.valve_name}' is on or off: its flow has no derivative by the "
-            "command; set device.valve to one that opens in proportion"
-        )
 
 
 class _Sides:

@@ -15,5 +15,5 @@ QUESTION = Question(
         SET,
     ),
     library="ppafo.questions.reproduce.publication:FILE",
-    listing="ppafo.questions.reproduce.studies:list_studies",
+    listing="ppafo.questions.reproduce.publication:list_studies",
 )

@@ -4,8 +4,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-Verdict = Literal["reproduced", "reproduced_with_assumptions", "shown_on_synthetic", "contradicted", "not_testable"]
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.errors import ParameterError
+from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio, subsonic_flow_constant
+from ppafo.model.orifice import isentropic_flow_function
+from ppafo.parameters import ParameterSet, load_parameter_set
+from ppafo.parameters.audit.evidence import Evidence, Interval
+from ppafo.parameters.device import Gas
 
+Verdict = Literal["reproduced", "reproduced_with_assumptions", "shown_on_synthetic", "contradicted", "not_testable"]
 VERDICTS: dict[Verdict, str] = {
     "reproduced": "reproduced",
     "reproduced_with_assumptions": "reproduced with assumptions",
@@ -103,3 +110,204 @@ def count_words(verdicts: Sequence[Verdict]) -> str:
     """Return the same of verdicts alone."""
     found = ", ".join(f"{count} {words}" for key, words in VERDICTS.items() if (count := verdicts.count(key)))
     return f"{len(verdicts)} claims: {found}"
+
+
+PRINTED_SET = "ppafo2011-printed"
+
+
+@dataclass(frozen=True, slots=True)
+class Printed:
+    """Read access to the printed set; every requested value has to be there."""
+
+    parameter_set: ParameterSet
+    evidence: Evidence
+
+    def number(self, path: str) -> float:
+        """Return the number as printed, in its printed unit."""
+        return self._entry_of(path)[0]
+
+    def unit(self, path: str) -> str:
+        """Return the printed unit, ``-`` for a plain number."""
+        return self._entry_of(path)[1] or "-"
+
+    def source(self, path: str) -> str:
+        """Return where the paper prints it."""
+        self._entry_of(path)
+        return self.parameter_set.numbers[path].source
+
+    def quotation(self, path: str) -> str:
+        """Return number and unit for a sentence, for example ``8.4 g m^2``."""
+        number, unit = self._entry_of(path)
+        return f"{number:g} {unit}".rstrip()
+
+    def in_si(self, path: str) -> float:
+        """Return the value in SI units."""
+        value = self.evidence.number(path)
+        if value is None:
+            raise self._lack(path)
+        return value
+
+    def in_printed_unit(self, path: str, value: float) -> float:
+        """Return an SI value in the unit in which the paper prints the quantity at a path (a unit without offset)."""
+        return value * self.number(path) / self.in_si(path)
+
+    def range(self, path: str) -> Interval:
+        """Return the range in SI that the printed digits leave open, without sign."""
+        interval = self.evidence.magnitude(path)
+        if interval is None:
+            raise self._lack(path)
+        return interval
+
+    def gas(self) -> Gas:
+        """Return the printed gas."""
+        gas = self.evidence.gas()
+        if gas is None:
+            raise self._lack("gas")
+        return gas
+
+    def _entry_of(self, path: str) -> tuple[float, str]:
+        entry = self.parameter_set.numbers.get(path)
+        if entry is None:
+            raise self._lack(path)
+        return entry.value, entry.unit
+
+    def _lack(self, path: str) -> ParameterError:
+        return ParameterError(f"{self.parameter_set.file}: '{path}' is missing; the claims of the paper need it")
+
+
+def load_printed() -> Printed:
+    """Return the paper's numbers, exactly as printed."""
+    parameter_set = load_parameter_set(PRINTED_SET)
+    return Printed(parameter_set, Evidence(parameter_set, parameter_set.declarations()))
+
+
+_INERTIA = "foot_plate.inertia"
+_DIGITS = "to the printed digits"
+
+
+def arithmetic_claims(printed: Printed) -> list[Claim]:
+    """Return the claims on C1, C2, the critical ratio, damping, dynamic friction and both discharge coefficients."""
+    return [
+        *_flow_constants(printed),
+        _product(
+            printed, "rotary_damping", "friction.viscous_damping", "reported.velocity_over_acceleration", "decay rate"
+        ),
+        _product(
+            printed, "dynamic_friction", "friction.dynamic_torque", "reported.stopping_deceleration", "deceleration"
+        ),
+        _coefficient(printed, "solenoid"),
+        _coefficient(printed, "proportional"),
+    ]
+
+
+def _flow_constants(printed: Printed) -> list[Claim]:
+    gas = printed.gas()
+    k, constant, temperature = gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature
+    found = (
+        (
+            "c1",
+            "C1 of choked flow",
+            "reported.choked_flow_constant",
+            choked_flow_constant(k, constant, temperature),
+            " With the exponent (k + 1)/(k - 1) under the root, not the printed one: see the audit.",
+        ),
+        (
+            "c2",
+            "C2 of subsonic flow",
+            "reported.subsonic_flow_constant",
+            subsonic_flow_constant(k, constant, temperature),
+            "",
+        ),
+        (
+            "critical_pressure_ratio",
+            "the pressure ratio where flow chokes",
+            "reported.critical_pressure_ratio",
+            1.0 / critical_pressure_ratio(k),
+            "",
+        ),
+    )
+    claims = []
+    for identifier, name, path, value, remark in found:
+        holds = printed.range(path).meets(Interval(value, value))
+        statement = f"{name[0].upper()}{name[1:]} follows from the gas: k, molar mass and temperature as printed."
+        note = f"{'Agrees' if holds else 'Does not agree'} {_DIGITS}.{remark}"
+        claims.append(_claim(printed, identifier, statement, path, value, holds, note))
+    return claims
+
+
+def _product(printed: Printed, identifier: str, path: str, rate_path: str, rate_name: str) -> Claim:
+    """Compare a printed product with inertia times the printed rate; a rate in 1/s is one, whatever it is called."""
+    name = identifier.replace("_", " ")
+    holds = printed.range(_INERTIA).times(printed.range(rate_path)).meets(printed.range(path))
+    value = printed.in_printed_unit(path, printed.in_si(_INERTIA) * abs(printed.in_si(rate_path)))
+    rate = f"{abs(printed.number(rate_path)):g} {printed.unit(rate_path)}"
+    implied = printed.in_printed_unit(_INERTIA, printed.in_si(path) / abs(printed.in_si(rate_path)))
+    statement = f"The {name} is the inertia, {printed.quotation(_INERTIA)}, times the measured {rate_name}, {rate}."
+    note = (
+        f"The printed product holds {_DIGITS}."
+        if holds
+        else f"The product is {value:.3g} {printed.unit(path)}; the printed {printed.quotation(path)} would need an "
+        f"inertia of {implied:.2g} {printed.unit(_INERTIA)}. The measured {rate_name} itself cannot be tested here."
+    )
+    return _claim(printed, identifier, statement, path, value, holds, note)
+
+
+def _coefficient(printed: Printed, valve: str) -> Claim:
+    """Compare a printed Cd with the one that the printed flow needs through the printed area; equation (6)."""
+    coefficient, area = f"valves.{valve}.discharge_coefficient", f"valves.{valve}.area"
+    flow, pressure = f"reported.valves.{valve}.mass_flow", f"reported.valves.{valve}.flow_pressure"
+    per_area = _flow_per_area(printed, pressure)
+    value = printed.in_si(flow) / (per_area * printed.in_si(area))
+    needed = printed.range(flow).over(printed.range(area)).over(Interval(per_area, per_area))
+    holds = needed.meets(printed.range(coefficient))
+    stated = 1e3 * printed.in_si(coefficient) * printed.in_si(area) * per_area
+    through = f"{printed.quotation(area)} and {printed.quotation(flow)} at {printed.quotation(pressure)}"
+    statement = f"The discharge coefficient of the {valve} valve follows from its area and flow: {through}."
+    note = (
+        f"Agrees {_DIGITS}."
+        if holds
+        else f"The printed flow needs Cd = {value:.3g} (a plain number: the printed unit {printed.unit(coefficient)} "
+        f"does not fit equation (6)); the printed {printed.number(coefficient):g} would pass {stated:.3g} g/s."
+    )
+    assumptions = (
+        f"supply.atmospheric_pressure = {STANDARD_ATMOSPHERE:g} Pa_a: not printed; the standard atmosphere",
+        "the measured flow is choked or leaves into the atmosphere through one opening of the printed area",
+    )
+    return _claim(
+        printed, f"discharge_coefficient_{valve}", statement, coefficient, value, holds, note, assumptions, "-"
+    )
+
+
+def _flow_per_area(printed: Printed, pressure_path: str) -> float:
+    """Flow of Cd A = 1 m^2 into the atmosphere [kg/(s m^2)]; equations (6), (7)."""
+    gas, pressure = printed.gas(), printed.in_si(pressure_path)
+    k = gas.heat_capacity_ratio
+    psi = isentropic_flow_function(min(STANDARD_ATMOSPHERE / pressure, 1.0), k)
+    return choked_flow_constant(k, gas.specific_gas_constant, gas.temperature) * pressure * psi
+
+
+def _claim(
+    printed: Printed,
+    identifier: str,
+    statement: str,
+    path: str,
+    value: float,
+    holds: bool,
+    note: str,
+    assumptions: tuple[str, ...] = (),
+    unit: str | None = None,
+) -> Claim:
+    verdict: Verdict = "reproduced" if holds else "contradicted"
+    if holds and assumptions:
+        verdict = "reproduced_with_assumptions"
+    return Claim(
+        id=identifier,
+        statement=statement,
+        paper=printed.number(path),
+        value=value,
+        unit=printed.unit(path) if unit is None else unit,
+        verdict=verdict,
+        source=printed.source(path),
+        note=note,
+        assumptions=assumptions,
+    )

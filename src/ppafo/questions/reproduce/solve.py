@@ -1,24 +1,24 @@
 """Runs the paper's experiments and judges what the paper claims of them."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any, Literal, overload
 
-from ppafo.answers import Solved
 from ppafo.errors import SimulationError
 from ppafo.parameters import load_parameter_set
-from ppafo.parameters.audit import Finding, audit
+from ppafo.parameters.audit import audit
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.questions.reproduce.arithmetic import arithmetic_claims
-from ppafo.questions.reproduce.assumed import AssumedValue, assumed_values, values_used_by
-from ppafo.questions.reproduce.claim import Claim, Observation
-from ppafo.questions.reproduce.measured import measured_claims
-from ppafo.questions.reproduce.printed import load_printed
-from ppafo.questions.reproduce.step_response import Levels, StepEvents, step_events, step_observations
-from ppafo.questions.reproduce.studies import ALL, SEED, Study, check_study, run_studies
-from ppafo.questions.reproduce.synthetic import NoEvidence, SyntheticEvidence, synthetic_evidence
+from ppafo.questions.reproduce.answer import PROPORTIONAL, SOLENOID, STEP, Reproduction, Studies
+from ppafo.questions.reproduce.bench import (
+    assumed_values,
+    measured_claims,
+    synthetic_evidence,
+    values_used_by,
+)
+from ppafo.questions.reproduce.claim import arithmetic_claims, load_printed
+from ppafo.questions.reproduce.publication import ALL, SEED, check_study, run_studies
+from ppafo.questions.reproduce.step_response import Levels, step_events, step_observations
 from ppafo.questions.reproduce.torque_task import torque_task_claims, torque_task_observations
-from ppafo.questions.unreported.solve import Family, infer_settings
+from ppafo.questions.unreported.solve import infer_settings
 from ppafo.simulation.declaration import value_at
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.overriding import apply_overrides, is_of_device, scenario_paths, split_override, unknown_value
@@ -28,13 +28,8 @@ from ppafo.simulation.simulate import simulate
 
 COMPLETIONS = 49_152
 """Completions of the torque task in the report; ``ppafo unreported`` takes more."""
-
-STEP = "step-response"
-SOLENOID = "torque-task-solenoid"
-PROPORTIONAL = "torque-task-proportional"
 EXPERIMENTS = (STEP, SOLENOID, PROPORTIONAL)
 """Shipped scenarios that stand for the paper's experiments."""
-
 ORDER = (
     "c1",
     "c2",
@@ -56,43 +51,6 @@ ORDER = (
     "co2_saving",
 )
 """Every claim, in the order of the paper."""
-
-
-@dataclass(frozen=True, slots=True)
-class Reproduction(Solved):
-    """What came of it: claims in the order of the paper, what the text tells, runs, assumptions and audit findings.
-
-    ``family`` is what the paper's results imply about the settings it does not print; None where values were changed.
-    """
-
-    claims: tuple[Claim, ...]
-    step_observations: tuple[Observation, ...]
-    torque_observations: tuple[Observation, ...]
-    step: Result
-    step_events: StepEvents | None
-    solenoid: Result
-    proportional: Result
-    synthetic: SyntheticEvidence | NoEvidence
-    assumed: tuple[AssumedValue, ...]
-    printed_set: str
-    printed_findings: tuple[Finding, ...]
-    completed_set: str
-    completed_findings: tuple[Finding, ...]
-    overrides: tuple[str, ...]
-    family: Family | None
-
-    @property
-    def missed(self) -> tuple[Claim, ...]:
-        """Claims whose number is outside the window that it has to meet."""
-        return tuple(claim for claim in self.claims if claim.is_missed)
-
-
-@dataclass(frozen=True, slots=True)
-class Studies(Solved):
-    """Some publications with their judged claims, and the reproduction of the paper where it is among them."""
-
-    studies: tuple[Study, ...]
-    reproduction: Reproduction | None = None
 
 
 @overload
@@ -141,7 +99,10 @@ def _reproduce_paper(overrides: Sequence[str], report: Report, completions: int 
     runs = {name: _run(scenario, report) for name, scenario in scenarios.items()}
     step, solenoid, proportional = (runs[name] for name in EXPERIMENTS)
     report(Progress("measuring on the virtual rig (synthetic)"))
-    synthetic = _synthetic(scenarios)
+    # The rig records with the overrides of the simulations.
+    meant = {name: scenario.origin.overrides for name, scenario in scenarios.items()}
+    tasks = {"solenoid": meant[SOLENOID], "proportional": meant[PROPORTIONAL]}
+    synthetic = synthetic_evidence(scenarios[STEP], tasks, meant[STEP])
     report(Progress("checking the paper's own numbers"))
     printed = load_printed()
     completed = load_parameter_set(step.scenario.origin.parameter_set)
@@ -151,10 +112,15 @@ def _reproduce_paper(overrides: Sequence[str], report: Report, completions: int 
         *measured_claims(printed, synthetic, values_used_by(assumed, STEP)),
         *torque_task_claims(solenoid, proportional, values_used_by(assumed, SOLENOID, PROPORTIONAL)),
     ]
-    events = step_events(step.recording)
+    events, supply, family = step_events(step.recording), step.scenario.device.supply, None
+    levels = Levels(supply.pressure, supply.atmospheric_pressure)
+    if not overrides:
+        count = completions or COMPLETIONS
+        report(Progress(f"drawing {count} completions of the torque task"))
+        family = infer_settings(count)
     return Reproduction(
         claims=tuple(sorted(claims, key=lambda claim: ORDER.index(claim.id))),
-        step_observations=tuple(step_observations(step.recording, _levels(step), events)),
+        step_observations=tuple(step_observations(step.recording, levels, events)),
         torque_observations=tuple(torque_task_observations(solenoid, proportional)),
         step=step,
         step_events=events,
@@ -167,14 +133,8 @@ def _reproduce_paper(overrides: Sequence[str], report: Report, completions: int 
         completed_set=completed.name,
         completed_findings=tuple(audit(completed)),
         overrides=tuple(overrides),
-        family=None if overrides else _family(completions or COMPLETIONS, report),
+        family=family,
     )
-
-
-def _family(completions: int, report: Report) -> Family:
-    """Return completions of the torque task with how well they agree with the paper."""
-    report(Progress(f"drawing {completions} completions of the torque task"))
-    return infer_settings(completions)
 
 
 def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
@@ -182,7 +142,10 @@ def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
     meant: dict[str, list[str]] = {name: [] for name in EXPERIMENTS}
     for override in overrides:
         path, _ = split_override(override)
-        documents = {name: _document_with(name, earlier) for name, earlier in meant.items()}
+        documents = {
+            name: apply_overrides(load_scenario(name).origin.content, earlier, name).document
+            for name, earlier in meant.items()
+        }
         known = tuple(dict.fromkeys(known for item in documents.values() for known in scenario_paths(item)))
         if path not in known and not is_of_device(path):
             raise unknown_value(override, known, f"{', '.join(EXPERIMENTS)} have")
@@ -190,18 +153,6 @@ def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
         for name in having or EXPERIMENTS:
             meant[name].append(override)
     return {name: load_scenario(name, chosen) for name, chosen in meant.items()}
-
-
-def _document_with(name: str, earlier: Sequence[str]) -> dict[str, Any]:
-    """Return the document of a scenario with the overrides that came earlier."""
-    return apply_overrides(load_scenario(name).origin.content, earlier, name).document
-
-
-def _synthetic(scenarios: Mapping[str, Scenario]) -> SyntheticEvidence | NoEvidence:
-    """Return what the rig measures in place of the paper, with the same overrides as the simulations."""
-    overrides = {name: scenario.origin.overrides for name, scenario in scenarios.items()}
-    tasks = {"solenoid": overrides[SOLENOID], "proportional": overrides[PROPORTIONAL]}
-    return synthetic_evidence(scenarios[STEP], tasks, overrides[STEP])
 
 
 def _has(document: dict[str, Any], path: str) -> bool:
@@ -217,8 +168,3 @@ def _run(scenario: Scenario, report: Report) -> Result:
     if not result.status.is_completed:
         raise SimulationError(f"{scenario.name}: {result.status.message}")
     return result
-
-
-def _levels(step: Result) -> Levels:
-    supply = step.scenario.device.supply
-    return Levels(supply.pressure, supply.atmospheric_pressure)

@@ -1,30 +1,23 @@
-"""Morris, Sobol and Shapley: designs in the unit cube in, indices out.
-
-A design is made of blocks that belong together: one trajectory of Morris, one base point of Sobol with its
-exchanged copies, one order of the values for Shapley. A block is the least that can be left out.
-"""
+"""The methods by which influence is measured: Sobol, Morris and Shapley, each with its design and its indices."""
 
 import importlib.util
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.errors import StudyError
-from ppafo.studies.distributions import Floats
+from ppafo.studies.distributions import Floats, jackknife_reach
 from ppafo.studies.draws import Uncertainty, replicate_seed
-from ppafo.studies.intervals import jackknife_reach
-from ppafo.studies.noise import NOISE
+from ppafo.studies.sampling import NOISE
 
 SCRAMBLES = 8
 """Independent scrambles of the Sobol sequence, to which the base points are dealt out in turn."""
-
 TAIL = 0.005
 """Morris moves between the 0.5 and the 99.5 % quantile of each distribution: a normal one has no end to stand on."""
-
 _LEVELS = 4
 _INNER = 3
 """Draws of some values with the others held, for the variance that they leave (Song, Nelson and Staum, 2016)."""
@@ -54,112 +47,75 @@ class Evaluated:
     seed: int
 
 
-class Method(Protocol):
-    """A design and its evaluation."""
-
-    @property
-    def name(self) -> str:
-        """Name in ``METHODS``."""
-        ...
-
-    @property
-    def shown(self) -> tuple[str, ...]:
-        """The indices that are drawn; the first one ranks."""
-        ...
-
-    @property
-    def takes_dependent(self) -> bool:
-        """Whether its indices mean something where values are correlated."""
-        ...
-
-    @property
-    def follows_noise(self) -> bool:
-        """Whether the noise of the sensors is one of its values; if not, it is held within every block."""
-        ...
-
-    @property
-    def fewest(self) -> int:
-        """Least number of blocks."""
-        ...
-
-    @property
-    def most(self) -> int:
-        """Largest number of blocks."""
-        ...
-
-    @property
-    def sizes_label(self) -> str:
-        """What blocks are called."""
-        ...
-
-    @property
-    def block_label(self) -> str:
-        """What one block is called."""
-        ...
-
-    def block_rows(self, dimensions: int) -> int:
-        """Return how many runs belong together."""
-        ...
-
-    def design(self, uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
-        """Return fractions in (0, 1), shape (blocks * block_rows, paths), block after block."""
-        ...
-
-    def indices(self, found: Evaluated, confidence: float) -> Indices:
-        """Return the indices from whole blocks of a design."""
-        ...
-
-
 @dataclass(frozen=True, slots=True)
-class Sobol:
-    """Fractions of the variance: first-order (each value alone) and total (with all its interactions).
+class Method:
+    """A design and its evaluation.
 
-    Saltelli's design as SALib makes it, on independent scrambles of the Sobol sequence; estimators of Saltelli et al.
-    (2010) and Jansen (1999). The bands come from the spread between the scrambles, because the points of one sequence
-    are not independent and resampling them gives bands that are several times too wide.
+    ``shown`` are the indices that are drawn, the first of which ranks. ``takes_dependent`` tells whether they mean
+    something where values are correlated; ``follows_noise`` whether the noise of the sensors is one of the values, if
+    not, it is held within every block. There are ``fewest`` to ``most`` blocks, called by ``sizes_label`` and each by
+    ``block_label``; ``block_rows`` says how many runs belong together for a number of values. ``design`` takes an
+    uncertainty, blocks and a seed and returns fractions in (0, 1), shape (blocks * block_rows, paths), block after
+    block; ``indices`` returns the indices of whole blocks with bands of a confidence.
     """
 
-    name: str = "sobol"
-    shown: tuple[str, ...] = ("total", "first")
-    takes_dependent: bool = False
-    follows_noise: bool = True
-    fewest: int = 64
-    most: int = 2**17
-    sizes_label: str = "base points"
-    block_label: str = "base point"
-
-    def block_rows(self, dimensions: int) -> int:
-        """Return how many runs belong together."""
-        return dimensions + 2
-
-    def design(self, uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
-        """Return fractions in (0, 1) for a power of 2 of blocks; block b is of scramble b % SCRAMBLES."""
-        if blocks & (blocks - 1):
-            raise StudyError(f"samples = {blocks}: Sobol indices need a power of 2, such as {1 << blocks.bit_length()}")
-        _check_salib()
-        from SALib.sample import sobol
-
-        dimensions, each = len(uncertainty.drawn), blocks // SCRAMBLES
-        design = np.empty((each, SCRAMBLES, dimensions + 2, dimensions))
-        for number in range(SCRAMBLES):
-            own = replicate_seed(seed, number) % 2**32
-            fractions = sobol.sample(_problem(dimensions), each, calc_second_order=False, seed=own)
-            design[:, number] = fractions.reshape(each, dimensions + 2, dimensions)
-        return np.clip(design.reshape(-1, dimensions), _SMALLEST, 1.0 - _SMALLEST)
-
-    def indices(self, found: Evaluated, confidence: float) -> Indices:
-        """Return ``first`` and ``total`` with bands."""
-        table = found.values.reshape(found.blocks.size, -1)
-        scramble = found.blocks % SCRAMBLES
-        parts = [scramble != number for number in np.unique(scramble)]
-        left_out = np.array([_sobol_indices(table[rest]) for rest in parts])
-        reach = jackknife_reach(left_out, confidence)
-        total, first = _sobol_indices(table)
-        return Indices({"total": total, "first": first}, {"total": reach[0], "first": reach[1]})
+    name: str
+    shown: tuple[str, ...]
+    takes_dependent: bool
+    follows_noise: bool
+    fewest: int
+    most: int
+    sizes_label: str
+    block_label: str
+    block_rows: Callable[[int], int]
+    design: Callable[[Uncertainty, int, int], Floats]
+    indices: Callable[[Evaluated, float], Indices]
 
 
-def _sobol_indices(table: Floats) -> Floats:
-    """Return total and first-order indices (2, paths) from blocks (blocks, paths + 2): a point, its copies, another."""
+def _check_salib() -> None:
+    if importlib.util.find_spec("SALib") is None:
+        raise StudyError("sensitivity needs SALib, which is not installed: pip install 'ppafo[studies]'")
+
+
+def _problem(dimensions: int) -> dict[str, Any]:
+    names = [f"x{number}" for number in range(dimensions)]
+    return {"num_vars": dimensions, "names": names, "bounds": [[0.0, 1.0]] * dimensions}
+
+
+def _sobol_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
+    """Return fractions in (0, 1) for a power of 2 of blocks; block b is of scramble b % SCRAMBLES."""
+    if blocks & (blocks - 1):
+        raise StudyError(f"samples = {blocks}: Sobol indices need a power of 2, such as {1 << blocks.bit_length()}")
+    _check_salib()
+    from SALib.sample import sobol
+
+    dimensions, each = len(uncertainty.drawn), blocks // SCRAMBLES
+    design = np.empty((each, SCRAMBLES, dimensions + 2, dimensions))
+    for number in range(SCRAMBLES):
+        own = replicate_seed(seed, number) % 2**32
+        fractions = sobol.sample(_problem(dimensions), each, calc_second_order=False, seed=own)
+        design[:, number] = fractions.reshape(each, dimensions + 2, dimensions)
+    return np.clip(design.reshape(-1, dimensions), _SMALLEST, 1.0 - _SMALLEST)
+
+
+def _sobol_indices(found: Evaluated, confidence: float) -> Indices:
+    """Return ``first`` and ``total`` with bands."""
+    table = found.values.reshape(found.blocks.size, -1)
+    scramble = found.blocks % SCRAMBLES
+    parts = [scramble != number for number in np.unique(scramble)]
+    left_out = np.array([_sobol_total_and_first(table[rest]) for rest in parts])
+    reach = jackknife_reach(left_out, confidence)
+    total, first = _sobol_total_and_first(table)
+    return Indices({"total": total, "first": first}, {"total": reach[0], "first": reach[1]})
+
+
+def _sobol_total_and_first(table: Floats) -> Floats:
+    """Return total and first-order indices (2, paths) from blocks (blocks, paths + 2): a point, its copies, another.
+
+    With f(A) at the first point, f(B) at the last, f(AB_i) where value i is that of B, and V the variance of f(A) and
+    f(B): total_i = mean (f(A) - f(AB_i))^2 / 2 V (Jansen, 1999), first_i = mean f(B) (f(AB_i) - f(A)) / V (Saltelli et
+    al., 2010).
+    """
     table = table - np.mean(table[:, [0, -1]])
     first, copies, second = table[:, :1], table[:, 1:-1], table[:, -1:]
     variance = float(np.mean(table[:, [0, -1]] ** 2))
@@ -167,60 +123,59 @@ def _sobol_indices(table: Floats) -> Floats:
     return np.stack([total, np.mean(second * (copies - first), axis=0)]) / (variance or math.nan)
 
 
-@dataclass(frozen=True, slots=True)
-class Morris:
-    """Elementary effects: how much a metric changes when one value goes through its whole range, here and there.
+SOBOL = Method(
+    name="sobol",
+    shown=("total", "first"),
+    takes_dependent=False,
+    follows_noise=True,
+    fewest=64,
+    most=2**17,
+    sizes_label="base points",
+    block_label="base point",
+    block_rows=lambda dimensions: dimensions + 2,
+    design=_sobol_design,
+    indices=_sobol_indices,
+)
+"""Fractions of the variance: first-order (each value alone) and total (with all its interactions).
 
-    An effect is the change of the metric over that of the value, times the range of the value: in the unit of the
-    metric, whatever the distribution. ``mean_effect`` is its mean size (Campolongo et al., 2007), ``spread`` its
-    standard deviation: large where the effect depends on the other values. The noise of the sensors is the same along
-    a trajectory.
-    """
+Saltelli's design as SALib makes it, on independent scrambles of the Sobol sequence; estimators of Saltelli et al.
+(2010) and Jansen (1999). The bands come from the spread between the scrambles, because the points of one sequence
+are not independent and resampling them gives bands that are several times too wide.
+"""
 
-    name: str = "morris"
-    shown: tuple[str, ...] = ("mean_effect", "spread")
-    takes_dependent: bool = False
-    follows_noise: bool = False
-    fewest: int = 8
-    most: int = 2**14
-    sizes_label: str = "trajectories"
-    block_label: str = "trajectory"
 
-    def block_rows(self, dimensions: int) -> int:
-        """Return how many runs belong together."""
-        return dimensions + 1
+def _morris_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
+    """Return fractions from TAIL to 1 - TAIL, and of the noise any, held in each block."""
+    _check_salib()
+    from SALib.sample import morris
 
-    def design(self, uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
-        """Return fractions from TAIL to 1 - TAIL, and of the noise any, held in each block."""
-        _check_salib()
-        from SALib.sample import morris
+    moved = len(uncertainty.drawn) - uncertainty.has_noise
+    design = morris.sample(_problem(moved), blocks, num_levels=_LEVELS, seed=seed)
+    fractions = np.asarray(TAIL + (1.0 - 2.0 * TAIL) * design)
+    if not uncertainty.has_noise:
+        return fractions
+    held = np.repeat(np.random.default_rng([seed, 1]).random(blocks), moved + 1)
+    return np.insert(fractions, uncertainty.paths.index(NOISE), held, axis=1)
 
-        moved = len(uncertainty.drawn) - uncertainty.has_noise
-        design = morris.sample(_problem(moved), blocks, num_levels=_LEVELS, seed=seed)
-        fractions = np.asarray(TAIL + (1.0 - 2.0 * TAIL) * design)
-        if not uncertainty.has_noise:
-            return fractions
-        held = np.repeat(np.random.default_rng([seed, 1]).random(blocks), self.block_rows(moved))
-        return np.insert(fractions, uncertainty.paths.index(NOISE), held, axis=1)
 
-    def indices(self, found: Evaluated, confidence: float) -> Indices:
-        """Return ``mean_effect`` with a band, and ``spread`` [unit of the metric]."""
-        from scipy.special import stdtrit
+def _morris_indices(found: Evaluated, confidence: float) -> Indices:
+    """Return ``mean_effect`` with a band, and ``spread`` [unit of the metric]."""
+    from scipy.special import stdtrit
 
-        blocks, paths = found.blocks.size, found.fractions.shape[1]
-        fractions, inputs = (table.reshape(blocks, -1, paths) for table in (found.fractions, found.inputs))
-        change = np.diff(found.values.reshape(blocks, -1), axis=1)
-        moves = np.diff(fractions, axis=1) != 0.0
-        way = np.sum(np.diff(inputs, axis=1) * moves, axis=1)
-        climb = np.sum(change[:, :, None] * moves, axis=1)
-        # Where a value takes few levels, a step may not change it: that says nothing.
-        effects = np.where(way != 0.0, climb / np.where(way != 0.0, way, 1.0) * found.ranges, math.nan)
-        effects = effects[:, moves.any(axis=(0, 1))]
-        known = np.count_nonzero(np.isfinite(effects), axis=0)
-        size = np.where(known > 0, np.nansum(np.abs(effects), axis=0) / np.maximum(known, 1), 0.0)
-        spread, of_size = (_deviation(item, known) for item in (effects, np.abs(effects)))
-        reach = stdtrit(np.maximum(known - 1, 1), 0.5 + 0.5 * confidence) * of_size / np.sqrt(np.maximum(known, 1))
-        return Indices({"mean_effect": size, "spread": spread}, {"mean_effect": reach})
+    blocks, paths = found.blocks.size, found.fractions.shape[1]
+    fractions, inputs = (table.reshape(blocks, -1, paths) for table in (found.fractions, found.inputs))
+    change = np.diff(found.values.reshape(blocks, -1), axis=1)
+    moves = np.diff(fractions, axis=1) != 0.0
+    way = np.sum(np.diff(inputs, axis=1) * moves, axis=1)
+    climb = np.sum(change[:, :, None] * moves, axis=1)
+    # Where a value takes few levels, a step may not change it: that says nothing.
+    effects = np.where(way != 0.0, climb / np.where(way != 0.0, way, 1.0) * found.ranges, math.nan)
+    effects = effects[:, moves.any(axis=(0, 1))]
+    known = np.count_nonzero(np.isfinite(effects), axis=0)
+    size = np.where(known > 0, np.nansum(np.abs(effects), axis=0) / np.maximum(known, 1), 0.0)
+    spread, of_size = (_deviation(item, known) for item in (effects, np.abs(effects)))
+    reach = stdtrit(np.maximum(known - 1, 1), 0.5 + 0.5 * confidence) * of_size / np.sqrt(np.maximum(known, 1))
+    return Indices({"mean_effect": size, "spread": spread}, {"mean_effect": reach})
 
 
 def _deviation(effects: Floats, known: NDArray[np.intp]) -> Floats:
@@ -229,67 +184,68 @@ def _deviation(effects: Floats, known: NDArray[np.intp]) -> Floats:
     return np.asarray(np.sqrt(np.nansum(away**2, axis=0) / np.maximum(known - 1, 1)))
 
 
-@dataclass(frozen=True, slots=True)
-class Shapley:
-    """Fractions of the variance that add up to 1 whether the values depend on each other or not.
+MORRIS = Method(
+    name="morris",
+    shown=("mean_effect", "spread"),
+    takes_dependent=False,
+    follows_noise=False,
+    fewest=8,
+    most=2**14,
+    sizes_label="trajectories",
+    block_label="trajectory",
+    block_rows=lambda dimensions: dimensions + 1,
+    design=_morris_design,
+    indices=_morris_indices,
+)
+"""Elementary effects: how much a metric changes when one value goes through its whole range, here and there.
 
-    What two values explain together, because they act together or because they are correlated, is divided between
-    them (Owen, 2014). By random orders: each value gets what it adds to the variance that the values before it leave
-    when all after it are held (Song, Nelson and Staum, 2016). Held values are drawn from the Gaussian copula.
-    """
+An effect is the change of the metric over that of the value, times the range of the value: in the unit of the
+metric, whatever the distribution. ``mean_effect`` is its mean size (Campolongo et al., 2007), ``spread`` its
+standard deviation: large where the effect depends on the other values. The noise of the sensors is the same along
+a trajectory.
+"""
 
-    name: str = "shapley"
-    shown: tuple[str, ...] = ("shapley",)
-    takes_dependent: bool = True
-    follows_noise: bool = True
-    fewest: int = 64
-    most: int = 2**17
-    sizes_label: str = "orders"
-    block_label: str = "order"
 
-    def block_rows(self, dimensions: int) -> int:
-        """Return how many runs belong together."""
-        return _INNER * (dimensions - 1)
+def _shapley_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
+    """Return fractions in (0, 1): in each block, for ever more values of its order, draws with the rest held."""
+    from scipy.special import ndtr
 
-    def design(self, uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
-        """Return fractions in (0, 1): in each block, for ever more values of its order, draws with the rest held."""
-        from scipy.special import ndtr
+    count = len(uncertainty.drawn)
+    lower = np.eye(count) if uncertainty.scores is None else np.asarray(uncertainty.scores)
+    random = np.random.default_rng([seed, 1])
+    scores = random.standard_normal((blocks, count - 1, 1, count)) @ lower.T
+    scores = np.repeat(scores, _INNER, axis=2)
+    fresh = random.standard_normal((blocks, count - 1, _INNER, count))
+    places = np.argsort(_orders(count, blocks, seed), axis=1)
+    free = places[:, None, :] <= np.arange(count - 1)[None, :, None]
+    for pattern in np.unique(free.reshape(-1, count), axis=0):
+        rows = np.all(free == pattern, axis=2)
+        mean, factor = _conditional(lower @ lower.T, pattern)
+        drawn = scores[rows][..., ~pattern] @ mean.T + fresh[rows][..., pattern] @ factor.T
+        part = scores[rows]
+        part[..., pattern] = drawn
+        scores[rows] = part
+    uniform = ndtr(np.linalg.solve(lower, scores.reshape(-1, count).T).T)
+    return np.asarray(np.clip(uniform, _SMALLEST, 1.0 - _SMALLEST))
 
-        count = len(uncertainty.drawn)
-        lower = np.eye(count) if uncertainty.scores is None else np.asarray(uncertainty.scores)
-        random = np.random.default_rng([seed, 1])
-        scores = random.standard_normal((blocks, count - 1, 1, count)) @ lower.T
-        scores = np.repeat(scores, _INNER, axis=2)
-        fresh = random.standard_normal((blocks, count - 1, _INNER, count))
-        places = np.argsort(_orders(count, blocks, seed), axis=1)
-        free = places[:, None, :] <= np.arange(count - 1)[None, :, None]
-        for pattern in np.unique(free.reshape(-1, count), axis=0):
-            rows = np.all(free == pattern, axis=2)
-            mean, factor = _conditional(lower @ lower.T, pattern)
-            drawn = scores[rows][..., ~pattern] @ mean.T + fresh[rows][..., pattern] @ factor.T
-            part = scores[rows]
-            part[..., pattern] = drawn
-            scores[rows] = part
-        uniform = ndtr(np.linalg.solve(lower, scores.reshape(-1, count).T).T)
-        return np.asarray(np.clip(uniform, _SMALLEST, 1.0 - _SMALLEST))
 
-    def indices(self, found: Evaluated, confidence: float) -> Indices:
-        """Return ``shapley`` with bands, by the delta method over the orders."""
-        from scipy.special import stdtrit
+def _shapley_indices(found: Evaluated, confidence: float) -> Indices:
+    """Return ``shapley`` with bands, by the delta method over the orders."""
+    from scipy.special import stdtrit
 
-        blocks, count = found.blocks.size, found.fractions.shape[1]
-        table = found.values.reshape(blocks, count - 1, _INNER)
-        whole = np.mean((table - np.mean(table)) ** 2, axis=(1, 2))
-        left = np.var(table, axis=2, ddof=1)
-        ends = np.zeros((blocks, 1)), whole[:, None]
-        gains = np.diff(np.concatenate([ends[0], left, ends[1]], axis=1), axis=1)
-        orders = _orders(count, int(found.blocks.max()) + 1, found.seed)[found.blocks]
-        effects = np.take_along_axis(gains, np.argsort(orders, axis=1), axis=1)
-        variance = float(np.mean(whole))
-        fractions = np.mean(effects, axis=0) / variance
-        away = (effects - fractions * whole[:, None]) / variance
-        reach = float(stdtrit(blocks - 1, 0.5 + 0.5 * confidence)) * np.std(away, axis=0, ddof=1) / math.sqrt(blocks)
-        return Indices({"shapley": fractions}, {"shapley": reach})
+    blocks, count = found.blocks.size, found.fractions.shape[1]
+    table = found.values.reshape(blocks, count - 1, _INNER)
+    whole = np.mean((table - np.mean(table)) ** 2, axis=(1, 2))
+    left = np.var(table, axis=2, ddof=1)
+    ends = np.zeros((blocks, 1)), whole[:, None]
+    gains = np.diff(np.concatenate([ends[0], left, ends[1]], axis=1), axis=1)
+    orders = _orders(count, int(found.blocks.max()) + 1, found.seed)[found.blocks]
+    effects = np.take_along_axis(gains, np.argsort(orders, axis=1), axis=1)
+    variance = float(np.mean(whole))
+    fractions = np.mean(effects, axis=0) / variance
+    away = (effects - fractions * whole[:, None]) / variance
+    reach = float(stdtrit(blocks - 1, 0.5 + 0.5 * confidence)) * np.std(away, axis=0, ddof=1) / math.sqrt(blocks)
+    return Indices({"shapley": fractions}, {"shapley": reach})
 
 
 def _orders(count: int, blocks: int, seed: int) -> NDArray[np.intp]:
@@ -306,15 +262,24 @@ def _conditional(covariance: Floats, free: NDArray[np.bool_]) -> tuple[Floats, F
     return mean, np.asarray(np.linalg.cholesky(rest), dtype=np.float64)
 
 
-METHODS: dict[str, Method] = {"sobol": Sobol(), "morris": Morris(), "shapley": Shapley()}
-"""To add a method: a class with these functions, and its line here."""
+SHAPLEY = Method(
+    name="shapley",
+    shown=("shapley",),
+    takes_dependent=True,
+    follows_noise=True,
+    fewest=64,
+    most=2**17,
+    sizes_label="orders",
+    block_label="order",
+    block_rows=lambda dimensions: _INNER * (dimensions - 1),
+    design=_shapley_design,
+    indices=_shapley_indices,
+)
+"""Fractions of the variance that add up to 1 whether the values depend on each other or not.
 
-
-def _check_salib() -> None:
-    if importlib.util.find_spec("SALib") is None:
-        raise StudyError("sensitivity needs SALib, which is not installed: pip install 'ppafo[studies]'")
-
-
-def _problem(dimensions: int) -> dict[str, Any]:
-    names = [f"x{number}" for number in range(dimensions)]
-    return {"num_vars": dimensions, "names": names, "bounds": [[0.0, 1.0]] * dimensions}
+What two values explain together, because they act together or because they are correlated, is divided between
+them (Owen, 2014). By random orders: each value gets what it adds to the variance that the values before it leave
+when all after it are held (Song, Nelson and Staum, 2016). Held values are drawn from the Gaussian copula.
+"""
+METHODS = {method.name: method for method in (SOBOL, MORRIS, SHAPLEY)}
+"""To add a method: its design, its indices, and its value here."""

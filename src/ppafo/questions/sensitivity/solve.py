@@ -1,17 +1,197 @@
 """Sensitivity over the distributions of a study file."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.answers import Answer, Column, Figure, Section, Table
+from ppafo.answers.display_units import axis_unit, change_text, display_difference, display_unit, metric_quantity
+from ppafo.answers.style import BLUE, COLOURS, ORANGE, Margins, figure_of_free_panels, house_style, mark_kind
 from ppafo.errors import StudyError, nearest_name
 from ppafo.progress import Report
-from ppafo.questions.sensitivity.analyse import Sensitivity, Settings, analyse
-from ppafo.questions.sensitivity.methods import METHODS
-from ppafo.studies.draws import choose_configuration, study_of, uncertainty_in
-from ppafo.studies.outcomes import Tally, scenario_model
+from ppafo.questions.question import Solved
+from ppafo.questions.sensitivity.methods import METHODS, TAIL, Evaluated, Indices, Method
+from ppafo.simulation.document import plain
+from ppafo.studies.distributions import Floats
+from ppafo.studies.draws import (
+    Model,
+    Outcomes,
+    Tally,
+    Uncertainty,
+    check_confidence,
+    check_failures,
+    check_fraction,
+    choose_configuration,
+    scenario_model,
+    study_of,
+    uncertainty_in,
+)
+from ppafo.studies.sampling import NOISE
 from ppafo.studies.study import Study
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+    from matplotlib.axes import Axes
+
+_ENDS = (TAIL, 1.0 - TAIL)
+_NEGLIGIBLE = 0.01
+_FEWEST_WHOLE = 4
+_SIZES = 6
+"""Sizes at which the indices are shown: all blocks, and halved again and again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Number of blocks, seed, confidence of the bands, fraction of the runs that may fail."""
+
+    samples: int
+    seed: int = 1
+    confidence: float = 0.95
+    maximum_failed: float = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class Settling:
+    """The indices of one metric from the first ``blocks`` blocks, of which ``used`` had values in all runs."""
+
+    blocks: int
+    used: int
+    indices: Indices
+
+
+@dataclass(frozen=True, slots=True)
+class OfMetric:
+    """The indices of a metric at growing sizes, the last the result. ``mean`` and ``sd`` [SI] are of all runs."""
+
+    metric: str
+    settling: tuple[Settling, ...]
+    dropped_runs: int
+    mean: float
+    sd: float
+
+    @property
+    def indices(self) -> Indices:
+        """The indices from all blocks."""
+        return self.settling[-1].indices
+
+    @property
+    def dropped_blocks(self) -> int:
+        """Number of blocks that were left out."""
+        return self.settling[-1].blocks - self.settling[-1].used
+
+
+@dataclass(frozen=True, slots=True)
+class Sensitivity(Solved):
+    """Indices of some metrics with regard to some paths; ``runs`` were made, ``failures`` of them failed."""
+
+    method: Method
+    settings: Settings
+    paths: tuple[str, ...]
+    metrics: tuple[OfMetric, ...]
+    runs: int
+    failures: int
+    name: str = ""
+
+    def overlapping_pairs(self, metric: OfMetric) -> list[tuple[str, str]]:
+        """Return neighbours in the order of the first index whose bands overlap: which of the two matters more is open.
+
+        Nothing is said of two that both are surely below a hundredth of the largest: neither matters.
+        """
+        name = self.method.shown[0]
+        values, bands = metric.indices.values[name], metric.indices.bands[name]
+        order = np.argsort(-values)
+        order = order[(values + bands)[order] >= _NEGLIGIBLE * np.max(values)]
+        return [
+            (self.paths[first], self.paths[second])
+            for first, second in pairwise(order)
+            if values[first] - bands[first] < values[second] + bands[second]
+        ]
+
+
+def analyse(
+    model: Model, uncertainty: Uncertainty, metrics: Sequence[str], method: Method, settings: Settings
+) -> Sensitivity:
+    """Return the indices of a model's metrics; StudyError for bad settings, dependent values or too many failures."""
+    if uncertainty.scores is not None and not method.takes_dependent:
+        raise StudyError(
+            f"sensitivity: the indices of {method.name} need values that are independent, and the study has "
+            "[[correlations]]; use '--method shapley', or treat the values as independent (--independent)"
+        )
+    if len(uncertainty.drawn) - (uncertainty.has_noise and not method.follows_noise) < 2:
+        raise StudyError("sensitivity: there is only one uncertain value; vary two or more")
+    if not method.fewest <= settings.samples <= method.most:
+        raise StudyError(
+            f"samples = {settings.samples}: {method.name} needs {method.fewest} to {method.most:,} {method.sizes_label}"
+        )
+    if settings.seed < 0:
+        raise StudyError(f"seed = {settings.seed}: must be 0 or more")
+    check_confidence(settings.confidence)
+    check_fraction(settings.maximum_failed, "maximum_failed")
+    design = method.design(uncertainty, settings.samples, settings.seed)
+    columns = uncertainty.columns(design)
+    outcomes = model(columns)
+    check_failures(outcomes, settings.maximum_failed, "sensitivity")
+    ends = [
+        np.array([item.distribution.values(np.array(fraction)) for item in uncertainty.drawn]) for fraction in _ENDS
+    ]
+    inputs = np.stack([columns[path] for path in uncertainty.paths], axis=1)
+    rows = design.shape[0] // settings.samples
+    blocks = np.repeat(np.arange(settings.samples), rows)
+    whole = Evaluated(design, inputs, np.empty(0), blocks, ends[1] - ends[0], settings.seed)
+    found = tuple(_of_metric(name, outcomes, whole, method, settings) for name in metrics)
+    paths = tuple(path for path in uncertainty.paths if method.follows_noise or path != NOISE)
+    return Sensitivity(method, settings, paths, found, outcomes.runs, outcomes.failures)
+
+
+def _of_metric(name: str, outcomes: Outcomes, design: Evaluated, method: Method, settings: Settings) -> OfMetric:
+    values = outcomes.metrics[name]
+    known = np.isfinite(values)
+    missing = int(np.count_nonzero(~known))
+    if missing > settings.maximum_failed * values.size:
+        raise StudyError(f"sensitivity: {missing:,} of {values.size:,} runs have no '{name}'; choose another metric")
+    if float(np.ptp(values[known])) == 0.0:
+        raise StudyError(f"sensitivity: '{name}' is {values[known][0]:g} in every run, so no value influences it")
+    rows = values.size // settings.samples
+    whole = np.all(known.reshape(-1, rows), axis=1)
+    sizes = [size for size in _sizes(whole.size, method.fewest) if _varies(values, whole, size, rows)]
+    if whole.size not in sizes:
+        raise StudyError(
+            f"sensitivity: {int(np.count_nonzero(whole)):,} of {whole.size:,} {method.sizes_label} have '{name}' in "
+            "all their runs, which is too few; use more samples, or fix what makes the runs fail"
+        )
+    return OfMetric(
+        name,
+        tuple(_settling(design, values, whole, size, method, settings) for size in sizes),
+        missing,
+        float(np.mean(values[known])),
+        float(np.std(values[known], ddof=1)),
+    )
+
+
+def _sizes(blocks: int, fewest: int) -> list[int]:
+    sizes = [blocks >> halvings for halvings in range(_SIZES)]
+    return sorted({size for size in sizes if size >= fewest} | {blocks})
+
+
+def _varies(values: Floats, whole: NDArray[np.bool_], size: int, rows: int) -> bool:
+    """Tell whether the first blocks say anything: many may be left out, and a metric that counts may be the same."""
+    kept = values.reshape(-1, rows)[:size][whole[:size]]
+    return len(kept) >= _FEWEST_WHOLE and float(np.ptp(kept)) > 0.0
+
+
+def _settling(
+    design: Evaluated, values: Floats, whole: NDArray[np.bool_], size: int, method: Method, settings: Settings
+) -> Settling:
+    kept = np.flatnonzero(whole[:size])
+    rows = np.flatnonzero(np.isin(design.blocks, kept))
+    found = Evaluated(design.fractions[rows], design.inputs[rows], values[rows], kept, design.ranges, design.seed)
+    return Settling(size, kept.size, method.indices(found, settings.confidence))
+
 
 DEFAULT_SAMPLES = {"sobol": 8192, "morris": 128, "shapley": 2048}
 
@@ -55,3 +235,211 @@ def sensitivity(
     tally = Tally(count * by.block_rows(len(used.drawn)), progress)
     model = scenario_model(base.scenario, requested, threads, tally.add, used.gauge)
     return replace(analyse(model, used, requested, by, settings), name=f"{chosen.name}, {base.name}")
+
+
+_WIDTH, _RIGHT_PANEL = 9.6, 1.0
+_LETTER, _LINE = 0.083, 0.27
+_MAXIMUM_LINES = 5
+_TITLES = {
+    "total": "total",
+    "first": "first order",
+    "mean_effect": "mean effect",
+    "spread": "spread of effect",
+    "shapley": "Shapley effect",
+}
+
+
+def sensitivity_figure(found: Sensitivity) -> "matplotlib.figure.Figure":
+    """Return the figure; the left names are those of the uncertain values."""
+    names = 0.25 + _LETTER * max(len(path) for path in found.paths)
+    margins = Margins(left=names, right=0.2, top=0.55, bottom=0.55, row_gap=0.95, column_gap=0.75)
+    panel = max(2.0, _LINE * len(found.paths))
+    rows = len(found.metrics)
+    height = margins.top + rows * panel + (rows - 1) * margins.row_gap + margins.bottom
+    with house_style():
+        figure, grid = figure_of_free_panels((_WIDTH, height), margins, rows, 2)
+        for metric, (bars, course) in zip(found.metrics, grid, strict=True):
+            _draw_indices(bars, found, metric)
+            _draw_settling(course, found, metric)
+        mark_kind(figure, "simulated")
+        return figure
+
+
+def _draw_indices(axes: "Axes", found: Sensitivity, metric: OfMetric) -> None:
+    shown = found.method.shown
+    order = np.argsort(metric.indices.values[shown[0]])
+    places = np.arange(order.size)
+    for name, colour, shift in zip(shown, (BLUE, ORANGE), (0.14, -0.14), strict=False):
+        values = _in_display_unit(found, metric, metric.indices.values[name])[order]
+        band = metric.indices.bands.get(name)
+        reach = None if band is None else _in_display_unit(found, metric, band)[order]
+        axes.errorbar(
+            values,
+            places + shift,
+            xerr=reach,
+            fmt="o",
+            color=colour,
+            markersize=5,
+            elinewidth=1.4,
+            label=_TITLES[name].removesuffix(" of effect"),
+        )
+    axes.set_yticks(places, [found.paths[row] for row in order])
+    for label, colour in zip(reversed(axes.get_yticklabels()), COLOURS[:_MAXIMUM_LINES], strict=False):
+        label.set_color(colour)
+    axes.axvline(0.0, color="#9a9a9a", linewidth=0.8)
+    axes.set_xlabel(_unit(found, metric))
+    axes.set_title(metric.metric)
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1, handlelength=1.0)
+
+
+def _draw_settling(axes: "Axes", found: Sensitivity, metric: OfMetric) -> None:
+    name = found.method.shown[0]
+    order = np.argsort(-metric.indices.values[name])[:_MAXIMUM_LINES]
+    sizes = [each.blocks for each in metric.settling]
+    for colour, row in zip(COLOURS, order, strict=False):
+        values = _in_display_unit(found, metric, np.array([each.indices.values[name][row] for each in metric.settling]))
+        bands = _in_display_unit(found, metric, np.array([each.indices.bands[name][row] for each in metric.settling]))
+        axes.plot(sizes, values, "o-", color=colour, markersize=3.5, linewidth=1.2, label=found.paths[row])
+        axes.fill_between(sizes, values - bands, values + bands, color=colour, alpha=0.15, linewidth=0)
+    axes.set_xscale("log", base=2)
+    axes.set_xlabel(f"{found.method.sizes_label[:1].upper()}{found.method.sizes_label[1:]}")
+    axes.set_title(f"{_TITLES[name][:1].upper()}{_TITLES[name][1:]}, {order.size} largest")
+
+
+def _in_display_unit(found: Sensitivity, metric: OfMetric, values: Floats) -> Floats:
+    return values * display_difference(1.0, metric_quantity(metric.metric)) if found.method.name == "morris" else values
+
+
+def _unit(found: Sensitivity, metric: OfMetric) -> str:
+    if found.method.name != "morris":
+        return "Fraction of the variance"
+    unit = axis_unit(metric_quantity(metric.metric))
+    return f"Change over the range ({unit})" if unit else "Change over the range"
+
+
+_CAPTION = (
+    "Left: the indices with their bands. Right: the largest of them, in the colours of their names, from growing "
+    "parts of the sample: whether they have converged."
+)
+
+
+def answer_of(found: Sensitivity) -> Answer:
+    """Return the answer of a sensitivity analysis; indices of Morris are in the SI unit of the metric in its data."""
+    figure = Figure("sensitivity", _CAPTION, lambda: sensitivity_figure(found))
+    return Answer(
+        name="sensitivity",
+        kicker="Sensitivity",
+        title=f"What matters in {found.name}",
+        lead=tuple(lead(found)),
+        sections=(
+            *(_metric_section(found, metric) for metric in found.metrics),
+            Section("Indices and their convergence", figure=figure, is_detail=True),
+        ),
+        data=_data(found),
+    )
+
+
+def _metric_section(found: Sensitivity, metric: OfMetric) -> Section:
+    head = tuple(map(Column, table_head(found, metric)))
+    rows = tuple(map(tuple, table_rows(found, metric)))
+    return Section(heading(found, metric), table=Table(head, rows), remarks=tuple(remarks(found, metric)))
+
+
+def lead(found: Sensitivity) -> list[str]:
+    """Return what was done, and what became of runs that failed."""
+    settings, method = found.settings, found.method
+    return [
+        f"{found.name}: {method.name}, {settings.samples:,} {method.sizes_label}, {found.runs:,} runs of "
+        f"{len(found.paths)} uncertain values; bands with {100.0 * settings.confidence:g} % confidence",
+        f"{found.failures:,} runs failed; up to {100.0 * settings.maximum_failed:g} % are allowed, and every "
+        f"{method.block_label} with a failed run is left out",
+    ]
+
+
+def heading(found: Sensitivity, metric: OfMetric) -> str:
+    """Return the name of a metric with its mean and standard deviation."""
+    spread = f"sd {change_text(metric.sd, metric_quantity(metric.metric))}"
+    dropped = f"; {metric.dropped_blocks:,} of {found.settings.samples:,} {found.method.sizes_label} left out"
+    return f"{metric.metric}: {spread}{dropped if metric.dropped_blocks else ''}"
+
+
+def table_head(found: Sensitivity, metric: OfMetric) -> list[str]:
+    """Return the head of the table of a metric."""
+    unit = display_unit(metric_quantity(metric.metric)) if found.method.name == "morris" else ""
+    names = []
+    for name in metric.indices.values:
+        names.append(f"{_TITLES[name]} ({unit})" if unit else _TITLES[name])
+        names += ["band"] if name in metric.indices.bands else []
+    return ["value", *names]
+
+
+def table_rows(found: Sensitivity, metric: OfMetric) -> list[list[str]]:
+    """Return a row for each uncertain value, the most important one first."""
+    order = np.argsort(-metric.indices.values[found.method.shown[0]])
+    return [[found.paths[row], *_cells(found, metric, int(row))] for row in order]
+
+
+def remarks(found: Sensitivity, metric: OfMetric) -> list[str]:
+    """Return what these numbers leave open."""
+    said = []
+    unsettled = found.overlapping_pairs(metric)
+    if unsettled:
+        pairs = ", ".join(f"{first} and {second}" for first, second in unsettled)
+        said.append(f"not converged at this size, their bands overlap: {pairs}")
+    if "first" in metric.indices.values:
+        said.append(_interactions(metric.indices))
+    return said
+
+
+def _interactions(indices: Indices) -> str:
+    """Return what is left for interactions; a rest within the error of the sum may be none."""
+    alone = float(np.sum(indices.values["first"]))
+    error = float(np.linalg.norm(indices.bands["first"]))
+    if alone + error < 1.0:
+        return f"first-order indices sum to {alone:.3f} ± {error:.2g}; the rest comes from interactions"
+    return f"first-order indices sum to {alone:.3f} ± {error:.2g}: interactions, if any, are within this error"
+
+
+def _data(found: Sensitivity) -> dict[str, Any]:
+    return {
+        "study": found.name,
+        "method": found.method.name,
+        "settings": plain(found.settings),
+        "paths": list(found.paths),
+        "runs": found.runs,
+        "failed": found.failures,
+        "policy": "above the maximum fraction refused; below, every block with a failed run is left out",
+        "metrics": [
+            {
+                "metric": metric.metric,
+                "mean": metric.mean,
+                "standard_deviation": metric.sd,
+                "runs_without_value": metric.dropped_runs,
+                "settling": [
+                    {
+                        "blocks": each.blocks,
+                        "used": each.used,
+                        "indices": {name: plain(values.tolist()) for name, values in each.indices.values.items()},
+                        "bands": {name: plain(values.tolist()) for name, values in each.indices.bands.items()},
+                    }
+                    for each in metric.settling
+                ],
+            }
+            for metric in found.metrics
+        ],
+    }
+
+
+def _cells(found: Sensitivity, metric: OfMetric, row: int) -> list[str]:
+    def to_display(value: float) -> float:
+        return display_difference(value, metric_quantity(metric.metric)) if found.method.name == "morris" else value
+
+    cells = []
+    for name, values in metric.indices.values.items():
+        value = to_display(values[row])
+        cells.append(f"{value:.3g}" if found.method.name == "morris" else f"{round(value, 3) + 0.0:.3f}")
+        band = metric.indices.bands.get(name)
+        if band is not None:
+            reach = to_display(band[row])
+            cells.append(f"± {reach:.2g}" if found.method.name == "morris" else f"± {reach:.3f}")
+    return cells

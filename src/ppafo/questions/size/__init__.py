@@ -8,5 +8,5 @@ QUESTION = Question(
         Argument(("SIZING",), "problem", "name of a sizing file, or a .toml file", "SIZING", nargs="?"),
         THREADS,
     ),
-    library="ppafo.questions.size.file:FILE",
+    library="ppafo.questions.size.problem:FILE",
 )

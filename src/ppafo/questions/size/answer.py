@@ -1,19 +1,214 @@
 """The answer of a sizing study: the valves with pressure and bottle, their margins, the suggestion, the doubts."""
 
-from dataclasses import asdict
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.display_units import display_value, quantity_text
+from ppafo.answers.display_units import axis_unit, display_value, display_values, quantity_text
+from ppafo.answers.style import ACTUAL, BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, WANTED, house_style, mark_kind
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.questions.parts.answer import doubts_data, doubts_sections, titles_section
-from ppafo.questions.size.figure import sizing_figure
-from ppafo.questions.size.file import SizingProblem
-from ppafo.questions.size.search import LIMITS
-from ppafo.questions.size.solve import SizedValve, Sizing
-from ppafo.questions.size.volumes import other_sentences
+from ppafo.parameters.parts import Part
+from ppafo.questions.parts.solve import doubts_data, doubts_sections, titles_section
+from ppafo.questions.question import Solved
+from ppafo.questions.size.problem import SizingProblem
+from ppafo.questions.size.search import LIMITS, Floats, Limit
+from ppafo.signals import Recording
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.version import __version__
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True, slots=True)
+class OtherChambers:
+    """A valve at a pressure with other chambers: RMS error [N m], gas per repetition [kg], total with the reserve [kg].
+
+    ``keeps`` tells whether the error limit is kept with the best gains.
+    """
+
+    name: str
+    keeps: bool
+    error: float
+    gas: float
+    gas_in_all: float
+
+
+def other_sentences(others: Sequence[OtherChambers]) -> list[str]:
+    """Return a sentence for each reading."""
+    return [
+        f"with {one.name}: RMS error {quantity_text(one.error, 'torque')}"
+        f"{'' if one.keeps else ', above the limit'}, {quantity_text(one.gas, 'gas mass')} per repetition, "
+        f"{quantity_text(one.gas_in_all, 'gas mass')} in total"
+        for one in others
+    ]
+
+
+@dataclass(frozen=True, slots=True)
+class Margins:
+    """How far a sized valve is from its limits, as fractions [-].
+
+    ``error``: how much smaller the RMS error is than its limit. ``torque``: how much more torque the pressure can hold
+    than the profile asks for; below 0 where the error limit lets its crest be cut. ``flow``: how much smaller the
+    opening might be if the gauge pressure were a tenth higher. ``gas``: how much more gas the bottle has than is used;
+    None without a bottle.
+    """
+
+    error: float
+    torque: float
+    flow: float
+    gas: float | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SizedValve:
+    """A valve at a supply pressure [Pa absolute] that keeps the error limit: the one with the lightest bottle.
+
+    ``works`` False: it keeps the limit at no pressure; then ``pressure`` is the one with the smallest error.
+    ``lowest_pressure`` [Pa absolute] is the lowest that works, and ``limit`` what keeps it from being lower. ``gains``
+    are those of the controller, by path, in SI. Error [N m], gas per repetition [kg], total gas with the reserve [kg];
+    ``bottle`` None where none is large enough; ``mass`` [kg] of valve, bottle, regulators, and actuator where one was
+    named. ``curve`` has pressures [Pa absolute], errors [N m] and gas per repetition [kg] with the best gains of each.
+    """
+
+    valve: Part
+    works: bool
+    pressure: float
+    lowest_pressure: float | None
+    gains: Mapping[str, float]
+    error: float
+    gas: float
+    gas_in_all: float
+    bottle: Part | None
+    mass: float | None
+    margins: Margins | None
+    limit: Limit
+    remark: str
+    curve: tuple[Floats, Floats, Floats]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sizing(Solved):
+    """The result of a sizing study: every valve, and the place of the lightest that works with a bottle, if any.
+
+    ``recording`` is the suggestion on the profile, None without one. ``failures`` maps reasons of failed runs to how
+    many had them. ``others`` is the suggestion with other readings of the paper's chambers.
+    ``streams`` of noise were met by every trial, its error the largest of them; 0 without noise.
+    """
+
+    problem: SizingProblem
+    valves: tuple[SizedValve, ...]
+    suggested: int | None
+    recording: Recording | None
+    runs: int
+    failures: Mapping[str, int]
+    seconds: float
+    others: tuple[OtherChambers, ...]
+    streams: int = 0
+
+    @property
+    def choice(self) -> SizedValve | None:
+        """The suggestion."""
+        return None if self.suggested is None else self.valves[self.suggested]
+
+    @property
+    def doubtful(self) -> tuple[tuple[Part, str], ...]:
+        """Figures that are quoted or assumed, of the parts that the result rests on."""
+        problem = self.problem
+        parts = [item.valve for item in self.valves] + [item.bottle for item in self.valves if item.bottle is not None]
+        parts += [*problem.regulators, *([] if problem.actuator is None else [problem.actuator])]
+        once = {(part.group, part.name): part for part in parts}.values()
+        return tuple((part, name) for part in once for name in part.doubtful)
+
+
+_SIZE = (9.0, 6.6)
+_COLOURS = (BLUE, VERMILION, GREEN, ORANGE, "#CC79A7", "#56B4E9")
+_MAXIMUM_OF_LIMIT = 4.0
+
+
+def sizing_figure(sizing: Sizing) -> "matplotlib.figure.Figure":
+    """Return the torque over time above, error and gas over supply pressure below."""
+    import matplotlib.figure
+
+    with house_style():
+        figure = matplotlib.figure.Figure(figsize=_SIZE)
+        figure.subplots_adjust(left=0.08, right=0.98, bottom=0.085, top=0.92, wspace=0.22, hspace=0.52)
+        grid = figure.add_gridspec(2, 2)
+        _torque(figure.add_subplot(grid[0, :]), sizing)
+        _errors(figure.add_subplot(grid[1, 0]), sizing)
+        _gas(figure.add_subplot(grid[1, 1]), sizing)
+        mark_kind(figure, "simulated")
+    return figure
+
+
+def _torque(axes: "Axes", sizing: Sizing) -> None:
+    problem = sizing.problem
+    time = np.linspace(0.0, problem.scenario.duration, 3001)
+    axes.plot(time, problem.profile.at(time), color=WANTED, linestyle="--", linewidth=1.2, label="prescribed")
+    title = "Torque (N m)"
+    if sizing.recording is not None and sizing.choice is not None:
+        axes.plot(sizing.recording.time, sizing.recording["torque"], color=ACTUAL, label=sizing.choice.valve.name)
+        pressure = display_value(sizing.choice.pressure, "pressure")
+        title += f", {sizing.choice.valve.name} at {pressure:.1f} {axis_unit('pressure')}"
+    axes.set_title(f"$\\bf{{A}}$   {title}", pad=18)
+    axes.set_xlabel("Time (s)")
+    axes.margins(x=0.0)
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1, handlelength=1.6)
+
+
+def _errors(axes: "Axes", sizing: Sizing) -> None:
+    limit = sizing.problem.largest_error
+    for number, item in enumerate(sizing.valves):
+        pressure, error, _ = item.curve
+        colour = _COLOURS[number % len(_COLOURS)]
+        axes.plot(
+            display_values(pressure, "pressure"), error, color=colour, marker=".", markersize=4, label=item.valve.name
+        )
+        _mark(axes, item, item.error, colour)
+    axes.axhline(limit, color=BLACK, linewidth=1.0, linestyle="--")
+    axes.set_ylim(0.0, _MAXIMUM_OF_LIMIT * limit)
+    axes.set_title("$\\bf{B}$   RMS error (N m), limit dashed", pad=8)
+    axes.set_xlabel(f"Supply pressure ({axis_unit('pressure')})")
+    axes.legend(loc="upper right", fontsize=8)
+
+
+def _gas(axes: "Axes", sizing: Sizing) -> None:
+    for number, item in enumerate(sizing.valves):
+        pressure, error, gas = item.curve
+        keeps = error <= sizing.problem.largest_error
+        colour = _COLOURS[number % len(_COLOURS)]
+        axes.plot(
+            display_values(pressure[keeps], "pressure"),
+            display_values(gas[keeps], "gas mass"),
+            color=colour,
+            marker=".",
+            markersize=4,
+        )
+        _mark(axes, item, display_value(item.gas, "gas mass"), colour)
+    axes.set_ylim(bottom=0.0)
+    axes.set_title("$\\bf{C}$   Gas per repetition (g) within the limit", pad=8)
+    axes.set_xlabel(f"Supply pressure ({axis_unit('pressure')})")
+    if not any(item.works for item in sizing.valves):
+        axes.text(0.5, 0.5, "no valve keeps the limit", transform=axes.transAxes, ha="center", color=GREY)
+
+
+def _mark(axes: "Axes", item: SizedValve, value: float, colour: str) -> None:
+    """Ring the pressure that was chosen for a valve."""
+    if item.works:
+        axes.plot(
+            display_value(item.pressure, "pressure"),
+            value,
+            marker="o",
+            markersize=9,
+            markerfacecolor="none",
+            color=colour,
+            markeredgewidth=1.4,
+        )
+
 
 _HEAD = (
     Column("valve"),
@@ -56,13 +251,20 @@ def answer_of(sizing: Sizing) -> Answer:
     """Return the answer of a sizing study; it has not passed where nothing can be suggested."""
     problem, recording = sizing.problem, sizing.recording
     suggestion = suggestion_sentence(sizing)
+    marked = () if sizing.suggested is None else (sizing.suggested,)
+    working = [place for place, item in enumerate(sizing.valves) if item.works]
+    margins = tuple(_margin_row(sizing.problem, sizing.valves[place]) for place in working)
+    sections = [Section("Valves", table=Table(_HEAD, tuple(map(_row, sizing.valves)), marked))]
+    if margins:
+        places = tuple(working.index(place) for place in marked)
+        sections.append(Section("Margins", table=Table(_MARGIN_HEAD, margins, places)))
     return Answer(
         name="size",
         kicker="Sizing study",
         title=problem.name,
         lead=(*([problem.description] if problem.description else []), _profile_sentence(problem)),
         sections=(
-            *_tables(sizing),
+            *sections,
             Section(remarks=(suggestion, *other_sentences(sizing.others), *_remarks(sizing))),
             Section(
                 "Error and gas over pressure",
@@ -77,17 +279,6 @@ def answer_of(sizing: Sizing) -> Answer:
         passed=sizing.choice is not None,
         files={} if recording is None else {"suggested.csv": lambda: marked_csv_bytes(recording)},
     )
-
-
-def _tables(sizing: Sizing) -> list[Section]:
-    marked = () if sizing.suggested is None else (sizing.suggested,)
-    working = [place for place, item in enumerate(sizing.valves) if item.works]
-    margins = tuple(_margin_row(sizing.problem, sizing.valves[place]) for place in working)
-    sections = [Section("Valves", table=Table(_HEAD, tuple(map(_row, sizing.valves)), marked))]
-    if margins:
-        places = tuple(working.index(place) for place in marked)
-        sections.append(Section("Margins", table=Table(_MARGIN_HEAD, margins, places)))
-    return sections
 
 
 def _profile_sentence(problem: SizingProblem) -> str:
@@ -116,16 +307,12 @@ def _row(item: SizedValve) -> tuple[str | float | None, ...]:
 
 def _margin_row(problem: SizingProblem, item: SizedValve) -> tuple[str | float | None, ...]:
     margins = [None if item.margins is None else getattr(item.margins, name) for name in _MARGINS]
-    return item.valve.name, *margins, _gains(problem, item)
-
-
-def _gains(problem: SizingProblem, item: SizedValve) -> str:
     control = problem.scenario.control
     units = {f"controller.{quantity.name}": quantity.unit for quantity in CONTROLLERS[control.kind].quantities}
     gains = [
         f"{path.rpartition('.')[2].replace('_', ' ')} {value:.3g} {units[path]}" for path, value in item.gains.items()
     ]
-    return ", ".join(gains) or "none to choose"
+    return item.valve.name, *margins, ", ".join(gains) or "none to choose"
 
 
 def suggestion_sentence(sizing: Sizing) -> str:

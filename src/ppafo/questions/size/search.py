@@ -1,8 +1,4 @@
-"""The pressures at which one valve keeps the error limit: a grid, then ever finer ones below the first that works.
-
-Each pressure is tried with many gains, and some openings, of one valve at once on the lanes. Nothing is taken for
-granted about how the error depends on the pressure.
-"""
+"""Which supply pressures a valve can do a task with, what it takes there, and what limits it."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -14,12 +10,10 @@ from numpy.typing import NDArray
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part
-from ppafo.questions.size.file import SizingProblem
+from ppafo.questions.size.problem import SizingProblem
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.studies.draws import Uncertainty
-from ppafo.studies.noise import NOISE
-
-Floats = NDArray[np.float64]
+from ppafo.studies.sampling import NOISE
 
 Limit = Literal["torque", "flow", "control", "pressure"]
 LIMITS: dict[Limit, str] = {
@@ -29,12 +23,11 @@ LIMITS: dict[Limit, str] = {
     "pressure": "nothing: the lowest requested pressure suffices",
 }
 """What keeps a valve from working at a lower pressure, or from working at all."""
-
+Floats = NDArray[np.float64]
 ERROR, GAS = "rms_error", "gas_supplied"
 _OPENINGS = ("valve.area", "valve.sonic_conductance")
 _CHUNK = 16_384
 """Runs handed to the lanes at once."""
-
 STREAMS = 16
 """Noise streams in each of which a limit must be kept, the same for all trials, where sensors are noisy."""
 _SEED = 1
@@ -68,6 +61,34 @@ class Trial:
         return Trial(self.error[members], self.gas[members], self.gains[members])
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Pressures:
+    """Pressures [Pa absolute] (pressures,) that were tried, growing, with the best trial of each.
+
+    ``works`` tells which keep the error limit.
+    """
+
+    pressure: Floats
+    trial: Trial
+    works: NDArray[np.bool_]
+
+    @property
+    def first(self) -> int | None:
+        """Place of the lowest pressure that works, None where none does."""
+        return int(self.works.argmax()) if self.works.any() else None
+
+    @property
+    def below(self) -> float | None:
+        """The highest pressure below the lowest that works; None where none works or none below was tried."""
+        return float(self.pressure[self.first - 1]) if self.first else None
+
+    @property
+    def fails_above(self) -> float | None:
+        """A pressure above the lowest that works at which the limit is missed again; None where there is none."""
+        failing = np.flatnonzero(~self.works[self.first :]) if self.first is not None else np.empty(0, dtype=int)
+        return float(self.pressure[(self.first or 0) + failing[0]]) if failing.size else None
+
+
 @final
 class Trials:
     """Runs trials of a problem and counts the runs and their failures.
@@ -81,7 +102,8 @@ class Trials:
         self.gain_sets: Floats = np.array(list(product(problem.gain_factors, repeat=len(problem.gains))))
         self.runs = 0
         self.failures: dict[str, int] = {}
-        self.seeds = _noise_streams(problem)
+        noise = Uncertainty(()).with_noise_of([problem.scenario])
+        self.seeds = noise.random_columns(0, STREAMS, _SEED)[NOISE] if noise.has_noise else np.zeros(0)
         self._threads = threads
 
     def run(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> Trial:
@@ -138,34 +160,6 @@ class Trials:
         for index, path in enumerate(problem.gains):
             columns[path] = self.gain_sets[gains, index] * settings[path.rpartition(".")[2]]
         return columns
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Pressures:
-    """Pressures [Pa absolute] (pressures,) that were tried, growing, with the best trial of each.
-
-    ``works`` tells which keep the error limit.
-    """
-
-    pressure: Floats
-    trial: Trial
-    works: NDArray[np.bool_]
-
-    @property
-    def first(self) -> int | None:
-        """Place of the lowest pressure that works, None where none does."""
-        return int(self.works.argmax()) if self.works.any() else None
-
-    @property
-    def below(self) -> float | None:
-        """The highest pressure below the lowest that works; None where none works or none below was tried."""
-        return float(self.pressure[self.first - 1]) if self.first else None
-
-    @property
-    def fails_above(self) -> float | None:
-        """A pressure above the lowest that works at which the limit is missed again; None where there is none."""
-        failing = np.flatnonzero(~self.works[self.first :]) if self.first is not None else np.empty(0, dtype=int)
-        return float(self.pressure[(self.first or 0) + failing[0]]) if failing.size else None
 
 
 def highest_pressure(problem: SizingProblem, valve: Part) -> float:
@@ -262,8 +256,3 @@ def flow_margin(trials: Trials, valve: Part, pressure: float) -> float:
             break
         smallest = opening
     return 1.0 - smallest
-
-
-def _noise_streams(problem: SizingProblem) -> Floats:
-    noise = Uncertainty(()).with_noise_of([problem.scenario])
-    return noise.random_columns(0, STREAMS, _SEED)[NOISE] if noise.has_noise else np.zeros(0)

@@ -1,20 +1,20 @@
 """Carries out a sizing study: problem in, every valve with pressure, bottle, margins and limit out."""
 
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from ppafo.answers import Solved
 from ppafo.answers.display_units import quantity_text
+from ppafo.parameters.chamber_volumes import ChamberVolumes, other_readings
+from ppafo.parameters.device import Actuator
 from ppafo.parameters.parts import Part
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.questions.size.file import SizingProblem, load_sizing
+from ppafo.questions.size.answer import Margins, OtherChambers, SizedValve, Sizing
+from ppafo.questions.size.problem import SizingProblem, load_sizing
 from ppafo.questions.size.search import (
-    Floats,
-    Limit,
     Pressures,
     Trials,
     ceiling,
@@ -23,87 +23,38 @@ from ppafo.questions.size.search import (
     limit_of,
     try_pressures,
 )
-from ppafo.questions.size.volumes import OtherChambers, with_other_chambers
 from ppafo.signals import Recording
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate
 
 
-@dataclass(frozen=True, slots=True)
-class Margins:
-    """How far a sized valve is from its limits, as fractions [-].
-
-    ``error``: how much smaller the RMS error is than its limit. ``torque``: how much more torque the pressure can hold
-    than the profile asks for; below 0 where the error limit lets its crest be cut. ``flow``: how much smaller the
-    opening might be if the gauge pressure were a tenth higher. ``gas``: how much more gas the bottle has than is used;
-    None without a bottle.
-    """
-
-    error: float
-    torque: float
-    flow: float
-    gas: float | None
+def with_other_chambers(
+    problem: SizingProblem, valve: Part, pressure: float, threads: int | None
+) -> tuple[OtherChambers, ...]:
+    """Return a valve at a supply pressure [Pa absolute] with each other reading; none for chambers of its own."""
+    return tuple(
+        _tried(problem, valve, pressure, chambers, threads) for chambers in other_readings(_actuator_of(problem))
+    )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SizedValve:
-    """A valve at a supply pressure [Pa absolute] that keeps the error limit: the one with the lightest bottle.
-
-    ``works`` False: it keeps the limit at no pressure; then ``pressure`` is the one with the smallest error.
-    ``lowest_pressure`` [Pa absolute] is the lowest that works, and ``limit`` what keeps it from being lower. ``gains``
-    are those of the controller, by path, in SI. Error [N m], gas per repetition [kg], total gas with the reserve [kg];
-    ``bottle`` None where none is large enough; ``mass`` [kg] of valve, bottle, regulators, and actuator where one was
-    named. ``curve`` has pressures [Pa absolute], errors [N m] and gas per repetition [kg] with the best gains of each.
-    """
-
-    valve: Part
-    works: bool
-    pressure: float
-    lowest_pressure: float | None
-    gains: Mapping[str, float]
-    error: float
-    gas: float
-    gas_in_all: float
-    bottle: Part | None
-    mass: float | None
-    margins: Margins | None
-    limit: Limit
-    remark: str
-    curve: tuple[Floats, Floats, Floats]
+def _actuator_of(problem: SizingProblem) -> Actuator:
+    """Return the actuator that was sized: that of the scenario with the figures of the part."""
+    own = problem.scenario.device.actuator
+    if problem.actuator is None:
+        return own
+    values = problem.actuator.values
+    return replace(own, torque_constant=values["torque_constant"], volume_per_angle=values["volume_per_angle"])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Sizing(Solved):
-    """The result of a sizing study: every valve, and the place of the lightest that works with a bottle, if any.
-
-    ``recording`` is the suggestion on the profile, None without one. ``failures`` maps reasons of failed runs to how
-    many had them. ``others`` is the suggestion with other readings of the paper's chambers.
-    ``streams`` of noise were met by every trial, its error the largest of them; 0 without noise.
-    """
-
-    problem: SizingProblem
-    valves: tuple[SizedValve, ...]
-    suggested: int | None
-    recording: Recording | None
-    runs: int
-    failures: Mapping[str, int]
-    seconds: float
-    others: tuple[OtherChambers, ...]
-    streams: int = 0
-
-    @property
-    def choice(self) -> SizedValve | None:
-        """The suggestion."""
-        return None if self.suggested is None else self.valves[self.suggested]
-
-    @property
-    def doubtful(self) -> tuple[tuple[Part, str], ...]:
-        """Figures that are quoted or assumed, of the parts that the result rests on."""
-        problem = self.problem
-        parts = [item.valve for item in self.valves] + [item.bottle for item in self.valves if item.bottle is not None]
-        parts += [*problem.regulators, *([] if problem.actuator is None else [problem.actuator])]
-        once = {(part.group, part.name): part for part in parts}.values()
-        return tuple((part, name) for part in once for name in part.doubtful)
+def _tried(
+    problem: SizingProblem, valve: Part, pressure: float, chambers: ChamberVolumes, threads: int | None
+) -> OtherChambers:
+    scenario = replace(problem.scenario, device=chambers.of(problem.scenario.device))
+    # Without the part, whose printed volume per angle would stand in for that of the reading.
+    trial = Trials(replace(problem, scenario=scenario, actuator=None), threads).best(valve, np.array([pressure]))
+    error, gas = float(trial.error[0]), float(trial.gas[0])
+    keeps = error <= problem.largest_error
+    return OtherChambers(chambers.name, keeps, error, gas, gas * problem.repetitions * (1.0 + problem.reserve))
 
 
 def size(problem: SizingProblem | str | Path, threads: int | None = None, progress: Report | None = None) -> Sizing:
@@ -147,11 +98,21 @@ def smallest_bottle(bottles: Sequence[Part], gas: float) -> Part | None:
 def _size_valve(trials: Trials, valve: Part) -> SizedValve:
     problem = trials.problem
     tried = try_pressures(trials, valve)
-    place = _place(problem, tried)
+    place = _place_in(problem, tried)
     pressure, error, gas = (float(series[place]) for series in (tried.pressure, tried.trial.error, tried.trial.gas))
     gains = int(tried.trial.gains[place])
     works = tried.first is not None
     bottle = _bottle(problem, gas) if works else None
+    said = []
+    if tried.fails_above is not None:
+        said.append(f"at {quantity_text(tried.fails_above, 'pressure')} the error limit is exceeded again")
+    if highest_pressure(problem, valve) < problem.highest_pressure and tried.first is None:
+        highest = quantity_text(highest_pressure(problem, valve), "pressure")
+        said.append(f"not tried above {highest}, the rated pressure of its parts")
+    if tried.first is not None and bottle is None:
+        largest = max(problem.bottles, key=lambda item: item.values["content"])
+        lasts = largest.values["content"] / _gas_in_all(problem, gas)
+        said.append(f"no bottle is large enough: {largest.name} lasts for {100 * lasts:.0f} % of the use")
     return SizedValve(
         valve=valve,
         works=works,
@@ -165,12 +126,12 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
         mass=None if bottle is None else _mass(problem, valve, bottle),
         margins=_margins(trials, valve, pressure, (error, gas), bottle) if works else None,
         limit=limit_of(trials, valve, tried),
-        remark=_remark(problem, valve, tried, gas, bottle),
+        remark="; ".join(said),
         curve=(tried.pressure, tried.trial.error, tried.trial.gas),
     )
 
 
-def _place(problem: SizingProblem, tried: Pressures) -> int:
+def _place_in(problem: SizingProblem, tried: Pressures) -> int:
     """Return the place of the pressure to choose: that with the lightest bottle, of these the lowest.
 
     Without a bottle the lowest pressure that works; where none works, the one with the minimum error.
@@ -209,21 +170,6 @@ def _margins(
         flow=flow_margin(trials, valve, pressure),
         gas=None if bottle is None or used <= 0.0 else bottle.values["content"] / used - 1.0,
     )
-
-
-def _remark(problem: SizingProblem, valve: Part, tried: Pressures, gas: float, bottle: Part | None) -> str:
-    """Return what a reader has to know besides the numbers, an empty text where nothing."""
-    said = []
-    if tried.fails_above is not None:
-        said.append(f"at {quantity_text(tried.fails_above, 'pressure')} the error limit is exceeded again")
-    if highest_pressure(problem, valve) < problem.highest_pressure and tried.first is None:
-        highest = quantity_text(highest_pressure(problem, valve), "pressure")
-        said.append(f"not tried above {highest}, the rated pressure of its parts")
-    if tried.first is not None and bottle is None:
-        largest = max(problem.bottles, key=lambda item: item.values["content"])
-        lasts = largest.values["content"] / _gas_in_all(problem, gas)
-        said.append(f"no bottle is large enough: {largest.name} lasts for {100 * lasts:.0f} % of the use")
-    return "; ".join(said)
 
 
 def _recording(trials: Trials, sized: SizedValve) -> Recording:

@@ -1,16 +1,333 @@
 """The answer of a sweep: counts, a table of metrics for each configuration, what varied and what was assumed."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.display_units import display_difference, display_value
-from ppafo.answers.shown_metrics import metric_quantity, metric_unit
+from ppafo.answers.display_units import (
+    axis_unit,
+    display_difference,
+    display_value,
+    display_values,
+    metric_quantity,
+    metric_title,
+    metric_unit,
+    quantity_of_unit,
+)
+from ppafo.answers.style import BLUE, GREEN, GREY, ORANGE, VERMILION, house_style, mark_kind
 from ppafo.answers.writing import files_of
-from ppafo.questions.sweep.figure import study_figure
-from ppafo.questions.sweep.results import SUMMARY, StudyResults
+from ppafo.errors import DataError, StudyError, nearest_name
+from ppafo.questions.question import Solved
+from ppafo.questions.sweep.manifest import RUNS_FOLDER, TRAJECTORIES_FOLDER, chunk_file
+from ppafo.signals.channels import CHANNELS
+from ppafo.storage.parquet import as_numpy, read_parquet
+from ppafo.storage.places import Place
+from ppafo.studies.distributions import Floats
+from ppafo.studies.sampling import NOISE
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+    import pyarrow as pa
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+SUMMARY = "summary.json"
+BANDS = "bands.parquet"
+Columns = dict[str, np.ndarray[Any, Any]]
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class StudyResults(Solved):
+    """The results of a study: ``document`` is its ``study.json``, ``summary`` its ``summary.json``.
+
+    ``kept`` holds a temporary folder as long as its results are used; None for a folder of one's own.
+    """
+
+    place: Place
+    document: Mapping[str, Any]
+    summary: Mapping[str, Any]
+    kept: tempfile.TemporaryDirectory[str] | None = None
+
+    def __repr__(self) -> str:
+        """Return name, runs, how many completed, and the metrics."""
+        counted = ", ".join(f"{self.summary[key]:,} {key}" for key in ("completed", "diverged", "refused"))
+        return (
+            f"StudyResults of '{self.name}' in {self.place.address}\n  {self.document['runs']:,} runs: {counted}\n  "
+            f"varied: {', '.join(self.varied) or 'nothing'}\n  metrics: "
+            f"{', '.join(self.document['metrics']) or 'none'}"
+        )
+
+    @property
+    def name(self) -> str:
+        """Name of the study."""
+        return str(self.document["study"]["name"])
+
+    @property
+    def configurations(self) -> tuple[str, ...]:
+        """Names of the configurations."""
+        return tuple(item["name"] for item in self.document["study"]["configurations"])
+
+    @property
+    def varied(self) -> tuple[str, ...]:
+        """The varied paths."""
+        return tuple(self.document["varied"])
+
+    @property
+    def metrics(self) -> Mapping[str, Mapping[str, Mapping[str, Any]]]:
+        """For each configuration and metric: unit, count, mean, standard deviation, extremes and quantiles."""
+        found: Mapping[str, Mapping[str, Mapping[str, Any]]] = self.summary["configurations"]
+        return found
+
+    def table(self, columns: Sequence[str] | None = None) -> Columns:
+        """Return the rows of all runs, or some columns of them, as arrays by name; SI units, nan where none."""
+        parts = [as_numpy(part) for part in self.chunks(RUNS_FOLDER, columns)]
+        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+    def by_configuration(self, column: str) -> dict[str, np.ndarray[Any, Any]]:
+        """Return a column of all runs, by name of the configuration; runs of the same place got the same draw."""
+        values = self.table([column])[column]
+        return dict(zip(self.configurations, np.split(values, len(self.configurations)), strict=True))
+
+    def trajectories(self, channel: str) -> np.ndarray[Any, Any]:
+        """Return a kept channel of all runs, shape (runs, samples), nan where a run failed."""
+        kept = self.document["study"]["outputs"].get("trajectories", ())
+        if channel not in kept:
+            raise StudyError(
+                f"no trajectories of '{channel}' were kept{nearest_name(channel, kept)}; available: {kept}"
+            )
+        rows = [row for part in self.chunks(TRAJECTORIES_FOLDER, [channel]) for row in part.column(channel).to_numpy()]
+        return np.stack(rows)
+
+    def bands(self) -> Columns:
+        """Return the bands: configuration, channel, time and a column for each quantile."""
+        return as_numpy(read_parquet(self.place.open(BANDS), BANDS))
+
+    def thin(self, column: str, maximum: int) -> dict[str, np.ndarray[Any, Any]]:
+        """Return a column by name of the configuration, of about ``maximum`` runs in all: every so many of them."""
+        step = -(-int(self.document["runs"]) // maximum) | 1
+        return {name: self._every(name, column, step) for name in self.configurations}
+
+    def _every(self, configuration: str, column: str, step: int) -> np.ndarray[Any, Any]:
+        parts, first = [], 0
+        for table in self.chunks(RUNS_FOLDER, [column], configuration):
+            parts.append(table.column(column).to_numpy()[first::step])
+            first = (first - table.num_rows) % step
+        return np.concatenate(parts)
+
+    def parts(self, configuration: str, column: str) -> Iterator[np.ndarray[Any, Any]]:
+        """Give the finite values of a column of a configuration, chunk by chunk."""
+        for table in self.chunks(RUNS_FOLDER, [column], configuration):
+            values = table.column(column).to_numpy()
+            yield values[np.isfinite(values)]
+
+    def chunks(
+        self, folder: str, columns: Sequence[str] | None = None, configuration: str | None = None
+    ) -> "Iterator[pa.Table]":
+        """Give the tables of the chunks one after the other, of all configurations or of one."""
+        numbers = range(self.document["chunks"])
+        if configuration is not None:
+            own = len(numbers) // len(self.configurations)
+            start = own * self.configurations.index(configuration)
+            numbers = numbers[start : start + own]
+        for number in numbers:
+            name = chunk_file(folder, number)
+            try:
+                yield read_parquet(self.place.open(name), name, columns)
+            except (DataError, OSError) as error:
+                raise DataError(
+                    f"{self.place.address}/{name}: is missing or damaged; run the study again into this folder to "
+                    "recompute this chunk"
+                ) from error
+
+
+COLOURS = (BLUE, VERMILION, GREEN, ORANGE, GREY)
+MOST_METRICS, MOST_CONFIGURATIONS = 9, len(COLOURS)
+_COLUMNS, _PANEL = 3, (3.5, 2.7)
+_HISTOGRAM_BINS = 60
+_MAXIMUM_POINTS = 3000
+_MEDIAN = 0.5
+_OPACITIES = (0.18, 0.32, 0.45)
+MAXIMUM_DRAWN = 4_000_000
+"""Runs from which a figure is drawn, spread evenly over all; the numbers beside it are from all of them."""
+_GRIDDED = ("grid", "list")
+
+
+def study_figure(results: StudyResults) -> "matplotlib.figure.Figure":
+    """Return maps for a grid of two axes, otherwise a panel a metric; and a panel for each band."""
+    import matplotlib.figure
+
+    metrics = list(results.document["metrics"])[:MOST_METRICS]
+    bands = list(results.document["study"]["outputs"].get("bands", ()))
+    names = results.configurations[:MOST_CONFIGURATIONS]
+    is_mapped = len(_grid_paths(results)) == 2
+    panels = [(metric, name) for metric in metrics for name in (names if is_mapped else ("",))]
+    count = max(1, len(panels) + len(bands))
+    columns = 2 if count == 4 else min(_COLUMNS, count)
+    rows = -(-count // columns)
+    with house_style():
+        figure = matplotlib.figure.Figure(figsize=(_PANEL[0] * columns + 0.3, _PANEL[1] * rows + 0.7), layout=_layout())
+        grid = figure.subplots(rows, columns, squeeze=False)
+        places = list(grid.flat)
+        _draw_metrics(places, panels, results, is_mapped)
+        for axes, channel in zip(places[len(panels) :], bands, strict=False):
+            _draw_bands(axes, results, channel, dict(zip(names, COLOURS, strict=False)))
+        for axes in places[len(panels) + len(bands) :]:
+            axes.set_axis_off()
+        from matplotlib.lines import Line2D
+
+        figure.suptitle(f"{results.name}, {results.summary['completed']:,} runs", x=0.01, ha="left", fontsize=11)
+        if not is_mapped and len(names) > 1:
+            handles = [Line2D([], [], color=colour) for colour in COLOURS[: len(names)]]
+            figure.legend(handles, names, loc="outside lower center", ncols=len(names))
+        mark_kind(figure, "simulated")
+        return figure
+
+
+def _layout() -> "ConstrainedLayoutEngine":
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    return ConstrainedLayoutEngine(w_pad=0.12, h_pad=0.08)
+
+
+def _draw_metrics(places: "list[Axes]", panels: list[tuple[str, str]], results: StudyResults, is_mapped: bool) -> None:
+    device = [path for path in results.varied if path != NOISE]
+    for axes, (metric, name) in zip(places, panels, strict=False):
+        if is_mapped:
+            _draw_map(axes, results, name, metric)
+        elif len(device) == 1:
+            _draw_over(axes, results, device[0], metric)
+        else:
+            _draw_histogram(axes, results, metric)
+
+
+def _draw_histogram(axes: "Axes", results: StudyResults, metric: str) -> None:
+    """Draw how often each value came, for every configuration."""
+    parts = {name: _metric_values(metric, values) for name, values in results.thin(metric, MAXIMUM_DRAWN).items()}
+    parts = {name: values[np.isfinite(values)] for name, values in parts.items()}
+    axes.set_xlabel(metric_title(metric))
+    axes.set_yticks([])
+    filled = [values for values in parts.values() if values.size]
+    if not filled:
+        return
+    edges = _edges(filled)
+    for (name, own), colour in zip(parts.items(), COLOURS, strict=False):
+        counts, _ = np.histogram(own, edges)
+        axes.stairs(counts, edges, fill=True, color=colour, alpha=0.35)
+        axes.stairs(counts, edges, color=colour, linewidth=1.2, label=name)
+
+
+def _edges(parts: list[Floats]) -> Floats:
+    """Return the edges of the bins: one for each whole number where values are counts of few kinds."""
+    low, high = min(float(part.min()) for part in parts), max(float(part.max()) for part in parts)
+    if high - low < _HISTOGRAM_BINS and all(bool(np.all(part == np.round(part))) for part in parts):
+        return np.arange(low - 0.5, high + 1.0)
+    size = sum(part.size for part in parts)
+    return np.linspace(low, high or low + 1.0, 1 + min(_HISTOGRAM_BINS, max(8, round(size**0.5))))
+
+
+def _draw_over(axes: "Axes", results: StudyResults, path: str, metric: str) -> None:
+    """Draw a metric over the one path that varies."""
+    across, values = results.thin(path, MAXIMUM_DRAWN), results.thin(metric, MAXIMUM_DRAWN)
+    for name, colour in zip(results.configurations, COLOURS, strict=False):
+        order = np.argsort(across[name], kind="stable")
+        order = order[:: max(1, order.size // _MAXIMUM_POINTS)]
+        shown = _path_for_display(results, path, across[name][order])[1]
+        axes.plot(shown, _metric_values(metric, values[name])[order], ".-", color=colour, label=name)
+    axes.set_xlabel(_path_for_display(results, path, np.zeros(1))[0])
+    axes.set_ylabel(metric_title(metric))
+
+
+def _draw_map(axes: "Axes", results: StudyResults, name: str, metric: str) -> None:
+    """Draw the mean of a metric over the two paths, for one configuration; white where no run completed."""
+    across, upward = _grid_paths(results)
+    columns, column = np.unique(results.thin(across, MAXIMUM_DRAWN)[name], return_inverse=True)
+    rows, row = np.unique(results.thin(upward, MAXIMUM_DRAWN)[name], return_inverse=True)
+    values = _metric_values(metric, results.thin(metric, MAXIMUM_DRAWN)[name])
+    place = row * columns.size + column
+    places = rows.size * columns.size
+    known = np.isfinite(values)
+    count = np.bincount(place[known], minlength=places)
+    total = np.bincount(place[known], weights=values[known], minlength=places)
+    mean = np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(rows.size, columns.size)
+    (x_label, x), (y_label, y) = _path_for_display(results, across, columns), _path_for_display(results, upward, rows)
+    mesh = axes.pcolormesh(x, y, mean, shading="nearest", rasterized=True, cmap="cividis")
+    axes.figure.colorbar(mesh, ax=axes, pad=0.02)
+    axes.grid(visible=False)
+    axes.set_xlabel(x_label)
+    axes.set_ylabel(y_label)
+    if _is_logarithmic(results, across):
+        axes.set_xscale("log")
+        _mark_plainly(axes.xaxis)
+    if _is_logarithmic(results, upward):
+        axes.set_yscale("log")
+        _mark_plainly(axes.yaxis)
+    label = metric_title(metric)
+    axes.set_title(label if len(results.configurations) == 1 else f"{label}, {name}")
+
+
+def _grid_paths(results: StudyResults) -> list[str]:
+    return [item["path"] for item in results.document["study"].get("vary", ()) if item["kind"] in _GRIDDED]
+
+
+def _is_logarithmic(results: StudyResults, path: str) -> bool:
+    items = {item["path"]: item for item in results.document["study"]["vary"]}
+    return bool(items[path].get("spacing") == "logarithmic")
+
+
+def _mark_plainly(axis: "Axis") -> None:
+    """Put plain numbers at 1, 2 and 5 of every decade."""
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _draw_bands(axes: "Axes", results: StudyResults, channel: str, colours: Mapping[str, str]) -> None:
+    """Draw the bands of a channel for every configuration: the outermost pair of quantiles light, the next darker."""
+    table, unit = results.bands(), CHANNELS[channel].unit
+    quantity = quantity_of_unit(unit)
+    levels = {name: display_values(values, quantity) for name, values in table.items() if name.startswith("q")}
+    fractions = sorted(float(name[1:]) for name in levels)
+    pairs = [(low, high) for low, high in zip(fractions, reversed(fractions), strict=True) if low < high]
+    for name, colour in colours.items():
+        own = (table["configuration"] == name) & (table["channel"] == channel)
+        time = table["time"][own]
+        for (low, high), opacity in zip(pairs, _OPACITIES, strict=False):
+            axes.fill_between(
+                time, levels[f"q{low:g}"][own], levels[f"q{high:g}"][own], color=colour, alpha=opacity, linewidth=0
+            )
+        if _MEDIAN in fractions:
+            axes.plot(time, levels["q0.5"][own], color=colour, label=name)
+    axes.set_xlabel("time (s)")
+    label = channel.replace("_", " ")
+    axes.set_ylabel(_axis_label(label, quantity, unit))
+    percentages = ", ".join(f"{100.0 * fraction:g}" for fraction in fractions)
+    axes.set_title(f"{label}: {percentages} % of runs below", fontsize=9)
+
+
+def _metric_values(name: str, values: Floats) -> Floats:
+    return display_values(values, metric_quantity(name))
+
+
+def _path_for_display(results: StudyResults, path: str, values: Floats) -> tuple[str, Floats]:
+    """Return label and values of a varied path [SI] in the units of the field."""
+    unit = results.document["varied"][path]["unit"]
+    quantity = quantity_of_unit(unit)
+    return _axis_label(path.replace(".", " ").replace("_", " "), quantity, unit), display_values(values, quantity)
+
+
+def _axis_label(name: str, quantity: str, unit: str) -> str:
+    """Return a name with the unit in which it is drawn: that of its quantity, else its own."""
+    drawn = axis_unit(quantity) if quantity else unit.removeprefix("-")
+    return f"{name} ({drawn})" if drawn else name
+
 
 FIGURE = "figure"
 _HEAD = ("metric", "unit", "runs", "mean", "sd")
@@ -18,13 +335,40 @@ _HEAD = ("metric", "unit", "runs", "mean", "sd")
 
 def answer_of(results: StudyResults) -> Answer:
     """Return the answer of a sweep; it has passed where any run completed."""
+    described = " ".join(results.document["study"].get("description", "").split())
+    failed = [f"run {item['run']} ({item['configuration']}): {item['reason']}" for item in results.summary["failures"]]
+    caption = (
+        "Distributions of the metrics, their dependence on the varied values, and quantiles over time where requested."
+    )
+    rows = tuple(_varied_row(item) for item in results.document["study"].get("vary", ()))
+    study = results.document["study"]
+    said = [
+        f"Correlation of {item['between'][0]} with {item['between'][1]}: {item['coefficient']}, of their normal scores."
+        for item in study.get("correlations", ())
+    ]
+    sample = study.get("sample")
+    if sample:
+        method, seed = sample["method"].replace("_", " "), sample.get("seed", 1)
+        said.append(f"Sampled by {method}: {sample['runs']} draws, seed {seed}.")
+    facts = (
+        ("rows of all runs", "runs/*.parquet"),
+        ("summary", SUMMARY),
+        ("study", f"study.json, sha256 {results.document['sha256'][:16]}"),
+    )
     return Answer(
         name="sweep",
         kicker="Study",
         title=results.name,
         lead=(f"{results.name}: {count_sentence(results)}", *_failure_remarks(results)),
         sections=(
-            _description(results),
+            (
+                Section(
+                    paragraphs=(described,) if described else (),
+                    remarks=tuple(failed),
+                    figure=Figure(FIGURE, caption, lambda: study_figure(results)),
+                    is_detail=True,
+                )
+            ),
             *(_metrics(results, name, metrics) for name, metrics in results.metrics.items()),
             Section(
                 "How to read it",
@@ -34,10 +378,10 @@ def answer_of(results: StudyResults) -> Answer:
                 ),
                 is_detail=True,
             ),
-            _varied_section(results),
-            _sampling_section(results),
+            _detail("What varied", ("path", "kind", ""), rows),
+            Section(paragraphs=tuple(said), is_detail=True),
             _assumptions_section(results),
-            _rows(results),
+            Section("Files", table=Table((), facts), is_detail=True),
         ),
         data={**results.summary, "folder": results.place.address},
         passed=results.summary["completed"] > 0,
@@ -82,55 +426,18 @@ def _failure_remarks(results: StudyResults) -> list[str]:
     ]
 
 
-def _description(results: StudyResults) -> Section:
-    """Return what the study is for, its figure, and the first runs that failed."""
-    described = " ".join(results.document["study"].get("description", "").split())
-    failed = [f"run {item['run']} ({item['configuration']}): {item['reason']}" for item in results.summary["failures"]]
-    caption = (
-        "Distributions of the metrics, their dependence on the varied values, and quantiles over time where requested."
-    )
-    return Section(
-        paragraphs=(described,) if described else (),
-        remarks=tuple(failed),
-        figure=Figure(FIGURE, caption, lambda: study_figure(results)),
-        is_detail=True,
-    )
-
-
 def _metrics(results: StudyResults, name: str, metrics: Mapping[str, Mapping[str, Any]]) -> Section:
-    head = _head(results)
+    described = [item for own in results.metrics.values() for item in own.values() if item["count"]]
+    fractions = list(described[0]["quantiles"]) if described else []
+    head = (*_HEAD, *(f"{100 * float(fraction):g} %" for fraction in fractions))
     rows = tuple(metric_cells(metric, item, len(head)) for metric, item in metrics.items())
     completed = f"{name}: {results.summary['completed_by_configuration'][name]:,} runs completed"
     return Section(table=Table(tuple(map(Column, head)), rows, left=2), paragraphs=(completed,))
 
 
-def _head(results: StudyResults) -> tuple[str, ...]:
-    described = [item for own in results.metrics.values() for item in own.values() if item["count"]]
-    fractions = list(described[0]["quantiles"]) if described else []
-    return (*_HEAD, *(f"{100 * float(fraction):g} %" for fraction in fractions))
-
-
-def _varied_section(results: StudyResults) -> Section:
-    rows = tuple(_varied_row(item) for item in results.document["study"].get("vary", ()))
-    return _detail("What varied", ("path", "kind", ""), rows)
-
-
 def _varied_row(item: Mapping[str, Any]) -> tuple[str, str, str]:
     others = [f"{key.replace('_', ' ')} {value}" for key, value in item.items() if key not in ("path", "kind")]
     return item["path"], item["kind"], ", ".join(others)
-
-
-def _sampling_section(results: StudyResults) -> Section:
-    study = results.document["study"]
-    said = [
-        f"Correlation of {item['between'][0]} with {item['between'][1]}: {item['coefficient']}, of their normal scores."
-        for item in study.get("correlations", ())
-    ]
-    sample = study.get("sample")
-    if sample:
-        method, seed = sample["method"].replace("_", " "), sample.get("seed", 1)
-        said.append(f"Sampled by {method}: {sample['runs']} draws, seed {seed}.")
-    return Section(paragraphs=tuple(said), is_detail=True)
 
 
 def _assumptions_section(results: StudyResults) -> Section:
@@ -141,15 +448,6 @@ def _assumptions_section(results: StudyResults) -> Section:
             names.setdefault((item["path"], item["value"], item["note"]), []).append(name)
     rows = tuple((*assumption, ", ".join(own)) for assumption, own in names.items())
     return _detail("What the base scenarios assume", ("value", "", "why", "in"), rows)
-
-
-def _rows(results: StudyResults) -> Section:
-    facts = (
-        ("rows of all runs", "runs/*.parquet"),
-        ("summary", SUMMARY),
-        ("study", f"study.json, sha256 {results.document['sha256'][:16]}"),
-    )
-    return Section("Files", table=Table((), facts), is_detail=True)
 
 
 def _detail(heading: str, head: Sequence[str], rows: tuple[tuple[str, ...], ...]) -> Section:

@@ -1,22 +1,76 @@
 """The answer about timing: errors of events by wearer, way and timing, and what the slap comes from."""
 
-from dataclasses import asdict
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import quantity_text
+from ppafo.answers.style import BLUE, GREY, VERMILION, house_style, mark_kind
 from ppafo.control.walking.catalog import TIMINGS
-from ppafo.questions.timing.figure import timing_figure
+from ppafo.engine.lanes import Floats
+from ppafo.questions.question import Solved
 from ppafo.questions.timing.slap import FACTORS, Falls, SlapStudy
-from ppafo.questions.timing.solve import STEADY, WEARERS, TimedWay, Timing
 from ppafo.version import __version__
-from ppafo.walking.event_times import EVENTS
+from ppafo.walking.event_times import EVENTS, EventErrors
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+
+WEARERS = {"healthy": ("wearer.keeps_gait=1",), "impaired": ("wearer.keeps_gait=0",)}
+"""A wearer whose muscles keep the measured gait, and the one of the walk file, whose foot drops."""
+STEADY, UNEVEN = "steady", "uneven"
+
+
+@dataclass(frozen=True, slots=True)
+class TimedWay:
+    """One wearer on one way with one timing: errors of each event."""
+
+    wearer: str
+    way: str
+    timing: str
+    events: Mapping[str, EventErrors]
+
+    @property
+    def rms(self) -> float:
+        """Root mean square [s] of the errors of all events."""
+        return rms_of([item.errors for item in self.events.values()])
+
+
+def rms_of(parts: Sequence[Floats]) -> float:
+    """Root mean square of several arrays together; nan without any number."""
+    every = np.concatenate([np.asarray(part) for part in parts]) if parts else np.empty(0)
+    return float(np.sqrt(np.mean(every**2))) if every.size else float("nan")
+
+
+@dataclass(frozen=True, slots=True)
+class Timing(Solved):
+    """What every timing knows of the events, and what the slap comes from; ``minutes`` of each way at most."""
+
+    file: str
+    overrides: tuple[str, ...]
+    minutes: float
+    ways: tuple[TimedWay, ...]
+    slap: SlapStudy | None
+
+    def pooled(self, wearer: str, timing: str, ways: Sequence[str] | None = None) -> float:
+        """Root mean square [s] of all errors of a wearer with a timing, on some ways or on all."""
+        chosen = [
+            item
+            for item in self.ways
+            if (item.wearer, item.timing) == (wearer, timing) and (ways is None or item.way in ways)
+        ]
+        return rms_of([found.errors for item in chosen for found in item.events.values()])
+
+    def reduction(self, wearer: str, timing: str, ways: Sequence[str] | None = None) -> float:
+        """Fraction by which a timing lowers the error of thresholds."""
+        return 1.0 - self.pooled(wearer, timing, ways) / self.pooled(wearer, next(iter(TIMINGS)), ways)
+
 
 PUBLISHED = {"healthy": 0.49, "impaired": 0.40}
 """Fractions by which state estimation lowered the error of event times at most (Li et al. 2011, abstract)."""
-
 _HEAD = (
     Column("wearer"),
     Column("way"),
@@ -240,3 +294,31 @@ def _way_data(way: TimedWay) -> dict[str, Any]:
 def _number(value: float) -> float | None:
     """Return a number as JSON has it: None where there is none."""
     return None if np.isnan(value) else value
+
+
+_COLOURS = (GREY, BLUE, VERMILION)
+_WIDTH = 0.26
+_MILLISECONDS = 1.0e3
+
+
+def timing_figure(timing: Timing) -> "matplotlib.figure.Figure":
+    """Return the figure: RMS errors of all events, one panel for each wearer, one group of bars for each way."""
+    import matplotlib.figure
+
+    with house_style():
+        figure = matplotlib.figure.Figure(figsize=(8.4, 3.8))
+        figure.subplots_adjust(left=0.08, right=0.98, top=0.84, bottom=0.14, wspace=0.08)
+        panels = figure.subplots(1, len(WEARERS), sharey=True)
+        for axes, wearer in zip(panels, WEARERS, strict=True):
+            ways = list(dict.fromkeys(item.way for item in timing.ways))
+            for number, name in enumerate(TIMINGS):
+                heights = [_MILLISECONDS * timing.pooled(wearer, name, [way]) for way in ways]
+                places = np.arange(len(ways)) + (number - 1.0) * _WIDTH
+                axes.bar(places, heights, _WIDTH, color=_COLOURS[number % len(_COLOURS)], label=name)
+            axes.set_xticks(range(len(ways)), ways)
+            axes.set_title(wearer)
+            axes.grid(visible=False, axis="x")
+        panels[0].set_ylabel("RMS error of event times (ms)")
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="upper right", ncols=len(TIMINGS))
+        mark_kind(figure, "simulated")
+        return figure

@@ -34,16 +34,12 @@ from ppafo.walking.result import REMEDY
 
 LARGER = 4.0
 """Valves of so many times the area, chambers of one so manieth of the volume: about as far as virtual work allows."""
-
 HIGHER = 20.0 * 6894.757293168361
 """Rise of both supply pressures [Pa]: 20 psi."""
-
 FIRST_STRIKE, STRIKES = 8, 12
 """Heel strikes that are looked at: by the first of them strides are learnt."""
-
 REACH = 0.3
 """Fraction of a stride within which a foot that strikes with its heel has come down."""
-
 AS_IT_IS = "timing.kind=thresholds"
 
 

@@ -1,19 +1,19 @@
 """Walks of a healthy and an impaired wearer, each with every timing of the stride: how far its events are off."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from ppafo.answers import Solved
 from ppafo.control.walking.catalog import TIMINGS
-from ppafo.engine.lanes import Floats, run_batch
+from ppafo.engine.lanes import run_batch
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, batch_of
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.questions.timing.slap import SlapStudy, slap_study
+from ppafo.questions.timing.answer import STEADY, UNEVEN, WEARERS, TimedWay, Timing
+from ppafo.questions.timing.slap import slap_study
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.course import Segment, WalkingCourse, list_courses, load_course
 from ppafo.walking.event_times import EVENTS, EventErrors, event_errors, known_events, true_events, within
@@ -23,64 +23,14 @@ from ppafo.walking.planning import course_of_walk, plan_walk
 from ppafo.walking.result import REMEDY
 from ppafo.walking.walk import lasting
 
-WEARERS = {"healthy": ("wearer.keeps_gait=1",), "impaired": ("wearer.keeps_gait=0",)}
-"""A wearer whose muscles keep the measured gait, and the one of the walk file, whose foot drops."""
-
-STEADY, UNEVEN = "steady", "uneven"
 SETTLED = 6.0
 """Time [s] from which events count: strides are learnt by then."""
-
 LONGEST = 2.0
 UNEVEN_STRIDES = 24
 VARIATION = 0.025
 """Standard deviation of stride times over their mean in steady walking, as published for healthy adults (Hausdorff
 et al. 1995, J Appl Physiol 78:349, and later: 1 to 3 %)."""
 SEED = 20110501
-
-
-@dataclass(frozen=True, slots=True)
-class TimedWay:
-    """One wearer on one way with one timing: errors of each event."""
-
-    wearer: str
-    way: str
-    timing: str
-    events: Mapping[str, EventErrors]
-
-    @property
-    def rms(self) -> float:
-        """Root mean square [s] of the errors of all events."""
-        return rms_of([item.errors for item in self.events.values()])
-
-
-@dataclass(frozen=True, slots=True)
-class Timing(Solved):
-    """What every timing knows of the events, and what the slap comes from; ``minutes`` of each way at most."""
-
-    file: str
-    overrides: tuple[str, ...]
-    minutes: float
-    ways: tuple[TimedWay, ...]
-    slap: SlapStudy | None
-
-    def pooled(self, wearer: str, timing: str, ways: Sequence[str] | None = None) -> float:
-        """Root mean square [s] of all errors of a wearer with a timing, on some ways or on all."""
-        chosen = [
-            item
-            for item in self.ways
-            if (item.wearer, item.timing) == (wearer, timing) and (ways is None or item.way in ways)
-        ]
-        return rms_of([found.errors for item in chosen for found in item.events.values()])
-
-    def reduction(self, wearer: str, timing: str, ways: Sequence[str] | None = None) -> float:
-        """Fraction by which a timing lowers the error of thresholds."""
-        return 1.0 - self.pooled(wearer, timing, ways) / self.pooled(wearer, next(iter(TIMINGS)), ways)
-
-
-def rms_of(parts: Sequence[Floats]) -> float:
-    """Root mean square of several arrays together; nan without any number."""
-    every = np.concatenate([np.asarray(part) for part in parts]) if parts else np.empty(0)
-    return float(np.sqrt(np.mean(every**2))) if every.size else float("nan")
 
 
 def event_timing(

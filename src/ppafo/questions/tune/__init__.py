@@ -10,5 +10,5 @@ QUESTION = Question(
         SEED,
         THREADS,
     ),
-    library="ppafo.questions.tune.file:TUNING",
+    library="ppafo.questions.tune.problem:TUNING",
 )

@@ -1,19 +1,229 @@
 """The answer of a tuning: gains and metrics before and after, how the search went, and lines to paste."""
 
 import math
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.display_units import display_value, title_with_unit
-from ppafo.answers.shown_metrics import metric_quantity
-from ppafo.questions.tune.figure import search_figure, task_figure
-from ppafo.questions.tune.problem import Constraint, Problem
-from ppafo.questions.tune.search import agreement, keeps
-from ppafo.questions.tune.solve import FRESH_DRAWS, Setting, Tuning
+from ppafo.answers.display_units import display_value, display_values, metric_quantity, title_with_unit
+from ppafo.answers.style import (
+    BLACK,
+    BLUE,
+    COLOURS,
+    GREY,
+    VERMILION,
+    Margins,
+    figure_of_free_panels,
+    figure_of_panels,
+    house_style,
+    label_lines,
+    mark_kind,
+)
+from ppafo.questions.question import Solved
+from ppafo.questions.tune.problem import Gains, Limit, Problem
 from ppafo.simulation.document import plain
+from ppafo.simulation.result import Result
 from ppafo.simulation.scenario import worn_kind
-from ppafo.studies.intervals import fraction_text
+from ppafo.studies.distributions import Interval, fraction_text
 from ppafo.units import percentage
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+    from matplotlib.axes import Axes
+
+INFEASIBLE = 1.0e6
+"""Where the costs of candidates begin that break a constraint."""
+
+
+def keeps(item: Limit, value: float) -> bool:
+    """Tell whether a value [SI] keeps a constraint."""
+    return value <= item.limit if item.is_most else value >= item.limit
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Where one start ended: fractions of the way (gains,), cost, candidates tried, best cost of each generation.
+
+    ``is_settled`` says whether its candidates had come together, or whether it ran out of generations.
+    """
+
+    fractions: tuple[float, ...]
+    cost: float
+    candidates: int
+    generations: tuple[float, ...]
+    is_settled: bool
+
+
+def agreement(starts: Sequence[Start]) -> float:
+    """Return the largest difference of a fraction of the way between the best start and those as good as it.
+
+    As good is a cost within a hundredth; large where very different gains do as well, which the goal then leaves open.
+    """
+    best = starts[0]
+    beyond = best.cost - INFEASIBLE if best.cost >= INFEASIBLE else best.cost
+    as_good = [item for item in starts if item.cost <= best.cost + 0.01 * abs(beyond)]
+    return max(float(np.max(np.abs(np.subtract(item.fractions, best.fractions)))) for item in as_good)
+
+
+FRESH_DRAWS = 1024
+"""Draws that the search never saw, over which the result is judged in the end."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ceiling:
+    """Draws in which the reference needs more torque than the supply can hold, whatever the gains.
+
+    ``fraction`` is theirs of all; ``explains`` are the metrics of the constraints that they alone break: no gains can
+    keep them, or the other draws do.
+    """
+
+    fraction: float
+    explains: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """Gains [SI] and what they give.
+
+    ``values`` are the metrics by which the search judges them [SI]: as the device is said to be, or at their bad end
+    over the draws of the search; ``fresh`` the same over draws that the search did not use (empty without draws).
+    ``objective`` is that of the search. ``violation`` and ``without_value`` are those of the search first, of the fresh
+    draws second (the same again without draws). ``noise`` is the fraction of the variance over the fresh draws that is
+    due to sensor noise, by metric. ``result`` is one run of the nominal device.
+    """
+
+    gains: Gains
+    values: Mapping[str, float]
+    fresh: Mapping[str, float]
+    objective: float
+    violation: tuple[float, float]
+    without_value: tuple[float, float]
+    ceiling: Ceiling
+    noise: Mapping[str, Interval]
+    result: Result
+
+    @property
+    def is_feasible_in_search(self) -> bool:
+        """True where all constraints are kept and no run fails over what the search saw."""
+        return self.violation[0] == 0.0 and self.without_value[0] == 0.0
+
+    @property
+    def is_feasible(self) -> bool:
+        """True where all constraints are kept and no run fails, over fresh draws too."""
+        return self.is_feasible_in_search and self.violation[1] == 0.0 and self.without_value[1] == 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Tuning(Solved):
+    """What a search came to. ``starts`` are best first; ``runs`` counts all simulated runs."""
+
+    problem: Problem
+    scales: Mapping[str, float]
+    before: Setting
+    after: Setting
+    starts: tuple[Start, ...]
+    runs: int
+
+    @property
+    def bounds_reached(self) -> dict[str, Literal["minimum", "maximum"]]:
+        """The gains that ended at a bound, and at which: a better one may lie beyond."""
+        found = {item.path: item.bound_reached(self.after.gains[item.path]) for item in self.problem.searched}
+        return {path: bound for path, bound in found.items() if bound is not None}
+
+    @property
+    def lines(self) -> list[str]:
+        """The gains found, as overrides ``PATH=VALUE`` to paste."""
+        return self.problem.lines(self.after.gains)
+
+
+_WIDTH, _PANEL, _LETTER = 7.2, 1.7, 0.083
+_MARGINS = Margins(left=0.75, right=0.2, top=0.55, bottom=0.55, row_gap=0.45)
+_PANELS = (
+    ("torque", title_with_unit("Actuator torque", "torque"), "torque"),
+    ("command", "Valve command (-1 to 1)", ""),
+    ("supplied_mass", title_with_unit("Gas supplied", "gas mass"), "gas mass"),
+)
+
+
+def task_figure(tuning: Tuning) -> "matplotlib.figure.Figure":
+    """Return torque, command and gas over time with the gains before and after, on the nominal device."""
+    height = _MARGINS.top + len(_PANELS) * _PANEL + (len(_PANELS) - 1) * _MARGINS.row_gap + _MARGINS.bottom
+    with house_style():
+        figure, rows = figure_of_panels((_WIDTH, height), _MARGINS, len(_PANELS))
+        for (channel, title, quantity), (axes,) in zip(_PANELS, rows, strict=True):
+            for setting, colour, name in ((tuning.before, VERMILION, "before"), (tuning.after, BLUE, "after")):
+                recording = setting.result.recording
+                steps = "steps-post" if channel == "command" else "default"
+                axes.plot(
+                    recording.time,
+                    display_values(np.asarray(recording[channel]), quantity),
+                    color=colour,
+                    label=name,
+                    linewidth=1.3,
+                    drawstyle=steps,
+                )
+            axes.set_title(title)
+        recording = tuning.after.result.recording
+        first = rows[0][0]
+        if "reference" in recording:
+            first.plot(recording.time, recording["reference"], "--", color=BLACK, label="reference", linewidth=1.2)
+        label_lines(first)
+        rows[-1][0].set_xlabel("Time (s)")
+        mark_kind(figure, "simulated")
+        return figure
+
+
+def search_figure(tuning: Tuning) -> "matplotlib.figure.Figure":
+    """Return the cost of each start over its generations, and the gains between their bounds."""
+    paths = [item.path for item in tuning.problem.searched]
+    names = 0.55 + _LETTER * max(len(path) for path in paths)
+    margins = Margins(left=0.85, right=0.45, top=0.55, bottom=0.55, row_gap=0.0, column_gap=names)
+    height = margins.top + margins.bottom + max(2.3, 0.4 * len(paths))
+    with house_style():
+        figure, ((course, places),) = figure_of_free_panels((3.2 + 3.2 + names + 1.3, height), margins, 1, 2)
+        for number, start in enumerate(tuning.starts):
+            costs = np.array(start.generations)
+            costs[costs >= INFEASIBLE] = np.nan  # no candidate keeps the constraints yet
+            course.plot(np.arange(costs.size), costs, color=COLOURS[number % len(COLOURS)], linewidth=1.3)
+        course.axhline(tuning.before.objective, color=GREY, linestyle="--", linewidth=1.0)
+        if course.dataLim.ymin > 0.0:
+            course.set_yscale("log")
+        course.set_title("Objective, best so far; dashed: before")
+        course.set_xlabel("Generation")
+        _draw_places(places, tuning)
+        mark_kind(figure, "simulated")
+        return figure
+
+
+def _draw_places(axes: "Axes", tuning: Tuning) -> None:
+    searched = tuning.problem.searched
+    rows = np.arange(len(searched))[::-1]
+    for row, item in zip(rows, searched, strict=True):
+        axes.plot([0.0, 1.0], [row, row], "-", color=GREY, linewidth=1.0)
+        for start in tuning.starts:
+            axes.plot(
+                item.fraction(float(item.value(np.array(start.fractions[searched.index(item)])))),
+                row,
+                "|",
+                color=GREY,
+                markersize=11,
+            )
+        axes.plot(
+            np.clip(item.fraction(item.before), -0.05, 1.05), row, "o", color=VERMILION, markersize=7, label="before"
+        )
+        axes.plot(item.fraction(tuning.after.gains[item.path]), row, "o", color=BLUE, markersize=7, label="after")
+    axes.set_yticks(rows, [item.path for item in searched])
+    axes.set_ylim(-0.6, len(searched) - 0.4)
+    axes.set_xticks([0.0, 1.0], ["minimum", "maximum"])
+    axes.set_title("Between bounds")
+    handles, labels = axes.get_legend_handles_labels()
+    legend = axes.legend(handles[:2], labels[:2], ncols=2, borderaxespad=0.1, handlelength=0.8, columnspacing=1.0)
+    legend.set_loc("lower right")
+    legend.set_bbox_to_anchor((1.0, 1.0))
+
 
 _DIFFERENT = 0.1
 """Fraction of the way between the bounds from which on two starts are said to have ended in different places."""
@@ -210,7 +420,7 @@ def _number(name: str, value: float | None) -> str:
     return "" if value is None or math.isnan(value) else f"{display_value(value, metric_quantity(name)):.4g}"
 
 
-def _limit(item: Constraint) -> str:
+def _limit(item: Limit) -> str:
     return f"at {'most' if item.is_most else 'least'} {item.text}"
 
 

@@ -1,104 +1,175 @@
 """Tunes a scenario: the search, then both settings, before and after, over fresh draws and on the nominal device."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ppafo.answers import Solved
 from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
+from ppafo.parameters.device import VANE
 from ppafo.progress import Report
-from ppafo.questions.tune.file import load_tuning
-from ppafo.questions.tune.problem import Constraint, Gains, Problem, Spread
-from ppafo.questions.tune.search import Judgement, Runs, Start, bad_ends, judge, keeps, search, shortfall
+from ppafo.questions.tune.answer import FRESH_DRAWS, INFEASIBLE, Ceiling, Setting, Start, Tuning, keeps
+from ppafo.questions.tune.problem import Effort, Gains, Limit, Problem, Spread, Term, load_tuning
 from ppafo.simulation.ensemble.columns import absolute
 from ppafo.simulation.numbers import TIMES, with_numbers
-from ppafo.simulation.result import Result
+from ppafo.simulation.plan import profile_bounds
 from ppafo.simulation.scenario import Scenario, worn_kind
 from ppafo.simulation.simulate import OPEN_LOOP, simulate
-from ppafo.studies.configurations import with_overrides
-from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import with_new_noise
-from ppafo.studies.intervals import Interval, noise_interval
-from ppafo.studies.outcomes import Model, Outcomes, Tally, scenario_model
+from ppafo.studies.distributions import Floats, Interval, noise_interval
+from ppafo.studies.draws import Model, Outcomes, Tally, scenario_model, with_new_noise
+from ppafo.studies.study import with_overrides
 
-FRESH_DRAWS = 1024
-"""Draws that the search never saw, over which the result is judged in the end."""
+FAILED = 1.0e12
+"""Where the costs of candidates begin of which a run fails; the fraction of such runs is added."""
+
+
+@dataclass(frozen=True, slots=True)
+class Runs:
+    """Metrics by name and failures of candidates, each (candidates, draws); one draw without uncertainty."""
+
+    metrics: Mapping[str, Floats]
+    failed: NDArray[np.bool_]
+
+    @property
+    def without_value(self) -> Floats:
+        """Fraction of the runs of each candidate that failed or lack a metric (candidates,)."""
+        lacking = self.failed | np.any([~np.isfinite(values) for values in self.metrics.values()], axis=0)
+        return np.asarray(np.mean(lacking, axis=1))
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """Objective, violation and what both are made of, each (candidates,): metric at its bad end by name [SI]."""
+
+    objective: Floats
+    violation: Floats
+    without_value: Floats
+
+    @property
+    def cost(self) -> Floats:
+        """One number by which candidates are compared."""
+        usual = np.where(self.violation > 0.0, INFEASIBLE + self.violation, self.objective)
+        return np.where(self.without_value > 0.0, FAILED * (1.0 + self.without_value), usual)
+
+    @property
+    def is_feasible(self) -> NDArray[np.bool_]:
+        """Which candidates satisfy all constraints and never fail."""
+        return np.asarray((self.violation == 0.0) & (self.without_value == 0.0))
+
+
+def shortfall(scenario: Scenario) -> Floats:
+    """Return what the supply lacks of the largest reference [N m] in each run (runs,); 0 for nothing.
+
+    With one chamber at its supply and the other at the atmosphere the vane holds at most the torque constant times the
+    difference of the two (equation (2)), whatever the controller does. Of another actuator no such limit is known here.
+    """
+    if scenario.device.actuator.kind != VANE:
+        return np.zeros(1)
+    supply, constant = scenario.device.supply, scenario.device.actuator.torque_constant
+    lowest, highest = profile_bounds(scenario.reference)
+    above = highest - constant * (supply.pressure - supply.atmospheric_pressure)
+    below = -lowest - constant * (supply.dorsiflexion_pressure - supply.atmospheric_pressure)
+    return np.atleast_1d(np.maximum(0.0, np.maximum(above, below)))
+
+
+def bad_ends(values: Floats, spread: Spread | None, is_high: bool) -> Floats:
+    """Return the value of a metric by which candidates are judged (candidates,) from (candidates, draws) [SI]."""
+    return values[:, 0] if spread is None else spread.bad_end(values, is_high)
+
+
+def judge(runs: Runs, problem: Problem, scales: Mapping[str, float]) -> Judgement:
+    """Return objective and violation of candidates; ``scales`` are the sizes of the goals by metric [SI]."""
+    failing = runs.without_value
+    known = {name: np.where(failing[:, None] > 0.0, 0.0, values) for name, values in runs.metrics.items()}
+    objective = sum((_term(goal, known, problem.spread, scales) for goal in problem.goals), np.zeros(failing.size))
+    violation = sum((_excess(item, known, problem.spread) for item in problem.constraints), np.zeros(failing.size))
+    return Judgement(np.asarray(objective), np.asarray(violation), failing)
+
+
+def _term(goal: Term, values: Mapping[str, Floats], spread: Spread | None, scales: Mapping[str, float]) -> Floats:
+    return goal.weight * bad_ends(values[goal.metric], spread, goal.weight > 0.0) / scales[goal.metric]
+
+
+def _excess(item: Limit, values: Mapping[str, Floats], spread: Spread | None) -> Floats:
+    """Return by how much a constraint is broken, as a fraction of its limit (candidates,); 0 where it is kept."""
+    reached = bad_ends(values[item.metric], spread, item.is_most)
+    beyond = reached - item.limit if item.is_most else item.limit - reached
+    return np.maximum(0.0, beyond) / (abs(item.limit) or 1.0)
+
+
+Costs = Callable[[Floats], Floats]
+"""Fractions of the way (candidates, gains) in, costs (candidates,) out."""
+_TOLERANCE = 1.0e-3
+"""A start has ended where the costs of its candidates differ by no more than this fraction of their mean."""
+
+
+def search(costs: Costs, before: Sequence[float], effort: Effort) -> list[Start]:
+    """Return what came of each start, the best first; the same every time for a seed.
+
+    ``before`` are the fractions of the values before tuning; they are among the first candidates where they lie within
+    the bounds. Differential evolution (Storn and Price, 1997) as in SciPy only ever compares costs.
+    """
+    seeds = np.random.SeedSequence(effort.seed).spawn(effort.starts)
+    found = [_start(costs, before, effort, np.random.default_rng(seed)) for seed in seeds]
+    return sorted(found, key=lambda start: start.cost)
+
+
+def _start(costs: Costs, before: Sequence[float], effort: Effort, random: np.random.Generator) -> Start:
+    from scipy.optimize import differential_evolution
+
+    course: list[float] = []
+    tried = 0
+
+    def generation(columns: Floats) -> Floats:
+        nonlocal tried
+        fractions = np.clip(np.atleast_2d(columns.T), 0.0, 1.0)
+        found = costs(fractions)
+        tried += len(fractions)
+        course.append(min([float(np.min(found)), *course[-1:]]))
+        return found
+
+    is_settled = False
+
+    def stop(intermediate_result: Any) -> bool:
+        nonlocal is_settled
+        is_settled = have_come_together(intermediate_result.population_energies)
+        return is_settled
+
+    is_within = all(0.0 <= fraction <= 1.0 for fraction in before)
+    result = differential_evolution(
+        generation,
+        [(0.0, 1.0)] * len(before),
+        x0=np.asarray(before) if is_within else None,
+        init="latinhypercube",
+        popsize=effort.candidates_per_gain,
+        maxiter=effort.generations,
+        tol=0.0,
+        callback=stop,
+        polish=False,
+        updating="deferred",
+        vectorized=True,
+        rng=random,
+    )
+    return Start(tuple(map(float, result.x)), float(result.fun), tried, tuple(course), is_settled)
+
+
+def have_come_together(costs: Floats) -> bool:
+    """Tell whether candidates cost the same; where all break a constraint, by how much they break it."""
+    if np.max(costs) >= FAILED or np.min(costs) < INFEASIBLE <= np.max(costs):
+        return False
+    beyond = costs - INFEASIBLE if np.min(costs) >= INFEASIBLE else costs
+    return float(np.std(beyond)) <= _TOLERANCE * abs(float(np.mean(beyond)))
+
+
 MINIMUM_ERRORS = ("peak_error", "rms_error_hold")
 """Metrics that are never below what the supply lacks of the largest reference."""
 _NOISE_DRAWS = 512
 """Fresh draws that are run once more with other noise."""
 _NOISE_CONFIDENCE = 0.95
-
-
-@dataclass(frozen=True, slots=True)
-class Ceiling:
-    """Draws in which the reference needs more torque than the supply can hold, whatever the gains.
-
-    ``fraction`` is theirs of all; ``explains`` are the metrics of the constraints that they alone break: no gains can
-    keep them, or the other draws do.
-    """
-
-    fraction: float
-    explains: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """Gains [SI] and what they give.
-
-    ``values`` are the metrics by which the search judges them [SI]: as the device is said to be, or at their bad end
-    over the draws of the search; ``fresh`` the same over draws that the search did not use (empty without draws).
-    ``objective`` is that of the search. ``violation`` and ``without_value`` are those of the search first, of the fresh
-    draws second (the same again without draws). ``noise`` is the fraction of the variance over the fresh draws that is
-    due to sensor noise, by metric. ``result`` is one run of the nominal device.
-    """
-
-    gains: Gains
-    values: Mapping[str, float]
-    fresh: Mapping[str, float]
-    objective: float
-    violation: tuple[float, float]
-    without_value: tuple[float, float]
-    ceiling: Ceiling
-    noise: Mapping[str, Interval]
-    result: Result
-
-    @property
-    def is_feasible_in_search(self) -> bool:
-        """True where all constraints are kept and no run fails over what the search saw."""
-        return self.violation[0] == 0.0 and self.without_value[0] == 0.0
-
-    @property
-    def is_feasible(self) -> bool:
-        """True where all constraints are kept and no run fails, over fresh draws too."""
-        return self.is_feasible_in_search and self.violation[1] == 0.0 and self.without_value[1] == 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Tuning(Solved):
-    """What a search came to. ``starts`` are best first; ``runs`` counts all simulated runs."""
-
-    problem: Problem
-    scales: Mapping[str, float]
-    before: Setting
-    after: Setting
-    starts: tuple[Start, ...]
-    runs: int
-
-    @property
-    def bounds_reached(self) -> dict[str, Literal["minimum", "maximum"]]:
-        """The gains that ended at a bound, and at which: a better one may lie beyond."""
-        found = {item.path: item.bound_reached(self.after.gains[item.path]) for item in self.problem.searched}
-        return {path: bound for path, bound in found.items() if bound is not None}
-
-    @property
-    def lines(self) -> list[str]:
-        """The gains found, as overrides ``PATH=VALUE`` to paste."""
-        return self.problem.lines(self.after.gains)
 
 
 def tune(
@@ -116,10 +187,13 @@ def tune(
     """
     problem = _problem_of(tuning, overrides)
     if seed is not None:
-        problem = replace(problem, effort=replace(problem.effort, seed=seed))
+        problem = replace(problem, effort=problem.effort.model_copy(update={"seed": seed}))
         if problem.spread is not None and not problem.spread.study:
             problem = replace(problem, spread=replace(problem.spread, seed=seed))
-    tally = Tally(_most_runs(problem), progress)
+    effort, draws = problem.effort, 1 if problem.spread is None else problem.spread.draws
+    candidates = effort.candidates_per_gain * len(problem.searched) * (effort.generations + 1) * effort.starts
+    noise = _NOISE_DRAWS if problem.spread is not None and problem.spread.uncertainty.has_noise else 0
+    tally = Tally(draws * (candidates + 3) + (2 * (FRESH_DRAWS + noise) if problem.spread is not None else 0), progress)
     model = scenario_model(problem.scenario, problem.metrics, threads, tally.add, problem.gauge)
     fixed = _draws(problem, 0, 1 if problem.spread is None else problem.spread.draws)
     scales = _scales(problem, _runs(model, problem, [problem.before], fixed))
@@ -144,13 +218,6 @@ def _problem_of(tuning: Problem | str | Path | Mapping[str, Any] | None, overrid
     if overrides:
         raise StudyError("a loaded Problem takes no overrides; give them to load_tuning")
     return tuning
-
-
-def _most_runs(problem: Problem) -> int:
-    effort, draws = problem.effort, 1 if problem.spread is None else problem.spread.draws
-    candidates = effort.candidates_per_gain * len(problem.searched) * (effort.generations + 1) * effort.starts
-    noise = _NOISE_DRAWS if problem.spread is not None and problem.spread.uncertainty.has_noise else 0
-    return draws * (candidates + 3) + (2 * (FRESH_DRAWS + noise) if problem.spread is not None else 0)
 
 
 def _draws(problem: Problem, first: int, count: int) -> dict[str, Floats]:
@@ -244,7 +311,7 @@ def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: 
     return Ceiling(float(np.mean(lacking > 0.0)), tuple(explained) if lacking.any() else ())
 
 
-def _is_explained(item: Constraint, spread: Spread | None, values: Floats, lacking: Floats) -> bool:
+def _is_explained(item: Limit, spread: Spread | None, values: Floats, lacking: Floats) -> bool:
     """Tell whether the draws below the ceiling alone break a constraint: no gains can, or the others keep it."""
     if item.metric in MINIMUM_ERRORS and item.is_most:
         least = np.mean(lacking, axis=1) if spread is None or spread.fraction is None else spread.bad_end(lacking, True)

@@ -1,29 +1,357 @@
 """The answer on what the paper left unsaid: what is left of each setting, and how firm the conclusions are."""
 
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.questions.unreported.evidence import REPORTED, STATED
-from ppafo.questions.unreported.figure import unreported_figure
-from ppafo.questions.unreported.implications import (
-    Conclusion,
-    Implication,
-    conclusions,
-    implications_of,
-    strongest_links,
+from ppafo.answers.style import BLUE, GREY, VERMILION, house_style
+from ppafo.questions.question import Solved
+from ppafo.questions.unreported.settings import (
+    GAS,
+    IMPROVEMENT,
+    REPORTED,
+    SETTINGS,
+    STATED,
+    Draws,
+    Floats,
+    Metrics,
+    Setting,
+    agreement,
+    effective,
+    improvement,
+    saving,
 )
-from ppafo.questions.unreported.solve import ENOUGH, REPLICATES, Family
 from ppafo.simulation.document import plain
+from ppafo.studies.distributions import jackknife_reach
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+    from matplotlib.axes import Axes
+
+REPLICATES = 8
+ENOUGH = 100.0
+
+
+@dataclass(frozen=True, slots=True)
+class Family(Solved):
+    """All completions that could be run: settings by name, metrics by valve and name, and how densely they were drawn.
+
+    Each (draws,). The first ``even`` are spread evenly over what is allowed, the others lie where the results agree.
+    ``replicate`` is which search drew each; ``densities`` (draws, searches) is how densely each search draws there,
+    over the even spread, 1 from another search where a completion can have no weight; ``sizes`` (searches,) is how much
+    each drew. ``drawn`` counts also those that no run can have or that failed.
+    """
+
+    draws: Draws
+    metrics: Metrics
+    densities: Floats
+    sizes: Floats
+    replicate: NDArray[np.intp]
+    even: int
+    drawn: int
+    seed: int
+
+    @property
+    def density(self) -> Floats:
+        """How densely all searches together draw, over the even spread."""
+        return np.asarray(self.densities @ self.sizes / np.sum(self.sizes))
+
+    def without_each(self) -> "list[Family]":
+        """Return, for each search, what the others found, weighed as if there had been no more."""
+        found = []
+        for number in range(self.sizes.size):
+            kept = self.replicate != number
+            even = int(np.count_nonzero(kept[: self.even]))
+            others = np.delete(self.densities[kept], number, axis=1)
+            # The numbers of the searches close up, as their columns do.
+            numbers = self.replicate[kept] - (self.replicate[kept] > number)
+            found.append(
+                Family(
+                    {name: values[kept] for name, values in self.draws.items()},
+                    {valve: {name: item[kept] for name, item in of.items()} for valve, of in self.metrics.items()},
+                    others,
+                    np.delete(self.sizes, number),
+                    numbers,
+                    even,
+                    self.drawn,
+                    self.seed,
+                )
+            )
+        return found
+
+    @property
+    def weights(self) -> Floats:
+        """Weight of each completion by all that is reported; they add up to 1, or are all 0."""
+        return self.weights_without(())
+
+    def weights_without(self, left_out: Collection[str]) -> Floats:
+        """Weights where some of what is reported does not count."""
+        raw = agreement(self.metrics, left_out) / self.density
+        total = raw.sum()
+        return np.asarray(raw / total if total > 0.0 else raw)
+
+    @property
+    def is_enough(self) -> bool:
+        """True where enough completions agree for a verdict on a setting."""
+        return self.effective >= ENOUGH
+
+    @property
+    def effective(self) -> float:
+        """Number of completions [-] that equal weights would need to say as much."""
+        return effective(self.weights)
+
+
+FEWEST_REPLICATES = 3
+TOO_FEW = "too few to say"
+IMPLIED, NARROWED = 0.5, 0.8
+"""A setting is implied (narrowed) where what is left of its range is below this fraction of what was allowed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Implication:
+    """What the results say about one setting: its median and 90 % interval, what is left of its range, in words.
+
+    For a choice, ``fractions`` are the weights of the choices and the numbers are nan. ``error`` is the half width of
+    the 95 % interval of each number, by its name, from the spread between the replicates.
+    """
+
+    setting: Setting
+    median: float
+    low: float
+    high: float
+    left: float
+    fractions: tuple[float, ...]
+    verdict: str
+    error: Mapping[str, tuple[float, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class Conclusion:
+    """A statement of the paper, and in which fraction of all completions, and of their weight, it holds [-].
+
+    ``by_the_rest`` is the fraction of the weight that follows without the results that already say it, and
+    ``rest_effective`` the number of completions that equal weights would need to say as much about that. ``error`` are
+    the half widths of the 95 % intervals of the three fractions, from the spread between the replicates.
+    """
+
+    statement: str
+    of_all: float
+    of_weight: float
+    by_the_rest: float
+    rest_effective: float
+    error: tuple[float, float, float]
+
+
+def implications_of(family: Family) -> list[Implication]:
+    """What the results imply for each setting, in their order; no verdict where too few completions agree."""
+    others = family.without_each()
+    found = []
+    for setting in SETTINGS:
+        item = _implication(setting, family)
+        left_out = [_implication(setting, other) for other in others]
+        error = {
+            name: _error([_numbers(each, name) for each in left_out]) for name in ("median", "low", "high", "left")
+        }
+        error["shares"] = _error([each.fractions for each in left_out])
+        ends = [_verdict(item.left + sign * error["left"][0]) for sign in (-1.0, 1.0)]
+        verdict = item.verdict if len(set(ends)) == 1 else " or ".join(ends)
+        found.append(replace(item, verdict=verdict if family.is_enough else TOO_FEW, error=error))
+    return found
+
+
+def _numbers(item: Implication, name: str) -> tuple[float, ...]:
+    number: float = getattr(item, name)
+    return (number,)
+
+
+def _error(left_out: Sequence[Sequence[float]]) -> tuple[float, ...]:
+    """Return half widths of 95 % intervals from estimates without each replicate in turn; nan from too few."""
+    if len(left_out) < FEWEST_REPLICATES:
+        return (math.nan,) * len(left_out[0]) if left_out else ()
+    return tuple(jackknife_reach(np.array(left_out, dtype=np.float64), 0.95).tolist())
+
+
+def _implication(setting: Setting, family: Family) -> Implication:
+    values, weight = family.draws[setting.name], family.weights
+    if setting.choices:
+        fractions = tuple(float(weight[values == choice].sum()) for choice in setting.choices)
+        left = spread_of(fractions)
+        return Implication(setting, np.nan, np.nan, np.nan, left, fractions, _verdict(left), {})
+    low, median, high = weighted_quantiles(values, weight, (0.05, 0.5, 0.95))
+    scale = np.log if setting.is_logarithmic else np.asarray
+    left = float((scale(high) - scale(low)) / (0.9 * (scale(setting.high) - scale(setting.low))))
+    return Implication(setting, median, low, high, left, (), _verdict(left), {})
+
+
+def spread_of(fractions: Sequence[float]) -> float:
+    """How far weights spread over choices, 0 for one alone to 1 for all alike, by their perplexity; nan for none."""
+    if not sum(fractions) > 0.0:
+        return float("nan")
+    entropy = -sum(fraction * math.log(fraction) for fraction in fractions if fraction > 0.0)
+    return (math.exp(entropy) - 1.0) / (len(fractions) - 1)
+
+
+def _verdict(left: float) -> str:
+    if math.isnan(left):
+        return "nothing agrees"
+    if left < IMPLIED:
+        return "implied"
+    return "narrowed" if left < NARROWED else "left open"
+
+
+def weighted_quantiles(values: Floats, weight: Floats, levels: tuple[float, ...]) -> list[float]:
+    """Quantiles of weighted values; nan where there is no weight."""
+    order = np.argsort(values)
+    total = np.cumsum(weight[order])
+    if total.size == 0 or total[-1] <= 0.0:
+        return [float("nan")] * len(levels)
+    places = np.searchsorted(total, np.array(levels) * total[-1])
+    return [float(values[order[min(place, order.size - 1)]]) for place in places]
+
+
+def conclusions(family: Family) -> list[Conclusion]:
+    """How firmly the paper's conclusions hold over all completions."""
+    others = family.without_each()
+    found = []
+    for statement, left_out in _STATEMENTS.items():
+        fractions = _fractions(family, statement, left_out)
+        error = _error([_fractions(other, statement, left_out) for other in others])
+        rest = effective(family.weights_without(left_out))
+        found.append(Conclusion(statement, *fractions, rest, (error[0], error[1], error[2])))
+    return found
+
+
+_BETTER, _LESS = "The proportional valve tracks better.", "The proportional valve uses less gas."
+_STATEMENTS: dict[str, tuple[str, ...]] = {
+    _BETTER: (IMPROVEMENT,),
+    _LESS: GAS,
+    "It does both.": (IMPROVEMENT, *GAS),
+}
+"""What the paper concludes, and the results that already say it."""
+
+
+def _fractions(family: Family, statement: str, left_out: Collection[str]) -> tuple[float, float, float]:
+    """In which fraction of all completions, of the weight, and of that without some results a statement holds [-]."""
+    better, less = improvement(family.metrics) > 0.0, saving(family.metrics) > 0.0
+    holds = {_BETTER: better, _LESS: less}.get(statement, better & less)
+    weights = (family.weights, family.weights_without(left_out))
+    of_weight, by_the_rest = (float(weight[holds].sum()) for weight in weights)
+    return float(holds[: family.even].mean()), of_weight, by_the_rest
+
+
+def strongest_links(family: Family, count: int = 4) -> list[tuple[str, str, float]]:
+    """Pairs of settings that the results tie together most, with their weighted correlation of ranks [-]."""
+    names = [setting.name for setting in SETTINGS if len(setting.choices) != 2]
+    ranks = np.array([_ranks(family.draws[name]) for name in names])
+    total = family.weights.sum()
+    if total <= 0.0:
+        return []
+    away = ranks - (ranks * family.weights).sum(axis=1, keepdims=True) / total
+    covariance = (away * family.weights) @ away.T / total
+    spread = np.sqrt(np.diag(covariance))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        correlation = np.nan_to_num(covariance / np.outer(spread, spread))
+    pairs = [
+        (names[one], names[two], float(correlation[one, two]))
+        for one in range(len(names))
+        for two in range(one + 1, len(names))
+    ]
+    return sorted(pairs, key=lambda pair: -abs(pair[2]))[:count]
+
+
+def _ranks(values: Floats) -> Floats:
+    """Ranks from 0 to 1; equal values share one."""
+    _, places, counts = np.unique(values, return_inverse=True, return_counts=True)
+    middle = np.cumsum(counts) - 0.5 * counts
+    return np.asarray(middle[places] / values.size)
+
+
+_SIZE = (9.6, 7.6)
+_COLUMNS = 4
+_BINS = 30
+_SHOWN_DOTS = 4000
+
+
+def unreported_figure(family: Family) -> "matplotlib.figure.Figure":
+    """Return the panels of all settings, allowed in grey and implied in blue, and one of the two main results."""
+    import matplotlib.figure
+
+    rows = -(-(len(SETTINGS) + 1) // _COLUMNS)
+
+    with house_style():
+        figure = matplotlib.figure.Figure(figsize=_SIZE)
+        figure.subplots_adjust(left=0.03, right=0.98, top=0.9, bottom=0.07, hspace=0.62, wspace=0.22)
+        panels = figure.subplots(rows, _COLUMNS).ravel().tolist()
+        weights = family.weights
+        for axes, setting, result in zip(panels, SETTINGS, implications_of(family), strict=False):
+            _drawn_setting(axes, setting, family.draws[setting.name], weights, result)
+        _results(panels[len(SETTINGS)], family)
+        for axes in panels[len(SETTINGS) + 1 :]:
+            axes.set_axis_off()
+        figure.text(
+            0.01,
+            0.985,
+            "What the paper left unsaid: prior in grey, posterior in blue (simulated; effective sample size "
+            f"{family.effective:.0f})",
+            va="top",
+            fontsize=11,
+        )
+        return figure
+
+
+def _drawn_setting(axes: "Axes", setting: Setting, values: Floats, weights: Floats, result: Implication) -> None:
+    axes.set_title(f"{setting.name}{f' ({setting.unit})' if setting.unit else ''}", fontsize=9.5)
+    axes.set_xlabel(result.verdict, fontsize=9, color=BLUE if result.verdict == "implied" else GREY)
+    axes.set_yticks([])
+    if setting.choices:
+        places = np.arange(len(setting.choices))
+        axes.bar(places, np.full(places.size, 1.0 / places.size), width=0.85, color=GREY, alpha=0.3)
+        axes.bar(places, result.fractions, width=0.5, color=BLUE)
+        names = setting.words or [f"{choice:g}" for choice in setting.choices]
+        axes.set_xticks(places, [_short(name) for name in names], fontsize=7.5)
+        return
+    scale = np.log10 if setting.is_logarithmic else np.asarray
+    edges = np.linspace(scale(setting.low), scale(setting.high), _BINS + 1)
+    axes.hist(edges[:-1], bins=list(edges), weights=np.full(_BINS, 1.0 / _BINS), color=GREY, alpha=0.3)
+    axes.hist(scale(values), bins=list(edges), weights=weights, color=BLUE)
+    if setting.is_logarithmic:
+        ticks = np.array(
+            [value for value in (0.3, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0) if setting.low <= value <= setting.high]
+        )
+        axes.set_xticks(np.log10(ticks), [f"{tick:g}" for tick in ticks])
+
+
+def _short(words: str) -> str:
+    """Return the words on two lines."""
+    parts = words.split()
+    half = (len(parts) + 1) // 2
+    return " ".join(parts[:half]) + ("\n" + " ".join(parts[half:]) if parts[half:] else "")
+
+
+def _results(axes: "Axes", family: Family) -> None:
+    better, less = improvement(family.metrics), saving(family.metrics)
+    even = slice(0, min(family.even, _SHOWN_DOTS))
+    axes.plot(less[even], better[even], ".", markersize=1.5, color=GREY, alpha=0.5)
+    likely = np.argsort(-family.weights)[: _SHOWN_DOTS // 8]
+    likely = likely[family.weights[likely] > 0.0]
+    axes.plot(less[likely], better[likely], ".", markersize=2.0, color=BLUE)
+    axes.plot([63.0], [15.0], "+", markersize=11, markeredgewidth=1.6, color=VERMILION)
+    axes.set_xlim(-20.0, 100.0)
+    axes.set_ylim(-60.0, 60.0)
+    axes.set_title("improvement (%) over saving (%)", fontsize=9.5)
+    axes.set_xlabel("+ the paper", fontsize=9, color=VERMILION)
+
 
 ERRORS = (
     f"each ±: 95 % by the spread between {REPLICATES} independent searches; the effective sample size shows how "
     "unequal the weights are, not how precise a fraction is"
 )
-
 _CAPTION = "Grey: prior; blue: posterior. Dots: improvement over saving, with the paper's as a cross."
-
 _SETTINGS = ("setting", "allowed", "posterior: median and 90 % interval", "verdict")
 _CONCLUSIONS = ("conclusion", "of all completions", "of those that agree", "by the other results alone")
 

@@ -1,11 +1,13 @@
 """The settings that the paper does not print, each with what it may be before anything is compared."""
 
 import math
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.parameters import load_device, load_parameter_set
 from ppafo.parameters.parameter_set import number_in_si
 from ppafo.parameters.plant import orifice_conductance
@@ -13,7 +15,6 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.units import parse_quantity
 
 Floats = NDArray[np.float64]
-
 DEVICE = "ppafo2011"
 SOLENOID, PROPORTIONAL = "solenoid", "proportional"
 VOLTS = "full scale of U"
@@ -76,11 +77,8 @@ SETTINGS: tuple[Setting, ...] = (
     Setting(PID_RATE, "Hz", "not printed", choices=(50.0, 100.0, 200.0, 500.0, 1000.0)),
     Setting(ON_OFF_RATE, "Hz", "20 Hz is printed for the component, not for the law", choices=(20.0, 100.0, 1000.0)),
 )
-
 Draws = dict[str, Floats]
 """Values of every setting in its shown unit, by name, shape (draws,)."""
-
-
 CELLS = tuple(len(setting.choices) for setting in SETTINGS)
 """Number of choices of each setting, 0 for a number."""
 
@@ -121,7 +119,7 @@ def columns(draws: Draws, valve: str) -> dict[str, Floats]:
         "valve.discharge_coefficient": discharge_coefficients(draws[DISCHARGE], valve),
         "run.duration": whole_durations(ramp + draws[HOLD]),
     }
-    return shared | (_pid(draws) if valve == PROPORTIONAL else _on_off(draws))
+    return shared | (_pid(draws) if valve == PROPORTIONAL else {"controller.rate": draws[ON_OFF_RATE]})
 
 
 def whole_durations(times: Floats) -> Floats:
@@ -152,5 +150,179 @@ def _pid(draws: Draws) -> dict[str, Floats]:
     return {"controller.rate": draws[PID_RATE], **scaled}
 
 
-def _on_off(draws: Draws) -> dict[str, Floats]:
-    return {"controller.rate": draws[ON_OFF_RATE]}
+Metrics = Mapping[str, Mapping[str, Floats]]
+"""Metrics by valve and name, each (draws,)."""
+METRICS = ("rms_error", "gas_supplied", "oscillations_ramp", "oscillations_hold")
+FEWEST_REVERSALS = 4.0
+"""Fewer reversals on the ramp are an overshoot, not an oscillation, as in the reproduction report."""
+MAXIMUM_REVERSALS = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Reported:
+    """A number of the paper: its value, standard deviation of the tolerance, and how a completion gives it."""
+
+    name: str
+    value: float
+    tolerance: float
+    unit: str
+    why: str
+    of: Callable[[Metrics], Floats]
+
+
+@dataclass(frozen=True, slots=True)
+class Stated:
+    """Something that the text states: a completion that does not show it counts for nothing."""
+
+    name: str
+    of: Callable[[Metrics], NDArray[np.bool_]]
+
+
+def improvement(metrics: Metrics) -> Floats:
+    """By how much the proportional valve's RMS error is smaller [%]."""
+    return np.asarray(100.0 * (1.0 - metrics[PROPORTIONAL]["rms_error"] / metrics[SOLENOID]["rms_error"]))
+
+
+def saving(metrics: Metrics) -> Floats:
+    """By how much the proportional valve's gas is less [%]; nan where the solenoids take none."""
+    used = metrics[SOLENOID]["gas_supplied"]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(used > 0.0, 100.0 * (1.0 - metrics[PROPORTIONAL]["gas_supplied"] / used), np.nan)
+
+
+def grams(valve: str) -> Callable[[Metrics], Floats]:
+    """Gas of one valve [g]."""
+    return lambda metrics: GRAMS_PER_KILOGRAM * metrics[valve]["gas_supplied"]
+
+
+def _oscillates_on_ramp_only(metrics: Metrics) -> NDArray[np.bool_]:
+    solenoid = metrics[SOLENOID]
+    return (solenoid["oscillations_ramp"] >= FEWEST_REVERSALS) & (solenoid["oscillations_hold"] <= MAXIMUM_REVERSALS)
+
+
+def _is_quiet(metrics: Metrics) -> NDArray[np.bool_]:
+    return metrics[PROPORTIONAL]["oscillations_ramp"] < FEWEST_REVERSALS
+
+
+IMPROVEMENT = "improvement"
+GAS = ("gas, solenoid", "gas, proportional", "saving")
+REPORTED: tuple[Reported, ...] = (
+    Reported(IMPROVEMENT, 15.0, 2.0, "%", "printed to 1 %; the model's error is of this size", improvement),
+    Reported(GAS[0], 1.1, 0.06, "g", "printed to 0.1 g, measured", grams(SOLENOID)),
+    Reported(GAS[1], 0.4, 0.03, "g", "printed to 0.1 g, measured", grams(PROPORTIONAL)),
+    Reported(GAS[2], 63.0, 2.0, "%", "printed to 1 %; sharper than the two rounded gases it is made of", saving),
+)
+STATED: tuple[Stated, ...] = (
+    Stated("the solenoid pair oscillates on the ramp and not on the hold", _oscillates_on_ramp_only),
+    Stated("the proportional valve does not oscillate on the ramp", _is_quiet),
+)
+
+
+def agreement(metrics: Metrics, left_out: Collection[str] = ()) -> Floats:
+    """How well each completion (draws,) agrees with what is reported, 0 to 1; ``left_out`` names do not count."""
+    logarithm = np.zeros(metrics[SOLENOID]["rms_error"].size)
+    for item in REPORTED:
+        if item.name in left_out:
+            continue
+        away = (item.of(metrics) - item.value) / item.tolerance
+        logarithm -= 0.5 * away * away
+    agrees = np.isfinite(logarithm)
+    for stated in STATED:
+        agrees &= stated.of(metrics)
+    return np.where(agrees, np.exp(np.where(agrees, logarithm, 0.0)), 0.0)
+
+
+ANYWHERE = 0.2
+KEEPS_CHOICE = 0.7
+CENTRES = 200
+NARROWEST = 0.02
+"""Smallest standard deviation of a bell along any direction, of the side of the cube."""
+ENOUGH = 100.0
+"""Effective number of completions that the bells are laid around; weights are tempered until there are as many."""
+_ROWS = 512
+"""Points whose densities are computed together: few enough that their table of bells stays in the cache of a core."""
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """Bells around ``centres`` (bells, dimensions); ``cells`` of a choice, 0 for a number.
+
+    ``shape`` (numbers, numbers) is the lower Cholesky factor of the bells' covariance over the numbers.
+    """
+
+    centres: Floats
+    shape: Floats
+    cells: tuple[int, ...]
+
+    @property
+    def numbers(self) -> list[int]:
+        """Columns that are numbers, not choices."""
+        return [column for column, cells in enumerate(self.cells) if not cells]
+
+    def draw(self, count: int, chance: np.random.Generator) -> Floats:
+        """Those of ``count`` drawn points that lie in the cube (points, dimensions)."""
+        chosen = self.centres[chance.integers(len(self.centres), size=count)]
+        near = chosen.copy()
+        steps = chance.standard_normal((count, len(self.numbers))) @ self.shape.T
+        near[:, self.numbers] += steps
+        for column, cells in enumerate(self.cells):
+            if cells:
+                within = (np.floor(chosen[:, column] * cells) + chance.random(count)) / cells
+                anew = chance.random(count) > KEEPS_CHOICE
+                near[:, column] = np.where(anew, chance.random(count), within)
+        anywhere = chance.random(count) < ANYWHERE
+        points = np.where(anywhere[:, None], chance.random(chosen.shape), near)
+        return np.asarray(points[((points >= 0.0) & (points < 1.0)).all(axis=1)])
+
+    def density(self, points: Floats) -> Floats:
+        """Density (points,) over the even spread, of points in the cube."""
+        parts = [self._density(points[first : first + _ROWS]) for first in range(0, len(points), _ROWS)]
+        return np.concatenate(parts)
+
+    def _density(self, points: Floats) -> Floats:
+        here, there = (np.linalg.solve(self.shape, rows[:, self.numbers].T).T for rows in (points, self.centres))
+        squares = (here**2).sum(axis=1)[:, None] + (there**2).sum(axis=1)[None, :] - 2.0 * here @ there.T
+        scale = (2.0 * math.pi) ** (-0.5 * len(self.numbers)) / np.prod(np.diag(self.shape))
+        total = scale * np.exp(-0.5 * np.maximum(squares, 0.0))
+        for column, cells in enumerate(self.cells):
+            if cells:
+                same = np.floor(points[:, column, None] * cells) == np.floor(self.centres[None, :, column] * cells)
+                total *= (1.0 - KEEPS_CHOICE) + KEEPS_CHOICE * cells * same
+        return np.asarray(ANYWHERE + (1.0 - ANYWHERE) * total.mean(axis=1))
+
+
+def effective(weights: Floats) -> float:
+    """Number of points [-] that equal weights would need to say as much."""
+    squares = float((weights**2).sum())
+    return float(weights.sum()) ** 2 / squares if squares > 0.0 else 0.0
+
+
+def temper(weights: Floats) -> Floats:
+    """The weights, flattened by the least power that leaves enough of them; they add up to 1."""
+    power = 1.0
+    positive = weights > 0.0
+    enough = min(ENOUGH, 0.5 * float(positive.sum()))
+    flat = weights
+    while power > 0.01:
+        flat = np.where(positive, np.where(positive, weights, 1.0) ** power, 0.0)
+        if effective(flat) >= enough:
+            break
+        power *= 0.8
+    return np.asarray(flat / flat.sum())
+
+
+def next_proposal(
+    points: Floats, weights: Floats, cells: tuple[int, ...], chance: np.random.Generator
+) -> Proposal | None:
+    """The proposal after points with weights; None where nothing has any weight."""
+    if not weights.sum() > 0.0:
+        return None
+    flat = temper(weights)
+    centres = points[chance.choice(len(points), size=CENTRES, p=flat)]
+    numbers = points[:, [column for column, count in enumerate(cells) if not count]]
+    away = numbers - flat @ numbers
+    covariance = (flat[:, None] * away).T @ away
+    narrowing = effective(flat) ** (-1.0 / (numbers.shape[1] + 4.0))
+    return Proposal(
+        centres, np.linalg.cholesky(narrowing**2 * covariance + NARROWEST**2 * np.eye(len(covariance))), cells
+    )

@@ -15,17 +15,21 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.answers import Solved
 from ppafo.errors import ScenarioError
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.questions.unreported.evidence import GAS, IMPROVEMENT, METRICS, Metrics, agreement
-from ppafo.questions.unreported.proposal import Proposal, effective, next_proposal
+from ppafo.questions.unreported.answer import REPLICATES, Family
 from ppafo.questions.unreported.settings import (
     CELLS,
+    GAS,
+    IMPROVEMENT,
+    METRICS,
     PROPORTIONAL,
     SOLENOID,
-    Draws,
+    Floats,
+    Proposal,
+    agreement,
     columns,
+    next_proposal,
     spread,
     values_of,
 )
@@ -33,82 +37,9 @@ from ppafo.simulation.ensemble import COMPLETED, run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.draws import replicate_seed
 
-Floats = NDArray[np.float64]
-
 CHUNK = 32_768
-REPLICATES = 8
 ROUNDS = 12
 FEWEST, MOST = 1_000, 20_000_000
-ENOUGH = 100.0
-
-
-@dataclass(frozen=True, slots=True)
-class Family(Solved):
-    """All completions that could be run: settings by name, metrics by valve and name, and how densely they were drawn.
-
-    Each (draws,). The first ``even`` are spread evenly over what is allowed, the others lie where the results agree.
-    ``replicate`` is which search drew each; ``densities`` (draws, searches) is how densely each search draws there,
-    over the even spread, 1 from another search where a completion can have no weight; ``sizes`` (searches,) is how much
-    each drew. ``drawn`` counts also those that no run can have or that failed.
-    """
-
-    draws: Draws
-    metrics: Metrics
-    densities: Floats
-    sizes: Floats
-    replicate: NDArray[np.intp]
-    even: int
-    drawn: int
-    seed: int
-
-    @property
-    def density(self) -> Floats:
-        """How densely all searches together draw, over the even spread."""
-        return np.asarray(self.densities @ self.sizes / np.sum(self.sizes))
-
-    def without_each(self) -> "list[Family]":
-        """Return, for each search, what the others found, weighed as if there had been no more."""
-        found = []
-        for number in range(self.sizes.size):
-            kept = self.replicate != number
-            even = int(np.count_nonzero(kept[: self.even]))
-            others = np.delete(self.densities[kept], number, axis=1)
-            # The numbers of the searches close up, as their columns do.
-            numbers = self.replicate[kept] - (self.replicate[kept] > number)
-            found.append(
-                Family(
-                    {name: values[kept] for name, values in self.draws.items()},
-                    {valve: {name: item[kept] for name, item in of.items()} for valve, of in self.metrics.items()},
-                    others,
-                    np.delete(self.sizes, number),
-                    numbers,
-                    even,
-                    self.drawn,
-                    self.seed,
-                )
-            )
-        return found
-
-    @property
-    def weights(self) -> Floats:
-        """Weight of each completion by all that is reported; they add up to 1, or are all 0."""
-        return self.weights_without(())
-
-    def weights_without(self, left_out: Collection[str]) -> Floats:
-        """Weights where some of what is reported does not count."""
-        raw = agreement(self.metrics, left_out) / self.density
-        total = raw.sum()
-        return np.asarray(raw / total if total > 0.0 else raw)
-
-    @property
-    def is_enough(self) -> bool:
-        """True where enough completions agree for a verdict on a setting."""
-        return self.effective >= ENOUGH
-
-    @property
-    def effective(self) -> float:
-        """Number of completions [-] that equal weights would need to say as much."""
-        return effective(self.weights)
 
 
 def infer_settings(draws: int = 262_144, seed: int = 2011, progress: Report | None = None) -> Family:

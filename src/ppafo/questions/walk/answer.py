@@ -2,6 +2,7 @@
 
 import platform
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,12 @@ from ppafo.answers.display_units import display_value, title_with_unit
 from ppafo.live.workbench import live_part
 from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE
+from ppafo.questions.endurance.answer import Endurance
 from ppafo.questions.endurance.draw import FORMAT
-from ppafo.questions.endurance.solve import Endurance
+from ppafo.questions.question import Solved
 from ppafo.questions.walk.bottle import bottle_data, bottle_files, bottle_remark, bottle_sections
 from ppafo.questions.walk.course import course_data, course_files, course_pictures, course_sections, trust_remark
-from ppafo.questions.walk.solve import WalkPair, Wearers
-from ppafo.questions.walk.volumes import volumes_data, volumes_sections
+from ppafo.questions.walk.volumes import VolumeReading, volumes_data, volumes_sections
 from ppafo.questions.walk.wearers import wearers_answer
 from ppafo.signals.recording import Floats
 from ppafo.simulation.document import UNITS, plain
@@ -34,9 +35,31 @@ from ppafo.walking.figures.phases import strip_figure
 from ppafo.walking.gait_subject import person_remarks
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of
+from ppafo.walking.population import Population
 from ppafo.walking.result import WalkResult
 from ppafo.walking.safety_events import event_lines
 from ppafo.walking.strides import PHASES
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WalkPair(Solved):
+    """A walk with the device and without it; ``life`` is how long one bottle lasts, None where no gas was taken.
+
+    ``volumes`` has the walk and the same with the other readings of the paper's chambers; none for chambers of its own.
+    """
+
+    comparison: Comparison
+    life: Endurance | None
+    volumes: tuple[VolumeReading, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Wearers(Solved):
+    """What many wearers get; ``volumes`` is the same for fewer of them with other readings of the paper's chambers."""
+
+    population: Population
+    volumes: Mapping[str, Population]
+
 
 SCHEMA_VERSION = 1
 _HEAD = ("", "with", "without", "healthy")
@@ -55,10 +78,8 @@ _ROWS = (
     ("counted_strides", "Strides with these means", "", 0),
 )
 """Metric, title, kind of quantity and digits behind the point of each row."""
-
 _SAME_RATE = 0.1
 """Rates of a foot [rad/s] that differ by less are alike."""
-
 _EXPLAINED = (
     "'Without' is the same wearer with the same device and both chambers vented. 'Healthy' is the gait itself. The "
     "first two strides, in which the controller learns the stride time, are left out, and so is one that has begun "

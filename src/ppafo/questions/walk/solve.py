@@ -1,44 +1,22 @@
 """Walks of one wearer with and without the device, or of many wearers."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ppafo.answers import Solved
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.questions.endurance.solve import Endurance, endurance_of_walk
-from ppafo.questions.walk.volumes import VolumeReading, walks_by_volume
+from ppafo.questions.endurance.solve import endurance_of_walk
+from ppafo.questions.walk.answer import WalkPair, Wearers
+from ppafo.questions.walk.volumes import walks_by_volume
 from ppafo.questions.walk.wearers_volumes import wearers_by_volume
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import course as courses
-from ppafo.walking.comparison import Comparison, compare_walks
+from ppafo.walking.comparison import compare_walks
 from ppafo.walking.loading import FILE, load_walk
 from ppafo.walking.motion import walk_of
-from ppafo.walking.population import Population
 
 _LONG = 12.0
 """Minutes above which a walk reports how far it is."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class WalkPair(Solved):
-    """A walk with the device and without it; ``life`` is how long one bottle lasts, None where no gas was taken.
-
-    ``volumes`` has the walk and the same with the other readings of the paper's chambers; none for chambers of its own.
-    """
-
-    comparison: Comparison
-    life: Endurance | None
-    volumes: tuple[VolumeReading, ...]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Wearers(Solved):
-    """What many wearers get; ``volumes`` is the same for fewer of them with other readings of the paper's chambers."""
-
-    population: Population
-    volumes: Mapping[str, Population]
 
 
 def walk_with_and_without(

@@ -7,8 +7,9 @@ from typing import Any
 from ppafo.answers import Column, Section, Table
 from ppafo.errors import DataError
 from ppafo.parameters.chamber_volumes import ChamberVolumes, other_readings, own_reading
+from ppafo.questions.endurance.answer import Endurance
 from ppafo.questions.endurance.draw import full_chambers, largest_flow, walk_gas
-from ppafo.questions.endurance.solve import Endurance, endurance_of_walk
+from ppafo.questions.endurance.solve import endurance_of_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.on_bottle import DIVERGED, WALKED
 from ppafo.walking.result import WalkResult, integral_of_a_stride
@@ -16,7 +17,6 @@ from ppafo.walking.walk import walk
 
 LONGEST = 1.0
 """Minutes that are walked at most with other chambers: a walk repeats itself, but for a course and on a bottle."""
-
 _HEAD = (
     Column("chambers"),
     Column("swept", "volume per angle", ".3g"),

@@ -18,7 +18,6 @@ from ppafo.walking.walk import Progress
 
 LARGEST, LONGEST = 200, 1.0
 """Wearers and minutes that are walked at most with other chambers."""
-
 _HEAD = (
     Column("chambers"),
     Column("wearers", form=".0f"),

@@ -6,8 +6,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ppafo.answers.display_units import axis_unit, display_value, display_values
-from ppafo.answers.layout import Margins, figure_of_panels
-from ppafo.answers.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, house_style, label_lines, mark_kind
+from ppafo.answers.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    VERMILION,
+    Margins,
+    figure_of_panels,
+    house_style,
+    label_lines,
+    mark_kind,
+)
 from ppafo.signals.recording import Floats
 from ppafo.walking.result import WalkResult
 

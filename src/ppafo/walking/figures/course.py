@@ -4,8 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.answers.layout import Margins, figure_of_panels
-from ppafo.answers.style import BLACK, GREY, house_style, mark_kind
+from ppafo.answers.style import BLACK, GREY, Margins, figure_of_panels, house_style, mark_kind
 from ppafo.gait.gait import clinical_angle
 from ppafo.walking.figures.mean_stride import WITH, WITHOUT
 from ppafo.walking.motion import walk_of

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from ppafo.answers.layout import Margins, figure_of_panels
-from ppafo.answers.style import BLACK, BLUE, GREY, VERMILION, house_style, mark_kind
+from ppafo.answers.style import BLACK, BLUE, GREY, VERMILION, Margins, figure_of_panels, house_style, mark_kind
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.gait.gait import clinical_angle
 from ppafo.metrics import Metric

@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ppafo.answers.layout import Margins, figure_of_panels
-from ppafo.answers.style import BLACK, BLUE, GREY, VERMILION, house_style, mark_kind
+from ppafo.answers.style import BLACK, BLUE, GREY, VERMILION, Margins, figure_of_panels, house_style, mark_kind
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.control.walking.signs import HELPS, LIFTS, PAUSED, STOPPED
 from ppafo.signals.recording import Floats

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.answers.layout import Margins, figure_of_panels
-from ppafo.answers.style import CHAMBER_1, CHAMBER_2, GREY, house_style, mark_kind
+from ppafo.answers.style import CHAMBER_1, CHAMBER_2, GREY, Margins, figure_of_panels, house_style, mark_kind
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.model.command import VENTS_ABOVE
 from ppafo.signals.recording import Floats

@@ -12,7 +12,7 @@ import pytest
 from ppafo.cli.main import main
 from ppafo.engine.lanes import BatchResult, run_batch
 from ppafo.errors import SimulationError
-from ppafo.questions.bits import runs, solve
+from ppafo.questions.bits import solve
 from ppafo.simulation.loading import list_scenarios
 from ppafo.walking import list_walks
 
@@ -22,9 +22,9 @@ CHEAP = "torque-task-proportional"
 
 def test_every_scenario_and_walk_has_golden_hashes_and_the_quick_ones_are_among_them() -> None:
     golden = solve.golden_hashes()
-    assert set(golden) == set(runs.names())
+    assert set(golden) == set(solve.names())
     assert {*list_scenarios(), *list_walks(), *solve.QUICK} <= set(golden)
-    assert all(0 < hashes["failed"] < runs.DRAWS // 2 for hashes in golden.values())
+    assert all(0 < hashes["failed"] < solve.DRAWS // 2 for hashes in golden.values())
     assert len({hashes["draws"] for hashes in golden.values()}) == len(golden)
 
 
@@ -44,7 +44,7 @@ def test_the_golden_bits_are_found_on_this_computer(
 
 @pytest.mark.parametrize("name", [CHEAP, "solenoid"])
 def test_a_draw_has_the_same_bits_in_a_block_and_alone(name: str) -> None:
-    batch = runs.drawn_batch(runs.plain_batch(name), 100)
+    batch = solve.drawn_batch(solve.plain_batch(name), 100)
     together = run_batch(batch).states
     for run in range(100):
         column = slice(run, run + 1)
@@ -94,7 +94,7 @@ def test_names_beside_all_are_refused() -> None:
         b"[]",
         b"{}",
         solve.GOLDEN.read_bytes().replace(b'"draws"', b'"drawn"', 1),
-        json.dumps(dict.fromkeys(runs.names(), 1)).encode(),
+        json.dumps(dict.fromkeys(solve.names(), 1)).encode(),
     ],
     ids=["empty", "half", "no text", "too deep", "a list", "nothing", "another part", "numbers"],
 )
@@ -113,12 +113,12 @@ def test_the_last_bit_of_one_number_is_another_hash_and_what_a_nan_is_made_of_is
     result = BatchResult(np.array([[1.0, np.nan]]), np.zeros((1, 1, 2)))
     other = replace(result, states=np.array([[np.nextafter(1.0, 2.0), np.nan]]))
     signed = replace(result, states=np.array([[1.0, -np.nan]]))
-    assert runs.digest(result) == runs.digest(signed) != runs.digest(other)
+    assert solve.digest(result) == solve.digest(signed) != solve.digest(other)
 
 
 def test_draws_are_made_of_whole_numbers_and_spread_over_their_range() -> None:
-    plain = runs.plain_batch(CHEAP)
-    drawn = runs.drawn_batch(plain, 1000)
+    plain = solve.plain_batch(CHEAP)
+    drawn = solve.drawn_batch(plain, 1000)
     assert (drawn.parameters[:5] == plain.parameters[:5]).all()
     row = np.flatnonzero(plain.parameters[:, 0] > 0.0)[7]
     factors = np.delete(drawn.parameters[row] / plain.parameters[row], np.arange(0, 1000, 10))

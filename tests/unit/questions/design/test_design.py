@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from ppafo.errors import PpafoError, StudyError
-from ppafo.questions.design.answer import answer_of, front_table
-from ppafo.questions.design.evaluation import Evaluation, design_columns, noise_streams
-from ppafo.questions.design.file import json_schema, load_design
-from ppafo.questions.design.front import Candidates
-from ppafo.questions.design.solve import Design, design
+from ppafo.questions.design.answer import Design, answer_of, front_table
+from ppafo.questions.design.problem import json_schema, load_design
+from ppafo.questions.design.search import Candidates
+from ppafo.questions.design.solve import Evaluation, design, design_columns, noise_streams
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate

@@ -5,9 +5,10 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 
-from ppafo.questions.design.front import (
+from ppafo.questions.design.search import (
     Candidates,
     Floats,
+    SearchTable,
     Worth,
     crowding,
     dominance,
@@ -17,10 +18,12 @@ from ppafo.questions.design.front import (
     knee,
     non_dominated,
     ranks,
+    reflect,
     representatives,
+    search_front,
     survivors,
+    survivors_of_many,
 )
-from ppafo.questions.design.search import SearchSettings, reflect, search_front, survivors_of_many
 
 
 def random_worth(seed: int, count: int, whole: bool = False) -> Worth:
@@ -109,7 +112,7 @@ def sphere(candidates: Candidates) -> Worth:
     return Worth(away[:, None] * np.stack(unit, axis=1), np.zeros(len(candidates)))
 
 
-SETTINGS = SearchSettings(screening=512, population=128, generations=60, tolerance=0.0, seed=3)
+SETTINGS = SearchTable(screening=512, population=128, generations=60, tolerance=0.0, seed=3)
 
 
 def test_a_known_front_is_found_and_its_choice_of_parts_too() -> None:
@@ -138,12 +141,12 @@ def test_the_hypervolume_of_the_search_only_grows() -> None:
 def test_the_same_seed_gives_the_same_front_and_another_seed_another() -> None:
     first, again = (search_front(sphere, 4, 7, SETTINGS) for _ in range(2))
     assert np.array_equal(first.worth.objectives, again.worth.objectives)
-    other = search_front(sphere, 4, 7, SearchSettings(512, 128, 60, 0.0, 4))
+    other = search_front(sphere, 4, 7, SETTINGS.model_copy(update={"seed": 4}))
     assert not np.array_equal(first.worth.objectives[:20], other.worth.objectives[:20])
 
 
 def test_a_search_that_no_longer_grows_stops() -> None:
-    front = search_front(sphere, 4, 7, SearchSettings(512, 128, 500, 5e-3, 3))
+    front = search_front(sphere, 4, 7, SETTINGS.model_copy(update={"generations": 500, "tolerance": 5e-3}))
     assert front.settled
     assert len(front.growth) < 500
 
@@ -162,7 +165,7 @@ def test_a_problem_without_any_candidate_that_keeps_the_constraints_has_an_empty
     def never(candidates: Candidates) -> Worth:
         return Worth(sphere(candidates).objectives, np.ones(len(candidates)))
 
-    front = search_front(never, 1, 3, SearchSettings(64, 16, 3, 0.0, 1))
+    front = search_front(never, 1, 3, SearchTable(screening=64, population=16, generations=3, tolerance=0.0, seed=1))
     assert len(front.candidates) == 0
     assert front.growth[-1][1] == 0.0
 

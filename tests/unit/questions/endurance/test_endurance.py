@@ -7,9 +7,9 @@ import pytest
 
 from ppafo.errors import DataError, ParameterError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
+from ppafo.questions.endurance.answer import Endurance, Endurances
 from ppafo.questions.endurance.draw import Schedule, draw_of_numbers, draw_of_recording
-from ppafo.questions.endurance.reuse import parse_reuse, reuse
-from ppafo.questions.endurance.solve import Endurance, Endurances, endurance, follow_bottle
+from ppafo.questions.endurance.solve import check_reuse, endurance, follow_bottle, parse_reuse
 from ppafo.signals import Channel, Recording
 
 WITHOUT_REST = Schedule(600.0, 0.0, 86400.0)
@@ -198,9 +198,9 @@ def test_reuse_that_makes_no_sense_is_refused(texts: list[str], words: str) -> N
 def test_chambers_that_hold_more_than_a_step_takes_are_refused() -> None:
     plan = parse_reuse(["reservoir_volume=50 cm^3"], load_bottle(PAPER_BOTTLE))
     with pytest.raises(ParameterError, match=r"more than the 0\.3 g"):
-        reuse(plan, 3e-4)
+        check_reuse(plan, 3e-4)
     with pytest.raises(ParameterError, match="at least the atmospheric pressure"):
-        reuse(replace(plan, cycle=plan.cycle._replace(fill_pressure=9e4)), 1e-3)
+        check_reuse(replace(plan, cycle=plan.cycle._replace(fill_pressure=9e4)), 1e-3)
 
 
 def test_the_verb_takes_numbers_as_the_command_takes_texts() -> None:

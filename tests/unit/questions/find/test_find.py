@@ -13,12 +13,10 @@ from ppafo.cli.main import main
 from ppafo.errors import StudyError
 from ppafo.progress import Progress
 from ppafo.questions.find import solve
-from ppafo.questions.find.answer import remarks, stretches, verdict
-from ppafo.questions.find.solve import ACCURACY, Found, find
-from ppafo.studies.outcomes import Outcomes
+from ppafo.questions.find.solve import ACCURACY, Found, find, remarks, stretches, verdict
+from ppafo.studies.draws import Outcomes
 
 Floats = NDArray[np.float64]
-
 TASK = "torque-task-proportional"
 BAR = 1e5
 RANGE = "supply.pressure=2..10 bar_a"

@@ -10,12 +10,10 @@ import pytest
 import ppafo
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.errors import ScenarioError, SimulationError
-from ppafo.questions.league import lower_bound, torque_contest
-from ppafo.questions.league.answer import league_remarks
-from ppafo.questions.league.draws import UNCERTAINTIES, draw_devices, draw_factors
-from ppafo.questions.league.entrants import ENTRANTS
-from ppafo.questions.league.solve import League, league
-from ppafo.questions.league.standing import Robustness
+from ppafo.questions.league import bound, torque
+from ppafo.questions.league.answer import League, league_remarks
+from ppafo.questions.league.solve import league
+from ppafo.questions.league.standing import ENTRANTS, UNCERTAINTIES, Robustness, draw_devices, draw_factors
 from ppafo.simulation.result import Status
 
 SHORT = ("run.duration=0.6 s", "reference.ramp_time=0.3 s", "reference.level=3 N m")
@@ -30,12 +28,12 @@ def small() -> League:
 
 
 def test_an_entrant_whose_run_diverges_is_absent(monkeypatch: pytest.MonkeyPatch) -> None:
-    contest = torque_contest.torque_contest("torque-task-proportional", SHORT)
+    contest = torque.torque_contest("torque-task-proportional", SHORT)
     failed = dataclasses.replace(
-        torque_contest.simulate(contest.scenario_of(BY_NAME["pid-paper"])),
+        torque.simulate(contest.scenario_of(BY_NAME["pid-paper"])),
         status=Status("diverged", 0.1, "it diverged"),
     )
-    monkeypatch.setattr(torque_contest, "simulate", lambda _: failed)
+    monkeypatch.setattr(torque, "simulate", lambda _: failed)
     with pytest.raises(SimulationError, match="it diverged"):
         contest.evaluate(BY_NAME["pid-paper"], 0, 1, print)
 
@@ -142,7 +140,7 @@ def test_who_cannot_play_is_absent_and_the_reason_is_told() -> None:
 
 
 def test_without_the_extra_the_league_is_played_and_says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lower_bound, "find_spec", lambda _: None)
+    monkeypatch.setattr(bound, "find_spec", lambda _: None)
     played = league("torque-task-proportional", SHORT, draws=0, entrants=[BY_NAME["pid-paper"]])
     assert played.bounds == {}
     assert "pip install ppafo[optimal]" in played.without_bound

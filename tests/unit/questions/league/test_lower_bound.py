@@ -13,9 +13,18 @@ from ppafo.model.orifice import FlowCurve, orifice_flow
 from ppafo.model.plant import Openings, blended_ports
 from ppafo.model.ports import BlendedPort, blended_port_flow
 from ppafo.parameters.plant import plant_parameters
-from ppafo.questions.league.bound_problem import SMOOTH, WAYS, at_once, mean_openings
-from ppafo.questions.league.bound_solver import BoundSolver, Optimum
-from ppafo.questions.league.lower_bound import LowerBound, lower_bound, play_optimum, valve_command
+from ppafo.questions.league.bound import (
+    SMOOTH,
+    WAYS,
+    BoundSolver,
+    LowerBound,
+    Optimum,
+    at_once,
+    lower_bound,
+    mean_openings,
+    play_optimum,
+    valve_command,
+)
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.symbolic import symbolic
@@ -167,7 +176,7 @@ def test_a_reference_that_asks_for_nothing_is_refused() -> None:
 
 def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     # The package exports a function of the module's name, so the module itself is found by its full name.
-    monkeypatch.setattr(sys.modules["ppafo.questions.league.lower_bound"], "find_spec", lambda _: None)
+    monkeypatch.setattr(sys.modules["ppafo.questions.league.bound"], "find_spec", lambda _: None)
     with pytest.raises(SimulationError, match=r"pip install ppafo\[optimal\]"):
         lower_bound(short_task())
 

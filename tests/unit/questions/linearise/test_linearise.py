@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.answers.text import text_of
+from ppafo.answers.writing import text_of
 from ppafo.cli.main import main
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
@@ -19,8 +19,8 @@ from ppafo.errors import ScenarioError
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.valves.proportional import openings_of, spool_acceleration
-from ppafo.questions.linearise.solve import LinearModel, linearise
-from ppafo.questions.linearise.steps import steps_of
+from ppafo.questions.linearise.answer import LinearModel, steps_of
+from ppafo.questions.linearise.solve import linearise
 from ppafo.simulation.plan import plan_run
 from ppafo.translation.plant_rates import gas_flows, thermal_gas_flows
 

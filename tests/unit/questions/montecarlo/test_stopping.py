@@ -8,13 +8,20 @@ import numpy as np
 import pytest
 
 from ppafo.errors import StudyError
-from ppafo.questions.montecarlo.answer import remarks
-from ppafo.questions.montecarlo.estimate import StoppingRule, draw_until
-from ppafo.questions.montecarlo.solve import monte_carlo, stopping_rule
-from ppafo.questions.montecarlo.statistic import Mean, Probability, Quantile, parse_statistic
+from ppafo.questions.montecarlo.solve import (
+    Statistic,
+    StoppingRule,
+    draw_until,
+    mean_of,
+    monte_carlo,
+    parse_statistic,
+    probability_of,
+    quantile_of,
+    remarks,
+    stopping_rule,
+)
 from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround
-from ppafo.studies.draws import Uncertainty
-from ppafo.studies.outcomes import Model, Outcomes
+from ppafo.studies.draws import Model, Outcomes, Uncertainty
 from ppafo.studies.study import Drawn
 
 METRIC = "rms_error"
@@ -42,7 +49,7 @@ def failing(share: float) -> Model:
 
 def test_it_stops_at_the_first_look_that_is_narrow_enough() -> None:
     rule = StoppingRule(0.05, is_relative=False, first=64, maximum=2**16)
-    found = draw_until(value, UNCERTAIN, METRIC, Mean("N m"), rule, 1)
+    found = draw_until(value, UNCERTAIN, METRIC, mean_of("N m"), rule, 1)
     widths = [look.interval.width for look in found.looks]
     assert found.is_met
     assert widths[-1] <= 0.05 < min(widths[:-1])
@@ -53,7 +60,7 @@ def test_it_stops_at_the_first_look_that_is_narrow_enough() -> None:
 
 def test_a_width_that_is_out_of_reach_is_said_and_not_hidden() -> None:
     rule = StoppingRule(1e-6, is_relative=True, first=64, maximum=200)
-    found = draw_until(value, UNCERTAIN, METRIC, Mean("N m"), rule, 1)
+    found = draw_until(value, UNCERTAIN, METRIC, mean_of("N m"), rule, 1)
     assert not found.is_met
     assert [look.draws for look in found.looks] == [64, 128, 200]
 
@@ -61,13 +68,13 @@ def test_a_width_that_is_out_of_reach_is_said_and_not_hidden() -> None:
 @pytest.mark.parametrize(
     ("statistic", "truth", "width"),
     [
-        (Mean("N m"), MEAN, 0.08),
-        (Quantile("N m", 0.9), math.exp(NORMAL.inv_cdf(0.9)), 0.3),
-        (Probability(1.5, True, "1.5 N m"), 1.0 - NORMAL.cdf(math.log(1.5)), 0.08),
+        (mean_of("N m"), MEAN, 0.08),
+        (quantile_of("N m", 0.9), math.exp(NORMAL.inv_cdf(0.9)), 0.3),
+        (probability_of(1.5, True, "1.5 N m"), 1.0 - NORMAL.cdf(math.log(1.5)), 0.08),
     ],
 )
 def test_all_looks_together_hold_the_truth_as_often_as_is_said(
-    statistic: Mean | Quantile | Probability, truth: float, width: float
+    statistic: Statistic, truth: float, width: float
 ) -> None:
     rule = StoppingRule(width, is_relative=False, first=64, maximum=8192, confidence=0.9)
     found = [draw_until(value, UNCERTAIN, METRIC, statistic, rule, seed) for seed in range(300)]
@@ -81,9 +88,9 @@ def test_without_the_correction_they_would_not() -> None:
     rule = StoppingRule(0.08, is_relative=False, first=64, maximum=8192, confidence=0.9)
     held = []
     for seed in range(300):
-        looks = draw_until(value, UNCERTAIN, METRIC, Mean("N m"), rule, seed).looks
+        looks = draw_until(value, UNCERTAIN, METRIC, mean_of("N m"), rule, seed).looks
         values = UNCERTAIN.random_columns(0, looks[-1].draws, seed)["x"]
-        intervals = [Mean("N m").estimate(values[: look.draws], 0.9) for look in looks]
+        intervals = [mean_of("N m").estimate(values[: look.draws], 0.9) for look in looks]
         held.append(all(interval.low <= MEAN <= interval.high for interval in intervals))
     assert np.mean(held) < 0.88
 
@@ -97,7 +104,7 @@ def test_a_mean_that_a_few_draws_carry_is_not_believed_and_drawn_on() -> None:
         return Outcomes({METRIC: values}, np.zeros(values.size, bool), "")
 
     rule = StoppingRule(0.5, is_relative=True, first=64, maximum=4096)
-    found = [draw_until(heavy, NORMALS, METRIC, Mean("N m"), rule, seed) for seed in range(60)]
+    found = [draw_until(heavy, NORMALS, METRIC, mean_of("N m"), rule, seed) for seed in range(60)]
     wrong = [not item.last.interval.low <= math.exp(2.0) <= item.last.interval.high for item in found]
     narrow = [any(rule.is_narrow(look.interval) for look in item.looks) for item in found]
     assert np.mean(narrow) > 0.3, "an interval that is narrow enough comes often"
@@ -105,7 +112,7 @@ def test_a_mean_that_a_few_draws_carry_is_not_believed_and_drawn_on() -> None:
     warned = [item for item in found if not item.last.is_carried]
     assert len(warned) > 50
     assert "do not trust this interval" in remarks(warned[0])[0]
-    quiet = draw_until(value, UNCERTAIN, METRIC, Mean("N m"), StoppingRule(0.05, False, first=512), 1)
+    quiet = draw_until(value, UNCERTAIN, METRIC, mean_of("N m"), StoppingRule(0.05, False, first=512), 1)
     assert quiet.is_met
     assert remarks(quiet) == []
 
@@ -118,7 +125,7 @@ def test_replicates_know_the_mean_of_a_smooth_function_far_better_than_independe
     drawn = [smooth(NORMALS.replicated_columns(0, 1024, seed)) for seed in seeds]
     independent = [np.mean(smooth(NORMALS.random_columns(0, 1024, seed))) for seed in seeds]
     assert np.var(independent) > 100.0 * np.var([np.mean(values) for values in drawn])
-    intervals = [Mean("N m").estimate(values, 0.9) for values in drawn]
+    intervals = [mean_of("N m").estimate(values, 0.9) for values in drawn]
     held = np.mean([interval.low <= 3.0 <= interval.high for interval in intervals])
     assert 0.85 <= held <= 0.95
 
@@ -132,11 +139,11 @@ def test_replicates_in_pieces_are_those_of_the_whole() -> None:
 
 def test_failed_draws_are_left_out_and_counted_or_refused() -> None:
     rule = StoppingRule(0.1, is_relative=False, first=1024, maximum=2048, maximum_failed=0.02)
-    found = draw_until(failing(0.005), UNCERTAIN, METRIC, Mean("N m"), rule, 1)
+    found = draw_until(failing(0.005), UNCERTAIN, METRIC, mean_of("N m"), rule, 1)
     assert 0 < found.last.missing <= 0.02 * found.last.draws
     assert found.values.size == found.last.draws - found.last.missing
     with pytest.raises(StudyError, match=r"runs failed .* more than the 2 % .*diverged"):
-        draw_until(failing(0.1), UNCERTAIN, METRIC, Mean("N m"), rule, 1)
+        draw_until(failing(0.1), UNCERTAIN, METRIC, mean_of("N m"), rule, 1)
 
 
 @pytest.mark.parametrize(
@@ -150,7 +157,7 @@ def test_failed_draws_are_left_out_and_counted_or_refused() -> None:
         (lambda: parse_statistic("median", METRIC, None), "statistic 'median' is not known"),
         (lambda: parse_statistic("quantile 1.5", METRIC, None), "a fraction above 0 and below 1"),
         (lambda: parse_statistic("probability above 3 g", METRIC, None), "statistic 'probability above 3 g'"),
-        (lambda: stopping_rule(Mean("N m"), METRIC, "3 g", StoppingRule(1.0, False)), "width = '3 g'"),
+        (lambda: stopping_rule(mean_of("N m"), METRIC, "3 g", StoppingRule(1.0, False)), "width = '3 g'"),
         (
             lambda: stopping_rule(
                 parse_statistic("probability above 1 N m", METRIC, None), METRIC, "1 %", StoppingRule(1.0, False)
@@ -168,9 +175,9 @@ def test_rules_and_words_that_make_no_sense_are_one_line(make: Callable[[], obje
 
 def test_widths_are_read_in_the_unit_of_the_metric() -> None:
     like = StoppingRule(1.0, False)
-    assert stopping_rule(Mean("kg"), "gas_supplied", "2 g", like).width == pytest.approx(0.002)
-    assert stopping_rule(Mean("Pa"), "largest_pressure", "1 psi_d", like).width == pytest.approx(6894.757)
-    relative = stopping_rule(Mean("kg"), "gas_supplied", "5 %", like)
+    assert stopping_rule(mean_of("kg"), "gas_supplied", "2 g", like).width == pytest.approx(0.002)
+    assert stopping_rule(mean_of("Pa"), "largest_pressure", "1 psi_d", like).width == pytest.approx(6894.757)
+    relative = stopping_rule(mean_of("kg"), "gas_supplied", "5 %", like)
     assert (relative.width, relative.is_relative) == (pytest.approx(0.05), True)
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from ppafo.questions.sweep.results import StudyResults
+from ppafo.questions.sweep.answer import StudyResults
 from ppafo.questions.sweep.solve import sweep
 
 

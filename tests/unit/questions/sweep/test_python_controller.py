@@ -15,7 +15,7 @@ import pytest
 import ppafo
 from ppafo.errors import StudyError
 from ppafo.model.sensors import Measurement
-from ppafo.questions.sweep.python_controller import controller_document
+from ppafo.questions.sweep.manifest import controller_document
 from ppafo.studies.study import Study
 
 LAW = """

@@ -1,14 +1,61 @@
-"""Reading results: by configuration, thinned, by channel, and what is not there."""
+"""Results of a study: statistics of what is too large for the memory, tables and columns, bands, the figure."""
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import ppafo
+from ppafo.answers.style import render_figure
 from ppafo.errors import DataError, StudyError
-from ppafo.questions.sweep.results import StudyResults, load_study_results
+from ppafo.questions.sweep import solve as statistics
+from ppafo.questions.sweep.answer import StudyResults, study_figure
+from ppafo.questions.sweep.manifest import BINS, Bins, bins_around, counts_of, outside_fraction, quantiles_of
+from ppafo.questions.sweep.results import load_study_results
+from ppafo.questions.sweep.solve import describe, order_statistics, sweep
+
+SHARES = (0.0, 0.05, 0.25, 0.5, 0.777, 0.95, 1.0)
+RANDOM = np.random.default_rng(6)
+COLUMNS = {
+    "normal": RANDOM.normal(1e5, 3.0, 5001),
+    "both signs": RANDOM.normal(0.0, 1e-9, 4000),
+    "counts": RANDOM.integers(-2, 3, 3000).astype(np.float64),
+    "wide": np.sign(RANDOM.normal(size=999)) * 10.0 ** RANDOM.uniform(-100, 100, 999),
+    "constant": np.full(77, -0.1),
+    "one": np.array([4.0]),
+}
+
+
+@pytest.mark.parametrize("name", COLUMNS)
+@pytest.mark.parametrize("in_memory", [0, 16_000_000])
+def test_statistics_are_those_of_numpy(name: str, in_memory: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    values = COLUMNS[name]
+    monkeypatch.setattr(statistics, "MAXIMUM_IN_MEMORY", in_memory)
+    said = describe(lambda: iter(np.array_split(values, 7)), SHARES)
+    assert said["count"] == values.size
+    assert said["mean"] == pytest.approx(values.mean(), rel=1e-12)
+    assert said["minimum"] == values.min()
+    assert said["maximum"] == values.max()
+    if name not in ("one", "wide"):
+        assert said["sd"] == pytest.approx(values.std(ddof=1), rel=1e-9, abs=1e-15)
+    for share in SHARES:
+        assert said["quantiles"][f"{share:g}"] == pytest.approx(np.quantile(values, share), rel=1e-9)
+
+
+def test_every_rank_is_found() -> None:
+    values = COLUMNS["both signs"][:300]
+    found = order_statistics(lambda: iter(np.array_split(values, 3)), range(300))
+    assert list(found.values()) == np.sort(values).tolist()
+
+
+def test_nothing_has_a_count_only() -> None:
+    def parts() -> Iterator[np.ndarray]:
+        yield np.array([])
+
+    assert describe(parts, SHARES) == {"count": 0}
 
 
 def test_a_thinned_column_has_every_so_many_runs_across_chunks(small_results: StudyResults) -> None:
@@ -53,3 +100,126 @@ def test_results_do_what_everything_solved_does(small_results: StudyResults, tmp
 def test_the_name_of_an_earlier_version_says_the_new_one() -> None:
     with pytest.raises(AttributeError, match=r"ppafo\.run_study is now called ppafo\.sweep"):
         _ = ppafo.run_study
+
+
+BAND_SHARES = (0.0, 0.05, 0.25, 0.5, 0.9, 1.0)
+
+
+@pytest.fixture
+def traces() -> np.ndarray:
+    """Three times, 5000 runs: a normal, a skew and a constant one, some of them failed."""
+    random = np.random.default_rng(2)
+    values = np.stack([random.normal(3.0, 1.0, 5000), random.exponential(2.0, 5000), np.full(5000, 1.0)])
+    values[:, ::50] = np.nan
+    return values
+
+
+def test_counts_of_parts_add_up_to_those_of_the_whole(traces: np.ndarray) -> None:
+    bins = bins_around(traces[:, :200])
+    parts = [counts_of(part, bins) for part in np.array_split(traces, 7, axis=1)]
+    np.testing.assert_array_equal(sum(reversed(parts)), counts_of(traces, bins))
+    assert counts_of(traces, bins).sum(axis=1).tolist() == [4900] * 3
+
+
+def test_quantiles_are_within_a_bin_of_those_of_the_values(traces: np.ndarray) -> None:
+    bins = bins_around(traces)
+    found = quantiles_of(counts_of(traces, bins), bins, BAND_SHARES)
+    for share in BAND_SHARES:
+        exact = np.nanquantile(traces, share, axis=1, method="inverted_cdf")
+        assert np.all(np.abs(found[share] - exact) <= bins.width * 1.000001)
+
+
+def test_values_beyond_the_bins_are_counted_at_their_ends(traces: np.ndarray) -> None:
+    bins = Bins(2.0, 3.0)
+    counts = counts_of(traces, bins)
+    known = traces[0][np.isfinite(traces[0])]
+    assert counts[0, 0] == np.count_nonzero(known < 2.0)
+    assert counts[0, -1] == np.count_nonzero(known >= 3.0)
+    assert counts.shape == (3, BINS + 2)
+    found = quantiles_of(counts, bins, (0.001, 0.999))
+    assert found[0.001][0] == 2.0
+    assert found[0.999][0] == 3.0
+    assert 0.0 < outside_fraction({"torque": counts}) < 1.0
+
+
+def test_a_time_without_any_run_has_no_quantile() -> None:
+    counts = counts_of(np.full((2, 4), np.nan), Bins(0.0, 1.0))
+    assert np.isnan(quantiles_of(counts, Bins(0.0, 1.0), (0.5,))[0.5]).all()
+    assert outside_fraction({"torque": counts}) == 0.0
+
+
+@pytest.mark.parametrize("value", [0.0, 5.0, -1e5, 1e-9])
+def test_bins_around_a_constant_hold_it_inside(value: float) -> None:
+    bins = bins_around(np.full((3, 4), value))
+    assert bins.low < value < bins.high
+
+
+def test_bins_around_nothing_exist() -> None:
+    assert bins_around(np.full((3, 4), np.nan)).width > 0.0
+
+
+AXIS = {"path": "reference.level", "kind": "grid", "first": "2 N m", "last": "5 N m", "count": 3}
+OTHER = {"path": "valve.area", "kind": "grid", "first": "4 mm^2", "last": "16 mm^2", "count": 3}
+DRAWN = {"path": "supply.pressure", "kind": "uniform", "minimum": "45 psi_g", "maximum": "55 psi_g"}
+LEAK = {"path": "actuator.leak.area", "kind": "uniform", "minimum": "0.2 mm^2", "maximum": "0.4 mm^2"}
+NOBODY = {"path": "actuator.angle_min", "kind": "list", "values": ["140 deg", "141 deg"]}
+
+
+def study(*vary: dict[str, Any], names: tuple[str, ...] = ("proportional",), **outputs: Any) -> dict[str, Any]:
+    """A short study."""
+    found: dict[str, Any] = {
+        "schema_version": 1,
+        "name": "drawn",
+        "configurations": [
+            {"name": name, "scenario": f"torque-task-{name}", "overrides": ["run.duration=0.2 s"]} for name in names
+        ],
+        "vary": list(vary),
+        "outputs": {"metrics": ["rms_error", "switchings"], "every": "20 ms", **outputs},
+    }
+    if DRAWN in vary:
+        found["sample"] = {"method": "random", "runs": 12}
+    return found
+
+
+BOTH = ("proportional", "solenoid")
+
+
+@pytest.mark.parametrize(
+    ("document", "panels"),
+    [
+        (study(DRAWN), ["supply pressure (psi gauge)"] * 2),
+        (study(DRAWN, LEAK, names=BOTH, bands=["torque"]), ["RMS error (N m)", "Switchings", "time (s)"]),
+        (study(AXIS), ["reference level (N m)"] * 2),
+        (study(AXIS, OTHER), ["reference level (N m)"] * 2),
+        (study(AXIS, OTHER | {"spacing": "logarithmic"}, DRAWN, names=BOTH), ["reference level (N m)"] * 4),
+        (study(DRAWN, metrics=[], bands=["command"]), ["time (s)"]),
+        (study(DRAWN, metrics=[], trajectories=["command"]), []),
+        (study(NOBODY), ["actuator angle min (deg)"] * 2),
+        (study(names=BOTH), ["RMS error (N m)", "Switchings"]),
+    ],
+)
+def test_there_is_a_panel_for_everything_that_was_asked(document: dict[str, Any], panels: list[str]) -> None:
+    figure = study_figure(sweep(document))
+    shown = [axes for axes in figure.axes if axes.axison and axes.get_label() != "<colorbar>"]
+    assert [axes.get_xlabel() for axes in shown] == panels
+    assert render_figure(figure, ["png"])["png"].startswith(b"\x89PNG")
+    assert any("simulated" in text.get_text() for text in figure.texts)
+
+
+def test_a_map_shows_the_mean_over_the_draws_where_it_belongs() -> None:
+    results = sweep(study(AXIS, OTHER, DRAWN, metrics=["gas_supplied"]))
+    figure = results.plot()
+    mesh = figure.axes[0].collections[0]
+    table = results.table()
+    for row, area in enumerate((4e-6, 10e-6, 16e-6)):
+        for column, level in enumerate((2.0, 3.5, 5.0)):
+            own = (abs(table["valve.area"] - area) < 1e-12) & (abs(table["reference.level"] - level) < 1e-9)
+            assert own.sum() == 12
+            mean = 1e3 * table["gas_supplied"][own].mean()
+            assert mesh.get_array()[row, column] == pytest.approx(mean, rel=1e-9)
+
+
+def test_the_same_results_give_the_same_figure() -> None:
+    results = sweep(study(DRAWN, LEAK, names=BOTH))
+    one, other = (render_figure(results.plot(), ["svg", "png"]) for _ in range(2))
+    assert one == other

@@ -14,11 +14,10 @@ import ppafo
 from ppafo.errors import DataError, StudyError
 from ppafo.metrics import METRICS
 from ppafo.progress import Progress
-from ppafo.questions.sweep import chunks as chunks_module
-from ppafo.questions.sweep.chunks import estimate_bytes
-from ppafo.questions.sweep.compute import Task, compute_chunk, stored_unit
-from ppafo.questions.sweep.manifest import stored_bins
-from ppafo.questions.sweep.results import StudyResults, load_study_results
+from ppafo.questions.sweep import manifest as chunks_module
+from ppafo.questions.sweep.answer import StudyResults
+from ppafo.questions.sweep.manifest import estimate_bytes, stored_bins
+from ppafo.questions.sweep.results import Task, compute_chunk, load_study_results, stored_unit
 from ppafo.questions.sweep.solve import LOG, sweep
 from ppafo.signals.channels import CHANNELS
 from ppafo.storage.places import DiskFolder

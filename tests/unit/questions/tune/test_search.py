@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.questions.tune.problem import Constraint, Effort, Goal, Problem, SearchRange, Spread
-from ppafo.questions.tune.search import FAILED, INFEASIBLE, Runs, agreement, judge, search
+from ppafo.questions.tune.answer import INFEASIBLE, agreement
+from ppafo.questions.tune.problem import Effort, Limit, Problem, Searched, Spread, Term
+from ppafo.questions.tune.solve import FAILED, Runs, judge, search
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import Floats, NormalAround
 from ppafo.studies.draws import Uncertainty
@@ -25,8 +26,8 @@ def problem(**changes: Any) -> Problem:
         "scenario": load_scenario("torque-task-proportional"),
         "overrides": (),
         "searched": (),
-        "goals": (Goal("rms_error", 1.0, None),),
-        "constraints": (Constraint("gas_supplied", 0.5, True, "500 g"),),
+        "goals": (Term("rms_error", 1.0, None),),
+        "constraints": (Limit("gas_supplied", 0.5, True, "500 g"),),
         "spread": None,
         "effort": EFFORT,
     }
@@ -68,7 +69,7 @@ def test_a_search_is_the_same_every_time_for_a_seed_and_another_for_another() ->
     costs = bowl(np.array([0.5, 0.5]))
     one, other = (search(costs, [0.1, 0.1], EFFORT) for _ in range(2))
     assert one == other
-    assert one != search(costs, [0.1, 0.1], Effort(3, 200, 12, seed=5))
+    assert one != search(costs, [0.1, 0.1], Effort(starts=3, generations=200, candidates_per_gain=12, seed=5))
 
 
 def test_the_values_before_are_among_the_candidates_so_that_nothing_is_lost() -> None:
@@ -77,15 +78,15 @@ def test_the_values_before_are_among_the_candidates_so_that_nothing_is_lost() ->
     def costs(shares: Floats) -> Floats:
         return np.where(np.all(np.abs(shares - needle) < 1e-9, axis=1), 0.0, 1.0 + shares[:, 0])
 
-    assert search(costs, needle.tolist(), Effort(1, 3, 5, 1))[0].cost == 0.0
-    assert search(costs, [1.5, 0.5], Effort(1, 3, 5, 1))[0].cost >= 1.0
+    assert search(costs, needle.tolist(), Effort(starts=1, generations=3, candidates_per_gain=5, seed=1))[0].cost == 0.0
+    assert search(costs, [1.5, 0.5], Effort(starts=1, generations=3, candidates_per_gain=5, seed=1))[0].cost >= 1.0
 
 
 def test_two_minima_that_are_as_good_are_told_apart() -> None:
     def costs(shares: Floats) -> Floats:
         return np.asarray(1.0 + np.minimum((shares[:, 0] - 0.1) ** 2, (shares[:, 0] - 0.9) ** 2))
 
-    starts = search(costs, [0.5], Effort(12, 100, 8, 1))
+    starts = search(costs, [0.5], Effort(starts=12, generations=100, candidates_per_gain=8, seed=1))
     assert agreement(starts) == pytest.approx(0.8, abs=0.02)
 
 
@@ -96,7 +97,7 @@ def test_every_generation_is_asked_at_once() -> None:
         asked.append(len(shares))
         return np.asarray(np.sum(shares, axis=1))
 
-    search(costs, [0.5, 0.5], Effort(1, 4, 10, 1))
+    search(costs, [0.5, 0.5], Effort(starts=1, generations=4, candidates_per_gain=10, seed=1))
     assert set(asked) == {20}
     assert len(asked) <= 5
 
@@ -123,7 +124,7 @@ def test_a_run_without_the_metric_counts_as_failed() -> None:
 def test_candidates_are_judged_by_their_bad_end(share: float | None, deviations: float) -> None:
     spread = Spread(Uncertainty((Drawn("x", NormalAround(0.0, 1.0)),)), "s", 5, 1, deviations, share)
     values = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
-    goals = (Goal("rms_error", 1.0, None), Goal("gas_supplied", -1.0, None))
+    goals = (Term("rms_error", 1.0, None), Term("gas_supplied", -1.0, None))
     judged = judge(
         runs([values.tolist()], [values.tolist()]), problem(spread=spread, goals=goals, constraints=()), SCALES
     )
@@ -135,7 +136,7 @@ def test_candidates_are_judged_by_their_bad_end(share: float | None, deviations:
 def test_logarithmic_bounds_and_what_lies_at_them() -> None:
     scenario = load_scenario("torque-task-proportional")
     place = varied_path("controller.proportional_gain", scenario)
-    item = SearchRange("controller.proportional_gain", 0.01, 1.0, True, 0.1, place)
+    item = Searched("controller.proportional_gain", 0.01, 1.0, True, 0.1, place)
     assert item.value(np.array([0.0, 0.5, 1.0])) == pytest.approx([0.01, 0.1, 1.0])
     assert item.fraction(0.1) == pytest.approx(0.5)
     assert item.fraction(2.0) > 1.0
@@ -149,7 +150,7 @@ def test_logarithmic_bounds_and_what_lies_at_them() -> None:
 def test_the_gains_that_are_run_are_those_that_are_written() -> None:
     scenario = load_scenario("torque-task-proportional")
     place = varied_path("controller.proportional_gain", scenario)
-    trial = problem(searched=(SearchRange("controller.proportional_gain", 0.01, 1.0, True, 0.095, place),))
+    trial = problem(searched=(Searched("controller.proportional_gain", 0.01, 1.0, True, 0.095, place),))
     gains = trial.gains([0.123456789])
     line = trial.lines(gains)[0]
     assert load_scenario("torque-task-proportional", [line]).control.settings["proportional_gain"] == gains[place.path]

@@ -9,9 +9,9 @@ import pytest
 
 import ppafo
 from ppafo.errors import StudyError
-from ppafo.questions.tune.answer import remarks, verdict
-from ppafo.questions.tune.file import json_schema, list_tunings, load_tuning, present_value
-from ppafo.questions.tune.solve import Tuning, tune
+from ppafo.questions.tune.answer import Tuning, remarks, verdict
+from ppafo.questions.tune.problem import json_schema, list_tunings, load_tuning, present_value
+from ppafo.questions.tune.solve import tune
 
 DOCUMENT: dict[str, Any] = {
     "schema_version": 1,

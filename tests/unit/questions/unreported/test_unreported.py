@@ -3,33 +3,42 @@
 import numpy as np
 import pytest
 
-from ppafo.answers.text import text_of
+from ppafo.answers.writing import text_of
 from ppafo.cli.main import main
 from ppafo.errors import ScenarioError
-from ppafo.questions.unreported.evidence import GAS, IMPROVEMENT, agreement, improvement, saving
-from ppafo.questions.unreported.implications import (
+from ppafo.questions.unreported.answer import (
+    REPLICATES,
     TOO_FEW,
+    Family,
     conclusions,
     implications_of,
     spread_of,
     strongest_links,
     weighted_quantiles,
 )
-from ppafo.questions.unreported.proposal import Proposal, effective, next_proposal, temper
 from ppafo.questions.unreported.settings import (
     CELLS,
+    GAS,
+    IMPROVEMENT,
     PROPORTIONAL,
     SETTINGS,
     SOLENOID,
+    Proposal,
+    agreement,
     columns,
+    effective,
+    improvement,
+    next_proposal,
+    saving,
     spread,
+    temper,
     values_of,
 )
-from ppafo.questions.unreported.solve import REPLICATES, Family, infer_settings
+from ppafo.questions.unreported.solve import infer_settings
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate
+from ppafo.studies.distributions import jackknife_reach
 from ppafo.studies.draws import replicate_seed
-from ppafo.studies.intervals import jackknife_reach
 
 PAPER = {
     SOLENOID: {"rms_error": 1.0, "gas_supplied": 1.1e-3, "oscillations_ramp": 8.0, "oscillations_hold": 0.0},

@@ -6,11 +6,13 @@ from pathlib import Path
 import pytest
 
 import ppafo
-from ppafo.answers.text import text_of
+from ppafo.answers.writing import text_of
 from ppafo.errors import DataError
+from ppafo.questions.endurance.answer import Endurance
 from ppafo.questions.endurance.draw import read_walk_gas
-from ppafo.questions.endurance.solve import Endurance, endurance
-from ppafo.questions.walk.solve import WalkPair, Wearers, walk_with_and_without
+from ppafo.questions.endurance.solve import endurance
+from ppafo.questions.walk.answer import WalkPair, Wearers
+from ppafo.questions.walk.solve import walk_with_and_without
 
 MINUTES = 0.1
 

@@ -17,8 +17,7 @@ import numpy as np
 from ppafo.engine.run import Run
 from ppafo.errors import SimulationError
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.questions.league.bound_problem import BOUNDED_VALVES
-from ppafo.questions.league.lower_bound import MISSING_EXTRA, NEARLY
+from ppafo.questions.league.bound import BOUNDED_VALVES, MISSING_EXTRA, NEARLY
 from ppafo.questions.league.walking.measures import Toes, toes_of
 from ppafo.questions.league.walking.playing import ideal_plan
 from ppafo.questions.league.walking.solver import FREE, Guess, StrideOptimum, StrideSolver, guess_from_walk

@@ -12,12 +12,11 @@ from ppafo.model.gait import GaitTiming
 from ppafo.model.plant import PlantParameters
 from ppafo.parameters.plant import plant_parameters
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.questions.league.draws import NOISE_DRAWS, SEED, draw_factors, draw_seeds, scale_device
-from ppafo.questions.league.standing import Robustness
+from ppafo.questions.league.standing import NOISE_DRAWS, SEED, Robustness, draw_factors, draw_seeds, scale_device
 from ppafo.questions.league.walking.measures import Toes, course_of, last_strides, measures, toes_of
 from ppafo.questions.league.walking.task import WalkingTask
 from ppafo.simulation.scenario import Scenario
-from ppafo.studies.noise import other_noise
+from ppafo.studies.sampling import other_noise
 from ppafo.walking.anthropometry import Build, draw_builds
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import has_ideal_sensors, plan_walk

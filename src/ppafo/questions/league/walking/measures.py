@@ -51,7 +51,6 @@ MEASURES = {
     "safe_state": ("-", "1 if the controller paused or stopped"),
 }
 """Unit and meaning of every measure."""
-
 LAGS = np.arange(0.0, 0.0801, 0.002)
 """Lags [s] that are tried; recognising a heel strike takes some 30 ms."""
 _PROFILE_PHASES = np.linspace(0.0, 1.0, 2001)

@@ -13,7 +13,7 @@ from ppafo.model.contact import FLAT, foot_angle, prescribed_ankle
 from ppafo.model.gait import GaitNow
 from ppafo.model.plant import PlantParameters
 from ppafo.model.vane import actuator_torque, vane_acceleration
-from ppafo.questions.league.bound_problem import MARGIN, ChamberRates, chamber_rates
+from ppafo.questions.league.bound import MARGIN, ChamberRates, chamber_rates
 from ppafo.questions.league.walking.stride import DEGREE, Grid, Stride
 from ppafo.walking.posture import AnklePath
 
@@ -26,7 +26,6 @@ TINY = 1.0e-9
 """Time [s] that a window without any point counts as."""
 HIGHEST = 3.0
 """Largest pressure over the highest of the source: a vane that is pushed may compress its gas."""
-
 WAYS = (1.0, -1.0, VENT)
 """Commands [-] of what a valve can do, each for a share of the time: feed chamber 1, feed chamber 2, vent both."""
 MODES = len(WAYS)

@@ -10,7 +10,7 @@ from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
 from ppafo.errors import SimulationError
 from ppafo.model.command import VENTS_ABOVE
-from ppafo.questions.league.bound_solver import AS_GOOD, MEASURABLE, OPTIONS, STRATEGIES, TIE_BREAK
+from ppafo.questions.league.bound import AS_GOOD, MEASURABLE, OPTIONS, STRATEGIES, TIE_BREAK
 from ppafo.questions.league.walking.programme import MODES, Programme, programme
 from ppafo.questions.league.walking.stride import Stride
 from ppafo.questions.league.walking.task import PROFILE_KIND, PROFILE_VALVE, WalkingTask

@@ -20,7 +20,6 @@ CONFIGURATION = "proportional"
 MINUTES = 0.2
 SHORTEST, LONGEST = 0.1, 1.0
 """Minutes: enough strides to learn from, and few enough to record every sample of."""
-
 PROFILE_KIND, PROFILE_VALVE = "event_proportional", "proportional"
 """The controller whose settings say what is desired, on the valve that suits it; every other gets the same."""
 SWING_ANGLE = "swing_angle"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ppafo.engine.lanes import Floats
-from ppafo.questions.league.draws import UNCERTAINTIES
+from ppafo.questions.league.standing import UNCERTAINTIES
 from ppafo.questions.league.walking import draws
 from ppafo.questions.league.walking.draws import CHANGED, draw_measures, draw_plants
 from ppafo.questions.league.walking.measures import MEASURES, walk_measures

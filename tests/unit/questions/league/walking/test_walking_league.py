@@ -6,11 +6,11 @@ import pytest
 
 from ppafo.cli.main import build_parser
 from ppafo.errors import ScenarioError
-from ppafo.questions.league.entrants import WALKING_ENTRANTS, Entrant
-from ppafo.questions.league.solve import League, play
+from ppafo.questions.league.answer import League
+from ppafo.questions.league.solve import play
+from ppafo.questions.league.standing import WALKING_ENTRANTS, Entrant
 from ppafo.questions.league.walking import bound
-from ppafo.questions.league.walking.contest import WalkingContest
-from ppafo.questions.league.walking.presentation import clear_fraction, safe_states
+from ppafo.questions.league.walking.contest import WalkingContest, clear_fraction, safe_states
 from ppafo.questions.league.walking.task import walking_task
 from ppafo.walking.loading import load_walk
 from ppafo.walking.planning import law_of

@@ -4,7 +4,7 @@ import pytest
 
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import ScenarioError
-from ppafo.questions.league.entrants import WALKING_ENTRANTS
+from ppafo.questions.league.standing import WALKING_ENTRANTS
 from ppafo.questions.league.walking.task import walking_task
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of

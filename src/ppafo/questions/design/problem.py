@@ -1,4 +1,4 @@
-"""A design file: tasks, parts to choose from, variables, constraints; as written, and as a problem in SI units."""
+"""Numbers that a design may choose: read from the file, and from places in the unit interval to SI values."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -7,32 +7,174 @@ from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import BaseModel, Field
 
 from ppafo.documents.models import NAME, STRICT, Text, Texts, make_schema, read_model
-from ppafo.documents.toml_text import TomlKind
+from ppafo.documents.toml_text import TomlKind, beside
 from ppafo.errors import StudyError, UnitError, first_twice, nearest_name
 from ppafo.loading import load_scenario, placed
 from ppafo.metrics.catalog import METRICS
+from ppafo.model.declaration import Quantity
+from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, is_within
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.parts import Catalogue, Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
-from ppafo.questions.design.search import SearchSettings
-from ppafo.questions.design.variables import Variable, VariableTable, read_variables
+from ppafo.questions.design.search import LARGEST_SEED, Floats, SearchTable
+from ppafo.simulation.numbers import TIMES, declared_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import OPEN_LOOP
-from ppafo.studies.noise import NOISE
-from ppafo.studies.outcomes import common_level
+from ppafo.studies.draws import common_level
+from ppafo.studies.sampling import NOISE
 from ppafo.units import parse_quantity
 
-FILE = TomlKind("design", "design", resources.files("ppafo.questions.design") / "library", StudyError)
+SIZE = "actuator.size"
+DEAD_VOLUME = "actuator.dead_volume"
+OWN = {
+    SIZE: Quantity(
+        "size",
+        "",
+        "scale of the actuator's torque constant, volume per angle and mass relative to the part",
+        None,
+        0.05,
+        20.0,
+    ),
+    DEAD_VOLUME: Quantity("dead_volume", "m^3", "dead volume of each chamber", None, 1.0e-9, 1.0e-1),
+}
+"""Variables that stand for several numbers of the device."""
+_BY_PARTS = {
+    "actuator.torque_constant": SIZE,
+    "actuator.volume_per_angle": SIZE,
+    "actuator.dead_volume_1": DEAD_VOLUME,
+    "actuator.dead_volume_2": DEAD_VOLUME,
+}
+_AREA = {f"valve.{item.name}" for item in AREA_FORM}
+_SONIC = {f"valve.{item.name}" for item in SONIC_FORM}
 
+
+class VariableTable(BaseModel):
+    """A number that may be chosen: between two limits, or one of some values."""
+
+    model_config = STRICT
+
+    lowest: Annotated[str | None, Field(description="smallest value with its unit")] = None
+    highest: Annotated[str | None, Field(description="largest value with its unit")] = None
+    values: Annotated[Texts, Field(description="values to choose from, with unit; needed for times and rates")] = ()
+    scale: Annotated[Literal["linear", "log"], Field(description="spacing of values between the limits")] = "linear"
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A number to choose, in SI: its path, its limits or the values that it may have, and how it is spread.
+
+    ``kinds`` names the kinds of valve for which it means something, none for all.
+    """
+
+    path: str
+    unit: str
+    summary: str
+    lowest: float
+    highest: float
+    values: tuple[float, ...]
+    is_logarithmic: bool
+    kinds: tuple[str, ...] = ()
+
+    def value(self, place: Floats) -> Floats:
+        """Return the values (candidates,) in SI at places from 0 to 1."""
+        if self.values:
+            count = len(self.values)
+            return np.array(self.values)[np.minimum((place * count).astype(np.int64), count - 1)]
+        if self.is_logarithmic:
+            return np.asarray(np.exp(np.log(self.lowest) + place * np.log(self.highest / self.lowest)))
+        return self.lowest + place * (self.highest - self.lowest)
+
+
+def read_variables(
+    tables: Mapping[str, VariableTable],
+    scenarios: Mapping[str, Sequence[Scenario]],
+    valves: Sequence[Part],
+    file: str,
+) -> tuple[Variable, ...]:
+    """Return the variables of a file; StudyError for a path that no scenario has, or limits that it refuses.
+
+    ``scenarios`` are those of all tasks by kind of valve.
+    """
+    everything = [scenario for of_kind in scenarios.values() for scenario in of_kind]
+    known = {path: quantity for scenario in everything for path, quantity in declared_numbers(scenario).items()}
+    known = {path: quantity for path, quantity in known.items() if path not in _BY_PARTS} | OWN
+    atmosphere = everything[0].device.supply.atmospheric_pressure
+    found = []
+    for path, table in tables.items():
+        place = f"{file}: variables.'{path}'"
+        _check_path(path, known, valves, place)
+        kinds = _kinds(path, scenarios)
+        found.append(replace(_variable(path, table, known[path], atmosphere, place), kinds=kinds))
+    return tuple(found)
+
+
+def _kinds(path: str, scenarios: Mapping[str, Sequence[Scenario]]) -> tuple[str, ...]:
+    """Return the kinds of valve whose scenarios have a number, none where all of them do."""
+    having = {
+        kind: path in OWN or any(path in declared_numbers(scenario) for scenario in of_kind)
+        for kind, of_kind in scenarios.items()
+    }
+    return () if all(having.values()) else tuple(kind for kind, has in having.items() if has)
+
+
+def _check_path(path: str, known: Mapping[str, Quantity], valves: Sequence[Part], place: str) -> None:
+    if path in _BY_PARTS:
+        raise StudyError(f"{place}: is fixed by the chosen actuator; vary '{_BY_PARTS[path]}' instead")
+    if path not in known:
+        hint = nearest_name(path, known) or f"; for example {', '.join([*OWN, 'supply.pressure', 'controller.rate'])}"
+        raise StudyError(f"{place}: no scenario of the tasks has such a value{hint}")
+    other = _SONIC if path in _AREA else _AREA if path in _SONIC else frozenset[str]()
+    for valve in valves:
+        if {f"valve.{name}" for name in valve.values} & other:
+            raise StudyError(f"{place}: valve '{valve.name}' gives its orifice in the other form")
+
+
+def _variable(path: str, table: VariableTable, quantity: Quantity, atmosphere: float, place: str) -> Variable:
+    between = [text for text in (table.lowest, table.highest) if text is not None]
+    if bool(table.values) == bool(between) or len(between) == 1:
+        raise StudyError(f"{place}: give either lowest and highest, or values")
+    if path in TIMES and not table.values:
+        raise StudyError(
+            f"{place}: is a time or rate of the run; list the values to choose from, values = ['500 Hz', '1 kHz']"
+        )
+    numbers = [_number(text, quantity, atmosphere, place) for text in table.values or between]
+    lowest, highest = min(numbers), max(numbers)
+    if not table.values and numbers[0] >= numbers[1]:
+        raise StudyError(f"{place}: lowest = '{table.lowest}' must be below highest = '{table.highest}'")
+    if table.scale == "log" and lowest <= 0.0:
+        raise StudyError(f"{place}: scale = 'log' needs limits above 0")
+    return Variable(
+        path,
+        quantity.unit,
+        quantity.summary,
+        lowest,
+        highest,
+        tuple(numbers) if table.values else (),
+        table.scale == "log",
+    )
+
+
+def _number(text: str, quantity: Quantity, atmosphere: float, place: str) -> float:
+    try:
+        value = parse_quantity(text, "" if quantity.unit == "1" else quantity.unit, atmosphere)
+    except UnitError as error:
+        raise StudyError(f"{place}: '{text}': {error}") from error
+    if not is_within(value, quantity):
+        lower = f"{'at least' if quantity.minimum_allowed else 'more than'} {quantity.minimum:g}"
+        unit = quantity.unit if quantity.unit != "1" else ""
+        raise StudyError(f"{place}: '{text}': must be {lower} and at most {quantity.maximum:g} {unit}".rstrip())
+    return value
+
+
+FILE = TomlKind("design", "design", resources.files("ppafo.questions.design") / "library", StudyError)
 OBJECTIVES = {"error": "N m", "gas": "kg", "mass": "kg"}
 """What a design is judged by, all to be small, with the SI unit."""
 GAS = "gas_supplied"
-
 _OWN_NAMES = {"gas": GAS}
-_LARGEST_SEED = 2**32 - 1
 _Names = Annotated[tuple[Text, ...], Field(strict=False, min_length=1)]
 
 
@@ -69,25 +211,6 @@ class ConstraintTable(BaseModel):
 
     least: Annotated[str | None, Field(description="smallest value allowed, with its unit")] = None
     most: Annotated[str | None, Field(description="largest value allowed, with its unit")] = None
-
-
-class SearchTable(BaseModel):
-    """How long to search."""
-
-    model_config = STRICT
-
-    screening: Annotated[
-        int, Field(ge=16, le=100_000, description="number of evenly spread designs in the first generation")
-    ] = 4096
-    population: Annotated[int, Field(ge=16, le=4096, description="number of designs in each later generation")] = 256
-    generations: Annotated[int, Field(ge=0, le=10_000, description="maximum number of generations")] = 80
-    tolerance: Annotated[
-        float,
-        Field(ge=0.0, lt=1.0, description="stop when the hypervolume grows by less than this over 10 generations"),
-    ] = 1.0e-3
-    seed: Annotated[
-        int, Field(ge=0, le=_LARGEST_SEED, description="random seed; the same seed gives the same designs")
-    ] = 1
 
 
 class DesignFile(BaseModel):
@@ -162,7 +285,7 @@ class DesignProblem:
     other_mass: float
     variables: tuple[Variable, ...]
     constraints: tuple[Constraint, ...]
-    search: SearchSettings
+    search: SearchTable
 
     @property
     def parts(self) -> tuple[Part, ...]:
@@ -178,9 +301,15 @@ def load_design(name_or_path: str | Path, seed: int | None = None) -> DesignProb
     """
     document, file = read_design_file(name_or_path)
     folder = Path(name_or_path).parent
-    catalogue = load_catalogue(_place(document.catalogue, folder))
+    catalogue = load_catalogue(beside(document.catalogue, folder))
     combinations = _combinations(document.parts, catalogue)
-    tasks = _tasks(document.task, sorted({item.valve.kind for item in combinations}), folder, file)
+    kinds = sorted({item.valve.kind for item in combinations})
+    weights = sum(table.weight for table in document.task)
+    names = [table.name for table in document.task]
+    repeated = first_twice(names)
+    if repeated is not None:
+        raise StudyError(f"{file}: two tasks are named '{repeated}'; give each its own name")
+    tasks = tuple(_task(table, kinds, folder, file, weights) for table in document.task)
     if document.error not in _errors():
         hint = nearest_name(document.error, _errors())
         raise StudyError(
@@ -188,9 +317,16 @@ def load_design(name_or_path: str | Path, seed: int | None = None) -> DesignProb
         )
     if NOISE in document.variables:
         raise StudyError(f"{file}: variables.'{NOISE}': every design meets the same noise, so it cannot be searched")
-    search = document.search
     by_kind = {kind: [task.scenarios[kind] for task in tasks] for kind in tasks[0].scenarios}
     valves = [item.valve for item in combinations]
+    bottles = [] if document.parts.bottle is None else [catalogue.part("bottles", document.parts.bottle)]
+    place = f"{file}: parts.other_mass"
+    try:
+        other_mass = parse_quantity(document.parts.other_mass, "kg")
+    except UnitError as error:
+        raise StudyError(f"{place} = '{document.parts.other_mass}': {error}") from error
+    if other_mass < 0.0:
+        raise StudyError(f"{place} = '{document.parts.other_mass}': must be at least 0 kg")
     problem = DesignProblem(
         name=document.name,
         description=document.description,
@@ -198,26 +334,20 @@ def load_design(name_or_path: str | Path, seed: int | None = None) -> DesignProb
         error=document.error,
         tasks=tasks,
         combinations=combinations,
-        carried=_carried_parts(document.parts, catalogue),
-        other_mass=_mass(document.parts.other_mass, f"{file}: parts.other_mass"),
+        carried=(*(catalogue.part("regulators", name) for name in document.parts.regulators), *bottles),
+        other_mass=other_mass,
         variables=read_variables(document.variables, by_kind, valves, file),
         constraints=_constraints(document, _atmospheres(document, tasks), file),
-        search=SearchSettings(
-            search.screening,
-            search.population,
-            search.generations,
-            search.tolerance,
-            search.seed,
-        ),
+        search=document.search,
     )
     return problem if seed is None else with_seed(problem, seed)
 
 
 def with_seed(problem: DesignProblem, seed: int) -> DesignProblem:
     """Return a problem with another random seed; StudyError for one that no search has."""
-    if not 0 <= seed <= _LARGEST_SEED:
-        raise StudyError(f"seed = {seed}: must be a whole number from 0 to {_LARGEST_SEED}")
-    return replace(problem, search=replace(problem.search, seed=seed))
+    if not 0 <= seed <= LARGEST_SEED:
+        raise StudyError(f"seed = {seed}: must be a whole number from 0 to {LARGEST_SEED}")
+    return replace(problem, search=problem.search.model_copy(update={"seed": seed}))
 
 
 def _each_once(parts: Sequence[Part]) -> tuple[Part, ...]:
@@ -228,20 +358,6 @@ def _combinations(parts: PartsTable, catalogue: Catalogue) -> tuple[Combination,
     valves = [catalogue.part("valves", name) for name in dict.fromkeys(parts.valves)]
     actuators = [catalogue.part("actuators", name) for name in dict.fromkeys(parts.actuators)]
     return tuple(Combination(valve, actuator) for valve, actuator in product(valves, actuators))
-
-
-def _carried_parts(parts: PartsTable, catalogue: Catalogue) -> tuple[Part, ...]:
-    bottles = [] if parts.bottle is None else [catalogue.part("bottles", parts.bottle)]
-    return (*(catalogue.part("regulators", name) for name in parts.regulators), *bottles)
-
-
-def _tasks(tables: Sequence[TaskTable], kinds: Sequence[str], folder: Path, file: str) -> tuple[Task, ...]:
-    whole = sum(table.weight for table in tables)
-    names = [table.name for table in tables]
-    repeated = first_twice(names)
-    if repeated is not None:
-        raise StudyError(f"{file}: two tasks are named '{repeated}'; give each its own name")
-    return tuple(_task(table, kinds, folder, file, whole) for table in tables)
 
 
 def _task(table: TaskTable, kinds: Sequence[str], folder: Path, file: str, whole: float) -> Task:
@@ -267,24 +383,8 @@ def _task(table: TaskTable, kinds: Sequence[str], folder: Path, file: str, whole
     return Task(table.name, scenarios, table.weight / whole)
 
 
-def _place(name: str, folder: Path) -> str:
-    """Return a name of the package as it is, and a path relative to the file that names it."""
-    is_path = Path(name).suffix == ".toml" or "/" in name
-    return str(folder / name) if is_path else name
-
-
 def _errors() -> list[str]:
     return [name for name, kind in METRICS.items() if kind.unit == OBJECTIVES["error"]]
-
-
-def _mass(text: str, place: str) -> float:
-    try:
-        value = parse_quantity(text, "kg")
-    except UnitError as error:
-        raise StudyError(f"{place} = '{text}': {error}") from error
-    if value < 0.0:
-        raise StudyError(f"{place} = '{text}': must be at least 0 kg")
-    return value
 
 
 def _atmospheres(document: DesignFile, tasks: Sequence[Task]) -> frozenset[float]:
@@ -323,3 +423,7 @@ def _limit(text: str, unit: str, place: str, atmospheres: frozenset[float]) -> f
     if found is None:
         raise StudyError(f"{what}: the designs have several atmospheres; give an absolute pressure")
     return found
+
+
+SEARCHED_STREAMS, FRESH_STREAMS = 16, 64
+"""Noise streams over which every candidate of a noisy task is judged, and those, all new, over which a front is."""
