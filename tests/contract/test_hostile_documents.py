@@ -26,9 +26,8 @@ from ppafo.questions.tune.problem import load_tuning
 from ppafo.rig.folder import check_rig_folder
 from ppafo.rig.preset import load_preset
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
-from ppafo.storage.column_map import load_column_map
-from ppafo.storage.recordings import read_recording
-from ppafo.storage.result_folder import read_document
+from ppafo.storage.foreign import load_column_map
+from ppafo.storage.result_folder import read_document, read_recording
 from ppafo.studies.loading import load_study
 from ppafo.walking.course import load_course
 from ppafo.walking.loading import load_walk

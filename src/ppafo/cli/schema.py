@@ -17,7 +17,7 @@ FORMATS: dict[str, str] = {
     "walk": "ppafo.walking.schema",
     "course": "ppafo.walking.course",
     "identification": "ppafo.identification.problem",
-    "columns": "ppafo.storage.column_map",
+    "columns": "ppafo.storage.foreign",
     "rig": "ppafo.rig.preset",
     "gait": "ppafo.gait.document",
     "gait-map": "ppafo.gait.recorded.mapping",

@@ -1,13 +1,156 @@
-"""The pieces of which the layouts of files are made: strict tables, values that may be left out, unions of kinds."""
+"""The pieces of which the layouts of files are made: strict tables, values that may be left out, unions of kinds.
 
+What pydantic finds wrong in a document becomes one line: the key, the value, what is allowed, the nearest name.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, Union
+from types import UnionType
+from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+from pydantic_core import ErrorDetails
 
-from ppafo.documents.problems import first_problem
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import PpafoError
+from ppafo.errors import PpafoError, nearest_name, one_line
+
+_LONGEST_VALUE = 60
+_NOT_THERE = frozenset({"missing", "union_tag_not_found"})
+
+
+def is_gap(detail: ErrorDetails) -> bool:
+    """Tell whether a problem is only that something is not there yet."""
+    return detail["type"] in _NOT_THERE
+
+
+def first_problem(details: list[ErrorDetails], model: type[BaseModel]) -> str:
+    """Return one problem as a sentence, and how many more there are; a misspelt key also makes another one missing."""
+    first = next((detail for detail in details if detail["type"] == "extra_forbidden"), details[0])
+    spot = _spot(model, first["loc"])
+    template = _TEMPLATES.get(first["type"])
+    if template is None:
+        sentence = _SENTENCES.get(first["type"], _any_other)(spot, first)
+    else:
+        sentence = template.format(path=spot.path, value=quote(first["input"]))
+    more = len(details) - 1
+    return f"{sentence} (and {more} more)" if more else sentence
+
+
+def quote(value: object) -> str:
+    """Return a short quotation of a value on one line."""
+    quoted = one_line(repr(value))
+    return quoted if len(quoted) <= _LONGEST_VALUE else f"{quoted[:_LONGEST_VALUE]}..."
+
+
+@dataclass(frozen=True, slots=True)
+class _Spot:
+    """Where in a file a problem is: dotted path, the model that holds its last key, and the type of what is there."""
+
+    path: str
+    holder: Any
+    wanted: Any
+
+
+def _spot(model: Any, location: Iterable[int | str]) -> _Spot:
+    """Return the spot at a location; in a union pydantic puts the kind into it, where the file has no such key."""
+    keys: list[str] = []
+    holder = wanted = model
+    for part in location:
+        kinds = _kinds(wanted)
+        if kinds:
+            wanted = kinds.get(str(part))
+            continue
+        holder, wanted = wanted, _below(wanted, str(part))
+        keys.append(one_line(part))
+    return _Spot(".".join(keys), holder, wanted)
+
+
+def _kinds(node: Any) -> dict[str, Any]:
+    """Return the members of a union of kinds by kind, nothing for any other type."""
+    union = get_args(node)[0] if get_origin(node) is Annotated else node
+    models = [item for item in get_args(union) if _is_model(item)] if get_origin(union) in (Union, UnionType) else []
+    return {get_args(item.model_fields["kind"].annotation)[0]: item for item in models if "kind" in item.model_fields}
+
+
+def _below(node: Any, part: str) -> Any:
+    """Return the type of what a table has at a key, or a table or list by names or numbers at any; None if unknown."""
+    if _is_model(node):
+        field = node.model_fields.get(part)
+        return None if field is None else _required_type(field.annotation)
+    members = [item for item in get_args(node) if item is not Ellipsis]
+    return members[-1] if members else None
+
+
+def _required_type(annotation: Any) -> Any:
+    """Return the type of a value that is there, for one that may be left out as ``X | None``."""
+    members = [item for item in get_args(annotation) if item is not type(None)]
+    return members[0] if get_origin(annotation) in (Union, UnionType) and len(members) == 1 else annotation
+
+
+def _is_model(node: Any) -> bool:
+    return isinstance(node, type) and issubclass(node, BaseModel)
+
+
+def _unknown_key(spot: _Spot, _detail: ErrorDetails) -> str:
+    allowed = list(spot.holder.model_fields)
+    hint = nearest_name(spot.path.rpartition(".")[2], allowed)
+    return f"unknown key '{spot.path}'{hint}; allowed here: {', '.join(allowed)}"
+
+
+def _unknown_choice(spot: _Spot, detail: ErrorDetails) -> str:
+    allowed = _quoted_names(detail["ctx"]["expected"].replace(" or ", ","))
+    hint = nearest_name(str(detail["input"]), allowed)
+    return f"{spot.path} = {quote(detail['input'])} is not allowed{hint}; allowed: {', '.join(allowed)}"
+
+
+def _unknown_kind(spot: _Spot, detail: ErrorDetails) -> str:
+    allowed, tag = _quoted_names(detail["ctx"]["expected_tags"]), detail["ctx"]["tag"]
+    return (
+        f"{spot.path}.kind = {quote(tag)} is not known{nearest_name(str(tag), allowed)}; allowed: {', '.join(allowed)}"
+    )
+
+
+def _wrong_name(spot: _Spot, detail: ErrorDetails) -> str:
+    """Say what a name may consist of; pydantic marks one that is the key of a table."""
+    if detail["loc"][-1] == "[key]":
+        table = one_line(".".join(map(str, detail["loc"][:-2])))
+        return f"{table}: the name {quote(detail['input'])} must consist of letters, digits, '-' and '_'"
+    return f"{spot.path} = {quote(detail['input'])} must consist of lower-case letters, digits, '-' and '_'"
+
+
+def _not_a_table(spot: _Spot, detail: ErrorDetails) -> str:
+    fields = spot.wanted.model_fields if _is_model(spot.wanted) else {}
+    required = [name for name, field in fields.items() if field.is_required()]
+    keys = f" with the key{'s' * (len(required) > 1)} {', '.join(required)}" if required else f", [{spot.path}]"
+    return f"{spot.path} = {quote(detail['input'])} must be a table{keys}"
+
+
+def _any_other(spot: _Spot, detail: ErrorDetails) -> str:
+    _, wanted, must = detail["msg"].partition(" should ")
+    said = f"must {must}" if wanted else f"must be {detail['msg']}"
+    return f"{spot.path} = {quote(detail['input'])}: {one_line(said)}"
+
+
+def _quoted_names(text: str) -> list[str]:
+    return [name.strip(" '") for name in text.split(",")]
+
+
+_TEMPLATES = {
+    "missing": "'{path}' is missing",
+    "union_tag_not_found": "'{path}.kind' is missing",
+    "string_type": "{path} = {value} must be a text in quotation marks",
+}
+_SENTENCES: dict[str, Callable[[_Spot, ErrorDetails], str]] = {
+    "extra_forbidden": _unknown_key,
+    "literal_error": _unknown_choice,
+    "string_pattern_mismatch": _wrong_name,
+    "union_tag_invalid": _unknown_kind,
+    "model_type": _not_a_table,
+    "model_attributes_type": _not_a_table,
+    "dict_type": _not_a_table,
+}
+
 
 Model = TypeVar("Model", bound=BaseModel)
 

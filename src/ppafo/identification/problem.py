@@ -31,7 +31,7 @@ from ppafo.identification.trajectory.section import TrajectorySection
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.parameter_set import ParameterSet, chosen_valve, number_in_si
 from ppafo.parameters.provenance import CONFIDENCE
-from ppafo.storage.column_map import ColumnMap
+from ppafo.storage.foreign import ColumnMap
 from ppafo.units import parse_quantity, to_si
 
 _Recordings = Annotated[tuple[Text, ...], Field(strict=False, min_length=1, description="files, relative to this one")]

@@ -4,8 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.metrics.metric import Floats, MetricKind, Readings
-from ppafo.metrics.phases import hold, ramp, spans
+from ppafo.metrics.metric import Floats, MetricKind, Readings, hold, ramp, spans
 from ppafo.model.columns import root
 from ppafo.signals import Recording
 from ppafo.signals.meter import Course, MeterKind, Sample, ends_before_hold

@@ -9,8 +9,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field
 
-from ppafo.documents.models import STRICT, make_schema, table
-from ppafo.documents.problems import quote
+from ppafo.documents.models import STRICT, make_schema, quote, table
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
 from ppafo.model.declaration import Quantity

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from ppafo.documents.problems import first_problem, is_gap
+from ppafo.documents.models import first_problem, is_gap
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ScenarioError
 from ppafo.parameters import ParameterSet

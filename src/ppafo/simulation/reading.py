@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.problems import quote
+from ppafo.documents.models import quote
 from ppafo.errors import ScenarioError, UnitError, one_line
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import is_within

@@ -9,19 +9,99 @@ import io
 import math
 import re
 from array import array
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, one_line
-from ppafo.signals import Channel, Recording, RecordingKind
-from ppafo.signals.channels import TIME, TIME_UNIT
+from ppafo.errors import DataError, UnitError, first_twice, one_line
+from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
+from ppafo.signals.channels import PLAIN_NUMBER, TIME, TIME_UNIT
 from ppafo.signals.recording import Floats
-from ppafo.storage.columns import Column, check_clock, in_si, parse_header
 from ppafo.storage.files import read_bytes, write_file
+
+_HEADER = re.compile(r"\s*(\w+)\s*\[\s*([^\[\]]+?)\s*\]\s*", re.ASCII)
+_LEVEL = "Pa_a"
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """What a header says of a column: channel (or time) and the unit of its numbers."""
+
+    name: str
+    unit: str
+
+    @property
+    def si_unit(self) -> str:
+        """The unit in which the recording keeps it; a channel that is not known by name stays as it is."""
+        if self.name == TIME:
+            return TIME_UNIT
+        return CHANNELS[self.name].unit if self.name in CHANNELS else self.unit
+
+
+def parse_header(cells: list[str]) -> list[Column]:
+    """Return the columns of a header such as ``time [s]``, ``pressure_1 [psi_g]``; time comes first.
+
+    DataError for one that cannot be read.
+    """
+    if not cells:
+        raise DataError("the header must come first, line 1 is empty")
+    columns = []
+    for cell in cells:
+        match = _HEADER.fullmatch(cell)
+        if match is None:
+            shown = cell if len(cell) <= 40 else f"{cell[:36]} ..."
+            raise DataError(f"the header must name columns as 'name [unit]', separated by commas; '{shown}' is not one")
+        columns.append(Column(match[1], match[2]))
+    names = [column.name for column in columns]
+    if names[0] != TIME:
+        raise DataError(f"the first column must be '{TIME} [{TIME_UNIT}]', it is '{names[0]}'")
+    twice = first_twice(names)
+    if twice is not None:
+        raise DataError(f"there are two columns '{twice}'")
+    return columns
+
+
+def check_clock(time: Floats, lines: Sequence[int]) -> None:
+    """Refuse a clock [s] that goes backwards or stands still; ``lines`` are those of the rows in the file.
+
+    DataError names the line.
+    """
+    stalled = np.flatnonzero(np.diff(time) <= 0.0)
+    if stalled.size:
+        index = int(stalled[0]) + 1
+        word = "stands still" if time[index] == time[index - 1] else "goes backwards"
+        raise DataError(
+            f"line {lines[index]}, column '{TIME}': the clock {word}: {time[index]:.9g} s follows "
+            f"{time[index - 1]:.9g} s; time must increase from sample to sample"
+        )
+
+
+def in_si(column: Column, values: Floats, atmosphere: float) -> Floats:
+    """Return the values in the unit in which a recording keeps them; gauge counts from ``atmosphere`` [Pa absolute].
+
+    DataError for a unit that does not fit.
+    """
+    from ppafo.units import check_unit, to_si
+
+    try:
+        if column.unit != column.si_unit:
+            given, wanted = (_for_conversion(unit) for unit in (column.unit, column.si_unit))
+            return np.array([to_si(value, given, wanted, atmosphere) for value in values.tolist()])
+        if column.name not in CHANNELS:
+            check_unit(_for_conversion(column.unit))
+    except UnitError as error:
+        raise DataError(f"column '{column.name} [{column.unit}]': {error}") from error
+    return values
+
+
+def _for_conversion(unit: str) -> str:
+    """Return the unit as ``ppafo.units`` spells it: there a pressure says its kind and a plain number has no unit."""
+    return {"Pa": _LEVEL, PLAIN_NUMBER: ""}.get(unit, unit)
+
 
 _MARKS: dict[RecordingKind, str] = {
     "simulated": "# simulated: a model's own output, not measured",
@@ -77,9 +157,9 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
         if not len(values):
             raise DataError("has a header but no samples")
         check_clock(values[:, 0], range(first + 2, first + 2 + len(values)))
-        time, *channels = (_channel(column, values[:, index], atmosphere) for index, column in enumerate(columns))
-        named = {column.name: channel for column, channel in zip(columns[1:], channels, strict=True)}
-        return Recording(label or one_line(Path(path).stem), time.values, named, kind_of_comments(lines[:first]))
+        series = [in_si(column, values[:, index], atmosphere) for index, column in enumerate(columns)]
+        named = {column.name: Channel(one, column.si_unit) for column, one in zip(columns[1:], series[1:], strict=True)}
+        return Recording(label or one_line(Path(path).stem), series[0], named, kind_of_comments(lines[:first]))
     except csv.Error as error:
         raise DataError(f"{path}: is not a CSV file: {error}") from error
     except DataError as error:
@@ -148,7 +228,3 @@ def _is_finite(cell: str) -> bool:
         return math.isfinite(float(cell)) and _UNDERSCORE not in cell
     except ValueError:
         return False
-
-
-def _channel(column: Column, values: Floats, atmosphere: float) -> Channel:
-    return Channel(in_si(column, values, atmosphere), column.si_unit)

@@ -1,4 +1,7 @@
-"""Tables from elsewhere, read through a column map; what cannot be read is named with file, line and column."""
+"""Tables from elsewhere, with their own columns, units and signs, read through a column map as recordings.
+
+A map is part of a TOML file, ``[columns.NAME]``. What cannot be read is named with file, line and column.
+"""
 
 import csv
 import math
@@ -6,20 +9,102 @@ import re
 from array import array
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from importlib import resources
 from itertools import chain, islice
 from pathlib import Path
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
 
 from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.documents.models import STRICT, Text, make_schema, read_model
+from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import DataError, UnitError, nearest_name, one_line
 from ppafo.signals import Channel, Recording
 from ppafo.signals.channels import PLAIN_NUMBER, TIME, TIME_UNIT
 from ppafo.signals.recording import Floats
-from ppafo.storage.column_map import ColumnMap, MappedChannel, MappedDirection
-from ppafo.storage.columns import Column, check_clock, in_si
-from ppafo.storage.comma_separated import kind_of_comments
+from ppafo.storage.comma_separated import Column, check_clock, in_si, kind_of_comments
 from ppafo.storage.files import read_bytes
+
+Thousands = Literal["point", "comma", "apostrophe", "blank"]
+
+
+class MappedChannel(BaseModel):
+    """Where one channel comes from: a column, or a constant. The value is sign * (factor * number + offset) in unit."""
+
+    model_config = STRICT
+
+    column: Annotated[
+        Annotated[int, Field(ge=1)] | Text | None, Field(description="number of the column from 1, or its name")
+    ] = None
+    constant: Annotated[Text | None, Field(description="instead of a column: one value, such as '1 bar_a'")] = None
+    unit: Annotated[str, Field(description="unit of the value, such as 'bar_g'; '-' for a plain number")] = "-"
+    sign: Annotated[Literal[1, -1], Field(description="-1 where the file has the opposite sign")] = 1
+    factor: Annotated[float, Field(description="unit per number, for a sensor's volts")] = 1.0
+    offset: Annotated[float, Field(description="added after the factor, in unit")] = 0.0
+    times: Annotated[Text | None, Field(description="a quantity to multiply by, such as a lever arm '0.13 m'")] = None
+    thousands: Annotated[Thousands | None, Field(description="mark between groups of digits")] = None
+
+
+class MappedDirection(BaseModel):
+    """Direction (1 or -1, 0 for neither) from how fast a channel moves; sweeps one way are counted as repetitions."""
+
+    model_config = STRICT
+
+    of: Annotated[Text, Field(description="channel whose rate decides")]
+    threshold: Annotated[Text, Field(description="slowest rate that counts, such as '2 mm/s'")]
+    window: Annotated[Text, Field(description="time over which the channel is smoothed, such as '0.2 s'")]
+    sign: Annotated[Literal[1, -1], Field(description="-1 where a growing channel means falling pressure")] = 1
+
+
+class ColumnMap(BaseModel):
+    """How a file is written and what its columns are."""
+
+    model_config = STRICT
+
+    delimiter: Annotated[
+        Literal["comma", "semicolon", "tab", "whitespace"], Field(description="what separates columns")
+    ] = "comma"
+    decimal: Annotated[Literal["point", "comma"], Field(description="decimal mark")] = "point"
+    encoding: Annotated[Literal["utf-8", "latin-1"], Field(description="encoding of the text")] = "utf-8"
+    header: Annotated[bool, Field(description="whether a line names the columns")] = True
+    skip_lines: Annotated[int, Field(ge=0, description="lines before the header, or before the first row")] = 0
+    skip_rows: Annotated[int, Field(ge=0, description="rows of numbers to leave out at the start")] = 0
+    channels: Annotated[dict[str, MappedChannel], Field(min_length=1, description="channels by name, with 'time'")]
+    direction: Annotated[MappedDirection | None, Field(description="direction from the rate of a channel")] = None
+
+
+class ColumnMaps(BaseModel):
+    """Column maps by name, as a file has them; a problem file of ``ppafo identify`` has more beside them."""
+
+    model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
+
+    columns: Annotated[dict[str, ColumnMap], Field(min_length=1, description="column maps by name")]
+
+
+_FILE = TomlKind("file of column maps", "columns", resources.files("ppafo.storage"), DataError)
+
+
+def load_column_map(path: str | Path, name: str | None = None) -> ColumnMap:
+    """Return a column map of a TOML file by its name; without a name the file's only one.
+
+    DataError where it has no such map, or several and no name is given.
+    """
+    parsed, file = read_model(_FILE, ColumnMaps, path)
+    maps = parsed.columns
+    known = ", ".join(maps)
+    if name is None and len(maps) > 1:
+        raise DataError(f"{file}: has several column maps; name one as {file}:NAME; available: {known}")
+    if name is not None and name not in maps:
+        raise DataError(f"{file}: there is no column map '{name}'{nearest_name(name, maps)}; available: {known}")
+    return maps[name or next(iter(maps))]
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a file of column maps."""
+    return make_schema(ColumnMaps, "ppafo column maps")
+
 
 _DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t"}
 _MARKS = {"point": ".", "comma": ",", "apostrophe": "'", "blank": " "}
@@ -54,7 +139,9 @@ def read_foreign(
         }
         time = channels.pop(TIME).values
         check_clock(time, table.lines)
-        recording = Recording(label or one_line(Path(path).stem), time, channels, kind_of_comments(_comments(lines)))
+        # A synthetic recording stays one through a column map.
+        kind = kind_of_comments(line for line in lines if line.startswith(_COMMENT))
+        recording = Recording(label or one_line(Path(path).stem), time, channels, kind)
         return recording if columns.direction is None else _with_direction(recording, columns.direction)
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
@@ -116,11 +203,6 @@ def _lines(path: str | Path, encoding: str) -> list[str]:
     return text.splitlines()
 
 
-def _comments(lines: list[str]) -> list[str]:
-    """Return the lines of comment: a synthetic recording stays one through a column map."""
-    return [line for line in lines if line.startswith(_COMMENT)]
-
-
 def _split(lines: Iterable[tuple[int, str]], delimiter: str) -> Rows:
     for number, line in lines:
         if not line.strip() or line.startswith(_COMMENT):
@@ -141,7 +223,23 @@ def _place(name: str, item: MappedChannel, names: list[str], width: int) -> int:
             f"the column map gives channel '{name}' {'neither' if item.column is None else 'both'} "
             f"a column {'nor' if item.column is None else 'and'} a constant; give one of them"
         )
-    return -1 if item.column is None else _index(name, item, names, width)
+    if item.column is None:
+        return -1
+    if isinstance(item.column, int):
+        if item.column > width:
+            raise DataError(f"channel '{name}' is to come from column {item.column}, the file has {width}")
+        return item.column - 1
+    if not names:
+        raise DataError(f"channel '{name}' names a column {item.column!r}, but the file has no header; give its number")
+    places = [place for place, known in enumerate(names, start=1) if known == item.column]
+    if not places:
+        shown = ", ".join(one_line(known)[:_LONGEST_SHOWN] for known in names)
+        hint = nearest_name(item.column, names)
+        raise DataError(f"channel '{name}': there is no column {item.column!r}{hint}; the file has {shown}")
+    if len(places) > 1:
+        shown = " and ".join(map(str, places))
+        raise DataError(f"channel '{name}': columns {shown} are both called {item.column!r}; give the number of one")
+    return places[0] - 1
 
 
 def _constant(name: str, text: str, count: int, atmosphere: float) -> Channel:
@@ -153,24 +251,6 @@ def _constant(name: str, text: str, count: int, atmosphere: float) -> Channel:
         raise DataError(f"channel '{name}', constant = {text!r}: {error}") from error
     column = Column(name, unit or PLAIN_NUMBER)
     return Channel(in_si(column, np.full(count, value), atmosphere), column.si_unit)
-
-
-def _index(name: str, item: MappedChannel, names: list[str], width: int) -> int:
-    if isinstance(item.column, int):
-        if item.column > width:
-            raise DataError(f"channel '{name}' is to come from column {item.column}, the file has {width}")
-        return item.column - 1
-    if not names:
-        raise DataError(f"channel '{name}' names a column {item.column!r}, but the file has no header; give its number")
-    if item.column not in names:
-        shown = ", ".join(one_line(known)[:_LONGEST_SHOWN] for known in names)
-        hint = nearest_name(str(item.column), names)
-        raise DataError(f"channel '{name}': there is no column {item.column!r}{hint}; the file has {shown}")
-    places = [place for place, known in enumerate(names, start=1) if known == item.column]
-    if len(places) > 1:
-        shown = " and ".join(map(str, places))
-        raise DataError(f"channel '{name}': columns {shown} are both called {item.column!r}; give the number of one")
-    return places[0] - 1
 
 
 def _number(cell: str, thousands: str | None, decimal: str, column: str, line: int) -> float:

@@ -1,22 +1,62 @@
-"""Recordings as NetCDF files, which xarray opens too; loading xarray itself takes longer than a whole run.
+"""Recordings as NetCDF files, and as the Dataset of xarray that opens them too; loading xarray takes longer than a run.
 
 Read as the HDF5 files that they are: h5netcdf prints a traceback of its own where it meets a damaged one.
 """
 
 import io
+import json
 import math
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ppafo.errors import DataError, one_line
-from ppafo.signals import Channel, Recording, recording_kind
-from ppafo.signals.channels import TIME, TIME_UNIT
-from ppafo.storage.dataset import channel_attributes, global_attributes, time_attributes, unit_of_attribute
+from ppafo.signals import CHANNELS, Channel, Recording, recording_kind
+from ppafo.signals.channels import PLAIN_NUMBER, TIME, TIME_UNIT
 from ppafo.storage.files import read_bytes, write_file
+
+if TYPE_CHECKING:
+    import xarray
+
+_PLAIN_NUMBER_IN_NETCDF = "1"
+
+
+def dataset_of(recording: Recording, scenario: Mapping[str, Any] | None = None) -> "xarray.Dataset":
+    """Return the recording as a Dataset over time [s]; ``scenario`` goes into an attribute as JSON."""
+    import xarray
+
+    variables = {name: (TIME, recording[name], channel_attributes(recording, name)) for name in recording.names}
+    coordinates = {TIME: (TIME, recording.time, time_attributes())}
+    return xarray.Dataset(variables, coordinates, global_attributes(recording, scenario))
+
+
+def global_attributes(recording: Recording, scenario: Mapping[str, Any] | None) -> dict[str, str]:
+    """Return what a NetCDF file says of the whole recording."""
+    attributes = {"title": recording.label, "kind": recording.kind}
+    if scenario is not None:
+        attributes["scenario"] = json.dumps(scenario, ensure_ascii=False, allow_nan=False)
+    return attributes
+
+
+def time_attributes() -> dict[str, str]:
+    """Return the attributes of the time."""
+    return {"units": TIME_UNIT, "long_name": "time"}
+
+
+def channel_attributes(recording: Recording, name: str) -> dict[str, str]:
+    """Return unit and long name of a channel; a plain number has the unit 1, as the NetCDF conventions ask."""
+    unit = recording.unit(name)
+    summary = CHANNELS[name].summary if name in CHANNELS else name.replace("_", " ")
+    return {"units": _PLAIN_NUMBER_IN_NETCDF if unit == PLAIN_NUMBER else unit, "long_name": summary}
+
+
+def unit_of_attribute(text: str) -> str:
+    """Return the unit that ``channel_attributes`` wrote as this text."""
+    return PLAIN_NUMBER if text == _PLAIN_NUMBER_IN_NETCDF else text
+
 
 _DAMAGED = (OSError, KeyError, RuntimeError, TypeError, ValueError, OverflowError, MemoryError)
 """What h5py raises where a file is cut off or damaged."""

@@ -1,7 +1,11 @@
-"""Tables of OpenSim, ``.mot`` and ``.sto``: read with both styles of header, and written so that OpenSim reads them.
+"""Tables of OpenSim, ``.mot`` and ``.sto``, read and written as it does, and tables of markers, ``.trc``.
 
 A header is lines until ``endheader``: ``nRows=211`` and ``inDegrees=yes`` (or the sentence "Angles are in degrees."),
 or in the older style ``datarows 9009``. Then come one line of labels and the rows.
+
+Of a ``.trc`` file lines 1 to 3 are ``PathFileType 4 (X/Y/Z) NAME``, names of the header's values, and these. Line 4 has
+``Frame#``, ``Time`` and a name for every three columns, line 5 ``X1 Y1 Z1 ...``; then come the rows. A marker that was
+not seen leaves its cells empty, or has ``nan``.
 """
 
 import re
@@ -81,20 +85,17 @@ def _read(path: str | Path, cell: Cell) -> OpenSimTable:
         values, remarks = _without_repeats(_rows(lines, number + 1, labels, header, cell))
         time = values[:, 0]
         _check_clock(time, number + 1)
-        remarks = [*_width_remarks(labels, header), *remarks]
+        if header.width is not None and header.width != len(labels):
+            said = (
+                f"the header states {header.width} columns, labels and every row have {len(labels)}, which were taken"
+            )
+            remarks.insert(0, said)
     except DataError as error:
         raise DataError(f"{path}: {error}".replace(f"{path}: {path}:", f"{path}:")) from error
     columns = {label: values[:, index] for index, label in enumerate(labels) if index > 0}
     return OpenSimTable(
         header.name, time, columns, header.in_degrees, number + 1, tuple(remarks), header.kind, header.is_old
     )
-
-
-def _width_remarks(labels: list[str], header: _Header) -> list[str]:
-    """Return a remark where the header counts other columns than labels and rows have, which agree."""
-    if header.width is None or header.width == len(labels):
-        return []
-    return [f"the header states {header.width} columns, labels and every row have {len(labels)}, which were taken"]
 
 
 def _without_repeats(values: Floats) -> tuple[Floats, list[str]]:
@@ -167,21 +168,16 @@ def _labels(lines: list[str], header: _Header) -> tuple[int, list[str]]:
     for number in range(header.end + 2, len(lines) + 1):
         if lines[number - 1].strip():
             labels = _cells(lines[number - 1])
-            _check_labels(labels, number)
+            if labels[0].lower() != TIME:
+                first = one_line(labels[0])[:_LONGEST_SHOWN]
+                raise DataError(f"line {number}: the first column must be '{TIME}', it is {first!r}")
+            twice = first_twice(labels)
+            if twice is not None:
+                raise DataError(f"line {number}: there are two columns {twice!r}; rename or remove one")
+            if "" in labels:
+                raise DataError(f"line {number}: column {labels.index('') + 1} has no name")
             return number, labels
     raise DataError(f"has nothing after '{_END}': the file is cut off")
-
-
-def _check_labels(labels: list[str], number: int) -> None:
-    if labels[0].lower() != TIME:
-        raise DataError(
-            f"line {number}: the first column must be '{TIME}', it is {one_line(labels[0])[:_LONGEST_SHOWN]!r}"
-        )
-    twice = first_twice(labels)
-    if twice is not None:
-        raise DataError(f"line {number}: there are two columns {twice!r}; rename or remove one")
-    if "" in labels:
-        raise DataError(f"line {number}: column {labels.index('') + 1} has no name")
 
 
 def _cells(line: str) -> list[str]:
@@ -262,3 +258,84 @@ def opensim_bytes(recording: Recording) -> bytes:
 def write_opensim(path: str | Path, recording: Recording) -> Path:
     """Write a recording as a ``.sto`` file that OpenSim reads; returns the path."""
     return write_file(path, opensim_bytes(recording))
+
+
+_FIRST = "PathFileType"
+_HEAD_LINES = 5
+_UNITS = ("mm", "cm", "m")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MarkerTable:
+    """Markers over time [s]: coordinates (3, frames) by name in ``unit``; NaN where a marker was not seen."""
+
+    time: Floats
+    markers: Mapping[str, Floats]
+    unit: str
+
+
+def read_trc(path: str | Path) -> MarkerTable:
+    """Return the markers in a ``.trc`` file; DataError names file, line and what is wrong."""
+    try:
+        lines = text_lines(read_bytes(path))
+        if not lines[0].startswith(_FIRST) or len(lines) <= _HEAD_LINES:
+            raise DataError(
+                f"is not a .trc file: its first line begins with '{_FIRST}', and five lines come before rows"
+            )
+        unit = dict(zip(lines[1].split(), lines[2].split(), strict=False)).get("Units", "")
+        if unit not in _UNITS:
+            shown = one_line(unit)[:_LONGEST_SHOWN]
+            raise DataError(f"line 3: Units is {shown!r}; allowed are {', '.join(_UNITS)}")
+        names = _names(lines[3])
+        rows = [(number, line) for number, line in enumerate(lines[_HEAD_LINES:], _HEAD_LINES + 1) if line.strip()]
+        values = np.array([_marker_row(line, number, len(names)) for number, line in rows]).reshape(
+            -1, 1 + 3 * len(names)
+        )
+        _check_frames(values[:, 0], [number for number, _ in rows])
+    except DataError as error:
+        raise DataError(f"{path}: {error}".replace(f"{path}: {path}:", f"{path}:")) from error
+    markers = {name: values[:, 1 + 3 * place : 4 + 3 * place].T for place, name in enumerate(names)}
+    return MarkerTable(values[:, 0], markers, unit)
+
+
+def _names(line: str) -> list[str]:
+    """Return the names of the markers; the two names before them are those of frame and time."""
+    cells = [cell.strip() for cell in line.split("\t")]
+    if len(cells) < 3 or cells[1].lower() != "time":
+        raise DataError("line 4: must begin with 'Frame#', 'Time' and the names of markers, parted by tabs")
+    names = [name for name in cells[2:] if name]
+    twice = first_twice(names)
+    if twice is not None or not names:
+        what = "no marker" if twice is None else f"two markers {one_line(twice)[:_LONGEST_SHOWN]!r}"
+        raise DataError(f"line 4: names {what}; every marker needs a name of its own")
+    return names
+
+
+def _marker_row(line: str, number: int, markers: int) -> list[float]:
+    """Return time and coordinates of a row; cells that are not there are those of markers that were not seen."""
+    cells = [cell.strip() for cell in line.split("\t")] if "\t" in line else line.split()
+    wanted = 2 + 3 * markers
+    if len(cells) > wanted and any(cells[wanted:]):
+        raise DataError(f"line {number} has {len(cells)} values for {wanted} columns")
+    cells = [*cells, *[""] * (wanted - len(cells))][:wanted]
+    return [_marker_number(cells[1], number, is_time=True), *(_marker_number(cell, number) for cell in cells[2:])]
+
+
+def _marker_number(cell: str, number: int, is_time: bool = False) -> float:
+    if not is_time and cell.lower() in ("", "nan"):
+        return float("nan")
+    value = float(cell) if _NUMBER.fullmatch(cell) else float("nan")
+    if not np.isfinite(value):
+        raise DataError(f"line {number}: {one_line(cell)[:_LONGEST_SHOWN]!r} is not a number, or not a finite one")
+    return value
+
+
+def _check_frames(time: Floats, lines: list[int]) -> None:
+    if time.size == 0:
+        raise DataError("has no rows")
+    stalled = np.flatnonzero(np.diff(time) <= 0.0)
+    if stalled.size:
+        index = int(stalled[0]) + 1
+        raise DataError(
+            f"line {lines[index]}: the time {time[index]:g} s follows {time[index - 1]:g} s; it must increase"
+        )

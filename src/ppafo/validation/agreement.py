@@ -1,4 +1,7 @@
-"""A model compared with one recording, on the inputs of that recording: errors channel by channel."""
+"""A model compared with one recording, on the inputs of that recording: errors channel by channel.
+
+How much later the measurement is than the model is the shift in time that leaves the smallest squares.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,25 +14,113 @@ from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded.inputs import SUPPLY, regular_interval
 from ppafo.simulation.recorded.scenario import with_fixed_volume
-from ppafo.validation.alignment import DEFAULT_LIMIT, Curve, Delay, estimate_delay
-from ppafo.validation.compared import (
+from ppafo.validation.measured import (
     ANGLE,
     COMPARED,
     PRESSURE_1,
     PRESSURE_2,
     PRESSURE_DIFFERENCE,
+    Measured,
     Thresholds,
     parse_thresholds,
+    supply_gauge,
 )
-from ppafo.validation.measured import Measured, supply_gauge
 from ppafo.validation.replay import Motion, Replayed, initial_in_fixed_volume, replay_recording, start_of
+
+DEFAULT_LIMIT = 0.02
+"""Largest delay [s] that is looked for; sensors, filters and valves are late by less, and a model by more is wrong."""
+
+_SHIFTS = 81
+_MAXIMUM_SAMPLES = 4000
+_MINIMUM_GAIN = 25.0
+"""In variances of one sample: five standard deviations of white noise. Less is noise and no delay."""
+_SMALLEST_GAIN = 1.0e-12
+"""Gain below which two curves are the same to the accuracy of the engine."""
+_RESOLUTION = 0.02
+"""Fraction of a sample below which a delay counts as none."""
+_GOLDEN = 0.6180339887498949
+_REFINEMENTS = 30
+_AT_LIMIT = 0.99
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """One channel of both: measured values at their times, the model's at its own, and the full range."""
+
+    times: Floats
+    values: Floats
+    model_times: Floats
+    model_values: Floats
+    full_range: float
+
+    def shift(self, delay: float, times: Floats) -> Floats:
+        """The model, ``delay`` [s] later, at some times; before its first and after its last value it stands still."""
+        return np.interp(times - delay, self.model_times, self.model_values)
+
+
+@dataclass(frozen=True, slots=True)
+class Delay:
+    """Time [s] by which the measurement is later than the model, 0 where none can be seen; True at its limit."""
+
+    value: float
+    is_at_limit: bool
+
+    @property
+    def correction(self) -> float:
+        """The delay [s] to correct for; 0 at the limit, where the best fit is no delay of a sensor any more."""
+        return 0.0 if self.is_at_limit else self.value
+
+
+def estimate_delay(curves: "list[Curve]", limit: float) -> Delay:
+    """The delay, at most ``limit`` [s] either way, that brings the channels together best, each in its full range."""
+    if limit <= 0.0 or not curves:
+        return Delay(0.0, is_at_limit=False)
+    # No more measured samples than the search needs.
+    steps = [-(-curve.times.size // _MAXIMUM_SAMPLES) for curve in curves]
+    thinned = [
+        replace(curve, times=curve.times[::step], values=curve.values[::step])
+        for curve, step in zip(curves, steps, strict=True)
+    ]
+    shifts = np.linspace(-limit, limit, _SHIFTS).tolist()
+    best = int(np.argmin([_cost(thinned, shift) for shift in shifts]))
+    value = _minimum(thinned, shifts[max(0, best - 1)], shifts[min(_SHIFTS - 1, best + 1)])
+    # A delay counts where it explains more than noise and the accuracy of the engine could.
+    shifted = _cost(thinned, value)
+    gain, samples = _cost(thinned, 0.0) - shifted, sum(curve.times.size for curve in thinned)
+    is_significant = gain > _SMALLEST_GAIN and gain * samples > _MINIMUM_GAIN * shifted
+    if abs(value) < _RESOLUTION * float(np.median(np.diff(curves[0].times))) or not is_significant:
+        return Delay(0.0, is_at_limit=False)
+    return Delay(value, abs(value) > _AT_LIMIT * limit)
+
+
+def _cost(curves: "list[Curve]", delay: float) -> float:
+    """Mean squared error over all samples and channels, in full ranges [-]."""
+    means = [
+        float((((curve.shift(delay, curve.times) - curve.values) / curve.full_range) ** 2).mean()) for curve in curves
+    ]
+    return sum(means) / len(means)
+
+
+def _minimum(curves: "list[Curve]", low: float, high: float) -> float:
+    """The delay [s] of the smallest cost between two delays, by golden section."""
+    inner = [high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)]
+    costs = [_cost(curves, delay) for delay in inner]
+    for _ in range(_REFINEMENTS):
+        if costs[0] <= costs[1]:
+            high, inner[1], costs[1] = inner[1], inner[0], costs[0]
+            inner[0] = high - _GOLDEN * (high - low)
+            costs[0] = _cost(curves, inner[0])
+        else:
+            low, inner[0], costs[0] = inner[0], inner[1], costs[1]
+            inner[1] = low + _GOLDEN * (high - low)
+            costs[1] = _cost(curves, inner[1])
+    return 0.5 * (low + high)
+
 
 _LONGEST_WEIGHT = 3.0
 """Usual intervals for which one sample may speak at most, so that a gap does not count for what nobody measured."""
 _OTHER_SUPPLY = 0.05
 """Fraction of the set's gauge pressure by which a recorded supply may differ before it is remarked on."""
-_AT_LIMIT = "model and measurement are more than {:g} s apart in time; no delay was removed"
-_CHANNEL_AT_LIMIT = "own delay of {} is at the limit of {:g} s: not the delay of a sensor, but a different time course"
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,13 +254,20 @@ def compare_recording(measured: Measured, device: Device, settings: ReplaySettin
     if settings.volume is not None:
         device = with_fixed_volume(device, settings.volume)
         settings = replace(settings, motion="held", initial=initial_in_fixed_volume(device, settings.initial))
-    _check_angle(measured, settings.motion)
+    if settings.motion == "measured" and not measured.has(ANGLE):
+        raise DataError(f"{measured.file}: there is no channel '{ANGLE}' to prescribe (--motion measured)")
     start = start_of(measured, device, settings.initial)
     replayed = replay_recording(measured, device, start, settings.motion, settings.longest_delay)
     items = _comparisons(measured, replayed, device, settings)
     delay = common_delay(items, settings.longest_delay)
     channels = tuple(channel_agreement(item, delay.correction, settings.longest_delay) for item in items)
-    late = _late_remarks(delay, channels, settings.longest_delay)
+    late, longest = [], settings.longest_delay
+    alone = ", ".join(channel.channel for channel in channels if channel.delay_is_at_limit)
+    if delay.is_at_limit:
+        late.append(f"model and measurement are more than {longest:g} s apart in time; no delay was removed")
+    elif alone:
+        limit = f"own delay of {alone} is at the limit of {longest:g} s"
+        late.append(f"{limit}: not the delay of a sensor, but a different time course")
     return RecordingAgreement(
         file=measured.file,
         sha256=measured.sha256,
@@ -184,14 +282,6 @@ def compare_recording(measured: Measured, device: Device, settings: ReplaySettin
     )
 
 
-def _late_remarks(delay: Delay, channels: Sequence[ChannelAgreement], longest: float) -> tuple[str, ...]:
-    """Say where the search for a delay ended at its limit, for all channels together or for some alone."""
-    if delay.is_at_limit:
-        return (_AT_LIMIT.format(longest),)
-    alone = [channel.channel for channel in channels if channel.delay_is_at_limit]
-    return (_CHANNEL_AT_LIMIT.format(", ".join(alone), longest),) if alone else ()
-
-
 def measured_values(recording: Recording, name: str) -> Floats | None:
     """The values of a channel to compare; the pressure difference follows from both pressures where they are there."""
     if name == PRESSURE_DIFFERENCE and PRESSURE_1 in recording and PRESSURE_2 in recording:
@@ -201,18 +291,17 @@ def measured_values(recording: Recording, name: str) -> Floats | None:
     return recording[name]
 
 
-def _check_angle(measured: Measured, motion: Motion) -> None:
-    if motion == "measured" and not measured.has(ANGLE):
-        raise DataError(f"{measured.file}: there is no channel '{ANGLE}' to prescribe (--motion measured)")
-
-
 def _comparisons(measured: Measured, replayed: Replayed, device: Device, settings: ReplaySettings) -> list[Comparison]:
     """The channels that the recording has and that the model was not given."""
     gauge = supply_gauge(measured.recording, device)
+    # Channels that say nothing where the vane is held, or where there is none.
+    silent: tuple[str, ...] = (ANGLE,) if settings.motion == "held" else ()
+    if settings.volume is not None:
+        silent = tuple(name for name in COMPARED if name != PRESSURE_1)
     items = []
     for name, kind in COMPARED.items():
         values = measured_values(measured.recording, name)
-        if values is None or name in replayed.inputs or name in _not_of_motion(settings):
+        if values is None or name in replayed.inputs or name in silent:
             continue
         full_range = kind.full_range(device, gauge)
         model = replayed.recording
@@ -222,13 +311,6 @@ def _comparisons(measured: Measured, replayed: Replayed, device: Device, setting
         word = "pressure_1" if settings.volume is not None else "anything beside the prescribed angle"
         raise DataError(f"{measured.file}: has nothing to compare; it needs {word}")
     return items
-
-
-def _not_of_motion(settings: ReplaySettings) -> tuple[str, ...]:
-    """The channels that say nothing where the vane is held, or where there is none."""
-    if settings.volume is not None:
-        return tuple(name for name in COMPARED if name != PRESSURE_1)
-    return (ANGLE,) if settings.motion == "held" else ()
 
 
 def _remarks(measured: Measured, device: Device, settings: ReplaySettings) -> tuple[str, ...]:

@@ -1,12 +1,16 @@
-"""A recording as evidence: read from its file, and refused or remarked on where it cannot carry a comparison."""
+"""A recording as evidence: read from its file, and refused or remarked on where it cannot carry a comparison.
+
+The channels in which it is compared with a model are here too, their full ranges, and how large an error may be.
+"""
 
 import hashlib
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from ppafo.errors import DataError, nearest_name
+from ppafo.errors import DataError, UnitError, nearest_name, one_line
 from ppafo.parameters.device import Device
 from ppafo.signals import CHANNELS, Recording
 from ppafo.signals.faults import FEWEST_AT_LIMIT, Plateau, is_at_limit, is_noisy, lasting_change, plateaus
@@ -14,11 +18,106 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded.checks import PRESSURES, check_absolute, check_command, check_gaps, usual_interval
 from ppafo.simulation.recorded.inputs import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
 from ppafo.storage import read_recording
-from ppafo.storage.column_map import ColumnMap
 from ppafo.storage.files import read_bytes
-from ppafo.storage.foreign import read_foreign
+from ppafo.storage.foreign import ColumnMap, read_foreign
 from ppafo.storage.result_folder import NETCDF_FILE
-from ppafo.validation.compared import ANGLE, COMPARED, PRESSURE_1, PRESSURE_2
+from ppafo.units import from_si, parse_quantity, split_quantity
+
+ANGLE, PRESSURE_1, PRESSURE_2 = "angle", "pressure_1", "pressure_2"
+PRESSURE_DIFFERENCE, TORQUE = "pressure_difference", "torque"
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """A channel: unit of an error in it (``Pa_d``: a pressure difference), kind of quantity of its errors, full range.
+
+    ``full_range(device, gauge)`` takes the gauge pressure of the supply [Pa].
+    """
+
+    unit: str
+    quantity: str
+    title: str
+    full_range: Callable[[Device, float], float]
+
+
+COMPARED: dict[str, Compared] = {
+    ANGLE: Compared(
+        "rad", "angle", "Vane angle", lambda device, _: device.actuator.angle_max - device.actuator.angle_min
+    ),
+    PRESSURE_1: Compared("Pa_d", "pressure change", "Pressure in chamber 1", lambda _, gauge: gauge),
+    PRESSURE_2: Compared("Pa_d", "pressure change", "Pressure in chamber 2", lambda _, gauge: gauge),
+    PRESSURE_DIFFERENCE: Compared("Pa_d", "pressure change", "Pressure difference", lambda _, gauge: 2.0 * gauge),
+    TORQUE: Compared(
+        "N m", "torque", "Actuator torque", lambda device, gauge: 2.0 * gauge * device.actuator.torque_constant
+    ),
+}
+"""Full ranges as the paper has them: 110 deg, 55 psi, 55 psi and 110 psi; the torque follows by equation (2).
+
+A difference goes from full supply on one side to full supply on the other.
+"""
+
+ACCEPTABLE_FRACTION = 0.10
+"""RMS error over full range that the paper calls acceptable (page with figure 7)."""
+
+_FRACTION_UNITS = ("%", "percent")
+_EXAMPLES = "a threshold is written 'angle=10%', 'pressure_1=3.7 psi_d' or '5%' for all channels"
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """Largest RMS error: a fraction of the full range [-], or an error in the SI unit of the channel."""
+
+    value: float
+    is_fraction: bool
+
+    def fraction_of(self, full_range: float) -> float:
+        """The limit as a fraction [-] of a full range in the SI unit of the channel."""
+        return self.value if self.is_fraction else self.value / full_range
+
+
+@dataclass(frozen=True, slots=True)
+class Thresholds:
+    """The limit of every channel that has one of its own, and that of the others."""
+
+    others: Limit
+    channels: Mapping[str, Limit]
+
+    def limit(self, channel: str) -> Limit:
+        """The limit that holds for a channel."""
+        return self.channels.get(channel, self.others)
+
+
+def parse_thresholds(texts: Iterable[str] = ()) -> Thresholds:
+    """Return the thresholds of texts such as ``angle=10%``, ``pressure_1=3.7 psi_d`` or ``5%``; later ones win."""
+    others = Limit(ACCEPTABLE_FRACTION, is_fraction=True)
+    channels: dict[str, Limit] = {}
+    for text in texts:
+        name, separator, value = text.rpartition("=")
+        if separator:
+            channel = name.strip()
+            if channel not in COMPARED:
+                hint, known = nearest_name(channel, COMPARED), ", ".join(COMPARED)
+                raise DataError(
+                    f"threshold '{one_line(text)}': there is no channel '{one_line(channel)}'{hint}; available: {known}"
+                )
+            channels[channel] = _limit(value, text, COMPARED[channel].unit)
+        else:
+            others = _limit(value, text, "")
+    return Thresholds(others, channels)
+
+
+def _limit(value: str, text: str, unit: str) -> Limit:
+    try:
+        is_fraction = split_quantity(value)[1] in _FRACTION_UNITS
+        number = parse_quantity(value, "" if is_fraction else unit)
+    except UnitError as error:
+        raise DataError(f"threshold '{one_line(text)}': {error}; {_EXAMPLES}") from error
+    if not unit and not is_fraction:
+        raise DataError(f"threshold '{one_line(text)}': a limit for all channels is a percentage of the full range")
+    if number <= 0.0:
+        raise DataError(f"threshold '{one_line(text)}': must be above 0; {_EXAMPLES}")
+    return Limit(number, is_fraction)
+
 
 MINIMUM_SAMPLES = 10
 """Fewer are a few readings and no course in time."""
@@ -60,7 +159,10 @@ def read_measured(path: str | Path, device: Device, columns: ColumnMap | None = 
 
 def check_recording(recording: Recording, device: Device, file: str, sha256: str = "") -> Measured:
     """Return a recording as evidence with its remarks, or refuse it in one line that begins with ``file``."""
-    _check_length(recording, file)
+    count = len(recording)
+    if count < MINIMUM_SAMPLES:
+        noun = "sample" if count == 1 else "samples"
+        raise DataError(f"{file}: has {count} {noun}; at least {MINIMUM_SAMPLES} are needed")
     unknown = _check_names(recording, file)
     check_gaps(recording, file)
     check_command(recording, file)
@@ -69,13 +171,6 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
     _check_change(recording, device, file)
     remarks = (*unknown, *_gap_remarks(recording), *_constant_remarks(recording), *_clip_remarks(recording))
     return Measured(file, sha256, recording, remarks)
-
-
-def _check_length(recording: Recording, file: str) -> None:
-    count = len(recording)
-    if count < MINIMUM_SAMPLES:
-        noun = "sample" if count == 1 else "samples"
-        raise DataError(f"{file}: has {count} {noun}; at least {MINIMUM_SAMPLES} are needed")
 
 
 def _check_names(recording: Recording, file: str) -> tuple[str, ...]:
@@ -122,16 +217,11 @@ def _check_pressures(recording: Recording, device: Device, file: str) -> None:
     for name in (name for name in (PRESSURE_1, PRESSURE_2) if name in recording):
         level = max(float(recording[name][0]), float(np.median(recording[name])))
         if level > allowed:
-            raise DataError(_above_supply(file, name, level, highest, device, SUPPLY in recording))
-
-
-def _above_supply(file: str, name: str, level: float, supply: float, device: Device, is_recorded: bool) -> str:
-    from ppafo.units import from_si
-
-    shown = [f"{from_si(p, 'psi_g', 'Pa_a', device.supply.atmospheric_pressure):.4g} psi_g" for p in (level, supply)]
-    owner = f"the recorded '{SUPPLY}'" if is_recorded else f"the supply of {device.name}"
-    remedy = "check both sensors" if is_recorded else f'record it, or give --set "supply.pressure={shown[0]}"'
-    return f"{file}: '{name}' stays at {shown[0]}, above {owner}, {shown[1]}: {remedy}"
+            atmosphere, is_recorded = supply.atmospheric_pressure, SUPPLY in recording
+            shown = [f"{from_si(one, 'psi_g', 'Pa_a', atmosphere):.4g} psi_g" for one in (level, highest)]
+            owner = f"the recorded '{SUPPLY}'" if is_recorded else f"the supply of {device.name}"
+            remedy = "check both sensors" if is_recorded else f'record it, or give --set "supply.pressure={shown[0]}"'
+            raise DataError(f"{file}: '{name}' stays at {shown[0]}, above {owner}, {shown[1]}: {remedy}")
 
 
 def supply_gauge(recording: Recording, device: Device) -> float:

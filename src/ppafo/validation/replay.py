@@ -30,8 +30,7 @@ from ppafo.simulation.recorded.scenario import held_vane, replay_scenario, with_
 from ppafo.simulation.recorded.start import Start, samples_at_rest
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.units import parse_quantity
-from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2
-from ppafo.validation.measured import Measured
+from ppafo.validation.measured import ANGLE, PRESSURE_1, PRESSURE_2, Measured
 
 Motion = Literal["free", "measured", "held"]
 MOTIONS: tuple[Motion, ...] = ("free", "measured", "held")
@@ -56,7 +55,11 @@ def replay_recording(measured: Measured, device: Device, start: Start, motion: M
     run = _plan(measured, device, start, motion, extra)
     if motion == "measured":
         run = with_prescribed_angle(run, start.angle)
-    inputs = _inputs(measured, motion)
+    # The torque on a prescribed vane is what moves it, not an input.
+    followed = [name for name in (SUPPLY, DORSIFLEXION_SUPPLY) if measured.has(name)]
+    followed += [EXTERNAL_TORQUE] if measured.has(EXTERNAL_TORQUE) and motion == "free" else []
+    followed += [ANGLE] if motion == "measured" else []
+    inputs = RecordedInputs(measured.recording, (COMMAND, *followed), float(measured.recording.time[0]))
     outcome = replay(batch_of(run), step_inputs(inputs, device, run))
     rows = state_row_numbers(run)
     failed = float(outcome.states[rows["result.failure_time"], 0])
@@ -67,16 +70,6 @@ def replay_recording(measured: Measured, device: Device, start: Start, motion: M
             remedy = TOO_MANY_PARTS
         raise SimulationError(f"{measured.file}: the model diverged {until:.6g} s after the first sample; {remedy}")
     return Replayed(_recording(measured, run, outcome.record[:, :, 0]), run.step, inputs.names)
-
-
-def _inputs(measured: Measured, motion: Motion) -> RecordedInputs:
-    """Return what the model is given: the command, and supply and torque where they are in the recording."""
-    names = (
-        COMMAND,
-        *(name for name in (SUPPLY, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE) if _is_used(measured, name, motion)),
-        *((ANGLE,) if motion == "measured" else ()),
-    )
-    return RecordedInputs(measured.recording, names, float(measured.recording.time[0]))
 
 
 def _plan(measured: Measured, device: Device, start: Start, motion: Motion, extra: float) -> Run:
@@ -95,18 +88,10 @@ def _plan(measured: Measured, device: Device, start: Start, motion: Motion, extr
     supply = device.supply
     plant = run.plant._replace(supply_pressure=supply.pressure, dorsiflexion_pressure=supply.dorsiflexion_pressure)
     samples = math.ceil(run.step_count / run.steps_per_sample)
-    return replace(run, plant=plant, record_every=_record_every(run), step_count=samples * run.steps_per_sample)
-
-
-def _record_every(run: Run) -> int:
-    """Steps between two records; they divide a sample, so that the model is known at every regular sample."""
+    # Steps between two records divide a sample, so that the model is known at every regular sample.
     most = max(1, int(_RECORD_INTERVAL / run.step * (1.0 + _WHOLE)))
-    return max(count for count in range(1, most + 1) if run.steps_per_sample % count == 0)
-
-
-def _is_used(measured: Measured, name: str, motion: Motion) -> bool:
-    """True where an input is in the recording; the torque on a prescribed vane is what moves it, not an input."""
-    return measured.has(name) and not (name == EXTERNAL_TORQUE and motion != "free")
+    every = max(count for count in range(1, most + 1) if run.steps_per_sample % count == 0)
+    return replace(run, plant=plant, record_every=every, step_count=samples * run.steps_per_sample)
 
 
 def _recording(measured: Measured, run: Run, record: Floats) -> Recording:

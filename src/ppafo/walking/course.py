@@ -9,8 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
-from ppafo.documents.models import NAME, make_schema, one_of, optional, table, validate
-from ppafo.documents.problems import quote
+from ppafo.documents.models import NAME, make_schema, one_of, optional, quote, table, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.model.declaration import Quantity

@@ -13,7 +13,7 @@ from ppafo.cli.main import main
 from ppafo.live.page import bundled, digest
 from ppafo.questions.walk import solve
 from ppafo.storage import read_csv, read_netcdf
-from ppafo.storage.recordings import read_recording
+from ppafo.storage.result_folder import read_recording
 from ppafo.walking import loading
 
 SHORT = ["--minutes", "0.1"]

@@ -438,8 +438,7 @@ def test_a_recording_of_one_s_own_is_compared_as_validate_does(chromium: Any, fi
     import numpy as np
 
     from ppafo.simulation.simulate import simulate
-    from ppafo.validation.agreement import Comparison, channel_agreement
-    from ppafo.validation.alignment import DEFAULT_LIMIT, Curve, estimate_delay
+    from ppafo.validation.agreement import DEFAULT_LIMIT, Comparison, Curve, channel_agreement, estimate_delay
 
     recording = simulate(load_scenario("torque-task-solenoid")).recording
     time = recording.time[50:2900:3]

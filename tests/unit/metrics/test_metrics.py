@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ppafo.metrics import METRICS, evaluate
-from ppafo.metrics.phases import hold_start
+from ppafo.metrics.metric import hold_start
 from ppafo.metrics.switching import reversals
 from ppafo.signals import CHANNELS, Channel, Recording
 

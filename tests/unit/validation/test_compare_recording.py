@@ -13,7 +13,7 @@ from ppafo.parameters.device import Device
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate
-from ppafo.validation.compared import parse_thresholds
+from ppafo.validation.measured import parse_thresholds
 
 Agree = Callable[..., Any]
 Step = tuple[Device, Recording]

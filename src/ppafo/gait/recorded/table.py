@@ -15,12 +15,10 @@ import numpy as np
 from ppafo.errors import DataError, first_twice, one_line
 from ppafo.gait.recorded.c3d import Trial, read_c3d
 from ppafo.signals.recording import Floats
-from ppafo.storage.column_map import ColumnMap, MappedChannel
 from ppafo.storage.comma_separated import read_csv
 from ppafo.storage.files import read_bytes
-from ppafo.storage.foreign import read_foreign
-from ppafo.storage.opensim import OpenSimTable, read_opensim_with_gaps
-from ppafo.storage.trc import read_trc
+from ppafo.storage.foreign import ColumnMap, MappedChannel, read_foreign
+from ppafo.storage.opensim import OpenSimTable, read_opensim_with_gaps, read_trc
 
 _LARGEST_JUMP = 3.0
 """Times the median interval; a longer one is a gap, not jitter of the clock."""

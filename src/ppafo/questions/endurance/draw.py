@@ -22,8 +22,7 @@ from ppafo.simulation.loading import scenario_from_dict
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 from ppafo.simulation.simulate import simulate
 from ppafo.storage.owned_folder import read_json
-from ppafo.storage.recordings import read_recording
-from ppafo.storage.result_folder import RUN_FILE, read_document
+from ppafo.storage.result_folder import RUN_FILE, read_document, read_recording
 from ppafo.walking import WalkResult
 from ppafo.walking.course_segments import is_whole_course
 from ppafo.walking.motion import walk_of

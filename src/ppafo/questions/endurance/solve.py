@@ -30,7 +30,7 @@ from ppafo.questions.endurance.draw import (
     walk_gas,
 )
 from ppafo.signals import Recording
-from ppafo.storage.recordings import read_recording
+from ppafo.storage.result_folder import read_recording
 from ppafo.units import parse_quantity
 from ppafo.walking import WalkResult
 

@@ -26,7 +26,7 @@ from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, c
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.identify.answer import Beforehand, Identification, _bench_estimates
 from ppafo.storage.foreign import read_foreign
-from ppafo.storage.recordings import read_recording
+from ppafo.storage.result_folder import read_recording
 
 
 def identify(problem: str | Path, progress: Report = report_nothing) -> Identification:

@@ -21,7 +21,7 @@ from ppafo.parameters.parts.catalogue import DEFAULT
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import OPEN_LOOP
-from ppafo.storage.recordings import read_recording
+from ppafo.storage.result_folder import read_recording
 from ppafo.units import parse_quantity, split_quantity
 
 Floats = NDArray[np.float64]

@@ -19,8 +19,7 @@ from pydantic import BaseModel, Field
 
 from ppafo.control.kind import PythonController
 from ppafo.documents.json_text import json_text
-from ppafo.documents.models import validate
-from ppafo.documents.problems import quote
+from ppafo.documents.models import quote, validate
 from ppafo.engine.lanes import write_source
 from ppafo.errors import DataError, StudyError
 from ppafo.metrics import METRICS

@@ -28,13 +28,17 @@ from ppafo.parameters.device import Device
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.question import Solved
 from ppafo.signals.recording import Floats
-from ppafo.storage.column_map import ColumnMap, load_column_map
 from ppafo.storage.comma_separated import marked_csv_bytes
+from ppafo.storage.foreign import ColumnMap, load_column_map
 from ppafo.validation import ChannelAgreement
-from ppafo.validation.agreement import RecordingAgreement, ReplaySettings, compare_recording, measured_values
-from ppafo.validation.alignment import DEFAULT_LIMIT
-from ppafo.validation.compared import COMPARED, PRESSURE_1, PRESSURE_2, parse_thresholds
-from ppafo.validation.measured import read_measured
+from ppafo.validation.agreement import (
+    DEFAULT_LIMIT,
+    RecordingAgreement,
+    ReplaySettings,
+    compare_recording,
+    measured_values,
+)
+from ppafo.validation.measured import COMPARED, PRESSURE_1, PRESSURE_2, parse_thresholds, read_measured
 from ppafo.validation.replay import MOTIONS, Motion, parse_initial
 from ppafo.version import __version__
 

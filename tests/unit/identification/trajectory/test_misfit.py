@@ -19,7 +19,7 @@ from ppafo.questions.identify.solve import identify
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
-from ppafo.storage.recordings import read_recording
+from ppafo.storage.result_folder import read_recording
 
 DEAD_VOLUME = "actuator.dead_volume_1"
 PARAMETERS = tuple(FreeParameter(path) for path in FIVE_PARAMETERS)
