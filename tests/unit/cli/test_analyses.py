@@ -95,6 +95,7 @@ def test_the_lines_of_a_tuning_can_be_pasted(tuning: Path, tmp_path: Path, capsy
     result = json.loads(capsys.readouterr().out)
     stored = json.loads((tmp_path / "out" / "tune.json").read_text())
     assert result["metrics"]["rms_error"]["value"] == pytest.approx(stored["after"]["values"]["rms_error"], rel=1e-9)
+    assert set(stored["effort"]) == {"starts", "generations", "candidates_per_gain", "seed"}
 
 
 def test_a_goal_that_no_gains_can_keep_is_exit_code_1_and_says_why(

@@ -396,7 +396,7 @@ def _data(tuning: Tuning) -> dict[str, Any]:
         "robust": None
         if problem.spread is None
         else {"study": problem.spread.study or None, "measure": problem.spread.measure},
-        "effort": plain(problem.effort),
+        "effort": problem.effort.model_dump(),
         "before": _setting_data(tuning.before),
         "after": _setting_data(tuning.after),
         "starts": [plain(start) for start in tuning.starts],
