@@ -1,4 +1,4 @@
-"""In which unit a person is shown a quantity: the only table of it. Files and data stay in SI."""
+"""In which unit a person is shown a quantity or a metric: the only table of it. Files and data stay in SI."""
 
 import math
 from collections.abc import Mapping

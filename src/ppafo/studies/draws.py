@@ -1,4 +1,4 @@
-"""Draws from the distributions of a study, as columns of values for an ensemble."""
+"""Draws from the distributions of a study, as columns of values for an ensemble, and what comes of their runs."""
 
 import time
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence

@@ -7,6 +7,9 @@ without making the others: a Feistel network on the next even number of bits, fo
 (cycle walking; Black and Rogaway, CT-RSA 2002). The mixing is that of SplitMix64 (Steele et al., OOPSLA 2014).
 
 Correlations are those of normal scores: a Gaussian copula, which leaves each distribution as it was.
+
+A scenario has one seed, so that a single run can be repeated. A statement about a device must not depend on that one
+realisation: where sensors are noisy, every draw gets a noise stream of its own.
 """
 
 import threading

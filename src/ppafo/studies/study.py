@@ -1,4 +1,4 @@
-"""A study as frozen values in SI units, and which run has which configuration, grid point and draw."""
+"""A study as frozen values in SI units: what it keeps, its runs, grid points and draws, and its configurations."""
 
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence

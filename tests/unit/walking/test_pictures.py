@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from ppafo.answers.writing import text_of
-from ppafo.questions.walk.answer import comparison_table
-from ppafo.questions.walk.wearers import wearers_answer
+from ppafo.questions.walk.answer import comparison_table, wearers_answer
 from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk, walk_population
 from ppafo.walking.figures.animation import animation
 from ppafo.walking.figures.legs import drags, frames_figure, last_phases, legs_of

@@ -1,4 +1,8 @@
-"""Do the runs of this computer have the bits of every other: the runs, their hashes, the answer."""
+"""Do the runs of this computer have the bits of every other: the runs, their hashes, the answer.
+
+The rows of a run are made by its plan. Those of a draw are theirs times factors from whole numbers alone, so that no
+library has a part in them.
+"""
 
 import hashlib
 import json

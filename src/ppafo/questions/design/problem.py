@@ -1,4 +1,4 @@
-"""Numbers that a design may choose: read from the file, and from places in the unit interval to SI values."""
+"""A design file: numbers to choose, tasks, parts and constraints, and the problem in SI units that it makes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,11 @@
-"""Search for designs that no other dominates: what dominates what, how a generation follows from the last."""
+"""Search for designs that no other dominates: what dominates what, how a generation follows from the last.
+
+Non-dominated sorting with constraints: Deb, Pratap, Agarwal and Meyarivan, A fast and elitist multiobjective genetic
+algorithm: NSGA-II, 2002. All objectives are to be small.
+
+Kukkonen and Lampinen, GDE3: the third evolution step of generalized differential evolution, 2005; variation of the
+choice of parts as in a genetic algorithm. Why so: docs/decisions/0006.
+"""
 
 import time
 from bisect import bisect_left

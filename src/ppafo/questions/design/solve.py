@@ -1,4 +1,4 @@
-"""Carries out a design study: problem in, front with table, knee and doubts out."""
+"""What designs are worth on every task and in every noise stream, and the study: problem in, front out."""
 
 import time
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""The lowest or highest value of a number that meets a condition on a metric: a grid, then ever smaller brackets."""
+"""The lowest or highest value that meets a condition on a metric: a grid, then ever smaller brackets; the answer."""
 
 import re
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""The answer of a league, whatever its task: the table, what it rests on, error against gas, who plays."""
+"""A league, whatever its task, and its answer: the table, what it rests on, error against gas, who plays."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

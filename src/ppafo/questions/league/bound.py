@@ -5,6 +5,10 @@ differences: near equal pressures the straight line and the root of the flow cur
 supply that takes no gas back closes smoothly too, and a valve may spend a share of the time at each of its ways. Both
 ways at once stands for a valve that switches between them infinitely fast, so that no control of the valve can do
 better.
+
+Held or prescribed motion, isothermal gas. Sampling, sensors, dead band, delays and spool are left out: each of them can
+only make a task harder, so what is found without them bounds what is possible with them. The optimiser finds a local
+optimum; that it is the best there is, is checked only by every controller staying above it.
 """
 
 from collections.abc import Callable, Sequence

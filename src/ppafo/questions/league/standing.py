@@ -1,4 +1,18 @@
-"""What a league reports of one entrant, and of a valve: measures, robustness over draws, lower bound; any task."""
+"""Who plays in a league, on which drawn devices, and what is reported of an entrant and of a valve; any task.
+
+A law with a continuous command says nothing to a solenoid valve but its sign, so only the on/off laws play there. To
+add an entrant to the torque task: one line here. A controller that is new in the walking catalogue enters by itself, on
+the proportional valve; only another valve takes a line.
+
+Iterative learning repeats a task to learn the feed-forward table of ``damped_proportional``. The law of
+Zhang, Cheah and Collins (2015) from one repetition n to the next, for every place i of the table:
+
+    filtered_n = (1 - m) filtered_{n-1} + m e_n
+    table_{n+1}(i) = b table_n(i) + k filtered_n(i)
+
+with the table used a little earlier than it was learnt, by the lead. The error e at a knot is the mean over the time
+that belongs to the knot, weighted as the table is read: straight to its neighbours.
+"""
 
 import math
 from collections.abc import Callable, Mapping, Sequence

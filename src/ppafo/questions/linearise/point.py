@@ -1,4 +1,4 @@
-"""The point at which a scenario is made linear: an instant of its run, or the steady state that it asks for."""
+"""The plant at a point, symbolically, and the point itself: an instant of a run, or the steady state that it has."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,12 @@
-"""Monte Carlo over the distributions of a study file."""
+"""A statistic over the distributions of a study, drawn until its interval is narrow enough, and the answer.
+
+A mean is estimated from randomised Sobol replicates, which know that of a smooth function far better than as many
+independent draws. The intervals of quantiles and probabilities are exact for independent draws, and get those.
+
+Looking repeatedly and stopping at a favourable interval makes an ordinary interval too narrow. Here the number of
+looks is bounded before the first draw, and each look takes an equal part of the allowed error (Bonferroni's
+inequality): with the stated confidence all intervals of the trace hold at once, the one at which it stopped too.
+"""
 
 import math
 import re

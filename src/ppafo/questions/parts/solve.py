@@ -1,4 +1,4 @@
-"""Looks parts up in a catalogue."""
+"""Real parts of a catalogue, listed with the origin of every figure; what other answers say of doubtful figures."""
 
 import textwrap
 from collections.abc import Iterable, Mapping

@@ -2,6 +2,9 @@
 
 Two presets of the rig record each experiment. `ideal-laboratory` has the paper's physics and shows whether a procedure
 returns what was planted. `paper-bench` adds effects that the paper's laws do not know, and shows what they do to it.
+
+What a synthetic recording shows is that the procedure works. It says nothing about the paper's device, so that none of
+these claims is ever plainly reproduced.
 """
 
 import math

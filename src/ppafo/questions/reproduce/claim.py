@@ -1,4 +1,4 @@
-"""One claim of the paper beside our number, with the verdict and what it rests on; one sentence of its text."""
+"""Claims of the paper beside our numbers, the paper's numbers as printed, and the claims that are arithmetic."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

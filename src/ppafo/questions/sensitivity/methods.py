@@ -1,4 +1,8 @@
-"""The methods by which influence is measured: Sobol, Morris and Shapley, each with its design and its indices."""
+"""The methods by which influence is measured: Sobol, Morris and Shapley, each with its design and its indices.
+
+A design is made of blocks that belong together: one trajectory of Morris, one base point of Sobol with its
+exchanged copies, one order of the values for Shapley. A block is the least that can be left out.
+"""
 
 import importlib.util
 import math

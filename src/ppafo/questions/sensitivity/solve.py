@@ -1,4 +1,9 @@
-"""Sensitivity over the distributions of a study file."""
+"""The sensitivity of metrics to what has a distribution in a study: the analysis at growing sizes, and the answer.
+
+Policy for runs that fail: where more than a fraction of all runs has no value it is refused, because the indices
+would be those of the survivors. Otherwise every block (trajectory or base point) with such a run is left out whole,
+since the formulas need whole blocks, and counted; the indices then hold for values with which the model runs.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

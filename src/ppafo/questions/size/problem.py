@@ -1,4 +1,4 @@
-"""The prescribed torque of a sizing file: from a recording or a list to the table that the lanes follow."""
+"""A sizing file: the prescribed torque as a table that the lanes follow, and the problem in SI units that it makes."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,8 @@
-"""Which supply pressures a valve can do a task with, what it takes there, and what limits it."""
+"""Which supply pressures a valve can do a task with, what it takes there, and what limits it.
+
+Each pressure is tried with many gains, and some openings, of one valve at once on the lanes. Nothing is taken for
+granted about how the error depends on the pressure.
+"""
 
 from dataclasses import dataclass
 from itertools import product

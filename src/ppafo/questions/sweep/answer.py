@@ -1,4 +1,4 @@
-"""The answer of a sweep: counts, a table of metrics for each configuration, what varied and what was assumed."""
+"""The results of a study and their answer: counts, metrics of each configuration, what varied, the figure."""
 
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence

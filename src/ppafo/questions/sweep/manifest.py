@@ -1,4 +1,12 @@
-"""``study.json``: whose results a folder holds, complete enough to refuse those of another study by what differs."""
+"""What identifies a study: bins, chunks, the controllers in Python, and ``study.json``, which refuses another study.
+
+Counts of two chunks add up to those of both, exactly and in any order, so that bands do not depend on how the runs were
+divided. The bins are fixed before the first chunk by trial runs spread over the whole study; what lies outside
+them is counted at their ends.
+
+Runs are numbered configuration by configuration, in each grid point by grid point (the last axis fastest), at each
+draw by draw. A chunk never holds runs of two configurations.
+"""
 
 import copy
 import hashlib

@@ -1,4 +1,4 @@
-"""The contents of a results folder, read on demand."""
+"""Chunks of a study computed, here or on a cluster, and the contents of a results folder, read on demand."""
 
 import hashlib
 from collections.abc import Callable, Iterable, Mapping

@@ -1,4 +1,8 @@
-"""Tunes a scenario: the search, then both settings, before and after, over fresh draws and on the nominal device."""
+"""Tunes a scenario: cost and search, then both settings, before and after, over fresh draws and the nominal device.
+
+A candidate that satisfies all constraints is always better than one that does not; among those that do not, less
+violation is better; a candidate with a run that fails is worse than all (Deb's rules, 2000).
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

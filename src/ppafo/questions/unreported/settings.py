@@ -1,4 +1,11 @@
-"""The settings that the paper does not print, each with what it may be before anything is compared."""
+"""The settings that the paper does not print, what it reports that they have to agree with, and where to draw next.
+
+Completions are points in the unit cube, evenly spread before anything is compared. A proposal is a mixture of bells
+around some points, with the spread and the correlations of those that agreed, and of the even spread; a choice is kept
+with some probability or drawn anew. What falls outside the cube is no completion and is dropped. The density is known,
+so every completion can be weighed as if all had been drawn from the mixture of all proposals (deterministic mixture;
+Owen and Zhou, J. Am. Stat. Assoc. 95 (2000) 135).
+"""
 
 import math
 from collections.abc import Callable, Collection, Mapping

@@ -1,4 +1,4 @@
-"""A parameter set compared with recordings."""
+"""A parameter set compared with recordings, channel by channel, and the answer."""
 
 import re
 from collections.abc import Sequence

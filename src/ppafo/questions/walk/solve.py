@@ -7,8 +7,7 @@ from typing import Any
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.endurance.solve import endurance_of_walk
 from ppafo.questions.walk.answer import WalkPair, Wearers
-from ppafo.questions.walk.volumes import walks_by_volume
-from ppafo.questions.walk.wearers_volumes import wearers_by_volume
+from ppafo.questions.walk.volumes import walks_by_volume, wearers_by_volume
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import course as courses
 from ppafo.walking.comparison import compare_walks

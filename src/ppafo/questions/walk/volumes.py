@@ -1,19 +1,24 @@
-"""The same walk with other chambers: what gas, work and bottle come to where the paper leaves the volume open."""
+"""The walk, of one wearer or of many, with other readings of the paper's chambers: what each comes to."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from ppafo.answers import Column, Section, Table
 from ppafo.errors import DataError
+from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.parameters.chamber_volumes import ChamberVolumes, other_readings, own_reading
 from ppafo.questions.endurance.answer import Endurance
-from ppafo.questions.endurance.draw import full_chambers, largest_flow, walk_gas
-from ppafo.questions.endurance.solve import endurance_of_walk
+from ppafo.questions.endurance.draw import draw_of_numbers, full_chambers, largest_flow, walk_gas
+from ppafo.questions.endurance.solve import WITHOUT_REST, endurance_of_walk, follow_bottle
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.motion import walk_of
 from ppafo.walking.on_bottle import DIVERGED, WALKED
+from ppafo.walking.population import Population, walk_population
 from ppafo.walking.result import WalkResult, integral_of_a_stride
-from ppafo.walking.walk import walk
+from ppafo.walking.walk import Progress, walk
 
 LONGEST = 1.0
 """Minutes that are walked at most with other chambers: a walk repeats itself, but for a course and on a bottle."""
@@ -172,3 +177,74 @@ def _course_gas(result: WalkResult) -> dict[str, float]:
     """Return the gas [kg] and the time [s] of a whole course, by which a bottle follows it."""
     names = {"gas_of_course": "course_gas", "course_time": "course_time"}
     return {own: result.metrics[name].value for own, name in names.items() if name in result.metrics}
+
+
+LARGEST = 200
+"""Wearers and minutes that are walked at most with other chambers."""
+_WEARERS_HEAD = (
+    Column("chambers"),
+    Column("wearers", form=".0f"),
+    Column("gas per stride, 5 %", "gas mass", ".3f"),
+    Column("median", "gas mass", ".3f"),
+    Column("95 %", "gas mass", ".3f"),
+    Column("work in push-off, median", "energy", ".2f"),
+    Column("bottle, median gas", "duration", ".3g"),
+)
+_WEARERS_EXPLAINED = (
+    "The paper's torque constant and volume per angle contradict each other by virtual work (`ppafo audit`), so some "
+    f"wearers walk again with other chambers: {LARGEST} at most, for at most {LONGEST:g} min, with the same "
+    "seed. The bottle is the paper's, followed with the median gas of a stride, drawn evenly."
+)
+_QUANTILES = (0.05, 0.5, 0.95)
+
+
+def wearers_by_volume(
+    configuration: Scenario, minutes: float | None, wearers: int, seed: int, progress: Progress
+) -> tuple[Population, Mapping[str, Population]]:
+    """Return the wearers, and all readings of their chambers by name; {} for chambers of its own or without gas."""
+    population = walk_population(configuration, minutes, wearers, seed, progress)
+    actuator = configuration.device.actuator
+    own = own_reading(actuator)
+    if own is None or not population.count or not float(np.median(population.outcomes["gas"])) > 0.0:
+        return population, {}
+    shorter = minutes if walk_of(configuration).course is not None else min(population.minutes, LONGEST)
+    found = {own.name: population}
+    for chambers in other_readings(actuator):
+        other = replace(configuration, device=chambers.of(configuration.device))
+        found[chambers.name] = walk_population(other, shorter, min(wearers, LARGEST), seed)
+    return population, found
+
+
+def wearers_volumes_sections(read: Mapping[str, Population]) -> tuple[Section, ...]:
+    """Return the table of the readings, and how to read it; nothing without them."""
+    if not read:
+        return ()
+    rows = tuple((name, *_wearers_row(population)) for name, population in read.items())
+    return (
+        Section("What rests on the volume of the chambers", table=Table(_WEARERS_HEAD, rows)),
+        Section("Why there are several chambers", (_WEARERS_EXPLAINED,), is_detail=True),
+    )
+
+
+def _wearers_row(population: Population) -> tuple[float | None, ...]:
+    gas = np.quantile(population.outcomes["gas"], _QUANTILES).tolist() if population.count else [None] * 3
+    work = float(np.median(population.outcomes["push_off_work"])) if population.count else None
+    return population.count, *gas, work, _wearers_last(population)
+
+
+def _wearers_last(population: Population) -> float | None:
+    """Return how long the paper's bottle lasts [s] with the median gas of a stride."""
+    if not population.count:
+        return None
+    gas, time = (float(np.median(values)) for values in (population.outcomes["gas"], population.traits["stride_time"]))
+    draw = draw_of_numbers(gas, time, None)
+    return follow_bottle(load_bottle(PAPER_BOTTLE), draw, WITHOUT_REST).discharge.walking_time
+
+
+def wearers_volumes_data(read: Mapping[str, Population]) -> list[dict[str, Any]]:
+    """Return the readings as plain data in SI units."""
+    names = ("wearers", "gas_low", "gas_median", "gas_high", "push_off_work_median", "walking_time")
+    return [
+        {"chambers": name, **dict(zip(names, _wearers_row(population), strict=True))}
+        for name, population in read.items()
+    ]

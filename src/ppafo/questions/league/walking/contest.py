@@ -12,10 +12,8 @@ from ppafo.answers.display_units import quantity_text, title_with_unit
 from ppafo.progress import Progress, Report
 from ppafo.questions.league.answer import League, Look, Presentation, TableColumn, measure, of_draws
 from ppafo.questions.league.standing import WALKING_ENTRANTS, Bounded, Entrant, Measures, Robustness, Standing
-from ppafo.questions.league.walking.bound import Reached, WalkingBound, walking_bound
-from ppafo.questions.league.walking.draws import draw_measures
-from ppafo.questions.league.walking.measures import MEASURES, walk_measures
-from ppafo.questions.league.walking.playing import PlayedStride, play_stride
+from ppafo.questions.league.walking.bound import PlayedStride, Reached, WalkingBound, play_stride, walking_bound
+from ppafo.questions.league.walking.measures import MEASURES, draw_measures, walk_measures
 from ppafo.questions.league.walking.solver import StrideOptimum
 from ppafo.questions.league.walking.task import WalkingTask
 

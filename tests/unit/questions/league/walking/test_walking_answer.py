@@ -8,10 +8,9 @@ import pytest
 from ppafo.answers.writing import files_of, row_texts, text_of
 from ppafo.questions.league.answer import League, league_table
 from ppafo.questions.league.standing import WALKING_ENTRANTS, Bounded, Robustness, Standing
-from ppafo.questions.league.walking.bound import WalkingBound
+from ppafo.questions.league.walking.bound import PlayedStride, WalkingBound
 from ppafo.questions.league.walking.contest import WalkingContest, bound_sentence, disagreement
 from ppafo.questions.league.walking.measures import MEASURES
-from ppafo.questions.league.walking.playing import PlayedStride
 from ppafo.questions.league.walking.solver import Guess, StrideOptimum, Strike
 from ppafo.questions.league.walking.task import walking_task
 

@@ -6,9 +6,15 @@ import pytest
 from ppafo.errors import SimulationError
 from ppafo.model.command import VENT
 from ppafo.questions.league.walking import bound
-from ppafo.questions.league.walking.bound import Reached, SearchGrid, WalkingBound, walking_bound
+from ppafo.questions.league.walking.bound import (
+    Reached,
+    SearchGrid,
+    WalkingBound,
+    play_stride,
+    stride_command,
+    walking_bound,
+)
 from ppafo.questions.league.walking.measures import walk_measures
-from ppafo.questions.league.walking.playing import play_stride, stride_command
 from ppafo.questions.league.walking.solver import StrideOptimum
 from ppafo.questions.league.walking.task import walking_task
 

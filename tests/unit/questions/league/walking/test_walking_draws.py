@@ -5,9 +5,8 @@ import pytest
 
 from ppafo.engine.lanes import Floats
 from ppafo.questions.league.standing import UNCERTAINTIES
-from ppafo.questions.league.walking import draws
-from ppafo.questions.league.walking.draws import CHANGED, draw_measures, draw_plants
-from ppafo.questions.league.walking.measures import MEASURES, walk_measures
+from ppafo.questions.league.walking import measures
+from ppafo.questions.league.walking.measures import CHANGED, MEASURES, draw_measures, draw_plants, walk_measures
 from ppafo.questions.league.walking.task import walking_task
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.varying import with_duration
@@ -28,7 +27,7 @@ def test_the_first_draw_with_the_tasks_own_device_is_the_walk_itself(monkeypatch
     def none_changed(count: int, _seed: int) -> Floats:
         return np.ones((count, len(UNCERTAINTIES)))
 
-    monkeypatch.setattr(draws, "draw_factors", none_changed)
+    monkeypatch.setattr(measures, "draw_factors", none_changed)
     first, second = draw_measures(TASK, WALKED, 2).drawn
     assert first is not None
     assert second is not None
@@ -39,7 +38,7 @@ def test_the_first_draw_with_the_tasks_own_device_is_the_walk_itself(monkeypatch
 
 def test_draws_are_the_same_in_groups_of_any_size(monkeypatch: pytest.MonkeyPatch) -> None:
     together = draw_measures(TASK, WALKED, 3)
-    monkeypatch.setattr(draws, "NUMBERS_AT_ONCE", 1.0)
+    monkeypatch.setattr(measures, "NUMBERS_AT_ONCE", 1.0)
     assert draw_measures(TASK, WALKED, 3) == together
     assert set(together.drawn[0] or {}) == set(MEASURES)
 
