@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.rig.catalog import EXPERIMENTS
+from ppafo.rig.experiments import EXPERIMENTS
 from ppafo.rig.preset import list_presets
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "use-the-virtual-rig.md"

@@ -79,7 +79,7 @@ def _draw_folder(folder: Path, names: list[str]) -> "dict[str, Figure]":
     from ppafo.answers.recording_figure import draw_stored_result
     from ppafo.questions.sweep.manifest import MANIFEST
     from ppafo.questions.sweep.results import load_study_results
-    from ppafo.rig.folder import RIG_FILE
+    from ppafo.rig.record import RIG_FILE
     from ppafo.storage import read_result
     from ppafo.storage.owned_folder import MARK
     from ppafo.storage.result_folder import NETCDF_FILE, RUN_FILE
@@ -98,7 +98,7 @@ def _draw_folder(folder: Path, names: list[str]) -> "dict[str, Figure]":
 def _draw_rig(folder: Path, names: list[str]) -> "dict[str, Figure]":
     """Return a figure of each recording of the rig; gauge pressure counts from the atmosphere of its device."""
     from ppafo.answers.recording_figure import recording_figure, stated_atmosphere
-    from ppafo.rig.folder import RIG_FILE
+    from ppafo.rig.record import RIG_FILE
     from ppafo.storage import read_recording
 
     file = folder / RIG_FILE

@@ -46,7 +46,7 @@ def run(parsed: argparse.Namespace) -> int:
 
 def _list(parsed: argparse.Namespace) -> int:
     from ppafo.rig import list_presets, load_preset
-    from ppafo.rig.catalog import EXPERIMENTS
+    from ppafo.rig.experiments import EXPERIMENTS
 
     experiments = {item.name: item.summary for item in EXPERIMENTS.values()}
     presets = {name: load_preset(name).title for name in list_presets()}
@@ -64,8 +64,7 @@ def _list(parsed: argparse.Namespace) -> int:
 
 
 def _record(parsed: argparse.Namespace) -> int:
-    from ppafo.rig.folder import check_rig_folder, write_rig_recording
-    from ppafo.rig.record import NOTICE, find_experiment, record
+    from ppafo.rig.record import NOTICE, check_rig_folder, find_experiment, record, write_rig_recording
 
     find_experiment(parsed.experiment)
     seed = _whole_number(parsed.seed)

@@ -1,4 +1,8 @@
-"""Presets of the rig: how far it departs from the identified model. TOML files, each value with its unit and reason."""
+"""Presets of the rig: how far it departs from the identified model. TOML files, each value with its unit and reason.
+
+Every value that a preset can hold is declared here: section, name, SI unit, range and meaning. So is what the rig is
+asked to do with one, and what it gives back.
+"""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -14,8 +18,111 @@ from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import is_within
-from ppafo.rig.declaration import PATHS, SECTIONS
+from ppafo.parameters.device import Device
+from ppafo.signals.recording import Recording
 from ppafo.units import parse_quantity, to_si
+
+GAS = (
+    Quantity("heat_transfer_coefficient", "W/(m^2 K)", "heat transfer between gas and wall", minimum=0.0, maximum=1e9),
+    Quantity(
+        "wall_area_per_volume", "1/m", "inner surface of chamber or line over its volume", minimum=0.0, maximum=1e5
+    ),
+    Quantity(
+        "wall_temperature_difference", "K", "wall and room above the set's temperature", minimum=-80.0, maximum=80.0
+    ),
+    Quantity(
+        "supply_temperature_difference", "K", "supplied gas above the set's temperature", minimum=-80.0, maximum=80.0
+    ),
+    Quantity(
+        "real_gas_share", "", "fraction of the gas's second virial coefficient, 0: ideal", minimum=0.0, maximum=1.0
+    ),
+)
+SUPPLY = (
+    Quantity("droop", "Pa s/kg", "fall of a regulated pressure per mass flow", minimum=0.0, maximum=1e9),
+    Quantity(
+        "recovery_time",
+        "s",
+        "time constant with which the regulated pressure falls and recovers",
+        minimum=0.0,
+        maximum=10.0,
+    ),
+)
+LINE = (
+    Quantity("volume", "m^3", "volume of each line, a part of the dead volume, 0 for none", minimum=0.0, maximum=1e-2),
+    Quantity(
+        "area",
+        "m^2",
+        "area of an orifice between line and chamber with the same pressure loss",
+        minimum=0.0,
+        maximum=1e-2,
+    ),
+    Quantity("discharge_coefficient", "", "discharge coefficient of that orifice", minimum=0.0, maximum=2.0),
+    Quantity("delay", "s", "time that a wave needs through the line, added to the command", minimum=0.0, maximum=0.1),
+)
+VALVE = (
+    Quantity("hysteresis", "", "play between command and spool, whole width", minimum=0.0, maximum=0.5),
+    Quantity("dead_band", "", "proportional: smallest command that opens the valve", minimum=0.0, maximum=0.9),
+    Quantity("delay", "s", "proportional: dead time between command and spool", minimum=0.0, maximum=0.2),
+    Quantity(
+        "spool_frequency", "Hz", "proportional: undamped frequency of the spool, 0 for none", minimum=0.0, maximum=2e3
+    ),
+    Quantity("spool_damping_ratio", "", "proportional: damping ratio of the spool", minimum=0.05, maximum=5.0),
+    Quantity("opening_delay", "s", "solenoid: time from energising to flow from the source", minimum=0.0, maximum=0.2),
+    Quantity("closing_delay", "s", "solenoid: time from de-energising to venting", minimum=0.0, maximum=0.2),
+)
+FRICTION = (
+    Quantity(
+        "static_per_pressure", "m^3", "static limit per pressure difference across the vane", minimum=0.0, maximum=1e-2
+    ),
+    Quantity("dynamic_per_pressure", "m^3", "dynamic friction per pressure difference", minimum=0.0, maximum=1e-2),
+    Quantity(
+        "stribeck_velocity", "rad/s", "speed over which friction falls to its dynamic value", minimum=0.0, maximum=1e2
+    ),
+    Quantity("scatter", "", "standard deviation of the static limit from reading to reading", minimum=0.0, maximum=0.5),
+)
+LEAK = (
+    Quantity("conductance_factor", "", "leak of the device times this", minimum=0.0, maximum=1e3),
+    Quantity(
+        "laminar_conductance",
+        "kg/(s Pa^2)",
+        "further leak per difference of squared pressures",
+        minimum=0.0,
+        maximum=1e-8,
+    ),
+)
+SAMPLING = (Quantity("rate", "Hz", "samples recorded per second", minimum=1.0, maximum=1e5),)
+
+
+def _sensor(unit: str, what: str) -> tuple[Quantity, ...]:
+    return (
+        Quantity("noise", unit, f"standard deviation of the noise of the {what}", minimum=0.0),
+        Quantity("offset", unit, f"standard deviation of the offset of the {what}, drawn once", minimum=0.0),
+        Quantity("quantum", unit, f"step of the {what}, 0 for none", minimum=0.0),
+    )
+
+
+def _bandwidth(what: str) -> Quantity:
+    return Quantity("bandwidth", "Hz", f"first-order bandwidth of the {what}, 0 for none", minimum=0.0, maximum=1e5)
+
+
+SECTIONS: dict[str, tuple[Quantity, ...]] = {
+    "gas": GAS,
+    "supply": SUPPLY,
+    "line": LINE,
+    "valve": VALVE,
+    "friction": FRICTION,
+    "leak": LEAK,
+    "sampling": SAMPLING,
+    "angle_sensor": (_bandwidth("angle sensor"), *_sensor("rad", "angle sensor")),
+    "pressure_sensor": (_bandwidth("pressure sensors"), *_sensor("Pa_d", "pressure sensors")),
+    "torque_sensor": _sensor("N m", "scale"),
+    "flow_sensor": _sensor("kg/s", "flow meter"),
+}
+"""All values are needed in every preset: what is off says so with a 0 and a reason."""
+
+PATHS: dict[str, Quantity] = {
+    f"{section}.{quantity.name}": quantity for section, members in SECTIONS.items() for quantity in members
+}
 
 
 class PresetValue(BaseModel):
@@ -28,15 +135,6 @@ class PresetValue(BaseModel):
     reason: str = Field(min_length=1, description="reason for the number: a source, or why it was chosen")
 
 
-def _description(quantity: Quantity) -> str:
-    return f"{quantity.summary} [{quantity.unit or '-'}]"
-
-
-def _section(name: str, quantities: tuple[Quantity, ...]) -> type[BaseModel]:
-    title = "".join(part.capitalize() for part in name.split("_"))
-    return table(title, {item.name: (PresetValue, Field(description=_description(item))) for item in quantities})
-
-
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a preset; every value is needed."""
     fields: dict[str, Any] = {
@@ -45,7 +143,11 @@ def json_schema() -> dict[str, Any]:
         "title": (str, Field(description="which test bench it represents, in one line")),
         "notes": (str, Field(description="what is on, what is off, and where the values come from")),
     }
-    fields |= {name: (_section(name, members), Field()) for name, members in SECTIONS.items()}
+    for name, members in SECTIONS.items():
+        values = {
+            item.name: (PresetValue, Field(description=f"{item.summary} [{item.unit or '-'}]")) for item in members
+        }
+        fields[name] = (table("".join(part.capitalize() for part in name.split("_")), values), Field())
     return make_schema(table("RigPreset", fields), "ppafo rig preset")
 
 
@@ -99,20 +201,16 @@ def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Pres
         path, separator, text = (part.strip() for part in one_line(override).partition("="))
         if not separator or not path.startswith(PREFIX) or not text:
             raise ParameterError(f"override '{one_line(override)}' is not of the form {PREFIX}PATH=VALUE")
-        preset = _override(preset, path.removeprefix(PREFIX), text)
+        path = path.removeprefix(PREFIX)
+        said = f"override '{PREFIX}{path}={text}'"
+        if path not in PATHS:
+            raise ParameterError(f"{said}: the rig has no value '{path}'{nearest_name(path, PATHS)}")
+        try:
+            value = parse_quantity(text, PATHS[path].unit)
+        except UnitError as error:
+            raise ParameterError(f"{said}: {error}") from error
+        preset = preset.with_value(path, value, "override")
     return preset
-
-
-def _override(preset: Preset, path: str, text: str) -> Preset:
-    if path not in PATHS:
-        raise ParameterError(
-            f"override '{PREFIX}{path}={text}': the rig has no value '{path}'{nearest_name(path, PATHS)}"
-        )
-    try:
-        value = parse_quantity(text, PATHS[path].unit)
-    except UnitError as error:
-        raise ParameterError(f"override '{PREFIX}{path}={text}': {error}") from error
-    return preset.with_value(path, value, "override")
 
 
 def _parse(document: dict[str, Any], file: str) -> Preset:
@@ -164,3 +262,24 @@ def _check_names(table: Mapping[str, Any], allowed: Iterable[str], before: str, 
     if unknown is not None:
         hint = nearest_name(unknown, names)
         raise ParameterError(f"{file}: unknown key '{before}{one_line(unknown)}'{hint}; allowed: {', '.join(names)}")
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """One experiment to be done: preset, seed, parameter set, its valve (None: the set's own), overrides of both."""
+
+    preset: Preset
+    seed: int
+    parameter_set: str
+    valve: str | None
+    overrides: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """The result of an experiment: recording, true device, offsets that the sensors had, and further true values."""
+
+    recording: Recording
+    device: Device
+    offsets: Mapping[str, float]
+    settings: Mapping[str, Any]

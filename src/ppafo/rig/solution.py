@@ -4,25 +4,150 @@ Friction is Coulomb's with a static limit and Stribeck's curve, both growing wit
 root functions begin and end, as in the reference solver. A bristle model would need no modes, but to agree with
 equation (10) to 1e-3 of the angle range its stiffness must be some 1e7 N m/rad, and CVODE would crawl through every
 reversal; with modes no kink lies inside a step, and without the extra terms the rig is equation (10) exactly.
+
+The right-hand side is compiled from the same source text as all compiled physics. The valve and a path of the vane stay
+outside, in Python: what they ask for comes in as numbers. So there is one program for all devices and experiments, and
+a new computer compiles once.
 """
 
-from typing import Any
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.entries import with_arrays
+from ppafo.engine.entries import ARRAY, FLOAT, HEADER, INLINE, entry_text, with_arrays
+from ppafo.engine.loading import load_source
 from ppafo.engine.reference import vane_mode
+from ppafo.engine.reference.derivative import ExactOrifice
 from ppafo.engine.reference.sampling import SAME_TIME, solve_segment
-from ppafo.engine.rows import numbers, rebuild
+from ppafo.engine.rows import leaf_paths, numbers, rebuild, row_expression
+from ppafo.engine.run import Run
+from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import SimulationError
+from ppafo.model.plant import Openings, PlantParameters
 from ppafo.model.sensors import Measurement
 from ppafo.model.vane import actuator_torque, holds_still
-from ppafo.rig.rows import RigState
-from ppafo.rig.run import RigRun, RigSolution, sensor_signals, spool_position
-from ppafo.rig.source import ANGLE, INPUTS, OUTPUTS, RATE, UNKNOWNS, load_rig_program
+from ppafo.parameters.device import Device
+from ppafo.rig.dynamics import observables, rig_rates
+from ppafo.rig.hardware import Sensor
+from ppafo.rig.rows import RigPhysics, RigState
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class RigRun:
+    """A run on the rig.
+
+    The device as it truly is, its plain run, the richer physics, sensors and when they are read, play of the valve [-].
+    """
+
+    device: Device
+    run: Run
+    physics: RigPhysics
+    line_orifice: ExactOrifice
+    initial: RigState
+    sensors: dict[str, Sensor]
+    sample_times: Floats
+    control_period: float
+    command_delay: float
+    hysteresis: float
+
+
+@dataclass(slots=True)
+class RigSolution:
+    """True state (samples, unknowns of ``RigState``), pressures [Pa] and command at each sample; impacts [s]."""
+
+    states: Floats
+    pressures: Floats
+    commands: Floats
+    impacts: list[float] = field(default_factory=list)
+    breakaways: list[float] = field(default_factory=list)
+
+
+def spool_position(position: float, command: float, width: float) -> float:
+    """Position [-1, 1] of a spool with play of a whole ``width`` [-] behind a command; it reaches full opening."""
+    half = 0.5 * width
+    inner = position * (1.0 - half)
+    inner = max(command - half, min(command + half, inner))
+    return max(-1.0, min(1.0, inner / (1.0 - half)))
+
+
+def sensor_signals(rig_run: RigRun, state: Floats, pressures: Floats) -> tuple[float, float, float]:
+    """Angle [rad] and both pressures [Pa] behind the bandwidth of the sensors, before noise."""
+    names = RigState._fields
+    slow_angle, slow_pressure = rig_run.physics.angle_follow_rate > 0.0, rig_run.physics.pressure_follow_rate > 0.0
+    angle = state[names.index("sensor_angle")] if slow_angle else state[0]
+    first = state[names.index("sensor_pressure_1")] if slow_pressure else pressures[0]
+    second = state[names.index("sensor_pressure_2")] if slow_pressure else pressures[1]
+    return float(angle), float(first), float(second)
+
+
+UNKNOWNS = len(RigState._fields)
+OUTPUTS = 4
+"""Numbers that ``show`` writes: both pressures [Pa], driving torque and static limit of friction [N m]."""
+
+ANGLE, RATE = 4, 5
+INPUTS = 6
+"""Numbers that come from outside: four openings, angle [rad] and prescribed rate [rad/s] of the vane."""
+
+PARAMETER_GROUPS = {
+    "plant": PlantParameters,
+    "rig": RigPhysics,
+    "valve_orifice": ExactOrifice,
+    "leak_orifice": ExactOrifice,
+    "line_orifice": ExactOrifice,
+}
+"""Groups of numbers that both functions need, in order."""
+
+
+class RigProgram(NamedTuple):
+    """``fill(y, slopes, parameters, inputs, direction)`` and ``show(y, outputs, parameters, inputs, direction)``.
+
+    ``y`` and ``slopes`` are those of the unknowns of ``RigState``.
+    """
+
+    fill: Callable[..., None]
+    show: Callable[..., None]
+
+
+def load_rig_program() -> RigProgram:
+    """Return the compiled right-hand side and observables of the rig."""
+    module = load_source(rig_source())
+    return RigProgram(module.fill, module.show)
+
+
+@functools.cache
+def rig_source() -> str:
+    """Source of the module."""
+    collector = SourceCollector(INLINE)
+    add = collector.add
+    cells: dict[str, str] = {}
+    for name, row in PARAMETER_GROUPS.items():
+        for path in leaf_paths(row, name):
+            cells[path] = f"parameters[{len(cells)}]"
+    cells |= {f"state.{field}": f"y[{number}]" for number, field in enumerate(RigState._fields)}
+    cells |= {f"openings.{field}": f"inputs[{number}]" for number, field in enumerate(Openings._fields)}
+    rows = PARAMETER_GROUPS | {"state": RigState, "openings": Openings}
+    given = [f"{name} = {row_expression(row, name, cells, add)}" for name, row in rows.items()]
+    orifices = "valve_orifice, leak_orifice, line_orifice"
+    motion = f"inputs[{ANGLE}], inputs[{RATE}], direction"
+    fill = [f"rates = {add(rig_rates)}(plant, rig, {orifices}, openings, state, {motion})"]
+    fill += [f"slopes[{number}] = rates.{field}" for number, field in enumerate(RigState._fields)]
+    show = [f"now = {add(observables)}(plant, rig, state, inputs[{ANGLE}])"]
+    outputs = ("node_1.pressure", "node_2.pressure", "torque", "static_limit")
+    show += [f"outputs[{number}] = now.{path}" for number, path in enumerate(outputs)]
+    functions = [_function("fill", "slopes", given + fill), _function("show", "outputs", given + show)]
+    return "\n\n\n".join([HEADER, collector.text(), *functions])
+
+
+def _function(name: str, output: str, lines: list[str]) -> str:
+    arrays = dict.fromkeys(("y", output, "parameters", "inputs"), ARRAY)
+    return entry_text(name, arrays | {"direction": FLOAT}, lines)
+
 
 TOLERANCE = 1.0e-8
 MAXIMUM_STEPS = 100_000

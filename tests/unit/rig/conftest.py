@@ -4,10 +4,9 @@ from collections.abc import Callable
 
 import pytest
 
-from ppafo.rig.bench.dynamic import rig_run
-from ppafo.rig.preset import Preset, load_preset
-from ppafo.rig.request import Request
-from ppafo.rig.run import RigRun
+from ppafo.rig.experiments import rig_run
+from ppafo.rig.preset import Preset, Request, load_preset
+from ppafo.rig.solution import RigRun
 from ppafo.simulation.loading import load_scenario
 
 

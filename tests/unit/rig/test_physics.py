@@ -11,8 +11,7 @@ from ppafo.rig import record
 from ppafo.rig.hardware import SECOND_VIRIAL
 from ppafo.rig.preset import Preset, load_preset
 from ppafo.rig.rows import RigState
-from ppafo.rig.run import RigRun, RigSolution, spool_position
-from ppafo.rig.solution import solve_rig
+from ppafo.rig.solution import RigRun, RigSolution, solve_rig, spool_position
 from ppafo.simulation.simulate import simulate
 
 OnTheRig = Callable[[str, Preset], RigRun]

@@ -1,1 +1,0 @@
-"""Experiments on the rig, one module for each kind of bench."""

@@ -1,0 +1,406 @@
+"""The experiments of the rig. To add one: a function ``Request -> Outcome`` and one line in ``EXPERIMENTS``.
+
+On the steady bench true values go in and what the instruments show comes out: static torque against pressure, flow of
+the open valve, its map, the leak across the vane. Experiments in time are solved by CVODE: step response, torque task,
+free decay, leak between closed chambers.
+"""
+
+import copy
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ppafo.constants import PASCALS_PER_PSI
+from ppafo.engine.reference.derivative import ExactOrifice
+from ppafo.engine.run import Run
+from ppafo.errors import ScenarioError
+from ppafo.model.plant import chamber_volumes
+from ppafo.model.thermal import gas_energy, real_density
+from ppafo.model.valves.catalog import VALVES
+from ppafo.parameters import load_device
+from ppafo.parameters.declaration import SECTIONS
+from ppafo.parameters.device import Device
+from ppafo.rig.dynamics import ambient_node, leak_exchange, orifice_exchange
+from ppafo.rig.hardware import (
+    CHANNEL_SENSORS,
+    Floats,
+    line_orifice,
+    random_stream,
+    real_device,
+    rig_physics,
+    rig_plant,
+    sensor,
+)
+from ppafo.rig.preset import Outcome, Request
+from ppafo.rig.rows import RigPhysics, RigState
+from ppafo.rig.solution import RigRun, RigSolution, sensor_signals, solve_rig, spool_position
+from ppafo.signals.channels import CHANNELS
+from ppafo.signals.recording import Channel, Recording
+from ppafo.simulation.loading import load_scenario, scenario_from_dict
+from ppafo.simulation.plan import exact_orifice, plan_run, profile_values
+from ppafo.simulation.scenario import Scenario
+
+
+def read_off(
+    name: str,
+    request: Request,
+    device: Device,
+    interval: float,
+    true: Mapping[str, Floats],
+    settings: Mapping[str, float],
+    fraction_of_flow_range: float = 1.0,
+) -> Outcome:
+    """Return a reading every ``interval`` [s] of true values by channel [SI]; what no sensor reads is exact."""
+    count = len(next(iter(true.values())))
+    fractions = {"mass_flow": fraction_of_flow_range}
+    sensors = {
+        channel: sensor(request.preset, channel, request.seed, count, fractions.get(channel, 1.0))
+        for channel in true
+        if channel in CHANNEL_SENSORS
+    }
+    channels = {
+        channel: Channel(sensors[channel].readings(values) if channel in sensors else values, CHANNELS[channel].unit)
+        for channel, values in true.items()
+    }
+    recording = Recording(name, np.arange(count, dtype=np.float64) * interval, channels, kind="synthetic")
+    offsets = {channel: item.offset for channel, item in sensors.items()}
+    return Outcome(recording, device, offsets, {"reading_interval": interval, **settings})
+
+
+STEP = 5.0 * PASCALS_PER_PSI
+HIGHEST = 95.0 * PASCALS_PER_PSI
+TURN = 20.0 * PASCALS_PER_PSI
+"""Pressure [Pa] by which it goes beyond the highest reading before it falls, so that friction has turned by then."""
+TORQUE_REPETITIONS = 3
+TORQUE_READING_INTERVAL = 10.0
+
+
+def record_static_torque(request: Request) -> Outcome:
+    """Return torque on the scale [N m] over pressure difference, three times up and down in steps of 5 psi.
+
+    The vane presses on a scale and friction holds it back. It creeps and never slips, so friction is at its static
+    limit against the way the pressure goes: the limit of the rig's law at speed 0, a play operator without inertia, for
+    which no solver is needed.
+    """
+    device = real_device(load_device(request.parameter_set, request.valve, request.overrides), request.preset)
+    rising = np.arange(1, round(HIGHEST / STEP) + 1) * STEP
+    once = np.concatenate([rising, rising[::-1]])
+    directions = np.repeat([1.0, -1.0], rising.size)
+    values = request.preset.values
+    scatter = values["friction.scatter"] * random_stream(request.seed, "friction").standard_normal(
+        (TORQUE_REPETITIONS, once.size)
+    )
+    torque = []
+    for repetition in scatter:
+        pressed = 0.0
+        for pressure, direction, deviation in zip(once, directions, repetition, strict=True):
+            if direction < 0.0 and pressure == once[rising.size]:
+                pressed = device.actuator.torque_constant * (HIGHEST + TURN)
+            limit = device.friction.static_torque + values["friction.static_per_pressure"] * pressure
+            pressed = on_scale(pressed, device.actuator.torque_constant * pressure, limit * max(0.0, 1.0 + deviation))
+            torque.append(pressed)
+    true = {
+        "torque": np.array(torque),
+        "pressure_difference": np.tile(once, TORQUE_REPETITIONS),
+        "direction": np.tile(directions, TORQUE_REPETITIONS),
+        "repetition": np.repeat(np.arange(1.0, TORQUE_REPETITIONS + 1.0), once.size),
+    }
+    return read_off("static-torque", request, device, TORQUE_READING_INTERVAL, true, {"turn_beyond": TURN})
+
+
+def on_scale(before: float, actuator: float, limit: float) -> float:
+    """Torque [N m] on a scale that carries what friction within its limit cannot; a scale does not pull."""
+    return max(0.0, min(max(before, actuator - limit), actuator + limit))
+
+
+UPSTREAM_GAUGE = tuple(level * PASCALS_PER_PSI for level in (20.0, 35.0, 50.0, 65.0, 80.0))
+PRESSURE_RATIOS = (0.3, 0.4, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 0.98)
+LEAK_GAUGE = tuple(level * PASCALS_PER_PSI for level in range(5, 85, 5))
+COMMAND_STEPS = 100
+READING_INTERVAL = 2.0
+REPETITIONS = 2
+SMALL_METER = 0.1
+"""Range of the flow meter for the leak as a fraction [-] of that of the other."""
+
+
+def record_open_valve(request: Request) -> Outcome:
+    """Return the mass flow [kg/s] of the fully open valve at several pressures before and behind it."""
+    device, physics = _bench(request)
+    ambient = device.supply.atmospheric_pressure
+    pairs = []
+    for gauge in UPSTREAM_GAUGE:
+        upstream = ambient + gauge
+        pairs += [(upstream, ambient)]
+        pairs += [(upstream, upstream * ratio) for ratio in PRESSURE_RATIOS if upstream * ratio > ambient]
+    points = np.array(pairs * REPETITIONS)
+    orifice = exact_orifice(device.valve.orifice, device)
+    true = {
+        "upstream_pressure": points[:, 0],
+        "downstream_pressure": points[:, 1],
+        "mass_flow": np.array([_flow(physics, up, down, 1.0, orifice) for up, down in points]),
+        "command": np.ones(len(points)),
+    }
+    return read_off(
+        "open-valve-flow", request, device, READING_INTERVAL, true, {"gas_temperature": physics.supply_temperature}
+    )
+
+
+def record_valve_map(request: Request) -> Outcome:
+    """Return the mass flow [kg/s], above 0 into chamber 1, of the valve into the atmosphere over its command."""
+    device, physics = _bench(request)
+    supply, orifice = device.supply, exact_orifice(device.valve.orifice, device)
+    # The openings once nothing moves any more: of the valve with every time and frequency taken out.
+    kind = VALVES[device.valve.kind]
+    still = {item.name: 0.0 if item.unit else device.valve.settings[item.name] for item in kind.quantities}
+    model = kind.choose(still)
+    parameters = model.prepare(still)
+    rising = np.linspace(-1.0, 1.0, COMMAND_STEPS + 1)
+    commands = np.concatenate([rising, rising[-2::-1]])
+    spool, flows, upstream = -1.0, [], []
+    for command in commands:
+        spool = spool_position(spool, float(command), request.preset.values["valve.hysteresis"])
+        openings = model.instant(parameters, model.settle(parameters, model.initial(), spool, 0.0), spool)
+        forward = _flow(physics, supply.pressure, supply.atmospheric_pressure, openings.source_1, orifice)
+        backward = _flow(physics, supply.dorsiflexion_pressure, supply.atmospheric_pressure, openings.source_2, orifice)
+        flows.append(forward - backward)
+        upstream.append(supply.dorsiflexion_pressure if command < 0.0 else supply.pressure)
+    true = {
+        "command": commands,
+        "mass_flow": np.array(flows),
+        "upstream_pressure": np.array(upstream),
+        "downstream_pressure": np.full(commands.size, supply.atmospheric_pressure),
+    }
+    return read_off(
+        "valve-map", request, device, READING_INTERVAL, true, {"gas_temperature": physics.supply_temperature}
+    )
+
+
+def record_steady_leak(request: Request) -> Outcome:
+    """Return the mass flow [kg/s] that maintains the pressure in chamber 1, with chamber 2 open to the atmosphere."""
+    device, physics = _bench(request)
+    ambient = device.supply.atmospheric_pressure
+    levels = np.array(LEAK_GAUGE * REPETITIONS) + ambient
+    orifice = exact_orifice(device.actuator.leak, device)
+    # Gas that leaks has taken the temperature of the walls.
+    behind = ambient_node(physics, ambient, physics.wall_temperature)
+    before = [ambient_node(physics, float(level), physics.wall_temperature) for level in levels]
+    true = {
+        "pressure_1": levels,
+        "pressure_2": np.full(levels.size, ambient),
+        "mass_flow": np.array([leak_exchange(physics, node, behind, orifice).mass for node in before]),
+    }
+    settings = {"gas_temperature": physics.wall_temperature}
+    return read_off("vane-leak-steady", request, device, READING_INTERVAL, true, settings, SMALL_METER)
+
+
+def _bench(request: Request) -> tuple[Device, RigPhysics]:
+    device = real_device(load_device(request.parameter_set, request.valve, request.overrides), request.preset)
+    return device, rig_physics(device, request.preset)
+
+
+def _flow(physics: RigPhysics, upstream: float, downstream: float, fraction: float, orifice: ExactOrifice) -> float:
+    """Mass flow [kg/s] of gas at the supply's temperature."""
+    a = ambient_node(physics, float(upstream), physics.supply_temperature)
+    return orifice_exchange(
+        physics, a, ambient_node(physics, float(downstream), physics.wall_temperature), fraction, orifice, 1.0
+    ).mass
+
+
+LEAK_RATE = 20.0
+"""Samples in a second [Hz] of a leak that takes half a minute."""
+
+_SUPPLIES = {"supply_pressure": "supply_drop_1", "dorsiflexion_pressure": "supply_drop_2"}
+_IN_MOTION = ("angle", "pressure_1", "pressure_2", *_SUPPLIES, "command")
+_WHOLE = 1.0e-9
+_OPEN_LOOP = "constant"
+_CLOSED_VALVE = {"kind": "constant", "command": 0, "rate": "1 kHz"}
+
+
+def record_step_response(request: Request) -> Outcome:
+    """Return the step response of figure 7: the valve opens fully and the vane turns from stop to stop."""
+    scenario = _of_package("step-response", request)
+    bench_run = rig_run(scenario, request, request.preset.values["sampling.rate"])
+    return _outcome("step-response", scenario, bench_run, (*_IN_MOTION, "torque"))
+
+
+def record_torque_task(request: Request) -> Outcome:
+    """Return the torque task of figure 8 with the controller that belongs to the kind of valve."""
+    kind = load_device(request.parameter_set, request.valve).valve.kind
+    scenario = _of_package(f"torque-task-{kind}", request)
+    bench_run = rig_run(scenario, request, request.preset.values["sampling.rate"])
+    return _outcome("torque-task", scenario, bench_run, (*_IN_MOTION, "reference", "torque"))
+
+
+def record_free_decay(request: Request) -> Outcome:
+    """Return the angle after an impulse, device on its side, both chambers open to the room."""
+    motion = {"kind": "free", "angle": "25 deg", "angular_velocity": "380 deg/s", "external_torque": "0 N m"}
+    scenario = _of_bench("free-decay", request, motion, {}, "2 s")
+    bench_run = rig_run(scenario, request, request.preset.values["sampling.rate"])
+    run = replace(bench_run.run, plant=bench_run.run.plant._replace(gravity_torque=0.0))
+    opened = replace(bench_run, run=run, physics=bench_run.physics._replace(chambers_open=1.0))
+    return _outcome("free-decay", scenario, opened, ("angle",))
+
+
+def record_vane_leak(request: Request) -> Outcome:
+    """Return both pressures after chamber 1 was filled and both ports were plugged, the vane held in the middle."""
+    actuator = load_device(request.parameter_set, request.valve, device_overrides(request)).actuator
+    motion = {"kind": "held", "angle": f"{0.5 * (actuator.angle_min + actuator.angle_max)!r} rad"}
+    initial = {"pressure_1": "supply", "pressure_2": "atmosphere"}
+    scenario = _of_bench("vane-leak", request, motion, initial, "30 s")
+    bench_run = rig_run(scenario, request, min(LEAK_RATE, request.preset.values["sampling.rate"]))
+    plugged = replace(bench_run, physics=bench_run.physics._replace(ports_open=0.0))
+    return _outcome("vane-leak", scenario, plugged, ("pressure_1", "pressure_2"))
+
+
+def rig_run(scenario: Scenario, request: Request, rate: float) -> RigRun:
+    """Return the run of a scenario on the rig of a request, recorded ``rate`` times a second [Hz].
+
+    ScenarioError for a valve that the rig does not have.
+    """
+    preset, seed = request.preset, request.seed
+    device = real_device(scenario.device, preset)
+    run = plan_run(replace(scenario, device=device))
+    if run.program.valve.joint is not None:
+        raise ScenarioError(f"the virtual rig has no valve between the chambers: valve '{device.valve.kind}' has one")
+    run = replace(run, plant=rig_plant(run.plant, preset))
+    physics = rig_physics(device, preset)
+    times = np.arange(int(scenario.duration * rate + _WHOLE) + 1, dtype=np.float64) / rate
+    is_open_loop = scenario.control.kind == _OPEN_LOOP
+    return RigRun(
+        device=device,
+        run=run,
+        physics=physics,
+        line_orifice=line_orifice(device, preset),
+        initial=initial_state(scenario, run, physics),
+        sensors={
+            name: sensor(preset, name, seed, times.size) for name in ("angle", "pressure_1", "pressure_2", *_SUPPLIES)
+        },
+        sample_times=times,
+        control_period=2.0 * scenario.duration if is_open_loop else run.period,
+        command_delay=run.command_delay + preset.values["line.delay"],
+        hysteresis=preset.values["valve.hysteresis"],
+    )
+
+
+def initial_state(scenario: Scenario, run: Run, physics: RigPhysics) -> RigState:
+    """Return vane and gas at the start [SI], everything at the temperature of the walls."""
+    angle, rate = run.initial.angle, run.initial.angular_velocity
+    warm = physics.wall_temperature
+    pressures = (scenario.initial_pressure_1, scenario.initial_pressure_2)
+    densities = [real_density(pressure, warm, physics.gas_constant, physics.virial) for pressure in pressures]
+    volumes = chamber_volumes(run.plant, angle)
+    mass_1, mass_2 = (density * volume for density, volume in zip(densities, volumes, strict=True))
+    line_1, line_2 = (density * physics.line_volume for density in densities)
+    energy_1, energy_2, line_energy_1, line_energy_2 = (
+        gas_energy(mass, warm, physics.heat_capacity) for mass in (mass_1, mass_2, line_1, line_2)
+    )
+    return RigState(
+        angle=angle,
+        angular_velocity=rate,
+        mass_1=mass_1,
+        energy_1=energy_1,
+        mass_2=mass_2,
+        energy_2=energy_2,
+        line_mass_1=line_1,
+        line_energy_1=line_energy_1,
+        line_mass_2=line_2,
+        line_energy_2=line_energy_2,
+        supplied_mass=0.0,
+        vented_mass=0.0,
+        leaked_mass=0.0,
+        supply_drop_1=0.0,
+        supply_drop_2=0.0,
+        enthalpy_in=0.0,
+        work_done=0.0,
+        heat_in=0.0,
+        sensor_angle=angle,
+        sensor_pressure_1=pressures[0],
+        sensor_pressure_2=pressures[1],
+    )
+
+
+def _outcome(name: str, scenario: Scenario, bench_run: RigRun, names: tuple[str, ...]) -> Outcome:
+    solution = solve_rig(bench_run)
+    values = sensor_readings(scenario, bench_run, solution)
+    channels = {item: Channel(values[item], CHANNELS[item].unit) for item in names}
+    recording = Recording(name, bench_run.sample_times, channels, kind="synthetic")
+    offsets = {item: bench_run.sensors[item].offset for item in names if item in bench_run.sensors}
+    settings = {
+        "duration": scenario.duration,
+        "initial_angle": bench_run.initial.angle,
+        "initial_angular_velocity": bench_run.initial.angular_velocity,
+        "impacts": solution.impacts,
+        "breakaways": solution.breakaways,
+    }
+    return Outcome(recording, bench_run.device, offsets, settings)
+
+
+def sensor_readings(scenario: Scenario, bench_run: RigRun, solution: RigSolution) -> dict[str, Floats]:
+    """Return what the sensors read at every sample [SI]; the torque is computed from the measured pressures."""
+    signals = [sensor_signals(bench_run, *pair) for pair in zip(solution.states, solution.pressures, strict=True)]
+    true = dict(zip(("angle", "pressure_1", "pressure_2"), np.array(signals).T, strict=True))
+    for name, drop in _SUPPLIES.items():
+        regulated = getattr(bench_run.run.plant, name)
+        true[name] = regulated - solution.states[:, RigState._fields.index(drop)]
+    readings = {name: bench_run.sensors[name].readings(values) for name, values in true.items()}
+    readings["command"] = solution.commands
+    readings["torque"] = bench_run.run.plant.torque_constant * (readings["pressure_1"] - readings["pressure_2"])
+    readings["reference"] = profile_values(scenario.reference, bench_run.sample_times)[0]
+    return readings
+
+
+def device_overrides(request: Request) -> tuple[str, ...]:
+    """Return the overrides that belong to the device and not to the scenario of an experiment."""
+    sections = {section.partition(".")[0] for section in SECTIONS} | {"valve", "valves"}
+    return tuple(item for item in request.overrides if item.strip().partition(".")[0] in sections)
+
+
+def _of_package(name: str, request: Request) -> Scenario:
+    """Return a scenario of the package with the requested device."""
+    document = copy.deepcopy(dict(load_scenario(name).origin.content))
+    document["device"] = {"overrides": document["device"].get("overrides", []), **_device_table(request)}
+    return scenario_from_dict(document, request.overrides)
+
+
+def _of_bench(name: str, request: Request, motion: dict[str, str], initial: dict[str, str], duration: str) -> Scenario:
+    document: dict[str, Any] = {
+        "schema_version": 1,
+        "name": name,
+        "device": _device_table(request),
+        "run": {"duration": duration, "step": "1 ms", "output_interval": "1 ms"},
+        "motion": motion,
+        "initial": initial,
+        "controller": _CLOSED_VALVE,
+    }
+    return scenario_from_dict(document, request.overrides)
+
+
+def _device_table(request: Request) -> dict[str, str]:
+    table = {"set": request.parameter_set}
+    return table if request.valve is None else {**table, "valve": request.valve}
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """An experiment: name, what is done, and the function that does it."""
+
+    name: str
+    summary: str
+    record: Callable[[Request], Outcome]
+
+
+EXPERIMENTS: dict[str, Experiment] = {
+    item.name: item
+    for item in (
+        Experiment("static-torque", "torque on a scale over pressure, three times up and down", record_static_torque),
+        Experiment("free-decay", "angle after an impulse, chambers open to the room", record_free_decay),
+        Experiment("open-valve-flow", "flow of the open valve at many pressures", record_open_valve),
+        Experiment("vane-leak", "pressures of plugged chambers as gas leaks across the vane", record_vane_leak),
+        Experiment("vane-leak-steady", "flow that maintains the pressure in chamber 1", record_steady_leak),
+        Experiment("valve-map", "flow of the valve over its command, up and down", record_valve_map),
+        Experiment("step-response", "figure 7: valve opened fully, vane from stop to stop", record_step_response),
+        Experiment("torque-task", "figure 8: torque ramp and hold under control", record_torque_task),
+    )
+}
