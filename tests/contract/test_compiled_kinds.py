@@ -18,12 +18,13 @@ from ppafo.engine.numba_compiler import NumbaCompiler
 from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.engine.source_text import SourceCollector
 from ppafo.metrics import METRICS
+from ppafo.metrics.metric import WALK
 from ppafo.model.effects.catalog import EFFECTS
 from ppafo.model.effects.kind import Moment
 from ppafo.model.gait_sensors import Fault, GaitMeasurement, GaitSeen, GaitSensors, measure_gait
 from ppafo.model.sensors import Measurement, SensorParameters, measure
 from ppafo.model.valves.catalog import VALVES
-from ppafo.signals.meter import Course, MeterKind, Sample
+from ppafo.signals.meter import Course, MeterKind, Sample, WalkSample
 
 QUICKLY = '@njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)'
 ROUNDING = 1.0e-12
@@ -152,14 +153,32 @@ def meters(draw: random.Random) -> Iterator[Entry]:
         )
         for number in range(60)
     ]
-    kinds: dict[str, MeterKind] = {meter.name: meter for kind in METRICS.values() for meter in kind.meters}
-    for name, kind in kinds.items():
-        state = kind.start(course, samples[0])
+    walked = [
+        WalkSample(
+            *sample,
+            supplied_mass=1.0e-4 * number,
+            strides=float(number // 8),
+            push_off_work=0.1 * number,
+            slap_rates=-0.3 * (number // 8),
+            clearances=-0.01 * (number // 8),
+            toe_landings=float(number // 20),
+            phase=float(number % 4),
+            level=1.0 if 40 < number < 44 else 0.0,
+            time=0.01 * number,
+        )
+        for number, sample in enumerate(samples)
+    ]
+    kinds: dict[str, tuple[MeterKind, bool]] = {
+        meter.name: (meter, WALK in kind.needs) for kind in METRICS.values() for meter in kind.meters
+    }
+    for name, (kind, is_of_walk) in kinds.items():
+        seen: list[Sample] | list[WalkSample] = walked if is_of_walk else samples
+        state = kind.start(course, seen[0])
         tried = []
-        for sample in samples[1:]:
+        for sample in seen[1:]:
             tried.append((state, course, sample))
             state = kind.update(*tried[-1])
-        yield Entry(f"{name}_start", kind.start, [(course, sample) for sample in samples])
+        yield Entry(f"{name}_start", kind.start, [(course, sample) for sample in seen])
         yield Entry(f"{name}_update", kind.update, tried)
 
 

@@ -9,13 +9,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ppafo.engine.rows import leaves, rebuilt
 from ppafo.gait import Gait
 from ppafo.model.columns import larger, over_runs, smaller
 from ppafo.model.fourier import Harmonic, Series
 from ppafo.model.gait import GaitSeries, GaitTiming
 from ppafo.model.leg import LegParameters
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.anthropometry import Build, draw_bounded_normal, draw_builds, segment_values
+from ppafo.walking.declaration import LARGEST_SEED
 from ppafo.walking.gait_series import gait_series, gait_timing, strike_angle
+from ppafo.walking.motion import walk_of
 from ppafo.walking.varied_gait import SERIES, SeriesOfMany, VariedGaits, draw_gaits
 from ppafo.walking.wearer import Wearer
 
@@ -45,39 +49,56 @@ class Person(NamedTuple):
     start: float
 
 
-def person_of(gait: Gait, number: Any) -> Person:
-    """The person with a number, a gait as the others have it; for an array (runs,) every number of it is one too."""
-    person: Person = over_runs(lambda one: _person(gait, one), number)
+def person_of(gait: Gait, who: Any) -> Person:
+    """The person with a number, or who is drawn already; for an array (runs,) every number of it is one too."""
+    if isinstance(who, Person):
+        return who
+    person: Person = over_runs(lambda one: _person(gait, one), who)
     return person
 
 
 def _person(gait: Gait, number: float) -> Person:
     if number == 0.0:
         return Person(1.0, 1.0, gait_series(gait), gait_timing(gait), strike_angle(gait), 1.0, 0.0)
-    build, gaits, thresholds, start = _drawn(gait, number)
-    series = GaitSeries(**{name: _series(curves) for name, curves in gaits.series.items()})
-    timing = GaitTiming(start=0.0, **{name: float(values[1]) for name, values in gaits.timing.items()})
-    foot = float(_at_strike(gaits.series["shank"]) - _at_strike(gaits.series["ankle"])) + 0.5 * np.pi
-    mass, stature = float(build.mass[1]), float(build.stature[1])
-    return Person(mass, stature, series, timing, foot - timing.ground_angle, thresholds, start)
+    build, gaits, generator = _drawn(gait, number)
+    person: Person = rebuilt(Person, [float(values[1]) for values in leaves(drawn_people(build, gaits, generator))])
+    return person
 
 
-def _drawn(gait: Gait, number: float) -> tuple[Build, VariedGaits, float, float]:
-    """Build and gait of two, the second of whom is the person, with factor on thresholds and shift of the push-off."""
+def _drawn(gait: Gait, number: float) -> tuple[Build, VariedGaits, np.random.Generator]:
+    """Build and gait of two, the second of whom is the person, and what draws on."""
     generator = np.random.default_rng(int(number))
     build = draw_builds(2, generator)
-    gaits = draw_gaits(gait, build.stature, generator)
-    scale, shift = (float(draw_bounded_normal(generator, (2,))[1]) for _ in range(2))
-    return build, gaits, 1.0 + THRESHOLD_VARIATION * scale, START_VARIATION * shift
+    return build, draw_gaits(gait, build.stature, generator), generator
+
+
+def drawn_people(build: Build, gaits: VariedGaits, generator: np.random.Generator) -> Person:
+    """People of some builds and gaits, each number an array (people,); the first is fitted as the settings say."""
+    count = build.mass.size
+    scale, shift = (draw_bounded_normal(generator, (count,)) for _ in range(2))
+    scale[0], shift[0] = 0.0, 0.0
+    timing: Any = {"start": np.zeros(count), **gaits.timing}
+    strike: Any = gaits.strike_angle() - gaits.timing["ground_angle"]
+    thresholds: Any = 1.0 + THRESHOLD_VARIATION * scale
+    mass: Any = build.mass
+    stature: Any = build.stature
+    start: Any = START_VARIATION * shift
+    series = GaitSeries(**{name: _series(curves) for name, curves in gaits.series.items()})
+    return Person(mass, stature, series, GaitTiming(**timing), strike, thresholds, start)
 
 
 def _series(curves: SeriesOfMany) -> Series:
-    pairs = zip(curves.cosines[1].tolist(), curves.sines[1].tolist(), strict=True)
-    return Series(mean=float(curves.mean[1]), harmonics=tuple(Harmonic(*pair) for pair in pairs))
+    pairs: Any = zip(curves.cosines.T, curves.sines.T, strict=True)
+    mean: Any = curves.mean
+    return Series(mean=mean, harmonics=tuple(Harmonic(*pair) for pair in pairs))
 
 
-def _at_strike(curves: SeriesOfMany) -> Any:
-    return curves.mean[1] + curves.cosines[1].sum()
+def crowd_of(scenario: Scenario, build: Build, gaits: VariedGaits, generator: np.random.Generator) -> Scenario:
+    """Many wearers as one walk whose numbers are arrays (people,); everybody has noise of his or her own."""
+    people = drawn_people(build, gaits, generator)
+    seeds: Any = (scenario.sensors.seed + np.arange(build.mass.size, dtype=np.float64)) % LARGEST_SEED
+    sensors = replace(scenario.sensors, seed=seeds)
+    return replace(scenario, sensors=sensors, motion=replace(walk_of(scenario), person=people))
 
 
 def leg_of_person(leg: LegParameters, person: Person) -> LegParameters:
@@ -102,7 +123,7 @@ def as_drawn(gait: Gait, wearer: Wearer, number: float) -> tuple[Gait, Wearer]:
     """Gait and wearer of the person with a number, for results: what is healthy is that of this person."""
     if number == 0.0:
         return gait, wearer
-    build, gaits, _, _ = _drawn(gait, number)
+    build, gaits, _ = _drawn(gait, number)
     curves = {}
     for field, name in SERIES.items():
         curve = gait.curves.get(name)

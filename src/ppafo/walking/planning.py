@@ -13,8 +13,9 @@ from ppafo.control.fixed.walking_law import GaitConverter, gait_converter
 from ppafo.control.fixed.walking_numbers import FIXED_WALKS
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
+from ppafo.engine.lanes import Batch
 from ppafo.engine.rows import leaves, rebuilt
-from ppafo.engine.run import Run, Walk
+from ppafo.engine.run import Run, Walk, batches_of
 from ppafo.engine.scheme.walking import WalkState
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
@@ -31,11 +32,12 @@ from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.plan import Pieces, Steps, compose_run, sensor_parameters, too_many_steps
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, ProfileChoice, Scenario
+from ppafo.walking.anthropometry import Build
 from ppafo.walking.course import WalkingCourse
 from ppafo.walking.course_planning import PlannedCourse, plan_course, standing_gait
 from ppafo.walking.heel_rocker import heel_rocker
 from ppafo.walking.motion import walk_of
-from ppafo.walking.person import Person, leg_of_person, person_of, settings_of_person
+from ppafo.walking.person import Person, crowd_of, leg_of_person, person_of, settings_of_person
 from ppafo.walking.preparation import (
     device_share,
     longest_delay,
@@ -47,6 +49,7 @@ from ppafo.walking.preparation import (
     with_leg,
 )
 from ppafo.walking.sensor_settings import FaultSettings, SensorSettings, sensors_of
+from ppafo.walking.varied_gait import VariedGaits
 from ppafo.walking.wearer import leg_parameters
 
 NO_REFERENCE = ProfileChoice("constant", {"level": 0.0})
@@ -108,6 +111,18 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         walk,
     )
     return run, (too_many_steps(scenario, run.step, run.step_count), *problems)
+
+
+def batch_of_many(scenario: Scenario, build: Build, gaits: VariedGaits, generator: np.random.Generator) -> Batch:
+    """The walks of many wearers, the first of whom is that of the scenario; nothing is recorded on the way."""
+    run, _ = plan_walks(crowd_of(scenario, build, gaits, generator))
+    return unrecorded(run, build.mass.size)
+
+
+def unrecorded(run: Run, runs: int) -> Batch:
+    """The batch of so many walks of one length, of which nothing is recorded on the way."""
+    ((_, batch),) = batches_of(run, runs)
+    return replace(batch, clock=replace(batch.clock, record_every=0))
 
 
 def walk_steps(scenario: Scenario, plant: PlantParameters) -> Steps:

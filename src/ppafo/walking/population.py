@@ -17,13 +17,13 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.walking.anthropometry import draw_builds
 from ppafo.walking.course_planning import turns_walked
 from ppafo.walking.motion import walk_of
-from ppafo.walking.planning import plan_walk
+from ppafo.walking.person import crowd_of
+from ppafo.walking.planning import course_of_walk, plan_walks, unrecorded
 from ppafo.walking.recorded import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
 from ppafo.walking.result import REMEDY
 from ppafo.walking.varied_gait import draw_gaits
 from ppafo.walking.varying import with_duration
 from ppafo.walking.walk import Progress, lasting, silent
-from ppafo.walking.wearers_rows import batch_of_many, course_of_many
 
 MAXIMUM_WEARERS = 1_000_000
 
@@ -111,12 +111,13 @@ def walk_population(
     generator = np.random.default_rng(seed)
     build = draw_builds(wearers, generator)
     gaits = draw_gaits(walk_of(configuration).gait, build.stature, generator)
-    planned = course_of_many(configuration, gaits)
+    crowd = crowd_of(configuration, build, gaits, generator)
+    planned = course_of_walk(crowd)
     if minutes is None and planned is not None:
         minutes = float(np.max(planned.duration)) / 60.0
     seconds = lasting(configuration, minutes).duration
-    run = plan_walk(with_duration(configuration, seconds))
-    batch = batch_of_many(configuration, run, build, gaits, generator, planned)
+    run, _ = plan_walks(with_duration(crowd, seconds))
+    batch = unrecorded(run, wearers)
     states = _run_in_groups(batch, progress)
     rows = {path: states[row] for path, row in row_numbers(batch.program.state_rows()).items()}
     good = (rows["result.failure_time"] >= NEVER_FAILED) & np.isfinite(states).all(axis=0)

@@ -37,23 +37,13 @@ class SeriesOfMany:
     cosines: Floats
     sines: Floats
 
-    def at_heel_strike(self, frequency: Floats) -> tuple[Floats, Floats, Floats]:
-        """Value, first and second time derivative at phase 0, for strides per second [1/s]."""
-        order = 2.0 * np.pi * np.arange(1, HARMONICS + 1)
-        value = self.mean + self.cosines.sum(axis=1)
-        return value, frequency * (self.sines @ order), -(frequency**2) * (self.cosines @ order**2)
+    def at_heel_strike(self) -> Floats:
+        """Value at phase 0."""
+        return np.asarray(self.mean + self.cosines.sum(axis=1))
 
     def scale(self, factor: Floats) -> "SeriesOfMany":
         """The curves, each times its factor [-] (people,)."""
         return SeriesOfMany(self.mean * factor, self.cosines * factor[:, None], self.sines * factor[:, None])
-
-    def rows(self) -> dict[str, Floats]:
-        """Coefficients (people,) by path in ``model.fourier.Series``, in the SI unit of the curve."""
-        found = {"mean": self.mean}
-        for order in range(HARMONICS):
-            found[f"harmonics[{order}].cosine"] = self.cosines[:, order]
-            found[f"harmonics[{order}].sine"] = self.sines[:, order]
-        return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,6 +53,10 @@ class VariedGaits:
     series: dict[str, SeriesOfMany]
     timing: dict[str, Floats]
     stride_time: Floats
+
+    def strike_angle(self) -> Floats:
+        """Angle [rad] of each foot over the horizontal at its heel strike."""
+        return self.series["shank"].at_heel_strike() - self.series["ankle"].at_heel_strike() + 0.5 * np.pi
 
 
 def draw_gaits(gait: Gait, stature: Floats, generator: np.random.Generator) -> VariedGaits:

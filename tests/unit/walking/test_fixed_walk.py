@@ -20,13 +20,12 @@ from ppafo.walking.anthropometry import draw_builds
 from ppafo.walking.comparison import with_device_off
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
-from ppafo.walking.planning import converter_of_walk, gait_sensors_of, plan_walk
+from ppafo.walking.planning import batch_of_many, converter_of_walk, gait_sensors_of, plan_walk
 from ppafo.walking.recorded import SAFE_ROW
 from ppafo.walking.sampled import run_sampled_walk
 from ppafo.walking.varied_gait import draw_gaits
 from ppafo.walking.varying import with_duration
 from ppafo.walking.walk import walk
-from ppafo.walking.wearers_rows import batch_of_many
 
 FIXED = "controller.arithmetic=fixed"
 
@@ -62,7 +61,7 @@ def test_the_thresholds_of_many_wearers_vary_on_whole_numbers_as_in_floats() -> 
         build = draw_builds(40, generator)
         gaits = draw_gaits(walk_of(configuration).gait, build.stature, generator)
         run = plan_walk(with_duration(configuration, 4.0))
-        found = batch_of_many(configuration, run, build, gaits, generator)
+        found = batch_of_many(with_duration(configuration, 4.0), build, gaits, generator)
         tables[name] = {path: found.parameters[row] for path, row in row_numbers(run.program.parameter_rows()).items()}
         alone = batch_of(run).parameters
         paths = [path for path in tables[name] if path.startswith("controller.")]

@@ -23,11 +23,10 @@ from ppafo.walking.anthropometry import (
 from ppafo.walking.gait_series import gait_timing
 from ppafo.walking.motion import walk_of
 from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
-from ppafo.walking.planning import plan_walk
+from ppafo.walking.planning import batch_of_many, plan_walk
 from ppafo.walking.varied_gait import SERIES, SeriesOfMany, draw_gaits
 from ppafo.walking.varying import with_duration
 from ppafo.walking.wearer import paper_subject
-from ppafo.walking.wearers_rows import batch_of_many
 
 MINUTES = 0.15
 
@@ -92,7 +91,8 @@ def test_any_wearer_walks_as_it_would_alone() -> None:
     alone = replace(configuration, motion=motion, control=replace(configuration.control, settings=settings))
     shared = plan_walk(with_duration(configuration, 60.0 * MINUTES))
     run = with_heel_of(plan_walk(with_duration(alone, 60.0 * MINUTES)), shared, float(build.stature[index]))
-    begun = batch_of_many(configuration, shared, build, gaits, np.random.default_rng(3)).states[:, index]
+    many = with_duration(configuration, 60.0 * MINUTES)
+    begun = batch_of_many(many, build, gaits, np.random.default_rng(3)).states[:, index]
     paths = [path for group, row in run.program.state_rows().items() for path in leaf_paths(row, group)]
     for path, value, own in zip(paths, begun.tolist(), batch_of(run).states[:, 0].tolist(), strict=True):
         assert value == pytest.approx(own, rel=1e-9, abs=1e-12), path

@@ -11,7 +11,7 @@ from ppafo.control.walking.assistance import TorqueProfile
 from ppafo.engine.lanes import Batch, Clock, Floats
 from ppafo.engine.program import Program
 from ppafo.engine.rows import numbers
-from ppafo.engine.run import Run, batch_of
+from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError, UnitError
 from ppafo.model.sensors import Measurement
 from ppafo.parameters import load_parameter_set
@@ -29,10 +29,9 @@ from ppafo.studies.varying import VariedPath, in_its_unit, varied_path
 from ppafo.units import parse_quantity
 from ppafo.walking.anthropometry import draw_builds
 from ppafo.walking.motion import walk_of
-from ppafo.walking.planning import plan_walk
+from ppafo.walking.planning import batch_of_many, plan_walk
 from ppafo.walking.varied_gait import draw_gaits
 from ppafo.walking.varying import with_duration
-from ppafo.walking.wearers_rows import batch_of_many
 from ppafo.worlds.gym.kernel import Columns, episode_program
 from ppafo.worlds.gym.tasks import Goal
 
@@ -212,10 +211,10 @@ def _repeated(columns: Columns, count: int) -> Columns:
 
 @dataclass(frozen=True, slots=True)
 class WalkEpisodes:
-    """Episodes of a walk; ``randomise`` draws another wearer with another gait for each."""
+    """Episodes of a walk, ``commanded`` from outside; ``randomise`` draws another wearer with another gait for each."""
 
     configuration: Scenario
-    run: Run
+    commanded: Scenario
     program: Program
     clock: Clock
     randomise: bool
@@ -241,10 +240,10 @@ class WalkEpisodes:
     def _wearer(self, generator: np.random.Generator) -> Batch:
         """Two wearers: that of the configuration, and one who is drawn, with noise of his or her own."""
         seed = float(generator.integers(0, LARGEST_SEED))
-        run = replace(self.run, sensors=self.run.sensors._replace(seed=seed))
+        drawn = replace(self.commanded, sensors=replace(self.commanded.sensors, seed=int(seed)))
         build = draw_builds(2, generator)
         gaits = draw_gaits(walk_of(self.configuration).gait, build.stature, generator)
-        return batch_of_many(self.configuration, run, build, gaits, generator)
+        return batch_of_many(drawn, build, gaits, generator)
 
 
 def walk_episodes(configuration: Scenario, randomise: bool, seconds: float) -> WalkEpisodes:
@@ -264,9 +263,8 @@ def walk_episodes(configuration: Scenario, randomise: bool, seconds: float) -> W
             f"{configuration.origin.file}: controller.kind = '{kind}' has no torque profile; event_pid has one"
         )
     goal = Goal(angle=0.0, profile=TorqueProfile(**{name: settings[name] for name in TorqueProfile._fields}))
-    planned = plan_walk(with_duration(configuration, seconds))
-    run = replace(planned, program=replace(planned.program, controller=None), controller=())
-    batch = batch_of(run)
+    commanded = with_duration(configuration, seconds).controlled_by(FromOutside())
+    batch = batch_of(plan_walk(commanded))
     program, clock = episode_program(batch)
     plain = Columns(batch.parameters, batch.states, np.array([numbers(goal)]).T)
-    return WalkEpisodes(configuration, run, program, replace(clock, record_every=0), randomise, plain)
+    return WalkEpisodes(configuration, commanded, program, replace(clock, record_every=0), randomise, plain)

@@ -137,7 +137,7 @@ def test_a_folder_that_says_too_little_is_refused(tmp_path: Path, content: str, 
         (
             "configuration.gait.stride_time",
             0,
-            "'walk_of(configuration).gait.stride_time' is 0, which is impossible for a walk",
+            "'configuration.gait.stride_time' is 0, which is impossible for a walk",
         ),
         ("configuration.gait", [], "has no number at 'configuration.gait.stride_time'"),
         (

@@ -36,7 +36,7 @@ from ppafo.walking.result import REMEDY
 from ppafo.walking.varied_gait import VariedGaits, draw_gaits
 from ppafo.walking.varying import with_duration
 from ppafo.walking.wearer import Wearer
-from ppafo.walking.wearers_rows import batch_of_many
+from ppafo.walking.planning import batch_of_many
 
 DEGREE = 2
 """Collocation points in an interval; Radau's, of third order."""
@@ -450,13 +450,13 @@ class DrawnWearers:
     batch: Batch
 
 
-def draw_wearers(configuration: Scenario, run: Run, count: int, seed: int = SEED) -> DrawnWearers:
+def draw_wearers(configuration: Scenario, count: int, seed: int = SEED) -> DrawnWearers:
     """Wearers drawn around that of a configuration, who is the first; for every controller the same."""
     # Not the stream of their devices, with which wearers would go hand in hand.
     generator = np.random.default_rng([seed, _WEARERS])
     build = draw_builds(count, generator)
     gaits = draw_gaits(walk_of(configuration).gait, build.stature, generator)
-    return DrawnWearers(build, gaits, batch_of_many(configuration, run, build, gaits, generator))
+    return DrawnWearers(build, gaits, batch_of_many(configuration, build, gaits, generator))
 
 
 def draw_measures(
@@ -470,8 +470,9 @@ def draw_measures(
 
     Each walk has its own noise where the sensors are noisy.
     """
-    run = plan_walk(with_duration(configuration, task.seconds))
-    wearers = draw_wearers(configuration, run, draws, seed)
+    configuration = with_duration(configuration, task.seconds)
+    run = plan_walk(configuration)
+    wearers = draw_wearers(configuration, draws, seed)
     plants = draw_plants(configuration, run, draw_factors(draws, seed))
     batch = _with_devices(run, wearers.batch, plants)
     is_noisy = not has_ideal_sensors(configuration)
