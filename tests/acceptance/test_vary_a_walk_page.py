@@ -11,7 +11,7 @@ import ppafo
 from ppafo.loading import load_scenario
 from ppafo.questions.find.solve import find
 from ppafo.questions.montecarlo.solve import monte_carlo
-from ppafo.questions.tune.problem import Effort, load_tuning
+from ppafo.questions.tune.problem import load_tuning
 from ppafo.questions.tune.solve import tune
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.studies.loading import load_study
@@ -68,7 +68,8 @@ def test_the_push_off_is_tuned_for_the_bad_end_of_people() -> None:
     problem = load_tuning("push-off")
     assert problem.spread is not None
     assert (problem.spread.fraction, problem.spread.study) == (0.9, "wearers")
-    quick = replace(problem, spread=replace(problem.spread, draws=4), effort=Effort(1, 2, 2, 1))
+    effort = replace(problem.effort, starts=1, generations=2, candidates_per_gain=2)
+    quick = replace(problem, spread=replace(problem.spread, draws=4), effort=effort)
     tuned = tune(quick)
     alone = walk(with_overrides(problem.scenario, problem.lines(tuned.after.gains)))
     assert tuned.after.result.metrics["push_off_work"].value == alone.metrics["push_off_work"].value
