@@ -28,7 +28,7 @@ from ppafo.walking.anthropometry import Build, draw_builds
 from ppafo.walking.event_times import EVENTS, TOO_FAR, Samples, event_errors, known_events, true_events, within
 from ppafo.walking.gait_series import gait_timing, truncate
 from ppafo.walking.motion import walk_of
-from ppafo.walking.planning import has_ideal_sensors, plan_walk
+from ppafo.walking.planning import batch_of_many, has_ideal_sensors, plan_walk
 from ppafo.walking.posture import AnklePath, ankle_path
 from ppafo.walking.preparation import vented_state, with_leg
 from ppafo.walking.recorded import SAFE_ROW
@@ -36,7 +36,6 @@ from ppafo.walking.result import REMEDY
 from ppafo.walking.varied_gait import VariedGaits, draw_gaits
 from ppafo.walking.varying import with_duration
 from ppafo.walking.wearer import Wearer
-from ppafo.walking.planning import batch_of_many
 
 DEGREE = 2
 """Collocation points in an interval; Radau's, of third order."""
