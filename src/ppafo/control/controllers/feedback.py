@@ -29,7 +29,14 @@ class PidState(NamedTuple):
 def pid_command(
     parameters: PidParameters, state: PidState, error: float, ahead: float, period: float
 ) -> tuple[float, PidState]:
-    """Command from -1 to 1 for a torque error [N m], added to the command ``ahead`` [-]. Equation (13)."""
+    """Command u from -1 to 1 for a torque error e [N m], added to the command ``ahead`` u_0 [-]. Equation (13):
+
+        u = u_0 + k_p e + k_i (integral of e) + k_d (slope of e)
+
+    The integral is a sum of rectangles. The slope is a backward difference through a filter of first order with the
+    time constant ``derivative_filter``. What a clipped command lacks is taken off the integral, by ``anti_windup`` a
+    second (back-calculation).
+    """
     change = (error - state.error) * state.started
     slope = state.slope + (change - period * state.slope) / (period + parameters.derivative_filter)
     integral = state.integral + parameters.integral_gain * error * period
@@ -94,7 +101,9 @@ def sliding_update(
     measurement: Measurement,
     period: float,
 ) -> tuple[float, SlidingModeState]:
-    """Command: saturation of s over the boundary layer, with s = e + slope times the integral of e [N m].
+    """Command u [-] for the torque error e [N m], with the boundary layer phi [N m] and the slope lambda [1/s]:
+
+        s = e + lambda (integral of e),    u = reaching_command min(1, max(-1, s / phi))
 
     The integral stands still outside the layer, where a longer error could not open the valve further.
     """
@@ -175,10 +184,12 @@ def learnt_command(parameters: DampedProportionalParameters, elapsed: float) -> 
 def damped_command(
     gains: DampedGains, course: TorqueSlope, reference: float, torque: float, ahead: float, period: float
 ) -> tuple[float, TorqueSlope]:
-    """Command from -1 to 1: gain times torque error, less damping times the rate of the torque, plus ``ahead`` [-].
+    """Command u from -1 to 1 for a reference r and a torque T [N m], added to the command ``ahead`` u_0 [-]:
 
-    Reference and torque [N m], period [s]. Damping acts on the rate of the torque, not of the error, so that a step of
-    the reference gives no kick.
+        u = u_0 + proportional_gain (r - T) - damping dT/dt
+
+    The rate is a backward difference over the period [s] through a filter of first order. Damping acts on the rate of
+    the torque, not of the error, so that a step of the reference gives no kick.
     """
     change = (torque - course.torque) * course.started
     slope = course.slope + (change - period * course.slope) / (period + gains.damping_filter)

@@ -62,7 +62,10 @@ NOMINAL_QUANTITIES = (
 
 
 def ellipse_flow(pressure_a: float, pressure_b: float, conductance: float, critical_ratio: float) -> float:
-    """Mass flow from a to b [kg/s] by the ellipse of ISO 6358, antisymmetric; conductance [kg/(s Pa)]."""
+    """Mass flow from a to b [kg/s] by the ellipse of ISO 6358, antisymmetric; conductance C [kg/(s Pa)].
+
+    C P_up sqrt(1 - ((r - b) / (1 - b))^2),    r = P_down / P_up above the critical ratio b, else r = b
+    """
     upstream = max(pressure_a, pressure_b)
     ratio = min(pressure_a, pressure_b) / upstream
     position = max(0.0, min(1.0, (ratio - critical_ratio) / (1.0 - critical_ratio)))
@@ -73,9 +76,13 @@ def ellipse_flow(pressure_a: float, pressure_b: float, conductance: float, criti
 def torque_rates(
     nominal: NominalChambers, angle: float, angular_velocity: float, pressure_1: float, pressure_2: float
 ) -> TorqueRates:
-    """Believed rates of K (P_1 - P_2) [N m/s] at an angle [rad], its rate [rad/s] and absolute pressures [Pa].
+    """Believed rates of T = K (P_1 - P_2) [N m/s] at an angle [rad], its rate w [rad/s] and absolute pressures [Pa].
 
-    Equations (2) to (9). Opening the valve raises or lowers the torque as it should where both pressures are above the
+    Equations (2) to (9), with the volumes V = V_dead + B (angle from the stop) and the flows m_1 and m_2 into them:
+
+        dT/dt = K (R T_gas / M) (m_1 / V_1 - m_2 / V_2) - K B w (P_1 / V_1 + P_2 / V_2)
+
+    Opening the valve raises or lowers the torque as it should where both pressures are above the
     atmosphere: the believed supplies let gas in only.
     """
     least = min(nominal.dead_volume_1, nominal.dead_volume_2)

@@ -32,13 +32,16 @@ class TorqueProfile(NamedTuple):
 
 
 def smooth(fraction: float) -> float:
-    """A cubic from 0 to 1 with level ends, at a fraction [-] from 0 to 1."""
+    """The cubic x^2 (3 - 2 x) from 0 to 1 with level ends, at a fraction x [-]."""
     inside = max(0.0, min(1.0, fraction))
     return inside * inside * (3.0 - 2.0 * inside)
 
 
 def profile_torque(profile: TorqueProfile, phase: float) -> float:
-    """Requested torque [N m] at a phase in turns from the heel strike."""
+    """Requested torque [N m] at a phase p in turns from the heel strike, with S the cubic of ``smooth``:
+
+    peak_torque (S((p - peak_time + rise_time) / rise_time) - S((p - peak_time) / fall_time))
+    """
     rise = smooth((phase - profile.peak_time + profile.rise_time) / profile.rise_time)
     fall = smooth((phase - profile.peak_time) / profile.fall_time)
     return profile.peak_torque * (rise - fall)
@@ -182,7 +185,10 @@ LARGEST_PRESS = 0.7
 
 
 def requested_torque(rules: Assistance, phase: PhaseState, time: GaitTime, angle: float, rate: float) -> float:
-    """Requested torque [N m], above 0 in plantarflexion, at an angle [rad] and its rate [rad/s]; 0 in mid-stance."""
+    """Requested torque [N m], above 0 in plantarflexion, at an angle q [rad] and its rate [rad/s]; 0 in mid-stance.
+
+    Landing and swing: stiffness (swing_angle - q) - damping dq/dt, less their profile. Push-off: its profile.
+    """
     fraction = time.since_strike / phase.stride_time
     hold = rules.hold
     held = hold.stiffness * (hold.swing_angle - angle) - hold.damping * rate
