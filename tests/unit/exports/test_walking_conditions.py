@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from ppafo.control.fixed.walking_law import HALVES, LONGEST, LONGEST_STRIDE, TOP, next_stride
 from ppafo.control.fixed.whole_numbers import FRACTION_BITS, HALF, LARGEST_FRACTION, nearest_fraction_of
-from ppafo.exports.firmware.walking import PythonWalkChip, walk_chip, walk_firmware
+from ppafo.exports.firmware.lock_step import PythonChip
+from ppafo.exports.firmware.walking import walk_chip, walk_firmware
 from ppafo.exports.firmware.walking.drawn import SAMPLES, gait_readings
 from ppafo.walking.loading import load_walk
 from tests.unit.control.test_fixed_walking import RULES
@@ -27,7 +28,7 @@ def test_samples_reach_every_condition_that_can_be_both_ways_and_each_decides_al
     for name, content in walk_firmware(configuration).items():
         (tmp_path / name).write_bytes(content)
     chip = walk_chip(configuration)
-    given, python, lines = gait_readings(chip.converter, SAMPLES, 1), PythonWalkChip(chip), []
+    given, python, lines = gait_readings(chip.converter, SAMPLES, 1), PythonChip(chip), []
     readings, begins = next(given)
     for _ in range(SAMPLES):
         if begins:

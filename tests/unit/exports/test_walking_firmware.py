@@ -7,20 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.control.fixed.walking_numbers import EVENT_ON_OFF
+from ppafo.control.fixed.walking_numbers import EVENT_ON_OFF, SIGN_BITS
 from ppafo.control.walking.signs import SIGNS
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports.firmware import proof
 from ppafo.exports.firmware.catalog import MSP430G2553
+from ppafo.exports.firmware.lock_step import PythonChip
 from ppafo.exports.firmware.simulators import built, missing_tools, sizes
-from ppafo.exports.firmware.walking import (
-    SIGN_BITS,
-    PythonWalkChip,
-    compare_drawn_walk,
-    walk_chip,
-    walk_firmware,
-    walk_on_chip,
-)
+from ppafo.exports.firmware.walking import compare_drawn_walk, walk_chip, walk_firmware, walk_on_chip
 from ppafo.exports.firmware.walking.drawn import DrawnGait
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.widths import Interval
@@ -57,7 +51,7 @@ def test_drawn_gaits_reach_every_phase_level_and_command_and_most_signs() -> Non
     chip = walk_chip(fixed_walk())
     seen: dict[str, set[int]] = {"phase": set(), "level": set(), "command": set(), "sign": set()}
     for seed in (3, 4, 5, 6):
-        drawn, python, command = DrawnGait(chip.converter, seed), PythonWalkChip(chip), 0
+        drawn, python, command = DrawnGait(chip.converter, seed), PythonChip(chip), 0
         for _ in range(30_000):
             readings, begins = drawn.next(command)
             if begins:
@@ -77,7 +71,7 @@ def test_the_c_of_the_law_decides_as_python_does_under_the_sanitizer(tmp_path: P
     configuration = fixed_walk()
     built(walk_firmware(configuration), tmp_path, ("host", "checked"))
     chip = walk_chip(configuration)
-    drawn, python, command, lines, wanted = DrawnGait(chip.converter, 5), PythonWalkChip(chip), 0, [], []
+    drawn, python, command, lines, wanted = DrawnGait(chip.converter, 5), PythonChip(chip), 0, [], []
     for _ in range(15_000):
         readings, begins = drawn.next(command)
         if begins:

@@ -12,7 +12,8 @@ from ppafo.engine.rows import leaf_paths, numbers, row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports.c_library import c_library
-from ppafo.exports.firmware.walking import PythonWalkChip, walk_chip
+from ppafo.exports.firmware.lock_step import PythonChip
+from ppafo.exports.firmware.walking import walk_chip
 from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import Fault, GaitMeasurement, GaitSensors
 from ppafo.simulation.sampled import state_row_numbers
@@ -35,7 +36,7 @@ class InPython:
 
     def __init__(self) -> None:
         self.chip = walk_chip(load_walk("solenoid", (FIXED,)))
-        self.law = PythonWalkChip(self.chip)
+        self.law = PythonChip(self.chip)
 
     def reset(self) -> None:
         self.law.begin()

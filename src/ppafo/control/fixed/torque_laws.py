@@ -49,6 +49,12 @@ WALK_TARGETS = ("msp430g2553",)
 """And those that an integer controller of walking can be written for: the smallest has no room for it."""
 
 
+def sound_of(state: Any) -> int:
+    """1 while all readings have been sound, from the state of a torque law."""
+    found: int = state.sound
+    return found
+
+
 @dataclass(frozen=True, slots=True)
 class FixedLaw:
     """The integer form of a controller of the catalogue, of a torque task or of a walk.
@@ -57,7 +63,7 @@ class FixedLaw:
     number from -1 to 1, or ``VENT``. ``sample(numbers, state, readings)`` is the law itself, on whole numbers only: the
     command in steps and the next state. ``numbers`` and ``readings`` are the NamedTuple classes of what it is given;
     ``number_quantities`` declare the numbers, in order. The state ``begins`` so, and ``state_ranges`` has lowest and
-    highest of every number of it, by its own name.
+    highest of every number of it, by its own name; ``status`` is the word that a chip reports of it.
 
     ``prepare`` makes the numbers: of a torque law ``(settings, period, torque_step)`` those after the limits of its
     readings, of a walking law ``(settings, period, converter)`` all by name, which may not be within their ranges yet.
@@ -73,6 +79,7 @@ class FixedLaw:
     state_ranges: Mapping[str, tuple[int, int]]
     prepare: Callable[[Mapping[str, float], float, Any], Any]
     readings: type = Readings
+    status: Callable[[Any], int] = sound_of
     largest: Callable[[Mapping[str, float], float, float], float] = lambda _settings, _period, _step: 0.0
 
     @property

@@ -306,6 +306,15 @@ STATE_RANGES = {
 """Lowest and highest of every number of ``WalkCounts``, by its own name."""
 
 
+SIGN_BITS = 8
+"""A chip reports its level above these bits of a word, and its sign in them."""
+
+
+def level_and_sign(state: walking_law.WalkCounts) -> int:
+    """Level and last sign in one word."""
+    return (state.safety.level << SIGN_BITS) + state.safety.sign
+
+
 EVENT_ON_OFF = FixedLaw(
     kind=replace(
         FLOAT_KIND,
@@ -317,6 +326,7 @@ EVENT_ON_OFF = FixedLaw(
     sample=walking_law.sample,
     numbers=walking_law.WalkNumbers,
     readings=walking_law.GaitReadings,
+    status=level_and_sign,
     begins=START_COUNTS,
     state_ranges=STATE_RANGES,
     number_quantities=NUMBERS,

@@ -3,7 +3,7 @@
 import random
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -40,22 +40,12 @@ EPISODE = 200
 TURN = 50
 """Drawn samples that the chip is asked at once."""
 
-Shown_contra = TypeVar("Shown_contra", bound=tuple[int, ...], contravariant=True)
+Shown = TypeVar("Shown", bound=tuple[int, ...])
 """What the converter shows at a sample."""
 
 
-class Reference(Protocol[Shown_contra]):
-    """A controller in Python, as the chip computes it."""
-
-    def begin(self) -> None:
-        """Forget everything."""
-
-    def sample(self, readings: Shown_contra, /) -> tuple[int, int]:
-        """Command in steps, and the status word that the chip reports with it."""
-
-
 class PythonChip:
-    """The integer controller of a scenario in Python, as the chip computes it."""
+    """The integer controller of a scenario or a walk in Python, as the chip computes it."""
 
     def __init__(self, chip: ChipController) -> None:
         self.law = chip.law
@@ -67,10 +57,10 @@ class PythonChip:
         """Forget everything."""
         self.state = self.law.begins
 
-    def sample(self, readings: Readings) -> tuple[int, int]:
-        """Command in steps, and 1 while all readings have been sound."""
+    def sample(self, readings: tuple[int, ...]) -> tuple[int, int]:
+        """Command in steps, and the status word that the chip reports with it."""
         command, self.state = self.law.sample(self.numbers, self.state, readings)
-        return command, self.state.sound
+        return command, self.law.status(self.state)
 
 
 class ChipLaw:
@@ -158,8 +148,8 @@ def compare_drawn(scenario: Scenario, samples: int, seed: int = 1, target: str =
 
 
 def compare_with(
-    reference: Reference[Shown_contra],
-    given: Generator[tuple[Shown_contra, bool], int, None],
+    reference: PythonChip,
+    given: Generator[tuple[Shown, bool], int, None],
     samples: int,
     contents: Mapping[str, bytes],
     target: Target,
@@ -169,7 +159,7 @@ def compare_with(
     ``given`` yields readings, and whether both are reset before them; it gets the command that they led to [steps].
     """
     wanted: list[tuple[int, int]] = []
-    asked: list[Shown_contra] = []
+    asked: list[Shown] = []
     decisions: list[Decision] = []
     with chip_simulator(contents, target) as (simulator, image):
         readings, begins = next(given)

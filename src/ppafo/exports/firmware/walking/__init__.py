@@ -1,24 +1,23 @@
 """The controller of a walk as firmware for an MSP430G2553, and on the chip's simulator beside the same in Python."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
 
 import numpy as np
 
-from ppafo.control.fixed.torque_laws import WALK_TARGETS, FixedLaw
-from ppafo.control.fixed.walking_law import GaitConverter, GaitReadings, WalkCounts, read_gait
-from ppafo.control.fixed.walking_numbers import FIXED_WALKS
+from ppafo.control.fixed.torque_laws import WALK_TARGETS
+from ppafo.control.fixed.walking_law import GaitConverter, GaitReadings, read_gait
+from ppafo.control.fixed.walking_numbers import FIXED_WALKS, SIGN_BITS
 from ppafo.control.fixed.whole_numbers import COMMAND_STEPS
 from ppafo.control.walking.signs import SIGNS
 from ppafo.engine.lanes import run_batch
-from ppafo.engine.rows import rebuilt, row_numbers
+from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
-from ppafo.exports.firmware import TICK, law_source, parameters_header, ticks_of
+from ppafo.exports.firmware import TICK, ChipController, law_source, parameters_header, ticks_of
 from ppafo.exports.firmware.catalog import MSP430G2553
-from ppafo.exports.firmware.lock_step import Comparison, Cost, compare_with, cost_of
+from ppafo.exports.firmware.lock_step import Comparison, Cost, PythonChip, compare_with, cost_of
 from ppafo.exports.firmware.simulators import ChipSimulator, Decision, chip_simulator
 from ppafo.exports.firmware.walking.drawn import gait_readings
 from ppafo.exports.templates import filled, licence, template
@@ -47,21 +46,7 @@ _TEMPLATES = (
 )
 
 
-class WalkChip(NamedTuple):
-    """The integer controller of a walk: law, whole numbers by name, converter, ticks of a sample."""
-
-    law: FixedLaw
-    numbers: Mapping[str, float]
-    converter: GaitConverter
-    ticks: int
-
-    @property
-    def of_law(self) -> Any:
-        """The numbers as the law takes them."""
-        return rebuilt(self.law.numbers, [int(value) for value in self.numbers.values()])
-
-
-def walk_chip(configuration: Scenario) -> WalkChip:
+def walk_chip(configuration: Scenario) -> ChipController:
     """The integer controller of a walk whose arithmetic is fixed.
 
     ScenarioError where it is not, or where the chip's timer or converter cannot do what it asks for.
@@ -82,7 +67,7 @@ def walk_chip(configuration: Scenario) -> WalkChip:
     ticks = ticks_of(name, period)
     law = FIXED_WALKS[configuration.control.kind]
     numbers = numbers_of_walk(configuration)
-    return WalkChip(law=law, numbers=numbers, converter=converter_of_walk(configuration), ticks=ticks)
+    return ChipController(law=law, numbers=numbers, converter=converter_of_walk(configuration), ticks=ticks)
 
 
 def walk_firmware(configuration: Scenario, target: str = WALK_TARGETS[0]) -> dict[str, bytes]:
@@ -112,7 +97,7 @@ def walk_firmware(configuration: Scenario, target: str = WALK_TARGETS[0]) -> dic
     return {name: text.encode() for name, text in sorted(texts.items())}
 
 
-def _words(configuration: Scenario, chip: WalkChip, target: str) -> dict[str, str]:
+def _words(configuration: Scenario, chip: ChipController, target: str) -> dict[str, str]:
     """What fills the templates."""
     given, converter = configuration.control.settings, chip.converter
     return {
@@ -144,26 +129,6 @@ def _origins(configuration: Scenario) -> Iterator[str]:
 
 _INSIDE = ("controller_state.", "gait_seen.")
 """What only the lanes keep: state of their controller, and the last readings."""
-
-SIGN_BITS = 8
-"""A chip tells its level above these bits of a word, and its sign in them."""
-
-
-class PythonWalkChip:
-    """The integer controller of a walk in Python, as the chip computes it."""
-
-    def __init__(self, chip: WalkChip) -> None:
-        self.law, self.numbers = chip.law, chip.of_law
-        self.state: WalkCounts = chip.law.begins
-
-    def begin(self) -> None:
-        """Forget everything."""
-        self.state = self.law.begins
-
-    def sample(self, readings: GaitReadings) -> tuple[int, int]:
-        """Command in steps, and level and sign in one word."""
-        command, self.state = self.law.sample(self.numbers, self.state, readings)
-        return command, (self.state.safety.level << SIGN_BITS) + self.state.safety.sign
 
 
 class ChipOfWalk:
@@ -230,4 +195,4 @@ def compare_drawn_walk(configuration: Scenario, samples: int, seed: int = 1) -> 
     """Give drawn readings of a gait to the chip's simulator and to Python, with a reset before every episode."""
     chip = walk_chip(configuration)
     given = gait_readings(chip.converter, samples, seed)
-    return compare_with(PythonWalkChip(chip), given, samples, walk_firmware(configuration), MSP430G2553)
+    return compare_with(PythonChip(chip), given, samples, walk_firmware(configuration), MSP430G2553)
