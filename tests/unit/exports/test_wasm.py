@@ -106,6 +106,14 @@ def test_the_programs_of_the_package_are_those_of_its_physics() -> None:
     assert shipped_programs() == {path.name: path.read_bytes() for path in FOLDER.iterdir()}
 
 
+def test_a_program_stays_good_where_its_functions_move_in_python_and_not_where_they_change() -> None:
+    text = wasm.source_of(library_of(load_scenario("step-response")))
+    moved = text.replace("model_orifice_", "model_flow_of_orifices_")
+    assert moved != text
+    assert wasm.digest_of(moved) == wasm.digest_of(text)
+    assert wasm.digest_of(text.replace("1.0 - ", "1.0 + ", 1)) != wasm.digest_of(text)
+
+
 def test_other_numbers_need_no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wasm, "build", lambda _text: pytest.fail("it was built"))
     plain = module_of(load_scenario("torque-task-proportional"))
