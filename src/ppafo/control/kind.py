@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from ppafo.model.declaration import Quantity
-from ppafo.model.sensors import Measurement
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +57,11 @@ class PythonController(Protocol):
     def reset(self) -> None:
         """Forget everything; called once before the run."""
 
-    def update(self, time: float, reference: float, measurement: Measurement) -> float:
-        """Return the command from -1 to 1 at a time [s], for a reference [N m] and a measurement.
+    def update(self, time: float, reference: float, measurement: Any) -> float:
+        """Return the command from -1 to 1 at a time [s], for a reference [N m] and a ``Measurement``.
+
+        In a walk it is a ``GaitMeasurement`` with the forces under heel and toes, the reference is 0, and
+        ``model.command.VENT`` is a command too: it joins both chambers to the atmosphere.
 
         Above 0 chamber 1 is joined to the supply and chamber 2 to the atmosphere, below 0 the other way round. At 0 a
         proportional valve is closed and both chambers hold their gas; a solenoid pair vents both.

@@ -14,8 +14,12 @@ from ppafo.engine.links import shown_by
 from ppafo.engine.metering import group_of
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import Run
-from ppafo.errors import SimulationError
+from ppafo.errors import ScenarioError, SimulationError
+from ppafo.model.command import VENT, VENTS_ABOVE
+from ppafo.model.gait_sensors import NOTHING_SEEN, GaitMeasurement, measure_gait
+from ppafo.model.plant import chamber_pressures
 from ppafo.model.sensors import Measurement, measure
+from ppafo.model.vane import actuator_torque
 
 
 @final
@@ -35,7 +39,7 @@ class SampledRun:
             len(program.traced),
         )
         self._reference, self._step = _group(batch, "reference"), _group(batch, "timing").step
-        self._see = _measurement_source(batch, self._block)
+        self._see = (_gait_measurements if program.walks else _measurement_source)(batch, self._block)
         self._command_row = row_numbers(program.state_rows())["result.command"]
 
     @property
@@ -50,8 +54,8 @@ class SampledRun:
         requested: float = self._batch.program.reference.value(self._reference, self.time)[0]
         return requested
 
-    def measurement(self) -> Measurement:
-        """What the sensors show at the present sample."""
+    def measurement(self) -> Any:
+        """What the sensors show at the present sample: a ``Measurement``, of a walk a ``GaitMeasurement``."""
         return self._see(self.taken)
 
     def go_on(self, command: float) -> None:
@@ -78,7 +82,7 @@ def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
     controller.reset()
     for _ in range(run.samples):
         command = controller.update(run.time, run.requested, run.measurement())
-        run.go_on(_clip_command(command, controller, run.time))
+        run.go_on(_clip_command(command, controller, run.time, batch.program.walks))
     return run.result()
 
 
@@ -104,12 +108,12 @@ def _group(batch: Batch, name: str) -> Any:
     return group_of(name, batch.program.parameter_rows(), values)
 
 
-def _clip_command(command: object, controller: PythonController, time: float) -> float:
-    """The command within -1 to 1."""
+def _clip_command(command: object, controller: PythonController, time: float, walks: bool) -> float:
+    """The command within -1 to 1; in a walk also the one that vents both chambers."""
     name = type(controller).__name__
     if isinstance(command, bool) or not isinstance(command, int | float | np.floating) or not math.isfinite(command):
         raise SimulationError(f"{name}.update returned {command!r} at t = {time:.6g} s; it must return a finite number")
-    return max(-1.0, min(1.0, float(command)))
+    return VENT if walks and command > VENTS_ABOVE else max(-1.0, min(1.0, float(command)))
 
 
 def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measurement]:
@@ -141,5 +145,41 @@ def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measu
             )
         seen = measure(sensors, angle, pressure_1, pressure_2, plant.torque_constant, sample)
         return seen_with_torque(actuator, plant, seen) if program.has_shape else seen
+
+    return see
+
+
+def _gait_measurements(batch: Batch, block: LaneBlock) -> Callable[[int], GaitMeasurement]:
+    """What the controller of a walk measures at a sample, of the present state.
+
+    ScenarioError for sensors that are late and for gas that warms, of which the lanes know more than this.
+    """
+    program, rows = batch.program, row_numbers(batch.program.state_rows())
+    if program.late_readings or program.is_thermal:
+        raise ScenarioError("a walk with a late sensor or with gas that warms has no controller outside the lanes")
+    plant, sensors, gait_sensors = (_group(batch, name) for name in ("plant", "sensors", "gait_sensors"))
+    period, last = batch.clock.steps_per_sample * _group(batch, "timing").step, NOTHING_SEEN
+
+    def see(sample: int) -> GaitMeasurement:
+        nonlocal last
+        state = block.states[:, 0]
+        angle, mass_1, mass_2, heel, toe = (
+            float(state[rows[path]])
+            for path in ("state.angle", "state.mass_1", "state.mass_2", "walk.heel_force", "walk.toe_force")
+        )
+        pressures = chamber_pressures(plant, angle, mass_1, mass_2)
+        if program.ideal_sensors:
+            return GaitMeasurement(
+                angle=angle,
+                pressure_1=pressures[0],
+                pressure_2=pressures[1],
+                torque=actuator_torque(*pressures, plant.torque_constant),
+                heel_force=heel,
+                toe_force=toe,
+            )
+        seen, last = measure_gait(
+            sensors, gait_sensors, last, angle, *pressures, heel, toe, plant.torque_constant, sample * period, sample
+        )
+        return seen
 
     return see

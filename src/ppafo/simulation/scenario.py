@@ -251,7 +251,9 @@ class Scenario:
                     f"{self.name}: a controller of type {kind} has no method '{method}'; it needs 'reset()' and "
                     f"'update(time, reference, measurement)', the latter returning a command from -1 to 1"
                 )
-        return replace(self, control=Control(PYTHON_CONTROLLER, {}, self.control.period, controller))
+        own = ("controller.", "timing.")
+        links = {path: link for path, link in self.links.items() if not path.startswith(own)}
+        return replace(self, control=Control(PYTHON_CONTROLLER, {}, self.control.period, controller), links=links)
 
 
 def vane_motion(scenario: Scenario) -> VaneMotion:

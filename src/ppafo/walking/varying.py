@@ -56,7 +56,9 @@ def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
     kept |= set() if scenario.supply_lines is None else set(paths())
     for sensor, fault in motion.faults.items():
         kept |= {f"faults.{sensor}.{name}" for name in fault.numbers}
-    return {path: item for path, item in known.items() if path in kept}
+    # An object in charge has no settings, and a timing is one of a controller that has some.
+    lost = {path for path in kept if path.startswith("timing.") and path.partition(".")[2] not in control.settings}
+    return {path: item for path, item in known.items() if path in kept - lost}
 
 
 def record_interval(seconds: float) -> float:

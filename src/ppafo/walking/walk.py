@@ -6,7 +6,9 @@ from pathlib import Path
 from ppafo.engine.lanes import STEPS_PER_CALL, Batch, BatchResult, begin_block
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
+from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Scenario
+from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.on_bottle import run_on_bottle
@@ -48,6 +50,10 @@ def walk(
         chosen = load_walk(scenario, overrides, gait, course, bottle)
     chosen = lasting(chosen, minutes)
     run, carried = plan_walk(chosen), walk_of(chosen).bottle
+    custom = chosen.control.custom
+    if custom is not None:
+        check_no_bottle(chosen)
+        return result_of_walk(chosen, run, run_sampled(batch_of(run), custom), None)
     if carried is None:
         return result_of_walk(chosen, run, _run_in_parts(batch_of(run), run.step, progress), None)
     outcome, supply = run_on_bottle(run, carried, walk_of(chosen).gait.stride_time, progress)

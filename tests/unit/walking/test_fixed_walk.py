@@ -16,14 +16,14 @@ from ppafo.exports.firmware.lock_step import PythonChip
 from ppafo.exports.firmware.walking import walk_chip
 from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import Fault, GaitMeasurement, GaitSensors
-from ppafo.simulation.sampled import state_row_numbers
+from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.sampled import run_sampled, state_row_numbers
 from ppafo.walking.anthropometry import draw_builds
 from ppafo.walking.comparison import with_device_off
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import batch_of_many, converter_of_walk, gait_sensors_of, plan_walk
 from ppafo.walking.recorded import SAFE_ROW
-from ppafo.walking.sampled import run_sampled_walk
 from ppafo.walking.varied_gait import draw_gaits
 from ppafo.walking.varying import with_duration
 from ppafo.walking.walk import walk
@@ -41,7 +41,7 @@ class InPython:
     def reset(self) -> None:
         self.law.begin()
 
-    def update(self, measurement: GaitMeasurement) -> float:
+    def update(self, time: float, reference: float, measurement: GaitMeasurement) -> float:
         return self.law.sample(read_gait(self.chip.converter, measurement))[0] / 1000 or VENT
 
 
@@ -80,8 +80,10 @@ def test_the_thresholds_of_many_wearers_vary_on_whole_numbers_as_in_floats() -> 
 
 
 def test_the_lanes_decide_as_python_does() -> None:
-    run = plan_walk(with_duration(load_walk("solenoid", (FIXED,)), 4.0))
-    inside, outside = run_batch(batch_of(run)), run_sampled_walk(run, InPython())
+    walked = with_duration(load_walk("solenoid", (FIXED,)), 4.0)
+    run, own_controller = plan_walk(walked), InPython()
+    inside = run_batch(batch_of(run))
+    outside = run_sampled(batch_of(plan_walk(walked.controlled_by(own_controller))), own_controller)
     rows, own = state_row_numbers(run), row_numbers(replace(run.program, controller=None).state_rows())
     for path in ("result.command", "state.angle", "state.mass_1", "state.mass_2", "state.supplied_mass"):
         assert np.array_equal(inside.record[:, rows[path], 0], outside.record[:, own[path], 0])
@@ -167,4 +169,13 @@ def test_a_late_sensor_has_no_controller_outside_the_lanes() -> None:
         "solenoid", (FIXED, "faults.heel.kind=distorted", "faults.heel.time=1 s", "faults.heel.delay=9 ms")
     )
     with pytest.raises(ScenarioError, match="no controller outside the lanes"):
-        run_sampled_walk(plan_walk(with_duration(late, 4.0)), InPython())
+        walk(with_duration(late, 6.0).controlled_by(InPython()))
+
+
+def test_an_object_of_ones_own_walks_as_the_law_that_it_is() -> None:
+    base = with_duration(load_walk("solenoid", (FIXED,)), 6.0)
+    own, lanes = walk(base.controlled_by(InPython())), walk(base)
+    assert own.recording["angle"].tolist() == lanes.recording["angle"].tolist()
+    assert own.metrics["gas"].value == pytest.approx(lanes.metrics["gas"].value, rel=1e-12)
+    rows = run_ensemble(base.controlled_by(InPython()), {"wearer.body_mass": np.array([72.5, 80.0])}, ["total_gas"])
+    assert rows.metrics["total_gas"][0] == pytest.approx(lanes.metrics["total_gas"].value, rel=1e-12)

@@ -24,14 +24,12 @@ from ppafo.exports.templates import filled, licence, template
 from ppafo.model.command import VENT
 from ppafo.model.gait_sensors import GaitMeasurement
 from ppafo.simulation.reading import quantity_text
-from ppafo.simulation.sampled import state_row_numbers
+from ppafo.simulation.sampled import run_sampled, state_row_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.version import __version__
 from ppafo.walking.declaration import ARITHMETIC, quantities
 from ppafo.walking.planning import converter_of_walk, numbers_of_walk, plan_walk
 from ppafo.walking.recorded import SAFE_ROW
-from ppafo.walking.sampled import run_sampled_walk
-from ppafo.walking.varying import with_duration
 from ppafo.walking.walk import lasting
 
 _TEMPLATES = (
@@ -144,7 +142,7 @@ class ChipOfWalk:
         self.simulator.begin()
         self.decisions.clear()
 
-    def update(self, measurement: GaitMeasurement) -> float:
+    def update(self, time: float, reference: float, measurement: GaitMeasurement) -> float:  # noqa: ARG002
         """Command from -1 to 1, or ``VENT``, from what the converter shows."""
         found = self.simulator.sample(read_gait(self.converter, measurement))
         self.decisions.append(found)
@@ -173,10 +171,11 @@ def walk_on_chip(configuration: Scenario, minutes: float | None = None) -> WalkO
     ScenarioError where the controller has no integer form, SimulationError where a tool is missing.
     """
     chip = walk_chip(configuration)
-    run = plan_walk(with_duration(configuration, lasting(configuration, minutes).duration))
+    walked = lasting(configuration, minutes)
+    run = plan_walk(walked)
     with chip_simulator(walk_firmware(configuration), MSP430G2553) as (simulator, image):
         law = ChipOfWalk(simulator, chip.converter)
-        outside = run_sampled_walk(run, law)
+        outside = run_sampled(batch_of(plan_walk(walked.controlled_by(law))), law)
         cost = cost_of(MSP430G2553, image, simulator.stack(), law.decisions)
     inside = run_batch(batch_of(run))
     rows = state_row_numbers(run)
