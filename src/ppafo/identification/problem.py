@@ -212,7 +212,11 @@ class VaneLeakProblem(BaseModel):
     volume_2: Annotated[Text | None, Field(description="volume of chamber 2 with its line")] = None
 
     def settings(self, setting: Setting) -> VaneLeakSettings:
-        """Return the settings of the procedure [SI]; volumes as given, else from the angle, equations (4), (5)."""
+        """Return the settings of the procedure [SI]; volumes as given, else from the angle.
+
+        Equations (4), (5): V1 = V_dead1 + v (theta - theta_min) and V2 = V_dead2 + v (theta_max - theta), with v the
+        volume per angle [m^3/rad].
+        """
         start, end = setting.quantity("start", self.start, "s"), setting.quantity("end", self.end, "s")
         volumes = {}
         for name, text in (("volume_1", self.volume_1), ("volume_2", self.volume_2)):

@@ -1,5 +1,11 @@
 """Laws of flow that the bench fits, on arrays: orifice, ISO 6358, laminar and linear; all antisymmetric.
 
+With r the downstream over the upstream pressure and k the heat capacity ratio, mass flow [kg/s] is
+
+    orifice    Cd A C1 P_up psi(r),   C1 = sqrt(k / (R T) (2 / (k + 1))^((k + 1) / (k - 1)))       equations (6), (7)
+               psi = 1 up to the critical ratio, then sqrt(2 k / (k - 1) r^(2/k) (1 - r^((k - 1)/k))) over C1 sqrt(R T)
+    ISO 6358   C rho_0 sqrt(T_0 / T) P_up phi(r),   phi = 1 up to b, then sqrt(1 - ((r - b) / (1 - b))^2)
+
 A leak between two closed chambers at constant temperature: dP1/dt = -k g(P1, P2) and dP2/dt = (V1/V2) k g, so that
 D = P1 - P2 falls by D' = -(1 + V1/V2) k g, and the time to fall from one D to another is an integral over D. It is
 computed once for a law; the rate k only stretches the time.

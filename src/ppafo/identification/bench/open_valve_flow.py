@@ -1,4 +1,10 @@
-"""Flow through the fully open valve: Cd A of equations (6), (7), or C and b of ISO 6358 from several ratios."""
+"""Flow through the fully open valve: Cd A of equations (6), (7), or C and b of ISO 6358 from several ratios.
+
+    flow = Cd A C1 P_up psi(P_down / P_up)    or    flow = C rho_0 sqrt(T_0 / T) P_up phi(P_down / P_up; b)
+
+The first is linear in Cd A. Of the second C is the choked flow, and b shows only where there is choked and subsonic
+flow.
+"""
 
 import math
 from dataclasses import dataclass, replace

@@ -4,9 +4,9 @@ While the pressure rises, friction keeps part of the torque from the scale; whil
 
     torque = K dP + T_0 - s (T_s + g (dP - mean dP)),   s = +1 rising, -1 falling
 
-K is the common slope, T_s half the distance of the branches, g how the friction grows with pressure, T_0 the zero of
-the scale. All are linear, so one regression gives them all. Its intervals stay honest where readings are not
-independent of each other: those of one repetition, or of one pressure, share an error.
+K is the common slope, by equation (2) T = K (P1 - P2), T_s half the distance of the branches, g how the friction
+grows with pressure, T_0 the zero of the scale. All are linear, so one regression gives them all. Its intervals stay
+honest where readings are not independent of each other: those of one repetition, or of one pressure, share an error.
 """
 
 from collections.abc import Sequence

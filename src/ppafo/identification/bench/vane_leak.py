@@ -105,6 +105,7 @@ class VaneLeakSettings:
 def vane_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> BenchResult:
     """Return A_leak [m^2] where the orifice law (6), (7) describes the decay, else the law that does, and no area.
 
+    With D = P1 - P2 the difference falls by D' = -(1 + V1/V2) k g(P1, P2); for the orifice k = Cd A_leak C1 R T / V1.
     Recordings with a ``mass_flow`` are steady: the flow that keeps up the pressure, at several pressures.
     IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
     """
