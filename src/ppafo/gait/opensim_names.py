@@ -12,11 +12,7 @@ from ppafo.constants import STANDARD_GRAVITY
 from ppafo.signals import Channel, Recording
 
 _ANGLES = {"ankle_angle": "{}", "angle": "{}", "healthy_angle": "healthy_{}"}
-_REVERSED = {
-    "angular_velocity": "{}_speed",
-    "ankle_moment": "{}_moment",
-    "external_torque": "{}_device_moment",
-}
+_REVERSED = {"angular_velocity": "{}_speed", "ankle_moment": "{}_moment", "external_torque": "{}_device_moment"}
 _KEPT = ("shank_angle",)
 _PER_MASS = ("ankle_moment", "vertical_force")
 

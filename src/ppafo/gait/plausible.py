@@ -347,10 +347,7 @@ def _too_large(factor: float) -> tuple[_Mistake, ...]:
 _MISTAKES = (
     _Mistake("are exchanged", "exchange them", (0.0, 1.0), (1.0, 0.0)),
     _Mistake(
-        "are exchanged, and knee_up has the other sign",
-        "exchange them and reverse knee_up",
-        (0.0, -1.0),
-        (1.0, 0.0),
+        "are exchanged, and knee_up has the other sign", "exchange them and reverse knee_up", (0.0, -1.0), (1.0, 0.0)
     ),
     *_too_small(_G, "in units of g"),
     *_too_small(1000.0, "1000 times too small"),

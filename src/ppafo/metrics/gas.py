@@ -205,22 +205,8 @@ _PRESSURES = ("pressure_1", "pressure_2")
 _TEMPERATURES = ("temperature_1", "temperature_2")
 
 METRICS = (
-    MetricKind(
-        "gas_supplied",
-        "kg",
-        "gas taken from the supply",
-        ("supplied_mass",),
-        gas_supplied,
-        read_gas_supplied,
-    ),
-    MetricKind(
-        "gas_vented",
-        "kg",
-        "gas let out to the atmosphere",
-        ("vented_mass",),
-        gas_vented,
-        read_gas_vented,
-    ),
+    MetricKind("gas_supplied", "kg", "gas taken from the supply", ("supplied_mass",), gas_supplied, read_gas_supplied),
+    MetricKind("gas_vented", "kg", "gas let out to the atmosphere", ("vented_mass",), gas_vented, read_gas_vented),
     MetricKind(
         "gas_leaked",
         "kg",

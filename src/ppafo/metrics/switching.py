@@ -163,13 +163,7 @@ _REVERSALS = "torque reversals of more than 5 % of the largest reference"
 
 METRICS = (
     MetricKind(
-        "switchings",
-        "-",
-        "changes of sign of the command",
-        ("command",),
-        switchings,
-        read_switchings,
-        (SWITCHINGS,),
+        "switchings", "-", "changes of sign of the command", ("command",), switchings, read_switchings, (SWITCHINGS,)
     ),
     MetricKind(
         "oscillations_ramp",

@@ -61,9 +61,7 @@ def update_squared_error(state: SquaredError, course: Course, sample: Sample) ->
     piece = 0.5 * (state.last + square)
     is_before = ends_before_hold(course, sample)
     return SquaredError(
-        square,
-        state.before_hold + (piece if is_before else 0.0),
-        state.on_hold + (0.0 if is_before else piece),
+        square, state.before_hold + (piece if is_before else 0.0), state.on_hold + (0.0 if is_before else piece)
     )
 
 
@@ -152,12 +150,6 @@ METRICS = (
         "peak_error", "N m", "largest absolute torque error", _NEEDED, peak_error, read_peak_error, (PEAK_ERROR,)
     ),
     MetricKind(
-        "final_error",
-        "N m",
-        "absolute torque error at the end",
-        _NEEDED,
-        final_error,
-        read_final_error,
-        (FINAL_ERROR,),
+        "final_error", "N m", "absolute torque error at the end", _NEEDED, final_error, read_final_error, (FINAL_ERROR,)
     ),
 )

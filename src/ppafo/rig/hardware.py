@@ -97,11 +97,7 @@ def line_orifice(device: Device, preset: Preset) -> ExactOrifice:
             f"preset '{preset.name}': line.area and line.discharge_coefficient must be above 0 with a line"
         )
     conductance = area_conductance(
-        line["area"],
-        line["discharge_coefficient"],
-        gas.heat_capacity_ratio,
-        gas.specific_gas_constant,
-        gas.temperature,
+        line["area"], line["discharge_coefficient"], gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature
     )
     return ExactOrifice(
         conductance=conductance, is_iso6358=0.0, number=gas.heat_capacity_ratio, linear_ratio=device.flow.linear_ratio

@@ -196,13 +196,7 @@ class _Rig:
         self.plant = rig_run.run.plant
         self.is_free = rig_run.run.program.angle is None
         run = rig_run.run
-        groups = (
-            run.plant,
-            rig_run.physics,
-            run.valve_orifice,
-            run.leak_orifice,
-            rig_run.line_orifice,
-        )
+        groups = (run.plant, rig_run.physics, run.valve_orifice, run.leak_orifice, rig_run.line_orifice)
         parameters = np.array([number for group in groups for number in numbers(group)])
         self.y = np.array([*rig_run.initial, *numbers(run.program.valve.initial())], dtype=np.float64)
         self.outputs, self.inputs = np.empty(OUTPUTS), np.zeros(INPUTS)

@@ -257,10 +257,7 @@ def _gait(
 
 
 def _remarks(
-    curves: Mapping[str, CurveStatistics],
-    strides: Sequence[Stride],
-    left_out: Sequence[Stride],
-    events: str,
+    curves: Mapping[str, CurveStatistics], strides: Sequence[Stride], left_out: Sequence[Stride], events: str
 ) -> list[str]:
     remarks = [
         f"stride from {item.start:.4g} to {item.end:.4g} s left out: {item.time:.3g} s long, the others are about "

@@ -16,15 +16,7 @@ from ppafo.errors import DataError, UnitError, nearest_name, one_line
 from ppafo.gait.gait import HARMONICS, REQUIRED, fit_curve
 from ppafo.gait.plausible import SignSource, other_sign
 from ppafo.gait.recorded.conventions import column_names
-from ppafo.gait.recorded.mapping import (
-    AngleMap,
-    ForceMap,
-    GaitMap,
-    KneeMap,
-    MomentMap,
-    PressureMap,
-    ShankMap,
-)
+from ppafo.gait.recorded.mapping import AngleMap, ForceMap, GaitMap, KneeMap, MomentMap, PressureMap, ShankMap
 from ppafo.gait.recorded.table import LONGEST_FILLED, OPENSIM, MotionTable
 from ppafo.signals.recording import Floats
 from ppafo.units import parse_quantity, to_si

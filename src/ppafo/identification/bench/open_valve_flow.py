@@ -241,11 +241,7 @@ def _checks(
 
 
 def _panels(
-    points: OpenReadings,
-    settings: OpenValveFlowSettings,
-    reported: CurveFit,
-    orifice: CurveFit,
-    sonic: CurveFit | None,
+    points: OpenReadings, settings: OpenValveFlowSettings, reported: CurveFit, orifice: CurveFit, sonic: CurveFit | None
 ) -> tuple[Panel, ...]:
     """Show conductance over ratio: flow over upstream pressure, which both laws make a function of the ratio alone."""
     ratios = np.linspace(0.0, 1.0, 201)

@@ -26,15 +26,7 @@ from ppafo.identification.bench.leak_fits import (
     law_checks,
     leak_or_relaxation,
 )
-from ppafo.identification.bench.result import (
-    IDENTIFIED_WITHIN,
-    BenchResult,
-    Evidence,
-    Number,
-    Panel,
-    Series,
-    count_of,
-)
+from ppafo.identification.bench.result import IDENTIFIED_WITHIN, BenchResult, Evidence, Number, Panel, Series, count_of
 from ppafo.identification.estimate import Check, Prospect
 from ppafo.identification.source import (
     Source,
@@ -152,11 +144,7 @@ def leak_prospects(sources: tuple[Source, ...], settings: VaneLeakSettings) -> t
     text += f"{CLEARLY_WORSE:g} is clear"
     several = len(decays) > 1
     more = "several decays" if several else "one decay: a sensor offset gives a linear leak the same curve"
-    return (
-        area,
-        Prospect("law of the leak", gain >= CLEARLY_WORSE, text),
-        Prospect("plateau or leak", several, more),
-    )
+    return (area, Prospect("law of the leak", gain >= CLEARLY_WORSE, text), Prospect("plateau or leak", several, more))
 
 
 def _least_gain(decay: Decay, noise: float, settings: VaneLeakSettings) -> float:

@@ -134,12 +134,7 @@ class NoiseDraw:
 
 
 def draw_posterior(
-    model: LinearModel,
-    noises: Sequence[SensorNoise],
-    kept: int,
-    seed: int,
-    chains: int = CHAINS,
-    count: int = DRAWS,
+    model: LinearModel, noises: Sequence[SensorNoise], kept: int, seed: int, chains: int = CHAINS, count: int = DRAWS
 ) -> tuple[Mixture, tuple[NoiseDraw, ...]]:
     """Return the distribution of the first ``kept`` columns with the noise drawn anew each time, and some draws."""
     means, covariances, draws, chain = [], [], [], []

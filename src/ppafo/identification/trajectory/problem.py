@@ -229,10 +229,7 @@ _ADDED = frozenset({"friction", "motion", "initial", "supply"})
 _STATE = frozenset({"motion", "initial"})
 """Sections that say how a run begins, which the recording may say better."""
 
-_SUPPLIES = {
-    "supply.pressure": "plant.supply_pressure",
-    "supply.dorsiflexion_pressure": "plant.dorsiflexion_pressure",
-}
+_SUPPLIES = {"supply.pressure": "plant.supply_pressure", "supply.dorsiflexion_pressure": "plant.dorsiflexion_pressure"}
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,12 +40,7 @@ from ppafo.identification.trajectory.problem import (
     ranges_of,
     use_of,
 )
-from ppafo.identification.trajectory.residuals import (
-    FIRST_STEP,
-    Floats,
-    Residuals,
-    prior_coordinates,
-)
+from ppafo.identification.trajectory.residuals import FIRST_STEP, Floats, Residuals, prior_coordinates
 from ppafo.identification.trajectory.search import is_at_bound
 from ppafo.identification.trajectory.uncertainty import FROM_PRIOR, STRONG, relative_to_number
 from ppafo.parameters import apply_overrides, build_device
@@ -130,8 +125,7 @@ class ExperimentSection(BaseModel):
         Text | None, Field(description="angle at which the vane is held, such as '75 deg'; without a scenario")
     ] = None
     volume: Annotated[
-        Text | None,
-        Field(description="no vane: a fixed volume, such as '60 cm^3', is chamber 1; without a scenario"),
+        Text | None, Field(description="no vane: a fixed volume, such as '60 cm^3', is chamber 1; without a scenario")
     ] = None
     initial_state: Annotated[
         Literal["scenario", "recording", "fitted"] | None,
@@ -141,8 +135,7 @@ class ExperimentSection(BaseModel):
         ),
     ] = None
     time_offset: Annotated[
-        Text | None,
-        Field(description="fit the delay of the samples behind the run, up to this: '20 ms'"),
+        Text | None, Field(description="fit the delay of the samples behind the run, up to this: '20 ms'")
     ] = None
 
 
@@ -265,10 +258,7 @@ def trajectory_problem(section: TrajectorySection, setting: Setting) -> Trajecto
     parameters = [_parameter(item, scenarios, setting) for item in section.parameters]
     nuisances = [one for item in section.experiments for one in _nuisances(item, setting)]
     search = Search(
-        loss=section.loss,
-        other_starts=section.other_starts,
-        seed=section.seed,
-        confidence=section.confidence,
+        loss=section.loss, other_starts=section.other_starts, seed=section.seed, confidence=section.confidence
     )
     return TrajectoryProblem((*parameters, *nuisances), experiments, search)
 
