@@ -68,7 +68,7 @@ def test_the_push_off_is_tuned_for_the_bad_end_of_people() -> None:
     problem = load_tuning("push-off")
     assert problem.spread is not None
     assert (problem.spread.fraction, problem.spread.study) == (0.9, "wearers")
-    effort = replace(problem.effort, starts=1, generations=2, candidates_per_gain=2)
+    effort = problem.effort.model_copy(update={"starts": 1, "generations": 2, "candidates_per_gain": 2})
     quick = replace(problem, spread=replace(problem.spread, draws=4), effort=effort)
     tuned = tune(quick)
     alone = walk(with_overrides(problem.scenario, problem.lines(tuned.after.gains)))

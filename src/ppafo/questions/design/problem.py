@@ -21,6 +21,7 @@ from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.parts import Catalogue, Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
 from ppafo.questions.design.search import LARGEST_SEED, Floats, SearchTable
+from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import TIMES, declared_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import OPEN_LOOP
@@ -309,7 +310,7 @@ def load_design(name_or_path: str | Path, seed: int | None = None) -> DesignProb
     repeated = first_twice(names)
     if repeated is not None:
         raise StudyError(f"{file}: two tasks are named '{repeated}'; give each its own name")
-    tasks = tuple(_task(table, kinds, folder, file, weights) for table in document.task)
+    tasks = tuple(_task(table, kinds, folder, file, weights, document.error) for table in document.task)
     if document.error not in _errors():
         hint = nearest_name(document.error, _errors())
         raise StudyError(
@@ -360,7 +361,7 @@ def _combinations(parts: PartsTable, catalogue: Catalogue) -> tuple[Combination,
     return tuple(Combination(valve, actuator) for valve, actuator in product(valves, actuators))
 
 
-def _task(table: TaskTable, kinds: Sequence[str], folder: Path, file: str, whole: float) -> Task:
+def _task(table: TaskTable, kinds: Sequence[str], folder: Path, file: str, whole: float, error: str) -> Task:
     for kind in kinds:
         if kind not in table.scenarios:
             raise StudyError(
@@ -374,6 +375,9 @@ def _task(table: TaskTable, kinds: Sequence[str], folder: Path, file: str, whole
                 f"{file}: task '{table.name}': scenario '{scenario.name}' follows no reference (controller "
                 f"'{OPEN_LOOP}'), so it has no tracking error"
             )
+        reason = lacking(scenario, METRICS[error]) if error in METRICS else ""
+        if reason:
+            raise StudyError(f"{file}: task '{table.name}': scenario '{scenario.name}' has no '{error}': {reason}")
         scenario.device.check_vane("a design")
         own = scenario.device.valve.kind
         if own != kind:
