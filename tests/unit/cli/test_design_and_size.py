@@ -66,6 +66,7 @@ def test_a_design_is_printed_and_written_with_its_doubts(folder: Path, capsys: p
     assert main(["design", str(folder / "design.toml"), "--out", str(out)]) == 0
     printed = capsys.readouterr().out
     assert "suggested: it has the smallest sum of error, gas and mass" in printed
+    assert "join(" not in printed
     assert printed.count("\n*  enfield-ls-v05s ") == 1
     assert "enfield-ls-v05s  mass (assumed)" in printed
     names = ["design.json", "design.txt", "front.csv", "front.png", "front.svg", "ppafo.json", "report.html"]

@@ -324,7 +324,7 @@ def _reason(points: tuple[DesignPoint, ...], place: int) -> str:
         said.append(f"10 % less {name} would cost {_cost(chosen, nearest, index)}")
     return (
         "it has the smallest sum of error, gas and mass, each as a fraction of its range on the front: any other "
-        "design loses at least as much in some of them as it gains in the others; {'; '.join(said)}"
+        f"design loses at least as much in some of them as it gains in the others; {'; '.join(said)}"
     )
 
 

@@ -125,7 +125,7 @@ def test_the_tunings_of_the_package_load_and_fit_the_published_schema() -> None:
     from importlib import resources
 
     folder = resources.files("ppafo") / "questions" / "tune" / "library"
-    assert list_tunings() == ("pid-gains", "pid-gains-robust")
+    assert list_tunings() == ("pid-gains", "pid-gains-robust", "push-off")
     for name in list_tunings():
         assert load_tuning(name).name == name
         jsonschema.validate(tomllib.loads((folder / f"{name}.toml").read_text()), json_schema())
