@@ -47,7 +47,8 @@ def read(recording: Recording) -> dict[str, float]:
     reference = recording["reference"]
     largest = float(np.abs(reference).max())
     course = Course(float(reference[-1]), largest, SAME_LEVEL * largest, 0.0)
-    meters = {meter.name: metered(meter, samples, course) for kind in METRICS.values() for meter in kind.meters}
+    of_recordings = {name: kind for name, kind in METRICS.items() if kind.compute is not None}
+    meters = {meter.name: metered(meter, samples, course) for kind in of_recordings.values() for meter in kind.meters}
     ended = next(iter(meters.values()))[1]
     totals = ("supplied_mass", "vented_mass", "leaked_mass", "mass_1", "mass_2", *ENERGIES)
     readings = Readings(
@@ -59,7 +60,7 @@ def read(recording: Recording) -> dict[str, float]:
         traces={"angle": recording["angle"][:, None]},
     )
     with np.errstate(all="ignore"):
-        return {name: float(kind.read(readings)[0]) for name, kind in METRICS.items()}
+        return {name: float(kind.read(readings)[0]) for name, kind in of_recordings.items()}
 
 
 def recorded(torque: Floats, reference: Floats, command: Floats, angle: Floats) -> Recording:
