@@ -23,6 +23,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from ppafo.simulation.scenario import worn_kind
+
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from ppafo.engine.run import batch_of
@@ -244,8 +246,8 @@ def at_library(name: str, count: int, seed: int) -> Judged:
     return found
 
 
-def _numbers_in_si(base: Scenario | Scenario, words: Words) -> dict[str, float]:
-    if isinstance(base, Scenario):
+def _numbers_in_si(base: Scenario, words: Words) -> dict[str, float]:
+    if worn_kind(base) is None:
         return in_si(base, words)
     declared = {path: quantity for path, (quantity, _) in numbers_of_walk(base).items()}
     zero = base.device.supply.atmospheric_pressure
@@ -300,8 +302,8 @@ def _page_values(folder: Path) -> list[str]:
 
 Door = Callable[[str, int, int], Judged]
 DOORS: Mapping[str, tuple[Door, Sequence[str]]] = {
-    "study": (at_study, list_scenarios()),
-    "numbers": (at_numbers, list_scenarios()),
+    "study": (at_study, (*list_scenarios(), *list_walks())),
+    "numbers": (at_numbers, (*list_scenarios(), *list_walks())),
     "gym": (at_gym, list_scenarios()),
     "page": (at_page, (*list_scenarios(), *list_walks())),
     "library": (at_library, (*list_scenarios(), *list_walks())),

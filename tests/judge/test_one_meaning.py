@@ -7,6 +7,7 @@ import pytest
 
 from ppafo.simulation import numbers
 from ppafo.simulation.loading import list_scenarios
+from ppafo.walking import list_walks
 from scripts.one_meaning import at_gym, at_library, at_numbers, at_page, at_study
 
 PAGE = Path(__file__).parents[2] / "page" / "node_modules" / "esbuild"
@@ -14,14 +15,14 @@ needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on th
 needs_node = pytest.mark.skipif(shutil.which("node") is None or not PAGE.exists(), reason="no script of the page")
 
 
-@pytest.mark.parametrize("name", list_scenarios())
+@pytest.mark.parametrize("name", [*list_scenarios(), *list_walks()])
 def test_columns_of_a_study_are_single_runs_with_the_same_words(name: str) -> None:
     found = at_study(name, 60, seed=11)
     assert found.differing == []
     assert found.same > 30
 
 
-@pytest.mark.parametrize("name", list_scenarios())
+@pytest.mark.parametrize("name", [*list_scenarios(), *list_walks()])
 def test_replaced_numbers_are_single_runs_with_the_same_words(name: str) -> None:
     found = at_numbers(name, 15, seed=12)
     assert found.differing == []
