@@ -22,13 +22,15 @@ from ppafo.simulation.plan import plan_run
 ON = (
     "effects.silencer.sonic_conductance=2e-8 m^3/(s Pa)",
     "effects.ice.blockage_per_gas=100 1/kg",
+    "effects.seal_friction.dynamic_per_pressure=1e-7 N m/Pa",
+    "effects.stribeck.velocity=0.1 rad/s",
     "sensors.pressure_bandwidth=80 Hz",
 )
 """Overrides that switch the effects of the package on, each."""
 SCENARIOS = ("torque-task-solenoid", "step-response")
 """A held vane whose steps are whole but for switchings, and a free one whose error decides."""
 GATE = 2.0
-"""Largest ratio that passes: a closed law costs a tenth, a state with an exponential up to two thirds, iterations tens."""
+"""Largest ratio that passes: a closed law costs a tenth, an exponential up to two thirds, iterations tens."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import ppafo
 from ppafo.cli.main import main
 from ppafo.engine.reference.agreement import compare_with_reference
 from ppafo.engine.run import batch_of
@@ -33,6 +32,7 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.simulate import simulate
 from ppafo.walking import load_walk
+from ppafo.walking.planning import plan_walk
 from ppafo.walking.walk import walk
 from tests.built_once import shared_library
 from tests.modules_under_node import compared, drawn
@@ -154,22 +154,11 @@ def test_an_exported_library_makes_the_numbers_of_a_run_that_python_makes(name: 
         (tmp_path / file).write_bytes(content)
     source = tmp_path / f"{c_identifier(walked.name)}.c"
     built = ctypes.CDLL(str(shared_library(source, "-O0", "-ffp-contract=off", "-DPPAFO_ENTRY=extern", "-w")))
-    run = planned(walked)
-    batch = batch_of(run)
+    batch = batch_of(plan_walk(walked) if is_walk else plan_run(walked))
     settings = np.array([item.value for item in library.settings])
     found = np.zeros(len(batch.parameters))
     built.prepare(*map(handed, (settings, found, np.zeros(len(batch.states)), np.zeros(6))))
     assert found.tobytes() == batch.parameters[:, 0].tobytes()
-
-
-def planned(walked: Any) -> Any:
-    """The run of a scenario or a walk."""
-    if isinstance(walked, ppafo.Scenario):
-        return plan_run(walked)
-    from ppafo.walking.planning import plan_walk
-    from ppafo.walking.walk import plan_of, walk_duration
-
-    return plan_walk(plan_of(walked, walk_duration(walked)))
 
 
 class Handed(ctypes.Structure):

@@ -11,7 +11,6 @@ from ppafo.engine.scheme.shaped_gas import links_of
 from ppafo.engine.source_text import Collector, SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.model.effects.kind import Effect, effect_problem, laws_in_order
-from ppafo.model.places import shown_signals
 
 
 def link_program(program: Program, collector: Collector) -> None:
@@ -48,23 +47,24 @@ def link_effects(effects: Sequence[Effect], collector: Collector, own: Mapping[A
             collector.effects[law] = tuple(row for row in effect.rows if row in asked)
 
 
-Show = Callable[[Mapping[str, Any], float, float, float], tuple[float, float, float]]
-"""From states of effects by name, an angle [rad] and two absolute pressures [Pa] to what the sensors show of these."""
+def python_place(
+    place: Callable[..., Any], effects: Sequence[Effect], rows: Sequence[Any]
+) -> Callable[..., Any] | None:
+    """Return a place as Python calls it with effects and their rows; None where no effect acts there.
 
-
-def shown_by(effects: Sequence[Effect], rows: Sequence[Any]) -> Show | None:
-    """Return what sensors show, as Python calls it, with effects and their rows; None where they show the truth."""
-    if not any(shown_signals in effect.laws for effect in effects):
+    Before its own arguments it takes the states of effects by name.
+    """
+    if not any(place in effect.laws for effect in effects):
         return None
     given = {effect.name: row for effect, row in zip(effects, rows, strict=True)}
     collector = SourceCollector("")
     link_effects(effects, collector)
-    name = collector.add(shown_signals)
+    name = collector.add(place)
     scope: dict[str, Any] = {"math": math, "namedtuple": namedtuple}
     exec(collector.text(), scope)
     composed, needed = scope[name], collector.needs[name]
 
-    def show(states: Mapping[str, Any], *signals: float) -> Any:
-        return composed(*((given | dict(states))[row] for row in needed), *signals)
+    def called(states: Mapping[str, Any], *own: float) -> Any:
+        return composed(*((given | dict(states))[row] for row in needed), *own)
 
-    return show
+    return called

@@ -18,3 +18,13 @@ def way_out(conductance: float) -> float:
 def shown_signals(angle: float, pressure_1: float, pressure_2: float) -> tuple[float, float, float]:
     """Angle [rad] and absolute pressures [Pa] as the sensors of a controller show them, before noise and rounding."""
     return angle, pressure_1, pressure_2
+
+
+def friction_at_rest(torque: float, pressure_1: float, pressure_2: float) -> float:
+    """Largest friction torque at rest [N m], from that without gas; absolute pressures [Pa]. Equation (10)."""
+    return torque
+
+
+def friction_in_motion(torque: float, angular_velocity: float, pressure_1: float, pressure_2: float) -> float:
+    """Size of friction in motion [N m], from the dynamic one; rate [rad/s], absolute pressures [Pa]. Equation (10)."""
+    return torque

@@ -10,13 +10,14 @@ import numpy as np
 from ppafo.control.kind import PythonController
 from ppafo.engine.actuator_values import seen_with_torque
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, load_program, samples_in
-from ppafo.engine.links import shown_by
+from ppafo.engine.links import python_place
 from ppafo.engine.metering import group_of
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import Run
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.command import VENT, VENTS_ABOVE
 from ppafo.model.gait_sensors import NOTHING_SEEN, GaitMeasurement, measure_gait
+from ppafo.model.places import shown_signals
 from ppafo.model.plant import chamber_pressures
 from ppafo.model.sensors import Measurement, measure
 from ppafo.model.vane import actuator_torque
@@ -122,7 +123,7 @@ def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measu
     rows = row_numbers(program.state_rows())
     plant, sensors, actuator = _group(batch, "plant"), _group(batch, "sensors"), program.actuator
     groups = program.state_rows()
-    show = shown_by(program.effects, [_group(batch, effect.name) for effect in program.effects])
+    show = python_place(shown_signals, program.effects, [_group(batch, effect.name) for effect in program.effects])
 
     def see(sample: int) -> Measurement:
         state = block.states[:, 0]

@@ -9,10 +9,12 @@ import numpy as np
 from ppafo.engine.actuator_values import pressures_of, torque_of
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
+from ppafo.engine.links import python_place
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together
 from ppafo.metrics.catalog import evaluate
 from ppafo.metrics.metric import Metric
+from ppafo.model.places import friction_in_motion
 from ppafo.model.regulator import LineState, line_pressures
 from ppafo.model.thermal import energy_per_content
 from ppafo.model.vane import gravity_torque, sliding_friction
@@ -117,7 +119,7 @@ def _recording(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, F
         "supplied_mass": (rows["state.supplied_mass"], "kg"),
         "vented_mass": (rows["state.vented_mass"], "kg"),
         "leaked_mass": (rows["state.leaked_mass"], "kg"),
-        "external_torque": (_external_torque(scenario, run, times, angle, rate, torque), "N m"),
+        "external_torque": (_external_torque(scenario, run, times, rows, torque), "N m"),
         "mass_1": (rows["state.mass_1"], "kg"),
         "mass_2": (rows["state.mass_2"], "kg"),
     }
@@ -163,17 +165,35 @@ def gas_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tu
     return found
 
 
-def _external_torque(
-    scenario: Scenario, run: Run, times: Floats, angle: Floats, rate: Floats, torque: Floats
-) -> Floats:
+def _external_torque(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats], torque: Floats) -> Floats:
     """T_ex of equation (1) [N m]: the constant of a free vane, or what keeps a prescribed one on its path."""
     plant = run.plant
     if not isinstance(scenario.motion, PrescribedMotion):
         return np.full(times.size, plant.external_torque)
     acceleration = profile_values(scenario.motion.profile, times)[2]
-    friction = np.array([sliding_friction(float(value), plant.dynamic_torque) for value in rate])
+    angle, rate = rows["state.angle"], rows["state.angular_velocity"]
+    friction = np.array([sliding_friction(float(value), 1.0) for value in rate]) * _sizes_of_friction(run, rows)
     gravity = gravity_torque(angle, plant.gravity_torque)
     return np.asarray(torque - gravity - friction - plant.viscous_damping * rate - plant.inertia * acceleration)
+
+
+def _sizes_of_friction(run: Run, rows: Mapping[str, Floats]) -> Floats | float:
+    """Size of the friction torque in motion [N m] at each sample, with the effects of a run."""
+    law = python_place(friction_in_motion, run.program.effects, run.effects)
+    if law is None:
+        return run.plant.dynamic_torque
+    angle, masses = rows["state.angle"], (rows["state.mass_1"], rows["state.mass_2"])
+    pressures = pressures_of(run.program.actuator, run.plant, angle, *masses)
+    states = {
+        name: [rebuilt(row, values) for values in zip(*(rows[path] for path in leaf_paths(row, name)), strict=True)]
+        for name, row in run.program.effect_states.items()
+    }
+    return np.array(
+        [
+            law({name: of_samples[sample] for name, of_samples in states.items()}, run.plant.dynamic_torque, *given)
+            for sample, given in enumerate(zip(rows["state.angular_velocity"], *pressures, strict=True))
+        ]
+    )
 
 
 def compile_models(scenarios: Iterable[Scenario | str | Path]) -> None:

@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 from ppafo.model.orifice import isentropic_flow_function, iso6358_flow_function
-from ppafo.model.places import way_in, way_out
+from ppafo.model.places import friction_in_motion, way_in, way_out
 from ppafo.model.plant import (
     Openings,
     PlantParameters,
@@ -207,5 +207,5 @@ def free_motion(
     if way == 0.0:
         return 0.0, 0.0
     torque = driving_torque(plant, angle, pressure_1, pressure_2)
-    friction = way * plant.dynamic_torque
+    friction = way * friction_in_motion(plant.dynamic_torque, angular_velocity, pressure_1, pressure_2)
     return angular_velocity, vane_acceleration(torque, angular_velocity, friction, plant.viscous_damping, plant.inertia)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ppafo.engine.actuator_values import driving_torque_of
 from ppafo.engine.entries import with_arrays
 from ppafo.engine.lanes import samples_in
-from ppafo.engine.links import shown_by
+from ppafo.engine.links import python_place
 from ppafo.engine.loading import load_source
 from ppafo.engine.reference import vane_mode
 from ppafo.engine.reference.sampling import SAME_TIME, SampledControl, Signals, solve_segment
@@ -23,6 +23,7 @@ from ppafo.engine.reference.source import (
 from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.engine.run import Run, states_at_start
 from ppafo.errors import SimulationError
+from ppafo.model.places import friction_at_rest, shown_signals
 
 Floats = NDArray[np.float64]
 
@@ -97,7 +98,8 @@ class _Solution:
         stated = [number for state in states_at_start(run) for number in numbers(state)]
         self.y = np.array([*numbers(run.initial), *masses, *stated, *numbers(run.program.valve.initial())])
         self.valve_from = unknowns_before_valve(run.program)
-        self.show = shown_by(run.program.effects, run.effects)
+        self.show = python_place(shown_signals, run.program.effects, run.effects)
+        self.limit = python_place(friction_at_rest, run.program.effects, run.effects)
         self.command = 0.0
         self.way = self.rest_mode() if run.program.angle is None else 0.0
         if self.y[1] != 0.0 and run.program.angle is None:
@@ -148,13 +150,12 @@ class _Solution:
         """Root functions of the present mode; Python's floats are several times quicker here than NumPy's."""
         plant = self.run.plant
         if self.way == 0.0:
-            return vane_mode.roots_at_rest(plant, y[0], self.torque(y))
+            return vane_mode.roots_at_rest(self.plant_at(y), y[0], self.torque(y))
         return vane_mode.roots_sliding(plant, y[0], y[1], self.way)
 
     def rest_mode(self) -> float:
         """Mode of the vane at rest with the present gas."""
-        plant = self.run.plant
-        return vane_mode.mode_at_rest(plant, self.y[0], self.torque(self.y.tolist()))
+        return vane_mode.mode_at_rest(self.plant_at(self.y.tolist()), self.y[0], self.torque(self.y.tolist()))
 
     def torque(self, y: Sequence[float]) -> float:
         """Driving torque [N m] with unknowns."""
@@ -187,12 +188,25 @@ class _Solution:
         signals = float(angle), float(pressure_1), float(pressure_2)
         if self.show is None:
             return signals
-        states, first = {}, gas_unknowns(run.program)
-        for name, row in run.program.effect_states.items():
+        shown: Signals = self.show(self.states_in(self.y), *signals)
+        return shown
+
+    def states_in(self, y: Any) -> dict[str, Any]:
+        """States of effects among unknowns, by name."""
+        states, first = {}, gas_unknowns(self.run.program)
+        for name, row in self.run.program.effect_states.items():
             count = len(leaf_paths(row, name))
-            states[name] = rebuild(row, self.y[first : first + count])
+            states[name] = rebuild(row, y[first : first + count])
             first += count
-        return self.show(states, *signals)
+        return states
+
+    def plant_at(self, y: Sequence[float]) -> Any:
+        """The plant with the friction that holds the vane at rest with unknowns."""
+        plant = self.run.plant
+        if self.limit is None:
+            return plant
+        pressures = self.run.program.actuator.pressures(plant, y[0], y[2], y[3])
+        return plant._replace(static_torque=self.limit(self.states_in(y), plant.static_torque, *pressures))
 
     def advance_to(self, end: float, next_sample: int) -> None:
         """Integrate to the next sample over all that happens on the way."""

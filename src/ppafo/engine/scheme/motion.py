@@ -10,6 +10,7 @@ import math
 from typing import NamedTuple
 
 from ppafo.engine.scheme.pneumatics import GasChange, HeldChambers, held_pressures
+from ppafo.model.places import friction_at_rest, friction_in_motion
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes, driving_torque
 from ppafo.model.vane import actuator_torque, holds_still
 
@@ -22,6 +23,13 @@ MISSED_FRACTION = 0.2
 SIXTH = 1.0 / 6.0
 LOWEST_REBOUND = 1.0e-7
 """Height over the range of the angle below which a rebound is none."""
+
+
+class Friction(NamedTuple):
+    """Sizes of the friction torque [N m]: the largest at rest, and that in motion."""
+
+    at_rest: float
+    in_motion: float
 
 
 class Departure(NamedTuple):
@@ -98,8 +106,16 @@ def time_to_stop(distance: float, angular_velocity: float, acceleration: float) 
     return 2.0 * distance / max(angular_velocity + math.sqrt(reach), 1.0e-30)
 
 
+def friction_now(plant: PlantParameters, angular_velocity: float, pressure_1: float, pressure_2: float) -> Friction:
+    """Sizes of friction [N m] at an angular velocity [rad/s] and two absolute pressures [Pa]. Equation (10)."""
+    return Friction(
+        at_rest=friction_at_rest(plant.static_torque, pressure_1, pressure_2),
+        in_motion=friction_in_motion(plant.dynamic_torque, angular_velocity, pressure_1, pressure_2),
+    )
+
+
 def depart(
-    plant: PlantParameters, departure: Departure, torque: float, next_torque: float, step: float
+    plant: PlantParameters, departure: Departure, torque: float, next_torque: float, friction: Friction, step: float
 ) -> tuple[float, float]:
     """Angle and angular velocity at the end of a step whose last part begins with ``departure``.
 
@@ -108,15 +124,15 @@ def depart(
     at_lower = departure.angle <= plant.angle_min
     at_upper = departure.angle >= plant.angle_max
     moving = departure.angular_velocity != 0.0
-    leaves_at_once = not holds_still(torque, plant.static_torque, at_lower, at_upper)
-    leaves_later = not holds_still(next_torque, plant.static_torque, at_lower, at_upper)
+    leaves_at_once = not holds_still(torque, friction.at_rest, at_lower, at_upper)
+    leaves_later = not holds_still(next_torque, friction.at_rest, at_lower, at_upper)
     way = direction_of(torque if leaves_at_once else next_torque)
     change = next_torque - torque
-    waits = (way * plant.static_torque - torque) / (change if change != 0.0 else 1.0)
+    waits = (way * friction.at_rest - torque) / (change if change != 0.0 else 1.0)
     waits = 0.0 if moving or leaves_at_once else max(0.0, min(1.0, waits))
     start_torque = torque + waits * change
     way = direction_of(departure.angular_velocity) if moving else way
-    sliding = way * plant.dynamic_torque
+    sliding = way * friction.in_motion
     duration = step * (1.0 - departure.fraction) * (1.0 - waits)
     velocity = departure.angular_velocity
     per_inertia = 1.0 / plant.inertia
@@ -140,10 +156,11 @@ def begin_part(plant: PlantParameters, state: PlantState, longest: float) -> tup
     velocity = state.angular_velocity
     pressure_1, pressure_2 = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
     torque = driving_torque(plant, state.angle, pressure_1, pressure_2)
-    stays = holds_still(torque, plant.static_torque, state.angle <= plant.angle_min, state.angle >= plant.angle_max)
+    friction = friction_now(plant, velocity, pressure_1, pressure_2)
+    stays = holds_still(torque, friction.at_rest, state.angle <= plant.angle_min, state.angle >= plant.angle_max)
     leaving = 0.0 if stays else direction_of(torque)
     way = direction_of(velocity) if velocity != 0.0 else leaving
-    sliding = (torque - way * plant.dynamic_torque - plant.viscous_damping * velocity) / plant.inertia
+    sliding = (torque - way * friction.in_motion - plant.viscous_damping * velocity) / plant.inertia
     acceleration = sliding if way != 0.0 else 0.0
     distance = plant.angle_max - state.angle if way > 0.0 else state.angle - plant.angle_min
     gets_there = velocity * velocity + 2.0 * acceleration * way * distance >= 0.0
@@ -166,7 +183,8 @@ def end_part(plant: PlantParameters, state: PlantState, begun: FreePart, length:
     velocity, way = state.angular_velocity, begun.way
     next_1, next_2 = chamber_pressures(plant, begun.next_angle, state.mass_1, state.mass_2)
     next_torque = driving_torque(plant, begun.next_angle, next_1, next_2)
-    sliding_torque = next_torque - way * plant.dynamic_torque
+    friction = friction_now(plant, velocity + begun.acceleration * length, next_1, next_2)
+    sliding_torque = next_torque - way * friction.in_motion
     full_velocity = next_velocity(plant, velocity, begun.acceleration, sliding_torque, length)
     slides = way != 0.0 and full_velocity * way > 0.0
 
@@ -175,7 +193,8 @@ def end_part(plant: PlantParameters, state: PlantState, begun: FreePart, length:
     fraction = velocity / (fall if fall != 0.0 else 1.0) if turns else 0.0
     turning_angle = clamp_angle(plant, state.angle + 0.5 * fraction * length * velocity)
     left_torque = begun.torque + fraction * (next_torque - begun.torque)
-    left_angle, left_velocity = depart(plant, Departure(fraction, turning_angle, 0.0), left_torque, next_torque, length)
+    departure = Departure(fraction, turning_angle, 0.0)
+    left_angle, left_velocity = depart(plant, departure, left_torque, next_torque, friction, length)
     rebound = rebound_velocity(plant, full_velocity, next_torque)
     slid_velocity = rebound if begun.meets_stop > 0.5 else full_velocity
     angle = begun.next_angle if slides else left_angle
@@ -238,7 +257,8 @@ def begin_free(
     way = direction_of(velocity)
     pressure_1, pressure_2 = held_pressures(held, state)
     torque = actuator_torque(pressure_1, pressure_2, plant.torque_constant) + added_torque
-    sliding = (torque - way * plant.dynamic_torque - plant.viscous_damping * velocity) / plant.inertia
+    friction = friction_now(plant, velocity, pressure_1, pressure_2)
+    sliding = (torque - way * friction.in_motion - plant.viscous_damping * velocity) / plant.inertia
     acceleration = sliding if way != 0.0 else 0.0
     free_angle = state.angle + step * (velocity + 0.5 * step * acceleration)
     return FreeStep(free_angle, acceleration, torque)
@@ -262,7 +282,8 @@ def end_free(
     predicted = clamp_angle(plant, begun.free_angle)
     next_1, next_2 = held_pressures(ahead, state)
     next_torque = actuator_torque(next_1, next_2, plant.torque_constant) + added_torque
-    sliding_torque = next_torque - way * plant.dynamic_torque
+    friction = friction_now(plant, velocity + begun.acceleration * step, next_1, next_2)
+    sliding_torque = next_torque - way * friction.in_motion
     full_velocity = next_velocity(plant, velocity, begun.acceleration, sliding_torque, step)
     slides_through = (way != 0.0) & (full_velocity * way > 0.0) & (begun.free_angle == predicted)
     return FreeEnd(
@@ -274,12 +295,14 @@ def end_free(
 
 
 def depart_free(
-    plant: PlantParameters, state: PlantState, begun: FreeStep, ended: FreeEnd, step: float
+    plant: PlantParameters, state: PlantState, ahead: HeldChambers, begun: FreeStep, ended: FreeEnd, step: float
 ) -> tuple[float, float]:
     """Angle [rad] and angular velocity [rad/s] at the end of the step [s] of a vane that does not slide through."""
+    pressure_1, pressure_2 = held_pressures(ahead, state)
+    friction = friction_now(plant, 0.0, pressure_1, pressure_2)
     departure = first_event(plant, state, begun.free_angle, begun.acceleration, ended.angular_velocity, step)
     departure_torque = begun.torque + departure.fraction * (ended.torque - begun.torque)
-    return depart(plant, departure, departure_torque, ended.torque, step)
+    return depart(plant, departure, departure_torque, ended.torque, friction, step)
 
 
 def with_motion(state: PlantState, angle: float, angular_velocity: float) -> PlantState:

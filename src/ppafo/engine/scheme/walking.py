@@ -26,6 +26,7 @@ from ppafo.model.leg import (
     LegParameters,
     foot_inertia_about_ankle,
 )
+from ppafo.model.places import friction_in_motion
 from ppafo.model.plant import PlantParameters, PlantState
 from ppafo.model.vane import actuator_torque
 
@@ -132,7 +133,8 @@ def external_torque(
     pressure_1, pressure_2 = held_pressures(held, state)
     actuator = actuator_torque(pressure_1, pressure_2, plant.torque_constant)
     way = (1.0 if speed > 0.0 else 0.0) - (1.0 if speed < 0.0 else 0.0)
-    moving = way * plant.dynamic_torque + share.viscous_damping * speed + share.inertia * led.acceleration
+    friction = friction_in_motion(plant.dynamic_torque, speed, pressure_1, pressure_2)
+    moving = way * friction + share.viscous_damping * speed + share.inertia * led.acceleration
     given = actuator + plate - moving
     return needed if angle_is_free else given
 
@@ -173,7 +175,7 @@ def depart_in_walk(
     plant: PlantParameters, state: PlantState, begun: WalkStep, ended: WalkEnd, ahead: HeldChambers, step: float
 ) -> tuple[WalkEnd, HeldChambers]:
     """End and chambers of a step [s] inside which an event leads the foot elsewhere; of any other foot as they are."""
-    angle, rate = depart_free(plant, state, begun.free, ended.motion, step)
+    angle, rate = depart_free(plant, state, ahead, begun.free, ended.motion, step)
     departs, slid = ended.motion.departs > 0.5, ended.motion
     there = held_chambers(plant, angle)
     held = HeldChambers(

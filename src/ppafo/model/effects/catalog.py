@@ -4,10 +4,10 @@ from collections.abc import Iterable
 
 from ppafo.errors import KindError, one_line
 from ppafo.kinds import Kinds
-from ppafo.model.effects import bandwidth, ice, silencer
+from ppafo.model.effects import bandwidth, ice, seal_friction, silencer, stribeck
 from ppafo.model.effects.kind import SECTION, Effect, effect_problem
 
-_OWN = (silencer.EFFECT, ice.EFFECT, bandwidth.EFFECT)
+_OWN = (silencer.EFFECT, ice.EFFECT, seal_friction.EFFECT, stribeck.EFFECT, bandwidth.EFFECT)
 EFFECTS: Kinds[Effect] = Kinds("ppafo.effects", "effect", Effect, _OWN)
 
 

@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 
 from ppafo.engine.lanes import Floats, run_batch
+from ppafo.engine.links import python_place
 from ppafo.engine.program import Program
 from ppafo.engine.reference.vane_mode import mode_at_rest, torque_on_vane
 from ppafo.engine.rows import leaf_paths, leaves, numbers, rebuilt
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.chambers import chamber_mass
+from ppafo.model.places import friction_at_rest
 from ppafo.model.plant import Openings, ThermalParameters, chamber_pressures, chamber_volumes
 from ppafo.model.valves.proportional import NO_SLEW_LIMIT
 from ppafo.model.vane import actuator_torque
@@ -217,7 +219,11 @@ def _way(run: Run, values: Mapping[str, float]) -> float | None:
         return 1.0 if rate > 0.0 else -1.0
     volumes, product = chamber_volumes(run.plant, angle), run.plant.gas_product
     masses = [chamber_mass(values[f"pressure_{side}"], volumes[side - 1], product) for side in (1, 2)]
-    return mode_at_rest(run.plant, angle, torque_on_vane(run.plant, angle, *masses))
+    limit, plant = python_place(friction_at_rest, run.program.effects, run.effects), run.plant
+    if limit is not None:
+        pressures = values["pressure_1"], values["pressure_2"]
+        plant = plant._replace(static_torque=limit({}, plant.static_torque, *pressures))
+    return mode_at_rest(plant, angle, torque_on_vane(plant, angle, *masses))
 
 
 def equilibrium(scenario: Scenario) -> Point:

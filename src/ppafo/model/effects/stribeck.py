@@ -1,0 +1,51 @@
+"""Stribeck friction: near standstill a sliding vane has nearly the friction that it has at rest."""
+
+from typing import Any, NamedTuple
+
+from ppafo.model.declaration import Quantity
+from ppafo.model.effects.kind import Effect
+from ppafo.model.places import friction_in_motion
+
+
+class Stribeck(NamedTuple):
+    """How much more friction there is near standstill [N m], and one over the square of its velocity [s^2/rad^2]."""
+
+    friction_rise: float
+    velocity_scale: float
+
+
+def prepare(settings: Any, device: Any) -> Stribeck:
+    """The row from the velocity at which half of the rise is left, and the friction of the device."""
+    velocity, friction = settings["velocity"], device.friction
+    scale = 1.0 / (velocity * velocity) if velocity > 0.0 else 0.0
+    return Stribeck(settings["share"] * (friction.static_torque - friction.dynamic_torque), scale)
+
+
+def more_near_standstill(
+    torque: float, angular_velocity: float, pressure_1: float, pressure_2: float, stribeck: Stribeck
+) -> float:
+    """Size of the friction torque in motion [N m]: ``T_d + a (T_s - T_d) / (1 + (w / w_s)^2)``."""
+    without = friction_in_motion(torque, angular_velocity, pressure_1, pressure_2)
+    return without + stribeck.friction_rise / (1.0 + stribeck.velocity_scale * angular_velocity * angular_velocity)
+
+
+EFFECT = Effect(
+    name="stribeck",
+    summary="More friction of the vane near standstill.",
+    quantities=(
+        Quantity(
+            "velocity", "rad/s", "angular velocity at which half of the rise is left, 0 for none", 0.0, 0.0, 1.0e4
+        ),
+        Quantity("share", "", "share of the fall from static to dynamic friction that the rise has", 0.9, 0.0, 0.99),
+    ),
+    parameters=Stribeck,
+    prepare=prepare,
+    switch=("velocity",),
+    laws={friction_in_motion: more_near_standstill},
+    source="the curve of Hess and Soom (Journal of Tribology 112, 1990); a share below 1 lets the vane break away",
+    equation="T_f = T_d + a (T_s - T_d) / (1 + (w / w_s)^2)",
+    symbols=(
+        ("a (T_s - T_d)", "friction_rise", "N m", "friction torque near standstill over the dynamic one"),
+        ("1/w_s^2", "velocity_scale", "s^2/rad^2", "one over the square of the Stribeck velocity"),
+    ),
+)

@@ -1,0 +1,57 @@
+"""Friction with pressure and near standstill: lanes and reference solver agree, formulas are what they name."""
+
+import pytest
+
+from ppafo.engine.reference.agreement import compare_with_reference
+from ppafo.model.effects.seal_friction import SealFriction, pressed_at_rest, pressed_in_motion
+from ppafo.model.effects.stribeck import Stribeck, more_near_standstill
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.simulate import simulate
+
+SEALS = (
+    "effects.seal_friction.static_per_pressure=2e-6 N m/Pa",
+    "effects.seal_friction.dynamic_per_pressure=1e-6 N m/Pa",
+)
+STRIBECK = ("effects.stribeck.velocity=2 rad/s",)
+
+
+@pytest.mark.parametrize(
+    ("name", "texts"),
+    [
+        ("step-response", SEALS),
+        ("step-response", STRIBECK),
+        ("torque-task-solenoid", (*SEALS, *STRIBECK, "motion.kind=free", "run.duration=0.3 s")),
+    ],
+)
+def test_friction_in_the_lanes_is_that_of_the_reference_solver(name: str, texts: tuple[str, ...]) -> None:
+    agreement = compare_with_reference(plan_run(load_scenario(name, texts)))
+    assert agreement.angle < 2e-4
+    assert agreement.worst_pressure < 1e-3
+
+
+def test_seals_that_the_gas_presses_hold_the_vane_for_longer() -> None:
+    departures = [
+        simulate(load_scenario("step-response", texts)).metrics["departure_time"].value
+        for texts in ((), ("effects.seal_friction.static_per_pressure=2e-6 N m/Pa",))
+    ]
+    assert departures[1] > departures[0]
+
+
+def test_the_formulas_are_those_that_they_name() -> None:
+    seals = SealFriction(2.0e-6, 1.0e-6)
+    assert pressed_at_rest(0.5, 1.0e5, 4.0e5, seals) == pytest.approx(1.1)
+    assert pressed_in_motion(0.4, 3.0, 4.0e5, 1.0e5, seals) == pytest.approx(0.7)
+    near = Stribeck(friction_rise=0.09, velocity_scale=0.25)
+    assert more_near_standstill(0.4, 0.0, 1.0e5, 1.0e5, near) == pytest.approx(0.49)
+    assert more_near_standstill(0.4, -2.0, 1.0e5, 1.0e5, near) == pytest.approx(0.445)
+
+
+def test_the_torque_on_a_prescribed_joint_has_the_friction_of_the_effects() -> None:
+    texts = ("run.duration=0.3 s",)
+    with_seals, without = (
+        simulate(load_scenario("torque-task-moving-ankle", own)).recording for own in ((*texts, SEALS[1]), texts)
+    )
+    more = abs(with_seals["pressure_1"] - with_seals["pressure_2"]) * 1.0e-6
+    found = abs(with_seals["external_torque"] - without["external_torque"])
+    assert found[50:].max() == pytest.approx(more[50:].max(), rel=1e-6)
