@@ -29,8 +29,8 @@ def valve_models(walks: bool) -> list[ValveModel]:
 
 
 def meters() -> tuple[MeterKind, ...]:
-    """Every meter of the metrics."""
-    return tuple({meter.name: meter for kind in METRICS.values() for meter in kind.meters}.values())
+    """Every meter of the metrics of recordings; those of walks have samples of their own."""
+    return tuple({meter.name: meter for kind in METRICS.values() if kind.compute for meter in kind.meters}.values())
 
 
 def drawn_programs(count: int, seed: int = 1) -> Iterator[Program]:

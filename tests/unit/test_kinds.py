@@ -18,8 +18,8 @@ from ppafo.simulation.schema import json_schema
 
 LAW = """
 from dataclasses import replace
-from ppafo.control.controllers import {name}
-KIND = replace({name}.KIND, name={call!r}, summary="Of another package.")
+from ppafo.control.catalog import CONTROLLERS
+KIND = replace(CONTROLLERS[{name!r}], name={call!r}, summary="Of another package.")
 """
 Install = Callable[..., None]
 

@@ -127,12 +127,12 @@ def test_a_law_without_a_file_is_known_by_its_code() -> None:
 
 COMPOSED = """
 from dataclasses import replace
-from ppafo.control.controllers import on_off
+from ppafo.control.controllers.switching import ON_OFF
 
 def update(parameters, state, reference, measurement, period):
     return (1.0 if reference > 0.5 * measurement.torque else -1.0), state
 
-KIND = replace(on_off.KIND, update=update)
+KIND = replace(ON_OFF, update=update)
 """
 
 
