@@ -238,6 +238,10 @@ def at_library(name: str, count: int, seed: int) -> Judged:
             if isinstance(alone, str):
                 found.refused += 1
                 continue
+            # An effect that is off in the library is another program, and has no settings there.
+            if any(path.startswith("effects.") and path not in built.places for path in words):
+                found.other += 1
+                continue
             door = built.planned(built.changed(_numbers_in_si(base, words)), alone)
             if door == OTHER_PROGRAM:
                 found.other += 1

@@ -125,7 +125,7 @@ def test_an_interrupted_study_writes_nothing_and_ends_with_130(
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    module = "ppafo.questions.design.solve" if command == "design" else "ppafo.questions.size.solve"
+    module = "ppafo.questions.design.solve" if command == "design" else "ppafo.questions.size.search"
     monkeypatch.setattr(f"{module}.run_ensemble", interrupted)
     file = folder / ("design.toml" if command == "design" else "sizing.toml")
     assert main([command, str(file), "--out", str(folder / "out")]) == 130

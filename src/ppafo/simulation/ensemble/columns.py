@@ -33,11 +33,15 @@ _UNIT_OF_TIMES = {"controller.rate": "Hz"}
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """A scenario and what varies in it, followers included: values (runs,) in SI by path, with their declarations."""
+    """A scenario and what varies in it, followers included: values (runs,) in SI by path, with their declarations.
+
+    ``given`` are the paths that are no followers.
+    """
 
     base: Scenario
     values: Mapping[str, Floats]
     declared: Mapping[str, Quantity]
+    given: frozenset[str]
 
     @property
     def runs(self) -> int:
@@ -72,7 +76,7 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
         )
     _check_together(base, values)
     every = moving_together(base, absolute(base, values, gauge))
-    return Columns(base, every, {path: declared[path] for path in every})
+    return Columns(base, every, {path: declared[path] for path in every}, frozenset(values))
 
 
 def absolute(base: Scenario, columns: Mapping[str, Floats], gauge: Collection[str]) -> dict[str, Floats]:

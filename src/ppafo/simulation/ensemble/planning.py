@@ -65,7 +65,9 @@ def screen_columns(columns: Columns) -> Screen:
     """The runs whose values are in range and fit together."""
     screen = Screen(columns)
     for path in columns.values:
-        screen.refuse(*_out_of_range(screen.columns, path))
+        # A default that follows others goes where they lead it, as it does in a single run.
+        if path in columns.given or not columns.declared[path].follows:
+            screen.refuse(*_out_of_range(screen.columns, path))
     if screen.members.size:
         _read_clocks(screen)
     for rule in rules_of(worn_kind(columns.base)):

@@ -316,5 +316,5 @@ def test_mistakes_are_one_line() -> None:
         sensitivity(STUDY)
     with pytest.raises(StudyError, match=r"--method shapley.*--independent"):
         sensitivity(STUDY, "sobol", configuration="solenoid", samples=64)
-    with pytest.raises(StudyError, match="no metric 'gas'; available: rms_error"):
+    with pytest.raises(StudyError, match="has no 'gas': it needs a walk"):
         sensitivity(STUDY, metrics=["gas"], configuration="solenoid")
