@@ -2,6 +2,7 @@
 
 import math
 import random
+import re
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -419,8 +420,9 @@ def test_functions_keep_names_and_docstrings() -> None:
     source = program_source(next(iter(drawn_programs(1))))
     assert "/* Mass flow from a to b [kg/s], positive from a to b" in source
     assert "PPAFO_INLINE double model_orifice_orifice_flow(double pressure_a, double pressure_b" in source
+    code = re.sub(r"/\*.*?\*/", "", source, flags=re.DOTALL)
     for forbidden in ("malloc", "static double", "exp(", "pow("):
-        assert forbidden not in source
+        assert forbidden not in code
 
 
 @needs_gcc
