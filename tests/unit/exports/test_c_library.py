@@ -64,7 +64,11 @@ def metrics_of(result: Result) -> dict[str, float]:
     last = float(recording["reference"][-1])
     largest = max(abs(float(recording["reference"][0])), abs(last))
     course = Course(last, largest, SAME_LEVEL * largest, 0.0)
-    kinds = [kind for kind in METRICS.values() if set(kind.channels) <= set(recording.names) and not kind.traced]
+    kinds = [
+        kind
+        for kind in METRICS.values()
+        if kind.compute and set(kind.channels) <= set(recording.names) and not kind.traced
+    ]
     meters = {meter.name: meter for kind in kinds for meter in kind.meters}
     states: dict[str, Any] = {}
     for number in range(len(recording)):
