@@ -59,7 +59,15 @@ def person_of(gait: Gait, who: Any) -> Person:
 
 def _person(gait: Gait, number: float) -> Person:
     if number == 0.0:
-        return Person(1.0, 1.0, gait_series(gait), gait_timing(gait), strike_angle(gait), 1.0, 0.0)
+        return Person(
+            mass=1.0,
+            stature=1.0,
+            series=gait_series(gait),
+            timing=gait_timing(gait),
+            strike_angle=strike_angle(gait),
+            thresholds=1.0,
+            start=0.0,
+        )
     build, gaits, generator = _drawn(gait, number)
     person: Person = rebuilt(Person, [float(values[1]) for values in leaves(drawn_people(build, gaits, generator))])
     return person
@@ -84,7 +92,15 @@ def drawn_people(build: Build, gaits: VariedGaits, generator: np.random.Generato
     stature: Any = build.stature
     start: Any = START_VARIATION * shift
     series = GaitSeries(**{name: _series(curves) for name, curves in gaits.series.items()})
-    return Person(mass, stature, series, GaitTiming(**timing), strike, thresholds, start)
+    return Person(
+        mass=mass,
+        stature=stature,
+        series=series,
+        timing=GaitTiming(**timing),
+        strike_angle=strike,
+        thresholds=thresholds,
+        start=start,
+    )
 
 
 def _series(curves: SeriesOfMany) -> Series:

@@ -263,7 +263,7 @@ def numbers_of_walk(scenario: Scenario) -> dict[str, Any]:
 
     def prepared(period: float, *given: float) -> tuple[float, ...]:
         settings = dict(zip(names, given[count:], strict=True))
-        found = law.prepare(settings, period, GaitConverter(*given[:count]))
+        found = law.prepare(settings, period, rebuilt(GaitConverter, given[:count]))
         return tuple(found[item.name] for item in law.number_quantities)
 
     found = over_runs(prepared, control.period, *converter, *control.settings.values())

@@ -50,9 +50,9 @@ def test_what_the_drawing_library_loads_late_is_there_when_it_is_used() -> None:
 
 def test_a_library_that_is_there_already_is_not_touched() -> None:
     code = (
-        "import sys, matplotlib.figure\nfrom ppafo.cli import quick_imports\n"
+        "import sys, matplotlib.figure\nfrom ppafo.cli import output\n"
         "def of_others(): return {name: item for name, item in sys.modules.items() if not name.startswith('ppafo')}\n"
-        "before = of_others()\nquick_imports.load_drawing()\nprint(of_others() == before)"
+        "before = of_others()\noutput.load_drawing()\nprint(of_others() == before)"
     )
     assert printed_by(code) == "True"
 
