@@ -29,8 +29,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from ppafo.errors import PpafoError
 from ppafo.live.workbench import DEFAULT, workbench
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.result import Result
-from ppafo.simulation.simulate import simulate
+from ppafo.simulation.simulate import Result, simulate
 from ppafo.units import parse_quantity
 from ppafo.walking.loading import load_walk
 from ppafo.walking.result import WalkResult

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from ppafo.errors import PpafoError
 from ppafo.exports.wasm import WasmModule
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.result import Result
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import simulate_many
+from ppafo.simulation.simulate import Result, simulate_many
 from ppafo.walking import load_walk
 from ppafo.walking.result import WalkResult
 from ppafo.walking.varying import record_interval

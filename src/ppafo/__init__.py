@@ -72,9 +72,8 @@ if TYPE_CHECKING:
     from ppafo.questions.validate.solve import Validation, validate
     from ppafo.signals import Channel, Recording
     from ppafo.simulation.loading import list_scenarios, scenario_from_dict
-    from ppafo.simulation.result import Result, Status
     from ppafo.simulation.scenario import Scenario
-    from ppafo.simulation.simulate import simulate, simulate_many
+    from ppafo.simulation.simulate import Result, Status, simulate, simulate_many
     from ppafo.storage import read_recording, read_result
     from ppafo.studies.loading import list_studies, load_study
     from ppafo.walking import compare_walks, list_walks, load_walk, walk_population
@@ -193,9 +192,8 @@ _HOMES = {
     "ppafo.signals": ("Channel", "Recording"),
     "ppafo.loading": ("load_scenario",),
     "ppafo.simulation.loading": ("list_scenarios", "scenario_from_dict"),
-    "ppafo.simulation.result": ("Result", "Status"),
     "ppafo.simulation.scenario": ("Scenario",),
-    "ppafo.simulation.simulate": ("simulate", "simulate_many"),
+    "ppafo.simulation.simulate": ("Result", "Status", "simulate", "simulate_many"),
     "ppafo.storage": ("read_recording", "read_result"),
     "ppafo.studies.loading": ("list_studies", "load_study"),
     "ppafo.questions.sweep.results": ("StudyResults", "load_study_results"),
@@ -230,14 +228,16 @@ _RENAMED = {"run_design": "design", "run_sizing": "size", "run_study": "sweep"}
 
 def _compiler_of_c(name: str) -> Compiler:
     """Return a compiler of C, which knows the translation above the engine."""
-    made: Compiler = importlib.import_module("ppafo.translation.native").compiler(name)
-    return made
+    from ppafo.translation.native import compiler
+
+    return compiler(name)
 
 
 def _numba() -> Compiler:
     """Return Numba."""
-    made: Compiler = importlib.import_module("ppafo.engine.numba_compiler").numba_compiler()
-    return made
+    from ppafo.engine.numba_compiler import numba_compiler
+
+    return numba_compiler()
 
 
 offer({**{name: partial(_compiler_of_c, name) for name in ("clang", "gcc", "zig")}, "numba": _numba})

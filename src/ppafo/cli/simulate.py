@@ -12,7 +12,7 @@ from ppafo.errors import ScenarioError
 if TYPE_CHECKING:
     from ppafo.answers import Answer
     from ppafo.simulation.check import Check
-    from ppafo.simulation.result import Result
+    from ppafo.simulation.simulate import Result
 
 DEFAULT_FOLDER = Path("out")
 CHECK_FILE = "check.json"

@@ -15,9 +15,9 @@ from ppafo.gait.opensim_names import opensim_recording
 from ppafo.metrics import METRICS, Metric, evaluate
 from ppafo.metrics.metric import REQUEST, STEADY, MetricKind
 from ppafo.signals import Recording
-from ppafo.simulation.result import Status
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
+from ppafo.simulation.simulate import Status
 from ppafo.storage.opensim import write_opensim
 from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.course_planning import PlannedCourse

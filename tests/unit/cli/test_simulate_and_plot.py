@@ -16,9 +16,8 @@ import pytest
 from ppafo.answers.recording_figure import figure_files, recording_figure
 from ppafo.cli.main import main
 from ppafo.signals import Channel, Recording
-from ppafo.simulation.result import Result, Status
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import compile_models, simulate
+from ppafo.simulation.simulate import Result, Status, compile_models, simulate
 from ppafo.storage import read_result
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes

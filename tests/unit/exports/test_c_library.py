@@ -25,9 +25,8 @@ from ppafo.signals.meter import SAME_LEVEL, Course, Sample, advance_course
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import TIMES, with_numbers
 from ppafo.simulation.plan import plan_run, plan_runs
-from ppafo.simulation.result import Result
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import simulate
+from ppafo.simulation.simulate import Result, simulate
 from ppafo.translation.c99 import program_source
 from ppafo.translation.native import build, run_native
 from tests.built_once import shared_library

@@ -23,7 +23,7 @@ from ppafo.questions.reproduce.claim import (
 )
 from ppafo.questions.reproduce.solve import EXPERIMENTS, ORDER, reproduce
 from ppafo.questions.reproduce.torque_task import torque_task_observations
-from ppafo.simulation.result import Result, Status
+from ppafo.simulation.simulate import Result, Status
 
 SYNTHETIC = {
     "k_actuator",

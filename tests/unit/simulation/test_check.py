@@ -14,9 +14,8 @@ from ppafo.errors import SimulationError
 from ppafo.model.sensors import Measurement
 from ppafo.simulation.check import HALF_ERROR, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck
 from ppafo.simulation.loading import list_scenarios, load_scenario
-from ppafo.simulation.result import Status
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import simulate
+from ppafo.simulation.simulate import Status, simulate
 
 CHAOTIC = (
     "motion.kind=free",

@@ -10,8 +10,8 @@ import pytest
 from ppafo.metrics import Metric
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.document import plain, scenario_document
-from ppafo.simulation.result import Result, Status
 from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import Result, Status
 from ppafo.storage import read_result
 
 

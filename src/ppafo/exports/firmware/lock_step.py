@@ -25,9 +25,8 @@ from ppafo.exports.firmware.simulators import (
 )
 from ppafo.model.sensors import Measurement
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.result import Result
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import simulate
+from ppafo.simulation.simulate import Result, simulate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -29,10 +29,9 @@ from ppafo.exports.hil import wire
 from ppafo.exports.hil.loop import Bench, Exchange, Pace, Row, without_collections
 from ppafo.model.valves import dump
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.result import Result
 from ppafo.simulation.sampled import SampledRun
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario
-from ppafo.simulation.simulate import result_of
+from ppafo.simulation.simulate import Result, result_of
 from ppafo.storage.comma_separated import marked_csv_bytes
 
 if TYPE_CHECKING:

@@ -49,7 +49,7 @@ from ppafo.questions.unreported.answer import (
     setting_rows,
     unreported_figure,
 )
-from ppafo.simulation.result import Result
+from ppafo.simulation.simulate import Result
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.version import __version__
 

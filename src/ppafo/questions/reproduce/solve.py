@@ -22,9 +22,8 @@ from ppafo.questions.unreported.solve import infer_settings
 from ppafo.simulation.declaration import value_at
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.overriding import apply_overrides, is_of_device, scenario_paths, split_override, unknown_value
-from ppafo.simulation.result import Result
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import simulate
+from ppafo.simulation.simulate import Result, simulate
 
 COMPLETIONS = 49_152
 """Completions of the torque task in the report; ``ppafo unreported`` takes more."""

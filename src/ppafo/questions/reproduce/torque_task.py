@@ -10,7 +10,7 @@ from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.questions.reproduce.bench import AssumedValue
 from ppafo.questions.reproduce.claim import Claim, Observation, Verdict
 from ppafo.signals import Recording
-from ppafo.simulation.result import Result
+from ppafo.simulation.simulate import Result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

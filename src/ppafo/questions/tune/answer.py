@@ -25,8 +25,8 @@ from ppafo.answers.style import (
 from ppafo.questions.question import Solved
 from ppafo.questions.tune.problem import Gains, Limit, Problem
 from ppafo.simulation.document import plain
-from ppafo.simulation.result import Result
 from ppafo.simulation.scenario import worn_kind
+from ppafo.simulation.simulate import Result
 from ppafo.studies.distributions import Interval, fraction_text
 from ppafo.units import percentage
 

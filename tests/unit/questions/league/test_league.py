@@ -14,7 +14,7 @@ from ppafo.questions.league import bound, torque
 from ppafo.questions.league.answer import League, league_remarks
 from ppafo.questions.league.solve import league
 from ppafo.questions.league.standing import ENTRANTS, UNCERTAINTIES, Robustness, draw_devices, draw_factors
-from ppafo.simulation.result import Status
+from ppafo.simulation.simulate import Status
 
 SHORT = ("run.duration=0.6 s", "reference.ramp_time=0.3 s", "reference.level=3 N m")
 BY_NAME = {entrant.name: entrant for entrant in ENTRANTS}

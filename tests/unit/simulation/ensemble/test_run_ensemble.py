@@ -14,9 +14,8 @@ from ppafo.metrics import METRICS
 from ppafo.simulation.ensemble import COMPLETED, DIVERGED, REFUSED, EnsembleResult, run_ensemble, running
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import TIMES, declared_numbers, with_numbers
-from ppafo.simulation.result import Result
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import simulate
+from ppafo.simulation.simulate import Result, simulate
 
 Floats = NDArray[np.float64]
 
