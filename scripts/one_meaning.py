@@ -37,10 +37,9 @@ from ppafo.live.content import page_content, program_content
 from ppafo.loading import load_scenario
 from ppafo.parameters.graph import ATMOSPHERE_PATH, counts_from
 from ppafo.questions.sweep.manifest import drawn_values, varied_columns
-from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import plan_ensemble
 from ppafo.simulation.loading import list_scenarios
-from ppafo.simulation.numbers import TIMES, with_numbers
+from ppafo.simulation.numbers import TIMES, check_columns, with_numbers
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.loading import load_study

@@ -106,7 +106,7 @@ def run(parsed: argparse.Namespace) -> int:
             f"written: {folder} (recording.nc, recording.csv, log.csv, link.json, run.json, figures)",
         ]
     )
-    from ppafo.simulation.document import plain
+    from ppafo.simulation.scenario import plain
 
     document = {
         "scenario": found.result.scenario.name,

@@ -60,7 +60,7 @@ def run(parsed: argparse.Namespace) -> int:
     report = page_of(_answer(result, check), {FIGURE: figures[f"{FIGURE}.svg"]})
     checked = {} if check is None else {CHECK_FILE: f"{json_text(check.document())}\n".encode()}
     result.save(folder, {**figures, REPORT: report, **checked})
-    from ppafo.simulation.document import plain
+    from ppafo.simulation.scenario import plain
 
     metrics = {name: plain(metric) for name, metric in result.metrics.items()}
     document = {

@@ -16,8 +16,8 @@ from typing import Any
 from ppafo.errors import UnitError
 from ppafo.exports.wasm import WasmModule
 from ppafo.parameters.graph import ATMOSPHERE_PATH
+from ppafo.simulation.building import apply_overrides, is_of_device, split_override
 from ppafo.simulation.declaration import PRESSURE_WORDS
-from ppafo.simulation.overriding import apply_overrides, is_of_device, split_override
 from ppafo.simulation.scenario import Scenario, worn_kind
 from ppafo.units import conversion, from_si, to_si
 from ppafo.version import __version__

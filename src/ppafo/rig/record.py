@@ -15,7 +15,7 @@ from ppafo.parameters.loading import load_parameter_set
 from ppafo.rig.experiments import EXPERIMENTS, Experiment
 from ppafo.rig.preset import PREFIX, Outcome, Preset, Request, load_preset
 from ppafo.signals.recording import Recording
-from ppafo.simulation.document import UNITS, plain
+from ppafo.simulation.scenario import UNITS, plain
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.files import LEFT_ASIDE, add_files, check_files_can_be_added
 from ppafo.storage.owned_folder import read_json

@@ -1,5 +1,7 @@
-"""From the document of a scenario file to a Scenario in SI units, and the values in it that no source gives."""
+"""From the document of a scenario file, with overrides, to a Scenario in SI units, and what no source gives in it."""
 
+import copy
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,12 +11,16 @@ from ppafo.control.fixed.torque_laws import FIXED, FLOAT
 from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
 from ppafo.model.declaration import Quantity
+from ppafo.model.regulator import SupplyLines
+from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set
 from ppafo.parameters import apply_overrides as apply_device_overrides
-from ppafo.parameters.declaration import RELIEVING_PATH
+from ppafo.parameters.declaration import ORIFICE, RELIEVING_PATH, SPECIES_PATH
+from ppafo.parameters.declaration import quantities as device_quantities
 from ppafo.parameters.device import Device, Supply
 from ppafo.parameters.graph import Follows, Graph, follows, gauge_link
 from ppafo.parameters.parameter_set import atmospheric_pressure, chosen_valve, entry_text, links_of_set
+from ppafo.simulation import declaration
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock, read_clock
 from ppafo.simulation.declaration import (
     ARITHMETIC,
@@ -23,15 +29,19 @@ from ppafo.simulation.declaration import (
     PRESSURE_WORDS,
     SEED,
     SENSORS,
+    SUPPLY_LINE,
+    SUPPLY_LINES,
+    THERMAL,
+    THERMAL_GAS,
     TORQUE_LEVEL,
     controller_settings,
     kind_at,
+    line_entries,
+    line_quantities,
     quantities,
     value_at,
 )
-from ppafo.simulation.gas_sections import assumed_lines, read_supply_lines, read_thermal
 from ppafo.simulation.motion import read_motion, read_profile
-from ppafo.simulation.overriding import OverriddenDocument, device_paths, scenario_paths, split_override
 from ppafo.simulation.reading import Reading, quantity_text
 from ppafo.simulation.scenario import (
     Assumption,
@@ -40,11 +50,131 @@ from ppafo.simulation.scenario import (
     ProfileChoice,
     Scenario,
     Sensors,
+    Thermal,
 )
-from ppafo.units import split_quantity
+from ppafo.units import format_quantity, split_quantity
 
 _SECTION = "assumed"
 _NOTHING_TO_FOLLOW = ProfileChoice("constant", {"level": 0.0})
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_SEED = "sensors.seed"
+_ONE_OR_OTHER = {"controller.rate": "period", "controller.period": "rate"}
+_OWN_KEYS = {"controller": frozenset({"kind", "rate", "period"})}
+
+
+@dataclass(frozen=True, slots=True)
+class OverriddenDocument:
+    """A document with overrides in it: paths that were set, and the overrides that belong to the device."""
+
+    document: dict[str, Any]
+    paths: frozenset[str]
+    device: tuple[str, ...]
+
+
+def apply_overrides(document: Mapping[str, Any], overrides: Iterable[str], file: str) -> OverriddenDocument:
+    """Return a changed copy of a document; ``file`` is what messages call it.
+
+    Naming another kind of motion, controller or profile drops the settings that only the old kind has; giving a rate
+    drops the period, and the reverse. A gain on the torque may leave out its unit. ScenarioError for a path that is
+    neither of the scenario nor of its device.
+    """
+    changed = copy.deepcopy(dict(document))
+    paths: set[str] = set()
+    device: list[str] = []
+    for override in overrides:
+        path, text = split_override(override)
+        if is_of_device(path):
+            device.append(override)
+            continue
+        known = scenario_paths(changed)
+        if path not in known:
+            raise unknown_value(override, known, f"{file} has")
+        if path == "motion.kind":
+            declaration.check_motion_kind(text, f"override '{override}'")
+        _set(changed, path, text, file)
+        paths.add(path)
+    return OverriddenDocument(changed, frozenset(paths), tuple(device))
+
+
+def split_override(override: str) -> tuple[str, str]:
+    """Return path and value of a text such as ``run.duration=1 s``. ScenarioError for any other text."""
+    on_one_line = one_line(override)
+    path, separator, text = (part.strip() for part in on_one_line.partition("="))
+    if not separator or not path or not text:
+        raise ScenarioError(f"override '{on_one_line}' is not of the form PATH=VALUE, as valve.area=12.6mm^2 is")
+    return path, text
+
+
+def scenario_paths(document: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return every path of the scenario that an override can set, for the kinds that the document names."""
+    return (*declaration.texts(document), *(declaration.quantities(document) | declaration.line_paths()))
+
+
+def device_paths() -> tuple[str, ...]:
+    """Return every path of the device that an override can set, with ``valve`` for the one that is chosen."""
+    sections = [path for path in device_quantities({}) if not path.startswith("reported.")]
+    valve = [*ORIFICE, *(item for kind in VALVES.values() for item in kind.quantities)]
+    return (*sections, SPECIES_PATH, RELIEVING_PATH, *(f"valve.{item.name}" for item in valve))
+
+
+def is_of_device(path: str) -> bool:
+    """Tell whether a path begins in the device, which then has the say about the rest of it."""
+    sections = {path.partition(".")[0] for path in device_paths()} | {"valves", "reported"}
+    return path.partition(".")[0] in sections
+
+
+def unknown_value(override: str, known: tuple[str, ...], who_has: str) -> ScenarioError:
+    """Return the error for a path that is neither known nor of the device; ``who_has`` begins as ``task.toml has``."""
+    path, _ = split_override(override)
+    allowed = [*known, *device_paths()]
+    section = path.partition(".")[0]
+    near = [name for name in known if name.startswith(f"{section}.")]
+    hint = nearest_name(path, allowed) or f"; for example {', '.join(near[:6] or known[:6])}"
+    return ScenarioError(f"override '{one_line(override)}': {who_has} no value '{path}'{hint}")
+
+
+def _set(document: dict[str, Any], path: str, text: str, file: str) -> None:
+    section, _, name = path.rpartition(".")
+    table = document
+    for part in section.split(".") if section else ():
+        table = table.setdefault(part, {})
+        if not isinstance(table, dict):
+            raise ScenarioError(f"override '{path}={text}': {file} has no table [{section}]")
+    if name == "kind" and table.get("kind") != text:
+        _drop_settings_of_old_kind(document, section, text)
+    table.pop(_ONE_OR_OTHER.get(path, ""), None)
+    table[name] = _seed(path, text) if path == _SEED else _with_unit_of_gain(document, path, text)
+
+
+def _drop_settings_of_old_kind(document: dict[str, Any], section: str, kind: str) -> None:
+    table = declaration.value_at(document, section)
+    before = _setting_names(document, section)
+    table["kind"] = kind
+    after = _setting_names(document, section)
+    for name in before - after - _OWN_KEYS.get(section, frozenset()):
+        table.pop(name, None)
+
+
+def _setting_names(document: dict[str, Any], section: str) -> frozenset[str]:
+    """Return the keys that a section can have beside its kind."""
+    prefix = f"{section}."
+    paths = [path.removeprefix(prefix) for path in scenario_paths(document) if path.startswith(prefix)]
+    return frozenset(path.partition(".")[0] for path in paths) - {"kind"}
+
+
+def _with_unit_of_gain(document: dict[str, Any], path: str, text: str) -> str:
+    """Return the text with the SI unit of a gain on the torque where it has none: papers print gains without units."""
+    quantity = declaration.quantities(document).get(path)
+    is_gain = quantity is not None and path.startswith("controller.") and "(N m" in quantity.unit
+    return f"{text} {quantity.unit}" if quantity is not None and is_gain and _NUMBER.fullmatch(text) else text
+
+
+def _seed(path: str, text: str) -> int:
+    try:
+        return int(text)
+    except ValueError as error:
+        raise ScenarioError(f"override '{path}={text}': must be a whole number") from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -268,4 +398,54 @@ def _unknown(reading: Reading, path: str) -> ScenarioError:
     hint = nearest_name(path, [*scenario_paths(reading.document), *device_paths()])
     return ScenarioError(
         f"{reading.file}: [{_SECTION}] names '{one_line(path)}', which has no value in this scenario{hint}"
+    )
+
+
+def read_thermal(reading: Reading) -> Thermal | None:
+    """Return how the gas takes up heat in SI, None where it keeps its temperature."""
+    if kind_at(reading.document, "gas_model") != THERMAL:
+        return None
+    values = reading.section("gas_model", THERMAL_GAS)
+    return Thermal(
+        heat_transfer_coefficient=values["heat_transfer_coefficient"], area_per_volume=values["wall_area_per_volume"]
+    )
+
+
+def read_supply_lines(reading: Reading, device: Device) -> SupplyLines | None:
+    """Return the lines of a file in SI, None where it has no such section: then supply pressures are constant.
+
+    ScenarioError where dorsiflexion is set to more than the line has that feeds its regulator.
+    """
+    if value_at(reading.document, SUPPLY_LINE) is None:
+        return None
+    supply = device.supply
+    if supply.dorsiflexion_pressure > supply.pressure:
+        first, second = (
+            quantity_text(pressure, "Pa_a", supply.atmospheric_pressure)
+            for pressure in (supply.pressure, supply.dorsiflexion_pressure)
+        )
+        raise ScenarioError(
+            f"{reading.file}: [{SUPPLY_LINE}]: its second regulator is fed by the first, so "
+            f"supply.dorsiflexion_pressure, {second}, cannot be above supply.pressure, {first}"
+        )
+    first_line, second_line = (reading.section(f"{SUPPLY_LINE}.{line}", line_quantities(line)) for line in SUPPLY_LINES)
+    return SupplyLines(
+        droop_1=first_line["droop"],
+        largest_flow_1=first_line["largest_flow"],
+        volume_1=first_line["volume"],
+        droop_2=second_line["droop"],
+        largest_flow_2=second_line["largest_flow"],
+        volume_2=second_line["volume"],
+        relieving=float(supply.relieving),
+    )
+
+
+def assumed_lines(reading: Reading) -> tuple[Assumption, ...]:
+    """Return the values of the lines that the file leaves to their defaults, with the reason for each."""
+    if value_at(reading.document, SUPPLY_LINE) is None:
+        return ()
+    return tuple(
+        Assumption(f"{SUPPLY_LINE}.{path}", format_quantity(entry.value, entry.unit), f"{entry.origin}: {entry.source}")
+        for path, entry in line_entries().items()
+        if value_at(reading.document, f"{SUPPLY_LINE}.{path}") is None
     )

@@ -12,7 +12,7 @@ from typing import Any
 from ppafo.answers.display_units import metric_change, metric_level
 from ppafo.answers.writing import align_columns
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.simulation.document import plain
+from ppafo.simulation.scenario import plain
 
 MOVE = 1.0e-7
 """How far a start or a measurement is moved, as a fraction of its range."""

@@ -4,8 +4,11 @@ The schema, the conversion to SI, the messages and the overrides all read these 
 profiles come from their own catalogues. Limits are wide: they exclude slips of the pen and what no solver could handle.
 """
 
+import functools
+import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
+from importlib import resources
 from typing import Any
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
@@ -15,7 +18,8 @@ from ppafo.errors import KindError, ScenarioError
 from ppafo.kinds import Kinds
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.bandwidth import EFFECT as BANDWIDTH
-from ppafo.simulation import supply_line
+from ppafo.parameters.provenance import Entry
+from ppafo.units import to_si
 
 LARGEST_SEED = 2**32 - 1
 PLAIN = ("", "1")
@@ -69,6 +73,16 @@ ARITHMETIC = "controller.arithmetic"
 TORQUE_LEVEL = Quantity("level", "N m", "", None, -1.0e4, 1.0e4)
 ANGLE_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
 
+SUPPLY_LINE = "supply_line"
+SUPPLY_LINES = ("plantarflexion", "dorsiflexion")
+"""Behind the bottle's regulator, and behind the second one on the device, which the first line feeds."""
+
+_REGULATED = (
+    Quantity("droop", "Pa s/kg", "fall of the line pressure per mass flow", None, 1.0, 1.0e10),
+    Quantity("largest_flow", "kg/s", "what the regulator passes at most", None, 1.0e-6, 1.0),
+    Quantity("volume", "m^3", "room for gas between regulator and valve", None, 1.0e-6, 1.0e-2),
+)
+
 MOTIONS = ("free", "held", "prescribed")
 OLD_PRESCRIBED = "led"
 """What version 0.1 called a prescribed motion."""
@@ -81,7 +95,7 @@ SECTIONS = (
     "reference",
     "sensors",
     "gas_model",
-    supply_line.SECTION,
+    SUPPLY_LINE,
     "assumed",
 )
 TEXTS = ("name", "description", "device.set", "device.valve")
@@ -124,7 +138,7 @@ def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
         "gas_model": gas_settings(kind_at(document, "gas_model")),
     }
     found = {f"{section}.{item.name}": item for section, items in sections.items() for item in items}
-    return found | supply_line.paths() if supply_line.SECTION in document else found
+    return found | line_paths() if SUPPLY_LINE in document else found
 
 
 def texts(document: Mapping[str, Any]) -> tuple[str, ...]:
@@ -181,3 +195,26 @@ def _level(quantity: Quantity, prescribed: Quantity) -> Quantity:
         minimum=max(quantity.minimum, prescribed.minimum),
         maximum=min(quantity.maximum, prescribed.maximum),
     )
+
+
+@functools.cache
+def line_entries() -> dict[str, Entry]:
+    """Return the defaults for what ``[supply_line]`` does not give, by path such as ``dorsiflexion.droop``."""
+    document = tomllib.loads((resources.files("ppafo.simulation") / "supply_line.toml").read_text(encoding="utf-8"))
+    return {
+        f"{line}.{item.name}": Entry.model_validate(document[line][item.name])
+        for line in SUPPLY_LINES
+        for item in _REGULATED
+    }
+
+
+@functools.cache
+def line_quantities(line: str) -> tuple[Quantity, ...]:
+    """Return what a file may state of one line, with defaults in SI."""
+    found = ((item, line_entries()[f"{line}.{item.name}"]) for item in _REGULATED)
+    return tuple(replace(item, default=to_si(entry.value, entry.unit, item.unit)) for item, entry in found)
+
+
+def line_paths() -> dict[str, Quantity]:
+    """Return the declaration of every number of both lines, by path such as ``supply_line.dorsiflexion.droop``."""
+    return {f"{SUPPLY_LINE}.{line}.{item.name}": item for line in SUPPLY_LINES for item in line_quantities(line)}

@@ -13,9 +13,8 @@ from ppafo.documents.models import first_problem, is_gap
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ScenarioError
 from ppafo.parameters import ParameterSet
-from ppafo.simulation.building import ScenarioRequest, build_scenario
+from ppafo.simulation.building import ScenarioRequest, apply_overrides, build_scenario
 from ppafo.simulation.declaration import find_kinds
-from ppafo.simulation.overriding import apply_overrides
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.schema import scenario_file
 

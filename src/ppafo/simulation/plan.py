@@ -1,39 +1,52 @@
-"""From settings to a run, of a scenario or a walk: step sizes, rows of parameters, initial gas."""
+"""From settings to a run, of a scenario or a walk: step sizes, rows of parameters, initial gas.
+
+What the numbers come to is pure functions of one run or of columns of runs: Python plans with them, and an exported
+library has them in C.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
+from ppafo.control.fixed.torque_laws import FIXED_LAWS
+from ppafo.control.fixed.whole_numbers import SETTINGS, Converter, converter_of
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.engine.actuator_values import volumes_of
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.reference.derivative import ExactOrifice
-from ppafo.engine.rows import rebuilt
+from ppafo.engine.refinement import is_slow
+from ppafo.engine.rows import leaves, rebuilt
 from ppafo.engine.run import Lines, Run, Walk
 from ppafo.errors import ScenarioError
 from ppafo.model.actuators.catalog import ACTUATORS
 from ppafo.model.actuators.vane import KIND as VANE
-from ppafo.model.columns import Problem, at, first, over_runs, whole
-from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters
-from ppafo.model.regulator import SupplyLines
+from ppafo.model.chambers import chamber_mass
+from ppafo.model.columns import (
+    Number,
+    Problem,
+    at,
+    choose,
+    first,
+    larger,
+    over_runs,
+    rounded_up,
+    smaller,
+    truncated,
+    whole,
+)
+from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_volumes
+from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import SensorParameters
+from ppafo.model.thermal import wall_exchange
 from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveModel
-from ppafo.parameters.device import Device, Orifice, SonicOrifice
+from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice
 from ppafo.parameters.effects import effect_rows, effects_of
 from ppafo.parameters.plant import orifice_conductance, plant_parameters
-from ppafo.simulation.fixed_point import fixed_controller
-from ppafo.simulation.preparation import (
-    is_slow_held,
-    lines_at_start,
-    state_at_start,
-    state_with_volumes,
-    step_counts,
-    thermal_gas,
-)
+from ppafo.simulation.reading import short_quantity_text
 from ppafo.simulation.scenario import (
     PYTHON_CONTROLLER,
     FreeMotion,
@@ -46,6 +59,11 @@ from ppafo.simulation.scenario import (
 )
 
 MAXIMUM_STEPS = 1.0e9
+
+WHOLE = 1.0e-9
+"""Relative difference up to which a number of steps is a whole one."""
+
+_ROUNDING = 1.0e-9
 
 
 def plan_run(scenario: Scenario) -> Run:
@@ -332,3 +350,157 @@ def exact_orifice(orifice: Orifice | SonicOrifice, device: Device) -> ExactOrifi
         number=orifice.critical_ratio if isinstance(orifice, SonicOrifice) else device.gas.heat_capacity_ratio,
         linear_ratio=device.flow.linear_ratio,
     )
+
+
+class StepCounts(NamedTuple):
+    """Length of a step [s], how many there are, how many to a sample of the controller and of the recording [-]."""
+
+    step: float
+    step_count: float
+    steps_per_sample: float
+    record_every: float
+
+
+def step_counts(duration: float, time_step: float, output_interval: float, period: float) -> StepCounts:
+    """The largest steps that divide a sample of the controller, and are no longer than ``time_step``; all in [s]."""
+    steps_per_sample = larger(1.0, rounded_up(period / time_step - WHOLE))
+    step = period / steps_per_sample
+    return StepCounts(
+        step=step,
+        step_count=rounded_up(duration / step - WHOLE),
+        steps_per_sample=steps_per_sample,
+        record_every=nearly_whole(output_interval / step),
+    )
+
+
+def nearly_whole(steps: Number) -> Number:
+    """A number of steps [-], to the whole number where it is one to rounding."""
+    counted = truncated(steps + 0.5)
+    found: Number = choose(abs(steps - counted) <= WHOLE * steps, counted, steps)
+    return found
+
+
+def is_slow_held(plant: PlantParameters, step: float, angle: float, stiffness: float) -> bool:
+    """True where plain steps [s] follow the gas of a vane that is held at an angle [rad]; see ``is_slow``."""
+    return is_slow(plant, step, larger(angle, plant.angle_min), smaller(angle, plant.angle_max), stiffness)
+
+
+def thermal_gas(walls: Thermal, gas: Gas) -> ThermalParameters:
+    """How a gas with an energy balance takes up heat."""
+    exchange = wall_exchange(
+        walls.heat_transfer_coefficient, walls.area_per_volume, gas.heat_capacity_ratio, gas.specific_gas_constant
+    )
+    return ThermalParameters(
+        heat_capacity_ratio=gas.heat_capacity_ratio, wall_exchange=exchange, temperature=gas.temperature
+    )
+
+
+def state_at_start(
+    plant: PlantParameters, angle: Any, angular_velocity: Any, pressure_1: float, pressure_2: float
+) -> PlantState:
+    """The vane at an angle [rad] with a rate [rad/s], and the gas of two absolute pressures [Pa]."""
+    volume_1, volume_2 = chamber_volumes(plant, angle)
+    return state_with_volumes(plant, angle, angular_velocity, volume_1, volume_2, pressure_1, pressure_2)
+
+
+def state_with_volumes(
+    plant: PlantParameters,
+    angle: Any,
+    angular_velocity: Any,
+    volume_1: float,
+    volume_2: float,
+    pressure_1: float,
+    pressure_2: float,
+) -> PlantState:
+    """As ``state_at_start``, of chambers whose volumes [m^3] at that angle and those pressures are known."""
+    return PlantState(
+        angle=angle,
+        angular_velocity=angular_velocity,
+        mass_1=chamber_mass(pressure_1, volume_1, plant.gas_product),
+        mass_2=chamber_mass(pressure_2, volume_2, plant.gas_product),
+        supplied_mass=0.0,
+        vented_mass=0.0,
+        leaked_mass=0.0,
+    )
+
+
+def lines_at_start(plant: PlantParameters, lines: SupplyLines) -> LineState:
+    """Both lines at the pressures that their regulators are set to, and nothing let through yet."""
+    return LineState(
+        mass_1=chamber_mass(plant.supply_pressure, lines.volume_1, plant.gas_product),
+        mass_2=chamber_mass(plant.dorsiflexion_pressure, lines.volume_2, plant.gas_product),
+        regulated_mass=0.0,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class FixedController:
+    """An integer controller for the lanes: its kind, its numbers by name (whole ones in floats), what may be wrong."""
+
+    kind: ControllerKind
+    numbers: Mapping[str, Any]
+    problems: tuple[Problem, ...]
+
+
+def fixed_controller(scenario: Scenario, torque_constant: Any, reference: tuple[Any, Any]) -> FixedController:
+    """The integer form of the controller; any number may be an array (runs,).
+
+    It is told the device's torque constant [N m/Pa], and the lowest and highest ``reference`` [N m].
+    """
+    control = scenario.control
+    law = FIXED_LAWS[control.kind]
+    bits, pressure_range = (control.settings[item.name] for item in SETTINGS)
+    converter: Converter = over_runs(converter_of, bits, pressure_range, torque_constant)
+    names = tuple(control.settings)
+
+    def settings_of(values: tuple[float, ...]) -> dict[str, float]:
+        return dict(zip(names, values, strict=True))
+
+    def prepared(period: float, torque_step: float, *values: float) -> tuple[float, ...]:
+        found: tuple[float, ...] = law.prepare(settings_of(values), period, torque_step)
+        return found
+
+    def largest(period: float, torque_step: float, *values: float) -> float:
+        return law.largest(settings_of(values), period, torque_step)
+
+    given = (control.period, converter.torque_step, *control.settings.values())
+    every = (*leaves(converter), *over_runs(prepared, *given))
+    numbers = dict(zip((item.name for item in law.kind.quantities), every, strict=True))
+    size = over_runs(largest, *given)
+    return FixedController(
+        law.kind, numbers, (_broken_bit(bits), _too_large(size, control.kind), _reference(reference, converter))
+    )
+
+
+def _broken_bit(bits: Any) -> Problem:
+    """A number of bits that is not whole."""
+    return np.asarray(bits % 1.0 != 0.0), lambda run: f"controller.converter_bits = {at(bits, run):g}: must be whole"
+
+
+def _too_large(size: Any, kind: str) -> Problem:
+    """A setting beyond what 15 bits and the range of the converter can hold."""
+
+    def line(run: int) -> str:
+        return (
+            f"controller: a gain of '{kind}' on whole numbers is {at(size, run):.3g} times the largest: take more "
+            f"converter_bits, a smaller converter_range, or a smaller gain"
+        )
+
+    return np.asarray(size > 1.0), line
+
+
+def _reference(bounds: tuple[Any, Any], converter: Converter) -> Problem:
+    """A reference that the converter cannot show."""
+    lowest, highest = bounds
+    low, high = -converter.middle * converter.torque_step, (converter.top - converter.middle) * converter.torque_step
+
+    def line(run: int) -> str:
+        shown, wanted = (
+            (short_quantity_text(at(end, run), "N m") for end in ends) for ends in ((low, high), (lowest, highest))
+        )
+        return (
+            f"reference: from {' to '.join(wanted)}, and the converter shows {' to '.join(shown)} only: "
+            "take a larger controller.converter_range"
+        )
+
+    return np.logical_or(lowest < low - _ROUNDING, highest > high + _ROUNDING), line

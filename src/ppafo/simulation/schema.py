@@ -15,7 +15,7 @@ from ppafo.control.fixed.torque_laws import FIXED_LAWS
 from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table
 from ppafo.model.declaration import Quantity
-from ppafo.simulation import declaration, supply_line
+from ppafo.simulation import declaration
 
 _LONGEST_NAME = 100
 _STARTS_WITH_NUMBER = r"^\s*[+-]?(\d|\.\d)"
@@ -123,9 +123,9 @@ def supply_line_table() -> Any:
     """Return the section of the regulators and lines that feed the device."""
     fields = {
         line: optional(
-            table(f"{model_name(line)}Line", quantity_fields(supply_line.line_quantities(line))), f"{line} line"
+            table(f"{model_name(line)}Line", quantity_fields(declaration.line_quantities(line))), f"{line} line"
         )
-        for line in supply_line.LINES
+        for line in declaration.SUPPLY_LINES
     }
     return table("SupplyLine", fields)
 
@@ -166,7 +166,7 @@ def _scenario_file(*_kinds: Any) -> type[BaseModel]:
         "reference": optional(reference, "torque that the controller follows; 0 N m unless given"),
         "sensors": optional(table("Sensors", _sensors()), "sensors of the controller; ideal unless given"),
         "gas_model": optional(gas_model_table(), "how the gas in the chambers behaves; isothermal unless given"),
-        supply_line.SECTION: optional(
+        declaration.SUPPLY_LINE: optional(
             supply_line_table(), "regulators and lines of the gas; constant pressures unless given"
         ),
         "assumed": (

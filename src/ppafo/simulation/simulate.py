@@ -25,11 +25,10 @@ from ppafo.model.vane import gravity_torque, sliding_friction
 from ppafo.parameters.device import Gas
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.check import ALLOWED_CHANGE, HALF_ERROR, MOVE, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck
-from ppafo.simulation.document import plain, scenario_document
 from ppafo.simulation.loading import scenario_or_load
 from ppafo.simulation.plan import plan_run, profile_values
 from ppafo.simulation.sampled import run_sampled, state_row_numbers
-from ppafo.simulation.scenario import PrescribedMotion, Scenario, worn_kind
+from ppafo.simulation.scenario import PrescribedMotion, Scenario, plain, scenario_document, worn_kind
 from ppafo.storage import dataset_of, write_result
 from ppafo.version import __version__
 

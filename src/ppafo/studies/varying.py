@@ -16,9 +16,8 @@ from ppafo.parameters.graph import counts_from, gauge_link
 from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si
 from ppafo.parameters.provenance import Entry
 from ppafo.simulation import declaration
-from ppafo.simulation.building import set_name
+from ppafo.simulation.building import is_of_device, set_name, split_override
 from ppafo.simulation.numbers import declared_numbers
-from ppafo.simulation.overriding import is_of_device, split_override
 from ppafo.simulation.reading import WRITTEN_UNITS
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared

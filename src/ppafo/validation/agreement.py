@@ -12,8 +12,7 @@ from ppafo.errors import DataError
 from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
-from ppafo.simulation.recorded.inputs import SUPPLY, regular_interval
-from ppafo.simulation.recorded.scenario import with_fixed_volume
+from ppafo.simulation.recorded import SUPPLY, regular_interval, with_fixed_volume
 from ppafo.validation.measured import (
     ANGLE,
     COMPARED,

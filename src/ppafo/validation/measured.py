@@ -15,8 +15,17 @@ from ppafo.parameters.device import Device
 from ppafo.signals import CHANNELS, Recording
 from ppafo.signals.faults import FEWEST_AT_LIMIT, Plateau, is_at_limit, is_noisy, lasting_change, plateaus
 from ppafo.signals.recording import Floats
-from ppafo.simulation.recorded.checks import PRESSURES, check_absolute, check_command, check_gaps, usual_interval
-from ppafo.simulation.recorded.inputs import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
+from ppafo.simulation.recorded import (
+    COMMAND,
+    DORSIFLEXION_SUPPLY,
+    EXTERNAL_TORQUE,
+    PRESSURES,
+    SUPPLY,
+    check_absolute,
+    check_command,
+    check_gaps,
+    usual_interval,
+)
 from ppafo.storage import read_recording
 from ppafo.storage.files import read_bytes
 from ppafo.storage.foreign import ColumnMap, read_foreign

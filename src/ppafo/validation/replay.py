@@ -15,19 +15,22 @@ from ppafo.model.plant import chamber_pressures
 from ppafo.parameters.device import Device
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.recorded.inputs import (
+from ppafo.simulation.recorded import (
     COMMAND,
     DORSIFLEXION_SUPPLY,
     EXTERNAL_TORQUE,
     SUPPLY,
     RecordedInputs,
+    Start,
     between_stops,
+    held_vane,
+    replay_scenario,
     sample_period,
+    samples_at_rest,
     step_inputs,
+    with_highest_supply,
     with_prescribed_angle,
 )
-from ppafo.simulation.recorded.scenario import held_vane, replay_scenario, with_highest_supply
-from ppafo.simulation.recorded.start import Start, samples_at_rest
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.units import parse_quantity
 from ppafo.validation.measured import ANGLE, PRESSURE_1, PRESSURE_2, Measured

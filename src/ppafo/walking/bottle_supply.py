@@ -15,9 +15,8 @@ from ppafo.model.source import content_energy
 from ppafo.parameters.bottles.bottle import PATHS, Bottle, load_bottle
 from ppafo.parameters.device import Device
 from ppafo.parameters.provenance import Entry
-from ppafo.simulation.declaration import THERMAL, kind_at, value_at
+from ppafo.simulation.declaration import SUPPLY_LINE, THERMAL, kind_at, value_at
 from ppafo.simulation.reading import Reading, quantity_text
-from ppafo.simulation.supply_line import SECTION as LINES
 from ppafo.units import format_quantity
 
 SECTION = "bottle"
@@ -40,7 +39,7 @@ _FOLLOWS = {
 }
 """What makes a part of the supply follow more slowly."""
 
-_OWN = tuple(f"{LINES}.plantarflexion.{name}" for name in ("droop", "largest_flow"))
+_OWN = tuple(f"{SUPPLY_LINE}.plantarflexion.{name}" for name in ("droop", "largest_flow"))
 """What the bottle's own regulator says instead."""
 
 _SAME_GAS, _SAME_PRESSURE = 1.0e-2, 2.0e-3

@@ -4,8 +4,7 @@ from ppafo.control.fixed.walking_law import SETTINGS as CONVERTER
 from ppafo.control.fixed.walking_numbers import FIXED_WALKS
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers
 from ppafo.model.declaration import Quantity
-from ppafo.simulation import supply_line
-from ppafo.simulation.declaration import PERIOD, RATE, SENSORS, THERMAL_GAS
+from ppafo.simulation.declaration import PERIOD, RATE, SENSORS, THERMAL_GAS, line_paths
 from ppafo.walking import bottle_supply
 from ppafo.walking.wearer import WEARER
 
@@ -127,4 +126,4 @@ def quantities(controller: str, timing: str = THRESHOLDS) -> dict[str, Quantity]
     for sensor in FAULTY:
         items = (FAULT_TIME, PERIOD_OF_FAULT, READINGS[sensor], *DISTORTIONS[sensor])
         found |= {f"faults.{sensor}.{item.name}": item for item in items}
-    return found | supply_line.paths()
+    return found | line_paths()

@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from ppafo.simulation.document import plain
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.scenario import Scenario, plain
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import sensor_settings
 

@@ -19,13 +19,21 @@ from ppafo.model.regulator import SupplyLines
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph
-from ppafo.simulation.building import Hardware, ScenarioRequest, read_device, read_hardware
-from ppafo.simulation.declaration import ISOTHERMAL, PERIOD, RATE, kind_at, value_at
-from ppafo.simulation.gas_sections import assumed_lines, read_supply_lines, read_thermal
-from ppafo.simulation.overriding import device_paths, is_of_device, split_override
+from ppafo.simulation.building import (
+    Hardware,
+    ScenarioRequest,
+    assumed_lines,
+    device_paths,
+    is_of_device,
+    read_device,
+    read_hardware,
+    read_supply_lines,
+    read_thermal,
+    split_override,
+)
+from ppafo.simulation.declaration import ISOTHERMAL, PERIOD, RATE, SUPPLY_LINE, kind_at, value_at
 from ppafo.simulation.reading import Reading
 from ppafo.simulation.scenario import Assumption, Control, MotionKind, Origin, Scenario, Sensors
-from ppafo.simulation.supply_line import SECTION as LINES
 from ppafo.walking import bottle_supply
 from ppafo.walking.bottle_supply import BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk, rules
@@ -318,7 +326,7 @@ def _lines(
 ) -> SupplyLines | None:
     """Return the lines of a walk; a bottle always feeds some, with the defaults of what the file does not say."""
     if carried is not None:
-        document.setdefault(LINES, {})
+        document.setdefault(SUPPLY_LINE, {})
     lines = read_supply_lines(reading, device)
     return lines if lines is None or carried is None else carried.lines(lines)
 

@@ -1,6 +1,6 @@
 """From the settings of a walk in SI units to the numbers that it begins with.
 
-Pure functions of one run, as in ``simulation/preparation.py``: Python plans with them, and an exported library has them
+Pure functions of one run, as in ``simulation/plan.py``: Python plans with them, and an exported library has them
 in C. What a gait comes to (series, events, the fit of the heel) is data.
 """
 
@@ -17,7 +17,7 @@ from ppafo.model.gait import GaitNow
 from ppafo.model.gait_sensors import Fault, GaitSensors
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, torque_of_shank
 from ppafo.model.plant import PlantParameters, PlantState, chamber_volumes
-from ppafo.simulation.preparation import WHOLE, StepCounts, state_at_start
+from ppafo.simulation.plan import WHOLE, StepCounts, state_at_start
 from ppafo.walking.wearer import HeelRocker
 
 LOWEST_ANGLE, HIGHEST_ANGLE = math.radians(60.0), math.radians(115.0)

@@ -9,8 +9,7 @@ from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.fixed.walking_numbers import FIXED_WALKS
 from ppafo.control.walking.catalog import TIMINGS, WALKING_CONTROLLERS, walking_controllers
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table
-from ppafo.simulation import supply_line
-from ppafo.simulation.declaration import SAMPLING
+from ppafo.simulation.declaration import SAMPLING, SUPPLY_LINE
 from ppafo.simulation.schema import (
     device_fields,
     gas_model_table,
@@ -105,9 +104,7 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
         "sensors": optional(table("WalkSensors", sensors), "sensors of the controller; ideal unless given"),
         "faults": optional(table("Faults", faults), "sensors that fail during the walk"),
         "gas_model": optional(gas_model_table(), "how the gas in the chambers behaves; isothermal unless given"),
-        supply_line.SECTION: optional(
-            supply_line_table(), "regulators and lines of the gas; constant pressures unless given"
-        ),
+        SUPPLY_LINE: optional(supply_line_table(), "regulators and lines of the gas; constant pressures unless given"),
         bottle_supply.SECTION: optional(
             table("WalkBottle", _bottle()), "bottle that the device hangs on; a supply without end unless given"
         ),

@@ -10,9 +10,8 @@ from ppafo.control.walking.catalog import TIMINGS
 from ppafo.model.columns import Problem, at, over_runs
 from ppafo.model.declaration import Quantity
 from ppafo.simulation.clock import Clock
-from ppafo.simulation.declaration import gas_settings
+from ppafo.simulation.declaration import gas_settings, line_paths
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.supply_line import paths
 from ppafo.walking.declaration import (
     FAULTY,
     FORCES,
@@ -53,7 +52,7 @@ def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
     kept = {f"controller.{item.name}" for item in own} | {"controller.rate", "controller.period"}
     kept |= {path for path in known if path.partition(".")[0] in ("wearer", "timing", "sensors", "run")}
     kept |= {f"gas_model.{item.name}" for item in gas_settings("" if scenario.thermal is None else "thermal")}
-    kept |= set() if scenario.supply_lines is None else set(paths())
+    kept |= set() if scenario.supply_lines is None else set(line_paths())
     for sensor, fault in motion.faults.items():
         kept |= {f"faults.{sensor}.{name}" for name in fault.numbers}
     # An object in charge has no settings, and a timing is one of a controller that has some.

@@ -148,8 +148,8 @@ def as_it_is(number: float) -> float:
     [
         ("ppafo.engine.scheme.pneumatics.GAMMA", 0.3),
         ("ppafo.metrics.switching.OSCILLATION_THRESHOLD", 0.06),
-        ("ppafo.simulation.preparation.WHOLE", 1e-8),
-        ("ppafo.simulation.preparation.rounded_up", as_it_is),
+        ("ppafo.simulation.plan.WHOLE", 1e-8),
+        ("ppafo.simulation.plan.rounded_up", as_it_is),
     ],
 )
 def test_changed_physics_never_takes_a_program_of_the_package(

@@ -15,9 +15,9 @@ from ppafo.parameters.loading import load_device, load_parameter_set, parse_para
 from ppafo.parameters.writing import parameter_set_toml
 from ppafo.questions.league.bound import check_bounded
 from ppafo.questions.tune.solve import shortfall
-from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import screen_columns
 from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.numbers import check_columns
 
 EXAMPLE = Path(str(resources.files("ppafo") / "examples" / "actuators"))
 HEADER = "angle [deg],pressure [kPa_g],volume_1 [mL]"

@@ -6,9 +6,9 @@ import pytest
 
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Orifice, SonicOrifice
-from ppafo.simulation.document import scenario_document
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.numbers import TIMES, declared_numbers, number_at, other_form, with_numbers
+from ppafo.simulation.scenario import scenario_document
 
 
 @pytest.mark.parametrize("name", list_scenarios())

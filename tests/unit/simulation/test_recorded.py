@@ -10,16 +10,18 @@ from ppafo.parameters import apply_overrides, load_device, load_parameter_set
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.recorded.inputs import (
+from ppafo.simulation.recorded import (
     RecordedInputs,
+    Start,
     between_stops,
     regular_interval,
+    replay_scenario,
     sample_period,
+    samples_at_rest,
     step_inputs,
     supply_paths,
+    with_highest_supply,
 )
-from ppafo.simulation.recorded.scenario import replay_scenario, with_highest_supply
-from ppafo.simulation.recorded.start import Start, samples_at_rest
 
 
 def recording(time: np.ndarray, command: np.ndarray, supply: np.ndarray) -> Recording:

@@ -9,8 +9,7 @@ import pytest
 
 from ppafo.metrics import Metric
 from ppafo.signals import Channel, Recording
-from ppafo.simulation.document import plain, scenario_document
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.scenario import Scenario, plain, scenario_document
 from ppafo.simulation.simulate import Result, Status
 from ppafo.storage import read_result
 

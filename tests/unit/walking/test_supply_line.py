@@ -8,8 +8,8 @@ import pytest
 
 from ppafo.errors import ParameterError, ScenarioError
 from ppafo.model.regulator import SupplyLines
+from ppafo.simulation.declaration import line_entries
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.supply_line import entries
 from ppafo.walking import load_walk, walk, walk_population
 from ppafo.walking.comparison import with_device_off
 
@@ -34,8 +34,8 @@ def test_a_walk_without_the_section_has_constant_pressures(name: str) -> None:
 def test_what_is_not_given_has_value_origin_and_source(name: str) -> None:
     configuration = load_walk(name)
     assert configuration.supply_lines == SupplyLines(3.0e6, 0.01, 1.0e-5, 6.7e7, 1.5e-3, 2.0e-6, 0.0)
-    assert len(entries()) == 6
-    for path, entry in entries().items():
+    assert len(line_entries()) == 6
+    for path, entry in line_entries().items():
         assert entry.origin in assumed_by(configuration)[f"supply_line.{path}"]
         assert entry.source in assumed_by(configuration)[f"supply_line.{path}"]
 

@@ -27,8 +27,7 @@ from ppafo.exports.fmu import compiler_for, host_platform
 from ppafo.exports.mujoco import Headers, attributes_of, installed_headers, plugin_files, plugin_library
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.recorded.inputs import with_prescribed_angle
-from ppafo.simulation.recorded.scenario import held_vane
+from ppafo.simulation.recorded import held_vane, with_prescribed_angle
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario, Sensors
 
 mujoco: Any = pytest.importorskip("mujoco", reason="MuJoCo is not installed (pip install 'ppafo[mujoco]')")

@@ -22,8 +22,7 @@ from ppafo.model.effects.catalog import ordered_effects
 from ppafo.parameters.device import Device
 from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import Graph
-from ppafo.simulation.plan import plan_run
-from ppafo.simulation.preparation import step_counts
+from ppafo.simulation.plan import plan_run, step_counts
 from ppafo.simulation.scenario import Control, Scenario, Sensors, worn_kind
 
 if TYPE_CHECKING:

@@ -30,11 +30,18 @@ from ppafo.parameters.effects import SEEN_BY_EFFECTS, effects_of
 from ppafo.parameters.graph import Graph, Term
 from ppafo.parameters.plant import area_restriction, plant_with, sonic_restriction
 from ppafo.simulation.clock import links_of_times, step_unless_given, step_with_output
-from ppafo.simulation.declaration import value_at
-from ppafo.simulation.ensemble.columns import time_texts
+from ppafo.simulation.declaration import SUPPLY_LINE, SUPPLY_LINES, value_at
 from ppafo.simulation.motion import TOLERANCE
-from ppafo.simulation.numbers import HELD_ANGLE, TIMES, declared_numbers, links_that_hold, number_at, other_form
-from ppafo.simulation.preparation import (
+from ppafo.simulation.numbers import (
+    HELD_ANGLE,
+    TIMES,
+    declared_numbers,
+    links_that_hold,
+    number_at,
+    other_form,
+    time_texts,
+)
+from ppafo.simulation.plan import (
     is_slow_held,
     lines_at_start,
     state_at_start,
@@ -43,7 +50,6 @@ from ppafo.simulation.preparation import (
     thermal_gas,
 )
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
-from ppafo.simulation.supply_line import LINES, SECTION
 from ppafo.units import parse_quantity
 
 ENTRY = '@njit("void(float64[::1], float64[::1], float64[::1], float64[::1])")'
@@ -219,8 +225,8 @@ class Writing:
             yield f"thermal = {add(thermal_gas)}({self.row('Walls', walls)}, gas)"
         if self.lines is not None:
             of_lines = [
-                c_identifier(f"{SECTION}.{line}.{name}")
-                for line in LINES
+                c_identifier(f"{SUPPLY_LINE}.{line}.{name}")
+                for line in SUPPLY_LINES
                 for name in ("droop", "largest_flow", "volume")
             ]
             yield f"lines = {add(SupplyLines)}({', '.join(of_lines)}, {self.lines.relieving!r})"

@@ -17,11 +17,10 @@ from ppafo.model.gait import gait_at
 from ppafo.model.gait_sensors import NOTHING_SEEN
 from ppafo.parameters.building import consistency
 from ppafo.parameters.graph import Follows, Graph, Term, holding
-from ppafo.simulation.declaration import PERIOD, RUN, THERMAL_GAS
+from ppafo.simulation.declaration import PERIOD, RUN, SUPPLY_LINES, THERMAL_GAS, line_paths
 from ppafo.simulation.numbers import device_number_at, device_numbers
 from ppafo.simulation.plan import profile_parameters
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.supply_line import LINES, paths
 from ppafo.walking.course_planning import flat_foot
 from ppafo.walking.declaration import SEED, STEP, WALK_SENSORS, fault_numbers
 from ppafo.walking.gait_series import gait_series, gait_timing
@@ -123,9 +122,9 @@ def _gas_numbers(configuration: Scenario) -> dict[str, tuple[Quantity, float]]:
         given = walls.heat_transfer_coefficient, walls.area_per_volume
         found = {f"gas_model.{item.name}": (item, value) for item, value in zip(THERMAL_GAS, given, strict=True)}
     if lines is not None:
-        for path, item in paths().items():
+        for path, item in line_paths().items():
             _, line, name = path.split(".")
-            found[path] = (item, getattr(lines, f"{name}_{1 + LINES.index(line)}"))
+            found[path] = (item, getattr(lines, f"{name}_{1 + SUPPLY_LINES.index(line)}"))
     return found
 
 
@@ -223,7 +222,7 @@ def _steps(configuration: Scenario, writing: Writing) -> Iterator[str]:
     """Lines that make the steps."""
     yield f"volume = {writing.add(smallest_chamber)}(plant)"
     if configuration.supply_lines is not None:
-        volumes = (c_identifier(f"supply_line.{line}.volume") for line in LINES)
+        volumes = (c_identifier(f"supply_line.{line}.volume") for line in SUPPLY_LINES)
         yield f"volume = min(volume, {', '.join(volumes)})"
     stiffness = "1.0" if configuration.thermal is None else "gas_heat_capacity_ratio"
     given = "run_duration, run_step, run_output_interval, controller_period"

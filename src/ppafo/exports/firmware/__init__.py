@@ -14,8 +14,7 @@ from ppafo.exports.firmware.catalog import target_of
 from ppafo.exports.templates import filled, licence, template
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.plant import plant_parameters
-from ppafo.simulation.fixed_point import fixed_controller
-from ppafo.simulation.plan import plan_run, profile_bounds
+from ppafo.simulation.plan import fixed_controller, plan_run, profile_bounds
 from ppafo.simulation.reading import quantity_text
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.c99 import c_source, documents_of

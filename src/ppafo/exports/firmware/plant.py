@@ -27,8 +27,7 @@ from ppafo.exports.firmware.simulators import (
 )
 from ppafo.exports.templates import filled, template
 from ppafo.model.sensors import Measurement
-from ppafo.simulation.plan import profile_parameters
-from ppafo.simulation.preparation import step_counts
+from ppafo.simulation.plan import profile_parameters, step_counts
 from ppafo.simulation.reading import quantity_text
 from ppafo.simulation.scenario import Scenario, Sensors
 from ppafo.simulation.simulate import simulate

@@ -36,7 +36,7 @@ from ppafo.exports.fmu.description import (
 )
 from ppafo.exports.templates import filled, licence, template
 from ppafo.model.command import VENT
-from ppafo.simulation.preparation import step_counts
+from ppafo.simulation.plan import step_counts
 from ppafo.simulation.scenario import (
     Control,
     FreeMotion,

@@ -17,7 +17,7 @@ from ppafo.exports.c_library.preparation import preparation_of
 from ppafo.exports.c_library.program import ExportedProgram
 from ppafo.exports.fmu import HIDDEN, PLATFORMS, build_library
 from ppafo.exports.templates import filled, template
-from ppafo.simulation.recorded.scenario import held_vane
+from ppafo.simulation.recorded import held_vane
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
 from ppafo.version import __version__
 

@@ -40,10 +40,9 @@ from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, Term, itself
 from ppafo.parameters.overrides import SOURCE
 from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si
 from ppafo.parameters.provenance import Entry
-from ppafo.simulation.building import set_name
+from ppafo.simulation.building import is_of_device, set_name, split_override
 from ppafo.simulation.declaration import SEED, value_at
 from ppafo.simulation.numbers import HELD_ANGLE, TIMES
-from ppafo.simulation.overriding import is_of_device, split_override
 from ppafo.simulation.scenario import Scenario, worn_kind
 from ppafo.units import to_si
 from ppafo.version import __version__

@@ -17,17 +17,20 @@ from ppafo.parameters.device import Device, Orifice
 from ppafo.signals import Recording
 from ppafo.simulation import numbers
 from ppafo.simulation.declaration import FREE, INITIAL
-from ppafo.simulation.recorded.checks import check_absolute, check_command, check_gaps
-from ppafo.simulation.recorded.inputs import (
+from ppafo.simulation.recorded import (
     ANGLE,
     COMMAND,
     DORSIFLEXION_SUPPLY,
     EXTERNAL_TORQUE,
     SUPPLY,
     between_stops,
+    check_absolute,
+    check_command,
+    check_gaps,
+    replay_control,
     supply_paths,
+    with_highest_supply,
 )
-from ppafo.simulation.recorded.scenario import replay_control, with_highest_supply
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, Scenario, Sensors
 
 FITTED_CHANNELS = ("angle", "pressure_1", "pressure_2")

@@ -38,7 +38,7 @@ from ppafo.simulation.plan import (
     thermal_parameters,
     valve_parameters,
 )
-from ppafo.simulation.recorded.inputs import ANGLE, RecordedInputs, step_inputs, with_prescribed_angle
+from ppafo.simulation.recorded import ANGLE, RecordedInputs, step_inputs, with_prescribed_angle
 from ppafo.simulation.scenario import FreeMotion, Scenario
 
 Floats = NDArray[np.float64]

@@ -49,9 +49,17 @@ from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.progress import Progress, Report
 from ppafo.signals import Recording
 from ppafo.simulation.loading import list_scenarios, load_scenario
-from ppafo.simulation.recorded.inputs import ANGLE, COMMAND, LONGEST_STEP, between_stops
-from ppafo.simulation.recorded.scenario import held_vane, replay_scenario, with_fixed_volume
-from ppafo.simulation.recorded.start import Start, samples_at_rest
+from ppafo.simulation.recorded import (
+    ANGLE,
+    COMMAND,
+    LONGEST_STEP,
+    Start,
+    between_stops,
+    held_vane,
+    replay_scenario,
+    samples_at_rest,
+    with_fixed_volume,
+)
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import read_csv
 from ppafo.units import parse_quantity, percentage

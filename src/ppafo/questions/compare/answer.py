@@ -31,8 +31,7 @@ from ppafo.live.workbench import live_part
 from ppafo.metrics import Metric
 from ppafo.questions.compare.paired import Paired, best_probabilities, compare_pairs, pareto_front
 from ppafo.questions.question import Solved
-from ppafo.simulation.document import plain
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.scenario import Scenario, plain
 from ppafo.simulation.simulate import Status
 from ppafo.studies.distributions import FEWEST_EFFECTIVE, Floats, Interval, fraction_text
 from ppafo.studies.draws import Outcomes

@@ -17,9 +17,8 @@ from ppafo.model.chambers import chamber_1_volume, chamber_2_volume
 from ppafo.parameters.chamber_volumes import other_readings
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
-from ppafo.simulation.document import scenario_document
 from ppafo.simulation.loading import scenario_from_dict
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario, scenario_document
 from ppafo.simulation.simulate import simulate
 from ppafo.storage.owned_folder import read_json
 from ppafo.storage.result_folder import RUN_FILE, read_document, read_recording

@@ -25,8 +25,7 @@ from ppafo.errors import ScenarioError, StudyError, UnitError, one_line
 from ppafo.loading import scenario_or_load
 from ppafo.progress import Report
 from ppafo.questions.question import Solved
-from ppafo.simulation.document import plain
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.scenario import Scenario, plain
 from ppafo.studies.draws import Outcomes, Tally, Uncertainty, atmosphere_of, check_metrics, level_of, scenario_model
 from ppafo.studies.sampling import NOISE, with_noise
 from ppafo.studies.study import with_overrides

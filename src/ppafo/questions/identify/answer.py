@@ -37,7 +37,7 @@ from ppafo.parameters.writing import parameter_set_toml
 from ppafo.questions.question import Solved
 from ppafo.signals import Recording, RecordingKind
 from ppafo.signals.recording import Floats
-from ppafo.simulation.document import plain
+from ppafo.simulation.scenario import plain
 
 if TYPE_CHECKING:
     import matplotlib.figure

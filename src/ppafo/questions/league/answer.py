@@ -13,7 +13,7 @@ from ppafo.answers.style import BLACK, BLUE, GREY, VERMILION, house_style, mark_
 from ppafo.progress import Report
 from ppafo.questions.league.standing import UNCERTAINTIES, Bound, Bounded, Entrant, Robustness, Standing
 from ppafo.questions.question import Solved
-from ppafo.simulation.document import plain
+from ppafo.simulation.scenario import plain
 from ppafo.studies.distributions import fraction_text
 from ppafo.version import __version__
 

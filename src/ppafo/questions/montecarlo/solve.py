@@ -32,7 +32,7 @@ from ppafo.errors import StudyError, UnitError
 from ppafo.metrics import METRICS
 from ppafo.progress import Report
 from ppafo.questions.question import Solved
-from ppafo.simulation.document import plain
+from ppafo.simulation.scenario import plain
 from ppafo.studies.distributions import (
     FEWEST_EFFECTIVE,
     Floats,

@@ -36,8 +36,8 @@ from ppafo.parameters.provenance import Entry
 from ppafo.questions.reproduce.claim import Claim, Printed, Verdict
 from ppafo.rig import record
 from ppafo.signals import Recording
+from ppafo.simulation.building import apply_overrides
 from ppafo.simulation.declaration import quantities
-from ppafo.simulation.overriding import apply_overrides
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
 from ppafo.validation import RecordingAgreement, ReplaySettings, compare_recording
 from ppafo.validation.measured import check_recording

@@ -21,7 +21,7 @@ from ppafo.errors import StudyError, nearest_name
 from ppafo.progress import Report
 from ppafo.questions.question import Solved
 from ppafo.questions.sensitivity.methods import METHODS, TAIL, Evaluated, Indices, Method
-from ppafo.simulation.document import plain
+from ppafo.simulation.scenario import plain
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import (
     Model,

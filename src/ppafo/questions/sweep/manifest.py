@@ -31,9 +31,8 @@ from ppafo.documents.models import quote, validate
 from ppafo.engine.lanes import write_source
 from ppafo.errors import DataError, StudyError
 from ppafo.metrics import METRICS
-from ppafo.simulation.document import plain, scenario_document
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.scenario import Scenario, plain, scenario_document
 from ppafo.storage.places import Place, read_document
 from ppafo.studies.distributions import Floats
 from ppafo.studies.sampling import correlate, uniform_numbers

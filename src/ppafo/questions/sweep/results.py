@@ -35,7 +35,7 @@ from ppafo.questions.sweep.manifest import (
 )
 from ppafo.signals.channels import CHANNELS
 from ppafo.simulation.ensemble import EnsembleResult, run_ensemble
-from ppafo.simulation.ensemble.columns import absolute
+from ppafo.simulation.numbers import absolute
 from ppafo.storage.parquet import TableColumn, encode_texts, lists_of, parquet_bytes, table_of, texts_of_some
 from ppafo.storage.places import Place, place_at, read_document
 from ppafo.studies.distributions import Floats

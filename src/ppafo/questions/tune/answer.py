@@ -24,8 +24,7 @@ from ppafo.answers.style import (
 )
 from ppafo.questions.question import Solved
 from ppafo.questions.tune.problem import Gains, Limit, Problem
-from ppafo.simulation.document import plain
-from ppafo.simulation.scenario import worn_kind
+from ppafo.simulation.scenario import plain, worn_kind
 from ppafo.simulation.simulate import Result
 from ppafo.studies.distributions import Interval, fraction_text
 from ppafo.units import percentage

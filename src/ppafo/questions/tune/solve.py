@@ -18,8 +18,7 @@ from ppafo.parameters.device import VANE
 from ppafo.progress import Report
 from ppafo.questions.tune.answer import FRESH_DRAWS, INFEASIBLE, Ceiling, Setting, Start, Tuning, keeps
 from ppafo.questions.tune.problem import Effort, Gains, Limit, Problem, Spread, Term, load_tuning
-from ppafo.simulation.ensemble.columns import absolute
-from ppafo.simulation.numbers import TIMES, with_numbers
+from ppafo.simulation.numbers import TIMES, absolute, with_numbers
 from ppafo.simulation.plan import profile_bounds
 from ppafo.simulation.scenario import Scenario, worn_kind
 from ppafo.simulation.simulate import OPEN_LOOP, simulate

@@ -26,7 +26,7 @@ from ppafo.questions.unreported.settings import (
     improvement,
     saving,
 )
-from ppafo.simulation.document import plain
+from ppafo.simulation.scenario import plain
 from ppafo.studies.distributions import jackknife_reach
 
 if TYPE_CHECKING:

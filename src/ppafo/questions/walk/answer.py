@@ -34,8 +34,7 @@ from ppafo.questions.walk.volumes import (
     wearers_volumes_sections,
 )
 from ppafo.signals.recording import Floats
-from ppafo.simulation.document import UNITS, plain
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.scenario import UNITS, Scenario, plain
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.version import __version__

@@ -12,9 +12,9 @@ from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.metrics.catalog import METRICS
 from ppafo.metrics.metric import MetricKind
-from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import EnsemblePlan, plan_ensemble
 from ppafo.simulation.ensemble.running import REFERENCE, Outcome, Request, intervals, samples_of
+from ppafo.simulation.numbers import check_columns
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import OPEN_LOOP, REMEDY
 
