@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 
 from ppafo import load_device, simulate
 from ppafo.answers.style import house_style
-from ppafo.engine.actuator_values import torque_of, volumes_of
+from ppafo.engine.scheme.actuators import torque_of, volumes_of
 from ppafo.model.actuators.catalog import ACTUATORS
 from ppafo.parameters.plant import plant_parameters
 

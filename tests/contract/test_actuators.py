@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from ppafo import load_device
-from ppafo.engine.actuator_values import pressures_of, torque_of, volumes_of
+from ppafo.engine.scheme.actuators import pressures_of, torque_of, volumes_of
 from ppafo.model.actuators.catalog import ACTUATORS
 from ppafo.model.actuators.kind import ActuatorModel
 from ppafo.model.plant import PlantParameters

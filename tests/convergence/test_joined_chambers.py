@@ -10,16 +10,17 @@ import pytest
 
 from ppafo.engine.reference.agreement import compare_with_reference
 from ppafo.engine.reference.derivative import ExactOrifice, joined_thermal_rates, thermal_gas_rates
-from ppafo.engine.scheme.joined_chambers import plant_with_joined_chambers
 from ppafo.engine.scheme.motion import with_gas
 from ppafo.engine.scheme.pneumatics import (
     begin_still_gas,
     held_chambers,
     held_pressures,
+    plant_with_joined_chambers,
     second_still_stage,
+    sloped_flows,
+    stage_flows,
     still_change,
 )
-from ppafo.engine.scheme.stage_flows import sloped_flows, stage_flows
 from ppafo.model.plant import Openings, ThermalParameters, chamber_pressures
 from ppafo.model.ports import single_port_flow, single_port_flow_slopes
 from ppafo.model.valves import solenoid_recycling

@@ -1,8 +1,7 @@
 """Writes the source of the lane loop of one program: loads, calls and stores, with the rows as literals."""
 
-from ppafo.engine.lane_control import control_loop, remember_commands, signals_before_start
-from ppafo.engine.lane_meters import measure_sample
 from ppafo.engine.lane_rows import VECTOR, LaneRows, indent
+from ppafo.engine.lane_samples import control_loop, measure_sample, remember_commands, signals_before_start
 from ppafo.engine.lane_step import find_begin, over_rows, plant_loop
 from ppafo.engine.links import link_program
 from ppafo.engine.program import Program

@@ -1,23 +1,43 @@
-"""What the lanes do between two samples: valve, gas and vane, over a whole step or in parts of it.
+"""What the lanes do between two samples: the way of one step, from the valve to the state that is stored.
 
 A step is whole where nothing changes abruptly inside it and its error is known to be small: the gas of a held vane
 behind a valve that follows at once. Otherwise each lane goes through it in parts of its own. A part ends where a coil
 switches, a late command arrives, the vane meets a stop, a sample is due, or its error would become too large. Lanes
 that are through wait, masked, and no lane sees another.
+
+``phases`` is the step itself, read downwards: where a walking leg or a vane would be, the valve and the flows with
+which the step begins, the first stage of the gas, the flows to which that leads, the second stage, the motion at the
+end, and the state, unless its error refuses it.
 """
 
-from ppafo.engine import lane_effects
-from ppafo.engine.lane_control import sense_end
-from ppafo.engine.lane_gas import begin_gas, feed, open_valve, pass_gas
+import re
+
 from ppafo.engine.lane_rows import HANDED, LaneRows, RarePhase, count_lanes, indent
-from ppafo.engine.lane_walk import lead_walk, mark_stride, reach_end
-from ppafo.engine.scheme import motion, parts, thermal_gas, walking
-from ppafo.engine.scheme.ankle_torque import carried_foot
-from ppafo.engine.scheme.pneumatics import held_chambers
+from ppafo.engine.lane_samples import present_pressures, pressures_of, sense_end
+from ppafo.engine.rows import leaf_paths
+from ppafo.engine.scheme import actuators, motion, pneumatics, supply_lines, thermal_gas, walking
+from ppafo.engine.source_text import woven
+from ppafo.model.course import gait_on_course, shown_toe_force, stands_on_toes
+from ppafo.model.effects.kind import Moment, State
+from ppafo.model.gait import GaitMeasured, GaitNow, gait_of, measured_at, place_at
 
 IMPOSSIBLE_RATE = 1.0e6
 IMPOSSIBLE_MASS = 1.0e3
 MAXIMUM_PARTS = 100_000
+LARGEST = 1.0e300
+"""A state beyond this, or one that is no number, is a failure."""
+
+
+def find_begin(rows: LaneRows) -> list[str]:
+    """Finds what a step is handed by the one before, where there was none; of a held vane it lasts for all steps."""
+    if not rows.program.hands_chambers_on:
+        return []
+    held = f"held = {rows.add(pneumatics.held_chambers)}(plant, state.angle)"
+    lines = [rows.load("plant"), rows.load("state"), held, *rows.keep("held")]
+    if rows.program.walks:
+        carried = f"carried = {rows.add(walking.carried_foot)}(leg, share, walk.now, walk.foot)"
+        lines += [*[rows.load(name) for name in ("leg", "share", "walk")], carried, *rows.keep("carried")]
+    return rows.over_lanes(lines)
 
 
 def plant_loop(rows: LaneRows) -> list[str]:
@@ -59,16 +79,413 @@ def time_of_step(rows: LaneRows) -> str:
     return f"time = {step} * timing.step"
 
 
-def find_begin(rows: LaneRows) -> list[str]:
-    """Finds what a step is handed by the one before, where there was none; of a held vane it lasts for all steps."""
-    if not rows.program.hands_chambers_on:
+def phases(rows: LaneRows) -> list[list[str] | RarePhase]:
+    """Both stages of the gas over ``length`` [s] from ``time`` [s], what leads to them, and the state at the end."""
+    program = rows.program
+    is_free = program.angle is None
+    kept = rows.keep("gas") if is_free else rows.keep("begun", "gas")
+    first = [rows.load("flowing"), *lead(rows), begin_gas(rows), *kept]
+    before = [*lead_walk(rows), open_valve(rows), first, pass_gas(rows)]
+    if not is_free:
+        return [*before, [*feed(rows), *finish(rows)]]
+    error = [f"{rows.error} = gas_error"] if program.is_adaptive else []
+    loaded = [rows.load("begun"), rows.load("change")]
+    loaded += [f"gas_error = {rows.error}"] if program.is_adaptive else []
+    reached = reach_end(rows, with_gas(rows)) if program.walks else []
+    return [*before, [*feed(rows), *rows.keep("change"), *error], *reached, [*loaded, *finish(rows)]]
+
+
+def lead_walk(rows: LaneRows) -> list[list[str]]:
+    """Phases before the gas of a walking leg: the gait at the end of the step, and where the foot would be."""
+    if not rows.program.walks:
         return []
-    held = f"held = {rows.add(held_chambers)}(plant, state.angle)"
-    lines = [rows.load("plant"), rows.load("state"), held, *rows.keep("held")]
+    foot = f"{rows.add(walking.begin_walk)}(plant, leg, gait_timing, state, held, walk, carried, next_gait, length)"
+    return [
+        *next_gait(rows),
+        [rows.load("next_gait"), rows.load("carried"), f"begun = {foot}", *rows.keep("begun")],
+    ]
+
+
+def next_gait(rows: LaneRows) -> list[list[str]]:
+    """Phases that make the gait at the end of the step: stride after stride, or on a course, with its marks."""
+    add = rows.add
+    if rows.program.takes_course:
+        given = "gait, walk_course, gait_timing, leg, time + length"
+        made = f"next_gait, marks = {add(gait_on_course)}({given})"
+        return [[rows.load("gait"), rows.load("walk_course"), made, *rows.keep("next_gait", "marks")]]
+    cells = {name: rows.cells[f"next_gait.{name}"] for name in GaitNow._fields}
+    measured = [cells[name] for name in GaitMeasured._fields]
+    rest = [name for name in GaitNow._fields if name not in GaitMeasured._fields]
+    return [
+        [f"place = {add(place_at)}(gait_timing, time + length)", *rows.keep("place")],
+        [
+            rows.load("gait"),
+            rows.load("place"),
+            f"measured = {add(measured_at)}(gait, gait_timing, leg, place)",
+            *[f"{cells[name]} = measured.{name}" for name in GaitMeasured._fields],
+        ],
+        [
+            f"next_gait = {add(gait_of)}(leg, {add(GaitMeasured)}({', '.join(measured)}))",
+            *[f"{cells[name]} = next_gait.{name}" for name in rest],
+        ],
+    ]
+
+
+def open_valve(rows: LaneRows) -> list[str]:
+    """The valve, and the flows with which the step begins."""
+    valve, add = rows.program.valve, rows.add
+    after = "next_valve" if rows.program.is_parted else "valve_state"
+    return [
+        f"shown, {after} = {add(valve.advance)}(valve, valve_state, command, time, length)",
+        *connect(rows, "line_state"),
+        *present_pressures(rows),
+        f"flowing = {add(pneumatics.sloped_flows)}"
+        f"(plant, pressure_1, pressure_2, port_1, port_2, {add(valve.port_flow_slopes)})",
+        *rows.keep("flowing", "shown"),
+        *(rows.keep("next_valve") if rows.program.is_parted else rows.store("valve_state")),
+    ]
+
+
+def connect(rows: LaneRows, line_state: str) -> list[str]:
+    """The ports of both chambers; where there are lines, at the pressures that they have in ``line_state``.
+
+    A valve that joins the chambers makes the leak between them as wide as it stands open.
+    """
+    source, valve = "plant", rows.program.valve
+    if rows.program.has_lines:
+        source = f"{rows.add(supply_lines.plant_at_line_pressures)}(plant, lines, {line_state})"
+    lines = [f"port_1, port_2 = {rows.add(valve.connect)}({source}, shown)"]
+    if valve.joint is not None:
+        opening = f"{rows.add(valve.joint.opening)}(shown)"
+        lines.append(f"plant = {rows.add(pneumatics.plant_with_joined_chambers)}(plant, {opening})")
+    return lines
+
+
+def lead(rows: LaneRows) -> list[str]:
+    """Where the vane would be at the end of the step, ``next_angle``, and what else its motion needs then."""
+    program, add = rows.program, rows.add
+    if program.walks:
+        return [
+            rows.load("begun"),
+            f"next_angle = {add(walking.next_angle)}(plant, leg, walk, begun)",
+            f"ahead = {add(pneumatics.held_chambers)}(plant, next_angle)",
+            *rows.keep("ahead"),
+        ]
+    if program.angle is None:
+        return [rows.load("begun"), "next_angle = begun.next_angle"]
+    if program.is_held:
+        return ["next_angle = state.angle", "begun = ()"]
+    return [
+        rows.load("path"),
+        f"next_angle, next_rate, _ = {add(program.angle.value)}(path, time + length)",
+        f"begun = {add(motion.PrescribedStep)}(next_angle, next_rate)",
+    ]
+
+
+def begin_gas(rows: LaneRows) -> str:
+    """The first stage of the gas."""
+    program, add = rows.program, rows.add
+    given = "flowing, length"
+    if program.has_lines:
+        begun = f"state, masses, next_angle, {given}" if program.is_thermal else f"state, next_angle, {given}"
+        if program.is_thermal:
+            return f"gas = {add(supply_lines.begin_fed_thermal_gas)}(plant, thermal, lines, line_state, {begun})"
+        return f"gas = {add(supply_lines.begin_fed_gas)}(plant, lines, line_state, {begun})"
+    if program.is_thermal:
+        return f"gas = {add(thermal_gas.begin_thermal_gas)}(plant, thermal, state, masses, next_angle, {given})"
+    if program.keeps_volumes:
+        return f"gas = {add(pneumatics.begin_still_gas)}(state, held, {given})"
+    if program.has_shape:
+        return f"gas = {add(actuators.begin_shaped_gas)}(plant, state, next_angle, {given})"
+    held = "held" if program.hands_chambers_on else f"{add(pneumatics.held_chambers)}(plant, state.angle)"
+    return f"gas = {add(pneumatics.begin_moving_gas)}(plant, state, {held}, next_angle, {given})"
+
+
+def pass_gas(rows: LaneRows) -> list[str]:
+    """The flows of the second stage, at the pressures to which the first one leads."""
+    program, add = rows.program, rows.add
+    gas = chambers_of(rows)
+    still = gas if program.keeps_volumes else f"{gas}.still"
+    ends = f"{add(thermal_gas.end_pressures)}(plant, {gas})" if program.is_thermal else f"{still}.end_1, {still}.end_2"
+    connected = connect(rows, "gas.lines.after")
+    return [
+        rows.load("gas"),
+        rows.load("shown"),
+        *states_ahead(rows, connected),
+        *connected,
+        f"pressure_1, pressure_2 = {ends}",
+        f"passing = {add(pneumatics.stage_flows)}"
+        f"(plant, pressure_1, pressure_2, port_1, port_2, {add(program.valve.port_flow)})",
+        *rows.keep("passing"),
+    ]
+
+
+def states_ahead(rows: LaneRows, lines: list[str]) -> list[str]:
+    """Lines that predict, for the end of the first stage, the states that laws called in some lines ask for.
+
+    Without them the flows of the second stage would have the states of the begin, and the order would fall to one.
+    """
+    words = {word for line in woven(lines, rows.needs) for word in re.findall(r"\w+", line)}
+    asked = [(name, kind) for name, kind in rows.program.stated.items() if f"{name}_state" in words]
+    if not asked:
+        return []
+    predicted = []
+    for name, kind in asked:
+        row = kind.row
+        fields = (f"{path} + length * {moved}" for path, moved in _with_slopes(name, kind))
+        predicted += [_slopes(rows, name, kind), f"{name}_state = {rows.add(row)}({', '.join(fields)})"]
+    return [*begun_moment(rows), *predicted]
+
+
+def feed(rows: LaneRows) -> list[str]:
+    """The second stage: the gas of the step, and in parts that may be refused the error of the gas."""
+    program, add = rows.program, rows.add
+    gas, is_still = chambers_of(rows), program.keeps_volumes
+    if program.is_thermal:
+        second = f"{add(thermal_gas.second_thermal_stage)}(thermal, {gas}, passing)"
+        change = f"{add(thermal_gas.thermal_change)}(plant, thermal, {gas}, second, length)"
+        error = f"{add(thermal_gas.thermal_error)}(plant, {gas}, second, length)"
+        shifted = f"{add(thermal_gas.thermal_opening_error)}(plant, {gas}, shift, length)"
+    else:
+        still = gas if is_still else f"{gas}.still"
+        next_angle = "state.angle" if program.is_held else "begun.next_angle"
+        stage = pneumatics.second_still_stage if is_still else pneumatics.second_moving_stage
+        second = f"{add(stage)}({gas}, passing)"
+        whole = pneumatics.still_change if is_still else pneumatics.moving_change
+        change = f"{add(whole)}(plant, {still}, second, length)"
+        error = f"{add(pneumatics.gas_error)}(plant, {still}, second, {next_angle}, length)"
+        shifted = f"{add(pneumatics.opening_error)}(plant, {still}, shift, {next_angle}, length)"
+    lines = [rows.load(name) for name in ("begun", "gas", "shown", "passing")]
+    lines += [f"second = {second}", f"change = {change}", *feed_lines(rows)]
+    if not program.is_adaptive:
+        return lines
+    if program.has_lines:
+        error = f"max({error}, {add(supply_lines.line_error)}(plant, lines, gas.lines.after, next_lines))"
+    moves = program.valve.shift
+    if moves is not None:
+        lines += [rows.load("next_valve"), f"shift = {add(moves)}(valve_state, next_valve)"]
+    return [*lines, f"gas_error = {error}" + (f" + {shifted}" if moves else "")]
+
+
+def feed_lines(rows: LaneRows) -> list[str]:
+    """Lines that bring regulators and lines to the end of the step, kept apart where it may be refused."""
+    program, add = rows.program, rows.add
+    if not program.has_lines:
+        return []
+    end = supply_lines.end_thermal_lines if program.is_thermal else supply_lines.end_lines
+    before, moved = ("plant, thermal", "second") if program.is_thermal else ("plant", "change")
+    given = f"{before}, lines, line_state, gas, {moved}, passing.in_2.from_source, length"
+    if program.is_parted:
+        return [f"next_lines = {add(end)}({given})", *rows.keep("next_lines")]
+    return [f"line_state = {add(end)}({given})", *rows.store("line_state")]
+
+
+def reach_end(rows: LaneRows, fed: list[str]) -> list[list[str] | RarePhase]:
+    """Phases that find where the step ends, from the lines that add its gas; few feet depart from where they slide."""
+    add = rows.add
+    loads = [rows.load(name) for name in ("begun", "change", "ahead")]
+    given = "plant, leg, share, gait_timing, fed, walk, begun, next_gait, ahead, length"
+    reached = f"ended, carried = {add(walking.reach_end)}({given})"
+    departs = f"ended, ahead = {add(walking.depart_in_walk)}(plant, fed, begun, ended, ahead, length)"
+    return [
+        [*loads, rows.load("next_gait"), *fed, reached, *rows.keep("ended", "carried")],
+        RarePhase(
+            [*loads, rows.load("ended"), *fed, departs, *rows.keep("ended", "ahead")],
+            rows.cells["ended.motion.departs"],
+        ),
+    ]
+
+
+def finish(rows: LaneRows) -> list[str]:
+    """The state at the end of a step or part, unless the part is refused; and the first time at which a run failed."""
+    program, add = rows.program, rows.add
+    lines = [*with_gas(rows), *end_motion(rows), *with_work(rows), *advance_states(rows)]
+    if not program.is_parted:
+        return [*lines, *store_all(rows, ""), *judge(rows), *sense_end(rows)]
+    lines += [rows.load("next_valve"), *([rows.load("next_lines")] if program.has_lines else [])]
+    if not program.is_adaptive:
+        flag = "" if program.parts_are_rare else "taken"
+        stored = [*store_all(rows, flag), *judge(rows, flag), *sense_end(rows)]
+        return [f"taken = {rows.remaining} > 0.0", *lines, *stored, *add_up(rows)]
+    return [
+        *lines,
+        f"error = max({', '.join(['error', 'gas_error', *state_errors(rows)])}) / timing.tolerance",
+        f"error = error if {positive(rows)} else {motion.MAXIMUM_ERROR!r}",
+        f"refused = {add(motion.is_refused)}(error, length) and not result.failure_time <= time",
+        f"next_length = {add(motion.next_pace)}(pace, error, length, refused, timing.step).length",
+        f"active = {rows.remaining} > 0.0",
+        f"{rows.cells['pace.length']} = next_length if active else pace.length",
+        "taken = active and not refused",
+        *store_all(rows, "taken"),
+        *judge(rows, "taken"),
+        *sense_end(rows),
+        *add_up(rows),
+    ]
+
+
+def with_gas(rows: LaneRows) -> list[str]:
+    """Lines that add the gas of the step: ``fed``, and ``warmed`` for the true masses."""
+    if rows.program.is_thermal:
+        return [f"fed, warmed = {rows.add(thermal_gas.with_thermal_gas)}(state, masses, change)"]
+    return [f"fed = {rows.add(motion.with_gas)}(state, change)"]
+
+
+def end_motion(rows: LaneRows) -> list[str]:
+    """Lines that lead to the state ``after`` the step, and in parts to the ``error`` of the motion."""
+    program, add = rows.program, rows.add
+    if program.walks:
+        follow = rows.cells["gait_sensors.follow_rate"]
+        given = f"plant, leg, share, gait_timing, {follow}, fed, walk, begun, ended, held, carried, next_gait, length"
+        lines = [
+            *[rows.load(name) for name in ("ended", "ahead", "carried", "next_gait")],
+            "held = ahead",
+            *rows.keep("held"),
+        ]
+        lines += [f"after, walk_after = {add(walking.end_walk)}({given})", *mark_stride(rows)]
+        if program.is_thermal:
+            assumed = f"{add(walking.next_angle)}(plant, leg, walk, begun)"
+            lines.append(f"after = {add(thermal_gas.after_motion)}(plant, thermal, after, {assumed}, after.angle)")
+        return lines
+    if program.angle is None:
+        lines = [f"angle, rate, error = {add(motion.end_part)}(plant, fed, begun, length)"]
+        if program.is_thermal:
+            lines.append(f"fed = {add(thermal_gas.after_motion)}(plant, thermal, fed, begun.next_angle, angle)")
+        return [*lines, f"after = {add(motion.with_motion)}(fed, angle, rate)"]
+    if program.is_held:
+        return ["after = fed", "error = 0.0"]
+    return [f"after = {add(motion.with_motion)}(fed, begun.next_angle, begun.next_rate)", "error = 0.0"]
+
+
+def mark_stride(rows: LaneRows) -> list[str]:
+    """Lines that add what marks a stride of a course: a scuff on the toe sensor, a forefoot on the edge of a stair."""
+    if not rows.program.takes_course:
+        return []
+    add, follow = rows.add, rows.cells["gait_sensors.follow_rate"]
+    marked = {
+        "toe_force": f"{add(shown_toe_force)}(walk_after.toe_force, marks, {follow}, length)",
+        "toes_first": f"{add(stands_on_toes)}(walk_after.toes_first, marks)",
+    }
+    fields = ", ".join(marked.get(name, f"walk_after.{name}") for name in walking.WalkState._fields)
+    return [rows.load("marks"), f"walk_after = {add(walking.WalkState)}({fields})"]
+
+
+def with_work(rows: LaneRows) -> list[str]:
+    """Lines that count the work of gas with an energy balance; a held vane takes none."""
+    if not rows.program.is_thermal or rows.program.is_held:
+        return []
+    return [f"warmed = {rows.add(thermal_gas.with_work)}(plant, warmed, state, after)"]
+
+
+def advance_states(rows: LaneRows) -> list[str]:
+    """Lines that bring the states of effects to the end of a step or part: ``NAME_state_after``."""
+    stated = rows.program.stated
+    if not stated:
+        return []
+    mean = f"/ max(length, {pneumatics.SHORTEST!r})"
+    lines = [
+        f"supplied = (after.supplied_mass - state.supplied_mass) {mean}",
+        f"vented = (after.vented_mass - state.vented_mass) {mean}",
+        *moment(rows, "before_step", "state"),
+        *moment(rows, "after_step", "after"),
+        *(begun_moment(rows) if rows.program.is_adaptive and any(kind.tolerances for kind in stated.values()) else []),
+    ]
+    for name, kind in stated.items():
+        lines.append(
+            f"{name}_state_after = {rows.add(kind.advance)}({name}, {name}_state, before_step, after_step, length)"
+        )
+        lines += [_slopes(rows, name, kind)] if kind.tolerances and rows.program.is_adaptive else []
+    return lines
+
+
+def state_errors(rows: LaneRows) -> list[str]:
+    """Expressions of the errors of the states of effects in a part over what is allowed [-]."""
+    found = []
+    for name, kind in rows.program.stated.items():
+        for (path, moved), allowed in zip(
+            _with_slopes(name, kind) if kind.tolerances else (), kind.tolerances, strict=True
+        ):
+            after = path.replace(f"{name}_state", f"{name}_state_after", 1)
+            found.append(f"abs({after} - ({path} + length * {moved})) / {allowed!r}")
+    return found
+
+
+def positive(rows: LaneRows) -> str:
+    """Condition that no mass is lost; false for what is no number."""
+    names = ["after.mass_1", "after.mass_2"]
+    names += ["warmed.mass_1", "warmed.mass_2"] if rows.program.is_thermal else []
+    names += ["next_lines.mass_1", "next_lines.mass_2"] if rows.program.has_lines else []
+    return " and ".join(f"{name} > 0.0" for name in names)
+
+
+def store_all(rows: LaneRows, flag: str) -> list[str]:
+    """Lines that write the new state, where ``flag`` names a condition only under it."""
+    lines = rows.store("state", "after", flag)
+    if rows.program.is_thermal:
+        lines += rows.store("masses", "warmed", flag)
     if rows.program.walks:
-        carried = f"carried = {rows.add(carried_foot)}(leg, share, walk.now, walk.foot)"
-        lines += [*[rows.load(name) for name in ("leg", "share", "walk")], carried, *rows.keep("carried")]
-    return rows.over_lanes(lines)
+        lines += rows.store("walk", "walk_after", flag)
+    for state in rows.program.effect_states:
+        lines += rows.store(state, f"{state}_after", flag)
+    if rows.program.is_parted:
+        lines += rows.store("valve_state", "next_valve", flag)
+        lines += rows.store("line_state", "next_lines", flag) if rows.program.has_lines else []
+    return lines
+
+
+def judge(rows: LaneRows, flag: str = "") -> list[str]:
+    """The first time at which a run left what is possible."""
+    counted = ["after.mass_1", "after.mass_2"]
+    counted += ["warmed.mass_1", "warmed.mass_2"] if rows.program.is_thermal else []
+    gas = ", ".join(counted)
+    waits = f"not {flag} or " if flag else ""
+    return [
+        f"possible = {waits}(abs(after.angular_velocity) < {IMPOSSIBLE_RATE} and min({gas}) > 0.0 "
+        f"and max({gas}) < {IMPOSSIBLE_MASS}{states_are_possible(rows)})",
+        "failed = result.failure_time if possible else min(result.failure_time, time + length)",
+        f"{rows.cells['result.failure_time']} = failed",
+    ]
+
+
+def states_are_possible(rows: LaneRows) -> str:
+    """Further conditions of a run that did not fail."""
+    paths = (path for name, row in rows.program.effect_states.items() for path in leaf_paths(row, f"{name}_after"))
+    return "".join(f" and abs({path}) < {LARGEST!r}" for path in paths)
+
+
+def begun_moment(rows: LaneRows) -> list[str]:
+    """Lines that make the moment ``now`` at the begin of a step, with the flows of its first stage."""
+    gas = chambers_of(rows)
+    first = f"{gas}.first" if rows.program.is_thermal or rows.program.keeps_volumes else f"{gas}.still.first"
+    return [
+        rows.load("gas"),
+        f"supplied = {first}.supplied",
+        f"vented = {first}.supplied - {first}.mass_1 - {first}.mass_2",
+        *moment(rows, "now", "state"),
+    ]
+
+
+def moment(rows: LaneRows, name: str, state: str) -> list[str]:
+    """Lines that make a moment of the plant in some state, with the flows ``supplied`` and ``vented``."""
+    given = f"{state}.angle, {state}.angular_velocity, pressure_1, pressure_2, supplied, vented, command"
+    return [
+        f"pressure_1, pressure_2 = {pressures_of(rows, state)}",
+        f"{name} = {rows.add(Moment)}({given})",
+    ]
+
+
+def _slopes(rows: LaneRows, name: str, kind: State) -> str:
+    return f"{name}_state_slopes = {rows.add(kind.slopes)}({name}, {name}_state, now)"
+
+
+def _with_slopes(name: str, kind: State) -> list[tuple[str, str]]:
+    """Each number of a state, and its rate."""
+    paths = leaf_paths(kind.row, f"{name}_state")
+    return [(path, path.replace(f"{name}_state", f"{name}_state_slopes", 1)) for path in paths]
+
+
+def chambers_of(rows: LaneRows) -> str:
+    """What the first stage of the chambers is called."""
+    return "gas.chambers" if rows.program.has_lines else "gas"
 
 
 def step_in_parts(rows: LaneRows) -> list[str]:
@@ -93,6 +510,44 @@ def step_in_parts(rows: LaneRows) -> list[str]:
         "else:",
         *indent(rows.over_lanes(give_up(rows))),
     ]
+
+
+def part_opening(rows: LaneRows) -> list[str]:
+    """Lines that load what a part needs, and the command that the valve has in it."""
+    lines = [*opening(rows), rows.load("pace"), f"before = {rows.before}", "time += before"]
+    if rows.program.late_commands:
+        lines += [
+            f"until_command = timing.command_lag * timing.step - before - {motion.SAME_INSTANT!r}",
+            "early = command_history[place_before, lane]",
+            "command = early if until_command > 0.0 else command_history[place_after, lane]",
+        ]
+    if rows.program.late_signals:
+        lines.append("look_at = (1.0 - timing.signal_lag) * timing.step")
+    return lines
+
+
+def measure(rows: LaneRows) -> list[str]:
+    """Lines that find the length of a part; where the vane is free, until it meets a stop."""
+    program, add = rows.program, rows.add
+    lines = ["remaining = max(goal * timing.step - before, 0.0)", "until = remaining"]
+    if program.late_commands:
+        arrival = f"until_command + {motion.SAME_INSTANT!r}"
+        lines.append(f"until = min(until, {arrival}) if until_command > 0.0 else until")
+    if program.late_signals:
+        soon = f"look_at - before > {motion.SAME_INSTANT!r}"
+        lines.append(f"until = min(until, look_at - before) if {soon} else until")
+    if program.valve.jumps:
+        functions = f"{add(program.valve.next_event)}, {add(program.valve.settle)}"
+        lines.append(f"until = {add(motion.until_jump)}(valve, valve_state, command, time, until, {functions})")
+    if program.is_adaptive:
+        hurries = "remaining == 0.0 or result.failure_time <= time"
+        lines.append(f"until = remaining if {hurries} else {add(motion.part_length)}(pace, until)")
+        if program.angle is None:
+            lines.append(f"begun, until = {add(motion.begin_part)}(plant, state, until)")
+            lines += rows.keep("begun")
+    else:
+        lines.append("until = remaining if result.failure_time <= time else until")
+    return [*lines, f"{rows.length} = until", f"{rows.remaining} = remaining"]
 
 
 def put_aside(rows: LaneRows) -> list[str]:
@@ -123,9 +578,13 @@ def handed_aside(rows: LaneRows) -> dict[str, str]:
     return {path: f"x[{first + place}, lane]" for place, path in enumerate(paths)}
 
 
-def over_rows(count: int, line: str) -> list[str]:
-    """A line for all lanes of the first rows."""
-    return [f"for row in range({count}):", "    for lane in range(width):", f"        {line}"]
+def add_up(rows: LaneRows) -> list[str]:
+    """Lines that count the time of a part that is taken; the end of the last one is the goal to the last bit."""
+    return [
+        f"arrives = length >= {rows.remaining} and taken or {rows.remaining} == 0.0",
+        f"{rows.before} = goal * timing.step if arrives else before + (length if taken else 0.0)",
+        f"{rows.remaining} = 0.0 if arrives else {rows.remaining}",
+    ]
 
 
 def give_up(rows: LaneRows) -> list[str]:
@@ -141,189 +600,6 @@ def give_up(rows: LaneRows) -> list[str]:
     ]
 
 
-def part_opening(rows: LaneRows) -> list[str]:
-    """Lines that load what a part needs, and the command that the valve has in it."""
-    lines = [*opening(rows), rows.load("pace"), f"before = {rows.before}", "time += before"]
-    if rows.program.late_commands:
-        lines += [
-            f"until_command = timing.command_lag * timing.step - before - {parts.SAME_INSTANT!r}",
-            "early = command_history[place_before, lane]",
-            "command = early if until_command > 0.0 else command_history[place_after, lane]",
-        ]
-    if rows.program.late_signals:
-        lines.append("look_at = (1.0 - timing.signal_lag) * timing.step")
-    return lines
-
-
-def measure(rows: LaneRows) -> list[str]:
-    """Lines that find the length of a part; where the vane is free, until it meets a stop."""
-    program, add = rows.program, rows.add
-    lines = ["remaining = max(goal * timing.step - before, 0.0)", "until = remaining"]
-    if program.late_commands:
-        arrival = f"until_command + {parts.SAME_INSTANT!r}"
-        lines.append(f"until = min(until, {arrival}) if until_command > 0.0 else until")
-    if program.late_signals:
-        soon = f"look_at - before > {parts.SAME_INSTANT!r}"
-        lines.append(f"until = min(until, look_at - before) if {soon} else until")
-    if program.valve.jumps:
-        functions = f"{add(program.valve.next_event)}, {add(program.valve.settle)}"
-        lines.append(f"until = {add(parts.until_jump)}(valve, valve_state, command, time, until, {functions})")
-    if program.is_adaptive:
-        hurries = "remaining == 0.0 or result.failure_time <= time"
-        lines.append(f"until = remaining if {hurries} else {add(parts.part_length)}(pace, until)")
-        if program.angle is None:
-            lines.append(f"begun, until = {add(motion.begin_part)}(plant, state, until)")
-            lines += rows.keep("begun")
-    else:
-        lines.append("until = remaining if result.failure_time <= time else until")
-    return [*lines, f"{rows.length} = until", f"{rows.remaining} = remaining"]
-
-
-def phases(rows: LaneRows) -> list[list[str] | RarePhase]:
-    """Both stages of the gas over ``length`` [s] from ``time`` [s], what leads to them, and the state at the end."""
-    program = rows.program
-    is_free = program.angle is None
-    kept = rows.keep("gas") if is_free else rows.keep("begun", "gas")
-    first = [rows.load("flowing"), *lead(rows), begin_gas(rows), *kept]
-    before = [*lead_walk(rows), open_valve(rows), first, pass_gas(rows)]
-    if not is_free:
-        return [*before, [*feed(rows), *finish(rows)]]
-    error = [f"{rows.error} = gas_error"] if program.is_adaptive else []
-    loaded = [rows.load("begun"), rows.load("change")]
-    loaded += [f"gas_error = {rows.error}"] if program.is_adaptive else []
-    reached = reach_end(rows, with_gas(rows)) if program.walks else []
-    return [*before, [*feed(rows), *rows.keep("change"), *error], *reached, [*loaded, *finish(rows)]]
-
-
-def lead(rows: LaneRows) -> list[str]:
-    """Where the vane would be at the end of the step, ``next_angle``, and what else its motion needs then."""
-    program, add = rows.program, rows.add
-    if program.walks:
-        return [
-            rows.load("begun"),
-            f"next_angle = {add(walking.next_angle)}(plant, leg, walk, begun)",
-            f"ahead = {add(held_chambers)}(plant, next_angle)",
-            *rows.keep("ahead"),
-        ]
-    if program.angle is None:
-        return [rows.load("begun"), "next_angle = begun.next_angle"]
-    if program.is_held:
-        return ["next_angle = state.angle", "begun = ()"]
-    return [
-        rows.load("path"),
-        f"next_angle, next_rate, _ = {add(program.angle.value)}(path, time + length)",
-        f"begun = {add(motion.PrescribedStep)}(next_angle, next_rate)",
-    ]
-
-
-def finish(rows: LaneRows) -> list[str]:
-    """The state at the end of a step or part, unless the part is refused; and the first time at which a run failed."""
-    program, add = rows.program, rows.add
-    lines = [*with_gas(rows), *end_motion(rows), *with_work(rows), *lane_effects.advance_states(rows)]
-    if not program.is_parted:
-        return [*lines, *store_all(rows, ""), *judge(rows), *sense_end(rows)]
-    lines += [rows.load("next_valve"), *([rows.load("next_lines")] if program.has_lines else [])]
-    if not program.is_adaptive:
-        flag = "" if program.parts_are_rare else "taken"
-        stored = [*store_all(rows, flag), *judge(rows, flag), *sense_end(rows)]
-        return [f"taken = {rows.remaining} > 0.0", *lines, *stored, *add_up(rows)]
-    return [
-        *lines,
-        f"error = max({', '.join(['error', 'gas_error', *lane_effects.state_errors(rows)])}) / timing.tolerance",
-        f"error = error if {positive(rows)} else {parts.MAXIMUM_ERROR!r}",
-        f"refused = {add(parts.is_refused)}(error, length) and not result.failure_time <= time",
-        f"next_length = {add(parts.next_pace)}(pace, error, length, refused, timing.step).length",
-        f"active = {rows.remaining} > 0.0",
-        f"{rows.cells['pace.length']} = next_length if active else pace.length",
-        "taken = active and not refused",
-        *store_all(rows, "taken"),
-        *judge(rows, "taken"),
-        *sense_end(rows),
-        *add_up(rows),
-    ]
-
-
-def with_gas(rows: LaneRows) -> list[str]:
-    """Lines that add the gas of the step: ``fed``, and ``warmed`` for the true masses."""
-    if rows.program.is_thermal:
-        return [f"fed, warmed = {rows.add(thermal_gas.with_thermal_gas)}(state, masses, change)"]
-    return [f"fed = {rows.add(motion.with_gas)}(state, change)"]
-
-
-def with_work(rows: LaneRows) -> list[str]:
-    """Lines that count the work of gas with an energy balance; a held vane takes none."""
-    if not rows.program.is_thermal or rows.program.is_held:
-        return []
-    return [f"warmed = {rows.add(thermal_gas.with_work)}(plant, warmed, state, after)"]
-
-
-def end_motion(rows: LaneRows) -> list[str]:
-    """Lines that lead to the state ``after`` the step, and in parts to the ``error`` of the motion."""
-    program, add = rows.program, rows.add
-    if program.walks:
-        follow = rows.cells["gait_sensors.follow_rate"]
-        given = f"plant, leg, share, gait_timing, {follow}, fed, walk, begun, ended, held, carried, next_gait, length"
-        lines = [
-            *[rows.load(name) for name in ("ended", "ahead", "carried", "next_gait")],
-            "held = ahead",
-            *rows.keep("held"),
-        ]
-        lines += [f"after, walk_after = {add(walking.end_walk)}({given})", *mark_stride(rows)]
-        if program.is_thermal:
-            assumed = f"{add(walking.next_angle)}(plant, leg, walk, begun)"
-            lines.append(f"after = {add(thermal_gas.after_motion)}(plant, thermal, after, {assumed}, after.angle)")
-        return lines
-    if program.angle is None:
-        lines = [f"angle, rate, error = {add(motion.end_part)}(plant, fed, begun, length)"]
-        if program.is_thermal:
-            lines.append(f"fed = {add(thermal_gas.after_motion)}(plant, thermal, fed, begun.next_angle, angle)")
-        return [*lines, f"after = {add(motion.with_motion)}(fed, angle, rate)"]
-    if program.is_held:
-        return ["after = fed", "error = 0.0"]
-    return [f"after = {add(motion.with_motion)}(fed, begun.next_angle, begun.next_rate)", "error = 0.0"]
-
-
-def store_all(rows: LaneRows, flag: str) -> list[str]:
-    """Lines that write the new state, where ``flag`` names a condition only under it."""
-    lines = rows.store("state", "after", flag)
-    if rows.program.is_thermal:
-        lines += rows.store("masses", "warmed", flag)
-    if rows.program.walks:
-        lines += rows.store("walk", "walk_after", flag)
-    for state in rows.program.effect_states:
-        lines += rows.store(state, f"{state}_after", flag)
-    if rows.program.is_parted:
-        lines += rows.store("valve_state", "next_valve", flag)
-        lines += rows.store("line_state", "next_lines", flag) if rows.program.has_lines else []
-    return lines
-
-
-def positive(rows: LaneRows) -> str:
-    """Condition that no mass is lost; false for what is no number."""
-    names = ["after.mass_1", "after.mass_2"]
-    names += ["warmed.mass_1", "warmed.mass_2"] if rows.program.is_thermal else []
-    names += ["next_lines.mass_1", "next_lines.mass_2"] if rows.program.has_lines else []
-    return " and ".join(f"{name} > 0.0" for name in names)
-
-
-def add_up(rows: LaneRows) -> list[str]:
-    """Lines that count the time of a part that is taken; the end of the last one is the goal to the last bit."""
-    return [
-        f"arrives = length >= {rows.remaining} and taken or {rows.remaining} == 0.0",
-        f"{rows.before} = goal * timing.step if arrives else before + (length if taken else 0.0)",
-        f"{rows.remaining} = 0.0 if arrives else {rows.remaining}",
-    ]
-
-
-def judge(rows: LaneRows, flag: str = "") -> list[str]:
-    """The first time at which a run left what is possible."""
-    counted = ["after.mass_1", "after.mass_2"]
-    counted += ["warmed.mass_1", "warmed.mass_2"] if rows.program.is_thermal else []
-    gas = ", ".join(counted)
-    waits = f"not {flag} or " if flag else ""
-    return [
-        f"possible = {waits}(abs(after.angular_velocity) < {IMPOSSIBLE_RATE} and min({gas}) > 0.0 "
-        f"and max({gas}) < {IMPOSSIBLE_MASS}{lane_effects.states_are_possible(rows)})",
-        "failed = result.failure_time if possible else min(result.failure_time, time + length)",
-        f"{rows.cells['result.failure_time']} = failed",
-    ]
+def over_rows(count: int, line: str) -> list[str]:
+    """A line for all lanes of the first rows."""
+    return [f"for row in range({count}):", "    for lane in range(width):", f"        {line}"]

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from ppafo.engine.program import Program
-from ppafo.engine.scheme.shaped_gas import links_of
+from ppafo.engine.scheme.actuators import links_of
 from ppafo.engine.source_text import Collector, SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.model.effects.kind import Effect, effect_problem, laws_in_order

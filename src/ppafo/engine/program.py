@@ -7,15 +7,11 @@ from typing import Any, NamedTuple, get_type_hints
 from ppafo.control.controllers import switching as constant_controller
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.control.profiles import CONSTANT
-from ppafo.engine.scheme.ankle_torque import CarriedFoot, DeviceShare
-from ppafo.engine.scheme.motion import FreePart, PrescribedStep
-from ppafo.engine.scheme.parts import Pace
-from ppafo.engine.scheme.pneumatics import GasChange, HeldChambers, MovingGas, StillGas
-from ppafo.engine.scheme.stage_flows import SlopedFlows, StageFlows
+from ppafo.engine.scheme.motion import FreePart, Pace, PrescribedStep
+from ppafo.engine.scheme.pneumatics import GasChange, HeldChambers, MovingGas, SlopedFlows, StageFlows, StillGas
 from ppafo.engine.scheme.supply_lines import FedGas, FedThermalGas
-from ppafo.engine.scheme.thermal_flows import ThermalFlows
-from ppafo.engine.scheme.thermal_gas import ThermalGas
-from ppafo.engine.scheme.walking import WalkEnd, WalkState, WalkStep
+from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalGas
+from ppafo.engine.scheme.walking import CarriedFoot, DeviceShare, WalkEnd, WalkState, WalkStep
 from ppafo.model.actuators.kind import ActuatorModel
 from ppafo.model.actuators.vane import MODEL as VANE
 from ppafo.model.course import Course as WalkCourse

@@ -7,15 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.actuator_values import pressures_of
 from ppafo.engine.lane_step import MAXIMUM_PARTS
 from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_batch
 from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program
 from ppafo.engine.reference.derivative import ExactOrifice
 from ppafo.engine.rows import leaves, rebuilt, table
-from ppafo.engine.scheme.ankle_torque import DeviceShare
-from ppafo.engine.scheme.parts import Pace
-from ppafo.engine.scheme.walking import WalkState
+from ppafo.engine.scheme.actuators import pressures_of
+from ppafo.engine.scheme.motion import Pace
+from ppafo.engine.scheme.walking import DeviceShare, WalkState
 from ppafo.model.columns import larger, over_runs, truncated
 from ppafo.model.course import Course
 from ppafo.model.effects.kind import Moment, State

@@ -8,12 +8,12 @@ from typing import Any, final
 import numpy as np
 
 from ppafo.control.kind import PythonController
-from ppafo.engine.actuator_values import seen_with_torque
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, load_program, samples_in
 from ppafo.engine.links import python_place
 from ppafo.engine.metering import group_of
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import Run
+from ppafo.engine.scheme.actuators import measurement_of
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.command import VENT, VENTS_ABOVE
 from ppafo.model.gait_sensors import NOTHING_SEEN, GaitMeasurement, measure_gait
@@ -145,7 +145,7 @@ def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measu
                 torque=actuator.torque(plant, angle, pressure_1, pressure_2),
             )
         seen = measure(sensors, angle, pressure_1, pressure_2, plant.torque_constant, sample)
-        return seen_with_torque(actuator, plant, seen) if program.has_shape else seen
+        return measurement_of(actuator, plant, seen) if program.has_shape else seen
 
     return see
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from ppafo.engine.lane_meters import TRACED
+from ppafo.engine.lane_samples import TRACED
 from ppafo.errors import StudyError, UnitError, first_twice, nearest_name
 from ppafo.loading import reloaded, scenario_or_load
 from ppafo.metrics import METRICS

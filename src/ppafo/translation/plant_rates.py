@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from ppafo.engine.reference.derivative import free_motion
-from ppafo.engine.scheme.thermal_flows import ThermalFlows, thermal_flows
+from ppafo.engine.scheme.thermal_gas import ThermalFlows, thermal_flows
 from ppafo.errors import SimulationError
 from ppafo.model.orifice import orifice_flow
 from ppafo.model.plant import (

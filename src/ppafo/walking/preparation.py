@@ -7,9 +7,8 @@ in C. What a gait comes to (series, events, the fit of the heel) is data.
 import math
 from collections.abc import Mapping
 
-from ppafo.engine.refinement import filling_time
-from ppafo.engine.scheme.ankle_torque import DeviceShare, foot_direction
-from ppafo.engine.scheme.walking import NO_CLEARANCE, WalkState
+from ppafo.engine.scheme.pneumatics import filling_time
+from ppafo.engine.scheme.walking import NO_CLEARANCE, DeviceShare, WalkState, foot_direction
 from ppafo.model.columns import larger, rounded_up, truncated
 from ppafo.model.contact import FLAT, HEEL
 from ppafo.model.elementary import exponential

@@ -13,12 +13,14 @@ from ppafo.engine.scheme.motion import with_gas
 from ppafo.engine.scheme.pneumatics import (
     GasChange,
     MovingGas,
+    SlopedFlows,
     begin_moving_gas,
     held_chambers,
     moving_change,
     second_moving_stage,
+    sloped_flows,
+    stage_flows,
 )
-from ppafo.engine.scheme.stage_flows import SlopedFlows, sloped_flows, stage_flows
 from ppafo.engine.scheme.supply_lines import begin_fed_gas, end_lines, plant_at_line_pressures
 from ppafo.model.orifice import orifice_flow
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.engine.lane_meters import walk_traces
+from ppafo.engine.lane_samples import walk_traces
 from ppafo.engine.lanes import Batch, run_batch
 from ppafo.engine.loading import BACKEND_VARIABLE, NUMBA
 from ppafo.engine.rows import row_numbers

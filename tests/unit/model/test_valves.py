@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from ppafo.engine.scheme.parts import until_jump
+from ppafo.engine.scheme.motion import until_jump
 from ppafo.model.valves import proportional, solenoid, solenoid_recycling
 
 SPOOL = {"dead_band": 0.0, "delay": 0.0, "spool_frequency": 50.0, "spool_damping_ratio": 0.5, "slew_limit": 0.0}

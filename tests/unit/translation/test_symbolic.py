@@ -10,9 +10,8 @@ import pytest
 
 import ppafo
 from ppafo.engine.rows import leaf_paths, leaves, numbers, rebuild, rebuilt
-from ppafo.engine.scheme.pneumatics import GAMMA, linearise
-from ppafo.engine.scheme.stage_flows import SlopedFlows, sloped_flows
-from ppafo.engine.scheme.thermal_flows import transport
+from ppafo.engine.scheme.pneumatics import GAMMA, SlopedFlows, linearise, sloped_flows
+from ppafo.engine.scheme.thermal_gas import transport
 from ppafo.errors import ProgramError
 from ppafo.model import sensors
 from ppafo.model.orifice import FlowCurve, fitted_flow_function, isentropic_flow_function, orifice_flow

@@ -10,7 +10,7 @@ import pytest
 
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import Run, batch_of
-from ppafo.engine.scheme.ankle_torque import DeviceShare, foot_direction, leg_torque
+from ppafo.engine.scheme.walking import DeviceShare, foot_direction, leg_torque
 from ppafo.gait import Gait, load_gait
 from ppafo.gait.gait import Curve
 from ppafo.model import contact as ground

@@ -10,7 +10,7 @@ import pytest
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.rows import leaves
 from ppafo.engine.run import batch_of
-from ppafo.engine.scheme.ankle_torque import foot_direction
+from ppafo.engine.scheme.walking import foot_direction
 from ppafo.gait import Gait, load_gait
 from ppafo.gait.gait import Curve
 from ppafo.model.contact import SWING

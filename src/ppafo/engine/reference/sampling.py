@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.actuator_values import seen_with_torque
 from ppafo.engine.run import Run
+from ppafo.engine.scheme.actuators import measurement_of
 from ppafo.errors import SimulationError
 from ppafo.model.sensors import Measurement, measure
 
@@ -73,7 +73,7 @@ class SampledControl:
                 torque=run.program.actuator.torque(run.plant, angle, pressure_1, pressure_2),
             )
         seen = measure(run.sensors, *signals, run.plant.torque_constant, sample)
-        return seen_with_torque(run.program.actuator, run.plant, seen) if run.program.has_shape else seen
+        return measurement_of(run.program.actuator, run.plant, seen) if run.program.has_shape else seen
 
 
 Floats = NDArray[np.float64]

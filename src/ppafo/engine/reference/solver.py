@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.actuator_values import driving_torque_of
 from ppafo.engine.entries import with_arrays
 from ppafo.engine.lanes import samples_in
 from ppafo.engine.links import python_place
@@ -22,6 +21,7 @@ from ppafo.engine.reference.source import (
 )
 from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.engine.run import Run, states_at_start
+from ppafo.engine.scheme.actuators import driving_torque_of
 from ppafo.errors import SimulationError
 from ppafo.model.places import friction_at_rest, shown_signals
 

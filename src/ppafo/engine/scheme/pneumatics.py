@@ -2,16 +2,111 @@
 
 The method is ROS2 of Verwer, Spee, Blom and Hundsdorfer (SIAM J. Sci. Comput. 20, 1999), gamma = 1 - 1/sqrt(2), with
 the exact Jacobian and the time derivative that comes from the moving volumes, which run linearly through the step.
-Gas totals are integrated by the same method as further unknowns, so that mass is conserved to rounding. A step is two
-functions, one for each stage, because the lanes take each stage in a loop of its own, and its flows in one before it.
-The first stage alone is a step of first order, and what the second adds to it is the estimate of the error.
+Gas totals are integrated by the same method as further unknowns, so that mass is conserved to rounding.
+
+A step goes: the flows at its begin with their slopes (``sloped_flows``), the first stage (``begin_still_gas``,
+``begin_moving_gas``, ``begin_shaped_gas``), the flows at the pressures to which that leads (``stage_flows``), the
+second stage and what both change. The lanes find the flows in loops of their own: a flow waits long for its division
+and its root, and in a short loop the processor works on several lanes meanwhile. The first stage alone is a step of
+first order, and what the second adds to it is the estimate of the error.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
-from ppafo.engine.scheme.stage_flows import SlopedFlows, StageFlows
+from ppafo.model.columns import smaller
+from ppafo.model.orifice import FlowCurve, orifice_flow, orifice_flow_slopes
 from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes, pressures_per_mass
-from ppafo.model.ports import admitted_flow
+from ppafo.model.ports import PortFlow, PortFlowSlopes, admitted_flow
+
+
+class LeakSlopes(NamedTuple):
+    """Flow across the vane from chamber 1 to 2 [kg/s], its derivatives with respect to both pressures [kg/(s Pa)]."""
+
+    flow: float
+    by_1: float
+    by_2: float
+
+
+class SlopedFlows(NamedTuple):
+    """Flows into both chambers and across the vane, with derivatives."""
+
+    in_1: PortFlowSlopes
+    in_2: PortFlowSlopes
+    leak: LeakSlopes
+
+
+class StageFlows(NamedTuple):
+    """Flows into both chambers and across the vane from chamber 1 to 2 [kg/s]."""
+
+    in_1: PortFlow
+    in_2: PortFlow
+    leak: float
+
+
+def sloped_flows(
+    plant: PlantParameters,
+    pressure_1: float,
+    pressure_2: float,
+    port_1: Any,
+    port_2: Any,
+    port_flow_slopes: Callable[..., PortFlowSlopes],
+) -> SlopedFlows:
+    """All flows at two chamber pressures [Pa absolute], with derivatives."""
+    flow, by_1, by_2 = orifice_flow_slopes(pressure_1, pressure_2, plant.leak_conductance, plant.leak_curve)
+    return SlopedFlows(
+        in_1=port_flow_slopes(pressure_1, port_1, plant.valve_curve),
+        in_2=port_flow_slopes(pressure_2, port_2, plant.valve_curve),
+        leak=LeakSlopes(flow, by_1, by_2),
+    )
+
+
+def stage_flows(
+    plant: PlantParameters,
+    pressure_1: float,
+    pressure_2: float,
+    port_1: Any,
+    port_2: Any,
+    port_flow: Callable[..., PortFlow],
+) -> StageFlows:
+    """All flows at two chamber pressures [Pa absolute]."""
+    return StageFlows(
+        in_1=port_flow(pressure_1, port_1, plant.valve_curve),
+        in_2=port_flow(pressure_2, port_2, plant.valve_curve),
+        leak=orifice_flow(pressure_1, pressure_2, plant.leak_conductance, plant.leak_curve),
+    )
+
+
+def plant_with_joined_chambers(plant: PlantParameters, opening: float) -> PlantParameters:
+    """The plant whose vane leak has a valve beside it that joins both chambers, open by ``opening`` [-], 0 to 1.
+
+    Both openings follow the mean of their flow curves by conductance: exact where these have the same ratios.
+    """
+    joining = opening * plant.valve_conductance
+    conductance = plant.leak_conductance + joining
+    share = joining / max(conductance, 1.0e-30)
+    curve = mean_curve(plant.leak_curve, plant.valve_curve, share)
+    return plant._replace(leak_conductance=conductance, leak_curve=curve)
+
+
+def mean_curve(first: FlowCurve, second: FlowCurve, share: float) -> FlowCurve:
+    """The flow curve of two orifices side by side, of whose conductance the second has ``share`` [-]."""
+    a, b = first.coefficients, second.coefficients
+    return FlowCurve(
+        critical_ratio=first.critical_ratio + share * (second.critical_ratio - first.critical_ratio),
+        linear_ratio=first.linear_ratio + share * (second.linear_ratio - first.linear_ratio),
+        linear_slope=first.linear_slope + share * (second.linear_slope - first.linear_slope),
+        coefficients=(
+            a[0] + share * (b[0] - a[0]),
+            a[1] + share * (b[1] - a[1]),
+            a[2] + share * (b[2] - a[2]),
+            a[3] + share * (b[3] - a[3]),
+            a[4] + share * (b[4] - a[4]),
+            a[5] + share * (b[5] - a[5]),
+            a[6] + share * (b[6] - a[6]),
+        ),
+    )
+
 
 GAMMA = 0.2928932188134524
 SHORTEST = 1.0e-30
@@ -98,15 +193,28 @@ def response(linear: Linearisation, rate_1: float, rate_2: float) -> Flows:
     )
 
 
-def solve_stage(linear: Linearisation, flow_1: float, flow_2: float, supplied: float, leaked: float) -> Flows:
-    """Stage slopes [kg/s] from the right-hand sides of both chambers and both totals [kg/s]."""
-    rate_1 = (linear.d * flow_1 - linear.b * flow_2) * linear.scale
-    rate_2 = (linear.a * flow_2 - linear.c * flow_1) * linear.scale
+def added_flows(one: Flows, other: Flows) -> Flows:
+    """Rates [kg/s] of two sets of flows together."""
+    return Flows(
+        mass_1=one.mass_1 + other.mass_1,
+        mass_2=one.mass_2 + other.mass_2,
+        supplied=one.supplied + other.supplied,
+        leaked=one.leaked + other.leaked,
+    )
+
+
+def solve_stage(linear: Linearisation, right: Flows) -> Flows:
+    """Stage slopes k [kg/s] from the right-hand sides of both masses and both totals [kg/s].
+
+    ``(1 - gamma h J) k = right`` by Cramer's rule; the totals follow, because nothing depends on them.
+    """
+    rate_1 = (linear.d * right.mass_1 - linear.b * right.mass_2) * linear.scale
+    rate_2 = (linear.a * right.mass_2 - linear.c * right.mass_1) * linear.scale
     return Flows(
         mass_1=rate_1,
         mass_2=rate_2,
-        supplied=supplied + linear.supplied_by_1 * rate_1 + linear.supplied_by_2 * rate_2,
-        leaked=leaked + linear.b * rate_2 - linear.c * rate_1,
+        supplied=right.supplied + linear.supplied_by_1 * rate_1 + linear.supplied_by_2 * rate_2,
+        leaked=right.leaked + linear.b * rate_2 - linear.c * rate_1,
     )
 
 
@@ -141,7 +249,7 @@ def linearise(per_mass_1: float, per_mass_2: float, flowing: SlopedFlows, step: 
 def begin_still_gas(state: PlantState, held: HeldChambers, flowing: SlopedFlows, step: float) -> StillGas:
     """First stage of one step [s] in which the vane stands still."""
     linear, flows = linearise(held.per_mass_1, held.per_mass_2, flowing, step)
-    first = solve_stage(linear, flows.mass_1, flows.mass_2, flows.supplied, flows.leaked)
+    first = solve_stage(linear, flows)
     return StillGas(
         linear=linear,
         first=first,
@@ -182,13 +290,7 @@ def begin_moving_stage(
         state.mass_1 * held.per_mass_1 * (volumes[0] - next_volumes[0]) * per_duration,
         state.mass_2 * held.per_mass_2 * (volumes[1] - next_volumes[1]) * per_duration,
     )
-    first = solve_stage(
-        linear,
-        flows.mass_1 + drift.mass_1,
-        flows.mass_2 + drift.mass_2,
-        flows.supplied + drift.supplied,
-        flows.leaked + drift.leaked,
-    )
+    first = solve_stage(linear, added_flows(flows, drift))
     end_1, end_2 = chamber_pressures(
         plant, next_angle, state.mass_1 + step * first.mass_1, state.mass_2 + step * first.mass_2
     )
@@ -218,20 +320,20 @@ def both_stages(first: Flows, second: Flows, step: float) -> GasChange:
 
 def second_still_stage(begun: StillGas, flowing: StageFlows) -> Flows:
     """Second stage [kg/s] of a step in which the vane stands still."""
-    right = second_right_sides(begun.first, flowing)
-    return solve_stage(begun.linear, right.mass_1, right.mass_2, right.supplied, right.leaked)
+    return solve_stage(begun.linear, second_right_sides(begun.first, flowing))
 
 
 def second_moving_stage(begun: MovingGas, flowing: StageFlows) -> Flows:
     """Second stage [kg/s] of a step with moving volumes."""
-    right = second_right_sides(begun.still.first, flowing)
-    drift = begun.drift
+    right, drift = second_right_sides(begun.still.first, flowing), begun.drift
     return solve_stage(
         begun.still.linear,
-        right.mass_1 - drift.mass_1,
-        right.mass_2 - drift.mass_2,
-        right.supplied - drift.supplied,
-        right.leaked - drift.leaked,
+        Flows(
+            mass_1=right.mass_1 - drift.mass_1,
+            mass_2=right.mass_2 - drift.mass_2,
+            supplied=right.supplied - drift.supplied,
+            leaked=right.leaked - drift.leaked,
+        ),
     )
 
 
@@ -306,3 +408,22 @@ def supply_range(plant: PlantParameters) -> float:
     """Pressure [Pa] of the higher supply over the atmosphere, not less than a fraction of the latter."""
     supplied = max(plant.supply_pressure, plant.dorsiflexion_pressure) - plant.atmospheric_pressure
     return max(supplied, MINIMUM_PRESSURE * plant.atmospheric_pressure)
+
+
+STEPS_PER_FILLING = 70.0
+
+
+def filling_time(plant: PlantParameters, volume: float) -> float:
+    """Shortest time constant [s] of a chamber of ``volume`` [m^3] behind the fully open valve and the leak."""
+    return volume / ((plant.valve_conductance + plant.leak_conductance) * plant.gas_product)
+
+
+def is_slow(plant: PlantParameters, step: float, lowest_angle: float, highest_angle: float, stiffness: float) -> bool:
+    """True where a step [s] is at most 1/70 of the time in which a chamber fills, for angles between two [rad].
+
+    This keeps the error of a plain step below 1e-3 of the pressure range (docs/decisions/0002). ``stiffness`` [-] is
+    how much stiffer than at constant temperature the gas is: 1, or the heat capacity ratio, by which adiabatic chambers
+    also fill faster. Any of the numbers may be an array (runs,), and the result is one then.
+    """
+    volume = smaller(chamber_volumes(plant, lowest_angle)[0], chamber_volumes(plant, highest_angle)[1])
+    return step * STEPS_PER_FILLING * stiffness <= filling_time(plant, volume) * (1.0 + 1.0e-9)

@@ -15,14 +15,13 @@ from ppafo.engine.scheme.pneumatics import (
     GasChange,
     Linearisation,
     MovingGas,
+    SlopedFlows,
     begin_moving_stage,
     held_chambers,
     linearise,
     pressure_that_matters,
 )
-from ppafo.engine.scheme.stage_flows import SlopedFlows
-from ppafo.engine.scheme.thermal_flows import ThermalFlows, transport
-from ppafo.engine.scheme.thermal_gas import ThermalGas, begin_thermal_stage, volumes_at_begin
+from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalGas, begin_thermal_stage, transport, volumes_at_begin
 from ppafo.model.plant import (
     PlantParameters,
     PlantState,

@@ -11,7 +11,7 @@ from ppafo.engine.program import LaneResult, LaneTiming, Program
 from ppafo.engine.replay import RECORDED_ANGLE, Segment
 from ppafo.engine.rows import leaf_paths, numbers, row_expression
 from ppafo.engine.run import NEVER_FAILED, initial_masses, moment_at_start, whole_and_rest
-from ppafo.engine.scheme.parts import Pace
+from ppafo.engine.scheme.motion import Pace
 from ppafo.engine.source_text import Collector, woven
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
 from ppafo.exports.c_library.program import COUNTS

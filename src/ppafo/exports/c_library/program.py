@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.engine.lane_meters import REQUEST, TRACED, walk_traces
 from ppafo.engine.lane_rows import HANDED, indent
+from ppafo.engine.lane_samples import REQUEST, TRACED, walk_traces
 from ppafo.engine.lane_source import HEADER, INLINE, lane_loop
 from ppafo.engine.links import link_program
 from ppafo.engine.outline import Outline

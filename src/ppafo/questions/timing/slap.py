@@ -18,7 +18,7 @@ from ppafo.engine.lane_rows import lanes_of
 from ppafo.engine.lanes import Floats, LaneBlock, begin_block
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
-from ppafo.engine.scheme.ankle_torque import foot_direction
+from ppafo.engine.scheme.walking import foot_direction
 from ppafo.errors import SimulationError
 from ppafo.model.chambers import chamber_mass
 from ppafo.model.contact import foot_angle

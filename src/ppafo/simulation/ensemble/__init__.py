@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.lane_meters import TRACED
+from ppafo.engine.lane_samples import TRACED
 from ppafo.engine.lanes import Floats, load_programs
 from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError, nearest_name

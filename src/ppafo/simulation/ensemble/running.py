@@ -7,7 +7,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from ppafo.control.kind import PythonController
-from ppafo.engine.lane_meters import REQUEST as REQUEST_ROW
+from ppafo.engine.lane_samples import REQUEST as REQUEST_ROW
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import Batch, BatchResult, Floats, run_blocks
 from ppafo.engine.metering import add_meters, group_of, meters_of

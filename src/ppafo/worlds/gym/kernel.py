@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.entries import ARRAY, ARRAY_2D, ARRAY_3D, FLOAT, INT, entry_text, with_arrays
-from ppafo.engine.lane_control import SIGNALS, current_readings, pressures_of, sense, sense_gait
 from ppafo.engine.lane_rows import VECTOR, LaneRows, indent, lanes_of
+from ppafo.engine.lane_samples import SIGNALS, current_readings, pressures_of, sense, sense_gait
 from ppafo.engine.lane_source import HEADER, INLINE, lane_loop
 from ppafo.engine.lanes import SIGNAL_ROWS, Batch, Clock, Floats
 from ppafo.engine.loading import load_source

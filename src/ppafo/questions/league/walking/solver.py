@@ -8,7 +8,7 @@ import numpy as np
 
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run, Walk
-from ppafo.engine.scheme.ankle_torque import Direction, leg_torque
+from ppafo.engine.scheme.walking import Direction, leg_torque
 from ppafo.errors import SimulationError
 from ppafo.model.command import VENT, VENTS_ABOVE
 from ppafo.model.contact import FLAT, foot_angle, prescribed_ankle

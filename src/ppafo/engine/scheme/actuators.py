@@ -1,23 +1,27 @@
-"""The gas of an actuator that is no vane: chambers of any shape, which may give under pressure.
+"""An actuator of any kind: what a program calls in the place of the functions of the vane, and its values from Python.
 
 A program is linked: where its text calls ``chamber_volumes``, ``chamber_pressures`` and the other functions of the
 vane's chambers, it calls those of its actuator. ``chambers_at``, ``pressures_at`` and ``torque_at``
 stand for the kind's own.
 """
 
+from collections.abc import Callable
 from typing import Any
 
+from ppafo.engine.rows import leaves, rebuilt
 from ppafo.engine.scheme.pneumatics import (
     SHORTEST,
     MovingGas,
+    SlopedFlows,
     StillGas,
+    added_flows,
     linearise,
     response,
     solve_stage,
 )
-from ppafo.engine.scheme.stage_flows import SlopedFlows
 from ppafo.model.actuators.kind import ActuatorModel, Chambers, ShapedPlant
 from ppafo.model.actuators.vane import MODEL as VANE
+from ppafo.model.columns import over_runs
 from ppafo.model.plant import (
     PlantParameters,
     PlantState,
@@ -88,13 +92,7 @@ def begin_shaped_gas(
         pressure_1 * (here.volume_1 - ahead.volume_1) * per_duration,
         pressure_2 * (here.volume_2 - ahead.volume_2) * per_duration,
     )
-    first = solve_stage(
-        linear,
-        flows.mass_1 + drift.mass_1,
-        flows.mass_2 + drift.mass_2,
-        flows.supplied + drift.supplied,
-        flows.leaked + drift.leaked,
-    )
+    first = solve_stage(linear, added_flows(flows, drift))
     end_1, end_2 = pressures_at(
         plant, next_angle, state.mass_1 + step * first.mass_1, state.mass_2 + step * first.mass_2
     )
@@ -115,3 +113,43 @@ def links_of(actuator: ActuatorModel) -> dict[Any, Any]:
         driving_torque: shaped_driving_torque,
         (PlantParameters, "_replace"): actuator.plant,
     }
+
+
+def _of_plant(actuator: ActuatorModel, function: Callable[..., Any], plant: Any, *given: Any) -> Any:
+    """What a function of a model gives, of numbers any of which may be arrays of one length."""
+    if actuator is VANE:
+        return function(plant, *given)
+    flat = leaves(plant)
+
+    def alone(*values: float) -> Any:
+        return function(rebuilt(actuator.plant, values[: len(flat)]), *values[len(flat) :])
+
+    return over_runs(alone, *flat, *given)
+
+
+def pressures_of(actuator: ActuatorModel, plant: Any, angle: Any, mass_1: Any, mass_2: Any) -> tuple[Any, Any]:
+    """Absolute pressures [Pa] of both chambers at an angle [rad] with two masses [kg]. Equation (3)."""
+    pressure_1, pressure_2 = _of_plant(actuator, actuator.pressures, plant, angle, mass_1, mass_2)
+    return pressure_1, pressure_2
+
+
+def volumes_of(actuator: ActuatorModel, plant: Any, angle: Any, pressure_1: Any, pressure_2: Any) -> tuple[Any, Any]:
+    """Volumes of both chambers [m^3] at an angle [rad] and two absolute pressures [Pa]."""
+    chambers = _of_plant(actuator, actuator.chambers, plant, angle, pressure_1, pressure_2)
+    return chambers.volume_1, chambers.volume_2
+
+
+def torque_of(actuator: ActuatorModel, plant: Any, angle: Any, pressure_1: Any, pressure_2: Any) -> Any:
+    """Torque [N m] at an angle [rad] and two absolute pressures [Pa], positive in plantarflexion."""
+    return _of_plant(actuator, actuator.torque, plant, angle, pressure_1, pressure_2)
+
+
+def measurement_of(actuator: ActuatorModel, plant: Any, seen: Measurement) -> Measurement:
+    """What the sensors show, with the torque that the actuator would have at the angle and pressures shown."""
+    return seen._replace(torque=actuator.torque(plant, seen.angle, seen.pressure_1, seen.pressure_2))
+
+
+def driving_torque_of(actuator: ActuatorModel, plant: Any, angle: float, mass_1: float, mass_2: float) -> float:
+    """Torque before friction and damping [N m] at an angle [rad] with two masses [kg]. Equation (1)."""
+    torque = actuator.torque(plant, angle, *actuator.pressures(plant, angle, mass_1, mass_2))
+    return net_driving_torque(torque, gravity_torque(angle, plant.gravity_torque), plant.external_torque)
