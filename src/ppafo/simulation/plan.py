@@ -16,10 +16,10 @@ from ppafo.control.fixed.whole_numbers import SETTINGS, Converter, converter_of
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.reference.derivative import ExactOrifice
-from ppafo.engine.scheme.pneumatics import is_slow
 from ppafo.engine.rows import leaves, rebuilt
 from ppafo.engine.run import Lines, Run, Walk
 from ppafo.engine.scheme.actuators import volumes_of
+from ppafo.engine.scheme.pneumatics import is_slow
 from ppafo.errors import ScenarioError
 from ppafo.model.actuators.catalog import ACTUATORS
 from ppafo.model.actuators.vane import KIND as VANE
