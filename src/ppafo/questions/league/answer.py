@@ -1,7 +1,7 @@
 """A league, whatever its task, and its answer: the table, what it rests on, error against gas, who plays."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -73,9 +73,10 @@ class League(Solved):
     without_bound: str
 
     def error_above_least(self, standing: Standing) -> float | None:
-        """Return the RMS error [N m] above the minimum that its valve can have; None without a bound."""
+        """Return the RMS error [N m] above the minimum that its valve can have; None without a bound that counts."""
         error, bounded = standing.measures.get(self.contest.error), self.bounds.get(standing.entrant.valve)
-        return None if bounded is None or error is None else max(0.0, error - bounded.bound.least_error.rms_error)
+        least = None if bounded is None else bounded.least_error
+        return None if least is None or error is None else max(0.0, error - least)
 
     def least_gas(self, standing: Standing) -> float | None:
         """Return the minimum gas [kg] for what an entrant reached with its valve; None without a bound."""
@@ -94,6 +95,16 @@ class TableColumn:
 
     column: Column
     cell: Callable[[League, Standing], Cell]
+
+    def head(self, league: League) -> Column:
+        """Return the head of the column; that of a distance to the bounds lists what they relax."""
+        shown: list[Bounded[Bound]] = []
+        if self.cell == League.error_above_least:
+            shown = [item for item in league.bounds.values() if item.least_error is not None]
+        if self.cell == League.gas_above_least:
+            shown = [item for item in league.bounds.values() if item.least_gas]
+        relaxed = dict.fromkeys(name for bounded in shown for name in bounded.relaxes)
+        return replace(self.column, title=f"{self.column.title} ({', '.join(relaxed)})") if relaxed else self.column
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,7 +286,7 @@ def answer_of(league: League) -> Answer:
 def league_table(league: League) -> Table:
     """Return a row for each standing, in order of the error."""
     columns = league.contest.shown_as.columns
-    head = (Column("controller"), Column("valve"), *(item.column for item in columns))
+    head = (Column("controller"), Column("valve"), *(item.head(league) for item in columns))
     rows = [
         (standing.entrant.name, standing.entrant.valve, *(item.cell(league, standing) for item in columns))
         for standing in league.standings

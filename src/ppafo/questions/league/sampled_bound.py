@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.lanes import Batch, Floats, run_batch
-from ppafo.engine.program import NoParameters
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import Run, batch_of
 from ppafo.errors import SimulationError
@@ -97,17 +96,18 @@ class _Task:
         return done.states, self.pressures(done.record[1:].transpose(1, 0, 2))
 
 
-def check_sampled(scenario: Scenario) -> None:
-    """Raise a SimulationError that says why the sampled bound cannot be computed for a scenario."""
-    problem = ""
+def sampled_problem(scenario: Scenario) -> str:
+    """Return why the sampled bound cannot be computed for a scenario; empty where it can."""
     if scenario.device.valve.kind != "solenoid":
-        problem = f"the valve '{scenario.device.valve.kind}' has no few commands to choose from; a solenoid pair has"
-    elif not isinstance(scenario.motion, PrescribedMotion) or scenario.motion.profile.kind != "constant":
-        problem = "the ankle must be fixed"
-    elif "reference" not in scenario.origin.content:
-        problem = "there is no [reference]"
-    if problem:
-        raise SimulationError(f"{scenario.name}: no bound for a sampled pair of valves: {problem}")
+        return f"the valve '{scenario.device.valve.kind}' has no few commands to choose from; a solenoid pair has"
+    if not isinstance(scenario.motion, PrescribedMotion) or scenario.motion.profile.kind != "constant":
+        return "the ankle must be fixed"
+    if "reference" not in scenario.origin.content:
+        return "there is no [reference]"
+    if scenario.thermal is not None:
+        return "the gas must be isothermal"
+    samples = scenario.duration / scenario.control.period
+    return "" if abs(samples - round(samples)) < SAME_TIME else "run.duration ends in a sample"
 
 
 def sampled_bound(
@@ -117,7 +117,9 @@ def sampled_bound(
 
     ``commands`` are those that a control may choose from. SimulationError for a scenario that it cannot do.
     """
-    check_sampled(scenario)
+    problem = sampled_problem(scenario)
+    if problem:
+        raise SimulationError(f"{scenario.name}: no bound for a sampled pair of valves: {problem}")
     task = _task(replace(scenario, control=Control(PYTHON_CONTROLLER, {}, scenario.control.period)), commands)
     progress(Progress("bound of the sampled pair: best decisions"))
     found, decisions = _best_decisions(task)
@@ -128,11 +130,7 @@ def sampled_bound(
 def _task(scenario: Scenario, commands: Sequence[float]) -> _Task:
     run = plan_run(scenario)
     batch = batch_of(run)
-    if run.thermal is not None and not isinstance(run.thermal, NoParameters):
-        raise SimulationError(f"{scenario.name}: no bound for a sampled pair of valves: the gas must be isothermal")
     count, rows = batch.clock.step_count, row_numbers(batch.program.state_rows())
-    if count % batch.clock.steps_per_sample:
-        raise SimulationError(f"{scenario.name}: no bound for a sampled pair of valves: run.duration ends in a sample")
     assert isinstance(scenario.motion, PrescribedMotion), "a fixed ankle, which was checked"
     angle = float(profile_values(scenario.motion.profile, np.zeros(1))[0][0])
     weights = np.full(count + 1, 1.0 / count)

@@ -27,7 +27,7 @@ from ppafo.control.walking.catalog import TIMINGS, WALKING_CONTROLLERS
 from ppafo.control.walking.timing import TimingKind
 from ppafo.engine.lanes import Floats
 from ppafo.errors import ScenarioError, SimulationError
-from ppafo.parameters.device import Device, Orifice, SonicOrifice
+from ppafo.parameters.device import Device, Orifice, SonicOrifice, Valve
 from ppafo.signals import Recording
 from ppafo.simulation.declaration import LARGEST_SEED
 from ppafo.simulation.scenario import Scenario
@@ -426,6 +426,16 @@ class Bound(Protocol):
         """True where the minimum error counts as none."""
 
 
+FORESEEN = "foresight"
+"""What every bound relaxes: its control knows task and state beforehand."""
+
+
+def relaxed_by(valve: Valve) -> tuple[str, ...]:
+    """Return what a bound relaxes whose valve follows its command at once."""
+    slow = [name for name, value in valve.settings.items() if value and not name.endswith("_ratio")]
+    return (FORESEEN, *(name.replace("_", " ") for name in slow))
+
+
 B_co = TypeVar("B_co", bound=Bound, covariant=True)
 
 
@@ -433,12 +443,16 @@ B_co = TypeVar("B_co", bound=Bound, covariant=True)
 class Bounded(Generic[B_co]):
     """The lower bound of a valve, and what the engine makes of its controls; none where no valve can play them.
 
-    ``least_gas`` is, by entrant, the minimum gas [kg] with which what it reached is possible.
+    ``least_error`` [N m] is what no control of the valve is below, ``least_gas`` by entrant the minimum gas [kg] with
+    which what it reached is possible; None and empty where the bound makes use of what it ``relaxes``, so that the
+    distance to it says nothing about a controller.
     """
 
     bound: B_co
     played: tuple[Point, ...]
     least_gas: Measures
+    least_error: float | None
+    relaxes: tuple[str, ...] = ()
 
     @property
     def points(self) -> tuple[Point, ...]:

@@ -14,8 +14,10 @@ from ppafo.metrics import METRICS
 from ppafo.progress import Report
 from ppafo.questions.league.answer import League, Look, Presentation, TableColumn, measure, of_draws
 from ppafo.questions.league.bound import LowerBound, lower_bound, play_optimum
+from ppafo.questions.league.sampled_bound import SampledBound, sampled_bound, sampled_problem
 from ppafo.questions.league.standing import (
     ENTRANTS,
+    FORESEEN,
     NOISE_DRAWS,
     Bounded,
     Entrant,
@@ -26,6 +28,7 @@ from ppafo.questions.league.standing import (
     draw_factors,
     draw_seeds,
     learn,
+    relaxed_by,
     table_of,
     with_noise,
 )
@@ -36,6 +39,13 @@ from ppafo.simulation.simulate import simulate, simulate_many
 from ppafo.studies.sampling import is_noisy, other_noise
 
 _ERROR, _GAS = "rms_error", "gas_supplied"
+
+
+@dataclass(frozen=True, slots=True)
+class TorqueBound(Bounded[LowerBound]):
+    """The lower bound of a valve; for a solenoid pair at a fixed ankle also that at its own sample rate."""
+
+    sampled: SampledBound | None = None
 
 
 def bound_sentence(valve: str, bounded: Bounded[LowerBound]) -> str:
@@ -53,7 +63,12 @@ def bound_sentence(valve: str, bounded: Bounded[LowerBound]) -> str:
         f"{quantity_text(bound.moved, 'fraction', '.2g')} in the last refinement"
     )
     if not bounded.played:
-        return f"{text}; for a valve that switches infinitely fast, so no run can confirm it"
+        text = f"{text}; for a valve that may switch at any rate, so no run can confirm it"
+        sampled = bounded.sampled if isinstance(bounded, TorqueBound) else None
+        if sampled is None:
+            return text
+        found, certified = (quantity_text(error, "torque", ".4f") for error in (sampled.found, sampled.certified))
+        return f"{text}; at its own sample rate the best decisions found reach {found}, and none is below {certified}"
     error, gas = (quantity_text(fraction, "fraction", ".2g") for fraction in disagreement(bounded))
     return f"{text}; in the simulation the error agrees within {error}, the gas within {gas}"
 
@@ -77,10 +92,13 @@ def _task_remarks(league: League) -> Sequence[str]:
 def _bound_data(bounded: Bounded[LowerBound]) -> dict[str, Any]:
     bound = bounded.bound
     optima = (bound.least_error, *bound.curve)
+    sampled = bounded.sampled if isinstance(bounded, TorqueBound) else None
     return {
         "intervals": bound.intervals,
         "moved": bound.moved,
         "unmeasurable_error": bound.unmeasurable,
+        "relaxes": list(bounded.relaxes),
+        "sampled": None if sampled is None else {"found": sampled.found, "certified": sampled.certified},
         "least_error_first": [
             {"rms_error": item.rms_error, "gas": item.gas, "overlap": item.overlap} for item in optima
         ],
@@ -128,7 +146,9 @@ TORQUE = Presentation(
     format="ppafo league",
     introduction=(
         "Every controller was simulated on the device. 'Above minimum' is the distance to the lower bound of the "
-        "controller's own valve: to the minimum error of any control, and to the minimum gas for its own error."
+        "controller's own valve: to the minimum error of any control, and to the minimum gas for its own error. The "
+        "heads of these columns list what the bound relaxes; a cell is empty where the bound makes use of that, as "
+        "the distance then says nothing about the controller."
     ),
     caption=(
         "A mark for each controller; thin lines: 5 to 95 % of its error on drawn devices. Lines: lower bounds for "
@@ -210,14 +230,22 @@ class TorqueContest:
             learning=learning,
         )
 
-    def bound(self, valve: str, standings: Sequence[Standing], progress: Report) -> Bounded[LowerBound]:
+    def bound(self, valve: str, standings: Sequence[Standing], progress: Report) -> TorqueBound:
         """Return the bound of a valve, simulated where a valve can follow it; SimulationError where there is none."""
         task = self.scenario_of(standings[0].entrant)
         reached = {item.entrant.name: item.measures[self.error] for item in standings if self.error in item.measures}
         bound = lower_bound(task, list(reached.values()), progress)
-        optima = (bound.least_error, *bound.curve) if valve == "proportional" else ()
+        if valve == "solenoid":
+            # Held openings between 0 and 1 are what the bound lives on here, and this pair has none.
+            sampled = None if sampled_problem(task) else sampled_bound(task, progress=progress)
+            least_error = None if sampled is None else sampled.certified
+            return TorqueBound(bound, (), {}, least_error, (FORESEEN,), sampled)
         least = {name: bound.gas_at(error) for name, error in reached.items()}
-        return Bounded(bound, tuple(play_optimum(task, optimum) for optimum in optima), least)
+        played = tuple(play_optimum(task, optimum) for optimum in (bound.least_error, *bound.curve))
+        relaxes = relaxed_by(task.device.valve)
+        if task.control.period > task.duration / bound.intervals:
+            relaxes = (*relaxes, "sample rate")
+        return TorqueBound(bound, played, least, bound.least_error.rms_error, relaxes)
 
 
 def torque_contest(scenario: str | Path = TASK, overrides: Sequence[str] = ()) -> TorqueContest:

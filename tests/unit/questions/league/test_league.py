@@ -77,9 +77,13 @@ def test_every_standing_is_above_the_bound_of_its_valve(small: League) -> None:
     for standing in small.standings:
         error, gas = small.error_above_least(standing), small.gas_above_least(standing)
         assert error is not None
-        assert gas is not None
         assert error >= 0.0
-        assert gas > -1e-6
+        assert (gas is None) == (standing.entrant.valve == "solenoid")
+        assert gas is None or gas > -1e-6
+    pair = small.bounds["solenoid"]
+    assert isinstance(pair, torque.TorqueBound)
+    assert pair.sampled is not None
+    assert pair.bound.least_error.rms_error < pair.sampled.certified == pair.least_error
     assert len(small.bounds["proportional"].played) == 1 + len(small.bounds["proportional"].bound.curve)
     assert small.bounds["solenoid"].played == ()
 

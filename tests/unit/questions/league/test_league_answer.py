@@ -11,9 +11,10 @@ from ppafo.control.controllers.feedback import KNOTS
 from ppafo.errors import ScenarioError
 from ppafo.questions.league.answer import League, league_table
 from ppafo.questions.league.bound import LowerBound, Optimum, Played
+from ppafo.questions.league.sampled_bound import SampledBound
 from ppafo.questions.league.standing import (
     ENTRANTS,
-    Bounded,
+    FORESEEN,
     LearningLaw,
     Robustness,
     Standing,
@@ -21,7 +22,7 @@ from ppafo.questions.league.standing import (
     learn,
     with_table,
 )
-from ppafo.questions.league.torque import TorqueContest, bound_sentence, disagreement
+from ppafo.questions.league.torque import TorqueBound, TorqueContest, bound_sentence, disagreement
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.scenario import Scenario
 
@@ -44,7 +45,7 @@ def league() -> League:
     control = result.scenario.control
     standing = Standing(ENTRANT, control.settings, control.period, measures, robustness, "ppafo simulate x")
     least = {ENTRANT.name: bound.gas_at(measures["rms_error"])}
-    bounds = {"proportional": Bounded(bound, played, least)}
+    bounds = {"proportional": TorqueBound(bound, played, least, 0.1, (FORESEEN, "spool frequency"))}
     return League(
         TorqueContest("x", ("a=b",), "ppafo2011"), (standing,), {"on_off": "it has no spool"}, 3, 1, bounds, ""
     )
@@ -75,9 +76,22 @@ def test_the_notes_say_bound_draws_and_who_is_absent(league: League) -> None:
 
 def test_an_error_that_counts_as_none_and_a_bound_without_runs_are_said_so(league: League) -> None:
     none = dataclasses.replace(league.bounds["proportional"].bound, unmeasurable=0.1)
-    text = bound_sentence("solenoid", Bounded(none, (), {}))
+    text = bound_sentence("solenoid", TorqueBound(none, (), {}, 0.85, (FORESEEN,), SampledBound(0.8553, 0.8531, ())))
     assert "an RMS error of 0.1 N m, which counts as zero, takes at least 0.4 g" in text
     assert "no run can confirm it" in text
+    assert "the best decisions found reach 0.8553 N m, and none is below 0.8531 N m" in text
+
+
+def test_the_head_of_a_distance_to_a_bound_lists_what_it_relaxes_and_a_bound_that_lives_on_that_says_nothing(
+    league: League,
+) -> None:
+    heads = [column.title for column in league_table(league).head]
+    assert f"error above minimum ({FORESEEN}, spool frequency)" in heads
+    assert f"gas above minimum ({FORESEEN}, spool frequency)" in heads
+    lives_on_it = dataclasses.replace(league.bounds["proportional"], least_gas={}, least_error=None)
+    silent = dataclasses.replace(league, bounds={"proportional": lives_on_it})
+    assert row_texts(league_table(silent))[0][6] == row_texts(league_table(silent))[0][8] == "-"
+    assert "error above minimum" in [column.title for column in league_table(silent).head]
 
 
 def test_without_a_bound_the_figure_has_only_marks_and_the_table_dashes(league: League) -> None:
@@ -92,7 +106,7 @@ def test_the_bound_ends_upwards_or_to_the_left_where_its_error_counts_as_none(le
     ends = []
     for unmeasurable in (0.004, 0.1):
         bound = dataclasses.replace(league.bounds["proportional"].bound, unmeasurable=unmeasurable)
-        changed = dataclasses.replace(league, bounds={"proportional": Bounded(bound, (), {})})
+        changed = dataclasses.replace(league, bounds={"proportional": TorqueBound(bound, (), {}, 0.1)})
         line = changed.plot().axes[0].lines[-1]
         ends.append((np.ptp(np.asarray(line.get_xdata())), np.ptp(np.asarray(line.get_ydata()))))
     assert ends[0][0] == 0.0 < ends[0][1]

@@ -11,7 +11,15 @@ from ppafo.answers import Column
 from ppafo.answers.display_units import quantity_text, title_with_unit
 from ppafo.progress import Progress, Report
 from ppafo.questions.league.answer import League, Look, Presentation, TableColumn, measure, of_draws
-from ppafo.questions.league.standing import WALKING_ENTRANTS, Bounded, Entrant, Measures, Robustness, Standing
+from ppafo.questions.league.standing import (
+    WALKING_ENTRANTS,
+    Bounded,
+    Entrant,
+    Measures,
+    Robustness,
+    Standing,
+    relaxed_by,
+)
 from ppafo.questions.league.walking.bound import PlayedStride, Reached, WalkingBound, play_stride, walking_bound
 from ppafo.questions.league.walking.measures import MEASURES, draw_measures, walk_measures
 from ppafo.questions.league.walking.solver import StrideOptimum
@@ -91,6 +99,7 @@ def _bound_data(bounded: Bounded[WalkingBound]) -> dict[str, Any]:
     return {
         "intervals": bound.intervals,
         "moved": bound.moved,
+        "relaxes": list(bounded.relaxes),
         "landing": bound.landing,
         "unmeasurable_error": bound.unmeasurable,
         "error_of_no_torque": bound.idle_error,
@@ -137,7 +146,8 @@ WALKING = Presentation(
         "error that remains without it, 'events' the RMS error of the times at which the controller knows of heel "
         "strike, toes on, heel off and toes off. 'Above minimum' is the distance to the lower bound of the "
         "controller's own valve: to the minimum error of any control with toes above the ground, and to the minimum "
-        "gas of a stride with its own lag, error at lag and toe clearance."
+        "gas of a stride with its own lag, error at lag and toe clearance. The heads of these columns list what the "
+        "bound relaxes; for a solenoid pair they are empty, because its bound switches at any rate."
     ),
     caption=(
         "A mark for each controller; thin lines across: 5 to 95 % of its error on drawn wearers and devices; "
@@ -225,8 +235,12 @@ class WalkingContest:
         bound = walking_bound(self.task, valve, reached, progress)
         progress(Progress(f"lower bound, {valve}: simulating the optimum"))
         played = tuple(play_stride(self.task, valve, optimum) for optimum in (bound.least_error, *bound.curve))
+        relaxes = (*relaxed_by(self.task.configuration(standings[0].entrant.kind, valve).device.valve), "sample rate")
+        if valve == "solenoid":
+            # The optimum switches within a sample, which the controllers of this pair cannot.
+            return Bounded(bound, played, {}, None, relaxes)
         least = {name: optimum.gas for name, optimum in bound.own.items() if optimum is not None}
-        return Bounded(bound, played, least)
+        return Bounded(bound, played, least, bound.least_error.rms_error, relaxes)
 
     def _command(self, entrant: Entrant) -> str:
         """Return the command that walks this entrant again."""

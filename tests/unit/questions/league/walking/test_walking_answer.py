@@ -56,7 +56,7 @@ def league() -> League:
     standing = Standing(ENTRANT, {}, 0.001, walked, Robustness(drawn), "ppafo walk x")
     idle = measures(torque_error=3.0, lagged_error=3.0, toe_height=-0.09, toe_strikes=1.0, toes_clear=0.0)
     off = Standing(OFF, {}, 0.001, idle, None, "ppafo walk y")
-    bounds = {"proportional": Bounded(bound, played, {ENTRANT.name: 2.0e-4})}
+    bounds = {"proportional": Bounded(bound, played, {ENTRANT.name: 2.0e-4}, 0.1)}
     contest = WalkingContest(task)
     return League(contest, (standing, off), {"servo": "there is no such valve"}, 3, 1, bounds, "")
 
