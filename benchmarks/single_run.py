@@ -17,8 +17,7 @@ from benchmarks.sampled_solvers import (
 from benchmarks.task import torque_task
 from benchmarks.timing import Contender, Timing, time_in_turn
 from ppafo.engine.lanes import Floats, run_batch
-from ppafo.engine.reference.agreement import chamber_pressures_of, plant_states
-from ppafo.engine.reference.solver import solve_reference
+from ppafo.engine.reference.solver import chamber_pressures_of, plant_states, solve_reference
 from ppafo.engine.run import Run, batch_of
 
 GROUP = "One closed-loop run at 1 kHz"

@@ -55,7 +55,7 @@ Check = Callable[[Path], list[Line]]
 
 def against_reference(_long: Path) -> list[Line]:
     """Shipped scenarios against the reference solver."""
-    from ppafo.engine.reference.agreement import compare_with_reference
+    from ppafo.engine.reference.solver import compare_with_reference
     from ppafo.simulation.loading import list_scenarios, load_scenario
     from ppafo.simulation.plan import plan_run
 

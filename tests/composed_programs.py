@@ -6,8 +6,8 @@ from typing import Any
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
+from ppafo.engine.lanes import RECORDED_ANGLE
 from ppafo.engine.program import Program
-from ppafo.engine.replay import RECORDED_ANGLE
 from ppafo.metrics import METRICS
 from ppafo.model.effects.catalog import EFFECTS
 from ppafo.model.valves import dump

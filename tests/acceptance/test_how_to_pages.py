@@ -20,8 +20,8 @@ import ppafo
 from ppafo.cli.main import main
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
-from ppafo.engine.compile_errors import mistake
-from ppafo.engine.reference.agreement import compare_with_reference
+from ppafo.engine.plain_python import mistake
+from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.model.actuators.catalog import ACTUATORS
 from ppafo.model.command import VENT
 from ppafo.model.sensors import Measurement

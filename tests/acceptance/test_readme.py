@@ -9,7 +9,7 @@ import pytest
 
 from ppafo.answers.writing import text_of
 from ppafo.cli.main import COMMANDS, build_parser, main
-from ppafo.engine.reference.agreement import compare_with_reference
+from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.questions.bits.solve import golden_hashes
 from ppafo.questions.reproduce.answer import Reproduction, Studies
 from ppafo.questions.reproduce.solve import reproduce

@@ -13,7 +13,7 @@ import pytest
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.cache import load_generated
-from ppafo.engine.entries import HEADER
+from ppafo.engine.loading import HEADER
 from ppafo.engine.numba_compiler import NumbaCompiler
 from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.engine.source_text import SourceCollector

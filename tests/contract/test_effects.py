@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.engine.reference.agreement import compare_with_reference
+from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
 from ppafo.exports.c_library import c_library, library_of

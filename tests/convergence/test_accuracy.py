@@ -6,7 +6,7 @@ from types import ModuleType
 
 import pytest
 
-from ppafo.engine.reference.agreement import Agreement, compare_with_reference
+from ppafo.engine.reference.solver import Agreement, compare_with_reference
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario

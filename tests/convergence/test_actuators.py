@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from ppafo import load_scenario
-from ppafo.engine.reference.agreement import compare_with_reference
+from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.simulation.plan import plan_run
 
 EXAMPLE = Path(str(resources.files("ppafo") / "examples" / "actuators"))

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from ppafo.engine.lanes import run_batch
-from ppafo.engine.reference.agreement import measure_agreement, plant_states
-from ppafo.engine.reference.solver import solve_reference
+from ppafo.engine.reference.solver import measure_agreement, plant_states, solve_reference
 from ppafo.engine.run import Run, batch_of
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run

@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from ppafo.engine.reference.agreement import compare_with_reference
-from ppafo.engine.reference.solver import solve_reference
+from ppafo.engine.reference.solver import compare_with_reference, solve_reference
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.catalog import EFFECTS
 from ppafo.model.effects.kind import Effect, Moment, State

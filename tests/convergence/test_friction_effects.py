@@ -2,7 +2,7 @@
 
 import pytest
 
-from ppafo.engine.reference.agreement import compare_with_reference
+from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.model.effects.seal_friction import SealFriction, pressed_at_rest, pressed_in_motion
 from ppafo.model.effects.stribeck import Stribeck, more_near_standstill
 from ppafo.simulation.loading import load_scenario

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from ppafo.engine.reference.agreement import compare_with_reference
-from ppafo.engine.reference.derivative import ExactOrifice, joined_thermal_rates, thermal_gas_rates
+from ppafo.engine.reference.right_hand_side import ExactOrifice, joined_thermal_rates, thermal_gas_rates
+from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.engine.scheme.motion import with_gas
 from ppafo.engine.scheme.pneumatics import (
     begin_still_gas,

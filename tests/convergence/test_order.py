@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from ppafo.engine.lanes import run_batch
-from ppafo.engine.reference.agreement import Agreement, measure_agreement
-from ppafo.engine.reference.solver import solve_reference
+from ppafo.engine.reference.solver import Agreement, measure_agreement, solve_reference
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of, run_together
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run

@@ -8,7 +8,7 @@ import pytest
 
 import ppafo
 from ppafo.engine.lanes import run_batch
-from ppafo.engine.reference.agreement import compare_with_reference
+from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.engine.run import batch_of
 from ppafo.model.sensors import Measurement, decay_factors
 from ppafo.simulation.ensemble import run_ensemble

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ppafo.engine.lanes import run_batch
-from ppafo.engine.reference.agreement import chamber_pressures_of, compare_with_reference, plant_states
+from ppafo.engine.reference.solver import chamber_pressures_of, compare_with_reference, plant_states
 from ppafo.engine.run import batch_of
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run

@@ -8,8 +8,7 @@ import dataclasses
 
 import pytest
 
-from ppafo.engine.reference.agreement import chamber_pressures_of
-from ppafo.engine.reference.solver import solve_reference
+from ppafo.engine.reference.solver import chamber_pressures_of, solve_reference
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario

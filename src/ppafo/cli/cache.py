@@ -21,8 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(parsed: argparse.Namespace) -> int:
     """Compile or remove programs as requested, and list what is there."""
-    from ppafo.engine.cache import cache_folder, clear, refusal
-    from ppafo.engine.kept import clear_kept
+    from ppafo.engine.cache import cache_folder, clear, clear_kept, refusal
 
     output.check_output(parsed)
     folder = cache_folder()
@@ -54,8 +53,7 @@ def run(parsed: argparse.Namespace) -> int:
 
 
 def _document(folder: Path | None, why_not: str) -> dict[str, Any]:
-    from ppafo.engine.cache import LONGEST_UNUSED, MAXIMUM_BYTES, list_programs
-    from ppafo.engine.kept import kept_sizes
+    from ppafo.engine.cache import LONGEST_UNUSED, MAXIMUM_BYTES, kept_sizes, list_programs
 
     programs = [] if folder is None else list_programs(folder)
     now = time.time()

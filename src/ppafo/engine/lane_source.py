@@ -3,8 +3,7 @@
 from ppafo.engine.lane_rows import VECTOR, LaneRows, indent
 from ppafo.engine.lane_samples import control_loop, measure_sample, remember_commands, signals_before_start
 from ppafo.engine.lane_step import find_begin, over_rows, plant_loop
-from ppafo.engine.links import link_program
-from ppafo.engine.program import Program
+from ppafo.engine.program import Program, link_program
 from ppafo.engine.source_text import Collector, SourceCollector
 
 HEADER = '''"""Generated from the functions of ppafo; their hash is in the file name. Not to be edited."""

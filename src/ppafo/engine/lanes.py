@@ -1,27 +1,33 @@
 """Runs many devices at once: blocks of up to 32 lanes, spread over threads, the same numbers in any order.
 
 A run's result does not depend on its block, its place in it or the number of threads, because every lane goes
-through the same instructions and no lane sees another.
+through the same instructions and no lane sees another. A run on inputs that were recorded (``replay``), the command and
+any parameter that changed meanwhile, goes on its own between two changes, so that a recording with a constant supply
+costs only a few calls.
 """
 
 import math
 import os
 import threading
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from types import ModuleType
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.kept import kept
+from ppafo.control.kind import ProfileKind
+from ppafo.engine.cache import kept_bytes
 from ppafo.engine.lane_rows import VECTOR, lanes_of
 from ppafo.engine.lane_source import INLINE, SAME_MOMENT, write_lanes
 from ppafo.engine.loading import load_source, load_sources
 from ppafo.engine.outline import Outline
 from ppafo.engine.program import Program
+from ppafo.engine.rows import leaf_paths, rebuilt, row_numbers
 from ppafo.engine.source_text import SourceCollector
+from ppafo.signals.meter import MeterKind
 
 Floats = NDArray[np.float64]
 
@@ -111,7 +117,7 @@ def write_source(program: Program, lanes: int = 0) -> tuple[Outline, str]:
     """What a program is made from, and its source for some lanes, 0 for as many as fit; written once, then kept."""
     outline = Outline(INLINE)
     made_from = write_lanes(program, outline, lanes)
-    source = kept("lanes", made_from, lambda: write_lanes(program, SourceCollector(INLINE), lanes).encode())
+    source = kept_bytes("lanes", made_from, lambda: write_lanes(program, SourceCollector(INLINE), lanes).encode())
     return outline, source.decode()
 
 
@@ -247,3 +253,113 @@ def _pad_columns(columns: Floats) -> Floats:
     if missing == 0:
         return np.array(columns, dtype=np.float64, order="C")
     return np.ascontiguousarray(np.pad(columns, ((0, 0), (0, missing)), mode="edge"), dtype=np.float64)
+
+
+def add_meters(batch: Batch, meters: Sequence[MeterKind], traced: Sequence[str] = (), trace_every: int = 0) -> Batch:
+    """The batch with meters at every sample that it would record, and traces of channels every so many samples."""
+    program = replace(batch.program, meters=tuple(meters), traced=tuple(traced))
+    clock, interval = batch.clock, batch.clock.record_every
+    clock = replace(clock, record_every=0, measure_every=interval, trace_every=trace_every)
+    rows = sum(len(leaf_paths(row, name)) for name, row in program.state_rows().items())
+    states = np.zeros((rows, batch.states.shape[1]))
+    states[: batch.states.shape[0]] = batch.states
+    return Batch(program, clock, batch.parameters, states)
+
+
+def group_of(name: str, groups: dict[str, type], rows: Floats) -> Any:
+    """The NamedTuple of a group of rows (rows, runs), such as ``Program.state_rows`` names, with arrays (runs,).
+
+    KeyError where no group has that name.
+    """
+    start = 0
+    for group, row in groups.items():
+        count = len(leaf_paths(row, group))
+        if group == name:
+            return rebuilt(row, rows[start : start + count])
+        start += count
+    raise KeyError(name)
+
+
+def meters_of(program: Program, states: Floats) -> dict[str, Any]:
+    """The last state of each meter by its name, with arrays (runs,), in the units of the meter."""
+    groups = program.state_rows()
+    return {kind.name: group_of(group, groups, states) for group, kind in program.meter_groups.items()}
+
+
+COMMAND = "result.command"
+
+
+class Segment(NamedTuple):
+    """A straight piece of a recorded angle: a time [s], the angle [rad] then, and the angular velocity [rad/s]."""
+
+    start: float
+    level: float
+    rate: float
+
+
+def segment_value(segment: Segment, time: float) -> tuple[float, float, float]:
+    """Angle [rad], angular velocity [rad/s] and angular acceleration [rad/s^2] at a time [s] on a straight piece."""
+    return segment.level + segment.rate * (time - segment.start), segment.rate, 0.0
+
+
+def segment_bounds(_segment: Segment) -> tuple[float, float]:
+    """Bounds [rad] of a segment: none, because the next one may lead anywhere between the stops."""
+    return -math.inf, math.inf
+
+
+RECORDED_ANGLE = ProfileKind(
+    name="recorded",
+    summary="A recorded angle, straight from sample to sample; its parameters change at every sample.",
+    quantities=(),
+    parameters=Segment,
+    value=segment_value,
+    bounds=segment_bounds,
+)
+"""Not in the catalogue: a scenario file cannot name it, because its values come from a recording."""
+
+
+@dataclass(frozen=True, slots=True)
+class StepInputs:
+    """Inputs of every step of a run: the command [-], and parameters by path such as ``plant.supply_pressure`` (SI).
+
+    ``command`` None leaves the command to the controller of the program.
+    """
+
+    command: Floats | None
+    parameters: Mapping[str, Floats]
+
+
+def prescribe_recorded_angle(program: Program) -> Program:
+    """The program with a recorded angle prescribed, by the parameters ``path.start``, ``.level``, ``.rate``."""
+    return replace(program, angle=RECORDED_ANGLE)
+
+
+def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
+    """Run devices on the same recorded inputs; with a command, the program must leave it to the caller."""
+    runs = batch.states.shape[1]
+    lanes = lanes_of(batch.program)
+    blocks = [slice(first, min(first + lanes, runs)) for first in range(0, runs, lanes)]
+    return join_results([_replay_block(batch, inputs, block) for block in blocks])
+
+
+def _replay_block(batch: Batch, inputs: StepInputs, runs: slice) -> BatchResult:
+    program, parameters, command = batch.program, inputs.parameters, inputs.command
+    block = begin_block(replace(batch, parameters=batch.parameters[:, runs], states=batch.states[:, runs]))
+    command_row = row_numbers(program.state_rows())[COMMAND]
+    numbered = row_numbers(program.parameter_rows())
+    rows = [numbered[path] for path in parameters]
+    table = np.array([*parameters.values(), *(() if command is None else (command,))])
+    starts = _changes(table)
+    for start, end in zip(starts, [*starts[1:], batch.clock.step_count], strict=True):
+        if command is not None:
+            block.states[command_row] = command[start]
+        if rows:
+            block.set_parameters(rows, table[: len(rows), start])
+        block.advance(end - start)
+    return block.result()
+
+
+def _changes(table: Floats) -> list[int]:
+    """Steps at which any input differs from the step before, the first step among them."""
+    changed = (np.diff(table, axis=1) != 0.0).any(axis=0)
+    return [0, *(np.flatnonzero(changed) + 1).tolist()]

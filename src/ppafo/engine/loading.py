@@ -1,23 +1,104 @@
-"""The module of a composed text, made by the first compiler that works on this computer.
+"""Entries of generated modules, and the module of a composed text, made by the first compiler that works here.
+
+An entry is a function that Python calls, with arrays and numbers, and that returns nothing. It states the types of its
+parameters in the words of Numba, and every compiler reads them there.
 
 ``PPAFO_BACKEND`` names one compiler; without it clang, gcc, zig and Numba are tried in this order. All give the same
 bits. One that does not work, because there are no headers or its libraries cannot be loaded, is reported in one line
 and left out for a day.
 """
 
+import ast
 import contextlib
+import inspect
 import logging
 import os
+import re
+import textwrap
 import threading
 import time
-from collections.abc import Iterable
-from functools import lru_cache
+from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache, partial
 from pathlib import Path
 from types import ModuleType
+from typing import Annotated, Any, Protocol, TypeAlias, get_type_hints, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.engine.cache import cache_folder, is_kept, load_all, load_generated, note_name, refusal
 from ppafo.engine.compilers import OFFERED, Compiler, CompilerError
 from ppafo.errors import ProgramError, SimulationError, nearest_name, one_line
+
+FLOAT, INT = "float64", "int64"
+ARRAY, ARRAY_2D, ARRAY_3D = "float64[::1]", "float64[:, ::1]", "float64[:, :, ::1]"
+
+Vector: TypeAlias = Annotated[NDArray[np.float64], ARRAY]
+"""Numbers in a row, as a parameter of a function for ``array_module``."""
+Table: TypeAlias = Annotated[NDArray[np.float64], ARRAY_2D]
+"""Numbers in rows, the last index running quickest."""
+
+HEADER = '''"""Generated from the functions of ppafo; their hash is in the file name. Not to be edited."""
+
+import math
+from collections import namedtuple
+
+from numba import njit
+'''
+"""What a module begins with that has no lanes."""
+INLINE = '@njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)'
+"""How functions are compiled that its entries call."""
+ENTRY = '@njit("void({})", cache=True, nogil=True, error_model="numpy")'
+"""How an entry is compiled, for the types of its parameters."""
+
+_ENTRY = re.compile(r"""^@njit\((["'])void\(([^"'\n]*)\)\1.*\)\ndef (\w+)\(""", re.MULTILINE)
+_TYPE = re.compile(r"float64\[.*?\]|float64|int64")
+
+
+@runtime_checkable
+class Packing(Protocol):
+    """An entry that is quicker where its arrays are handed over once."""
+
+    def with_arrays(self, *arrays: NDArray[np.float64]) -> Callable[..., None]:
+        """The entry as a function of what follows its arrays."""
+
+
+def with_arrays(entry: Callable[..., None], *arrays: NDArray[np.float64]) -> Callable[..., None]:
+    """An entry of a loaded module as a function of its numbers alone; the arrays, its first arguments, stay the same.
+
+    A call then costs what one with a few numbers costs, by every compiler.
+    """
+    return entry.with_arrays(*arrays) if isinstance(entry, Packing) else partial(entry, *arrays)
+
+
+def entry_text(name: str, parameters: Mapping[str, str], lines: Iterable[str]) -> str:
+    """Text of an entry, from the types of its parameters in order and the lines of its body."""
+    head = ENTRY.format(", ".join(parameters.values()))
+    return "\n".join([head, f"def {name}({', '.join(parameters)}):", *(f"    {line}" for line in lines), ""])
+
+
+def entry_types(source: str) -> dict[str, list[str]]:
+    """Types of the parameters of all entries of a module, in order, by the name of the entry."""
+    return {found[3]: _TYPE.findall(found[2]) for found in _ENTRY.finditer(source)}
+
+
+def array_module(functions: Iterable[Callable[..., None]]) -> str:
+    """Source of a module with these functions as its entries: each goes through its arrays and calls only ``math``.
+
+    Their parameters are annotated as ``Vector``, ``Table``, ``float`` or ``int``.
+    """
+    return "\n\n".join([HEADER, *map(_function_text, functions)])
+
+
+def _function_text(function: Callable[..., None]) -> str:
+    plain: dict[Any, str] = {float: FLOAT, int: INT}
+    hints = get_type_hints(function, include_extras=True)
+    types = {name: plain.get(hint) or hint.__metadata__[0] for name, hint in hints.items() if name != "return"}
+    (tree,) = ast.parse(textwrap.dedent(inspect.getsource(function))).body
+    assert isinstance(tree, ast.FunctionDef)
+    body = tree.body[1:] if ast.get_docstring(tree) is not None else tree.body
+    return entry_text(function.__name__, types, [line for item in body for line in ast.unparse(item).split("\n")])
+
 
 logger = logging.getLogger("ppafo")
 

@@ -19,8 +19,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from ppafo.engine.compile_errors import mistake
-from ppafo.engine.plain_python import parse_module
+from ppafo.engine.plain_python import mistake, parse_module
 from ppafo.engine.source_text import without_origins
 from ppafo.errors import SimulationError
 

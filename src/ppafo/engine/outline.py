@@ -15,11 +15,19 @@ from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
-from ppafo.engine import composed_names, plain_python, source_text
-from ppafo.engine.composed_names import is_row
-from ppafo.engine.source_text import Adaptation, Made, Read, as_it_is, check_is_plain, emitted_name, is_unchanged
+from ppafo.engine import plain_python, source_text
+from ppafo.engine.source_text import (
+    Adaptation,
+    Made,
+    Read,
+    as_it_is,
+    check_is_plain,
+    emitted_name,
+    is_row,
+    is_unchanged,
+)
 
-_WRITTEN_BY = (source_text, composed_names, plain_python)
+_WRITTEN_BY = (source_text, plain_python)
 """The modules that decide how a function is written; the outline has their content in it."""
 
 

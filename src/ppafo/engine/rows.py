@@ -6,7 +6,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from ppafo.engine.composed_names import is_row
+from ppafo.engine.source_text import is_row
 
 
 @cache

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ppafo.engine.lane_step import MAXIMUM_PARTS
 from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_batch
 from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program
-from ppafo.engine.reference.derivative import ExactOrifice
+from ppafo.engine.reference.right_hand_side import ExactOrifice
 from ppafo.engine.rows import leaves, rebuilt, table
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import Pace

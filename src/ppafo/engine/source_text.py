@@ -3,24 +3,318 @@
 The text holds everything that decides the machine code, so its hash names the module: a second start finds the
 compiled code on disk, and a change anywhere in the physics gives another name and is compiled anew. What would run
 otherwise than in Python is refused, in terms of the file that it was written in.
+
+Names from outside a function are replaced by what they stand for (``Composer``): numbers, generated names, ``math``.
 """
 
 import ast
+import builtins
+import functools
 import inspect
+import math
 import re
 import textwrap
+import types
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field
 from types import CodeType, FunctionType, ModuleType
 from typing import Any, Generic, NamedTuple, Protocol
 
-from ppafo.engine.composed_names import Composer, is_row
-from ppafo.engine.plain_python import check_flow, check_grammar, parse_module, place, refusal
-from ppafo.errors import ProgramError, one_line
+import numpy as np
 
-ORIGIN = "# origin"
-"""Beginning of the line before each function that says which lines of which file it was made from."""
+from ppafo.control.fixed.whole_numbers import each
+from ppafo.engine.plain_python import ORIGIN, check_flow, check_grammar, parse_module, place, refusal
+from ppafo.errors import ProgramError, nearest_name, one_line
+
+COMPILED_BUILTINS = frozenset(
+    {"abs", "bool", "divmod", "enumerate", "float", "int", "len", "max", "min", "pow", "range", "round", "sum", "zip"}
+)
+_INSIDE = object()
+"""Stands for a value that is known only while the function runs."""
+
+
+def is_row(candidate: object) -> bool:
+    """True for a NamedTuple class."""
+    return isinstance(candidate, type) and issubclass(candidate, tuple) and hasattr(candidate, "_fields")
+
+
+class Composer(ast.NodeTransformer):
+    """Rewrites the body of one function; ``add`` adds another to the module, ``note`` keeps what was looked up.
+
+    ``rows_of`` says which rows of effects a function that was added needs: each call hands them over before its own
+    arguments. ``needed`` has those that this function must be handed in its turn, because it has no such parameter.
+    ``stands_for`` says which class a declared row has in this module.
+    """
+
+    def __init__(
+        self,
+        function: types.FunctionType,
+        add: Callable[[Any], str],
+        note: Callable[[Mapping[str, Any], str, Any], None],
+        rows_of: Callable[[str], tuple[str, ...]] = lambda _name: (),
+        stands_for: Callable[[Any], Any] = lambda row: row,
+    ) -> None:
+        self.function = function
+        self.add = add
+        self.note = note
+        self.rows_of = rows_of
+        self.stands_for = stands_for
+        self.local = frozenset(function.__code__.co_varnames)
+        self.kinds: dict[str, Any] = dict(function.__annotations__)
+        self.given = frozenset(_parameters(function.__code__))
+        self.needed: set[str] = set()
+
+    def refuse(self, where: ast.AST, problem: str) -> ProgramError:
+        """The error for a place in the function."""
+        return refusal(self.function.__code__.co_filename, where, problem)
+
+    def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.stmt:
+        """Leave the annotation away."""
+        if node.value is None:
+            return ast.copy_location(ast.Pass(), node)
+        return ast.copy_location(ast.Assign([node.target], self.visit(node.value)), node)
+
+    def visit_Assign(self, node: ast.Assign) -> ast.stmt:
+        """Remember which row each name stands for, so that ``name._replace`` can be written out."""
+        kind, target = self.kind_of(node.value), node.targets[0]
+        parts = getattr(kind, "__args__", ())
+        named = zip(target.elts, parts, strict=False) if isinstance(target, ast.Tuple) else ((target, kind),)
+        for item, found in named:
+            if isinstance(item, ast.Name):
+                self.kinds[item.id] = found if self.kinds.get(item.id, found) is found else None
+        return ast.copy_location(ast.Assign(node.targets, self.visit(node.value)), node)
+
+    def visit_Expr(self, node: ast.Expr) -> ast.stmt:
+        """Leave a text that stands alone away."""
+        if isinstance(node.value, ast.Constant):
+            return ast.copy_location(ast.Pass(), node)
+        return ast.copy_location(ast.Expr(self.visit(node.value)), node)
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        """Replace a name from outside."""
+        value = self.value_of(node)
+        return node if value is _INSIDE else self.handed_over(value, node)
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
+        """Replace ``module.name``. ProgramError where it cannot be compiled."""
+        value = self.value_of(node)
+        if value is not _INSIDE:
+            return self.handed_over(value, node)
+        owner = self.value_of(node.value)
+        if owner is not _INSIDE and not isinstance(owner, tuple):
+            raise self.refuse(node, f"'{ast.unparse(node)}' is of a {type(owner).__name__}, which cannot be compiled")
+        return ast.Attribute(self.visit(node.value), node.attr, node.ctx)
+
+    def visit_Call(self, node: ast.Call) -> ast.expr:
+        """Check the arguments of what is called; those that a NamedTuple has of its own are written out.
+
+        ProgramError where one does not fit.
+        """
+        called = self.value_of(node.func)
+        if called is each and len(node.args) > 1:
+            return self.each_number(node.args[0], node.args[1])
+        if called is _INSIDE:
+            if isinstance(node.func, ast.Attribute) and node.func.attr == "_replace":
+                return self.replaced(node, node.func.value)
+            if isinstance(node.func, ast.Attribute):
+                raise self.refuse(node, f"'{ast.unparse(node.func)}()' is a method, which is not compiled")
+            self.generic_visit(node)
+            return node
+        own: list[ast.expr] = []
+        if isinstance(called, types.FunctionType) or is_row(called):
+            own = self.own_arguments(called, node)
+        function = self.stand_in(called, node.func)
+        arguments = [*self.rows_for(function, node), *(self.visit(item) for item in node.args)]
+        if not own:
+            named = [ast.keyword(item.arg, self.visit(item.value)) for item in node.keywords]
+            return ast.Call(function, arguments, named)
+        return ast.Call(function, [*arguments, *own], [])
+
+    def rows_for(self, function: ast.expr, node: ast.AST) -> list[ast.expr]:
+        """Rows of effects that a function of the module is handed first. ProgramError where a local name hides one."""
+        rows = self.rows_of(function.id) if isinstance(function, ast.Name) else ()
+        for row in rows:
+            if row in self.local - self.given:
+                raise self.refuse(node, f"the local name '{row}' hides the row of the effect '{row}'; rename it")
+        self.needed.update(row for row in rows if row not in self.given)
+        return [ast.Name(row, ast.Load()) for row in rows]
+
+    def handed_over(self, value: Any, node: ast.expr) -> ast.expr:
+        """What is written for a value that is not called. ProgramError for a function that needs rows of effects."""
+        found = self.stand_in(value, node)
+        if isinstance(found, ast.Name) and self.rows_of(found.id):
+            raise self.refuse(node, f"an effect acts inside '{ast.unparse(node)}', so that it can only be called")
+        return found
+
+    def own_arguments(self, called: Any, node: ast.Call) -> list[ast.expr]:
+        """Fields of a NamedTuple after those given by place, where some have the defaults of its class; else none.
+
+        ProgramError where they do not fit.
+        """
+        if any(isinstance(item, ast.Starred) for item in node.args):
+            return []  # how many there are is known only to the compiler
+        is_function = isinstance(called, types.FunctionType)
+        takes: tuple[str, ...] = _parameters(called.__code__) if is_function else called._fields
+        if len(node.args) == len(takes) and not node.keywords and not (is_function and called.__kwdefaults__):
+            return []
+        given = {item.arg: item.value for item in node.keywords if item.arg is not None}
+        try:
+            inspect.signature(called).bind(*node.args, **given)
+        except TypeError as error:
+            unknown = next((name for name in given if name not in takes), None)
+            problem = f"has no '{unknown}'{nearest_name(unknown, takes)}" if unknown else str(error)
+            raise self.refuse(node, f"{called.__name__}({', '.join(takes)}): {problem}") from error
+        if is_function or len(node.args) + len(given) == len(takes):
+            return []
+        return [
+            self.visit(given[name]) if name in given else self.literal(called._field_defaults[name], node, name)
+            for name in takes[len(node.args) :]
+        ]
+
+    def kind_of(self, node: ast.expr) -> Any:
+        """What is declared of a value, by the annotations of functions and of fields; None where nothing is."""
+        if isinstance(node, ast.Attribute) and (owner := self.row_of(node.value)) is not None:
+            return owner.__annotations__.get(node.attr)
+        if isinstance(node, ast.Call):
+            called = self.value_of(node.func)
+            if called is each or (isinstance(node.func, ast.Attribute) and node.func.attr == "_replace"):
+                return self.kind_of(node.func.value if isinstance(node.func, ast.Attribute) else node.args[1])
+            return getattr(called, "__annotations__", {}).get("return") if not is_row(called) else called
+        if isinstance(node, ast.Name) and node.id not in self.local:
+            return type(self.value_of(node))
+        return self.kinds.get(node.id) if isinstance(node, ast.Name) else None
+
+    def row_of(self, node: ast.expr) -> Any:
+        """The NamedTuple class that a value is declared to be, as its name stands now; None where it is none."""
+        kind = self.kind_of(node)
+        found = self.function.__globals__.get(kind if isinstance(kind, str) else getattr(kind, "__name__", ""), kind)
+        return found if is_row(found) else None
+
+    def fields_of(self, node: ast.expr) -> tuple[Any, list[ast.Attribute]]:
+        """The class of a row and an expression for each of its fields. ProgramError where the class is not declared."""
+        row, owner = self.stands_for(self.row_of(node)), node
+        while isinstance(owner, ast.Attribute):
+            owner = owner.value
+        if row is None or not isinstance(owner, ast.Name):
+            raise self.refuse(
+                node,
+                f"'{ast.unparse(node)}' must be a name that is annotated with its NamedTuple class, or a field of one",
+            )
+        return row, [ast.copy_location(ast.Attribute(node, name, ast.Load()), node) for name in row._fields]
+
+    def replaced(self, node: ast.Call, changed: ast.expr) -> ast.expr:
+        """``row._replace(field=...)`` as the row that it makes. ProgramError where there is no such field."""
+        row, fields = self.fields_of(changed)
+        given = {item.arg: item.value for item in node.keywords if item.arg is not None}
+        unknown = sorted(given.keys() - set(row._fields))
+        if unknown or node.args:
+            hint = nearest_name(unknown[0], row._fields) if unknown else ""
+            problem = f"has no '{unknown[0]}'{hint}" if unknown else "'_replace' takes fields by name"
+            raise self.refuse(node, f"{row.__name__}({', '.join(row._fields)}): {problem}")
+        values = [self.visit(given.get(item.attr, item)) for item in fields]
+        return ast.Call(ast.Name(self.add(row), ast.Load()), values, [])
+
+    def each_number(self, convert: ast.expr, node: ast.expr) -> ast.expr:
+        """``each(convert, row)`` as the row that it makes, number by number."""
+        row, fields = self.fields_of(node)
+        values = [
+            self.each_number(convert, item)
+            if is_row(row.__annotations__[item.attr])
+            else ast.Call(self.visit(convert), [self.visit(item)], [])
+            for item in fields
+        ]
+        return ast.Call(ast.Name(self.add(row), ast.Load()), values, [])
+
+    def value_of(self, node: ast.expr) -> Any:
+        """What a name or ``module.name`` stands for outside the function. ProgramError where it has no value."""
+        if isinstance(node, ast.Name):
+            return self.global_value(node)
+        if not isinstance(node, ast.Attribute):
+            return _INSIDE
+        owner = self.value_of(node.value)
+        if not isinstance(owner, types.ModuleType):
+            return _INSIDE
+        if not hasattr(owner, node.attr):
+            hint = nearest_name(node.attr, dir(owner))
+            raise self.refuse(node, f"module '{owner.__name__}' has no '{node.attr}'{hint}")
+        value = getattr(owner, node.attr)
+        self.note(vars(owner), node.attr, value)
+        return value
+
+    def global_value(self, node: ast.Name) -> Any:
+        """What a global name stands for now. ProgramError where it has no value."""
+        if node.id in self.local:
+            return _INSIDE
+        scope = self.function.__globals__
+        if node.id in scope:
+            self.note(scope, node.id, scope[node.id])
+            return scope[node.id]
+        if node.id not in COMPILED_BUILTINS:
+            if hasattr(builtins, node.id):
+                raise self.refuse(node, f"'{node.id}' cannot be compiled")
+            hint = nearest_name(node.id, [*self.local, *scope, *COMPILED_BUILTINS])
+            raise self.refuse(node, f"there is no '{node.id}'{hint}")
+        return getattr(builtins, node.id)
+
+    def stand_in(self, value: Any, node: ast.expr) -> ast.expr:
+        """What is written for a value from outside. ProgramError where it is nothing that can be compiled.
+
+        A function that remembers its results (``functools.lru_cache``) is what it remembers.
+        """
+        value = value.__wrapped__ if isinstance(value, functools._lru_cache_wrapper) else value
+        # ``inf`` and ``nan`` of math are written by name, as they are in most sources.
+        if isinstance(node, ast.Attribute) and self.value_of(node.value) is math:
+            return self.global_name("math", node.attr, node)
+        own = str(getattr(value, "__name__", ""))
+        if isinstance(value, types.BuiltinFunctionType) and getattr(math, own, None) is value:
+            return self.global_name("math", own, node)
+        if own in COMPILED_BUILTINS and getattr(builtins, own) is value:
+            return self.global_name("", own, node)
+        if isinstance(value, types.FunctionType) or is_row(value):
+            return self.global_name("", self.add(value), node)
+        name = ast.unparse(node)
+        if getattr(value, "__module__", "") == "numpy" or own.startswith("numpy"):
+            raise self.refuse(
+                node, f"'{name}' is from numpy, which cannot be compiled here; use 'math' for functions of one number"
+            )
+        return self.literal(value, node, f"'{name}'")
+
+    def global_name(self, module: str, name: str, node: ast.expr) -> ast.expr:
+        """A name of the generated module, which no local name may hide. ProgramError where a local name hides it."""
+        first = module or name
+        if first in self.local:
+            raise self.refuse(node, f"the local name '{first}' hides '{ast.unparse(node)}'; give it another name")
+        if not module:
+            return ast.Name(name, ast.Load())
+        return ast.Attribute(ast.Name(module, ast.Load()), name, ast.Load())
+
+    def literal(self, value: Any, where: ast.AST, name: str) -> ast.expr:
+        """A constant, to the last bit: a number, or a tuple or NamedTuple of them. ProgramError for anything else."""
+        if type(value) in (float, np.float64):
+            size: ast.expr = ast.Constant(abs(float(value)))
+            return ast.UnaryOp(ast.USub(), size) if math.copysign(1.0, value) < 0.0 else size
+        if type(value) is int and value < 0:
+            return ast.UnaryOp(ast.USub(), ast.Constant(-value))
+        if type(value) in (bool, int):
+            return ast.Constant(value)
+        if type(value) is tuple:
+            return ast.Tuple([self.literal(item, where, name) for item in value], ast.Load())
+        if is_row(type(value)):
+            fields = [self.literal(item, where, name) for item in value]
+            return ast.Call(ast.Name(self.add(type(value)), ast.Load()), fields, [])
+        if isinstance(value, types.FunctionType):
+            return ast.Name(self.add(value), ast.Load())
+        raise self.refuse(
+            where,
+            f"cannot compile {self.function.__qualname__}: {name} is not a number, a tuple of numbers, a plain "
+            f"function, a NamedTuple or the module math",
+        )
+
+
+def _parameters(code: types.CodeType) -> tuple[str, ...]:
+    """Names of the parameters of a function."""
+    return code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
 
 
 class Read(NamedTuple):

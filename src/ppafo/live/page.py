@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.engine.kept import kept
+from ppafo.engine.cache import kept_bytes
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 
@@ -239,7 +239,7 @@ def digest(text: str) -> str:
 
 def packed_once(content: bytes) -> str:
     """Return the same of what many pages hold, from the disk where it was packed before."""
-    return kept("packed", hashlib.sha256(content).hexdigest(), lambda: packed(content).encode()).decode()
+    return kept_bytes("packed", hashlib.sha256(content).hexdigest(), lambda: packed(content).encode()).decode()
 
 
 def packed(content: bytes) -> str:

@@ -6,7 +6,7 @@ chamber with its own orifice, a laminar part of the leak, friction that grows wi
 
 import math
 
-from ppafo.engine.reference.derivative import ExactOrifice, exact_flow
+from ppafo.engine.reference.right_hand_side import ExactOrifice, exact_flow
 from ppafo.model.plant import Openings, PlantParameters, chamber_volumes, driving_torque
 from ppafo.model.ports import admitted_flow
 from ppafo.model.thermal import (

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.constants import PASCALS_PER_PSI
-from ppafo.engine.reference.derivative import ExactOrifice
+from ppafo.engine.reference.right_hand_side import ExactOrifice
 from ppafo.engine.run import Run
 from ppafo.errors import ScenarioError
 from ppafo.model.plant import chamber_volumes

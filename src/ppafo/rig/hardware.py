@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.reference.derivative import ExactOrifice
+from ppafo.engine.reference.right_hand_side import ExactOrifice
 from ppafo.errors import ParameterError
 from ppafo.model.orifice_curves import area_conductance
 from ppafo.model.plant import PlantParameters

@@ -18,11 +18,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.entries import ARRAY, FLOAT, HEADER, INLINE, entry_text, with_arrays
-from ppafo.engine.loading import load_source
-from ppafo.engine.reference import vane_mode
-from ppafo.engine.reference.derivative import ExactOrifice
-from ppafo.engine.reference.sampling import SAME_TIME, solve_segment
+from ppafo.engine.loading import ARRAY, FLOAT, HEADER, INLINE, entry_text, load_source, with_arrays
+from ppafo.engine.reference.right_hand_side import ExactOrifice
+from ppafo.engine.reference.solver import SAME_TIME, Roots, after_stop, roots_at_rest, roots_sliding, solve_segment
 from ppafo.engine.rows import leaf_paths, numbers, rebuild, row_expression
 from ppafo.engine.run import Run
 from ppafo.engine.source_text import SourceCollector
@@ -257,12 +255,12 @@ class _Rig:
         function.direction = [-1, -1]
         return function
 
-    def roots(self, t: float, y: Floats) -> vane_mode.Roots:
+    def roots(self, t: float, y: Floats) -> Roots:
         """Distance from breakaway, or from standstill and the stop ahead."""
         if self.direction != 0.0:
-            return vane_mode.roots_sliding(self.plant, float(y[0]), float(y[1]), self.direction)
+            return roots_sliding(self.plant, float(y[0]), float(y[1]), self.direction)
         torque, limit = self.torque_and_limit(t, y)
-        return vane_mode.roots_at_rest(self.plant._replace(static_torque=limit), float(y[0]), torque)
+        return roots_at_rest(self.plant._replace(static_torque=limit), float(y[0]), torque)
 
     def observe(self, t: float, y: Floats) -> Floats:
         """Pressures, driving torque and static limit of a state."""
@@ -387,7 +385,7 @@ class _Rig:
         if abs(roots.second) < abs(roots.first):
             self.result.impacts.append(self.time)
             self.y[0] = plant.angle_max if self.direction > 0.0 else plant.angle_min
-            self.y[1] = vane_mode.after_stop(plant, float(self.y[1]))
+            self.y[1] = after_stop(plant, float(self.y[1]))
         else:
             self.y[1] = 0.0
         self.direction = float(np.sign(self.y[1])) if self.y[1] != 0.0 else self.rest_mode()

@@ -15,7 +15,7 @@ from ppafo.control.fixed.torque_laws import FIXED_LAWS
 from ppafo.control.fixed.whole_numbers import SETTINGS, Converter, converter_of
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.engine.program import NoParameters, Program
-from ppafo.engine.reference.derivative import ExactOrifice
+from ppafo.engine.reference.right_hand_side import ExactOrifice
 from ppafo.engine.rows import leaves, rebuilt
 from ppafo.engine.run import Lines, Run, Walk
 from ppafo.engine.scheme.actuators import volumes_of

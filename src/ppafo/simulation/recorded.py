@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ppafo.engine.replay import StepInputs, prescribe_recorded_angle
+from ppafo.engine.lanes import StepInputs, prescribe_recorded_angle
 from ppafo.engine.run import Run
 from ppafo.errors import DataError
 from ppafo.parameters.device import Device, Orifice

@@ -8,9 +8,8 @@ from typing import Any, final
 import numpy as np
 
 from ppafo.control.kind import PythonController
-from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, load_program, samples_in
-from ppafo.engine.links import python_place
-from ppafo.engine.metering import group_of
+from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, group_of, load_program, samples_in
+from ppafo.engine.program import python_place
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import Run
 from ppafo.engine.scheme.actuators import measurement_of

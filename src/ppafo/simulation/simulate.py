@@ -11,7 +11,7 @@ import numpy as np
 
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
-from ppafo.engine.links import python_place
+from ppafo.engine.program import python_place
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together
 from ppafo.engine.scheme.actuators import pressures_of, torque_of, volumes_of

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from ppafo.engine.reference.derivative import free_motion
+from ppafo.engine.reference.right_hand_side import free_motion
 from ppafo.engine.scheme.thermal_gas import ThermalFlows, thermal_flows
 from ppafo.errors import SimulationError
 from ppafo.model.orifice import orifice_flow

@@ -13,10 +13,9 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
-from ppafo.engine.composed_names import is_row
-from ppafo.engine.links import link_effects
+from ppafo.engine.program import link_effects
 from ppafo.engine.rows import is_number, members
-from ppafo.engine.source_text import SourceCollector, emitted_name
+from ppafo.engine.source_text import SourceCollector, emitted_name, is_row
 from ppafo.errors import ProgramError
 from ppafo.model.effects.kind import Effect
 from ppafo.translation import typed

@@ -11,9 +11,8 @@ from copy import copy
 from dataclasses import dataclass, field
 from typing import Any
 
-from ppafo.engine.compile_errors import place_in
-from ppafo.engine.entries import entry_types
-from ppafo.engine.plain_python import parse_module, refusal
+from ppafo.engine.loading import entry_types
+from ppafo.engine.plain_python import parse_module, place_in, refusal
 from ppafo.errors import ProgramError
 from ppafo.translation import typed
 from ppafo.translation.scopes import Names, changed, needed

@@ -7,8 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from ppafo.engine.lanes import Floats
-from ppafo.engine.replay import replay
+from ppafo.engine.lanes import Floats, replay
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of
 from ppafo.errors import DataError, SimulationError, UnitError, nearest_name, one_line
 from ppafo.model.plant import chamber_pressures

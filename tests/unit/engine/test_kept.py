@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.engine.kept import FOLDER, clear_kept, kept, kept_sizes
+from ppafo.engine.cache import FOLDER, clear_kept, kept_bytes, kept_sizes
 
 Make = Callable[[], bytes]
 
@@ -32,30 +32,30 @@ def only_file(cache: Path) -> Path:
 
 def test_the_same_is_made_once_and_something_else_anew(fresh_cache: Path) -> None:
     make, other = Maker(), Maker(b"other")
-    assert [kept("text", "a program", make) for _ in range(3)] == [b"made"] * 3
+    assert [kept_bytes("text", "a program", make) for _ in range(3)] == [b"made"] * 3
     assert make.times == 1
-    assert kept("text", "another program", other) == kept("form", "a program", other) == b"other"
+    assert kept_bytes("text", "another program", other) == kept_bytes("form", "a program", other) == b"other"
     assert other.times == 2
 
 
 @pytest.mark.parametrize("place", [0, 40, -1])
 def test_what_is_damaged_is_made_anew_and_kept_again(fresh_cache: Path, place: int) -> None:
     make = Maker(bytes(100))
-    kept("text", "a program", make)
+    kept_bytes("text", "a program", make)
     spoilt = bytearray(only_file(fresh_cache).read_bytes())
     spoilt[place] ^= 1
     only_file(fresh_cache).write_bytes(bytes(spoilt))
-    assert kept("text", "a program", make) == make.content
-    assert kept("text", "a program", make) == make.content
+    assert kept_bytes("text", "a program", make) == make.content
+    assert kept_bytes("text", "a program", make) == make.content
     assert make.times == 2
 
 
 @pytest.mark.parametrize("content", [b"", b"short"])
 def test_a_file_without_its_hash_is_not_read(fresh_cache: Path, content: bytes) -> None:
     make = Maker()
-    kept("text", "a program", make)
+    kept_bytes("text", "a program", make)
     only_file(fresh_cache).write_bytes(content)
-    assert kept("text", "a program", make) == b"made"
+    assert kept_bytes("text", "a program", make) == b"made"
     assert make.times == 2
 
 
@@ -64,7 +64,7 @@ def test_nothing_is_left_of_what_could_not_be_made(fresh_cache: Path) -> None:
         raise ValueError("it cannot be made")
 
     with pytest.raises(ValueError, match="cannot be made"):
-        kept("text", "a program", fail)
+        kept_bytes("text", "a program", fail)
     assert not (fresh_cache / FOLDER).exists()
 
 
@@ -72,25 +72,25 @@ def test_nothing_is_left_of_what_could_not_be_made(fresh_cache: Path) -> None:
 @pytest.mark.parametrize("where", ["", FOLDER])
 def test_a_folder_that_others_can_write_is_neither_read_nor_believed(fresh_cache: Path, where: str) -> None:
     make = Maker()
-    kept("text", "a program", make)
+    kept_bytes("text", "a program", make)
     (fresh_cache / where).chmod(0o777)
-    assert kept("text", "a program", make) == b"made"
+    assert kept_bytes("text", "a program", make) == b"made"
     assert make.times == 2
 
 
 def test_a_link_is_not_read_and_what_it_leads_to_is_not_removed(fresh_cache: Path, tmp_path: Path) -> None:
     make = Maker()
-    kept("text", "a program", make)
+    kept_bytes("text", "a program", make)
     file = only_file(fresh_cache)
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     file.rename(elsewhere / file.name)
     file.symlink_to(elsewhere / file.name)
-    assert kept("text", "a program", make) == b"made"
+    assert kept_bytes("text", "a program", make) == b"made"
     assert make.times == 2
     clear_kept(fresh_cache)
     (fresh_cache / FOLDER).symlink_to(elsewhere)
-    assert kept("text", "a program", make) == b"made"
+    assert kept_bytes("text", "a program", make) == b"made"
     assert make.times == 3
     assert clear_kept(fresh_cache) == 0
     assert (elsewhere / file.name).exists()
@@ -98,33 +98,33 @@ def test_a_link_is_not_read_and_what_it_leads_to_is_not_removed(fresh_cache: Pat
 
 def test_what_was_not_used_for_long_goes_and_what_was_used_stays(fresh_cache: Path) -> None:
     old, used = Maker(), Maker()
-    kept("text", "old", old)
+    kept_bytes("text", "old", old)
     before = set((fresh_cache / FOLDER).iterdir())
-    kept("text", "used", used)
+    kept_bytes("text", "used", used)
     half_a_year_ago = time.time() - 180.0 * 86400.0
     for file in (fresh_cache / FOLDER).iterdir():
         os.utime(file, (half_a_year_ago, half_a_year_ago))
-    kept("text", "used", used)
-    kept("text", "new", Maker())
+    kept_bytes("text", "used", used)
+    kept_bytes("text", "new", Maker())
     assert before.isdisjoint((fresh_cache / FOLDER).iterdir())
-    kept("text", "used", used)
+    kept_bytes("text", "used", used)
     assert used.times == 1
 
 
 def test_the_largest_size_is_kept_by_removing_what_was_used_first(
     fresh_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("ppafo.engine.kept.MAXIMUM_BYTES", 1000)
+    monkeypatch.setattr("ppafo.engine.cache.MAXIMUM_MADE_BYTES", 1000)
     for number in range(6):
-        kept("text", f"program {number}", Maker(bytes(300)))
+        kept_bytes("text", f"program {number}", Maker(bytes(300)))
     assert sum(kept_sizes(fresh_cache)) <= 1000
     last = Maker()
-    kept("text", "program 5", last)
+    kept_bytes("text", "program 5", last)
     assert last.times == 0
 
 
 def test_clearing_removes_it_and_leaves_what_others_put_there(fresh_cache: Path) -> None:
-    kept("text", "a program", Maker())
+    kept_bytes("text", "a program", Maker())
     theirs = fresh_cache / FOLDER / "notes.txt"
     theirs.write_text("mine")
     assert clear_kept(fresh_cache) == sum(map(len, [b"made"])) + 32

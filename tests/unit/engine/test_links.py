@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from ppafo.engine.links import link_effects, link_program
 from ppafo.engine.outline import Outline
+from ppafo.engine.program import link_effects, link_program
 from ppafo.engine.source_text import SourceCollector, woven
 from ppafo.errors import ProgramError
 from ppafo.model.declaration import Quantity

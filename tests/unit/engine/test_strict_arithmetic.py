@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from ppafo.engine import entries, lane_source
+from ppafo.engine import lane_source, loading
 from ppafo.engine.lane_source import HEADER, INLINE
 from tests.composed_programs import drawn_programs
 
@@ -29,7 +29,7 @@ def test_compiler_may_neither_reorder_nor_contract_nor_take_reciprocals() -> Non
     assert INEXACT.search(compiled("@njit(fastmath=True)")), "the check sees what is not allowed"
 
 
-@pytest.mark.parametrize("module", [lane_source, entries])
+@pytest.mark.parametrize("module", [lane_source, loading])
 def test_no_program_is_compiled_with_inexact_arithmetic(module: Any) -> None:
     texts = [value for value in vars(module).values() if isinstance(value, str) and "njit" in value]
     assert texts

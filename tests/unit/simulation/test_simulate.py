@@ -14,7 +14,7 @@ import pytest
 
 from ppafo.engine import lane_step
 from ppafo.engine.lanes import write_source
-from ppafo.engine.reference.agreement import compare_with_reference
+from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.sensors import Measurement

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ppafo.engine.reference.agreement import compare_with_reference
+from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.metrics.gas import energy_imbalance, gas_imbalance
 from ppafo.model.orifice import orifice_flow

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.engine.replay import StepInputs, replay
+from ppafo.engine.lanes import StepInputs, replay
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.errors import ParameterError, ScenarioError

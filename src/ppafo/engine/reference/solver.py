@@ -1,4 +1,8 @@
-"""Integrates one run with CVODE from event to event: samples, valve switchings, breakaway, reversal, stops."""
+"""Integrates one run with CVODE from event to event: samples, valve switchings, breakaway, reversal, stops.
+
+First the sampled controller beside a solution in continuous time, with what it sees and commands late; then stick, slip
+and stops as the modes between which the solver switches; then the solution; last how far the lanes are from it.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -7,23 +11,151 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.entries import with_arrays
-from ppafo.engine.lanes import samples_in
-from ppafo.engine.links import python_place
-from ppafo.engine.loading import load_source
-from ppafo.engine.reference import vane_mode
-from ppafo.engine.reference.sampling import SAME_TIME, SampledControl, Signals, solve_segment
-from ppafo.engine.reference.source import (
+from ppafo.engine.lanes import BatchResult, Floats, run_batch, samples_in
+from ppafo.engine.loading import load_source, with_arrays
+from ppafo.engine.program import python_place
+from ppafo.engine.reference.right_hand_side import (
     PLANT_UNKNOWNS,
     gas_unknowns,
     right_hand_side_source,
     unknowns_before_valve,
 )
+from ppafo.engine.reference.solver import ReferenceResult, solve_reference
 from ppafo.engine.rows import leaf_paths, numbers, rebuild
-from ppafo.engine.run import Run, states_at_start
-from ppafo.engine.scheme.actuators import driving_torque_of
+from ppafo.engine.run import Run, batch_of, states_at_start
+from ppafo.engine.scheme.actuators import driving_torque_of, measurement_of
 from ppafo.errors import SimulationError
 from ppafo.model.places import friction_at_rest, shown_signals
+from ppafo.model.plant import PlantParameters, chamber_pressures, driving_torque
+from ppafo.model.sensors import Measurement, measure
+from ppafo.model.vane import holds_still
+
+SAME_TIME = 1.0e-12
+
+Signals = tuple[float, float, float]
+"""Angle [rad] and both absolute pressures [Pa]."""
+
+
+class SampledControl:
+    """Keeps what the sensors have seen, the controller's state, and the commands that are on their way to the valve."""
+
+    def __init__(self, run: Run, first_signals: Signals) -> None:
+        if run.program.controller is None:
+            raise SimulationError("the reference solver runs controllers of the catalogue only")
+        self._run = run
+        self._controller = run.program.controller
+        self._state = run.program.controller.initial
+        self._first_signals = first_signals
+        self._seen: dict[int, Signals] = {}
+        self._on_the_way: list[tuple[float, float]] = []
+        self.decided = 0.0
+
+    def decide(self, sample: int, time: float, present: Signals) -> None:
+        """Take a sample at ``time`` [s] and send the new command on its way."""
+        run = self._run
+        wanted = run.program.reference.value(run.reference, time)[0]
+        seen = self._measurement(sample, present)
+        self.decided, self._state = self._controller.update(run.controller, self._state, wanted, seen, run.period)
+        self._on_the_way.append((time + run.command_delay, self.decided))
+
+    def looks(self, next_sample: int) -> dict[float, int]:
+        """Times [s] before the next sample at which a late sensor looks, each with the sample that will use it."""
+        run = self._run
+        if run.signal_delay <= 0.0:
+            return {}
+        ahead = range(next_sample, next_sample + int(run.signal_delay / run.period) + 2)
+        return {index * run.period - run.signal_delay: index for index in ahead}
+
+    def keep(self, sample: int, signals: Signals) -> None:
+        """Keep what a late sensor sees now for a sample to come."""
+        self._seen[sample] = signals
+
+    def arriving(self, time: float, command: float) -> float:
+        """Command at the valve at ``time`` [s]: the last that has arrived, else the one in force."""
+        while self._on_the_way and self._on_the_way[0][0] <= time + SAME_TIME:
+            command = self._on_the_way.pop(0)[1]
+        return command
+
+    def arrivals(self) -> list[float]:
+        """Times [s] at which commands will arrive."""
+        return [moment for moment, _ in self._on_the_way]
+
+    def _measurement(self, sample: int, present: Signals) -> Measurement:
+        run = self._run
+        before_start = sample * run.period < run.signal_delay - SAME_TIME
+        signals = self._seen.pop(sample, None) or (self._first_signals if before_start else present)
+        if run.program.ideal_sensors:
+            angle, pressure_1, pressure_2 = signals
+            return Measurement(
+                angle=angle,
+                pressure_1=pressure_1,
+                pressure_2=pressure_2,
+                torque=run.program.actuator.torque(run.plant, angle, pressure_1, pressure_2),
+            )
+        seen = measure(run.sensors, *signals, run.plant.torque_constant, sample)
+        return measurement_of(run.program.actuator, run.plant, seen) if run.program.has_shape else seen
+
+
+Floats = NDArray[np.float64]
+
+
+def solve_segment(solver: Any, y: Floats, time: float, end: float, wanted: Floats, name: str) -> Any:
+    """Solution from ``time`` to ``end`` [s], or to an event before, also at the ``wanted`` times that lie ahead.
+
+    ``wanted`` may hold times before ``time`` and after ``end``. SimulationError, which calls the solver ``name``, where
+    the solver gives up.
+    """
+    inside = wanted[(wanted > time + SAME_TIME) & (wanted < end - SAME_TIME)]
+    grid = np.unique(np.concatenate([[time], inside, [end]]))
+    # With only two times the solver would return its own steps instead of the end.
+    times = grid if grid.size > 2 else np.array([grid[0], 0.5 * (grid[0] + grid[1]), grid[1]])
+    solution = solver.solve(times, y)
+    if not solution.success:
+        raise SimulationError(f"{name} stopped at t = {solution.t[-1]:.6g} s: {solution.message}")
+    return solution
+
+
+SLOWEST_REBOUND = 1.0e-7
+
+
+class Roots(NamedTuple):
+    """Two root functions whose zeros end a mode; positive while the mode lasts."""
+
+    first: float
+    second: float
+
+
+def torque_on_vane(plant: PlantParameters, angle: float, mass_1: float, mass_2: float) -> float:
+    """Driving torque [N m] from the masses in the chambers."""
+    pressure_1, pressure_2 = chamber_pressures(plant, angle, mass_1, mass_2)
+    return driving_torque(plant, angle, pressure_1, pressure_2)
+
+
+def mode_at_rest(plant: PlantParameters, angle: float, torque: float) -> float:
+    """Direction in which a vane at ``angle`` [rad] sets off under ``torque`` [N m]: 1, -1, or 0 where it is held."""
+    if holds_still(torque, plant.static_torque, angle <= plant.angle_min, angle >= plant.angle_max):
+        return 0.0
+    return 1.0 if torque > 0.0 else -1.0
+
+
+def roots_at_rest(plant: PlantParameters, angle: float, torque: float) -> Roots:
+    """Distance of the torque from breakaway in both directions [N m]; a stop holds against any torque."""
+    towards_upper = 1.0 if angle >= plant.angle_max else plant.static_torque - torque
+    towards_lower = 1.0 if angle <= plant.angle_min else plant.static_torque + torque
+    return Roots(towards_upper, towards_lower)
+
+
+def roots_sliding(plant: PlantParameters, angle: float, angular_velocity: float, way: float) -> Roots:
+    """Speed along the way [rad/s] and distance from the stop ahead [rad]."""
+    ahead = plant.angle_max - angle if way > 0.0 else angle - plant.angle_min
+    return Roots(way * angular_velocity, ahead)
+
+
+def after_stop(plant: PlantParameters, angular_velocity: float) -> float:
+    """Angular velocity [rad/s] after an impact on a stop; 0 where the rebound is not worth following."""
+    rebound = -plant.restitution * angular_velocity
+    return rebound if abs(rebound) > SLOWEST_REBOUND else 0.0
+
 
 Floats = NDArray[np.float64]
 
@@ -146,16 +278,16 @@ class _Solution:
             max_num_steps=MAXIMUM_STEPS,
         )
 
-    def roots(self, y: Sequence[float]) -> vane_mode.Roots:
+    def roots(self, y: Sequence[float]) -> Roots:
         """Root functions of the present mode; Python's floats are several times quicker here than NumPy's."""
         plant = self.run.plant
         if self.way == 0.0:
-            return vane_mode.roots_at_rest(self.plant_at(y), y[0], self.torque(y))
-        return vane_mode.roots_sliding(plant, y[0], y[1], self.way)
+            return roots_at_rest(self.plant_at(y), y[0], self.torque(y))
+        return roots_sliding(plant, y[0], y[1], self.way)
 
     def rest_mode(self) -> float:
         """Mode of the vane at rest with the present gas."""
-        return vane_mode.mode_at_rest(self.plant_at(self.y.tolist()), self.y[0], self.torque(self.y.tolist()))
+        return mode_at_rest(self.plant_at(self.y.tolist()), self.y[0], self.torque(self.y.tolist()))
 
     def torque(self, y: Sequence[float]) -> float:
         """Driving torque [N m] with unknowns."""
@@ -281,7 +413,88 @@ class _Solution:
         if abs(roots.second) < abs(roots.first):
             self.result.impacts.append(self.time)
             self.y[0] = plant.angle_max if self.way > 0.0 else plant.angle_min
-            self.y[1] = vane_mode.after_stop(plant, self.y[1])
+            self.y[1] = after_stop(plant, self.y[1])
         else:
             self.y[1] = 0.0
         self.way = float(np.sign(self.y[1])) if self.y[1] != 0.0 else self.rest_mode()
+
+
+IMPACT_WINDOW = 5.0e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """Largest and root-mean-square differences as fractions of the angle range and of the supply's gauge pressure [-].
+
+    Where the supply is at the pressure of the atmosphere, that pressure stands for the gauge pressure. Instants within
+    5 ms of an impact on a stop are left out. ``supplied`` is relative, ``impacts`` in seconds.
+    """
+
+    angle: float
+    pressure_1: float
+    pressure_2: float
+    angle_rms: float
+    pressure_1_rms: float
+    pressure_2_rms: float
+    supplied: float
+    impacts: tuple[float, ...]
+
+    @property
+    def worst_pressure(self) -> float:
+        """The larger of the two largest pressure differences [-]."""
+        return max(self.pressure_1, self.pressure_2)
+
+    @property
+    def worst_rms(self) -> float:
+        """The largest of the root-mean-square differences [-]."""
+        return max(self.angle_rms, self.pressure_1_rms, self.pressure_2_rms)
+
+
+def compare_with_reference(run: Run, reference: ReferenceResult | None = None) -> Agreement:
+    """Run the lanes and, unless it is given, the reference solver, and compare them at the record times."""
+    judge = reference or solve_reference(run)
+    return measure_agreement(run, run_batch(batch_of(run)), judge)
+
+
+def measure_agreement(run: Run, outcome: BatchResult, reference: ReferenceResult) -> Agreement:
+    """Differences between a recorded run of the lanes and the reference."""
+    plant = run.plant
+    states = plant_states(run, outcome)
+    away = np.ones(reference.times.size, dtype=bool)
+    for impact in reference.impacts:
+        away &= np.abs(reference.times - impact) > IMPACT_WINDOW
+    gauge = max(plant.supply_pressure, plant.dorsiflexion_pressure) - plant.atmospheric_pressure
+    pressure_range = gauge if gauge > 0.0 else plant.atmospheric_pressure
+    ours, theirs = chamber_pressures_of(run, states), chamber_pressures_of(run, reference.states)
+    differences = [
+        (states[:, 0] - reference.states[:, 0]) / (plant.angle_max - plant.angle_min),
+        (ours[0] - theirs[0]) / pressure_range,
+        (ours[1] - theirs[1]) / pressure_range,
+    ]
+    largest = [float(np.abs(difference[away]).max()) for difference in differences]
+    rms = [float(np.sqrt(np.mean(difference[away] ** 2))) for difference in differences]
+    supplied = float(abs(states[-1, 4] - reference.states[-1, 4]) / max(abs(reference.states[-1, 4]), 1e-12))
+    return Agreement(
+        angle=largest[0],
+        pressure_1=largest[1],
+        pressure_2=largest[2],
+        angle_rms=rms[0],
+        pressure_1_rms=rms[1],
+        pressure_2_rms=rms[2],
+        supplied=supplied,
+        impacts=tuple(reference.impacts),
+    )
+
+
+def plant_states(run: Run, outcome: BatchResult) -> Floats:
+    """The seven numbers [SI] of ``PlantState`` at each record (records, 7) of the first run in a result."""
+    paths = [path for name, row in run.program.state_rows().items() for path in leaf_paths(row, name)]
+    first = paths.index("state.angle")
+    return outcome.record[:, first : first + 7, 0]
+
+
+def chamber_pressures_of(run: Run, states: Floats) -> tuple[Floats, Floats]:
+    """Both pressures [Pa absolute] of states (records, 7)."""
+    pressures = run.program.actuator.pressures
+    pairs = [pressures(run.plant, float(row[0]), float(row[2]), float(row[3])) for row in states]
+    return np.array([pair[0] for pair in pairs]), np.array([pair[1] for pair in pairs])

@@ -16,9 +16,8 @@ import numpy as np
 from ppafo.engine.lane_rows import HANDED, indent
 from ppafo.engine.lane_samples import REQUEST, TRACED, walk_traces
 from ppafo.engine.lane_source import HEADER, INLINE, lane_loop
-from ppafo.engine.links import link_program
 from ppafo.engine.outline import Outline
-from ppafo.engine.program import Program
+from ppafo.engine.program import Program, link_program
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import Collector, SourceCollector, woven
 from ppafo.metrics.catalog import METRICS

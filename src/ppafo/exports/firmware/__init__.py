@@ -6,9 +6,8 @@ from typing import Any, NamedTuple, get_type_hints
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.fixed.torque_laws import FIXED_LAWS, TARGETS, FixedLaw
 from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, LARGEST_READING, SETTINGS, Converter, Readings
-from ppafo.engine.composed_names import is_row
 from ppafo.engine.rows import is_number, leaf_paths, members, rebuilt
-from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.source_text import SourceCollector, is_row
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports.firmware.catalog import target_of
 from ppafo.exports.templates import filled, licence, template

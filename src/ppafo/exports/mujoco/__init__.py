@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ppafo.engine.replay import prescribe_recorded_angle
+from ppafo.engine.lanes import prescribe_recorded_angle
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.exports.c_library import commanded, scenario_library
 from ppafo.exports.c_library.files import OUTPUTS, Library, Setting, library_files, steps_source

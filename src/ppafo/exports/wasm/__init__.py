@@ -48,7 +48,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, final
 
-from ppafo.engine.kept import kept
+from ppafo.engine.cache import kept_bytes
 from ppafo.engine.outline import file_hash
 from ppafo.errors import ProgramError
 from ppafo.exports.c_library import library_of
@@ -95,7 +95,7 @@ def program_of(library: Library) -> bytes:
     outline = _unit(library, outline_of(library.program, names, library.further, LANES))
     translators = [*(files("ppafo.translation").iterdir()), *(files("ppafo.exports.c_library").iterdir()), __file__]
     hashes = sorted(f"{Path(str(file)).name} {file_hash(str(file))}" for file in translators)
-    digest = kept(
+    digest = kept_bytes(
         "digest",
         "\n".join([__version__, *hashes, *FLAGS, template("wasm", "math.h"), outline]),
         lambda: digest_of(source_of(library)).encode(),
@@ -104,7 +104,7 @@ def program_of(library: Library) -> bytes:
     if prebuilt is not None:
         return _programs().joinpath(prebuilt).read_bytes()
     check_can_build()
-    return kept("wasm", f"{digest} {compiler_version()}", lambda: build(source_of(library)))
+    return kept_bytes("wasm", f"{digest} {compiler_version()}", lambda: build(source_of(library)))
 
 
 def source_of(library: Library) -> str:

@@ -7,8 +7,7 @@ import math
 from functools import cache
 from types import ModuleType
 
-from ppafo.engine.entries import Table, Vector, array_module
-from ppafo.engine.loading import load_source
+from ppafo.engine.loading import Table, Vector, array_module, load_source
 
 
 @cache

@@ -18,8 +18,7 @@ from typing import Any, final
 
 import numpy as np
 
-from ppafo.engine.lanes import Floats
-from ppafo.engine.replay import StepInputs, replay
+from ppafo.engine.lanes import Floats, StepInputs, replay
 from ppafo.engine.run import Run, batch_of
 from ppafo.errors import SimulationError
 from ppafo.metrics.gas import gas_supplied

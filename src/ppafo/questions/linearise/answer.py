@@ -21,8 +21,7 @@ from ppafo.answers.style import (
     house_style,
     mark_kind,
 )
-from ppafo.engine.lanes import Floats
-from ppafo.engine.replay import StepInputs, replay
+from ppafo.engine.lanes import Floats, StepInputs, replay
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError, nearest_name, one_line
 from ppafo.model.plant import chamber_pressures

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from ppafo.engine.lanes import Floats, run_batch
-from ppafo.engine.links import python_place
-from ppafo.engine.program import Program
-from ppafo.engine.reference.vane_mode import mode_at_rest, torque_on_vane
+from ppafo.engine.program import Program, python_place
+from ppafo.engine.reference.solver import mode_at_rest, torque_on_vane
 from ppafo.engine.rows import leaf_paths, leaves, numbers, rebuilt
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.errors import ScenarioError, SimulationError

@@ -9,8 +9,7 @@ import numpy as np
 from ppafo.control.kind import PythonController
 from ppafo.engine.lane_samples import REQUEST as REQUEST_ROW
 from ppafo.engine.lane_source import SAME_MOMENT
-from ppafo.engine.lanes import Batch, BatchResult, Floats, run_blocks
-from ppafo.engine.metering import add_meters, group_of, meters_of
+from ppafo.engine.lanes import Batch, BatchResult, Floats, add_meters, group_of, meters_of, run_blocks
 from ppafo.engine.program import Program
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, Members

@@ -11,12 +11,11 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.entries import ARRAY, ARRAY_2D, ARRAY_3D, FLOAT, INT, entry_text, with_arrays
 from ppafo.engine.lane_rows import VECTOR, LaneRows, indent, lanes_of
 from ppafo.engine.lane_samples import SIGNALS, current_readings, pressures_of, sense, sense_gait
 from ppafo.engine.lane_source import HEADER, INLINE, lane_loop
 from ppafo.engine.lanes import SIGNAL_ROWS, Batch, Clock, Floats
-from ppafo.engine.loading import load_source
+from ppafo.engine.loading import ARRAY, ARRAY_2D, ARRAY_3D, FLOAT, INT, entry_text, load_source, with_arrays
 from ppafo.engine.program import LaneStart, Program
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.engine.entries import array_module
+from ppafo.engine.loading import array_module
 from ppafo.identification.trajectory import sample_loops
 from ppafo.identification.trajectory.sample_loops import (
     innovations,

@@ -14,8 +14,7 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from ppafo.engine.lanes import Batch, Floats
-from ppafo.engine.replay import StepInputs, replay
+from ppafo.engine.lanes import Batch, Floats, StepInputs, replay
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import Run, batch_of
 from ppafo.errors import SimulationError
