@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.lanes import BatchResult, Floats, run_batch, samples_in
+from ppafo.engine.lanes import BatchResult, run_batch, samples_in
 from ppafo.engine.loading import load_source, with_arrays
 from ppafo.engine.program import python_place
 from ppafo.engine.reference.right_hand_side import (
@@ -20,7 +20,6 @@ from ppafo.engine.reference.right_hand_side import (
     right_hand_side_source,
     unknowns_before_valve,
 )
-from ppafo.engine.reference.solver import ReferenceResult, solve_reference
 from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.engine.run import Run, batch_of, states_at_start
 from ppafo.engine.scheme.actuators import driving_torque_of, measurement_of
@@ -156,8 +155,6 @@ def after_stop(plant: PlantParameters, angular_velocity: float) -> float:
     rebound = -plant.restitution * angular_velocity
     return rebound if abs(rebound) > SLOWEST_REBOUND else 0.0
 
-
-Floats = NDArray[np.float64]
 
 MASS_TOLERANCE = 1e-15
 TOLERANCES = (1e-11, 1e-10, *(MASS_TOLERANCE,) * 5)
