@@ -37,10 +37,10 @@ from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import Control, Scenario
 from ppafo.simulation.simulate import simulate_many
 from ppafo.walking import load_walk
+from ppafo.walking.events import PHASE_ROW, REQUEST_ROW, VENTINGS_ROW
+from ppafo.walking.gait_series import ankle_path
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of, plan_walk
-from ppafo.walking.posture import ankle_path
-from ppafo.walking.recorded import PHASE_ROW, REQUEST_ROW, VENTINGS_ROW
 
 GAS_PRICE = 1.0e3
 """N m of RMS error (in push-off where it walks) that a kilogram of gas (in a stride) is worth: 1 N m per gram."""

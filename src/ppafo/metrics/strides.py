@@ -1,6 +1,6 @@
 """Metrics of a walk stride by stride, without a recording: one meter that goes through the samples once.
 
-What is counted is that of ``walking/strides.py`` and ``walking/walk_metrics.py``, which count it in a recording with
+What is counted is that of ``walking/strides.py`` and ``walking/strides.py``, which count it in a recording with
 its mean curves; tests hold both together.
 """
 

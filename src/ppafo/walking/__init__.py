@@ -1,11 +1,10 @@
 """The device on a walking leg: wearer, gait, sensors and event-based control, and the results."""
 
 from ppafo.simulation.scenario import Scenario
-from ppafo.walking.comparison import Comparison, compare_walks
 from ppafo.walking.loading import list_walks, load_walk
 from ppafo.walking.population import Population, walk_population
 from ppafo.walking.result import WalkResult
-from ppafo.walking.walk import walk
+from ppafo.walking.walk import Comparison, compare_walks, walk
 
 __all__ = [
     "Comparison",

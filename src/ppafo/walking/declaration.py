@@ -5,7 +5,7 @@ from ppafo.control.fixed.walking_numbers import FIXED_WALKS
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers
 from ppafo.model.declaration import Quantity
 from ppafo.simulation.declaration import PERIOD, RATE, SENSORS, THERMAL_GAS, line_paths
-from ppafo.walking import bottle_supply
+from ppafo.walking.bottle import BOTTLE, BOTTLE_NUMBERS
 from ppafo.walking.wearer import WEARER
 
 THRESHOLDS = next(iter(TIMINGS))
@@ -120,7 +120,7 @@ def quantities(controller: str, timing: str = THRESHOLDS) -> dict[str, Quantity]
         "sensors": (*WALK_SENSORS, *BANDWIDTHS, SEED),
         "run": (DURATION, STEP),
         "gas_model": THERMAL_GAS,
-        bottle_supply.SECTION: bottle_supply.NUMBERS,
+        BOTTLE: BOTTLE_NUMBERS,
     }
     found = {f"{section}.{item.name}": item for section, items in sections.items() for item in items}
     for sensor in FAULTY:

@@ -1,16 +1,26 @@
-"""A gait as the engine uses it: eight harmonics of each curve, its events, and how the heel meets the ground."""
+"""A gait on a leg: harmonics and events for the engine, how the heel rolls, and where shank and foot are.
+
+A gait file has angles only. The ankle's path follows from them: in stance the healthy foot rolls over heel and toes
+without sliding, in the swing the ankle goes over to the next foothold with the healthy toes above the ground. The same
+path carries the foot with and without the device; toes that come out below the ground would drag.
+"""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from ppafo.constants import STANDARD_GRAVITY
 from ppafo.gait import Gait
 from ppafo.gait.gait import Curve
+from ppafo.model.columns import over_runs
 from ppafo.model.contact import NEARLY_FLAT
 from ppafo.model.fourier import HARMONICS, Harmonic, Series
 from ppafo.model.gait import GaitSeries, GaitTiming
 from ppafo.signals.recording import Floats
+from ppafo.walking.preparation import rocker_on_heel
+from ppafo.walking.wearer import HeelRocker, Wearer
 
 FLAT_FROM, FLAT_TO = 0.15, 0.35
 """Phases between which every foot stands flat; the angle of the foot is taken from there."""
@@ -25,6 +35,29 @@ CLEARANCE_FROM, CLEARANCE_TO = 0.2, 0.9
 """Shares of the swing between which the toes must clear the ground."""
 
 ZERO = Series(mean=0.0, harmonics=(Harmonic(0.0, 0.0),) * HARMONICS)
+
+ANKLE_HEIGHT_FRACTION = 0.039 / 0.246
+"""Height of the ankle over the sole as a fraction of the shank's length: both as fractions of the stature in figure
+4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th ed. 2009."""
+
+MID_SWING_CLEARANCE = 0.015
+"""Healthy toes over the ground in mid-swing [m]; 1 to 2 cm (Winter 1992, Phys Ther 72:45)."""
+
+HAND_OVER = 0.02
+"""Difference of height [m] within which toes and heel both tell how high the ankle is in the swing, at most. Assumed:
+the ankle of a person has no kink; it is 0.9 cm higher than needed where both would touch."""
+
+DEFAULT_SPEED = 1.3
+"""Walking speed [m/s] where the gait has none; only for the length of the strides in pictures."""
+
+_GRID = np.linspace(0.0, 1.0, 1001)
+
+ROLL_ANGLES = tuple(math.radians(degrees) for degrees in range(2, 16))
+"""Tilts [rad] at which the lever of the ground force may have risen half of the way."""
+
+
+LONGER_THAN_A_FOOT = 1.0e3
+"""Lever [m] where nothing was measured: that of the heel bounds it."""
 
 
 def gait_series(gait: Gait) -> GaitSeries:
@@ -101,3 +134,143 @@ def gait_events(foot: Floats, stance_share: Floats) -> dict[str, Floats]:
         "clearance_to": stance_share + CLEARANCE_TO * swing,
         "ground_angle": ground_angle,
     }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Posture:
+    """Joints in the plane [m], each (samples, 2), x forward and y up from the ground."""
+
+    knee: Floats
+    ankle: Floats
+    heel: Floats
+    toe: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AnklePath:
+    """Path of the ankle [m] over the phases of one stride, and what it takes to place shank and foot on it."""
+
+    forward: Floats
+    up: Floats
+    stride_length: float
+    ground_angle: float
+    shank_length: float
+    heel_lever: float
+    toe_lever: float
+    height: float
+
+    def posture(self, turns: Floats, shank: Floats, ankle: Floats) -> Posture:
+        """Joints at a running phase [strides], for shank and ankle angles [rad]."""
+        phase = turns % 1.0
+        x = np.interp(phase, _GRID, self.forward) + self.stride_length * np.floor(turns)
+        joint = np.stack([x, np.interp(phase, _GRID, self.up)], axis=1)
+        knee = joint + self.shank_length * np.stack([-np.sin(shank), np.cos(shank)], axis=1)
+        tilt = shank - ankle + 0.5 * np.pi - self.ground_angle
+        return Posture(
+            knee, joint, joint + self._sole(tilt, -self.heel_lever), joint + self._sole(tilt, self.toe_lever)
+        )
+
+    def toe_height(self, phase: Floats, shank: Floats, ankle: Floats) -> Floats:
+        """Toes over the ground [m] at phases from 0 to 1; below 0 they would drag."""
+        return np.asarray(np.interp(phase % 1.0, _GRID, self.up) + self.toes_over_ankle(shank, ankle))
+
+    def toes_over_ankle(self, shank: Floats, ankle: Floats) -> Floats:
+        """Height of the toes over the ankle [m], below 0 with a flat foot."""
+        tilt = shank - ankle + 0.5 * np.pi - self.ground_angle
+        return np.asarray(self.toes_at(np.sin(tilt), np.cos(tilt)))
+
+    def toes_at(self, sine: Any, cosine: Any) -> Any:
+        """Height of the toes over the ankle [m], for sine and cosine of the sole's tilt: numbers or expressions."""
+        return self.toe_lever * sine - self.height * cosine
+
+    def ankle_height(self, phase: float) -> float:
+        """Height of the ankle over the ground [m] at a phase from 0 to 1."""
+        return float(np.interp(phase % 1.0, _GRID, self.up))
+
+    def _sole(self, tilt: Floats, lever: float) -> Floats:
+        along, up = np.cos(tilt), np.sin(tilt)
+        return np.stack([lever * along + self.height * up, lever * up - self.height * along], axis=1)
+
+
+def ankle_path(gait: Gait, timing: GaitTiming, wearer: Wearer) -> AnklePath:
+    """The path of the ankle [m] over one stride of a gait, for the segments of a wearer."""
+    height = ANKLE_HEIGHT_FRACTION * wearer.shank_length
+    shank, ankle = truncate(gait.shank_angle), truncate(gait.ankle_angle)
+    foot = shank.values_at(_GRID) - ankle.values_at(_GRID) + 0.5 * np.pi - timing.ground_angle
+    toes_down = height * np.cos(foot) - wearer.toe_lever * np.sin(foot)
+    heel_down = height * np.cos(foot) + wearer.heel_lever * np.sin(foot)
+    swing = np.clip((_GRID - timing.toe_off) / (1.0 - timing.toe_off), 0.0, 1.0)
+    up = _above(toes_down, heel_down, swing) + MID_SWING_CLEARANCE * np.sin(np.pi * swing) ** 2
+    length = (gait.walking_speed or DEFAULT_SPEED) * gait.stride_time
+    forward = _forward(foot, wearer, height, timing.toe_off, length)
+    levers = wearer.heel_lever, wearer.toe_lever
+    return AnklePath(forward, up, length, timing.ground_angle, wearer.shank_length, *levers, height)
+
+
+def _above(toes_down: Floats, heel_down: Floats, swing: Floats) -> Floats:
+    """Height of the ankle [m] that keeps toes and heel off the ground; late in the swing one goes over to the other.
+
+    In stance, at toe-off and at heel strike it is the higher of both.
+    """
+    width = HAND_OVER * swing**4 * (1.0 - swing) / (0.8**4 * 0.2)
+    return np.asarray(0.5 * (toes_down + heel_down + np.hypot(toes_down - heel_down, width)))
+
+
+def _forward(foot: Floats, wearer: Wearer, height: float, toe_off: float, length: float) -> Floats:
+    """Rolling over heel and toes in stance; in the swing a smooth way to the next foothold with equal speeds."""
+    on_heel = wearer.heel_lever * (np.cos(foot) - 1.0) - height * np.sin(foot)
+    on_toes = wearer.toe_lever * (1.0 - np.cos(foot)) - height * np.sin(foot)
+    rolled = np.where(foot > 0.0, on_heel, on_toes)
+    last = int(np.searchsorted(_GRID, toe_off)) - 1
+    speed = (rolled[last] - rolled[last - 10]) / (_GRID[last] - _GRID[last - 10])
+    way, span = rolled[0] + length - rolled[last], 1.0 - _GRID[last]
+    fraction = np.clip((_GRID - _GRID[last]) / span, 0.0, 1.0)
+    start = speed * span
+    cubic = start * fraction + (3.0 * way - 2.0 * start) * fraction**2 + (start - 2.0 * way) * fraction**3
+    return np.asarray(np.where(np.arange(_GRID.size) <= last, rolled, rolled[last] + cubic))
+
+
+class RockerFit(NamedTuple):
+    """What a gait tells of its heel: lever [m] nearly flat, what it gains far up, the tilt [rad] half way up."""
+
+    flat: float
+    rise: float
+    half: float
+
+
+def heel_rocker(gait: Gait, wearer: Wearer) -> HeelRocker:
+    """The lever over the tilt of the foot, as fitted to the gait and bounded by the heel of a wearer."""
+    return over_runs(rocker_on_heel, *fit_rocker(gait), wearer.heel_lever)
+
+
+def fit_rocker(gait: Gait) -> RockerFit:
+    """The lever over the tilt of the measured foot while it comes down on its heel alone, by least squares.
+
+    From the measured moment, which horizontal forces are part of, or without one from the centre of pressure. A heel
+    that is still up when the toes of the measured foot take over keeps the last lever. The lever of the heel itself
+    bounds it, and stands in where nothing was measured.
+    """
+    phases = np.linspace(0.0, landing_phase(gait), 151)
+    levers = _measured_levers(gait, phases)
+    if levers is None or gait.vertical_force is None:
+        return RockerFit(LONGER_THAN_A_FOOT, 0.0, ROLL_ANGLES[0])
+    tilt = np.maximum(foot_angles(gait, phases) - gait_timing(gait).ground_angle, 0.0)
+    force = np.maximum(truncate(gait.vertical_force).values_at(phases), 0.0)
+    flat = max(float(levers[-1]), 0.0)
+    _, rise, half = min(_rise(half, tilt, levers - flat, force) for half in ROLL_ANGLES)
+    return RockerFit(flat, rise, half)
+
+
+def _measured_levers(gait: Gait, phases: Floats) -> Floats | None:
+    if gait.ankle_moment is not None and gait.vertical_force is not None:
+        force = np.maximum(truncate(gait.vertical_force).values_at(phases) * STANDARD_GRAVITY, 1.0)
+        return np.asarray(-truncate(gait.ankle_moment).values_at(phases) / force)
+    return None if gait.centre_of_pressure is None else -truncate(gait.centre_of_pressure).values_at(phases)
+
+
+def _rise(half: float, tilt: Floats, levers: Floats, force: Floats) -> tuple[float, float, float]:
+    """Squares left over, the rise [m] of the lever far up, and the angle [rad] of half of it; weighted by the force."""
+    shape = force * tilt / (tilt + half)
+    rise = math.fsum(shape * force * levers) / max(math.fsum(shape * shape), 1.0e-12)
+    left = force * levers - rise * shape
+    return math.fsum(left * left), rise, half

@@ -1,7 +1,8 @@
-"""From a name or a file to a walk configuration; every mistake is one clear line."""
+"""From a name or a file to a scenario that is a walk; every mistake is one clear line."""
 
 import copy
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -15,10 +16,12 @@ from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
 from ppafo.gait import NORMATIVE, Gait, load_gait
+from ppafo.model.declaration import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG, Quantity
 from ppafo.model.regulator import SupplyLines
+from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters import ParameterSet
-from ppafo.parameters.device import Device
-from ppafo.parameters.graph import Graph
+from ppafo.parameters.device import Device, Valve
+from ppafo.parameters.graph import Follows, Graph, Term
 from ppafo.simulation.building import (
     Hardware,
     ScenarioRequest,
@@ -34,8 +37,7 @@ from ppafo.simulation.building import (
 from ppafo.simulation.declaration import ISOTHERMAL, PERIOD, RATE, SUPPLY_LINE, kind_at, value_at
 from ppafo.simulation.reading import Reading
 from ppafo.simulation.scenario import Assumption, Control, MotionKind, Origin, Scenario, Sensors
-from ppafo.walking import bottle_supply
-from ppafo.walking.bottle_supply import BottleSupply, read_bottle
+from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BOTTLE_OVERRIDES, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk, rules
 from ppafo.walking.course import WalkingCourse, load_course
 from ppafo.walking.declaration import (
@@ -55,13 +57,11 @@ from ppafo.walking.declaration import (
     quantities,
     timing_settings,
 )
-from ppafo.walking.following import links_of_defaults, with_default
-from ppafo.walking.gait_subject import read_wearer, wearer_origin
 from ppafo.walking.motion import WalkMotion, walk_of
-from ppafo.walking.planning import NO_REFERENCE, course_of_walk, noise, plan_walks, switches
+from ppafo.walking.planning import NO_REFERENCE, course_of_walk, noise, plan_walks, switches, walking_valve
+from ppafo.walking.preparation import FaultSettings, SensorSettings
 from ppafo.walking.result import lacks, measured
 from ppafo.walking.schema import walk_file
-from ppafo.walking.sensor_settings import FaultSettings, SensorSettings
 from ppafo.walking.varying import (
     PLACES,
     clock_with,
@@ -70,6 +70,7 @@ from ppafo.walking.varying import (
     record_interval,
     with_duration,
 )
+from ppafo.walking.wearer import read_wearer, wearer_origin
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 _TEXTS = (
@@ -80,12 +81,14 @@ _TEXTS = (
     "controller.kind",
     "timing.kind",
     "gas_model.kind",
-    bottle_supply.NAME,
+    BOTTLE_NAME,
     *(f"faults.{sensor}.kind" for sensor in FAULTY),
 )
 DEFAULT_PERIOD = 1.0e-3
 DEFAULT_DURATION, BOTTLE_DURATION = 60.0, 600.0
 """Length of a walk [s], and of one on a bottle, unless given or ended by the bottle before."""
+
+_TURN = 2.0 * math.pi
 
 
 def list_walks() -> tuple[str, ...]:
@@ -110,11 +113,11 @@ def load_walk(
     """
     file = label(str(name_or_path))
     given = tuple(overrides)
-    _check_given_once(given, {"gait": gait, "course": course, bottle_supply.NAME: bottle}, file)
+    _check_given_once(given, {"gait": gait, "course": course, BOTTLE_NAME: bottle}, file)
     content = FILE.parse(FILE.read(name_or_path), file)
     document = _apply_overrides(content, given, file)
     if bottle is not None:
-        document.setdefault(bottle_supply.SECTION, {})["name"] = str(bottle)
+        document.setdefault(BOTTLE, {})["name"] = str(bottle)
     load_walking_controller(kind_at(document, "controller"))
     validate(walk_file(), document, file, ScenarioError)
     reading = Reading(file, document, frozenset(split_override(text)[0] for text in given))
@@ -143,7 +146,7 @@ def load_walk(
         wearer_origin=wearer_origin(reading, walked, is_named),
         person=_person(reading),
     )
-    said = {"gait": gait, "course": course, bottle_supply.NAME: bottle}
+    said = {"gait": gait, "course": course, BOTTLE_NAME: bottle}
     more = tuple(f"{path}={_absolute(item)}" for path, item in said.items() if item is not None)
     supply, step = device.supply, reading.number("run.step", STEP)
     scenario = Scenario(
@@ -229,11 +232,11 @@ def _apply_overrides(document: dict[str, Any], overrides: tuple[str, ...], file:
         is_arithmetic = path == ARITHMETIC and kind_at(changed, "controller") in FIXED_WALKS
         if path in known or is_arithmetic:
             _set(changed, path, text)
-        elif path in bottle_supply.OVERRIDES:
-            own = changed.setdefault(bottle_supply.SECTION, {}).setdefault("overrides", [])
-            own.append(f"{bottle_supply.OVERRIDES[path]}={text}")
+        elif path in BOTTLE_OVERRIDES:
+            own = changed.setdefault(BOTTLE, {}).setdefault("overrides", [])
+            own.append(f"{BOTTLE_OVERRIDES[path]}={text}")
         elif not is_of_device(path):
-            hint = nearest_name(path, [*known, *bottle_supply.OVERRIDES, *device_paths()])
+            hint = nearest_name(path, [*known, *BOTTLE_OVERRIDES, *device_paths()])
             raise ScenarioError(f"override '{one_line(override)}': {file} has no value '{path}'{hint}")
     return changed
 
@@ -397,3 +400,36 @@ WALK = MotionKind(
     measured=measured,
 )
 """The motion of a scenario that walks."""
+
+
+def lag_of_bandwidth(bandwidth: float) -> float:
+    """Time constant [s] of a sensor of a bandwidth [Hz]; 0 for one that follows at once, whose bandwidth is 0."""
+    return 1.0 / (_TURN * bandwidth) if bandwidth > 0.0 else 0.0
+
+
+def links_of_defaults(sections: Mapping[str, Iterable[Quantity]], device: Device) -> Graph:
+    """Return the links of the quantities of some sections whose defaults follow others, by path."""
+    terms = _terms(device.valve)
+    return {
+        f"{section}.{item.name}": (Follows(tuple(terms[name] for name in item.follows), item.default or 0.0),)
+        for section, items in sections.items()
+        for item in items
+        if item.follows
+    }
+
+
+def with_default(item: Quantity, path: str, links: Graph, present: Callable[[str], Any]) -> Quantity:
+    """Return a quantity with the default that follows from what others are at ``present``."""
+    return replace(item, default=float(links[path][0].number(present))) if path in links else item
+
+
+def _terms(valve: Valve) -> dict[str, Term]:
+    kind = VALVES[valve.kind]
+    names = tuple(item.name for item in kind.quantities)
+    paths, delay = tuple(f"valve.{name}" for name in names), walking_valve(valve).command_delay
+    return {
+        VALVE_LAG: Term(paths, kind.lag or delay, names),
+        VALVE_DELAY: Term(paths, delay, names),
+        PRESSURE_LAG: Term(("sensors.pressure_bandwidth",), lag_of_bandwidth),
+        FORCE_LAG: Term(("sensors.force_bandwidth",), lag_of_bandwidth),
+    }

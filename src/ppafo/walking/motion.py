@@ -5,11 +5,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ppafo.gait import Gait
+from ppafo.gait.plausible import gait_file_remarks
 from ppafo.simulation.scenario import MotionKind, Scenario
-from ppafo.walking.bottle_supply import BottleSupply
+from ppafo.walking.bottle import BottleSupply
 from ppafo.walking.course import WalkingCourse
-from ppafo.walking.sensor_settings import FaultSettings
-from ppafo.walking.wearer import Wearer
+from ppafo.walking.preparation import FaultSettings
+from ppafo.walking.wearer import Wearer, who_walks
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,3 +47,10 @@ def walk_of(scenario: Scenario) -> WalkMotion:
     motion = scenario.motion
     assert isinstance(motion, WalkMotion), "only walks come here"
     return motion
+
+
+def person_remarks(scenario: Scenario) -> list[str]:
+    """Return who walks, and what is odd about the zero of the gait's ankle."""
+    motion = walk_of(scenario)
+    remarks = [f"remark: {text}" for text in gait_file_remarks(motion.gait)]
+    return [who_walks(motion.wearer, motion.gait, motion.wearer_origin), *remarks]

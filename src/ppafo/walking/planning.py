@@ -32,15 +32,16 @@ from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.plan import Pieces, Steps, compose_run, sensor_parameters, too_many_steps
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, ProfileChoice, Scenario
-from ppafo.walking.anthropometry import Build
-from ppafo.walking.course import WalkingCourse
-from ppafo.walking.course_planning import PlannedCourse, plan_course, standing_gait
-from ppafo.walking.heel_rocker import heel_rocker
+from ppafo.walking.course import PlannedCourse, WalkingCourse, plan_course, standing_gait
+from ppafo.walking.gait_series import heel_rocker
 from ppafo.walking.motion import walk_of
-from ppafo.walking.person import Person, crowd_of, leg_of_person, person_of, settings_of_person
+from ppafo.walking.person import Person, VariedGaits, crowd_of, leg_of_person, person_of, settings_of_person
 from ppafo.walking.preparation import (
+    FaultSettings,
+    SensorSettings,
     device_share,
     longest_delay,
+    sensors_of,
     smallest_chamber,
     vented_state,
     walk_from_standing,
@@ -48,9 +49,7 @@ from ppafo.walking.preparation import (
     walk_step_counts,
     with_leg,
 )
-from ppafo.walking.sensor_settings import FaultSettings, SensorSettings, sensors_of
-from ppafo.walking.varied_gait import VariedGaits
-from ppafo.walking.wearer import leg_parameters
+from ppafo.walking.wearer import Build, leg_parameters
 
 NO_REFERENCE = ProfileChoice("constant", {"level": 0.0})
 """A controller of walking makes its own."""

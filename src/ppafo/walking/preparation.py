@@ -6,6 +6,7 @@ in C. What a gait comes to (series, events, the fit of the heel) is data.
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from ppafo.engine.scheme.pneumatics import filling_time
 from ppafo.engine.scheme.walking import NO_CLEARANCE, DeviceShare, WalkState, foot_direction
@@ -26,6 +27,10 @@ STEPS_PER_FILLING = 15.0
 """Steps while the fastest of these chambers fills: at 1 kHz metrics then are good to 1 % (docs/decisions/0008)."""
 
 _TURN = 2.0 * math.pi
+
+NEVER = 1.0e9
+"""Time [s] of a fault that does not happen."""
+DISTORTED, FROZEN = "distorted", "frozen"
 
 
 def rocker_on_heel(flat: float, rise: float, half: float, heel_lever: float) -> HeelRocker:
@@ -243,3 +248,47 @@ def longest_delay(sensors: GaitSensors) -> float:
     forces = max(sensors.heel_fault.late_samples, sensors.toe_fault.late_samples)
     pressures = max(sensors.pressure_1_fault.late_samples, sensors.pressure_2_fault.late_samples)
     return max(forces, pressures, sensors.angle_fault.late_samples)
+
+
+@dataclass(frozen=True, slots=True)
+class FaultSettings:
+    """A kind of ``declaration.FAULT_KINDS`` and its numbers [SI]; no kind is a sensor without a fault."""
+
+    kind: str = ""
+    numbers: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class SensorSettings:
+    """Numbers [SI] of ``declaration.WALK_SENSORS``, and faults by the name of the sensor."""
+
+    numbers: Mapping[str, float]
+    faults: Mapping[str, FaultSettings]
+
+
+def sensors_of(settings: SensorSettings, period: float) -> GaitSensors:
+    """The sensors at a sample period [s] of the controller."""
+    faults = {f"{sensor}_fault": fault_of(fault, period) for sensor, fault in settings.faults.items()}
+    return gait_sensors(settings.numbers, period, **faults)
+
+
+def fault_of(fault: FaultSettings, period: float) -> Fault:
+    """A fault at a sample period [s] of the controller."""
+    given = fault.numbers
+    if not fault.kind:
+        return fixed_fault(NEVER, 0.0, 0.0, 0.0)
+    if fault.kind != DISTORTED:
+        holds = 1.0 if fault.kind == FROZEN else 0.0
+        return fixed_fault(given["time"], holds, given.get("reading", 0.0), given["period"])
+    return distorting_fault(
+        given["time"],
+        given["period"],
+        given["gain"],
+        given["offset"],
+        given["drift"],
+        given.get("crosstalk", 0.0),
+        given["lag"],
+        given["lost_share"],
+        given["delay"],
+        period,
+    )

@@ -19,7 +19,8 @@ from ppafo.simulation.schema import (
     quantity_fields,
     supply_line_table,
 )
-from ppafo.walking import bottle_supply, declaration
+from ppafo.walking import declaration
+from ppafo.walking.bottle import BOTTLE, BOTTLE_NUMBERS
 from ppafo.walking.wearer import WEARER
 
 
@@ -65,7 +66,7 @@ def _fault(sensor: str) -> Any:
 
 
 def _bottle() -> dict[str, Any]:
-    numbers = {item.name: optional(number_type(item), item.summary) for item in bottle_supply.NUMBERS}
+    numbers = {item.name: optional(number_type(item), item.summary) for item in BOTTLE_NUMBERS}
     changes: Any = (list[str], Field(default_factory=list, description="such as 'room.temperature=5 degC'"))
     return {"name": optional(str, "name of a bottle, or the path of its file"), **numbers, "overrides": changes}
 
@@ -105,7 +106,7 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
         "faults": optional(table("Faults", faults), "sensors that fail during the walk"),
         "gas_model": optional(gas_model_table(), "how the gas in the chambers behaves; isothermal unless given"),
         SUPPLY_LINE: optional(supply_line_table(), "regulators and lines of the gas; constant pressures unless given"),
-        bottle_supply.SECTION: optional(
+        BOTTLE: optional(
             table("WalkBottle", _bottle()), "bottle that the device hangs on; a supply without end unless given"
         ),
         "run": optional(table("WalkRun", run), "how long it is, and how it is computed"),

@@ -1,19 +1,29 @@
-"""A walk stride by stride: numbers of each stride, and curves averaged over strides at equal phases."""
+"""A walk stride by stride: numbers of each stride, mean curves, metrics of a walk, and of each segment of a course."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.control.walking.phases import PUSH_OFF
 from ppafo.control.walking.signs import HELPS
-from ppafo.metrics.strides import PER_STRIDE
+from ppafo.metrics import Metric
+from ppafo.metrics.strides import PER_STRIDE, SETTLING
+from ppafo.model.contact import FLAT, SWING
 from ppafo.signals import CHANNELS, Recording
-
-Floats = NDArray[np.float64]
+from ppafo.signals.recording import Floats
+from ppafo.simulation.scenario import Scenario
+from ppafo.walking.course import PlannedCourse, Span
+from ppafo.walking.gait_series import ankle_path, gait_timing
+from ppafo.walking.motion import walk_of
 
 PHASES = np.linspace(0.0, 1.0, 101)
 """Phases from heel strike to heel strike at which curves are averaged."""
+
+LOADED_HEEL = 0.1
+"""Body weights under the heel above which a push in plantarflexion is counted as one on a loaded heel."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,3 +85,271 @@ def times_of_phases(time: Floats, starts: NDArray[np.intp]) -> Floats:
 
 def _curves(strides: Floats, unit: str) -> Curves:
     return Curves(strides.mean(axis=0), strides.std(axis=0), unit)
+
+
+def walk_metrics(
+    configuration: Scenario,
+    recording: Recording,
+    strides: Mapping[str, Floats],
+    averages: Mapping[str, Curves],
+    starts: NDArray[np.intp],
+    helped: NDArray[np.bool_],
+    counted: NDArray[np.bool_],
+) -> dict[str, Metric]:
+    """Metrics of a walk by name, in SI, of its strides with help.
+
+    ``starts`` are the samples after each heel strike, ``helped`` tells which strides had help and ``counted`` which of
+    all are for means. ``averages`` are those of the counted strides with help.
+    """
+    counts = (
+        Metric(float(helped.size), "-", "whole strides of the walk"),
+        Metric(float(helped.sum()), "-", "whole strides with help from strike to strike"),
+        Metric(
+            float((~helped).sum()),
+            "-",
+            "whole strides with less help (lifted only, paused or stopped) in at least a part of them",
+        ),
+        Metric(float(np.ptp(recording["supplied_mass"][[0, -1]])), "kg", "gas taken from the supply in the whole walk"),
+    )
+    found = stride_metrics(configuration, strides, averages, helped & counted)
+    found |= dict(zip(("strides", "helped_strides", "vented_strides", "total_gas"), counts, strict=True))
+    return found | _tracking(recording, starts, helped & counted) | _safety(recording)
+
+
+def settled(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The chosen strides without the first ones of the walk."""
+    return chosen & (np.arange(chosen.size) >= SETTLING)
+
+
+def stride_metrics(
+    configuration: Scenario,
+    strides: Mapping[str, Floats],
+    averages: Mapping[str, Curves],
+    chosen: NDArray[np.bool_],
+) -> dict[str, Metric]:
+    """Means over the chosen strides (strides,), and what they are of a healthy ankle; ``averages`` are theirs too."""
+    found = {}
+    over = "" if walk_of(configuration).course is None else " over the strides at an even speed on level ground"
+    for name, item in PER_STRIDE.items():
+        values = strides[name][chosen]
+        if name == "slap_rate":
+            values = values[values < 0.0]
+        if values.size:
+            found[name] = Metric(float(values.mean()), item.unit, f"{item.summary}, mean{over}")
+    found["counted_strides"] = Metric(float(chosen.sum()), "-", "strides over which the means are taken")
+    healthy = healthy_positive_work(configuration)
+    if healthy > 0.0:
+        found["healthy_positive_work"] = Metric(healthy, "J", "positive work of the healthy ankle in one stride")
+        if "push_off_work" in found:
+            fraction = found["push_off_work"].value / healthy
+            found["push_off_share"] = Metric(
+                fraction, "-", "work of T_ex in push-off over the healthy ankle's positive work"
+            )
+    if "dorsiflexor_moment" in averages:
+        moment = float(averages["dorsiflexor_moment"].mean[:-1].mean())
+        found["dorsiflexor_moment"] = Metric(moment, "N m", "moment of the wearer's dorsiflexors, mean over the stride")
+    if "toe_height" in averages:
+        found["lowest_toes"] = lowest_toes(configuration, averages["toe_height"].mean)
+    if "angle" in averages:
+        away = averages["angle"].mean - averages["healthy_angle"].mean
+        found["angle_difference"] = Metric(
+            float(np.sqrt(np.mean(away**2))), "rad", "RMS difference of the mean ankle angle to the healthy one"
+        )
+    return found
+
+
+def lowest_toes(configuration: Scenario, height: Floats) -> Metric:
+    """Lowest toes in mid-swing, where they must clear the ground, from their height [m] at ``PHASES``."""
+    timing = gait_timing(walk_of(configuration).gait)
+    first, last = np.searchsorted(PHASES, [timing.clearance_from, timing.clearance_to])
+    return Metric(
+        float(height[first:last].min()), "m", "lowest toe height above ground in mid-swing of the mean stride"
+    )
+
+
+def _tracking(recording: Recording, starts: NDArray[np.intp], chosen: NDArray[np.bool_]) -> dict[str, Metric]:
+    """How well a controller that wants a torque gets it in push-off; nothing for others or without strides."""
+    if "reference" not in recording or not chosen.any():
+        return {}
+    pushes = samples_of(chosen, starts, recording.time.size) & (recording["controller_phase"] == PUSH_OFF)
+    error = (recording["reference"] - recording["torque"])[pushes]
+    if not error.size:
+        return {}
+    rms = float(np.sqrt(np.mean(error**2)))
+    return {"push_off_error": Metric(rms, "N m", "RMS of requested torque less actuator torque in push-off")}
+
+
+def _safety(recording: Recording) -> dict[str, Metric]:
+    """When the controller first helped less; nothing where it never did."""
+    if "safe_state" not in recording or not recording["safe_state"].any():
+        return {}
+    time = float(recording.time[int(np.argmax(recording["safe_state"] > 0.5))])
+    return {"safe_state_time": Metric(time, "s", "time at which the controller first lifted only, paused or stopped")}
+
+
+def healthy_positive_work(configuration: Scenario) -> float:
+    """Positive work [J] of the measured ankle moment in one stride of the wearer; 0 where no moment was measured."""
+    gait = walk_of(configuration).gait
+    if "ankle_moment" not in gait.curves:
+        return 0.0
+    phases = np.linspace(0.0, 1.0, 2001)
+    moment = walk_of(configuration).wearer.body_mass * gait.curve("ankle_moment").values_at(phases)
+    angle = gait.ankle_angle.values_at(phases)
+    power = np.maximum(moment * np.gradient(angle, phases), 0.0)
+    return float(np.trapezoid(power, phases))
+
+
+def healthy_toe_height(configuration: Scenario) -> Floats:
+    """Toes of the healthy gait over the ground [m] at ``PHASES``."""
+    gait = walk_of(configuration).gait
+    path = ankle_path(gait, gait_timing(gait), walk_of(configuration).wearer)
+    return path.toe_height(PHASES % 1.0, gait.shank_angle.values_at(PHASES), gait.ankle_angle.values_at(PHASES))
+
+
+@dataclass(frozen=True, slots=True)
+class SegmentResult:
+    """One segment of a course, from ``start`` to ``end`` [s], SI units.
+
+    ``strides`` begin in it with a strike, ``helped`` are those of them in which the controller was not in its safe
+    state up to the next strike, or to the end. ``gas`` [kg], ``push_off_work`` [J] of the strides that begin in it,
+    ``lowest_toes`` [m] over the ground in the middle of its swings, None without one. ``flat_push`` [N m] is the
+    largest torque in plantarflexion with a loaded heel, ``safe_time`` [s] when the controller first helped less (lifted
+    only, paused or stopped), None where it did not.
+    """
+
+    kind: str
+    title: str
+    start: float
+    end: float
+    strides: int
+    helped: int
+    gas: float
+    push_off_work: float
+    lowest_toes: float | None
+    flat_push: float
+    safe_time: float | None
+
+
+def steady_strides(planned: PlannedCourse, strikes: Floats) -> NDArray[np.bool_]:
+    """True for each whole stride, between strikes at times [s], at an even speed on level ground."""
+    first, last = strikes[:-1], strikes[1:]
+    steady = np.zeros(first.size, dtype=np.bool_)
+    for start, end in planned.steady:
+        steady |= (first >= start) & (last <= end)
+    return steady
+
+
+def segment_results(
+    configuration: Scenario,
+    planned: PlannedCourse,
+    recording: Recording,
+    works: Floats,
+    starts: NDArray[np.intp],
+) -> tuple[SegmentResult, ...]:
+    """The segments that a recording reached; ``works`` [J] of its whole strides, between strikes at ``starts``."""
+    end = float(recording.time[-1])
+    reached = [span for span in planned.spans if float(span.start) < end]
+    return tuple(_segment(configuration, span, recording, works, starts) for span in reached)
+
+
+def _segment(
+    configuration: Scenario, span: Span, recording: Recording, works: Floats, starts: NDArray[np.intp]
+) -> SegmentResult:
+    time = recording.time
+    last = min(float(span.end), float(time[-1]))
+    own = (time >= float(span.start)) & (time <= last)
+    strikes = time[starts]
+    begun = np.flatnonzero((strikes >= float(span.start)) & (strikes < last))
+    gas = np.interp([float(span.start), last], time, recording["supplied_mass"])
+    heel = (
+        recording["heel_force"]
+        > LOADED_HEEL * walk_of(configuration).wearer.body_mass * walk_of(configuration).wearer.leg().gravity
+    )
+    loaded = own & heel & (recording["contact"] <= FLAT) & (recording["contact"] != SWING)
+    push = recording["torque"][loaded]
+    return SegmentResult(
+        kind=span.kind,
+        title=span.title,
+        start=float(span.start),
+        end=last,
+        strides=begun.size,
+        helped=_helped(recording, begun, starts),
+        gas=float(gas[1] - gas[0]),
+        push_off_work=float(works[begun[begun < works.size]].sum()),
+        lowest_toes=_lowest_toes(configuration, recording, own),
+        flat_push=max(float(push.max()), 0.0) if push.size else 0.0,
+        safe_time=_safe_time(recording, own),
+    )
+
+
+def _helped(recording: Recording, begun: NDArray[np.intp], starts: NDArray[np.intp]) -> int:
+    """Number of strides without the safe state; none where no controller works."""
+    if "safe_state" not in recording:
+        return 0
+    safe = recording["safe_state"] > 0.5
+    edges = np.append(starts, recording.time.size)
+    return sum(not safe[edges[stride] : edges[stride + 1]].any() for stride in begun)
+
+
+def _lowest_toes(configuration: Scenario, recording: Recording, own: NDArray[np.bool_]) -> float | None:
+    """Lowest toes [m] where they must clear the ground: as far into each swing as for the mean stride of a walk."""
+    timing = gait_timing(walk_of(configuration).gait)
+    swing = recording["contact"] == SWING
+    edges = np.flatnonzero(np.diff(swing.astype(np.int8))) + 1
+    found = []
+    for first, last in pairwise(edges.tolist()):
+        if not (swing[first] and own[first]):
+            continue
+        span = 1.0 - timing.toe_off
+        middle = [first + round((last - first) * (at - timing.toe_off) / span) for at in timing[4:6]]
+        found.append(float(recording["toe_height"][middle[0] : middle[1] + 1].min()))
+    return min(found, default=None)
+
+
+def _safe_time(recording: Recording, own: NDArray[np.bool_]) -> float | None:
+    """When the controller first helped less within a segment [s]; None where it did not."""
+    if "safe_state" not in recording:
+        return None
+    safe = recording["safe_state"] > 0.5
+    begins = np.flatnonzero(own & safe & ~np.append(False, safe[:-1]))
+    return float(recording.time[begins[0]]) if begins.size else None
+
+
+_SAME_TIME = 0.05
+"""Time [s] by which a recording may end before its course: its samples."""
+
+
+def is_whole_course(walked: float, planned: float) -> bool:
+    """True where a course of a planned time [s] was walked to its end, after a time [s] by its recording."""
+    return walked >= planned - _SAME_TIME
+
+
+def course_metrics(
+    planned: PlannedCourse, segments: Sequence[SegmentResult], recording: Recording, steady: int
+) -> dict[str, Metric]:
+    """Numbers of a whole course by name, SI units, or of what was walked of it."""
+    toes = [segment.lowest_toes for segment in segments if segment.lowest_toes is not None]
+    # A walk may go on after its course.
+    end = min(float(recording.time[-1]), float(planned.duration))
+    gas = float(np.interp(end, recording.time, recording["supplied_mass"]))
+    found = {
+        "course_time": Metric(end, "s", "length of the course, as far as it was walked"),
+        "course_planned_time": Metric(float(planned.duration), "s", "length of the whole course"),
+        "steady_strides": Metric(float(steady), "-", "whole strides at an even speed on level ground"),
+        "course_strides": Metric(float(sum(item.strides for item in segments)), "-", "strides of the course"),
+        "course_gas": Metric(gas, "kg", "gas taken from the supply on the course"),
+        "course_work": Metric(
+            sum(item.push_off_work for item in segments), "J", "work of T_ex while the foot rolls over the toes"
+        ),
+        "course_flat_push": Metric(
+            max((item.flat_push for item in segments), default=0.0),
+            "N m",
+            "largest torque in plantarflexion with a loaded heel",
+        ),
+    }
+    if toes:
+        found["course_lowest_toes"] = Metric(min(toes), "m", "lowest toes over the ground in the middle of a swing")
+    if "walking_speed" in recording:
+        way = float(np.trapezoid(recording["walking_speed"], recording.time))
+        found["course_length"] = Metric(way, "m", "way on the course")
+    return found

@@ -1,11 +1,25 @@
-"""Who wears the device: segments of one leg and the ankle, in SI units."""
+"""Who wears the device: segments of one leg and the ankle, in SI units, and how wearers differ.
 
-from dataclasses import dataclass
+A person is scaled in mass and length. A segment keeps its fraction of the body mass, its fraction of the body's length,
+and where its mass lies in it (as in table 4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th ed.
+2009). So masses go with body mass, lengths with stature, and inertias with mass times length squared; the fractions are
+those of the wearer that is scaled. Tissue stays as it is. Where a walk file does not say who walks, it is the subject
+of the gait, or the paper's where no gait is named.
+"""
+
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+import numpy as np
+
 from ppafo.constants import STANDARD_GRAVITY
+from ppafo.errors import ScenarioError
+from ppafo.gait import Gait
 from ppafo.model.declaration import Quantity
 from ppafo.model.leg import LegParameters
+from ppafo.signals.recording import Floats
+from ppafo.simulation.declaration import value_at
+from ppafo.simulation.reading import Reading
 
 WEARER = (
     Quantity("body_mass", "kg", "mass of the body", 72.5, 10.0, 300.0),
@@ -34,6 +48,28 @@ WEARER = (
     ),
 )
 """Defaults: the paper's subject (after equation (12)); what it does not print is said in docs/decisions/0008."""
+
+MASS_VARIATION = 0.166
+STATURE_VARIATION = 0.039
+"""Standard deviation over mean of body mass and stature: 85.5 +- 14.2 kg and 1756 +- 69 mm for men in ANSUR II (Gordon
+et al. 2014, NATICK/TR-15/007)."""
+
+CORRELATION = 0.5
+"""Between body mass and stature. Assumed: the survey's table of means does not give it."""
+
+MAXIMUM_DEVIATIONS = 2.5
+"""Draws further from the mean than this are taken at this distance."""
+
+_LENGTHS = ("shank_length", "shank_mass_centre", "foot_mass_centre", "heel_lever", "toe_lever")
+_MASSES = ("shank_mass", "foot_mass")
+_INERTIAS = ("shank_inertia", "foot_inertia")
+
+SHANK_SHARE = 0.246
+"""Knee to ankle as a share of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th
+ed. 2009. The paper prints a shank of 0.46 m and no stature, which makes 1.87 m."""
+
+_SAME = 1.0e-3
+"""Share of the body mass that is rounding."""
 
 
 class HeelRocker(NamedTuple):
@@ -96,3 +132,81 @@ def leg_parameters(wearer: Wearer, rocker: HeelRocker) -> LegParameters:
 def paper_subject() -> Wearer:
     """The wearer of the defaults."""
     return Wearer(**{item.name: float(item.default or 0.0) for item in WEARER})
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Build:
+    """Body mass and stature of many people over those of one, each (people,)."""
+
+    mass: Floats
+    stature: Floats
+
+
+def draw_builds(count: int, generator: np.random.Generator) -> Build:
+    """Draw the build of ``count`` people; the first is the wearer that is scaled."""
+    normal = draw_bounded_normal(generator, (2, count))
+    stature = normal[0]
+    mass = CORRELATION * normal[0] + np.sqrt(1.0 - CORRELATION**2) * normal[1]
+    scaled = 1.0 + MASS_VARIATION * mass, 1.0 + STATURE_VARIATION * stature
+    for values in scaled:
+        values[0] = 1.0
+    return Build(*scaled)
+
+
+def draw_bounded_normal(generator: np.random.Generator, shape: tuple[int, ...]) -> Floats:
+    """Standard normal draws [-] of this shape, those beyond ``MAXIMUM_DEVIATIONS`` set to that limit."""
+    return np.clip(generator.standard_normal(shape), -MAXIMUM_DEVIATIONS, MAXIMUM_DEVIATIONS)
+
+
+def segment_values(wearer: Wearer, build: Build) -> dict[str, Floats]:
+    """Values of the leg (people,) by field of ``LegParameters``, in SI units."""
+    found = {name: getattr(wearer, name) * build.stature for name in _LENGTHS}
+    found |= {name: getattr(wearer, name) * build.mass for name in _MASSES}
+    found |= {name: getattr(wearer, name) * build.mass * build.stature**2 for name in _INERTIAS}
+    return {"body_mass": wearer.body_mass * build.mass, **found}
+
+
+def gait_subject(gait: Gait) -> Wearer:
+    """Return the wearer with body mass, and lengths where the stature is known, of the subject of a gait."""
+    paper = paper_subject()
+    stature = 1.0 if gait.stature is None else SHANK_SHARE * gait.stature / paper.shank_length
+    build = Build(np.array([gait.body_mass / paper.body_mass]), np.array([stature]))
+    segments = {name: float(values[0]) for name, values in segment_values(paper, build).items()}
+    return replace(paper, **segments)
+
+
+def read_wearer(reading: Reading, gait: Gait, is_named: bool) -> Wearer:
+    """Return the wearer of a walk file; what it leaves out is of the gait's subject, or of the paper's by default."""
+    if not is_named:
+        return Wearer(**reading.section("wearer", WEARER))
+    subject = gait_subject(gait)
+    quantities = tuple(replace(item, default=getattr(subject, item.name)) for item in WEARER)
+    for item in quantities:
+        value = getattr(subject, item.name)
+        if not item.minimum <= value <= item.maximum and value_at(reading.document, f"wearer.{item.name}") is None:
+            raise ScenarioError(
+                f"{reading.file}: gait '{gait.name}' is of a subject of {gait.body_mass:g} kg, which makes "
+                f"wearer.{item.name} {value:.3g} {item.unit}; a wearer has {item.minimum:g} to {item.maximum:g} "
+                f"{item.unit}: give wearer.{item.name}"
+            )
+    return Wearer(**reading.section("wearer", quantities))
+
+
+def wearer_origin(reading: Reading, gait: Gait, is_named: bool) -> str:
+    """Return where the body mass of the wearer comes from, in words."""
+    if value_at(reading.document, "wearer.body_mass") is not None:
+        return "as wearer.body_mass states"
+    return f"the subject of gait '{gait.name}'" if is_named else "the paper's subject"
+
+
+def who_walks(wearer: Wearer, gait: Gait, origin: str) -> str:
+    """Return one line on the person who walks, and on the gait's own subject where that is another."""
+    line = f"wearer: {wearer.body_mass:.4g} kg, {origin}"
+    if origin.startswith("the subject of"):
+        return line if gait.stature is None else f"{line}, {gait.stature:.4g} m"
+    if abs(wearer.body_mass - gait.body_mass) <= _SAME * gait.body_mass:
+        return line
+    return (
+        f"{line}; the subject of gait '{gait.name}' has {gait.body_mass:.4g} kg: moment and force of the gait are "
+        "scaled by body mass"
+    )

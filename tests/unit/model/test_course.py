@@ -10,8 +10,15 @@ from ppafo.gait import load_gait
 from ppafo.model.contact import foot_angle
 from ppafo.model.course import SCUFF_FORCE, STANDS_AT, Course, gait_on_course, pace_in, part_at
 from ppafo.model.gait import GaitNow, gait_at
-from ppafo.walking.course import Segment, WalkingCourse, list_courses, load_course
-from ppafo.walking.course_planning import PlannedCourse, pace_in_time, turns_walked
+from ppafo.walking.course import (
+    PlannedCourse,
+    Segment,
+    WalkingCourse,
+    list_courses,
+    load_course,
+    pace_in_time,
+    turns_walked,
+)
 from ppafo.walking.gait_series import gait_series, gait_timing
 from ppafo.walking.planning import planned_course
 from ppafo.walking.wearer import paper_subject

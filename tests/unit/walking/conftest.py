@@ -17,7 +17,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.walking import load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk
-from ppafo.walking.sensor_settings import FaultSettings
+from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.varying import with_duration
 from ppafo.walking.wearer import paper_subject
 

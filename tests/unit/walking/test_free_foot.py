@@ -18,8 +18,7 @@ from ppafo.model.gait import gait_at
 from ppafo.model.leg import foot_inertia_about_ankle, passive_torque
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import Scenario
-from ppafo.walking.gait_series import landing_phase, truncate
-from ppafo.walking.heel_rocker import heel_rocker
+from ppafo.walking.gait_series import heel_rocker, landing_phase, truncate
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.wearer import Wearer, paper_subject

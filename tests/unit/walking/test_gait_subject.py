@@ -9,8 +9,7 @@ from ppafo.errors import ScenarioError
 from ppafo.gait import load_gait
 from ppafo.gait.document import gait_toml
 from ppafo.walking import load_walk
-from ppafo.walking.gait_subject import person_remarks
-from ppafo.walking.motion import walk_of
+from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.wearer import paper_subject
 
 

@@ -6,11 +6,10 @@ from dataclasses import replace
 import pytest
 
 from ppafo.gait import load_gait
-from ppafo.walking.comparison import compare_walks
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.population import walk_population
-from ppafo.walking.walk import walk
+from ppafo.walking.walk import compare_walks, walk
 
 MINUTES = 0.25
 SLOW = 0.99

@@ -12,13 +12,13 @@ from ppafo.errors import ParameterError, ScenarioError, SimulationError
 from ppafo.parameters.bottles.bottle import FILE as BOTTLES
 from ppafo.questions.league.walking.task import walking_task
 from ppafo.questions.timing.solve import event_timing
-from ppafo.walking import load_walk, on_bottle, walk, walk_population
-from ppafo.walking.comparison import compare_walks, with_device_off
+from ppafo.walking import bottle, load_walk, walk, walk_population
 from ppafo.walking.loading import FILE
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.result import WalkResult
 from ppafo.walking.varying import with_duration
+from ppafo.walking.walk import compare_walks, with_device_off
 from tests.judge import bottle as independent
 
 WALK, BOTTLE = "solenoid-regulators", "paper-co2-9oz"
@@ -145,9 +145,9 @@ def test_a_walk_that_diverges_ends_so_and_says_what_was_let_through_before(
     chosen = load_walk(WALK, bottle=BOTTLE)
     run = plan_walk(with_duration(chosen, 12.0))
     rows = row_numbers(run.program.state_rows())
-    monkeypatch.setattr(on_bottle, "begin_block", lambda batch: Breaking(wrong, good, rows, batch.states))
+    monkeypatch.setattr(bottle, "begin_block", lambda batch: Breaking(wrong, good, rows, batch.states))
     assert walk_of(chosen).bottle is not None
-    _, course = on_bottle.run_on_bottle(run, walk_of(chosen).bottle, 1.1, lambda *_: None)
+    _, course = bottle.run_on_bottle(run, walk_of(chosen).bottle, 1.1, lambda *_: None)
     assert course.ending.kind == "diverged"
     assert "diverged, and 255 g were left" in course.ending.message
     assert course.ending.time == pytest.approx(min(0.25, 0.1 * (good + 1)) if "failure" in wrong else 0.1 * (good + 1))
@@ -250,6 +250,6 @@ def test_a_bottle_that_ends_a_walk_within_the_first_strides_is_named_with_its_ti
     assert small.supply is not None
     ending = small.supply.ending._replace(time=3.1, message="the bottle is empty")
     ended = replace(small, supply=replace(small.supply, ending=ending))
-    monkeypatch.setattr("ppafo.walking.comparison.walk", lambda *_, **__: ended)
+    monkeypatch.setitem(compare_walks.__globals__, "walk", lambda *_, **__: ended)
     with pytest.raises(SimulationError, match=r"the bottle is empty, after 3\.1 s: fewer than 5 strides"):
         compare_walks(small.scenario)

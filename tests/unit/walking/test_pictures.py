@@ -10,13 +10,11 @@ import pytest
 from ppafo.answers.writing import text_of
 from ppafo.questions.walk.answer import comparison_table, wearers_answer
 from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk, walk_population
-from ppafo.walking.figures.animation import animation
-from ppafo.walking.figures.legs import drags, frames_figure, last_phases, legs_of
+from ppafo.walking.figures.legs import animation, drags, frames_figure, last_phases, legs_of, strip_figure
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.over_time import over_time_figure
-from ppafo.walking.figures.phases import strip_figure
-from ppafo.walking.figures.wearers import population_figure
 from ppafo.walking.motion import walk_of
+from ppafo.walking.population import population_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

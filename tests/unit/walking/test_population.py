@@ -12,21 +12,20 @@ from ppafo.gait import load_gait
 from ppafo.gait.gait import KNEE, Curve
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.walking import load_walk, walk_population
-from ppafo.walking.anthropometry import (
+from ppafo.walking.gait_series import gait_timing
+from ppafo.walking.motion import walk_of
+from ppafo.walking.person import SERIES, START_VARIATION, THRESHOLD_VARIATION, SeriesOfMany, draw_gaits
+from ppafo.walking.planning import batch_of_many, plan_walk
+from ppafo.walking.varying import with_duration
+from ppafo.walking.wearer import (
     MASS_VARIATION,
     STATURE_VARIATION,
     Build,
     draw_bounded_normal,
     draw_builds,
+    paper_subject,
     segment_values,
 )
-from ppafo.walking.gait_series import gait_timing
-from ppafo.walking.motion import walk_of
-from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
-from ppafo.walking.planning import batch_of_many, plan_walk
-from ppafo.walking.varied_gait import SERIES, SeriesOfMany, draw_gaits
-from ppafo.walking.varying import with_duration
-from ppafo.walking.wearer import paper_subject
 
 MINUTES = 0.15
 

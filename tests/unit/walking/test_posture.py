@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from ppafo.gait import load_gait
-from ppafo.walking.gait_series import gait_timing
-from ppafo.walking.posture import MID_SWING_CLEARANCE, AnklePath, ankle_path
+from ppafo.walking.gait_series import MID_SWING_CLEARANCE, AnklePath, ankle_path, gait_timing
 from ppafo.walking.wearer import paper_subject
 
 PHASES = np.linspace(0.0, 1.0, 401)

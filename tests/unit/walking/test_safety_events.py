@@ -3,9 +3,8 @@
 import numpy as np
 
 from ppafo.control.walking.signs import PAUSED, SIGNS
+from ppafo.walking.events import FINDING_ROW, SAFE_ROW, VENTINGS_ROW, safety_events
 from ppafo.walking.loading import load_walk
-from ppafo.walking.recorded import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
-from ppafo.walking.safety_events import safety_events
 
 
 def test_readings_of_pressure_count_from_the_atmosphere_of_the_device() -> None:

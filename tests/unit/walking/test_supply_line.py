@@ -11,7 +11,7 @@ from ppafo.model.regulator import SupplyLines
 from ppafo.simulation.declaration import line_entries
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import load_walk, walk, walk_population
-from ppafo.walking.comparison import with_device_off
+from ppafo.walking.walk import with_device_off
 
 REGULATED = ("solenoid-regulators", "proportional-regulators")
 

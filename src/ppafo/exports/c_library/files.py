@@ -25,7 +25,7 @@ from ppafo.simulation.scenario import PrescribedMotion, Scenario
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
-    from ppafo.walking.sensor_settings import FaultSettings
+    from ppafo.walking.preparation import FaultSettings
 
 
 OUTPUTS = {

@@ -21,13 +21,16 @@ from ppafo.simulation.declaration import PERIOD, RUN, SUPPLY_LINES, THERMAL_GAS,
 from ppafo.simulation.numbers import device_number_at, device_numbers
 from ppafo.simulation.plan import profile_parameters
 from ppafo.simulation.scenario import Scenario
-from ppafo.walking.course_planning import flat_foot
+from ppafo.walking.course import flat_foot
 from ppafo.walking.declaration import SEED, STEP, WALK_SENSORS, fault_numbers
-from ppafo.walking.gait_series import gait_series, gait_timing
-from ppafo.walking.heel_rocker import fit_rocker
+from ppafo.walking.gait_series import fit_rocker, gait_series, gait_timing
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import NO_REFERENCE, course_of_walk, law_of, sensor_settings
 from ppafo.walking.preparation import (
+    DISTORTED,
+    FROZEN,
+    NEVER,
+    FaultSettings,
     device_share,
     distorting_fault,
     fixed_fault,
@@ -42,7 +45,6 @@ from ppafo.walking.preparation import (
     walk_step_counts,
     with_leg,
 )
-from ppafo.walking.sensor_settings import DISTORTED, FROZEN, NEVER, FaultSettings
 from ppafo.walking.varying import record_interval
 from ppafo.walking.wearer import WEARER, leg_parameters
 

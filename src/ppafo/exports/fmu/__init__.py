@@ -51,7 +51,7 @@ from ppafo.translation.native import asked, complaint
 from ppafo.version import __version__
 from ppafo.walking.declaration import FORCES
 from ppafo.walking.motion import walk_of
-from ppafo.walking.sensor_settings import FaultSettings
+from ppafo.walking.preparation import FaultSettings
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv")
 _ANOTHER = "install gcc, clang or 'pip install ppafo[native]' anew"

@@ -23,8 +23,8 @@ from ppafo.simulation.simulate import simulate
 from ppafo.storage.owned_folder import read_json
 from ppafo.storage.result_folder import RUN_FILE, read_document, read_recording
 from ppafo.walking import WalkResult
-from ppafo.walking.course_segments import is_whole_course
 from ppafo.walking.motion import walk_of
+from ppafo.walking.strides import is_whole_course
 
 PEAK_WINDOW = 0.1
 """Seconds over which the largest flow of a recording is averaged; lines and regulator even out what is shorter."""

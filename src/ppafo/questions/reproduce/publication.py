@@ -23,11 +23,10 @@ from ppafo.questions.reproduce.claim import Verdict
 from ppafo.questions.timing.answer import WEARERS, rms_of
 from ppafo.questions.timing.solve import timed_events, uneven_course
 from ppafo.units import from_si, parse_quantity
-from ppafo.walking.comparison import healthy_metrics
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult, integral_of_a_stride
-from ppafo.walking.walk import walk
+from ppafo.walking.walk import healthy_metrics, walk
 
 CHAMBERS = "chambers"
 """Stands for the unit of an argument that names a reading of the chambers' volumes."""

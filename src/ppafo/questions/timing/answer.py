@@ -14,7 +14,7 @@ from ppafo.engine.lanes import Floats
 from ppafo.questions.question import Solved
 from ppafo.questions.timing.slap import FACTORS, Falls, SlapStudy
 from ppafo.version import __version__
-from ppafo.walking.event_times import EVENTS, EventErrors
+from ppafo.walking.events import EVENTS, EventErrors
 
 if TYPE_CHECKING:
     import matplotlib.figure

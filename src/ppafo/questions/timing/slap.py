@@ -26,11 +26,11 @@ from ppafo.model.plant import chamber_pressures, chamber_volumes
 from ppafo.parameters.device import Device, Orifice
 from ppafo.progress import Progress, Report
 from ppafo.simulation.scenario import Scenario
-from ppafo.walking.comparison import with_device_off
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.result import REMEDY
+from ppafo.walking.walk import with_device_off
 
 LARGER = 4.0
 """Valves of so many times the area, chambers of one so manieth of the volume: about as far as virtual work allows."""

@@ -16,7 +16,7 @@ from ppafo.questions.timing.answer import STEADY, UNEVEN, WEARERS, TimedWay, Tim
 from ppafo.questions.timing.slap import slap_study
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.course import Segment, WalkingCourse, list_courses, load_course
-from ppafo.walking.event_times import EVENTS, EventErrors, event_errors, known_events, true_events, within
+from ppafo.walking.events import EVENTS, EventErrors, event_errors, known_events, true_events, within
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import course_of_walk, plan_walk

@@ -38,23 +38,18 @@ from ppafo.simulation.scenario import UNITS, Scenario, plain
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.version import __version__
-from ppafo.walking.anthropometry import CORRELATION, MASS_VARIATION, MAXIMUM_DEVIATIONS, STATURE_VARIATION
-from ppafo.walking.comparison import Comparison
-from ppafo.walking.document import walk_document
-from ppafo.walking.figures.animation import animation
-from ppafo.walking.figures.legs import frames_figure
+from ppafo.walking.events import event_lines
+from ppafo.walking.figures.legs import animation, frames_figure, strip_figure
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.over_time import failures, over_time_figure
-from ppafo.walking.figures.phases import strip_figure
-from ppafo.walking.figures.wearers import SHOWN, population_figure
-from ppafo.walking.gait_subject import person_remarks
-from ppafo.walking.motion import walk_of
+from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
-from ppafo.walking.planning import law_of
-from ppafo.walking.population import OUTCOMES, TRAITS, Number, Population
+from ppafo.walking.planning import law_of, sensor_settings
+from ppafo.walking.population import OUTCOMES, SHOWN, TRAITS, Number, Population, population_figure
 from ppafo.walking.result import WalkResult
-from ppafo.walking.safety_events import event_lines
 from ppafo.walking.strides import PHASES
+from ppafo.walking.walk import Comparison
+from ppafo.walking.wearer import CORRELATION, MASS_VARIATION, MAXIMUM_DEVIATIONS, STATURE_VARIATION
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 WEARERS_FORMAT = "ppafo wearers"
@@ -395,6 +390,34 @@ def _bottle(life: Endurance | None) -> str:
 def _steps(life: Endurance) -> str:
     steps, walked = life.discharge.steps, "" if life.is_whole else "what was walked of "
     return f"{steps:.1f} times {walked}this course" if life.is_of_course else f"{steps:.0f} strides of this leg"
+
+
+def walk_document(scenario: Scenario) -> dict[str, Any]:
+    """Return a walk as data in SI units; its bottle by its values, not by the tables of its gas."""
+    motion, control, origin = walk_of(scenario), scenario.control, scenario.origin
+    lines = scenario.supply_lines
+    return {
+        "name": scenario.name,
+        "description": scenario.description,
+        "device": plain(scenario.device),
+        "gait": plain(motion.gait),
+        "wearer": plain(motion.wearer),
+        "controller": control.kind,
+        "arithmetic": control.arithmetic,
+        "timing": motion.timing,
+        "settings": plain(control.settings),
+        "period": control.period,
+        "step": scenario.time_step,
+        "sensors": plain(sensor_settings(scenario)) | {"seed": scenario.sensors.seed},
+        "supply_lines": None if lines is None else plain(lines._asdict()),
+        "thermal": plain(scenario.thermal),
+        "course": plain(motion.course),
+        "bottle": None if motion.bottle is None else motion.bottle.to_dict(),
+        "wearer_origin": motion.wearer_origin,
+        "assumed": {item.path: item.note for item in scenario.assumptions},
+        "file": origin.file,
+        "overrides": list(origin.overrides),
+    }
 
 
 def _bottle_data(life: Endurance | None) -> dict[str, Any] | None:

@@ -12,14 +12,13 @@ from ppafo.errors import DataError
 from ppafo.gait.gait import speed_range
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
-from ppafo.walking.comparison import Comparison
-from ppafo.walking.course_segments import SegmentResult, is_whole_course
-from ppafo.walking.figures.bottle import bottle_figure, peak_torques
-from ppafo.walking.figures.course import course_figure
+from ppafo.walking.bottle import WALKED, SupplyCourse
 from ppafo.walking.figures.mean_stride import walk_figure
+from ppafo.walking.figures.over_time import bottle_figure, course_figure, peak_torques
 from ppafo.walking.motion import walk_of
-from ppafo.walking.on_bottle import WALKED, SupplyCourse
 from ppafo.walking.result import WalkResult
+from ppafo.walking.strides import SegmentResult, is_whole_course
+from ppafo.walking.walk import Comparison
 
 _BOTTLE_CAPTION = (
     "The supply over the walk. A regulator holds at most its set pressure, and less once the bottle has too little. "

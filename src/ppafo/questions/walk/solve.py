@@ -10,9 +10,9 @@ from ppafo.questions.walk.answer import WalkPair, Wearers
 from ppafo.questions.walk.volumes import walks_by_volume, wearers_by_volume
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import course as courses
-from ppafo.walking.comparison import compare_walks
 from ppafo.walking.loading import FILE, load_walk
 from ppafo.walking.motion import walk_of
+from ppafo.walking.walk import compare_walks
 
 _LONG = 12.0
 """Minutes above which a walk reports how far it is."""

@@ -14,8 +14,8 @@ from ppafo.questions.endurance.answer import Endurance
 from ppafo.questions.endurance.draw import draw_of_numbers, full_chambers, largest_flow, walk_gas
 from ppafo.questions.endurance.solve import WITHOUT_REST, endurance_of_walk, follow_bottle
 from ppafo.simulation.scenario import Scenario
+from ppafo.walking.bottle import DIVERGED, WALKED
 from ppafo.walking.motion import walk_of
-from ppafo.walking.on_bottle import DIVERGED, WALKED
 from ppafo.walking.population import Population, walk_population
 from ppafo.walking.result import WalkResult, integral_of_a_stride
 from ppafo.walking.walk import Progress, walk

@@ -1,1 +1,1 @@
-"""Figures of walks: the mean stride, the legs, the phases, the animation, and many wearers."""
+"""Figures of walks: the mean stride, the leg and the phases, and the whole walk over time."""

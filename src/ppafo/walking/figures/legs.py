@@ -1,25 +1,30 @@
-"""Shank and foot as a stick figure: how a leg is drawn, and which legs belong to a stride of a walk."""
+"""The leg as a stick figure: on the strip of gait phases of figure 1A, in single frames, and animated (GIF)."""
 
+import io
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.answers.style import GREY, house_style, mark_kind
+from ppafo.answers.style import BLACK, CHAMBER_1, CHAMBER_2, GREY, Margins, figure_of_panels, house_style, mark_kind
+from ppafo.constants import PASCALS_PER_PSI
+from ppafo.model.command import VENTS_ABOVE
 from ppafo.signals.recording import Floats
-from ppafo.walking.comparison import Comparison
 from ppafo.walking.figures.mean_stride import WITH, WITHOUT
-from ppafo.walking.gait_series import gait_timing
+from ppafo.walking.gait_series import Posture, ankle_path, gait_timing
 from ppafo.walking.motion import walk_of
-from ppafo.walking.posture import Posture, ankle_path
 from ppafo.walking.result import WalkResult
+from ppafo.walking.strides import PHASES, settled, times_of_phases
+from ppafo.walking.walk import Comparison
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
     from matplotlib.patches import Polygon
+    from PIL.Image import Image
 
 GHOST = "#5a5a5a"
 """The healthy foot: dark enough to be seen on a coloured one, in front of which it is drawn."""
@@ -32,6 +37,26 @@ _STRIP_SIZE = (10.4, 3.75)
 _FRAMES = 10
 _SLOT = 0.62
 """Width of the ground under one frame [m]."""
+
+_PHASES_SIZE = (9.4, 6.0)
+_MARGINS = Margins(left=1.3, right=0.2, top=0.55, bottom=0.52, row_gap=0.22, label=0.5)
+_HEIGHTS = (1.75, 0.7, 0.7, 0.7, 1.35)
+_PERCENT = 100.0 * PHASES
+_STRIP_FRAMES = 8
+_NARROW, _NARROWEST = 9.0, 2.5
+"""Percent of the stride below which a block's name stands upright, and below which it is left out."""
+
+_ANIMATION_SIZE, _RESOLUTION = (7.2, 4.6), 90
+_STRIDES, _PER_STRIDE = 2, 30
+_COLOURS = 48
+_NEARLY_WHITE = 248
+_SLOWED = 2.0
+_VIEW = (-0.62, 0.62, -0.12, 0.78)
+_TICK = 0.35
+"""Distance of the marks on the ground [m]."""
+
+_VALVE = {0: ("closed", "#ffffff"), 1: ("plantarflexion", "#8fbfe0"), -1: ("dorsiflexion", "#f0b48a")}
+_VENTED = ("vented", "#e4e4e4")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -169,3 +194,306 @@ def _row(axes: "Axes", result: WalkResult, label: str, colour: str) -> None:
     axes.set_ylim(-0.22, 0.68)
     axes.set_aspect("equal", adjustable="box")
     axes.set_axis_off()
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """One state of a row: name, the same for a narrow block, colour, and where a channel's values belong to it."""
+
+    name: str
+    short: str
+    colour: str
+    holds: Callable[[Floats], NDArray[np.bool_]]
+
+
+def _is(value: float) -> Callable[[Floats], NDArray[np.bool_]]:
+    return lambda values: values == value
+
+
+_FREE, _DORSI, _PLANTAR = "#e4e4e4", "#f0b48a", "#8fbfe0"
+_ROWS: Mapping[str, tuple[str, tuple[State, ...]]] = {
+    "Controller": (
+        "controller_phase",
+        (
+            State("1 heel strike", "1 heel", "#f6d5bd", _is(1.0)),
+            State("4 free motion", "4 free", _FREE, _is(2.0)),
+            State("2 push-off", "2 push", _PLANTAR, _is(3.0)),
+            State("3 swing", "3 swing", _DORSI, _is(0.0)),
+        ),
+    ),
+    "Foot": (
+        "contact",
+        (
+            State("on the heel", "heel", "#cfe3c9", _is(1.0)),
+            State("flat", "flat", "#9fcf94", _is(2.0)),
+            State("on the toes", "toes", "#63ad59", _is(3.0)),
+            State("in the air", "air", "#f3f3f3", _is(0.0)),
+        ),
+    ),
+    "Valve": (
+        "command",
+        (
+            State("vented", "vented", _FREE, lambda command: command > VENTS_ABOVE),
+            State("closed", "closed", "#ffffff", _is(0.0)),
+            State("plantarflexion", "plantar", _PLANTAR, lambda command: (command > 0.0) & (command <= VENTS_ABOVE)),
+            State("dorsiflexion", "dorsi", _DORSI, lambda command: command < 0.0),
+        ),
+    ),
+}
+
+
+def strip_figure(result: WalkResult) -> "Figure":
+    """Return the strip of gait phases of a walk; a fraction of strides where they differ."""
+    with house_style():
+        figure, grid = figure_of_panels(_PHASES_SIZE, _MARGINS, len(_HEIGHTS), heights=_HEIGHTS)
+        rows = [axes for (axes,) in grid]
+        _legs(rows[0], result)
+        for axes, (label, (channel, states)) in zip(rows[1:4], _ROWS.items(), strict=True):
+            _band(axes, label, _shares(result, channel, states), states)
+        _pressures(rows[4], result)
+        rows[4].set_xlabel("Stride (%)")
+        rows[4].set_xlim(0.0, 100.0)
+        width, height = _PHASES_SIZE
+        title = f"{result.scenario.name}: functional tasks of the paper's figure 1A over the stride"
+        figure.text(0.12 / width, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
+        remark = "height of each colour: fraction of strides"
+        figure.text(0.12 / width, 1.0 - 0.34 / height, remark, ha="left", va="top", fontsize=8.5, color=GREY)
+        mark_kind(figure, result.recording.kind)
+        return figure
+
+
+def _shares(result: WalkResult, channel: str, states: tuple[State, ...]) -> Floats:
+    """Fraction of the strides with help in each state at ``PHASES``, shape (states, phases); 0 if nothing is known."""
+    chosen = settled(result.helped)
+    if channel not in result.recording or not chosen.any():
+        return np.zeros((len(states), PHASES.size))
+    time = result.recording.time
+    found = np.searchsorted(time, times_of_phases(time, result.starts)[chosen], side="right") - 1
+    values = result.recording[channel][found]
+    return np.array([np.mean(state.holds(values), axis=0) for state in states])
+
+
+def _band(axes: "Axes", label: str, fractions: Floats, states: tuple[State, ...]) -> None:
+    below = np.zeros(PHASES.size)
+    for state, fraction in zip(states, fractions, strict=True):
+        axes.fill_between(_PERCENT, below, below + fraction, color=state.colour, linewidth=0.0, step="mid")
+        _name_blocks(axes, state, fraction, below + 0.5 * fraction)
+        below = below + fraction
+    if not below.any():
+        axes.text(50.0, 0.5, "no gait phases in this controller", ha="center", va="center", fontsize=9.0, color=GREY)
+    axes.set_ylim(0.0, 1.0)
+    axes.set_yticks([])
+    axes.grid(visible=False)
+    axes.spines["left"].set_visible(False)
+    axes.tick_params(axis="x", length=0.0)
+    axes.set_ylabel(label, rotation=0, ha="right", va="center")
+    axes.yaxis.set_label_coords(-0.012, 0.5)
+
+
+def _name_blocks(axes: "Axes", state: State, fraction: Floats, middle: Floats) -> None:
+    """Write the name into every block that is wide enough and holds for most strides."""
+    inside = np.flatnonzero(np.diff(np.concatenate([[0], (fraction > 0.5).astype(int), [0]])))
+    for first, last in zip(inside[::2], inside[1::2], strict=True):
+        left, right = _PERCENT[first], _PERCENT[last - 1]
+        if right - left >= _NARROWEST:
+            text, turn = (state.name, 0) if right - left >= _NARROW else (state.short, 90)
+            place = 0.5 * (left + right), float(np.mean(middle[first:last]))
+            axes.text(*place, text, ha="center", va="center", fontsize=9.0 if turn == 0 else 8.0, rotation=turn)
+
+
+def _legs(axes: "Axes", result: WalkResult) -> None:
+    """Stick figures over the strip, each over its instant, in an axes of metres that shares the percent below."""
+    turns = last_phases(result, 1, _STRIP_FRAMES) + 0.5 / _STRIP_FRAMES
+    legs = legs_of(result, turns)
+    panel_width = _PHASES_SIZE[0] - _MARGINS.left - _MARGINS.right
+    panel_height = axes.get_position().height * _PHASES_SIZE[1]
+    height = 0.7
+    metres = height * panel_width / panel_height
+    inner = axes.inset_axes((0.0, 0.0, 1.0, 1.0))
+    draw_ground(inner, 0.0, metres)
+    for index in range(turns.size):
+        offset = legs.healthy.ankle[index, 0] - metres * (turns[index] % 1.0)
+        leg_artists(inner, GHOST, 1.6, is_ghost=True).place(legs.healthy, index, offset)
+        leg_artists(inner, WITH, 2.6).place(legs.worn, index, offset)
+    inner.set_xlim(0.0, metres)
+    inner.set_ylim(-0.12, height - 0.12)
+    inner.set_axis_off()
+    axes.set_axis_off()
+
+
+def _pressures(axes: "Axes", result: WalkResult) -> None:
+    atmosphere = result.scenario.device.supply.atmospheric_pressure
+    for channel, name, colour in (
+        ("pressure_1", "plantarflexion", CHAMBER_1),
+        ("pressure_2", "dorsiflexion", CHAMBER_2),
+    ):
+        if channel in result.averages:
+            curve = (result.averages[channel].mean - atmosphere) / PASCALS_PER_PSI
+            axes.plot(_PERCENT, curve, color=colour, label=name)
+    axes.axhline(0.0, color=GREY, linewidth=0.8)
+    axes.set_ylabel("Chambers\n(psi, gauge)", rotation=0, ha="right", va="center")
+    axes.yaxis.set_label_coords(-0.045, 0.5)
+    axes.locator_params(axis="y", nbins=4)
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2, borderaxespad=0.1, handlelength=1.6)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Scene:
+    """One panel with a leg that walks through it."""
+
+    axes: "Axes"
+    legs: Legs
+    artists: tuple[Any, Any]
+    ticks: Any
+    colour: str
+    centre: np.ndarray
+
+    def show(self, index: int) -> list[Any]:
+        """Place ground marks and legs; returns what has to be drawn."""
+        offset = float(self.centre[index])
+        marks = np.arange(np.ceil((offset + _VIEW[0]) / _TICK), (offset + _VIEW[1]) / _TICK) * _TICK - offset
+        self.ticks.set_data(marks, np.full(marks.size, -0.018))
+        ghost, worn = self.artists
+        ghost.place(self.legs.healthy, index, offset)
+        worn.place(self.legs.worn, index, offset)
+        worn.colour(DRAGS if drags(self.legs, index) else self.colour)
+        parts = (ghost.shank, worn.shank, worn.foot, ghost.foot, worn.joint)
+        return [self.ticks, *parts]
+
+
+def animation(comparison: Comparison) -> bytes:
+    """Return the GIF; two strides at half speed."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    with house_style():
+        turns = last_phases(comparison.with_device, _STRIDES, _PER_STRIDE)
+        figure, scenes, cursor, lamp = _stage(comparison, turns)
+        canvas: Any = FigureCanvasAgg(figure)
+        canvas.draw()
+        empty = canvas.copy_from_bbox(figure.bbox)
+        images = []
+        commands = _commands(comparison.with_device, turns)
+        for index in range(turns.size):
+            canvas.restore_region(empty)
+            for scene in scenes:
+                for artist in scene.show(index):
+                    scene.axes.draw_artist(artist)
+            cursor.set_xdata([index / _PER_STRIDE] * 2)
+            name, colour = _valve_state(commands[index])
+            lamp.set_text(f"valve: {name}")
+            lamp.get_bbox_patch().set_facecolor(colour)
+            cursor.axes.draw_artist(cursor)
+            cursor.axes.draw_artist(lamp)
+            images.append(_image(canvas))
+        return _gif(images, walk_of(comparison.with_device.scenario).gait.stride_time)
+
+
+def _stage(comparison: Comparison, turns: np.ndarray) -> "tuple[Figure, list[_Scene], Any, Any]":
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=_ANIMATION_SIZE, dpi=_RESOLUTION)
+    pairs = ((comparison.without_device, "without", WITHOUT), (comparison.with_device, "with", WITH))
+    scenes = []
+    for place, (result, word, colour) in enumerate(pairs):
+        axes = figure.add_axes((0.01 + 0.5 * place, 0.34, 0.48, 0.6))
+        scenes.append(_scene(axes, result, turns, f"{word} the device", colour))
+    traces = figure.add_axes((0.09, 0.115, 0.89, 0.18))
+    _traces(traces, comparison.with_device, turns)
+    cursor = traces.axvline(0.0, color=BLACK, linewidth=1.2, animated=True)
+    box = {"boxstyle": "round,pad=0.3", "facecolor": "#ffffff", "edgecolor": GREY, "linewidth": 0.8}
+    lamp = traces.text(
+        0.995, 1.24, "", transform=traces.transAxes, ha="right", va="center", fontsize=9, bbox=box, animated=True
+    )
+    name = comparison.with_device.scenario.name
+    figure.text(
+        0.012,
+        0.985,
+        f"{name}, half speed, simulated; dark red: toes more than 1 cm below ground",
+        ha="left",
+        va="top",
+        fontsize=9,
+        color=GREY,
+    )
+    return figure, scenes, cursor, lamp
+
+
+def _scene(axes: "Axes", result: WalkResult, turns: np.ndarray, label: str, colour: str) -> _Scene:
+    legs = legs_of(result, turns)
+    stride = np.diff(legs.healthy.ankle[[0, _PER_STRIDE - 1], 0])[0] * _PER_STRIDE / (_PER_STRIDE - 1)
+    axes.set_xlim(*_VIEW[:2])
+    axes.set_ylim(*_VIEW[2:])
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_axis_off()
+    draw_ground(axes, *_VIEW[:2])
+    axes.text(_VIEW[0] + 0.02, _VIEW[3] - 0.03, label, color=colour, ha="left", va="top", fontsize=10.5)
+    (ticks,) = axes.plot([], [], "|", color=GREY, markersize=5, zorder=1)
+    artists = (leg_artists(axes, GHOST, 2.0, is_ghost=True), leg_artists(axes, colour, 4.0))
+    for artist in [ticks, *(part for leg in artists for part in (leg.shank, leg.foot, leg.joint))]:
+        artist.set_animated(True)
+    start = float(np.mean(legs.healthy.ankle[:_PER_STRIDE, 0] - stride * (turns[:_PER_STRIDE] - turns[0])))
+    return _Scene(axes, legs, artists, ticks, colour, start + stride * (turns - turns[0]))
+
+
+def _traces(axes: "Axes", result: WalkResult, turns: np.ndarray) -> None:
+    recording, configuration = result.recording, result.scenario
+    fine = np.linspace(turns[0], turns[-1], 400)
+    atmosphere = configuration.device.supply.atmospheric_pressure
+    names = (("pressure_1", "plantarflexion", CHAMBER_1), ("pressure_2", "dorsiflexion", CHAMBER_2))
+    for channel, name, colour in names:
+        values = np.interp(fine * walk_of(configuration).gait.stride_time, recording.time, recording[channel])
+        axes.plot(fine - turns[0], (values - atmosphere) / PASCALS_PER_PSI, color=colour, linewidth=1.3, label=name)
+    axes.set_xlim(0.0, turns[-1] - turns[0])
+    axes.set_ylim(top=max(10.0, axes.get_ylim()[1]))
+    axes.set_xlabel("strides", fontsize=8.5, labelpad=1.0)
+    axes.set_ylabel("psi, gauge", fontsize=8.5)
+    axes.tick_params(labelsize=8)
+    axes.locator_params(axis="y", nbins=3)
+    axes.legend(
+        loc="lower left", bbox_to_anchor=(0.0, 1.02), ncols=2, borderaxespad=0.0, handlelength=1.4, fontsize=8.5
+    )
+
+
+def _commands(result: WalkResult, turns: np.ndarray) -> np.ndarray:
+    times = turns * walk_of(result.scenario).gait.stride_time
+    return result.recording["command"][np.searchsorted(result.recording.time, times, side="right") - 1]
+
+
+def _valve_state(command: float) -> tuple[str, str]:
+    return _VENTED if command > VENTS_ABOVE else _VALVE[int(np.sign(command))]
+
+
+def _image(canvas: Any) -> "Image":
+    from PIL import Image
+
+    return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").copy()
+
+
+def _together(images: "list[Image]") -> "Image":
+    """Return images one below the other."""
+    from PIL import Image
+
+    width, height = images[0].size
+    sheet = Image.new("RGB", (width, height * len(images)))
+    for index, image in enumerate(images):
+        sheet.paste(image, (0, index * height))
+    return sheet
+
+
+def _gif(images: "list[Image]", stride_time: float) -> bytes:
+    """All frames on the palette of one, so that only what moves takes room."""
+    from PIL import Image
+
+    palette = _together(images[:: _PER_STRIDE // 5]).quantize(_COLOURS, dither=Image.Dither.NONE)
+    tones = palette.getpalette() or []
+    triples = [tones[start : start + 3] for start in range(0, len(tones), 3)]
+    # What is nearly white is white, for averages with its edges would tint the background; a small red foot is kept.
+    kept = [[255] * 3 if min(triple) > _NEARLY_WHITE else triple for triple in triples[:_COLOURS]]
+    kept.append([int(DRAGS[place : place + 2], 16) for place in (1, 3, 5)])
+    palette.putpalette([tone for triple in kept for tone in triple])
+    frames = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    buffer = io.BytesIO()
+    milliseconds = 10 * round(100.0 * _SLOWED * stride_time / _PER_STRIDE)  # a GIF counts hundredths of a second
+    frames[0].save(
+        buffer, "GIF", save_all=True, append_images=frames[1:], duration=milliseconds, loop=0, optimize=False
+    )
+    return buffer.getvalue()

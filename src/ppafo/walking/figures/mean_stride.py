@@ -13,8 +13,7 @@ from ppafo.metrics import Metric
 from ppafo.signals import Recording
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.motion import walk_of
-from ppafo.walking.strides import PHASES, Curves
-from ppafo.walking.walk_metrics import healthy_toe_height
+from ppafo.walking.strides import PHASES, Curves, healthy_toe_height
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -26,11 +26,11 @@ from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.varying import VariedPath, in_its_unit, varied_path
 from ppafo.units import parse_quantity
-from ppafo.walking.anthropometry import draw_builds
 from ppafo.walking.motion import walk_of
+from ppafo.walking.person import draw_gaits
 from ppafo.walking.planning import batch_of_many, plan_walk
-from ppafo.walking.varied_gait import draw_gaits
 from ppafo.walking.varying import with_duration
+from ppafo.walking.wearer import draw_builds
 from ppafo.worlds.gym.kernel import Columns, episode_program
 from ppafo.worlds.gym.tasks import Goal
 

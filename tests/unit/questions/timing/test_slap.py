@@ -8,8 +8,8 @@ import pytest
 
 from ppafo.questions.timing.slap import FIRST_STRIKE, STRIKES, Falls, falls_of, shares_of
 from ppafo.walking import load_walk, walk
-from ppafo.walking.comparison import with_device_off
 from ppafo.walking.motion import walk_of
+from ppafo.walking.walk import with_device_off
 
 CONFIGURATION = load_walk("solenoid")
 

@@ -28,8 +28,8 @@ from ppafo.simulation.sampled import run_sampled, state_row_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.version import __version__
 from ppafo.walking.declaration import ARITHMETIC, quantities
+from ppafo.walking.events import SAFE_ROW
 from ppafo.walking.planning import converter_of_walk, numbers_of_walk, plan_walk
-from ppafo.walking.recorded import SAFE_ROW
 from ppafo.walking.walk import lasting
 
 _TEMPLATES = (

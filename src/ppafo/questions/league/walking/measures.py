@@ -24,18 +24,24 @@ from ppafo.questions.league.standing import NOISE_DRAWS, SEED, Robustness, draw_
 from ppafo.questions.league.walking.task import WalkingTask
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.sampling import other_noise
-from ppafo.walking.anthropometry import Build, draw_builds
-from ppafo.walking.event_times import EVENTS, TOO_FAR, Samples, event_errors, known_events, true_events, within
-from ppafo.walking.gait_series import gait_timing, truncate
+from ppafo.walking.events import (
+    EVENTS,
+    SAFE_ROW,
+    TOO_FAR,
+    Samples,
+    event_errors,
+    known_events,
+    true_events,
+    within,
+)
+from ppafo.walking.gait_series import AnklePath, ankle_path, gait_timing, truncate
 from ppafo.walking.motion import walk_of
+from ppafo.walking.person import VariedGaits, draw_gaits
 from ppafo.walking.planning import batch_of_many, has_ideal_sensors, plan_walk
-from ppafo.walking.posture import AnklePath, ankle_path
 from ppafo.walking.preparation import vented_state, with_leg
-from ppafo.walking.recorded import SAFE_ROW
 from ppafo.walking.result import REMEDY
-from ppafo.walking.varied_gait import VariedGaits, draw_gaits
 from ppafo.walking.varying import with_duration
-from ppafo.walking.wearer import Wearer
+from ppafo.walking.wearer import Build, Wearer, draw_builds
 
 DEGREE = 2
 """Collocation points in an interval; Radau's, of third order."""

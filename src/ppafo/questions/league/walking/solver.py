@@ -27,7 +27,7 @@ from ppafo.questions.league.bound import (
 )
 from ppafo.questions.league.walking.measures import DEGREE, Grid, Stride
 from ppafo.questions.league.walking.task import PROFILE_KIND, PROFILE_VALVE, WalkingTask
-from ppafo.walking.posture import AnklePath
+from ppafo.walking.gait_series import AnklePath
 from ppafo.walking.walk import walk
 
 STICKING_SPEED = 0.05

@@ -10,7 +10,7 @@ from ppafo.model.command import VENT
 from ppafo.model.contact import SWING, TOE
 from ppafo.model.gait import GaitTiming
 from ppafo.questions.league.walking.measures import MEASURES, Course, last_strides, measures, switchings
-from ppafo.walking.event_times import EVENTS
+from ppafo.walking.events import EVENTS
 
 PROFILE = TorqueProfile(5.0, 0.5, 0.2, 0.1)
 TIMING = GaitTiming(1.0, 0.0, 0.4, 0.6, 0.7, 0.9, 0.0)
