@@ -15,7 +15,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     orders = parser.add_mutually_exclusive_group()
     orders.add_argument("--warm", action="store_true", help="compile the models of the scenarios of the package")
-    orders.add_argument("--clear", action="store_true", help="remove all compiled models")
+    orders.add_argument("--clear", action="store_true", help="remove all compiled models, and try each compiler again")
     output.add_output_arguments(parser)
 
 
@@ -47,13 +47,14 @@ def run(parsed: argparse.Namespace) -> int:
         f"  {item['name']}  {_megabytes(item['size']):>8}  last used {_days(item['unused_days'])}"
         for item in document["programs"]
     ]
+    lines += [f"left out for a day: {name}: {why}" for name, why in document["left_out"].items()]
     limits = f"{document['kept_unused_days']:.0f} days unused, or above {_megabytes(document['most_bytes'])} in all"
     output.deliver("cache", "\n".join([*lines, f"removed by themselves: after {limits}"]), document, parsed)
     return output.EXIT_GOOD
 
 
 def _document(folder: Path | None, why_not: str) -> dict[str, Any]:
-    from ppafo.engine.cache import LONGEST_UNUSED, MAXIMUM_BYTES, kept_sizes, list_programs
+    from ppafo.engine.cache import LONGEST_UNUSED, MAXIMUM_BYTES, kept_sizes, list_left_out, list_programs
 
     programs = [] if folder is None else list_programs(folder)
     now = time.time()
@@ -62,6 +63,7 @@ def _document(folder: Path | None, why_not: str) -> dict[str, Any]:
         "not_used": why_not or None,
         "size": sum(program.size for program in programs),
         "made_from_programs": 0 if folder is None else sum(kept_sizes(folder)),
+        "left_out": {} if folder is None else list_left_out(folder),
         "kept_unused_days": LONGEST_UNUSED / _DAY,
         "most_bytes": MAXIMUM_BYTES,
         "programs": [

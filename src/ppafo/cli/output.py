@@ -4,6 +4,7 @@ import argparse
 import contextlib
 import importlib
 import importlib.util
+import logging
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -25,10 +26,11 @@ EXIT_GOOD = 0
 EXIT_CHECK_FAILED = 1
 
 
-def add_output_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add ``--json`` and ``--out``, which every command takes."""
+def add_output_arguments(parser: argparse.ArgumentParser, default: str = "") -> None:
+    """Add ``--json`` and ``--out``, which every command takes; ``default`` is where it writes without ``--out``."""
     add_json_argument(parser)
-    parser.add_argument("--out", metavar="DIR", type=Path, help="also write the result as files into this folder")
+    what = f"the result folder; default {default}" if default else "also write the result as files into this folder"
+    parser.add_argument("--out", metavar="DIR", type=Path, help=what)
 
 
 def add_json_argument(parser: argparse.ArgumentParser) -> None:
@@ -181,6 +183,8 @@ def load_drawing() -> None:
     if "matplotlib.artist" in sys.modules:
         return
     _load_late("fontTools.agl")
+    # Its two lines about a folder that cannot be written say nothing of the result.
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     import matplotlib.artist
 
     flat = ModuleType(_AXES_IN_SPACE)

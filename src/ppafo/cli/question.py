@@ -20,7 +20,10 @@ def add_arguments(parser: argparse.ArgumentParser, question: Question) -> None:
         argument.add_to(parser)
     if question.library:
         parser.add_argument("--list", action="store_true", help="list the files that come with the package")
-    (output.add_json_argument if question.fills_folder else output.add_output_arguments)(parser)
+    if question.fills_folder:
+        output.add_json_argument(parser)
+    else:
+        output.add_output_arguments(parser, "one in out/ named after what ran" if question.default_folder else "")
 
 
 def run(parsed: argparse.Namespace, question: Question) -> int:

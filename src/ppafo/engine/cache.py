@@ -28,7 +28,7 @@ from types import ModuleType
 from ppafo.documents.regular_file import read_regular_file
 from ppafo.engine.compilers import Compiler
 from ppafo.engine.source_text import without_origins
-from ppafo.errors import reason
+from ppafo.errors import one_line, reason
 from ppafo.progress import time_text
 
 try:
@@ -64,6 +64,8 @@ _PROGRAM = re.compile(r"ppafo_[a-z]+_[0-9a-f]{24}(-[0-9a-f]{12}|\..+)?")
 
 NOTE = "not-working-"
 _ASIDE = re.compile(rf"\.writing-[0-9a-f]{{16}}|{re.escape(LOCK)}{_PROGRAM.pattern}|{NOTE}[a-z]+-[0-9a-f]{{12}}")
+LEFT_OUT_FOR = 86400.0
+"""Seconds after which a compiler that did not work is tried again: headers may have been installed."""
 _LONGEST_ASIDE = 86400.0
 _CHECKSUMS = "checksums.json"
 _LOADING: dict[str, threading.RLock] = {}
@@ -155,6 +157,18 @@ def is_kept(source: str, compiler: Compiler) -> bool:
 def note_name(compiler: Compiler) -> str:
     """Name of the file in the cache that says why a compiler does not work on this computer."""
     return f"{NOTE}{compiler.name}-{_short_hash(compiler.identity())}"
+
+
+def list_left_out(folder: Path) -> dict[str, str]:
+    """Return why compilers were left out lately, by their names."""
+    found = {}
+    for place in _entries_named(folder, _ASIDE):
+        if place.name.startswith(NOTE):
+            with contextlib.suppress(OSError):
+                text = read_regular_file(place).decode("utf-8", "replace")
+                if time.time() - place.lstat().st_mtime < LEFT_OUT_FOR:
+                    found[place.name.removeprefix(NOTE).partition("-")[0]] = one_line(text)
+    return found
 
 
 def list_programs(folder: Path) -> list[CachedProgram]:

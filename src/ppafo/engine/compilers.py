@@ -12,11 +12,14 @@ from ppafo.errors import SimulationError
 
 
 class CompilerError(SimulationError):
-    """A compiler does not work on this computer, whatever the program; ``names`` are all that fail for this reason."""
+    """A compiler does not work on this computer, whatever the program; ``names`` are all that fail for this reason.
 
-    def __init__(self, problem: str, *names: str) -> None:
+    ``passing`` says that the reason may be gone in the next run, such as a disk that is full.
+    """
+
+    def __init__(self, problem: str, *names: str, passing: bool = False) -> None:
         super().__init__(problem)
-        self.names = names
+        self.names, self.passing = names, passing
 
 
 class Compiler(Protocol):

@@ -5,7 +5,7 @@ parameters in the words of Numba, and every compiler reads them there.
 
 ``PPAFO_BACKEND`` names one compiler; without it clang, gcc, zig and Numba are tried in this order. All give the same
 bits. One that does not work, because there are no headers or its libraries cannot be loaded, is reported in one line
-and left out for a day.
+and left out for a day; one that was killed or found no room on a disk, for the rest of the run.
 """
 
 import ast
@@ -26,7 +26,7 @@ from typing import Annotated, Any, Protocol, TypeAlias, get_type_hints, runtime_
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.cache import cache_folder, is_kept, load_all, load_generated, note_name, refusal
+from ppafo.engine.cache import LEFT_OUT_FOR, cache_folder, is_kept, load_all, load_generated, note_name, refusal
 from ppafo.engine.compilers import OFFERED, Compiler, CompilerError
 from ppafo.errors import ProgramError, SimulationError, nearest_name, one_line
 
@@ -108,8 +108,6 @@ ANY_OF_C = "c"
 """Names the first compiler of C that works."""
 HOW_TO_INSTALL = "install gcc or clang, or 'pip install ppafo[native]', which brings zig"
 WITHOUT_C = f"{BACKEND_VARIABLE}={NUMBA} needs no compiler of C"
-LEFT_OUT_FOR = 86400.0
-"""Seconds after which a compiler that did not work is tried again: headers may have been installed."""
 
 _FAILED: set[str] = set()
 """Identities of compilers that failed in this process."""
@@ -174,8 +172,9 @@ def _load_by(source: str, compilers: tuple[Compiler, ...]) -> ModuleType:
             raise SimulationError(f"{failure}; {remedy}") from failure
         with _LEAVING_OUT:
             if compiler.identity() not in _FAILED:  # another thread may have found it at the same time
-                logger.warning("ppafo: %s; models are compiled by %s instead", failure, left[0].name)
-            _leave_out(failed, str(failure))
+                until = "in this run" if failure.passing else "for a day, or until 'ppafo cache --clear'"
+                logger.warning("ppafo: %s; models are compiled by %s instead %s", failure, left[0].name, until)
+            _leave_out(failed, failure)
         return _load_by(source, left)
     except ProgramError as refused:
         if compiler.name == NUMBA:
@@ -194,12 +193,12 @@ def _load_by_numba(source: str, numba: Compiler, refused: ProgramError) -> Modul
     return module
 
 
-def _leave_out(failed: Iterable[Compiler], failure: str) -> None:
-    """Remember in this process, and for a day beside the programs, that compilers do not work."""
+def _leave_out(failed: Iterable[Compiler], failure: CompilerError) -> None:
+    """Remember in this process, and beside the programs if the reason lasts, that compilers do not work."""
     folder = cache_folder()
     for compiler in failed:
         _FAILED.add(compiler.identity())
-        if folder is not None and not refusal(folder):
+        if folder is not None and not failure.passing and not refusal(folder):
             with contextlib.suppress(OSError):
                 (folder / note_name(compiler)).write_text(f"{failure}\n", encoding="utf-8")
     _compilers.cache_clear()

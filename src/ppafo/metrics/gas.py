@@ -229,7 +229,7 @@ METRICS = (
     MetricKind(
         "largest_pressure",
         "Pa",
-        "largest absolute pressure",
+        "largest pressure in a chamber",
         _PRESSURES,
         largest_pressure,
         read_largest_pressure,

@@ -11,7 +11,7 @@ from pydantic_core import ErrorDetails
 
 from ppafo.documents.models import first_problem, is_gap
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ScenarioError
+from ppafo.errors import ScenarioError, one_line
 from ppafo.parameters import ParameterSet
 from ppafo.simulation.building import ScenarioRequest, apply_overrides, build_scenario
 from ppafo.simulation.declaration import find_kinds
@@ -77,7 +77,8 @@ def _scenario(request: ScenarioRequest) -> Scenario:
     if "default_valve" in request.content and "run" not in request.content:
         raise ScenarioError(
             f"{request.file}: is a parameter set, not a scenario; "
-            f"run one with it: SCENARIO --set device.set={request.file}"
+            f"run one with it: SCENARIO --set device.set={request.file} "
+            f"--set device.valve={one_line(request.content['default_valve'])}"
         )
     find_kinds(request.content, request.file)
     if request.overrides:

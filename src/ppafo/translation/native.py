@@ -54,6 +54,14 @@ Entries = Mapping[str, tuple[Type, ...]]
 """Types of the parameters of entries, by name."""
 
 _PACKED = "_packed"
+_ROUNDING = """\
+int ppafo_rounds_as_written(double a, double b, double c, double d);
+int ppafo_rounds_as_written(double a, double b, double c, double d)
+{
+    return a * b + c == 0.0 && (b + d) - b == 0.0;
+}
+"""
+"""1 where each operation is rounded by itself; fused or reordered ones leave a rest of what `load_entries` gives."""
 _NOTHING, _FLOATS = ctypes.c_double * 0, np.dtype(np.float64)
 _NUMBERS: dict[Scalar, Any] = {FLOAT: ctypes.c_double, INT: ctypes.c_int64}
 
@@ -111,12 +119,23 @@ def with_packed_entries(source: str, entries: Entries) -> str:
         taken = ", ".join(["const ppafo_array *arrays", *(f"{kind} {number}" for number, kind in numbers.items())])
         given = ", ".join([*(f"arrays[{place}]" for place in range(len(arrays))), *numbers])
         texts.append(f"void {name}{_PACKED}({taken})\n{{\n    {name}({given});\n}}\n")
-    return "\n".join(texts)
+    return "\n".join([*texts, _ROUNDING])
 
 
 def load_entries(library: Path, entries: Entries) -> dict[str, NativeEntry]:
-    """Return the entries of a library by name; OSError where it cannot be loaded, AttributeError where it lacks one."""
+    """Return the entries of a library by name.
+
+    OSError where it cannot be loaded, AttributeError where it lacks one, CompilerError where its arithmetic is not
+    that of IEEE 754, to which an environment variable or a wrapper can set any compiler.
+    """
     loaded = ctypes.CDLL(str(library))
+    small = 2.0**-30
+    numbers = map(ctypes.c_double, (1.0 + small, 1.0 - small, -1.0, small * small))
+    if not loaded.ppafo_rounds_as_written(*numbers):
+        raise CompilerError(
+            "the compiler joins or reorders sums and products, so that results would differ from those of others "
+            "(look for -ffp-contract or -ffast-math in its wrapper or in the environment)"
+        )
     return {name: _entry(loaded[f"{name}{_PACKED}"], types) for name, types in entries.items()}
 
 
@@ -139,6 +158,15 @@ _LIBRARY_FILE = {"win32": "program.dll", "darwin": "program.dylib"}.get(sys.plat
 COMPILERS = ("clang", "gcc", "zig")
 """In the order of preference: lanes are about as quick by each."""
 _INTERRUPTED = (-signal.SIGINT, -signal.SIGTERM)
+_PASSING = (
+    "no space left",
+    "quota exceeded",
+    "temporary file",
+    "cannot allocate memory",
+    "out of memory",
+    "killed signal",
+)
+"""What compilers say where the computer lacks something at that moment, in small letters."""
 _LANE_LOOP = entries_of(f"{COMPILED}\ndef advance(")
 _TITLE = "Generated from the functions of ppafo. Not to be edited."
 
@@ -282,7 +310,9 @@ def _compiled(source: str, folder: Path, command: Sequence[str], flags: Sequence
     if done.returncode in _INTERRUPTED:
         raise SimulationError(f"{name} was interrupted")  # by the same key as this process: it works all the same
     if done.returncode != 0:
-        raise CompilerError(f"{name} does not compile a model: {complaint(done)}")
+        # Killed, or without room for its files: the compiler itself is sound and may work the next time.
+        passing = done.returncode < 0 or any(sign in done.stderr.casefold() for sign in _PASSING)
+        raise CompilerError(f"{name} does not compile a model: {complaint(done)}", passing=passing)
     if not library.is_file():
         raise CompilerError(f"{name} ended without an error, but made no library")
     return library

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from ppafo.engine import loading
-from ppafo.engine.cache import list_programs
+from ppafo.engine.cache import LEFT_OUT_FOR, list_left_out, list_programs
 from ppafo.engine.compilers import OFFERED
 from ppafo.engine.loading import BACKEND_VARIABLE, chosen_compiler, compilers_to_try, load_source
 from ppafo.errors import ProgramError, SimulationError
@@ -96,8 +96,11 @@ def test_a_compiler_without_headers_is_reported_once_and_the_next_one_compiles(
     assert result_of(text("x[0, 0] * 3.0")) == 6.0
     assert caplog.messages == [
         "ppafo: clang does not compile a model: program.c:1:10: fatal error: math.h: No such file or directory; "
-        "models are compiled by gcc instead"
+        "models are compiled by gcc instead for a day, or until 'ppafo cache --clear'"
     ]
+    assert list_left_out(fresh_cache) == {
+        "clang": "clang does not compile a model: program.c:1:10: fatal error: math.h: No such file or directory"
+    }
     assert chosen_compiler().name == "gcc"
     caplog.clear()
     assert result_of(text("x[0, 0] * 4.0")) == 8.0
@@ -121,7 +124,7 @@ def test_a_compiler_that_did_not_work_is_tried_again_after_a_day_or_when_it_is_a
     assert chosen_compiler().name == "numba"
     monkeypatch.setattr(loading, "_FAILED", set())
     (note,) = fresh_cache.glob("not-working-gcc-*")
-    old = time.time() - 2.0 * loading.LEFT_OUT_FOR
+    old = time.time() - 2.0 * LEFT_OUT_FOR
     os.utime(note, (old, old))
     forget()
     assert chosen_compiler().name == "gcc"
@@ -143,8 +146,50 @@ def test_a_folder_whose_libraries_cannot_be_loaded_is_reported_once_for_all_comp
     (said,) = caplog.messages
     assert said == (
         f"ppafo: libraries in {fresh_cache} cannot be loaded (it is mounted noexec); "
-        "models are compiled by numba instead"
+        "models are compiled by numba instead for a day, or until 'ppafo cache --clear'"
     )
+
+
+@on_unix
+@needs_gcc
+@pytest.mark.parametrize(
+    "end",
+    [
+        "echo 'gcc: fatal error: error writing to program.s: No space left on device' >&2; exit 1",
+        "echo 'gcc: fatal error: Killed signal terminated program cc1' >&2; exit 1",
+        "echo 'Cannot create temporary file in /gone/: No such file or directory' >&2; kill -6 $$",
+        "kill -9 $$",
+    ],
+)
+def test_a_compiler_that_lacked_room_or_was_killed_is_tried_again_in_the_next_process(
+    end: str, fresh_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    only(("gcc", "numba"), monkeypatch)
+    compiler_that_fails("gcc", tmp_path / "bin", monkeypatch).write_text(f"#!/bin/sh\n{end}\n", encoding="utf-8")
+    assert result_of(text("x[0, 0] + 0.25")) == 2.25
+    assert caplog.messages[0].endswith("; models are compiled by numba instead in this run")
+    assert chosen_compiler().name == "numba"
+    assert list_left_out(fresh_cache) == {}
+    monkeypatch.setattr(loading, "_FAILED", set())
+    forget()
+    assert chosen_compiler().name == "gcc"
+
+
+@on_unix
+@needs_gcc
+@pytest.mark.parametrize("flag", ["-ffp-contract=fast", "-funsafe-math-optimizations"])
+def test_a_compiler_that_is_set_to_join_or_reorder_operations_is_left_out(
+    flag: str, fresh_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    if "contract" in flag and " fma " not in native.described_processor():
+        pytest.skip("this processor has no instruction that joins a product and a sum")
+    real = shutil.which("gcc")
+    only(("gcc", "numba"), monkeypatch)
+    wrapper = compiler_that_fails("gcc", tmp_path / "bin", monkeypatch)
+    wrapper.write_text(f'#!/bin/sh\nexec {real} "$@" {flag}\n', encoding="utf-8")
+    assert result_of(text("x[0, 0] + 0.125")) == 2.125
+    assert "the compiler joins or reorders sums and products" in caplog.messages[0]
+    assert list(list_left_out(fresh_cache)) == ["gcc"]
 
 
 @needs_gcc

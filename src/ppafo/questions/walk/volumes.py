@@ -38,7 +38,7 @@ _EXPLAINED = (
     "The paper's torque constant and volume per angle contradict each other by virtual work, so the walk is repeated, "
     f"for at most {LONGEST:g} min, with other chambers. Controllers keep what they believe of them. With the volume by "
     "virtual work and dead volumes that are as large as the torque task's gas wants, the torque that was published of "
-    "walking at 90 psi gauge does not come in time; with short lines it does, and the torque task does not take its "
+    "walking at 90 psig does not come in time; with short lines it does, and the torque task does not take its "
     "gas. Work of the gas is the integral of (P1 - P2) dV over a stride with help, work at the shaft that of the "
     "actuator torque. The peak torque is that of the mean stride."
 )

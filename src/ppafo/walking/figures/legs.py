@@ -331,7 +331,7 @@ def _pressures(axes: "Axes", result: WalkResult) -> None:
             curve = (result.averages[channel].mean - atmosphere) / PASCALS_PER_PSI
             axes.plot(_PERCENT, curve, color=colour, label=name)
     axes.axhline(0.0, color=GREY, linewidth=0.8)
-    axes.set_ylabel("Chambers\n(psi, gauge)", rotation=0, ha="right", va="center")
+    axes.set_ylabel("Chambers\n(psig)", rotation=0, ha="right", va="center")
     axes.yaxis.set_label_coords(-0.045, 0.5)
     axes.locator_params(axis="y", nbins=4)
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2, borderaxespad=0.1, handlelength=1.6)
@@ -445,7 +445,7 @@ def _traces(axes: "Axes", result: WalkResult, turns: np.ndarray) -> None:
     axes.set_xlim(0.0, turns[-1] - turns[0])
     axes.set_ylim(top=max(10.0, axes.get_ylim()[1]))
     axes.set_xlabel("strides", fontsize=8.5, labelpad=1.0)
-    axes.set_ylabel("psi, gauge", fontsize=8.5)
+    axes.set_ylabel("psig", fontsize=8.5)
     axes.tick_params(labelsize=8)
     axes.locator_params(axis="y", nbins=3)
     axes.legend(

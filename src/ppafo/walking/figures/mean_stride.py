@@ -42,7 +42,7 @@ _PANELS = (
     _Panel("Ankle angle (deg, 0 neutral, dorsiflexion positive)", ("angle",), _DEGREES, 0.0),
     _Panel("Torque on the wearer, $T_{ex}$ (N m)", ("external_torque",), 1.0, 0.0),
     _Panel("Actuator torque (N m)", ("torque",), 1.0, 0.0),
-    _Panel("Chamber pressures (psi gauge; solid: plantarflexion, dashed: dorsiflexion)", ("pressure_1", "pressure_2")),
+    _Panel("Chamber pressures (psig; solid: plantarflexion, dashed: dorsiflexion)", ("pressure_1", "pressure_2")),
     _Panel("Toe height above ground (cm; the toes drag below -1)", ("toe_height",), 100.0, 0.0),
 )
 

@@ -209,7 +209,7 @@ def test_the_verb_takes_numbers_as_the_command_takes_texts() -> None:
     assert found.draw.mean_flow == pytest.approx(1e-3 / 1.1)
     assert found.to_dict()["bottle"]["gas_mass"] == pytest.approx(0.1)
     labels = [axes.get_title(loc="left") for axes in found.plot().axes]
-    assert labels == ["Temperature of the bottle (°C)", "Pressure in the bottle (psi gauge)", "Left in the bottle (g)"]
+    assert labels == ["Temperature of the bottle (°C)", "Pressure in the bottle (psig)", "Left in the bottle (g)"]
 
 
 def test_the_verb_takes_recordings_one_or_several() -> None:

@@ -187,7 +187,7 @@ BOTH = ("proportional", "solenoid")
 @pytest.mark.parametrize(
     ("document", "panels"),
     [
-        (study(DRAWN), ["supply pressure (psi gauge)"] * 2),
+        (study(DRAWN), ["supply pressure (psig)"] * 2),
         (study(DRAWN, LEAK, names=BOTH, bands=["torque"]), ["RMS error (N m)", "Switchings", "time (s)"]),
         (study(AXIS), ["reference level (N m)"] * 2),
         (study(AXIS, OTHER), ["reference level (N m)"] * 2),
