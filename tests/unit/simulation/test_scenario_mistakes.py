@@ -331,6 +331,7 @@ def test_the_old_name_of_a_prescribed_motion_is_refused_with_the_new_one() -> No
 
 def test_a_parameter_set_that_is_given_as_a_scenario_is_called_what_it_is() -> None:
     with pytest.raises(
-        ScenarioError, match=r"^bench\.toml: is a parameter set, not a scenario; .*device\.set=bench\.toml --set device\.valve=main$"
+        ScenarioError,
+        match=r"^bench\.toml: is a parameter set, not a scenario; .*device\.set=bench\.toml --set device\.valve=main$",
     ):
         parse_scenario(b'name = "bench"\ndefault_valve = "main"\n', "bench.toml")
