@@ -12,9 +12,8 @@ from ppafo.engine.lanes import Floats
 from ppafo.engine.reference.solver import load_right_hand_side
 from ppafo.engine.rows import numbers
 from ppafo.engine.run import Run
-from ppafo.model.plant import chamber_pressures
+from ppafo.model.plant import actuator_torque, chamber_pressures
 from ppafo.model.sensors import Measurement
-from ppafo.model.vane import actuator_torque
 
 PLANT_UNKNOWNS = 7
 TYPICAL_SIZES = (1.0, 1.0, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1.0)

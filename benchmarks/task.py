@@ -8,7 +8,7 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.engine.lanes import Batch, Floats
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.run import Run, batch_of
-from ppafo.model.chambers import chamber_1_volume, chamber_2_volume, chamber_mass
+from ppafo.model.plant import chamber_1_volume, chamber_2_volume, chamber_mass
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 

@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from ppafo import load_device, simulate
 from ppafo.answers.style import house_style
 from ppafo.engine.scheme.actuators import torque_of, volumes_of
-from ppafo.model.actuators.catalog import ACTUATORS
+from ppafo.model.catalog import ACTUATORS
 from ppafo.parameters.plant import plant_parameters
 
 EXAMPLE = Path(str(resources.files("ppafo") / "examples" / "actuators"))

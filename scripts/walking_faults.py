@@ -24,8 +24,8 @@ from ppafo.engine.rows import leaf_paths, numbers
 from ppafo.engine.run import Run, batch_of
 from ppafo.loading import reloaded
 from ppafo.model import contact as ground
-from ppafo.model.gait_sensors import Fault, GaitSensors
 from ppafo.model.plant import chamber_pressures
+from ppafo.model.sensors import Fault, GaitSensors
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.events import SAFE_ROW

@@ -206,7 +206,7 @@ def kinds() -> str:
     from ppafo.control.catalog import CONTROLLERS, PROFILES
     from ppafo.control.walking.catalog import WALKING_CONTROLLERS
     from ppafo.metrics import METRICS
-    from ppafo.model.valves.catalog import VALVES
+    from ppafo.model.catalog import VALVES
     from ppafo.signals.channels import CHANNELS
 
     text = _titled("Kinds and their settings", "What a file can name, as this package has it; numbers are in SI units.")

@@ -9,9 +9,8 @@ from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.lanes import RECORDED_ANGLE
 from ppafo.engine.program import Program
 from ppafo.metrics import METRICS
-from ppafo.model.effects.catalog import EFFECTS
+from ppafo.model.catalog import EFFECTS, VALVES
 from ppafo.model.valves import dump
-from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveModel
 from ppafo.signals.meter import MeterKind
 

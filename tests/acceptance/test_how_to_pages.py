@@ -22,10 +22,9 @@ from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.plain_python import mistake
 from ppafo.engine.reference.solver import compare_with_reference
-from ppafo.model.actuators.catalog import ACTUATORS
-from ppafo.model.command import VENT
+from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.sensors import Measurement
-from ppafo.model.valves.catalog import VALVES
+from ppafo.model.valves.kind import VENT
 from ppafo.parameters.building import build_device
 from ppafo.parameters.device import Valve
 from ppafo.parameters.loading import parse_parameter_set

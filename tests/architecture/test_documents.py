@@ -14,11 +14,9 @@ from typing import Any
 import pytest
 
 from ppafo.model import plant, sensors
-from ppafo.model.actuators.catalog import ACTUATORS
+from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.model.declaration import Quantity
-from ppafo.model.effects.catalog import EFFECTS
 from ppafo.model.effects.kind import Effect, equation_lines, nomenclature_lines
-from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters import declaration, device
 from ppafo.signals.channels import CHANNELS
 

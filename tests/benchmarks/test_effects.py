@@ -1,7 +1,7 @@
 """The command that times effects has all of the package."""
 
 from benchmarks.effects import ON
-from ppafo.model.effects.catalog import EFFECTS
+from ppafo.model.catalog import EFFECTS
 from ppafo.parameters.effects import effects_of
 from ppafo.simulation.loading import load_scenario
 

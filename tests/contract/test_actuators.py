@@ -8,8 +8,8 @@ import pytest
 
 from ppafo import load_device
 from ppafo.engine.scheme.actuators import pressures_of, torque_of, volumes_of
-from ppafo.model.actuators.catalog import ACTUATORS
 from ppafo.model.actuators.kind import ActuatorModel
+from ppafo.model.catalog import ACTUATORS
 from ppafo.model.plant import PlantParameters
 from ppafo.parameters.plant import plant_parameters
 

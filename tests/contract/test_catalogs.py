@@ -14,9 +14,9 @@ from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.lane_samples import TRACED
 from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.metrics import METRICS, MetricKind
+from ppafo.model.catalog import VALVES
 from ppafo.model.plant import Openings
 from ppafo.model.sensors import Measurement
-from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveKind, ValveModel
 from ppafo.signals.channels import CHANNELS
 

@@ -19,11 +19,18 @@ from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.engine.source_text import SourceCollector
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import WALK
-from ppafo.model.effects.catalog import EFFECTS
+from ppafo.model.catalog import EFFECTS, VALVES
 from ppafo.model.effects.kind import Moment
-from ppafo.model.gait_sensors import Fault, GaitMeasurement, GaitSeen, GaitSensors, measure_gait
-from ppafo.model.sensors import Measurement, SensorParameters, measure
-from ppafo.model.valves.catalog import VALVES
+from ppafo.model.sensors import (
+    Fault,
+    GaitMeasurement,
+    GaitSeen,
+    GaitSensors,
+    Measurement,
+    SensorParameters,
+    measure,
+    measure_gait,
+)
 from ppafo.signals.meter import Course, MeterKind, Sample, WalkSample
 
 QUICKLY = '@njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)'

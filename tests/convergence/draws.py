@@ -5,7 +5,7 @@ import math
 import random
 from functools import lru_cache
 
-from ppafo.model.valves.catalog import VALVES
+from ppafo.model.catalog import VALVES
 from ppafo.parameters.device import (
     Actuator,
     Device,

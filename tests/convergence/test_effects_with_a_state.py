@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import pytest
 
 from ppafo.engine.reference.solver import compare_with_reference, solve_reference
+from ppafo.model.catalog import EFFECTS
 from ppafo.model.declaration import Quantity
-from ppafo.model.effects.catalog import EFFECTS
 from ppafo.model.effects.kind import Effect, Moment, State
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run

@@ -21,8 +21,7 @@ from ppafo.engine.scheme.pneumatics import (
     stage_flows,
     still_change,
 )
-from ppafo.model.plant import Openings, ThermalParameters, chamber_pressures
-from ppafo.model.ports import single_port_flow, single_port_flow_slopes
+from ppafo.model.plant import Openings, ThermalParameters, chamber_pressures, single_port_flow, single_port_flow_slopes
 from ppafo.model.valves import solenoid_recycling
 from ppafo.parameters import load_device
 from ppafo.parameters.plant import plant_parameters

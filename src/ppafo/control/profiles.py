@@ -4,7 +4,7 @@ from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import ProfileKind
 from ppafo.model.declaration import Quantity
-from ppafo.model.turns import TURN, sine_and_cosine
+from ppafo.model.elementary import TURN, sine_and_cosine_of_turns
 
 
 class ConstantProfile(NamedTuple):
@@ -85,7 +85,7 @@ class Sine(NamedTuple):
 def sine_value(profile: Sine, time: float) -> tuple[float, float, float]:
     """Value, rate and second derivative at a time [s]."""
     angular = TURN * profile.frequency
-    sine, cosine = sine_and_cosine(profile.frequency * time + profile.phase)
+    sine, cosine = sine_and_cosine_of_turns(profile.frequency * time + profile.phase)
     swing = profile.amplitude * sine
     return profile.level + swing, angular * profile.amplitude * cosine, -angular * angular * swing
 

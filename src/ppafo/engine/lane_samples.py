@@ -10,11 +10,9 @@ from ppafo.engine.rows import leaf_paths
 from ppafo.engine.scheme.actuators import seen_with_torque, torque_at
 from ppafo.engine.scheme.motion import SAME_INSTANT
 from ppafo.engine.scheme.pneumatics import held_pressures
-from ppafo.model.gait_sensors import GaitMeasurement, late_measurement, measure_gait, samples_late
 from ppafo.model.places import shown_signals
-from ppafo.model.plant import chamber_pressures
-from ppafo.model.sensors import Measurement, measure
-from ppafo.model.vane import actuator_torque
+from ppafo.model.plant import actuator_torque, chamber_pressures
+from ppafo.model.sensors import GaitMeasurement, Measurement, late_measurement, measure, measure_gait, samples_late
 from ppafo.signals.meter import SAME_LEVEL, Sample, WalkSample, advance_course, is_away
 
 SIGNALS = ("angle", "pressure_1", "pressure_2")

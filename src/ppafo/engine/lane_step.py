@@ -17,9 +17,17 @@ from ppafo.engine.lane_samples import present_pressures, pressures_of, sense_end
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.scheme import actuators, motion, pneumatics, supply_lines, thermal_gas, walking
 from ppafo.engine.source_text import woven
-from ppafo.model.course import gait_on_course, shown_toe_force, stands_on_toes
 from ppafo.model.effects.kind import Moment, State
-from ppafo.model.gait import GaitMeasured, GaitNow, gait_of, measured_at, place_at
+from ppafo.model.gait import (
+    GaitMeasured,
+    GaitNow,
+    gait_of,
+    gait_on_course,
+    measured_at,
+    place_at,
+    shown_toe_force,
+    stands_on_toes,
+)
 
 IMPOSSIBLE_RATE = 1.0e6
 IMPOSSIBLE_MASS = 1.0e3

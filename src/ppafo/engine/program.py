@@ -20,15 +20,13 @@ from ppafo.engine.source_text import Collector, SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.model.actuators.kind import ActuatorModel
 from ppafo.model.actuators.vane import MODEL as VANE
-from ppafo.model.course import Course as WalkCourse
-from ppafo.model.course import Marks
 from ppafo.model.effects.kind import Effect, State, effect_problem, laws_in_order
-from ppafo.model.gait import GaitNow, GaitPlace, GaitSeries, GaitTiming
-from ppafo.model.gait_sensors import GaitSeen, GaitSensors
+from ppafo.model.gait import Course as WalkCourse
+from ppafo.model.gait import GaitNow, GaitPlace, GaitSeries, GaitTiming, Marks
 from ppafo.model.leg import LegParameters
 from ppafo.model.plant import PlantState, ThermalParameters, ThermalState
 from ppafo.model.regulator import LineState, SupplyLines
-from ppafo.model.sensors import SensorParameters
+from ppafo.model.sensors import GaitSeen, GaitSensors, SensorParameters
 from ppafo.model.valves.kind import ValveModel
 from ppafo.signals.meter import Course, MeterKind
 

@@ -16,14 +16,12 @@ from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import Pace
 from ppafo.engine.scheme.walking import DeviceShare, WalkState
 from ppafo.model.columns import larger, over_runs, truncated
-from ppafo.model.course import Course
 from ppafo.model.effects.kind import Moment, State
-from ppafo.model.gait import GaitSeries, GaitTiming
-from ppafo.model.gait_sensors import NOTHING_SEEN, GaitSensors
+from ppafo.model.gait import Course, GaitSeries, GaitTiming
 from ppafo.model.leg import LegParameters
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, chamber_pressures
 from ppafo.model.regulator import LineState, SupplyLines
-from ppafo.model.sensors import SensorParameters
+from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters
 
 Members = NDArray[np.intp]
 Floats = NDArray[np.float64]

@@ -14,24 +14,22 @@ from typing import NamedTuple
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.errors import SimulationError
-from ppafo.model.fluid_table import (
-    Column,
-    FluidTable,
-    densest_gas,
-    fluid_pressure,
-    gas_density,
-    gas_specific_energy,
-    has_liquid,
-)
 from ppafo.model.source import (
     BottleContent,
     BottleState,
     BottleWall,
+    Column,
+    FluidTable,
     Regulator,
     bottle_content,
     bottle_rates,
     content_energy,
     content_temperature,
+    densest_gas,
+    fluid_pressure,
+    gas_density,
+    gas_specific_energy,
+    has_liquid,
     regulator_flow_limit,
 )
 

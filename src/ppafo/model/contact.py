@@ -7,6 +7,7 @@ hand-over fades, so that the ankle does not jump.
 
 from typing import NamedTuple
 
+from ppafo.model.elementary import QUARTER_TURN
 from ppafo.model.gait import GaitNow, GaitTiming
 from ppafo.model.leg import LegParameters
 
@@ -14,7 +15,6 @@ SWING = 0.0
 HEEL = 1.0
 FLAT = 2.0
 TOE = 3.0
-QUARTER_TURN = 1.5707963267948966
 
 FADING_TIME = 0.02
 """Time [s] in which a difference of angle at a hand-over falls to a third: about that of a foot slap."""

@@ -1,10 +1,107 @@
-"""A measured gait as periodic functions, and the leg that it prescribes at an instant."""
+"""How a wearer leads the leg: a measured gait as Fourier series, stride after stride, or on a course.
+
+First the series, then where a stride stands and what was measured there, then a course: standing, starting, changing
+the speed, stairs, stopping.
+"""
 
 from typing import Annotated, NamedTuple
 
-from ppafo.model.fourier import HARMONICS, Harmonic, Series, acceleration_at, harmonics, rate_at, value_at
+from ppafo.model.elementary import QUARTER_TURN, TURN, TURNS_OF_RADIAN, sine_and_cosine_of_turns
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, torque_of_shank
-from ppafo.model.turns import TURNS_OF_RADIAN, sine_and_cosine
+
+HARMONICS = 8
+"""Harmonics that the engine follows; those of the built-in gait above are below 0.04 deg and 0.4 % of body weight."""
+
+
+class Harmonic(NamedTuple):
+    """Cosine and sine of a multiple of an angle, or the coefficients of both."""
+
+    cosine: float
+    sine: float
+
+
+class Series(NamedTuple):
+    """Mean, and the coefficients from the first harmonic on, all in the unit of the function."""
+
+    mean: float
+    harmonics: Annotated[tuple[Harmonic, ...], HARMONICS]
+
+
+def harmonics(turns: float) -> tuple[Harmonic, ...]:
+    """Cosines and sines of 1 to 8 times an angle."""
+    s1, c1 = sine_and_cosine_of_turns(turns)
+    c2, s2 = c1 * c1 - s1 * s1, 2.0 * s1 * c1
+    c3, s3 = c2 * c1 - s2 * s1, s2 * c1 + c2 * s1
+    c4, s4 = c2 * c2 - s2 * s2, 2.0 * s2 * c2
+    c5, s5 = c4 * c1 - s4 * s1, s4 * c1 + c4 * s1
+    c6, s6 = c3 * c3 - s3 * s3, 2.0 * s3 * c3
+    c7, s7 = c4 * c3 - s4 * s3, s4 * c3 + c4 * s3
+    c8, s8 = c4 * c4 - s4 * s4, 2.0 * s4 * c4
+    return (
+        Harmonic(cosine=c1, sine=s1),
+        Harmonic(cosine=c2, sine=s2),
+        Harmonic(cosine=c3, sine=s3),
+        Harmonic(cosine=c4, sine=s4),
+        Harmonic(cosine=c5, sine=s5),
+        Harmonic(cosine=c6, sine=s6),
+        Harmonic(cosine=c7, sine=s7),
+        Harmonic(cosine=c8, sine=s8),
+    )
+
+
+def value_at(series: Series, at: tuple[Harmonic, ...]) -> float:
+    """Value of a series, in its unit."""
+    by = series.harmonics
+    low = term_value(by[0], at[0]) + term_value(by[1], at[1]) + term_value(by[2], at[2]) + term_value(by[3], at[3])
+    high = term_value(by[4], at[4]) + term_value(by[5], at[5]) + term_value(by[6], at[6]) + term_value(by[7], at[7])
+    return series.mean + low + high
+
+
+def rate_at(series: Series, at: tuple[Harmonic, ...], frequency: float) -> float:
+    """Time derivative of a series, in its unit per second; ``frequency`` of the first harmonic [Hz]."""
+    by = series.harmonics
+    low = (
+        term_rate(by[0], at[0])
+        + 2.0 * term_rate(by[1], at[1])
+        + 3.0 * term_rate(by[2], at[2])
+        + 4.0 * term_rate(by[3], at[3])
+    )
+    high = (
+        5.0 * term_rate(by[4], at[4])
+        + 6.0 * term_rate(by[5], at[5])
+        + 7.0 * term_rate(by[6], at[6])
+        + 8.0 * term_rate(by[7], at[7])
+    )
+    return TURN * frequency * (low + high)
+
+
+def acceleration_at(series: Series, at: tuple[Harmonic, ...], frequency: float) -> float:
+    """Second time derivative of a series, in its unit per second squared; ``frequency`` as in ``rate_at``."""
+    by = series.harmonics
+    low = (
+        term_value(by[0], at[0])
+        + 4.0 * term_value(by[1], at[1])
+        + 9.0 * term_value(by[2], at[2])
+        + 16.0 * term_value(by[3], at[3])
+    )
+    high = (
+        25.0 * term_value(by[4], at[4])
+        + 36.0 * term_value(by[5], at[5])
+        + 49.0 * term_value(by[6], at[6])
+        + 64.0 * term_value(by[7], at[7])
+    )
+    angular = TURN * frequency
+    return -angular * angular * (low + high)
+
+
+def term_value(one: Harmonic, at: Harmonic) -> float:
+    """Value of a harmonic with the coefficients ``one`` where its angle has the cosine and the sine ``at``."""
+    return one.cosine * at.cosine + one.sine * at.sine
+
+
+def term_rate(one: Harmonic, at: Harmonic) -> float:
+    """As ``term_value``, a quarter of a turn later: the derivative with respect to the angle."""
+    return one.sine * at.cosine - one.cosine * at.sine
 
 
 class GaitSeries(NamedTuple):
@@ -122,8 +219,8 @@ def measured_at(gait: GaitSeries, timing: GaitTiming, leg: LegParameters, place:
 
 def gait_of(leg: LegParameters, now: GaitMeasured) -> GaitNow:
     """What was measured, with what follows of it for this leg."""
-    sine_shank, cosine_shank = sine_and_cosine(now.shank * TURNS_OF_RADIAN)
-    sine_foot, cosine_foot = sine_and_cosine((now.shank - now.ankle) * TURNS_OF_RADIAN + 0.25)
+    sine_shank, cosine_shank = sine_and_cosine_of_turns(now.shank * TURNS_OF_RADIAN)
+    sine_foot, cosine_foot = sine_and_cosine_of_turns((now.shank - now.ankle) * TURNS_OF_RADIAN + 0.25)
     carried = torque_of_shank(
         leg,
         sine_shank,
@@ -153,3 +250,231 @@ def gait_of(leg: LegParameters, now: GaitMeasured) -> GaitNow:
         sine_healthy_foot=sine_foot,
         healthy_torque=carried + moving,
     )
+
+
+PARTS = 32
+NEVER = 1.0e6
+"""Time [s] of a part that is not used, and length of one that does not end."""
+
+STANDS_AT = 0.5
+"""Phase of standing as a fraction of that at which the heel rises: half of the weight is under the heel there."""
+
+SCUFF_AT = 0.5
+"""Place of a scuff as a fraction of the swing."""
+SCUFF_FORCE = 0.2
+"""Force of a scuff under the toes in body weights. Assumed; twice what the shipped controllers take for a load."""
+
+WALKS_ABOVE = 0.5
+"""Strides per second over the recorded ones from which on the foot carries as in walking; below, partly as in
+standing."""
+
+
+class CoursePart(NamedTuple):
+    """One part: start and length [s], phase at its start [turns], and what changes over it: first value and gain.
+
+    Strides per second [Hz], ``stride`` (angles over the recorded ones) [-] and ``load`` [body weights] that the foot
+    carries in standing. ``tilt`` [rad] leans the shank forward at the strike, so that the toes come first; ``scuff``
+    [s] is how long the toes touch the ground in the swing; both hold for the whole part.
+    """
+
+    start: float
+    length: float
+    turns: float
+    frequency: float
+    frequency_gain: float
+    stride: float
+    stride_gain: float
+    load: float
+    load_gain: float
+    tilt: float
+    scuff: float
+
+
+class Course(NamedTuple):
+    """Parts in the order of their starts; those that are not used start at ``NEVER``."""
+
+    parts: Annotated[tuple[CoursePart, ...], PARTS]
+
+
+class Pace(NamedTuple):
+    """Phase [turns], strides per second [Hz], stride [-] and their time derivatives; load, tilt, scuff as in a part."""
+
+    turns: float
+    frequency: float
+    frequency_rate: float
+    stride: float
+    stride_rate: float
+    stride_acceleration: float
+    load: float
+    tilt: float
+    scuff: float
+
+
+class Marks(NamedTuple):
+    """What marks a stride now: force [N] of a scuff under the toes, and 1 where only the forefoot meets the ground."""
+
+    scuff_force: float
+    forefoot: float
+
+
+class Blend(NamedTuple):
+    """A value that goes from 0 to 1, and its first and second derivative."""
+
+    value: float
+    rate: float
+    acceleration: float
+
+
+def blend(fraction: float) -> Blend:
+    """From 0 to 1 over a fraction from 0 to 1, with both derivatives 0 at both ends."""
+    rest = 1.0 - fraction
+    square = fraction * fraction
+    return Blend(
+        value=square * fraction * (10.0 + fraction * (6.0 * fraction - 15.0)),
+        rate=30.0 * square * rest * rest,
+        acceleration=60.0 * fraction * rest * (1.0 - 2.0 * fraction),
+    )
+
+
+def part_at(course: Course, time: float) -> CoursePart:
+    """The part in force at a time [s] from 0 on."""
+    found = course.parts[0]
+    for part in course.parts[1:]:
+        begun = time >= part.start
+        found = CoursePart(
+            start=part.start if begun else found.start,
+            length=part.length if begun else found.length,
+            turns=part.turns if begun else found.turns,
+            frequency=part.frequency if begun else found.frequency,
+            frequency_gain=part.frequency_gain if begun else found.frequency_gain,
+            stride=part.stride if begun else found.stride,
+            stride_gain=part.stride_gain if begun else found.stride_gain,
+            load=part.load if begun else found.load,
+            load_gain=part.load_gain if begun else found.load_gain,
+            tilt=part.tilt if begun else found.tilt,
+            scuff=part.scuff if begun else found.scuff,
+        )
+    return found
+
+
+def pace_in(part: CoursePart, time: float) -> Pace:
+    """Phase, strides per second and stride in a part at a time [s] within it."""
+    passed = time - part.start
+    fraction = min(passed / part.length, 1.0)
+    shape = blend(fraction)
+    square = fraction * fraction
+    integral = square * square * (2.5 + fraction * (fraction - 3.0))
+    return Pace(
+        turns=part.turns + part.frequency * passed + part.frequency_gain * part.length * integral,
+        frequency=part.frequency + part.frequency_gain * shape.value,
+        frequency_rate=part.frequency_gain * shape.rate / part.length,
+        stride=part.stride + part.stride_gain * shape.value,
+        stride_rate=part.stride_gain * shape.rate / part.length,
+        stride_acceleration=part.stride_gain * shape.acceleration / (part.length * part.length),
+        load=part.load + part.load_gain * shape.value,
+        tilt=part.tilt,
+        scuff=part.scuff,
+    )
+
+
+class Motion(NamedTuple):
+    """An angle [rad] with its rate [rad/s] and acceleration [rad/s^2]."""
+
+    angle: float
+    rate: float
+    acceleration: float
+
+
+def blended_angle(series: Series, at: tuple[Harmonic, ...], pace: Pace, standing: float) -> Motion:
+    """An angle between that of standing [rad] and that of the gait."""
+    away = value_at(series, at) - standing
+    rate = rate_at(series, at, pace.frequency)
+    turning = acceleration_at(series, at, pace.frequency) + rate_at(series, at, pace.frequency_rate)
+    return Motion(
+        angle=standing + pace.stride * away,
+        rate=pace.stride_rate * away + pace.stride * rate,
+        acceleration=pace.stride_acceleration * away + 2.0 * pace.stride_rate * rate + pace.stride * turning,
+    )
+
+
+def tilt_of_shank(timing: GaitTiming, phase: float, pace: Pace) -> Motion:
+    """How far the shank leans forward for a strike with the toes: most at the strike, none at toe-off and standing."""
+    standing = STANDS_AT * timing.heel_off
+    since = phase - standing if phase >= standing else phase - standing + 1.0
+    strike, lifted = 1.0 - standing, timing.toe_off - standing
+    rises = since < strike
+    slope = 1.0 / (strike - lifted) if rises else -1.0 / standing
+    place = (since - lifted) * slope if rises else 1.0 + (since - strike) * slope
+    shape = blend(max(0.0, min(1.0, place)))
+    rate = slope * pace.frequency
+    return Motion(
+        angle=pace.tilt * shape.value,
+        rate=pace.tilt * shape.rate * rate,
+        acceleration=pace.tilt * (shape.acceleration * rate * rate + shape.rate * slope * pace.frequency_rate),
+    )
+
+
+def marks_at(timing: GaitTiming, leg: LegParameters, phase: float, pace: Pace) -> Marks:
+    """The marks at a phase; none in a part without a scuff and a tilt."""
+    since = phase - timing.toe_off - SCUFF_AT * (1.0 - timing.toe_off)
+    weight = SCUFF_FORCE * leg.body_mass * leg.gravity
+    scuffs = since >= 0.0 and since < pace.scuff * pace.frequency
+    return Marks(scuff_force=weight if scuffs else 0.0, forefoot=1.0 if pace.tilt > 0.0 else 0.0)
+
+
+def gait_on_course(
+    gait: GaitSeries, course: Course, timing: GaitTiming, leg: LegParameters, time: float
+) -> tuple[GaitNow, Marks]:
+    """The gait of a person with this leg at a time [s] of a course, and what marks the stride.
+
+    The ground force is that of the gait at any speed, and passes to the load of standing below ``WALKS_ABOVE``. The
+    acceleration of the knee goes with stride and strides per second squared; that of the way of the body as its speed
+    changes is left out: at most 1 m/s^2 beside 10 to 20.
+    """
+    pace = pace_in(part_at(course, time), time)
+    phase = pace.turns - float(int(pace.turns))
+    at = harmonics(phase)
+    tilt = tilt_of_shank(timing, phase, pace)
+    upright = blended_angle(gait.shank, at, pace, 0.0)
+    ankle = blended_angle(gait.ankle, at, pace, QUARTER_TURN - timing.ground_angle)
+    shank = upright.angle - tilt.angle
+    shank_rate = upright.rate - tilt.rate
+    shank_acceleration = upright.acceleration - tilt.acceleration
+    hurry = pace.frequency / timing.frequency
+    forward = pace.stride * hurry * hurry * value_at(gait.knee_forward, at)
+    up = pace.stride * hurry * hurry * value_at(gait.knee_up, at)
+    walks = blend(min(hurry / WALKS_ABOVE, 1.0)).value
+    carried = pace.load + walks * (value_at(gait.force, at) - pace.load)
+    sine_shank, cosine_shank = sine_and_cosine_of_turns(shank * TURNS_OF_RADIAN)
+    sine_foot, cosine_foot = sine_and_cosine_of_turns((shank - ankle.angle) * TURNS_OF_RADIAN + 0.25)
+    torque = torque_of_shank(
+        leg, sine_shank, cosine_shank, sine_foot, cosine_foot, shank_rate, shank_acceleration, forward, up
+    )
+    now = GaitNow(
+        phase=phase,
+        shank=shank,
+        shank_rate=shank_rate,
+        shank_acceleration=shank_acceleration,
+        ankle=ankle.angle,
+        ankle_rate=ankle.rate,
+        ankle_acceleration=ankle.acceleration,
+        moment=walks * leg.body_mass * value_at(gait.moment, at),
+        force=max(leg.body_mass * leg.gravity * carried, 0.0),
+        knee_forward=forward,
+        knee_up=up,
+        sine_shank=sine_shank,
+        cosine_shank=cosine_shank,
+        sine_healthy_foot=sine_foot,
+        healthy_torque=torque + foot_inertia_about_ankle(leg) * ankle.acceleration + leg.ankle_damping * ankle.rate,
+    )
+    return now, marks_at(timing, leg, phase, pace)
+
+
+def shown_toe_force(toe_force: float, marks: Marks, follow_rate: float, step: float) -> float:
+    """Toe force [N] that the sensor shows at the end of a step [s], with a scuff; it follows at a rate [1/s]."""
+    return toe_force + marks.scuff_force * follow_rate * step / (1.0 + follow_rate * step)
+
+
+def stands_on_toes(toes_first: float, marks: Marks) -> float:
+    """1 where the stride began with the toes, or where only the forefoot is on the ground: on the edge of a stair."""
+    return max(toes_first, marks.forefoot)

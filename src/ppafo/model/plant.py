@@ -1,13 +1,22 @@
-"""The plant: all components of one device put together, as floats."""
+"""The plant: vane, chambers and the ports of a valve, put together as floats.
+
+First the rows of numbers of a device and of its state. Then the vane with its foot plate, equations (1), (2) and (10):
+torques, stick-slip friction, acceleration. Then the two chambers, equations (3) to (5): volume, pressure and mass.
+
+Last what a chamber is connected to during one step, equation (8), for a steady or a changing valve. A ``SinglePort``
+joins a chamber to one node, source or atmosphere. A ``BlendedPort`` joins it to both, each with the mean opening over
+the step: that is how a valve that moves or switches inside a step is seen by the chamber. Flows are positive into the
+chamber. Both kinds offer the same two functions; the engine is composed with one pair. A source lets gas in only,
+unless its regulator is a relieving one: a flow back into a node is multiplied by what that node takes back, 1 for the
+atmosphere and for a relieving supply, 0 for a supply with a check valve.
+"""
 
 from typing import NamedTuple
 
-from ppafo.model.chambers import chamber_1_volume, chamber_2_volume
 from ppafo.model.columns import Number
-from ppafo.model.orifice import FlowCurve
+from ppafo.model.elementary import QUARTER_TURN
+from ppafo.model.orifice import FlowCurve, check_valve_flow, check_valve_flow_slopes, orifice_flow, orifice_flow_slopes
 from ppafo.model.places import way_in, way_out
-from ppafo.model.ports import BlendedPort, SinglePort
-from ppafo.model.vane import actuator_torque, gravity_torque, net_driving_torque
 
 
 class PlantParameters(NamedTuple):
@@ -91,11 +100,92 @@ class Openings(NamedTuple):
     vent_2: float
 
 
+def actuator_torque(pressure_1: float, pressure_2: float, torque_constant: float) -> float:
+    """Actuator torque [N m], positive in plantarflexion, of two absolute pressures [Pa]. Equation (2)."""
+    return torque_constant * (pressure_1 - pressure_2)
+
+
+def gravity_torque(angle: Number, largest_torque: float) -> Number:
+    """Torque [N m] that gravity takes from the vane (it is subtracted in equation (1)), for an upright shank.
+
+    The foot plate is level at 90 deg, where gravity pulls the toes down with ``largest_torque`` = m g l, that is in
+    plantarflexion, so the value is negative. The cosine of the slope is a power series, good to 1e-8 within 0 to
+    180 deg, because a library cosine cannot run in many lanes at once.
+    """
+    slope = angle - QUARTER_TURN
+    square = slope * slope
+    cosine = 1.0 / 479001600.0 * square - 1.0 / 3628800.0
+    cosine = cosine * square + 1.0 / 40320.0
+    cosine = cosine * square - 1.0 / 720.0
+    cosine = cosine * square + 1.0 / 24.0
+    cosine = cosine * square - 0.5
+    cosine = cosine * square + 1.0
+    return -largest_torque * cosine
+
+
+def net_driving_torque(actuator: float, gravity: float, external: float) -> float:
+    """Torque [N m] that drives the vane before friction and damping: actuator less gravity less T_ex. Equation (1)."""
+    return actuator - gravity - external
+
+
+def vane_acceleration(
+    driving_torque: float, angular_velocity: float, friction: float, viscous_damping: float, inertia: float
+) -> float:
+    """Angular acceleration [rad/s^2]; friction [N m] and damping are subtracted. Equation (1)."""
+    return (driving_torque - viscous_damping * angular_velocity - friction) / inertia
+
+
+def sliding_friction(angular_velocity: float, dynamic_torque: float) -> float:
+    """Friction torque [N m] of a moving vane, along the angular velocity [rad/s]: it is subtracted. Equation (10).
+
+    The paper prints the opposite sign beside a friction that is subtracted too, which would drive the motion.
+    """
+    if angular_velocity > 0.0:
+        return dynamic_torque
+    if angular_velocity < 0.0:
+        return -dynamic_torque
+    return 0.0
+
+
+def holds_still(net_torque: float, static_torque: float, at_lower_stop: bool, at_upper_stop: bool) -> bool:
+    """True where a vane at rest stays at rest: static friction or a stop balances the net torque [N m]."""
+    within = abs(net_torque) <= static_torque
+    against_stop = (at_lower_stop and net_torque < 0.0) or (at_upper_stop and net_torque > 0.0)
+    return within or against_stop
+
+
+def driving_torque(plant: PlantParameters, angle: float, pressure_1: float, pressure_2: float) -> float:
+    """Torque on the vane before friction and damping [N m], positive in plantarflexion. Equations (1), (2)."""
+    actuator = actuator_torque(pressure_1, pressure_2, plant.torque_constant)
+    gravity = gravity_torque(angle, plant.gravity_torque)
+    return net_driving_torque(actuator, gravity, plant.external_torque)
+
+
+def chamber_1_volume(angle: Number, angle_min: float, volume_per_angle: float, dead_volume: float) -> Number:
+    """Volume of chamber 1 [m^3], growing with the angle [rad]; equation (4) with a dead volume and a lower stop."""
+    return dead_volume + volume_per_angle * (angle - angle_min)
+
+
+def chamber_2_volume(angle: Number, angle_max: float, volume_per_angle: float, dead_volume: float) -> Number:
+    """Volume of chamber 2 [m^3], shrinking with the angle [rad]; equation (5) with a dead volume and an upper stop."""
+    return dead_volume + volume_per_angle * (angle_max - angle)
+
+
 def chamber_volumes(plant: PlantParameters, angle: Number) -> tuple[Number, Number]:
     """Volumes of both chambers [m^3] at an angle [rad]. Equations (4), (5)."""
     volume_1 = chamber_1_volume(angle, plant.angle_min, plant.volume_per_angle, plant.dead_volume_1)
     volume_2 = chamber_2_volume(angle, plant.angle_max, plant.volume_per_angle, plant.dead_volume_2)
     return volume_1, volume_2
+
+
+def chamber_pressure(mass: Number, volume: Number, gas_product: float) -> Number:
+    """Absolute pressure [Pa] of ``mass`` [kg] in ``volume`` [m^3]; ``gas_product`` is R T / M [J/kg]. Equation (3)."""
+    return mass * gas_product / volume
+
+
+def chamber_mass(pressure: float, volume: Number, gas_product: float) -> Number:
+    """Mass [kg] that fills ``volume`` [m^3] at an absolute pressure [Pa]; the inverse of equation (3)."""
+    return pressure * volume / gas_product
 
 
 def pressures_per_mass(plant: PlantParameters, angle: Number) -> tuple[Number, Number]:
@@ -111,11 +201,29 @@ def chamber_pressures(plant: PlantParameters, angle: Number, mass_1: Number, mas
     return mass_1 * per_mass_1, mass_2 * per_mass_2
 
 
-def driving_torque(plant: PlantParameters, angle: float, pressure_1: float, pressure_2: float) -> float:
-    """Torque on the vane before friction and damping [N m], positive in plantarflexion. Equations (1), (2)."""
-    actuator = actuator_torque(pressure_1, pressure_2, plant.torque_constant)
-    gravity = gravity_torque(angle, plant.gravity_torque)
-    return net_driving_torque(actuator, gravity, plant.external_torque)
+class SinglePort(NamedTuple):
+    """One open path: conductance [kg/(s Pa)], absolute pressure of the node [Pa], and 1 if that is the source.
+
+    ``takes_back`` is 1 where gas may flow back into the node, else 0.
+    """
+
+    conductance: float
+    node_pressure: float
+    source_fraction: float
+    takes_back: float
+
+
+class BlendedPort(NamedTuple):
+    """Two open paths: conductances [kg/(s Pa)] to the source and to the atmosphere and their pressures [Pa].
+
+    ``takes_back`` is 1 where gas may flow back into the source, else 0.
+    """
+
+    source_conductance: float
+    source_pressure: float
+    vent_conductance: float
+    vent_pressure: float
+    takes_back: float
 
 
 def single_ports(plant: PlantParameters, opening: float) -> tuple[SinglePort, SinglePort]:
@@ -157,3 +265,59 @@ def blended_ports(plant: PlantParameters, openings: Openings) -> tuple[BlendedPo
         takes_back=back,
     )
     return port_1, port_2
+
+
+class PortFlow(NamedTuple):
+    """Flow into the chamber [kg/s] and the part of it that comes from the source [kg/s]."""
+
+    total: float
+    from_source: float
+
+
+class PortFlowSlopes(NamedTuple):
+    """As ``PortFlow``, with the derivatives with respect to the chamber's pressure [kg/(s Pa)]."""
+
+    total: float
+    total_slope: float
+    from_source: float
+    source_slope: float
+
+
+def admitted_flow(flow: float, takes_back: float) -> float:
+    """Flow out of a node [kg/s], positive out of it: none back into one that takes nothing back. Equation (8)."""
+    return max(flow, flow * takes_back)
+
+
+def single_port_flow(pressure: float, port: SinglePort, curve: FlowCurve) -> PortFlow:
+    """Flow [kg/s] into a chamber at ``pressure`` [Pa absolute] through one open path. Equations (6) to (8)."""
+    flow = check_valve_flow(port.node_pressure, pressure, port.conductance, port.takes_back, curve)
+    return PortFlow(flow, flow * port.source_fraction)
+
+
+def single_port_flow_slopes(pressure: float, port: SinglePort, curve: FlowCurve) -> PortFlowSlopes:
+    """As ``single_port_flow``, with derivatives."""
+    flow, _, slope = check_valve_flow_slopes(port.node_pressure, pressure, port.conductance, port.takes_back, curve)
+    return PortFlowSlopes(
+        total=flow,
+        total_slope=slope,
+        from_source=flow * port.source_fraction,
+        source_slope=slope * port.source_fraction,
+    )
+
+
+def blended_port_flow(pressure: float, port: BlendedPort, curve: FlowCurve) -> PortFlow:
+    """Flow [kg/s] into a chamber at ``pressure`` [Pa absolute] through two open paths. Equations (6) to (8)."""
+    source = check_valve_flow(port.source_pressure, pressure, port.source_conductance, port.takes_back, curve)
+    vent = orifice_flow(port.vent_pressure, pressure, port.vent_conductance, curve)
+    return PortFlow(source + vent, source)
+
+
+def blended_port_flow_slopes(pressure: float, port: BlendedPort, curve: FlowCurve) -> PortFlowSlopes:
+    """As ``blended_port_flow``, with derivatives."""
+    source, _, source_slope = check_valve_flow_slopes(
+        port.source_pressure, pressure, port.source_conductance, port.takes_back, curve
+    )
+    vent, _, vent_slope = orifice_flow_slopes(port.vent_pressure, pressure, port.vent_conductance, curve)
+    return PortFlowSlopes(
+        total=source + vent, total_slope=source_slope + vent_slope, from_source=source, source_slope=source_slope
+    )

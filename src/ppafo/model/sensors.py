@@ -1,12 +1,14 @@
-"""What a controller sees of the plant: ideal, or with a bandwidth, noise and quantisation.
+"""What a controller sees of the plant: ideal, or with a bandwidth, noise and quantisation; and in a walk.
 
 Noise is a pure function of seed, sample number and channel, so that a run gives the same noise alone, in any block
-and on any number of threads.
+and on any number of threads. A controller of walking sees two force sensors under the foot beside angle and pressures,
+with faults. One draw a sample says of every sensor with a fault whether its sample is lost: two that lose samples lose
+the same.
 """
 
 from typing import NamedTuple
 
-from ppafo.model.turns import DOUBLINGS, SMALLEST_FRACTION, TERMS
+from ppafo.model.elementary import DOUBLINGS, SMALLEST_FRACTION, TERMS
 
 MASK = 0xFFFFFFFF
 ARRIVAL = 40.0
@@ -107,3 +109,222 @@ def measure(
     first = quantise(pressure_1 + sensors.pressure_noise * standard_noise(seed, sample, 1), sensors.pressure_quantum)
     second = quantise(pressure_2 + sensors.pressure_noise * standard_noise(seed, sample, 2), sensors.pressure_quantum)
     return Measurement(angle=angle, pressure_1=first, pressure_2=second, torque=torque_constant * (first - second))
+
+
+class GaitMeasurement(NamedTuple):
+    """Angle [rad], absolute pressures [Pa], actuator torque from them [N m], forces under heel and toes [N]."""
+
+    angle: float
+    pressure_1: float
+    pressure_2: float
+    torque: float
+    heel_force: float
+    toe_force: float
+
+
+class Fault(NamedTuple):
+    """What is wrong with a sensor from ``time`` [s] on: it shows its last value (``holds`` 1) or ``reading``.
+
+    With ``distorts`` 1 it shows gain times what is there, plus an offset and a drift [1/s] in its own unit, with a
+    fraction of the other sensor of its kind (``crosstalk``), a first-order lag (``memory``, what is left of its last
+    value after a sample), a fraction of its samples lost, and ``late_samples`` whole samples late. With a ``period``
+    [s] above 0 it is so in the first half of each period only.
+    """
+
+    time: float
+    holds: float
+    reading: float
+    distorts: float = 0.0
+    gain: float = 1.0
+    offset: float = 0.0
+    drift: float = 0.0
+    crosstalk: float = 0.0
+    memory: float = 0.0
+    lost_fraction: float = 0.0
+    period: float = 0.0
+    late_samples: float = 0.0
+
+
+class GaitSensors(NamedTuple):
+    """How sensors follow, noise and step of the forces [N], fractions of samples that are lost, and faults.
+
+    ``follow_rate`` [1/s] is that of the force sensors; ``angle_memory`` and ``pressure_memory`` are what is left of a
+    first-order sensor's last value after one sample, 0 for one that follows at once.
+    """
+
+    follow_rate: float
+    force_noise: float
+    force_quantum: float
+    lost_share: float
+    angle_memory: float
+    pressure_memory: float
+    angle_lost_share: float
+    pressure_lost_share: float
+    heel_fault: Fault
+    toe_fault: Fault
+    angle_fault: Fault
+    pressure_1_fault: Fault
+    pressure_2_fault: Fault
+
+
+class GaitSeen(NamedTuple):
+    """Last readings: forces under heel and toes [N], angle [rad], absolute pressures [Pa].
+
+    The last three are angle and pressures as a first-order sensor follows them, before noise and steps.
+    """
+
+    heel_force: float
+    toe_force: float
+    angle: float
+    pressure_1: float
+    pressure_2: float
+    smooth_angle: float
+    smooth_pressure_1: float
+    smooth_pressure_2: float
+
+
+HALF = 0.5
+"""Fraction of its period in which a fault that comes and goes is there."""
+
+NOTHING_SEEN = GaitSeen(
+    heel_force=0.0,
+    toe_force=0.0,
+    angle=0.0,
+    pressure_1=0.0,
+    pressure_2=0.0,
+    smooth_angle=0.0,
+    smooth_pressure_1=0.0,
+    smooth_pressure_2=0.0,
+)
+
+
+def lagged_reading(shown: float, true: float, follow_rate: float, step: float) -> float:
+    """What a first-order sensor shows after a step [s]; ``follow_rate`` [1/s] is the inverse of its time constant.
+
+    Both readings are in the sensor's unit.
+    """
+    fraction = follow_rate * step
+    return shown + (true - shown) * fraction / (1.0 + fraction)
+
+
+def is_active(fault: Fault, time: float) -> bool:
+    """True where a fault acts at a time [s]; one that comes and goes does so in the first half of each period."""
+    length = fault.period if fault.period > 0.0 else 1.0
+    periods = max(0.0, time - fault.time) / length
+    away = (periods - float(int(periods)) >= HALF) & (fault.period > 0.0)
+    return (time >= fault.time) & (not away)
+
+
+def distorted(fault: Fault, reading: float, other: float, last: float, time: float) -> float:
+    """A reading at ``time`` [s] with gain, offset, drift, lag and some of the other sensor in it, in its unit."""
+    mixed = reading + fault.crosstalk * (other - reading)
+    target = fault.gain * mixed + fault.offset + fault.drift * (time - fault.time)
+    return target + fault.memory * (last - target)
+
+
+def faulty(fault: Fault, reading: float, other: float, last: float, time: float, draw: float) -> float:
+    """A reading at ``time`` [s] as a sensor with a fault gives it, in its unit; ``other`` is that of the other sensor.
+
+    ``draw`` from 0 to 1 tells whether the sample is lost.
+    """
+    wrong = distorted(fault, reading, other, last, time)
+    wrong = last if draw < fault.lost_fraction else wrong
+    stuck = last if fault.holds > 0.5 else fault.reading
+    shown = wrong if fault.distorts > 0.5 else stuck
+    return shown if is_active(fault, time) else reading
+
+
+def force_reading(sensors: GaitSensors, force: float, seed: int, sample: int, channel: int) -> float:
+    """A force [N] with noise and steps, never below 0."""
+    noisy = force + sensors.force_noise * standard_noise(seed, sample, channel)
+    return max(quantise(noisy, sensors.force_quantum), 0.0)
+
+
+def previous_reading(last: float, reading: float, sample: int) -> float:
+    """The reading before, in the sensor's unit; before the first sample the same, as of a sensor that has settled."""
+    return last if sample > 0 else reading
+
+
+def hold_if_lost(last: float, reading: float, lost_share: float, seed: int, sample: int, channel: int) -> float:
+    """A reading, or the last one where the sample is lost, in the sensor's unit; ``lost_share`` [-] are lost."""
+    return last if unit_noise(seed, sample, channel) < lost_share else reading
+
+
+def measure_gait(
+    sensors: SensorParameters,
+    gait_sensors: GaitSensors,
+    last: GaitSeen,
+    angle: float,
+    pressure_1: float,
+    pressure_2: float,
+    heel_force: float,
+    toe_force: float,
+    torque_constant: float,
+    time: float,
+    sample: int,
+) -> tuple[GaitMeasurement, GaitSeen]:
+    """Measurement [SI] of a sample with bandwidth, noise, steps, loss and faults, and what to remember of it."""
+    seed = int(sensors.seed)
+    # A sensor has settled before the walk begins.
+    angle_memory = gait_sensors.angle_memory if sample > 0 else 0.0
+    pressure_memory = gait_sensors.pressure_memory if sample > 0 else 0.0
+    smooth_angle = angle + (last.smooth_angle - angle) * angle_memory
+    smooth_1 = pressure_1 + (last.smooth_pressure_1 - pressure_1) * pressure_memory
+    smooth_2 = pressure_2 + (last.smooth_pressure_2 - pressure_2) * pressure_memory
+    seen = measure(sensors, smooth_angle, smooth_1, smooth_2, torque_constant, sample)
+    heel = force_reading(gait_sensors, heel_force, seed, sample, 3)
+    toe = force_reading(gait_sensors, toe_force, seed, sample, 4)
+    was_angle = previous_reading(last.angle, seen.angle, sample)
+    was_1 = previous_reading(last.pressure_1, seen.pressure_1, sample)
+    was_2 = previous_reading(last.pressure_2, seen.pressure_2, sample)
+    was_heel = previous_reading(last.heel_force, heel, sample)
+    was_toe = previous_reading(last.toe_force, toe, sample)
+    kept_angle = hold_if_lost(was_angle, seen.angle, gait_sensors.angle_lost_share, seed, sample, 7)
+    kept_1 = hold_if_lost(was_1, seen.pressure_1, gait_sensors.pressure_lost_share, seed, sample, 8)
+    kept_2 = hold_if_lost(was_2, seen.pressure_2, gait_sensors.pressure_lost_share, seed, sample, 9)
+    kept_heel = hold_if_lost(was_heel, heel, gait_sensors.lost_share, seed, sample, 5)
+    kept_toe = hold_if_lost(was_toe, toe, gait_sensors.lost_share, seed, sample, 6)
+    draw = unit_noise(seed, sample, 10)
+    shown_angle = faulty(gait_sensors.angle_fault, kept_angle, kept_angle, was_angle, time, draw)
+    shown_1 = faulty(gait_sensors.pressure_1_fault, kept_1, kept_2, was_1, time, draw)
+    shown_2 = faulty(gait_sensors.pressure_2_fault, kept_2, kept_1, was_2, time, draw)
+    shown_heel = faulty(gait_sensors.heel_fault, kept_heel, kept_toe, was_heel, time, draw)
+    shown_toe = faulty(gait_sensors.toe_fault, kept_toe, kept_heel, was_toe, time, draw)
+    remembered = GaitSeen(
+        heel_force=shown_heel,
+        toe_force=shown_toe,
+        angle=shown_angle,
+        pressure_1=shown_1,
+        pressure_2=shown_2,
+        smooth_angle=smooth_angle,
+        smooth_pressure_1=smooth_1,
+        smooth_pressure_2=smooth_2,
+    )
+    return measurement_of(remembered, torque_constant), remembered
+
+
+def samples_late(fault: Fault, time: float, sample: int) -> int:
+    """How many samples ago a reading was made that arrives at ``time`` [s], the time of ``sample``."""
+    late = int(fault.late_samples) if is_active(fault, time) else 0
+    return min(late, sample)
+
+
+def late_measurement(
+    heel_force: float, toe_force: float, angle: float, pressure_1: float, pressure_2: float, torque_constant: float
+) -> GaitMeasurement:
+    """What a controller gets of readings that arrive late: forces [N], angle [rad], pressures [Pa]."""
+    return GaitMeasurement(
+        angle=angle,
+        pressure_1=pressure_1,
+        pressure_2=pressure_2,
+        torque=torque_constant * (pressure_1 - pressure_2),
+        heel_force=heel_force,
+        toe_force=toe_force,
+    )
+
+
+def measurement_of(shown: GaitSeen, torque_constant: float) -> GaitMeasurement:
+    """What a controller gets of what the sensors show; its torque is that of the readings, true or not."""
+    return late_measurement(
+        shown.heel_force, shown.toe_force, shown.angle, shown.pressure_1, shown.pressure_2, torque_constant
+    )

@@ -8,15 +8,13 @@ from typing import Any
 import numpy as np
 
 from ppafo.errors import ParameterError, UnitError, nearest_name
-from ppafo.model.actuators.catalog import ACTUATORS
 from ppafo.model.actuators.kind import Range
 from ppafo.model.actuators.table import Table
+from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.model.columns import Problem, at, larger
 from ppafo.model.declaration import Quantity
-from ppafo.model.effects.catalog import EFFECTS
 from ppafo.model.effects.kind import SECTION
 from ppafo.model.gas import SPECIES
-from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters import declaration
 from ppafo.parameters.actuator_table import highest_pressure
 from ppafo.parameters.device import (

@@ -9,12 +9,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
-from ppafo.model.actuators.catalog import ACTUATORS
 from ppafo.model.actuators.vane import KIND as VANE
+from ppafo.model.catalog import ACTUATORS, VALVES, device_effects
 from ppafo.model.declaration import Quantity
-from ppafo.model.effects.catalog import device_effects
 from ppafo.model.effects.kind import Effect
-from ppafo.model.valves.catalog import VALVES
 
 SPECIES_PATH = "gas.species"
 RELIEVING_PATH = "supply.relieving"

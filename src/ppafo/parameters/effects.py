@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
+from ppafo.model.catalog import device_effects, ordered_effects
 from ppafo.model.columns import first, over_runs
-from ppafo.model.effects.catalog import device_effects, ordered_effects
 from ppafo.model.effects.kind import Effect
 from ppafo.parameters.declaration import members
 from ppafo.parameters.device import Device

@@ -13,13 +13,11 @@ from pydantic import BaseModel, Field
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name
-from ppafo.model.actuators.catalog import ACTUATORS
 from ppafo.model.actuators.table import Table
 from ppafo.model.actuators.vane import KIND as VANE
+from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES, device_effects, find_effects
 from ppafo.model.declaration import Quantity
-from ppafo.model.effects.catalog import EFFECTS, device_effects, find_effects
 from ppafo.model.effects.kind import SECTION
-from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters import declaration
 from ppafo.parameters.actuator_table import read_actuator_table
 from ppafo.parameters.building import build_device

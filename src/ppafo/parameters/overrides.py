@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
-from ppafo.model.effects.catalog import find_effects
+from ppafo.model.catalog import find_effects
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.declaration import AREA_FORM, RELIEVING_PATH, SONIC_FORM, SPECIES_PATH
 from ppafo.parameters.graph import acting

@@ -2,11 +2,10 @@
 
 from typing import Any, NamedTuple, cast
 
-from ppafo.model.actuators.catalog import ACTUATORS
 from ppafo.model.actuators.kind import Range, mean_growth, plant_in_shape
+from ppafo.model.catalog import ACTUATORS
 from ppafo.model.columns import over_runs
-from ppafo.model.orifice import FlowCurve
-from ppafo.model.orifice_curves import area_conductance, isentropic_curve, iso6358_curve, sonic_conductance_mass
+from ppafo.model.orifice import FlowCurve, area_conductance, isentropic_curve, iso6358_curve, sonic_conductance_mass
 from ppafo.model.plant import PlantParameters
 from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice
 

@@ -7,9 +7,7 @@ chamber with its own orifice, a laminar part of the leak, friction that grows wi
 import math
 
 from ppafo.engine.reference.right_hand_side import ExactOrifice, exact_flow
-from ppafo.model.plant import Openings, PlantParameters, chamber_volumes, driving_torque
-from ppafo.model.ports import admitted_flow
-from ppafo.model.thermal import (
+from ppafo.model.gas import (
     energy_rate,
     gas_enthalpy,
     gas_temperature,
@@ -18,7 +16,14 @@ from ppafo.model.thermal import (
     real_pressure,
     temperature_flow_factor,
 )
-from ppafo.model.vane import vane_acceleration
+from ppafo.model.plant import (
+    Openings,
+    PlantParameters,
+    admitted_flow,
+    chamber_volumes,
+    driving_torque,
+    vane_acceleration,
+)
 from ppafo.rig.rows import Exchange, Node, Observables, RigPhysics, RigState, Side
 
 BREAKAWAY_DROP = 0.1

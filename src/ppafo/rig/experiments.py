@@ -16,9 +16,9 @@ from ppafo.constants import PASCALS_PER_PSI
 from ppafo.engine.reference.right_hand_side import ExactOrifice
 from ppafo.engine.run import Run
 from ppafo.errors import ScenarioError
+from ppafo.model.catalog import VALVES
+from ppafo.model.gas import gas_energy, real_density
 from ppafo.model.plant import chamber_volumes
-from ppafo.model.thermal import gas_energy, real_density
-from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters import load_device
 from ppafo.parameters.declaration import SECTIONS
 from ppafo.parameters.device import Device

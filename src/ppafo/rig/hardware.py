@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from ppafo.engine.reference.right_hand_side import ExactOrifice
 from ppafo.errors import ParameterError
-from ppafo.model.orifice_curves import area_conductance
+from ppafo.model.catalog import VALVES
+from ppafo.model.gas import heat_capacity_at_constant_volume
+from ppafo.model.orifice import area_conductance
 from ppafo.model.plant import PlantParameters
 from ppafo.model.sensors import quantise
-from ppafo.model.thermal import heat_capacity_at_constant_volume
-from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.rig.preset import Preset
 from ppafo.rig.rows import RigPhysics

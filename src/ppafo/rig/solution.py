@@ -25,9 +25,8 @@ from ppafo.engine.rows import leaf_paths, numbers, rebuild, row_expression
 from ppafo.engine.run import Run
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import SimulationError
-from ppafo.model.plant import Openings, PlantParameters
+from ppafo.model.plant import Openings, PlantParameters, actuator_torque, holds_still
 from ppafo.model.sensors import Measurement
-from ppafo.model.vane import actuator_torque, holds_still
 from ppafo.parameters.device import Device
 from ppafo.rig.dynamics import observables, rig_rates
 from ppafo.rig.hardware import Sensor

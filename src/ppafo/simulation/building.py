@@ -10,9 +10,9 @@ from typing import Any
 from ppafo.control.fixed.torque_laws import FIXED, FLOAT
 from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
+from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
 from ppafo.model.regulator import SupplyLines
-from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set
 from ppafo.parameters import apply_overrides as apply_device_overrides
 from ppafo.parameters.declaration import ORIFICE, RELIEVING_PATH, SPECIES_PATH

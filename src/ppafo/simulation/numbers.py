@@ -9,11 +9,10 @@ import numpy as np
 from ppafo.control.controllers import switching
 from ppafo.engine.lanes import Floats
 from ppafo.errors import ScenarioError, nearest_name
+from ppafo.model.catalog import VALVES, device_effects, find_effects
 from ppafo.model.declaration import Quantity
-from ppafo.model.effects.catalog import device_effects, find_effects
 from ppafo.model.effects.kind import SECTION as EFFECT_SETTINGS
 from ppafo.model.regulator import SupplyLines
-from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, members
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.effects import all_settings

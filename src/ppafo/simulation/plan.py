@@ -21,9 +21,8 @@ from ppafo.engine.run import Lines, Run, Walk
 from ppafo.engine.scheme.actuators import volumes_of
 from ppafo.engine.scheme.pneumatics import is_slow
 from ppafo.errors import ScenarioError
-from ppafo.model.actuators.catalog import ACTUATORS
 from ppafo.model.actuators.vane import KIND as VANE
-from ppafo.model.chambers import chamber_mass
+from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.columns import (
     Number,
     Problem,
@@ -37,11 +36,10 @@ from ppafo.model.columns import (
     truncated,
     whole,
 )
-from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_volumes
+from ppafo.model.gas import wall_exchange
+from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_mass, chamber_volumes
 from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import SensorParameters
-from ppafo.model.thermal import wall_exchange
-from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice
 from ppafo.parameters.effects import effect_rows, effects_of

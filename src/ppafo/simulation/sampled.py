@@ -14,12 +14,10 @@ from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import Run
 from ppafo.engine.scheme.actuators import measurement_of
 from ppafo.errors import ScenarioError, SimulationError
-from ppafo.model.command import VENT, VENTS_ABOVE
-from ppafo.model.gait_sensors import NOTHING_SEEN, GaitMeasurement, measure_gait
 from ppafo.model.places import shown_signals
-from ppafo.model.plant import chamber_pressures
-from ppafo.model.sensors import Measurement, measure
-from ppafo.model.vane import actuator_torque
+from ppafo.model.plant import actuator_torque, chamber_pressures
+from ppafo.model.sensors import NOTHING_SEEN, GaitMeasurement, Measurement, measure, measure_gait
+from ppafo.model.valves.kind import VENT, VENTS_ABOVE
 
 
 @final

@@ -18,10 +18,10 @@ from ppafo.engine.scheme.actuators import pressures_of, torque_of, volumes_of
 from ppafo.errors import SimulationError
 from ppafo.metrics.catalog import evaluate
 from ppafo.metrics.metric import Metric
+from ppafo.model.gas import energy_per_content
 from ppafo.model.places import friction_in_motion
+from ppafo.model.plant import gravity_torque, sliding_friction
 from ppafo.model.regulator import LineState, line_pressures
-from ppafo.model.thermal import energy_per_content
-from ppafo.model.vane import gravity_torque, sliding_friction
 from ppafo.parameters.device import Gas
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.check import ALLOWED_CHANGE, HALF_ERROR, MOVE, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck

@@ -16,13 +16,14 @@ from ppafo.model.plant import (
     Openings,
     PlantParameters,
     PlantState,
+    PortFlow,
     ThermalParameters,
     ThermalState,
+    blended_port_flow,
     blended_ports,
     chamber_volumes,
     pressures_per_mass,
 )
-from ppafo.model.ports import PortFlow, blended_port_flow
 from ppafo.translation.symbolic import Acting, Compare, both_sides, symbolic
 
 Around = Mapping[Any, Callable[..., Any]]

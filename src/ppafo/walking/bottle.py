@@ -31,7 +31,7 @@ from ppafo.model.cold_gas import (
     supply_now,
 )
 from ppafo.model.declaration import Quantity
-from ppafo.model.fluid_table import densest_gas, has_liquid, liquid_density
+from ppafo.model.source import densest_gas, has_liquid, liquid_density
 from ppafo.model.plant import PlantParameters
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.source import bottle_content, content_energy

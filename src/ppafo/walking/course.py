@@ -16,7 +16,7 @@ from ppafo.documents.toml_text import TomlKind, label
 from ppafo.engine.rows import leaves
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.gait import Gait
-from ppafo.model.course import NEVER, PARTS, STANDS_AT, Course, CoursePart
+from ppafo.model.gait import NEVER, PARTS, STANDS_AT, Course, CoursePart
 from ppafo.model.declaration import Quantity
 from ppafo.model.elementary import sine_and_cosine
 from ppafo.model.gait import GaitNow, GaitTiming

@@ -16,8 +16,7 @@ from ppafo.gait import Gait
 from ppafo.gait.gait import Curve
 from ppafo.model.columns import over_runs
 from ppafo.model.contact import NEARLY_FLAT
-from ppafo.model.fourier import HARMONICS, Harmonic, Series
-from ppafo.model.gait import GaitSeries, GaitTiming
+from ppafo.model.gait import HARMONICS, GaitSeries, GaitTiming, Harmonic, Series
 from ppafo.signals.recording import Floats
 from ppafo.walking.preparation import rocker_on_heel
 from ppafo.walking.wearer import HeelRocker, Wearer

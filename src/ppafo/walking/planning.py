@@ -19,14 +19,13 @@ from ppafo.engine.run import Run, Walk, batches_of
 from ppafo.engine.scheme.walking import WalkState
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
+from ppafo.model.catalog import VALVES
 from ppafo.model.columns import Problem, at, first, over_runs, smaller, truncated, whole
-from ppafo.model.course import Course
-from ppafo.model.gait import GaitSeries, GaitTiming, gait_at
-from ppafo.model.gait_sensors import GaitSensors
+from ppafo.model.gait import Course, GaitSeries, GaitTiming, gait_at
 from ppafo.model.leg import LegParameters
 from ppafo.model.plant import PlantParameters
+from ppafo.model.sensors import GaitSensors
 from ppafo.model.valves import dump
-from ppafo.model.valves.catalog import VALVES
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.plant import plant_parameters

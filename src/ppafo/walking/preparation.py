@@ -14,9 +14,9 @@ from ppafo.model.columns import larger, rounded_up, truncated
 from ppafo.model.contact import FLAT, HEEL
 from ppafo.model.elementary import exponential
 from ppafo.model.gait import GaitNow
-from ppafo.model.gait_sensors import Fault, GaitSensors
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, torque_of_shank
 from ppafo.model.plant import PlantParameters, PlantState, chamber_volumes
+from ppafo.model.sensors import Fault, GaitSensors
 from ppafo.simulation.plan import WHOLE, StepCounts, state_at_start
 from ppafo.walking.wearer import HeelRocker
 

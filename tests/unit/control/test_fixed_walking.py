@@ -23,8 +23,8 @@ from ppafo.control.walking import phases, signs
 from ppafo.control.walking.event_on_off import EVENT_ON_OFF as FLOAT_KIND
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.exports.firmware.walking.drawn import DrawnGait, Manner
-from ppafo.model.command import VENTS_ABOVE
-from ppafo.model.gait_sensors import GaitMeasurement
+from ppafo.model.sensors import GaitMeasurement
+from ppafo.model.valves.kind import VENTS_ABOVE
 
 PERIOD = 1.0e-3
 SET = {item.name: float(item.default or 0.0) for item in FLOAT_KIND.quantities}

@@ -25,14 +25,14 @@ import sys, time
 import ppafo
 from ppafo.simulation.loading import load_scenario
 if len(sys.argv) > 1:
-    import ppafo.model.vane as vane
+    import ppafo.model.plant as vane
     text = open(vane.__file__).read().replace("(pressure_1 - pressure_2)", "(pressure_1 - 0.5 * pressure_2)")
     path = sys.argv[1]
     open(path, "w").write(text)
     import importlib.util
-    spec = importlib.util.spec_from_file_location("ppafo.model.vane", path)
+    spec = importlib.util.spec_from_file_location("ppafo.model.plant", path)
     module = importlib.util.module_from_spec(spec)
-    sys.modules["ppafo.model.vane"] = module
+    sys.modules["ppafo.model.plant"] = module
     spec.loader.exec_module(module)
 result = ppafo.simulate("torque-task-proportional", ["run.duration=50 ms"])
 print(float(result.recording["torque"][-1]))

@@ -129,11 +129,11 @@ def test_a_function_redefined_under_one_name_is_refused_beside_the_first(write: 
 
 
 def test_a_module_of_a_user_named_as_one_of_the_package_is_another(write: Write) -> None:
-    from ppafo.model import vane
+    from ppafo.model import plant
 
-    module = write("def actuator_torque(a, b, c):\n    return 0.0\n", "model.vane")
+    module = write("def actuator_torque(a, b, c):\n    return 0.0\n", "model.plant")
     collector = SourceCollector("")
-    assert collector.add(vane.actuator_torque) != collector.add(module.actuator_torque)
+    assert collector.add(plant.actuator_torque) != collector.add(module.actuator_torque)
 
 
 def test_a_module_that_was_loaded_anew_is_the_same_where_its_text_is(write: Write) -> None:

@@ -23,8 +23,15 @@ from ppafo.engine.scheme.pneumatics import (
 )
 from ppafo.engine.scheme.supply_lines import begin_fed_gas, end_lines, plant_at_line_pressures
 from ppafo.model.orifice import orifice_flow
-from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes
-from ppafo.model.ports import SinglePort, single_port_flow, single_port_flow_slopes
+from ppafo.model.plant import (
+    PlantParameters,
+    PlantState,
+    SinglePort,
+    chamber_pressures,
+    chamber_volumes,
+    single_port_flow,
+    single_port_flow_slopes,
+)
 from ppafo.model.regulator import LineState, SupplyLines, line_pressures
 from ppafo.parameters import load_device
 from ppafo.parameters.plant import plant_parameters

@@ -22,7 +22,7 @@ from ppafo.errors import ScenarioError
 from ppafo.exports.hil.loop import BROKEN, SILENT, RealTime
 from ppafo.exports.hil.run import HardwareRun, Plant, plant_of, run_plant
 from ppafo.exports.hil.wire import Reader, Sample, open_port, sample_bytes
-from ppafo.model.command import VENT
+from ppafo.model.valves.kind import VENT
 from ppafo.simulation.loading import load_scenario
 from tests.virtual_wire import Fault, ProportionalPartner, faults, undisturbed
 

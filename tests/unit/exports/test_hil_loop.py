@@ -15,8 +15,8 @@ from ppafo.errors import ScenarioError
 from ppafo.exports.hil.loop import BROKEN, NOT_SOUND, SILENT, STOPPED, Bench, LockStep, RealTime, Row
 from ppafo.exports.hil.run import HardwareRun, Plant, check_baud, longest_silence, plant_of, run_plant
 from ppafo.exports.hil.wire import OVER, VENTED, Answer, Sample, answer_bytes
-from ppafo.model.command import VENT
 from ppafo.model.sensors import Measurement
+from ppafo.model.valves.kind import VENT
 from ppafo.parameters.device import Device
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import result_of, simulate

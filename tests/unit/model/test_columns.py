@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from ppafo.engine.rows import leaves
 from ppafo.model.columns import over_runs
 from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio
-from ppafo.model.orifice_curves import isentropic_curve, iso6358_curve, sonic_conductance_mass
+from ppafo.model.orifice import isentropic_curve, iso6358_curve, sonic_conductance_mass
 
 
 class Pair(NamedTuple):

@@ -7,9 +7,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ppafo.model.chambers import chamber_1_volume, chamber_2_volume, chamber_mass, chamber_pressure
+from ppafo.model.plant import (
+    actuator_torque,
+    chamber_1_volume,
+    chamber_2_volume,
+    chamber_mass,
+    chamber_pressure,
+    gravity_torque,
+    holds_still,
+    sliding_friction,
+    vane_acceleration,
+)
 from ppafo.model.sensors import SensorParameters, measure, quantise, standard_noise
-from ppafo.model.vane import actuator_torque, gravity_torque, holds_still, sliding_friction, vane_acceleration
 
 
 def test_printed_volumes_are_the_case_without_dead_volume_and_lower_stop() -> None:

@@ -3,11 +3,12 @@
 import pytest
 
 from ppafo.model import contact as ground
+from ppafo.model.elementary import QUARTER_TURN
 from ppafo.model.gait import GaitNow, GaitTiming
 
 TIMING = GaitTiming(1.0, 0.0, 0.42, 0.64, 0.7, 0.96, -0.07)
 NOW = GaitNow(*[0.0] * len(GaitNow._fields))._replace(phase=0.17, shank=-0.1, shank_rate=-1.0)
-FLAT_ANGLE = -0.1 + ground.QUARTER_TURN + 0.07
+FLAT_ANGLE = -0.1 + QUARTER_TURN + 0.07
 
 
 def test_the_heel_carries_all_while_the_foot_rolls_on_it_and_less_until_it_rises() -> None:

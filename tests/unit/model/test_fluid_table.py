@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.model.fluid_table import (
+from ppafo.model.source import (
     between,
     densest_gas,
     fluid_pressure,

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from ppafo.model.fourier import Harmonic, Series, acceleration_at, harmonics, rate_at, value_at
-from ppafo.model.turns import sine_and_cosine
+from ppafo.model.elementary import sine_and_cosine_of_turns
+from ppafo.model.gait import Harmonic, Series, acceleration_at, harmonics, rate_at, value_at
 
 FREQUENCY = 0.9
 
@@ -38,6 +38,6 @@ def test_value_and_derivatives_agree_with_the_sum_of_sines(time: float) -> None:
 
 @pytest.mark.parametrize("turns", [-1.3, -0.25, 0.0, 0.1, 0.5, 0.74, 3.9])
 def test_sine_and_cosine_are_those_of_the_library(turns: float) -> None:
-    sine, cosine = sine_and_cosine(turns)
+    sine, cosine = sine_and_cosine_of_turns(turns)
     assert sine == pytest.approx(math.sin(2.0 * math.pi * turns), abs=1e-9)
     assert cosine == pytest.approx(math.cos(2.0 * math.pi * turns), abs=1e-9)

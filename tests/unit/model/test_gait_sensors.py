@@ -5,8 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from ppafo.model.gait_sensors import NOTHING_SEEN, Fault, GaitMeasurement, GaitSeen, GaitSensors, measure_gait
-from ppafo.model.sensors import SensorParameters
+from ppafo.model.sensors import (
+    NOTHING_SEEN,
+    Fault,
+    GaitMeasurement,
+    GaitSeen,
+    GaitSensors,
+    SensorParameters,
+    measure_gait,
+)
 
 QUIET = SensorParameters(0.0, 0.0, 0.0, 0.0, 1.0)
 NEVER = Fault(1.0e9, 0.0, 0.0)

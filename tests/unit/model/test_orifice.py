@@ -9,14 +9,17 @@ from hypothesis import strategies as st
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.model.gas import SPECIES, choked_flow_constant, critical_pressure_ratio, subsonic_flow_constant
 from ppafo.model.orifice import (
+    area_conductance,
     fitted_flow_function,
     fitted_flow_slope,
+    isentropic_curve,
     isentropic_flow_function,
+    iso6358_curve,
     iso6358_flow_function,
     orifice_flow,
     orifice_flow_slopes,
+    sonic_conductance_mass,
 )
-from ppafo.model.orifice_curves import area_conductance, isentropic_curve, iso6358_curve, sonic_conductance_mass
 
 CO2 = SPECIES["CO2"]
 CO2_CONSTANT = UNIVERSAL_GAS_CONSTANT / CO2.molar_mass

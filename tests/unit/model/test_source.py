@@ -4,7 +4,6 @@ import math
 
 import pytest
 
-from ppafo.model.fluid_table import densest_gas, fluid_pressure, liquid_density
 from ppafo.model.gas import choked_flow_constant
 from ppafo.model.source import (
     BottleState,
@@ -15,6 +14,9 @@ from ppafo.model.source import (
     content_energy,
     content_temperature,
     delivered_pressure,
+    densest_gas,
+    fluid_pressure,
+    liquid_density,
     liquid_mass,
     pressure_reserve,
     regulated_pressure,

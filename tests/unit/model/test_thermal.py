@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ppafo.model import thermal
+from ppafo.model import gas as thermal
 
 R, K, T = 188.95, 1.3, 298.0
 CV = thermal.heat_capacity_at_constant_volume(R, K)

@@ -9,7 +9,7 @@ from typing import Any
 import jsonschema  # type: ignore[import-untyped]
 import pytest
 
-from ppafo.model.valves.catalog import VALVES
+from ppafo.model.catalog import VALVES
 from ppafo.parameters import list_sets
 from ppafo.parameters.loading import json_schema
 

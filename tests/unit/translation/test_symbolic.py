@@ -16,15 +16,16 @@ from ppafo.errors import ProgramError
 from ppafo.model import sensors
 from ppafo.model.orifice import FlowCurve, fitted_flow_function, isentropic_flow_function, orifice_flow
 from ppafo.model.plant import (
+    BlendedPort,
     Openings,
     PlantParameters,
     ThermalParameters,
+    blended_port_flow_slopes,
     blended_ports,
+    gravity_torque,
     pressures_per_mass,
 )
-from ppafo.model.ports import BlendedPort, blended_port_flow_slopes
 from ppafo.model.valves import dump, proportional, solenoid
-from ppafo.model.vane import gravity_torque
 from ppafo.parameters.plant import plant_parameters
 from ppafo.translation.plant_rates import gas_flows
 from ppafo.translation.symbolic import symbolic

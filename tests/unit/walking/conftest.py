@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import Run, batch_of
 from ppafo.gait import load_gait
-from ppafo.model.gait_sensors import Fault
+from ppafo.model.sensors import Fault
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import load_walk

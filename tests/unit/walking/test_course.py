@@ -10,9 +10,8 @@ import pytest
 from ppafo.engine.lane_source import lane_source
 from ppafo.errors import ScenarioError
 from ppafo.gait import load_gait
-from ppafo.model.chambers import chamber_mass
 from ppafo.model.contact import FLAT
-from ppafo.model.plant import chamber_volumes
+from ppafo.model.plant import chamber_mass, chamber_volumes
 from ppafo.questions.endurance.draw import walk_gas
 from ppafo.questions.walk.course import course_sections
 from ppafo.walking import load_walk, walk, walk_population

@@ -14,8 +14,8 @@ from ppafo.control.walking import signs
 from ppafo.engine.lanes import Batch, run_batch
 from ppafo.engine.rows import leaf_paths, numbers
 from ppafo.engine.run import batch_of
-from ppafo.model.gait_sensors import Fault, GaitSensors
 from ppafo.model.plant import chamber_pressures
+from ppafo.model.sensors import Fault, GaitSensors
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.units import parse_quantity
 from ppafo.walking import load_walk, walk_population

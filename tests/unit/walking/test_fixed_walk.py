@@ -14,8 +14,8 @@ from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports.c_library import c_library
 from ppafo.exports.firmware.lock_step import PythonChip
 from ppafo.exports.firmware.walking import walk_chip
-from ppafo.model.command import VENT
-from ppafo.model.gait_sensors import Fault, GaitMeasurement, GaitSensors
+from ppafo.model.sensors import Fault, GaitMeasurement, GaitSensors
+from ppafo.model.valves.kind import VENT
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.sampled import run_sampled, state_row_numbers
 from ppafo.walking.events import SAFE_ROW

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ppafo.model.gait_sensors import Fault, samples_late
+from ppafo.model.sensors import Fault, samples_late
 from ppafo.walking.loading import load_walk
 from ppafo.walking.walk import walk
 

@@ -10,7 +10,7 @@ import pytest
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.control.walking.phases import MID_STANCE, PUSH_OFF
 from ppafo.metrics.strides import SETTLING
-from ppafo.model.command import VENT
+from ppafo.model.valves.kind import VENT
 from ppafo.walking import WalkResult, load_walk, walk
 
 MINUTES = 0.25

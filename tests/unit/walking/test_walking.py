@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ppafo.model import contact as ground
-from ppafo.model.gait_sensors import Fault
+from ppafo.model.sensors import Fault
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk
 

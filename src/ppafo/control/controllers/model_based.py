@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 from ppafo.control.controllers.feedback import PidParameters, PidState, pid_command, pid_restart
 from ppafo.control.kind import ControllerKind
-from ppafo.model.chambers import chamber_1_volume, chamber_2_volume
 from ppafo.model.declaration import Quantity
+from ppafo.model.plant import chamber_1_volume, chamber_2_volume
 from ppafo.model.sensors import Measurement
 
 SMALLEST_GAIN = 1.0e-3

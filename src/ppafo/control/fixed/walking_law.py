@@ -21,7 +21,7 @@ from ppafo.control.fixed.whole_numbers import (
 )
 from ppafo.control.walking import phases, signs
 from ppafo.model.declaration import Quantity
-from ppafo.model.gait_sensors import GaitMeasurement
+from ppafo.model.sensors import GaitMeasurement
 
 SCALE_BITS = 14
 

@@ -14,9 +14,9 @@ from ppafo.control.walking import safety, signs
 from ppafo.control.walking.event_on_off import EVENT_ON_OFF as FLOAT_KIND
 from ppafo.control.walking.safety import START as SAFETY_START
 from ppafo.control.walking.safety import Finding, later_finding
-from ppafo.model.command import VENT
 from ppafo.model.declaration import Quantity
-from ppafo.model.gait_sensors import GaitMeasurement
+from ppafo.model.sensors import GaitMeasurement
+from ppafo.model.valves.kind import VENT
 
 SHARE: float = 2.0**FRACTION_BITS
 ROUNDING = 1.0e-6

@@ -16,10 +16,9 @@ from ppafo.control.walking.phases import PHASE_QUANTITIES, PhaseRules, PhaseStat
 from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.signs import SAFETY_QUANTITIES, SafetyRules
 from ppafo.control.walking.timing import GaitTime, follow_thresholds, threshold_time
-from ppafo.model.command import VENT
 from ppafo.model.declaration import Quantity
-from ppafo.model.gait_sensors import GaitMeasurement
-from ppafo.model.sensors import Measurement
+from ppafo.model.sensors import GaitMeasurement, Measurement
+from ppafo.model.valves.kind import VENT
 
 
 class TorqueProfile(NamedTuple):

@@ -27,8 +27,7 @@ from ppafo.control.walking.timing import FRACTIONAL, THRESHOLDS, ThresholdClock,
 from ppafo.errors import ScenarioError
 from ppafo.kinds import Kinds
 from ppafo.model.declaration import Quantity
-from ppafo.model.gait_sensors import GaitMeasurement
-from ppafo.model.sensors import Measurement
+from ppafo.model.sensors import GaitMeasurement, Measurement
 
 
 class LawParameters(NamedTuple):

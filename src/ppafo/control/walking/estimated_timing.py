@@ -24,7 +24,7 @@ from ppafo.control.walking.timing import (
     place_in_stride,
 )
 from ppafo.model.declaration import Quantity
-from ppafo.model.gait_sensors import GaitMeasurement
+from ppafo.model.sensors import GaitMeasurement
 
 KNOTS = 32
 WINDOW = 8

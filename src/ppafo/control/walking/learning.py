@@ -29,7 +29,7 @@ from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.signs import SafetyRules
 from ppafo.control.walking.timing import ThresholdClock, ThresholdRules
 from ppafo.model.declaration import Quantity
-from ppafo.model.gait_sensors import GaitMeasurement
+from ppafo.model.sensors import GaitMeasurement
 
 KNOTS = 16
 

@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 from ppafo.control.walking import signs
 from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState
-from ppafo.model.command import VENT, VENTS_ABOVE
-from ppafo.model.gait_sensors import GaitMeasurement
+from ppafo.model.sensors import GaitMeasurement
+from ppafo.model.valves.kind import VENT, VENTS_ABOVE
 
 
 class ValveTimes(NamedTuple):

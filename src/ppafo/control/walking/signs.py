@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, lifts
 from ppafo.model.declaration import PRESSURE_LAG, VALVE_LAG, Quantity
-from ppafo.model.gait_sensors import GaitMeasurement
+from ppafo.model.sensors import GaitMeasurement
 
 HELPS = 0.0
 LIFTS = 1.0

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 from ppafo.control.walking import phases
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.model.declaration import FORCE_LAG, VALVE_DELAY, Quantity
-from ppafo.model.gait_sensors import GaitMeasurement
+from ppafo.model.sensors import GaitMeasurement
 
 
 class GaitTime(NamedTuple):

@@ -15,12 +15,12 @@ from ppafo.model.plant import (
     Openings,
     PlantParameters,
     ThermalParameters,
+    admitted_flow,
     chamber_pressures,
     chamber_volumes,
     driving_torque,
+    vane_acceleration,
 )
-from ppafo.model.ports import admitted_flow
-from ppafo.model.vane import vane_acceleration
 
 
 class ExactOrifice(NamedTuple):

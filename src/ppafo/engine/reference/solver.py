@@ -25,9 +25,8 @@ from ppafo.engine.run import Run, batch_of, states_at_start
 from ppafo.engine.scheme.actuators import driving_torque_of, measurement_of
 from ppafo.errors import SimulationError
 from ppafo.model.places import friction_at_rest, shown_signals
-from ppafo.model.plant import PlantParameters, chamber_pressures, driving_torque
+from ppafo.model.plant import PlantParameters, chamber_pressures, driving_torque, holds_still
 from ppafo.model.sensors import Measurement, measure
-from ppafo.model.vane import holds_still
 
 SAME_TIME = 1.0e-12
 

@@ -28,10 +28,11 @@ from ppafo.model.plant import (
     chamber_pressures,
     chamber_volumes,
     driving_torque,
+    gravity_torque,
+    net_driving_torque,
     pressures_per_mass,
 )
 from ppafo.model.sensors import Measurement
-from ppafo.model.vane import gravity_torque, net_driving_torque
 
 
 def chambers_at(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: float) -> Chambers:

@@ -14,8 +14,15 @@ from typing import Any, NamedTuple
 
 from ppafo.engine.scheme.pneumatics import GasChange, HeldChambers, held_pressures
 from ppafo.model.places import friction_at_rest, friction_in_motion
-from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes, driving_torque
-from ppafo.model.vane import actuator_torque, holds_still
+from ppafo.model.plant import (
+    PlantParameters,
+    PlantState,
+    actuator_torque,
+    chamber_pressures,
+    chamber_volumes,
+    driving_torque,
+    holds_still,
+)
 
 SAME_INSTANT = 1.0e-9
 SHORTEST_PART = 1.0e-6

@@ -16,8 +16,16 @@ from typing import Any, NamedTuple
 
 from ppafo.model.columns import smaller
 from ppafo.model.orifice import FlowCurve, orifice_flow, orifice_flow_slopes
-from ppafo.model.plant import PlantParameters, PlantState, chamber_pressures, chamber_volumes, pressures_per_mass
-from ppafo.model.ports import PortFlow, PortFlowSlopes, admitted_flow
+from ppafo.model.plant import (
+    PlantParameters,
+    PlantState,
+    PortFlow,
+    PortFlowSlopes,
+    admitted_flow,
+    chamber_pressures,
+    chamber_volumes,
+    pressures_per_mass,
+)
 
 
 class LeakSlopes(NamedTuple):

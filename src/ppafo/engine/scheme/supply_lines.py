@@ -25,11 +25,11 @@ from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalGas, begin_ther
 from ppafo.model.plant import (
     PlantParameters,
     PlantState,
+    PortFlowSlopes,
     ThermalParameters,
     ThermalState,
     chamber_volumes,
 )
-from ppafo.model.ports import PortFlowSlopes
 from ppafo.model.regulator import LineState, LineStep, SupplyLines, line_pressures, step_lines
 
 

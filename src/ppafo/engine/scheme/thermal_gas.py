@@ -19,17 +19,19 @@ from ppafo.engine.scheme.pneumatics import (
     StageFlows,
     pressure_that_matters,
 )
+from ppafo.model.gas import enthalpy_flow_ratio, mass_flow_ratio
 from ppafo.model.plant import (
     PlantParameters,
     PlantState,
+    PortFlow,
+    PortFlowSlopes,
     ThermalParameters,
     ThermalState,
+    admitted_flow,
     chamber_pressures,
     chamber_volumes,
     pressures_per_mass,
 )
-from ppafo.model.ports import PortFlow, PortFlowSlopes, admitted_flow
-from ppafo.model.thermal import enthalpy_flow_ratio, mass_flow_ratio
 
 
 class ThermalFlows(NamedTuple):

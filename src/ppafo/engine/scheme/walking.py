@@ -16,12 +16,11 @@ from ppafo.engine.scheme.motion import (
 )
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers, held_pressures
 from ppafo.model import contact as ground
+from ppafo.model.elementary import TURNS_OF_RADIAN, sine_and_cosine_of_turns
 from ppafo.model.gait import GaitNow, GaitTiming
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, passive_torque, torque_of_shank_on
 from ppafo.model.places import friction_in_motion
-from ppafo.model.plant import PlantParameters, PlantState
-from ppafo.model.turns import TURNS_OF_RADIAN, sine_and_cosine
-from ppafo.model.vane import actuator_torque
+from ppafo.model.plant import PlantParameters, PlantState, actuator_torque
 
 
 class DeviceShare(NamedTuple):
@@ -53,7 +52,7 @@ class CarriedFoot(NamedTuple):
 
 def foot_direction(shank: float, angle: float) -> Direction:
     """Direction of the foot at a shank angle and an ankle angle [rad]."""
-    sine, cosine = sine_and_cosine(ground.foot_angle(shank, angle) * TURNS_OF_RADIAN)
+    sine, cosine = sine_and_cosine_of_turns(ground.foot_angle(shank, angle) * TURNS_OF_RADIAN)
     return Direction(sine, cosine)
 
 

@@ -18,7 +18,7 @@ from ppafo.exports.c_library.files import (
 )
 from ppafo.exports.c_library.preparation import following_text, links_of, preparation_of, relations_of, settings_of
 from ppafo.exports.c_library.program import Further, exported
-from ppafo.model.effects.catalog import ordered_effects
+from ppafo.model.catalog import ordered_effects
 from ppafo.parameters.device import Device
 from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import Graph

@@ -16,8 +16,8 @@ from ppafo.engine.source_text import Collector
 from ppafo.exports.c_library.program import COUNTS, IN_PARTS, WHOLE, ExportedProgram, Further, c_text
 from ppafo.exports.templates import filled, licence, template
 from ppafo.metrics.catalog import METRICS
+from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
-from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import Graph

@@ -16,13 +16,12 @@ from ppafo.engine.source_text import Collector, woven
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
 from ppafo.exports.c_library.program import COUNTS
 from ppafo.model.actuators.kind import Range, mean_growth
+from ppafo.model.catalog import VALVES, device_effects
 from ppafo.model.declaration import Quantity
-from ppafo.model.effects.catalog import device_effects
 from ppafo.model.gas import specific_gas_constant
 from ppafo.model.plant import PlantParameters
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.sensors import SensorParameters
-from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.building import consistency
 from ppafo.parameters.declaration import members
 from ppafo.parameters.device import Device, SonicOrifice

@@ -14,7 +14,7 @@ from ppafo.exports.c_library.files import Relation, Setting, c_identifier
 from ppafo.exports.c_library.preparation import SAID, Writing, used_numbers
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait import gait_at
-from ppafo.model.gait_sensors import NOTHING_SEEN
+from ppafo.model.sensors import NOTHING_SEEN
 from ppafo.parameters.building import consistency
 from ppafo.parameters.graph import Follows, Graph, Term, holding
 from ppafo.simulation.declaration import PERIOD, RUN, SUPPLY_LINES, THERMAL_GAS, line_paths

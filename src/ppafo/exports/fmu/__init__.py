@@ -35,7 +35,7 @@ from ppafo.exports.fmu.description import (
     variability_of,
 )
 from ppafo.exports.templates import filled, licence, template
-from ppafo.model.command import VENT
+from ppafo.model.valves.kind import VENT
 from ppafo.simulation.plan import step_counts
 from ppafo.simulation.scenario import (
     Control,

@@ -18,7 +18,7 @@ from typing import NamedTuple, Protocol, final
 
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil import wire
-from ppafo.model.command import VENT
+from ppafo.model.valves.kind import VENT
 from ppafo.simulation.sampled import SampledRun
 
 _AT_ONCE = 64

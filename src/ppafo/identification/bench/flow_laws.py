@@ -20,8 +20,7 @@ import numpy as np
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.identification.bench.result import Number
 from ppafo.model.gas import choked_flow_constant, specific_gas_constant
-from ppafo.model.orifice import isentropic_flow_function, iso6358_flow_function
-from ppafo.model.orifice_curves import sonic_conductance_mass
+from ppafo.model.orifice import isentropic_flow_function, iso6358_flow_function, sonic_conductance_mass
 from ppafo.signals.recording import Floats
 
 LINEAR_RATIO = 0.999

@@ -9,9 +9,8 @@ import numpy as np
 
 from ppafo.errors import IdentificationError, first_twice, nearest_name
 from ppafo.identification.source import Use, double_use
+from ppafo.model.catalog import VALVES, device_effects, find_effects
 from ppafo.model.declaration import Quantity
-from ppafo.model.effects.catalog import device_effects, find_effects
-from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.declaration import AREA_FORM, SECTIONS, SONIC_FORM
 from ppafo.parameters.device import Device, Orifice
 from ppafo.signals import Recording

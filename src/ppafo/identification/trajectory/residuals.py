@@ -23,9 +23,9 @@ from ppafo.engine.run import NEVER_FAILED, Run, batches_of
 from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory.problem import TIME_OFFSET, Experiment, Range, scenario_of, with_numbers
-from ppafo.model.chambers import chamber_1_volume, chamber_2_volume, chamber_pressure
+from ppafo.model.catalog import VALVES
 from ppafo.model.columns import at, over_runs
-from ppafo.model.valves.catalog import VALVES
+from ppafo.model.plant import chamber_1_volume, chamber_2_volume, chamber_pressure
 from ppafo.parameters.effects import effect_rows, switches_of
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.plan import (

@@ -20,7 +20,7 @@ from ppafo.model.actuators.linear_chambers import (
     stretching,
 )
 from ppafo.model.declaration import Quantity
-from ppafo.model.turns import TURNS_OF_RADIAN, sine_and_cosine
+from ppafo.model.elementary import TURNS_OF_RADIAN, sine_and_cosine_of_turns
 
 LARGEST_FOLD = math.radians(150.0)
 
@@ -49,7 +49,7 @@ class Bladders(NamedTuple):
 
 def folded(tube: Tube, stretch: float, fold: float, way: float) -> LinearChamber:
     """A tube folded by an angle [rad], which the joint's angle unfolds where ``way`` is 1 and folds where it is -1."""
-    sine, cosine = sine_and_cosine(fold * TURNS_OF_RADIAN)
+    sine, cosine = sine_and_cosine_of_turns(fold * TURNS_OF_RADIAN)
     per = 1.0 / (1.0 + cosine)
     volume = tube.full - tube.wedge * sine * per
     slope = way * tube.wedge * per

@@ -16,7 +16,7 @@ from ppafo.model.actuators.linear_chambers import (
     rigid,
 )
 from ppafo.model.declaration import Quantity
-from ppafo.model.turns import TURNS_OF_RADIAN, sine_and_cosine
+from ppafo.model.elementary import TURNS_OF_RADIAN, sine_and_cosine_of_turns
 
 LEAST_SINE = 0.05
 """Sine of the angle between lever and base below which the lever is too near its dead centre."""
@@ -48,7 +48,7 @@ class Pins(NamedTuple):
 
 def pins_at(lever: float, base: float, between: float) -> Pins:
     """Pins of a lever and a base [m] with an angle [rad] between them: the law of cosines."""
-    sine, cosine = sine_and_cosine(between * TURNS_OF_RADIAN)
+    sine, cosine = sine_and_cosine_of_turns(between * TURNS_OF_RADIAN)
     length = math.sqrt(lever * lever + base * base - 2.0 * lever * base * cosine)
     return Pins(length=length, arm=lever * base * sine / length)
 

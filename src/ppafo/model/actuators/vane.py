@@ -8,8 +8,7 @@ from collections.abc import Mapping
 
 from ppafo.model.actuators.kind import ActuatorKind, ActuatorModel, Chambers, Range
 from ppafo.model.declaration import Quantity
-from ppafo.model.plant import PlantParameters, chamber_pressures, chamber_volumes
-from ppafo.model.vane import actuator_torque
+from ppafo.model.plant import PlantParameters, actuator_torque, chamber_pressures, chamber_volumes
 
 
 def chambers(plant: PlantParameters, angle: float, pressure_1: float, pressure_2: float) -> Chambers:

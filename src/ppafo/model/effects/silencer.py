@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect
-from ppafo.model.orifice_curves import sonic_conductance_mass
+from ppafo.model.orifice import sonic_conductance_mass
 from ppafo.model.places import way_out
 
 

@@ -8,11 +8,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
-from ppafo.model.command import VENTS_ABOVE
-from ppafo.model.plant import Openings, PlantParameters, single_ports
-from ppafo.model.ports import SinglePort
+from ppafo.model.plant import Openings, PlantParameters, SinglePort, single_ports
 from ppafo.model.valves import proportional
-from ppafo.model.valves.kind import ValveModel
+from ppafo.model.valves.kind import VENTS_ABOVE, ValveModel
 from ppafo.model.valves.proportional import IdealProportional, MovingProportional, NoValveState, SpoolState
 
 

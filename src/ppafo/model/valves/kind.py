@@ -1,4 +1,7 @@
-"""What a valve declares of itself, and the two ways in which an engine can see it."""
+"""What a valve declares of itself, what a command to it means, and the two ways in which an engine can see it.
+
+A command goes from -1 to 1 as equation (8) says; one value stands for free motion.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -73,3 +76,10 @@ class ValveKind:
     quantities: tuple[Quantity, ...]
     choose: Callable[[Mapping[str, float]], ValveModel]
     lag: Callable[[Mapping[str, float]], float] | None = None
+
+
+VENT = 2.0
+"""Joins both chambers to the atmosphere: solenoids off; a proportional valve needs a dump valve for it."""
+
+VENTS_ABOVE = 1.5
+"""Commands above this vent."""

@@ -10,14 +10,16 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from ppafo.model.declaration import Quantity
-from ppafo.model.plant import Openings, blended_ports, single_ports
-from ppafo.model.ports import (
+from ppafo.model.elementary import DOUBLINGS, SMALLEST_FRACTION, TERMS
+from ppafo.model.plant import (
+    Openings,
     blended_port_flow,
     blended_port_flow_slopes,
+    blended_ports,
     single_port_flow,
     single_port_flow_slopes,
+    single_ports,
 )
-from ppafo.model.turns import DOUBLINGS, SMALLEST_FRACTION, TERMS
 from ppafo.model.valves.kind import ValveKind, ValveModel
 
 NO_SLEW_LIMIT = 1.0e12

@@ -9,12 +9,10 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from ppafo.model.command import VENTS_ABOVE
 from ppafo.model.declaration import Quantity
 from ppafo.model.places import way_in, way_out
-from ppafo.model.plant import Openings, PlantParameters
-from ppafo.model.ports import SinglePort, single_port_flow, single_port_flow_slopes
-from ppafo.model.valves.kind import ValveKind, ValveModel
+from ppafo.model.plant import Openings, PlantParameters, SinglePort, single_port_flow, single_port_flow_slopes
+from ppafo.model.valves.kind import VENTS_ABOVE, ValveKind, ValveModel
 
 NEVER = -1.0e9
 FOREVER = 1.0e9

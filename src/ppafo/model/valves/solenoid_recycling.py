@@ -11,8 +11,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from ppafo.model.declaration import Quantity
-from ppafo.model.plant import Openings, PlantParameters
-from ppafo.model.ports import SinglePort, single_port_flow, single_port_flow_slopes
+from ppafo.model.plant import Openings, PlantParameters, SinglePort, single_port_flow, single_port_flow_slopes
 from ppafo.model.valves import solenoid
 from ppafo.model.valves.kind import Joint, ValveKind, ValveModel
 from ppafo.model.valves.solenoid import NEVER, SAME_INSTANT, Coil, PairPositions, PairState, TimedSolenoid

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import UnitError
-from ppafo.model.chambers import chamber_1_volume
 from ppafo.model.declaration import Quantity
 from ppafo.model.gas import specific_gas_constant
+from ppafo.model.plant import chamber_1_volume
 from ppafo.parameters.audit.finding import NamedValue
 from ppafo.parameters.declaration import alternatives, is_within
 from ppafo.parameters.device import Gas

@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator
 
-from ppafo.model.orifice import iso6358_flow_function
-from ppafo.model.orifice_curves import sonic_conductance_mass
+from ppafo.model.orifice import iso6358_flow_function, sonic_conductance_mass
 from ppafo.parameters.audit.evidence import Evidence, Interval
 from ppafo.parameters.audit.finding import Finding, Side
 

@@ -15,9 +15,18 @@ from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
 from ppafo.model.cold_gas import ColdSupply, Passage
 from ppafo.model.declaration import Quantity
-from ppafo.model.fluid_table import densest_gas, fluid_pressure, gas_density, has_liquid, liquid_density
 from ppafo.model.gas import SPECIES
-from ppafo.model.source import BottleWall, Regulator, bottle_content, pressure_reserve
+from ppafo.model.source import (
+    BottleWall,
+    Regulator,
+    bottle_content,
+    densest_gas,
+    fluid_pressure,
+    gas_density,
+    has_liquid,
+    liquid_density,
+    pressure_reserve,
+)
 from ppafo.parameters.bottles.fluids import Fluid, load_fluid
 from ppafo.parameters.bottles.from_part import bottle_parts, scaled_entries
 from ppafo.parameters.declaration import is_within

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from importlib import resources
 
 from ppafo.errors import ParameterError, nearest_name
-from ppafo.model.fluid_table import FluidTable
+from ppafo.model.source import FluidTable
 
 _FOLDER = resources.files("ppafo.parameters.bottles") / "fluid_tables"
 _SUFFIX = ".json"

@@ -14,8 +14,8 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name
+from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
-from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, is_within
 from ppafo.parameters.parts.declaration import GROUPS, NEEDED, figures_of
 from ppafo.parameters.parts.part import Figure, Part

@@ -1,7 +1,7 @@
 """Every figure that a part can have: group, name, SI unit, range and meaning."""
 
+from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
-from ppafo.model.valves.catalog import VALVES
 from ppafo.parameters.declaration import ACTUATOR, ORIFICE
 
 MASS = Quantity("mass", "kg", "mass of the part, of both valves for a pair", minimum=0.0, maximum=100.0)

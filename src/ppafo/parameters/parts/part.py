@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, Field
 
 from ppafo.documents.models import STRICT
-from ppafo.model.valves.catalog import VALVES
+from ppafo.model.catalog import VALVES
 from ppafo.parameters.declaration import ORIFICE
 
 Origin = Literal["published", "datasheet", "quoted", "measured", "derived", "assumed"]

@@ -9,7 +9,6 @@ import numpy as np
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.errors import ParameterError, SimulationError
-from ppafo.model.fluid_table import densest_gas, has_liquid
 from ppafo.model.source import (
     BottleContent,
     BottleState,
@@ -18,6 +17,8 @@ from ppafo.model.source import (
     content_energy,
     content_temperature,
     delivered_pressure,
+    densest_gas,
+    has_liquid,
     pressure_reserve,
     regulator_flow_limit,
 )

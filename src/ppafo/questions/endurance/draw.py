@@ -13,7 +13,7 @@ import numpy as np
 from ppafo.constants import GRAMS_PER_KILOGRAM, STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, ParameterError, PpafoError
 from ppafo.metrics.strides import SETTLING
-from ppafo.model.chambers import chamber_1_volume, chamber_2_volume
+from ppafo.model.plant import chamber_1_volume, chamber_2_volume
 from ppafo.parameters.chamber_volumes import other_readings
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats

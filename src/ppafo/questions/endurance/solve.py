@@ -6,9 +6,9 @@ from pathlib import Path
 
 from ppafo.constants import GRAMS_PER_KILOGRAM, STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, ParameterError, UnitError, nearest_name, one_line
-from ppafo.model.chambers import chamber_1_volume, chamber_2_volume
 from ppafo.model.declaration import Quantity
 from ppafo.model.exhaust_reuse import ReuseCycle
+from ppafo.model.plant import chamber_1_volume, chamber_2_volume
 from ppafo.parameters import load_device
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle, load_bottle
 from ppafo.parameters.declaration import is_within

@@ -24,8 +24,7 @@ from ppafo.errors import SimulationError
 from ppafo.metrics.gas import gas_supplied
 from ppafo.metrics.tracking import rms_error
 from ppafo.model.orifice import FlowCurve, check_valve_flow, fitted_flow_function
-from ppafo.model.plant import Openings, chamber_pressures
-from ppafo.model.vane import actuator_torque
+from ppafo.model.plant import Openings, actuator_torque, chamber_pressures
 from ppafo.parameters.device import VANE, Valve
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.recording import Channel, Recording

@@ -23,8 +23,7 @@ from ppafo.engine.lanes import Batch, Floats, run_batch
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import Run, batch_of
 from ppafo.errors import SimulationError
-from ppafo.model.plant import pressures_per_mass
-from ppafo.model.vane import actuator_torque
+from ppafo.model.plant import actuator_torque, pressures_per_mass
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.simulation.plan import plan_run, profile_values
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, PrescribedMotion, Scenario

@@ -12,11 +12,16 @@ from ppafo.engine.reference.solver import mode_at_rest, torque_on_vane
 from ppafo.engine.rows import leaf_paths, leaves, numbers, rebuilt
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.errors import ScenarioError, SimulationError
-from ppafo.model.chambers import chamber_mass
 from ppafo.model.places import friction_at_rest
-from ppafo.model.plant import Openings, ThermalParameters, chamber_pressures, chamber_volumes
+from ppafo.model.plant import (
+    Openings,
+    ThermalParameters,
+    actuator_torque,
+    chamber_mass,
+    chamber_pressures,
+    chamber_volumes,
+)
 from ppafo.model.valves.proportional import NO_SLEW_LIMIT
-from ppafo.model.vane import actuator_torque
 from ppafo.simulation.plan import plan_run, profile_values
 from ppafo.simulation.sampled import run_sampled, state_row_numbers
 from ppafo.simulation.scenario import FreeMotion, Scenario

@@ -20,9 +20,8 @@ from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.engine.scheme.walking import foot_direction
 from ppafo.errors import SimulationError
-from ppafo.model.chambers import chamber_mass
 from ppafo.model.contact import foot_angle
-from ppafo.model.plant import chamber_pressures, chamber_volumes
+from ppafo.model.plant import chamber_mass, chamber_pressures, chamber_volumes
 from ppafo.parameters.device import Device, Orifice
 from ppafo.progress import Progress, Report
 from ppafo.simulation.scenario import Scenario

@@ -16,8 +16,8 @@ from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.errors import ScenarioError
 from ppafo.metrics.gas import ENERGIES
 from ppafo.metrics.metric import REQUEST, STEADY, WALK, MetricKind, Readings
+from ppafo.model.gas import energy_per_content
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
-from ppafo.model.thermal import energy_per_content
 from ppafo.simulation.sampled import run_in_turn
 from ppafo.simulation.scenario import Scenario, worn_kind
 from ppafo.simulation.simulate import OPEN_LOOP

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ppafo.answers.style import BLACK, CHAMBER_1, CHAMBER_2, GREY, Margins, figure_of_panels, house_style, mark_kind
 from ppafo.constants import PASCALS_PER_PSI
-from ppafo.model.command import VENTS_ABOVE
+from ppafo.model.valves.kind import VENTS_ABOVE
 from ppafo.signals.recording import Floats
 from ppafo.walking.figures.mean_stride import WITH, WITHOUT
 from ppafo.walking.gait_series import Posture, ankle_path, gait_timing

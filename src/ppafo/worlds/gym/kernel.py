@@ -21,7 +21,7 @@ from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ScenarioError
-from ppafo.model.vane import actuator_torque
+from ppafo.model.plant import actuator_torque
 from ppafo.worlds.gym.tasks import (
     Goal,
     Memory,

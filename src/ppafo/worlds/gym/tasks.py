@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 
 from ppafo.control.walking.assistance import TorqueProfile, profile_torque
 from ppafo.engine.rows import leaf_paths
-from ppafo.model.command import VENT
-from ppafo.model.gait_sensors import GaitMeasurement
-from ppafo.model.sensors import Measurement
+from ppafo.model.sensors import GaitMeasurement, Measurement
+from ppafo.model.valves.kind import VENT
 
 BAR = 1.0e5
 GRAM = 1.0e-3

@@ -16,10 +16,9 @@ from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.errors import DataError, ScenarioError, SimulationError, nearest_name, one_line
 from ppafo.exports.opensim.add_device import add_actuator, check_coordinate, line, read_model
-from ppafo.model.command import VENT
-from ppafo.model.plant import chamber_pressures
+from ppafo.model.plant import actuator_torque, chamber_pressures
 from ppafo.model.sensors import SensorParameters
-from ppafo.model.vane import actuator_torque
+from ppafo.model.valves.kind import VENT
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.plan import Pieces, Steps, compose_run
 from ppafo.simulation.scenario import ProfileChoice, Scenario

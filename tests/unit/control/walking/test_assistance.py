@@ -12,8 +12,8 @@ from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, Switch
 from ppafo.control.walking.timing import ThresholdClock, ThresholdRules, threshold_time
 from ppafo.engine.rows import rebuild
-from ppafo.model.command import VENT
-from ppafo.model.gait_sensors import GaitMeasurement
+from ppafo.model.sensors import GaitMeasurement
+from ppafo.model.valves.kind import VENT
 
 PERIOD = 1.0e-3
 PROFILE = TorqueProfile(4.0, 0.5, 0.2, 0.1)

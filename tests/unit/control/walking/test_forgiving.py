@@ -14,8 +14,8 @@ from ppafo.control.walking import signs
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.control.walking.phases import PUSH_OFF
 from ppafo.engine.rows import rebuild
-from ppafo.model.command import VENT
-from ppafo.model.gait_sensors import GaitMeasurement
+from ppafo.model.sensors import GaitMeasurement
+from ppafo.model.valves.kind import VENT
 
 PERIOD = 1.0e-3
 STRIDE = 1.1

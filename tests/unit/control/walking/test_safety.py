@@ -8,8 +8,8 @@ from ppafo.control.walking import phases, safety, signs
 from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, Switch
 from ppafo.control.walking.safety import Finding, SafetyState, Stance, ValveTimes
 from ppafo.control.walking.signs import SAFETY_QUANTITIES, SafetyRules
-from ppafo.model.command import VENT
-from ppafo.model.gait_sensors import GaitMeasurement
+from ppafo.model.sensors import GaitMeasurement
+from ppafo.model.valves.kind import VENT
 
 RULES = SafetyRules(*[float(item.default or 0.0) for item in SAFETY_QUANTITIES])
 PERIOD = 1.0e-3

@@ -14,8 +14,8 @@ from ppafo.control.walking.phases import PhaseRules
 from ppafo.control.walking.timing import TimingKind
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import ScenarioError
-from ppafo.model.command import VENT
-from ppafo.model.gait_sensors import GaitMeasurement
+from ppafo.model.sensors import GaitMeasurement
+from ppafo.model.valves.kind import VENT
 
 Floats = NDArray[np.float64]
 PERIOD = 1.0e-3

@@ -12,7 +12,7 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.errors import DataError, ParameterError
-from ppafo.model.chambers import chamber_1_volume, chamber_2_volume
+from ppafo.model.plant import chamber_1_volume, chamber_2_volume
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.questions.endurance import discharge
 from ppafo.questions.endurance.draw import (

@@ -10,8 +10,7 @@ import pytest
 import ppafo
 from ppafo.errors import SimulationError
 from ppafo.model.orifice import FlowCurve, orifice_flow
-from ppafo.model.plant import Openings, blended_ports
-from ppafo.model.ports import BlendedPort, blended_port_flow
+from ppafo.model.plant import BlendedPort, Openings, blended_port_flow, blended_ports
 from ppafo.parameters.plant import plant_parameters
 from ppafo.questions.league.bound import (
     SMOOTH,

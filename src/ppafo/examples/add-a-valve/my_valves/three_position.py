@@ -5,8 +5,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from ppafo.model.declaration import Quantity
-from ppafo.model.plant import Openings, single_ports
-from ppafo.model.ports import single_port_flow, single_port_flow_slopes
+from ppafo.model.plant import Openings, single_port_flow, single_port_flow_slopes, single_ports
 from ppafo.model.valves.kind import ValveKind, ValveModel
 
 

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect
-from ppafo.model.orifice_curves import area_conductance
+from ppafo.model.orifice import area_conductance
 from ppafo.model.places import way_out
 
 

@@ -21,8 +21,8 @@ from ppafo.exports.firmware.lock_step import Comparison, Cost, PythonChip, compa
 from ppafo.exports.firmware.simulators import ChipSimulator, Decision, chip_simulator
 from ppafo.exports.firmware.walking.drawn import gait_readings
 from ppafo.exports.templates import filled, licence, template
-from ppafo.model.command import VENT
-from ppafo.model.gait_sensors import GaitMeasurement
+from ppafo.model.sensors import GaitMeasurement
+from ppafo.model.valves.kind import VENT
 from ppafo.simulation.reading import quantity_text
 from ppafo.simulation.sampled import run_sampled, state_row_numbers
 from ppafo.simulation.scenario import Scenario

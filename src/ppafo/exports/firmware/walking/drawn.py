@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from ppafo.control.fixed.walking_law import TOP, GaitConverter, GaitReadings, read_gait
-from ppafo.model.gait_sensors import GaitMeasurement
+from ppafo.model.sensors import GaitMeasurement
 
 ROOM, FILLED = 1.013e5, 4.4e5
 """Pressures [Pa] of a chamber that is vented and of one that is fed."""

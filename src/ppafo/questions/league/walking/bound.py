@@ -18,9 +18,8 @@ from ppafo.engine.lanes import Batch, Floats, StepInputs, replay
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import Run, batch_of
 from ppafo.errors import SimulationError
-from ppafo.model.chambers import chamber_mass
-from ppafo.model.command import VENT
-from ppafo.model.plant import chamber_volumes
+from ppafo.model.plant import chamber_mass, chamber_volumes
+from ppafo.model.valves.kind import VENT
 from ppafo.parameters.device import Valve
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.league.bound import BOUNDED_VALVES, MISSING_EXTRA, NEARLY

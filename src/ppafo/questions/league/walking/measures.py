@@ -14,10 +14,10 @@ from ppafo.engine.run import NEVER_FAILED, Run, Walk, batch_of
 from ppafo.errors import SimulationError
 from ppafo.gait import Gait
 from ppafo.model import contact as ground
-from ppafo.model.command import VENTS_ABOVE
 from ppafo.model.contact import SWING
 from ppafo.model.gait import GaitNow, GaitTiming, gait_at
 from ppafo.model.plant import PlantParameters, chamber_pressures
+from ppafo.model.valves.kind import VENTS_ABOVE
 from ppafo.parameters.plant import plant_parameters
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.league.standing import NOISE_DRAWS, SEED, Robustness, draw_factors, draw_seeds, scale_device

@@ -10,11 +10,10 @@ from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run, Walk
 from ppafo.engine.scheme.walking import Direction, leg_torque
 from ppafo.errors import SimulationError
-from ppafo.model.command import VENT, VENTS_ABOVE
 from ppafo.model.contact import FLAT, foot_angle, prescribed_ankle
 from ppafo.model.gait import GaitNow
-from ppafo.model.plant import PlantParameters
-from ppafo.model.vane import actuator_torque, vane_acceleration
+from ppafo.model.plant import PlantParameters, actuator_torque, vane_acceleration
+from ppafo.model.valves.kind import VENT, VENTS_ABOVE
 from ppafo.questions.league.bound import (
     AS_GOOD,
     MARGIN,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import SimulationError
-from ppafo.model.command import VENT
+from ppafo.model.valves.kind import VENT
 from ppafo.questions.league.walking import bound
 from ppafo.questions.league.walking.bound import (
     Reached,

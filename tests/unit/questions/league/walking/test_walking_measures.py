@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from ppafo.control.walking.assistance import TorqueProfile, profile_torque
-from ppafo.model.command import VENT
 from ppafo.model.contact import SWING, TOE
 from ppafo.model.gait import GaitTiming
+from ppafo.model.valves.kind import VENT
 from ppafo.questions.league.walking.measures import MEASURES, Course, last_strides, measures, switchings
 from ppafo.walking.events import EVENTS
 

@@ -1,11 +1,28 @@
-"""The effects that a device can have. To add one: a module beside this file and one line here, or an entry point."""
+"""The valves, actuators and effects that a device can have. To add one: a module in their folder and one line here.
+
+Those of other packages are found by an entry point.
+"""
 
 from collections.abc import Iterable
 
 from ppafo.errors import KindError, one_line
 from ppafo.kinds import Kinds
+from ppafo.model.actuators import bladder, cylinder, muscle_pair, table, vane
+from ppafo.model.actuators.kind import ActuatorKind
 from ppafo.model.effects import bandwidth, ice, seal_friction, silencer, stribeck
 from ppafo.model.effects.kind import SECTION, Effect, effect_problem
+from ppafo.model.valves import proportional, solenoid, solenoid_recycling
+from ppafo.model.valves.kind import ValveKind
+
+VALVES: Kinds[ValveKind] = Kinds(
+    "ppafo.valves", "valve", ValveKind, (proportional.KIND, solenoid.KIND, solenoid_recycling.KIND)
+)
+
+
+ACTUATORS: Kinds[ActuatorKind] = Kinds(
+    "ppafo.actuators", "actuator", ActuatorKind, (vane.KIND, cylinder.KIND, muscle_pair.KIND, bladder.KIND, table.KIND)
+)
+
 
 _OWN = (silencer.EFFECT, ice.EFFECT, seal_friction.EFFECT, stribeck.EFFECT, bandwidth.EFFECT)
 EFFECTS: Kinds[Effect] = Kinds("ppafo.effects", "effect", Effect, _OWN)
