@@ -31,10 +31,9 @@ from ppafo.model.cold_gas import (
     supply_now,
 )
 from ppafo.model.declaration import Quantity
-from ppafo.model.source import densest_gas, has_liquid, liquid_density
 from ppafo.model.plant import PlantParameters
 from ppafo.model.regulator import SupplyLines
-from ppafo.model.source import bottle_content, content_energy
+from ppafo.model.source import bottle_content, content_energy, densest_gas, has_liquid, liquid_density
 from ppafo.parameters.bottles.bottle import PATHS, Bottle, load_bottle
 from ppafo.parameters.device import Device
 from ppafo.parameters.provenance import Entry

@@ -16,10 +16,9 @@ from ppafo.documents.toml_text import TomlKind, label
 from ppafo.engine.rows import leaves
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.gait import Gait
-from ppafo.model.gait import NEVER, PARTS, STANDS_AT, Course, CoursePart
 from ppafo.model.declaration import Quantity
 from ppafo.model.elementary import sine_and_cosine
-from ppafo.model.gait import GaitNow, GaitTiming
+from ppafo.model.gait import NEVER, PARTS, STANDS_AT, Course, CoursePart, GaitNow, GaitTiming
 from ppafo.model.leg import LegParameters
 from ppafo.signals.recording import Floats
 from ppafo.simulation.reading import Reading

@@ -15,8 +15,7 @@ from ppafo.gait import Gait
 from ppafo.gait.gait import KNEE, Curve
 from ppafo.model.columns import larger, over_runs, smaller
 from ppafo.model.elementary import sine_and_cosine
-from ppafo.model.gait import HARMONICS, Harmonic, Series
-from ppafo.model.gait import GaitSeries, GaitTiming
+from ppafo.model.gait import HARMONICS, GaitSeries, GaitTiming, Harmonic, Series
 from ppafo.model.leg import LegParameters
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import Scenario

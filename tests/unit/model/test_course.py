@@ -8,8 +8,7 @@ import pytest
 
 from ppafo.gait import load_gait
 from ppafo.model.contact import foot_angle
-from ppafo.model.gait import SCUFF_FORCE, STANDS_AT, Course, gait_on_course, pace_in, part_at
-from ppafo.model.gait import GaitNow, gait_at
+from ppafo.model.gait import SCUFF_FORCE, STANDS_AT, Course, GaitNow, gait_at, gait_on_course, pace_in, part_at
 from ppafo.walking.course import (
     PlannedCourse,
     Segment,
