@@ -29,7 +29,14 @@ def test_every_scenario_and_walk_has_golden_hashes_and_the_quick_ones_are_among_
 
 
 @pytest.mark.parametrize(
-    ("backend", "name"), [("", CHEAP), ("", "solenoid"), ("", "proportional"), ("numba", CHEAP), ("numba", "off")]
+    ("backend", "name"),
+    [
+        ("", CHEAP),
+        ("", "solenoid"),
+        ("", "proportional"),
+        ("numba", CHEAP),
+        pytest.param("numba", "off", marks=pytest.mark.long),
+    ],
 )
 def test_the_golden_bits_are_found_on_this_computer(
     backend: str, name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
