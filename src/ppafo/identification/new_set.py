@@ -9,8 +9,14 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters.building import build_device
 from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, alternatives, is_within
 from ppafo.parameters.graph import acting
-from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, links_of_set, number_text
-from ppafo.parameters.provenance import CONFIDENCE, Entry
+from ppafo.parameters.parameter_set import (
+    CONFIDENCE,
+    Entry,
+    ParameterSet,
+    atmospheric_pressure,
+    links_of_set,
+    number_text,
+)
 from ppafo.units import from_si
 
 _AREA_NAMES, _SONIC_NAMES = ({item.name for item in form} for form in (AREA_FORM, SONIC_FORM))

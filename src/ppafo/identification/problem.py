@@ -29,8 +29,7 @@ from ppafo.identification.estimate import Prospect, half_width_for
 from ppafo.identification.source import Source, data_prospects
 from ppafo.identification.trajectory.section import TrajectorySection
 from ppafo.model.gas import SPECIES
-from ppafo.parameters.parameter_set import ParameterSet, chosen_valve, number_in_si
-from ppafo.parameters.provenance import CONFIDENCE
+from ppafo.parameters.parameter_set import CONFIDENCE, ParameterSet, chosen_valve, number_in_si
 from ppafo.storage.foreign import ColumnMap
 from ppafo.units import parse_quantity, to_si
 

@@ -1,6 +1,7 @@
-"""The layout of a parameter set file, built from the declarations, and the way from a name or a file to a set."""
+"""The layout of a parameter set file, built from the declarations; from a name or file to a set, and back to a file."""
 
 import functools
+import json
 import re
 from collections.abc import Iterable, Iterator
 from importlib import resources
@@ -14,17 +15,15 @@ from ppafo.documents.models import NAME, make_schema, one_of, optional, table, v
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name
 from ppafo.model.actuators.table import Table
-from ppafo.model.actuators.vane import KIND as VANE
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES, device_effects, find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION
 from ppafo.parameters import declaration
 from ppafo.parameters.actuator_table import read_actuator_table
 from ppafo.parameters.building import build_device
-from ppafo.parameters.device import Device
+from ppafo.parameters.device import VANE, Device
 from ppafo.parameters.overrides import apply_overrides
-from ppafo.parameters.parameter_set import ParameterSet, chosen_valve
-from ppafo.parameters.provenance import Accepted, Citation, Entry, FlagEntry, TextEntry
+from ppafo.parameters.parameter_set import Accepted, Citation, Entry, FlagEntry, ParameterSet, TextEntry, chosen_valve
 from ppafo.units import check_unit
 
 # A dotted path names a valve: a dot or a blank in its name would make it another path.
@@ -59,7 +58,7 @@ def _valve_section(kind: str) -> Any:
 def _actuator_section(kind: str) -> Any:
     """Return the section of an actuator of a kind; a vane needs no ``kind``: older sets have none."""
     described = ACTUATORS[kind].summary
-    named = Field(kind, description=described) if kind == VANE.name else Field(description=described)
+    named = Field(kind, description=described) if kind == VANE else Field(description=described)
     leak = _section("Leak", declaration.ORIFICE)
     extra: dict[str, Any] = {
         "kind": (Literal[kind], named),
@@ -67,7 +66,7 @@ def _actuator_section(kind: str) -> Any:
     }
     if ACTUATORS[kind].model.table is not None:
         extra["file"] = (str, Field(min_length=1, description="its file, seen from the folder of the set"))
-    name = "Actuator" if kind == VANE.name else f"{_capital(kind)}Actuator"
+    name = "Actuator" if kind == VANE else f"{_capital(kind)}Actuator"
     return _section(name, declaration.actuator_quantities(kind), extra)
 
 
@@ -182,7 +181,7 @@ def _find_actuator(document: dict[str, Any]) -> None:
     actuator = document.get("actuator")
     if not isinstance(actuator, dict):
         return
-    kind = actuator.setdefault("kind", VANE.name)
+    kind = actuator.setdefault("kind", VANE)
     if isinstance(kind, str):
         ACTUATORS.get(kind)
 
@@ -204,7 +203,7 @@ def _flatten(parsed: Any, file: str, actuator_table: Table | None) -> ParameterS
         completed_by=parsed.completed_by,
         default_valve=parsed.default_valve,
         valve_kinds={name: valve.kind for name, valve in parsed.valves.items()},
-        actuator_kind=VANE.name if parsed.actuator is None else parsed.actuator.kind,
+        actuator_kind=VANE if parsed.actuator is None else parsed.actuator.kind,
         actuator_file=getattr(parsed.actuator, "file", ""),
         actuator_table=actuator_table,
         numbers={path: leaf for path, leaf in leaves.items() if isinstance(leaf, Entry)},
@@ -237,3 +236,90 @@ def _check(parameter_set: ParameterSet) -> None:
             check_unit(entry.unit)
         except UnitError as error:
             raise ParameterError(f"{parameter_set.file}: {path}.unit: {error}") from error
+
+
+def parameter_set_toml(parameter_set: ParameterSet) -> str:
+    """Return the TOML text of a set: head, citation, every value with its provenance, accepted contradictions."""
+    return "\n".join(_lines(parameter_set)) + "\n"
+
+
+def _lines(parameter_set: ParameterSet) -> Iterator[str]:
+    head = {
+        "name": parameter_set.name,
+        "title": parameter_set.title,
+        "default_valve": parameter_set.default_valve,
+        "completed_by": parameter_set.completed_by,
+        "notes": parameter_set.notes,
+    }
+    yield "schema_version = 1"
+    yield from (f"{key} = {_text(value)}" for key, value in head.items() if value)
+    if parameter_set.citation is not None:
+        yield from _citation(parameter_set.citation)
+    if parameter_set.actuator_kind != VANE:
+        yield from _actuator(parameter_set)
+    for path, entry in _sorted_entries(parameter_set):
+        valve = path.split(".")[1] if path.startswith("valves.") else None
+        if valve is not None and path == _first_path(parameter_set, valve):
+            yield from _valve(parameter_set, valve)
+        yield from ("", f"[{path}]", *_entry(entry))
+    for valve in parameter_set.valve_kinds:
+        if _first_path(parameter_set, valve) is None:
+            yield from _valve(parameter_set, valve)
+    for finding, reason in parameter_set.accepted.items():
+        yield from ("", "[[accepted]]", f"finding = {_text(finding)}", f"reason = {_text(reason)}")
+
+
+def _actuator(parameter_set: ParameterSet) -> Iterator[str]:
+    yield from ("", "[actuator]", f"kind = {_text(parameter_set.actuator_kind)}")
+    if parameter_set.actuator_file:
+        yield f"file = {_text(parameter_set.actuator_file)}"
+
+
+def _valve(parameter_set: ParameterSet, valve: str) -> Iterator[str]:
+    yield from ("", f"[valves.{valve}]", f"kind = {_text(parameter_set.valve_kinds[valve])}")
+
+
+def _first_path(parameter_set: ParameterSet, valve: str) -> str | None:
+    paths = (path for path, _ in _sorted_entries(parameter_set))
+    return next((path for path in paths if path.startswith(f"valves.{valve}.")), None)
+
+
+def _sorted_entries(parameter_set: ParameterSet) -> list[tuple[str, Entry | TextEntry | FlagEntry]]:
+    """Return the values section by section, in the order in which the sections first occur."""
+    entries = parameter_set.entries()
+    sections = list(dict.fromkeys(path.rpartition(".")[0] for path in entries))
+    return sorted(entries.items(), key=lambda item: sections.index(item[0].rpartition(".")[0]))
+
+
+def _entry(entry: Entry | TextEntry | FlagEntry) -> Iterator[str]:
+    if isinstance(entry, Entry):
+        yield f"value = {float(entry.value)!r}"
+        yield f"unit = {_text(entry.unit)}"
+    elif isinstance(entry, FlagEntry):
+        yield f"value = {_flag(entry.value)}"
+    else:
+        yield f"value = {_text(entry.value)}"
+    yield f"origin = {_text(entry.origin)}"
+    yield f"source = {_text(entry.source)}"
+    if entry.note:
+        yield f"note = {_text(entry.note)}"
+    if isinstance(entry, Entry) and entry.uncertainty is not None:
+        yield f"uncertainty = {float(entry.uncertainty)!r}"
+
+
+def _citation(citation: Citation) -> Iterator[str]:
+    yield from ("", "[citation]", f"title = {_text(citation.title)}")
+    if citation.authors:
+        yield f"authors = [{', '.join(map(_text, citation.authors))}]"
+    if citation.year is not None:
+        yield f"year = {citation.year}"
+    yield from (f"{key} = {_text(value)}" for key, value in (("doi", citation.doi), ("note", citation.note)) if value)
+
+
+def _flag(value: bool) -> str:
+    return "true" if value else "false"
+
+
+def _text(text: str) -> str:
+    """Return a basic string of TOML; what JSON escapes is escaped in the same way there, but for DEL."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -9,14 +9,16 @@ from ppafo.model.gas import SPECIES
 from ppafo.parameters.declaration import AREA_FORM, RELIEVING_PATH, SONIC_FORM, SPECIES_PATH
 from ppafo.parameters.graph import acting
 from ppafo.parameters.parameter_set import (
+    Entry,
+    FlagEntry,
     ParameterSet,
+    TextEntry,
     atmospheric_pressure,
     chosen_valve,
     entry_in_si,
     entry_text,
     links_of_set,
 )
-from ppafo.parameters.provenance import Entry, FlagEntry, TextEntry
 from ppafo.units import split_quantity
 
 SOURCE = "override"

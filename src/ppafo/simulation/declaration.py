@@ -18,7 +18,7 @@ from ppafo.errors import KindError, ScenarioError
 from ppafo.kinds import Kinds
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.bandwidth import EFFECT as BANDWIDTH
-from ppafo.parameters.provenance import Entry
+from ppafo.parameters.parameter_set import Entry
 from ppafo.units import to_si
 
 LARGEST_SEED = 2**32 - 1

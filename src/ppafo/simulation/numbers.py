@@ -15,8 +15,8 @@ from ppafo.model.effects.kind import SECTION as EFFECT_SETTINGS
 from ppafo.model.regulator import SupplyLines
 from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, members
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
-from ppafo.parameters.effects import all_settings
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, holding, left, resolved
+from ppafo.parameters.plant import all_settings
 from ppafo.simulation import declaration
 from ppafo.simulation.building import apply_overrides
 from ppafo.simulation.clock import Clock, read_clock

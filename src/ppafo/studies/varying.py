@@ -13,8 +13,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters import apply_overrides, load_parameter_set
 from ppafo.parameters.declaration import alternatives, is_within
 from ppafo.parameters.graph import counts_from, gauge_link
-from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si
-from ppafo.parameters.provenance import Entry
+from ppafo.parameters.parameter_set import Entry, atmospheric_pressure, entry_in_si
 from ppafo.simulation import declaration
 from ppafo.simulation.building import is_of_device, set_name, split_override
 from ppafo.simulation.numbers import declared_numbers

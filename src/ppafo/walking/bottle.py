@@ -36,7 +36,7 @@ from ppafo.model.regulator import SupplyLines
 from ppafo.model.source import bottle_content, content_energy, densest_gas, has_liquid, liquid_density
 from ppafo.parameters.bottles.bottle import PATHS, Bottle, load_bottle
 from ppafo.parameters.device import Device
-from ppafo.parameters.provenance import Entry
+from ppafo.parameters.parameter_set import Entry
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.declaration import SUPPLY_LINE, THERMAL, kind_at, value_at
 from ppafo.simulation.reading import Reading, quantity_text

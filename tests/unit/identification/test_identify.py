@@ -15,8 +15,7 @@ from ppafo.identification.estimate import Estimate
 from ppafo.identification.new_set import with_estimates
 from ppafo.identification.problem import json_schema, parse_problem
 from ppafo.parameters import apply_overrides, build_device
-from ppafo.parameters.loading import load_device, load_parameter_set, parse_parameter_set
-from ppafo.parameters.writing import parameter_set_toml
+from ppafo.parameters.loading import load_device, load_parameter_set, parameter_set_toml, parse_parameter_set
 from ppafo.questions.identify.answer import Identification
 from ppafo.questions.identify.solve import identify
 from ppafo.storage import write_csv

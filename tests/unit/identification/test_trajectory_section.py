@@ -16,8 +16,7 @@ from ppafo.errors import PpafoError
 from ppafo.identification.problem import json_schema
 from ppafo.identification.source import Use, common_use
 from ppafo.parameters.device import Orifice
-from ppafo.parameters.loading import load_device, parse_parameter_set
-from ppafo.parameters.writing import parameter_set_toml
+from ppafo.parameters.loading import load_device, parameter_set_toml, parse_parameter_set
 from ppafo.questions.identify.answer import Identification
 from ppafo.questions.identify.solve import identify
 from ppafo.signals.recording import Channel, Recording

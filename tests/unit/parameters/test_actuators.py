@@ -11,8 +11,7 @@ from ppafo.engine.rows import leaves
 from ppafo.errors import ParameterError, PpafoError, SimulationError
 from ppafo.model.actuators.table import bases_at, level_of
 from ppafo.parameters.actuator_table import read_actuator_table, table_of
-from ppafo.parameters.loading import load_device, load_parameter_set, parse_parameter_set
-from ppafo.parameters.writing import parameter_set_toml
+from ppafo.parameters.loading import load_device, load_parameter_set, parameter_set_toml, parse_parameter_set
 from ppafo.questions.league.bound import check_bounded
 from ppafo.questions.tune.solve import shortfall
 from ppafo.simulation.ensemble.planning import screen_columns

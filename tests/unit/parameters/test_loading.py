@@ -9,8 +9,7 @@ import pytest
 
 from ppafo.errors import ParameterError
 from ppafo.parameters import list_sets, load_device, load_parameter_set
-from ppafo.parameters.loading import parse_parameter_set
-from ppafo.parameters.writing import parameter_set_toml
+from ppafo.parameters.loading import parameter_set_toml, parse_parameter_set
 
 SMALL = """
 schema_version = 1

@@ -7,8 +7,7 @@ import pytest
 import ppafo
 from ppafo.errors import PpafoError
 from ppafo.parameters import apply_overrides, build_device, load_parameter_set
-from ppafo.parameters.loading import parse_parameter_set
-from ppafo.parameters.writing import parameter_set_toml
+from ppafo.parameters.loading import parameter_set_toml, parse_parameter_set
 from ppafo.simulation.plan import plan_run
 
 RELIEVING = "supply.relieving=true"

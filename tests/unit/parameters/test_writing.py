@@ -6,9 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ppafo.parameters.loading import list_sets, load_parameter_set, parse_parameter_set
-from ppafo.parameters.provenance import Entry
-from ppafo.parameters.writing import parameter_set_toml
+from ppafo.parameters.loading import list_sets, load_parameter_set, parameter_set_toml, parse_parameter_set
+from ppafo.parameters.parameter_set import Entry
 
 _TEXT = st.text(st.characters(blacklist_categories=("Cs",)), min_size=1)
 

@@ -20,8 +20,8 @@ from ppafo.exports.c_library.preparation import following_text, links_of, prepar
 from ppafo.exports.c_library.program import Further, exported
 from ppafo.model.catalog import ordered_effects
 from ppafo.parameters.device import Device
-from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import Graph
+from ppafo.parameters.plant import effects_of
 from ppafo.simulation.plan import plan_run, step_counts
 from ppafo.simulation.scenario import Control, Scenario, Sensors, worn_kind
 

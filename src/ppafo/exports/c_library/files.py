@@ -19,8 +19,8 @@ from ppafo.metrics.catalog import METRICS
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
-from ppafo.parameters.effects import effects_of
 from ppafo.parameters.graph import Graph
+from ppafo.parameters.plant import effects_of
 from ppafo.simulation.scenario import PrescribedMotion, Scenario
 from ppafo.version import __version__
 

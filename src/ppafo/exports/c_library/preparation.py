@@ -25,9 +25,8 @@ from ppafo.model.sensors import SensorParameters
 from ppafo.parameters.building import consistency
 from ppafo.parameters.declaration import members
 from ppafo.parameters.device import Device, SonicOrifice
-from ppafo.parameters.effects import SEEN_BY_EFFECTS, effects_of
 from ppafo.parameters.graph import Graph, Term
-from ppafo.parameters.plant import area_restriction, plant_with, sonic_restriction
+from ppafo.parameters.plant import SEEN_BY_EFFECTS, area_restriction, effects_of, plant_with, sonic_restriction
 from ppafo.simulation.clock import links_of_times, step_unless_given, step_with_output
 from ppafo.simulation.declaration import SUPPLY_LINE, SUPPLY_LINES, value_at
 from ppafo.simulation.motion import TOLERANCE

@@ -26,8 +26,7 @@ from ppafo.identification.trajectory.problem import TIME_OFFSET, Experiment, Ran
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import at, over_runs
 from ppafo.model.plant import chamber_1_volume, chamber_2_volume, chamber_pressure
-from ppafo.parameters.effects import effect_rows, switches_of
-from ppafo.parameters.plant import plant_parameters
+from ppafo.parameters.plant import effect_rows, plant_parameters, switches_of
 from ppafo.simulation.plan import (
     exact_orifice,
     initial_lines,

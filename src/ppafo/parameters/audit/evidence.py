@@ -1,22 +1,67 @@
-"""What the checks read: the numbers of a set in SI, how exactly they were printed, and how to write them again."""
+"""What an audit says, and what its checks are given: one contradiction or remark, with the numbers on both sides."""
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from decimal import Decimal
-from typing import NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import UnitError
 from ppafo.model.declaration import Quantity
 from ppafo.model.gas import specific_gas_constant
 from ppafo.model.plant import chamber_1_volume
-from ppafo.parameters.audit.finding import NamedValue
 from ppafo.parameters.declaration import alternatives, is_within
 from ppafo.parameters.device import Gas
 from ppafo.parameters.graph import ATMOSPHERE_PATH
-from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, number_in_si
-from ppafo.parameters.provenance import Entry
+from ppafo.parameters.parameter_set import Entry, ParameterSet, atmospheric_pressure, number_in_si
 from ppafo.units import from_si
+
+Severity = Literal["error", "warning", "note"]
+
+
+@dataclass(frozen=True, slots=True)
+class NamedValue:
+    """A value of the set that a finding rests on, as it was given."""
+
+    path: str
+    value: float | str
+    unit: str
+    origin: str
+
+
+@dataclass(frozen=True, slots=True)
+class Side:
+    """One of the numbers that are compared; SI units, pressures absolute."""
+
+    label: str
+    value: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A contradiction (error), something to know before trusting a result (warning), or a check that holds (note).
+
+    ``paragraph`` says in words what was compared and what would reconcile it. ``accepted`` is the reason why the
+    author of the set keeps a contradiction; it lowers an error to a warning and is empty otherwise.
+    """
+
+    id: str
+    severity: Severity
+    title: str
+    values: tuple[NamedValue, ...]
+    sides: tuple[Side, ...]
+    paragraph: str
+    accepted: str = ""
+
+    def document(self) -> dict[str, Any]:
+        """Return the finding as plain data for JSON, which knows no infinite numbers: those become null."""
+        plain = asdict(self)
+        for side in plain["sides"]:
+            side["value"] = side["value"] if math.isfinite(side["value"]) else None
+        return plain
+
 
 GAS_PATHS = ("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature")
 

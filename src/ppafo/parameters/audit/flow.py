@@ -1,12 +1,208 @@
-"""Do the printed flows follow from discharge coefficient and area? Equations (6) and (7)."""
+"""Do flows and constants of flow follow from orifices and gas? Equations (6) and (7), and ISO 6358."""
 
-from collections.abc import Iterator
+import ast
+import math
+import operator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from ppafo.model.gas import choked_flow_constant
-from ppafo.model.orifice import isentropic_flow_function
-from ppafo.parameters.audit.evidence import Evidence, Interval
-from ppafo.parameters.audit.finding import Finding, Side
+from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio, subsonic_flow_constant
+from ppafo.model.orifice import isentropic_flow_function, iso6358_flow_function, sonic_conductance_mass
+from ppafo.parameters.audit.evidence import GAS_PATHS, Evidence, Finding, Interval, Side
+from ppafo.parameters.building import both_forms
+from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM
+from ppafo.parameters.device import Gas, Orifice, SonicOrifice
+from ppafo.parameters.plant import orifice_conductance
+
+# Is every orifice given in one form, and what does each valve pass? Equations (6) and (7), ISO 6358.
+
+_SUPPLY = "supply.pressure"
+_GRAMS = 1e3
+
+
+def check_orifices(evidence: Evidence) -> Iterator[Finding]:
+    """Yield an error for an orifice in two forms, and a note with the flow of each valve in the set's gas."""
+    valves = {name: f"valves.{name}" for name in evidence.parameter_set.valve_kinds}
+    for section in ("actuator.leak", *valves.values()):
+        names = both_forms(evidence.parameter_set, section)
+        if names:
+            yield _two_forms(evidence, section, names)
+    for name, section in valves.items():
+        yield from _open_flow(evidence, name, section)
+
+
+def _two_forms(evidence: Evidence, section: str, names: tuple[str, ...]) -> Finding:
+    return Finding(
+        id=f"forms-of-{section.rpartition('.')[2]}",
+        severity="error",
+        title=f"{section} is given in two forms",
+        values=evidence.values_of(*(f"{section}.{name}" for name in names)),
+        sides=(),
+        paragraph=(
+            f"{section} has {', '.join(names)}, which specify one orifice twice, so no device can be built. "
+            "Reconciled by area and discharge_coefficient alone, or by sonic_conductance and critical_ratio alone."
+        ),
+    )
+
+
+def _open_flow(evidence: Evidence, name: str, section: str) -> Iterator[Finding]:
+    gas, supply, atmosphere = evidence.gas(), evidence.number(_SUPPLY), evidence.atmosphere()
+    if gas is None or supply is None or supply <= atmosphere or both_forms(evidence.parameter_set, section):
+        return
+    ratio = atmosphere / supply
+    area = evidence.numbers(*(f"{section}.{item.name}" for item in AREA_FORM))
+    sonic = evidence.numbers(*(f"{section}.{item.name}" for item in SONIC_FORM))
+    if area is not None and min(area) > 0.0:
+        conductance = orifice_conductance(Orifice(*area), gas)
+        flow = conductance * supply * isentropic_flow_function(ratio, gas.heat_capacity_ratio)
+        form, origin = AREA_FORM, "by its Cd A"
+    elif sonic is not None and min(sonic) > 0.0 and sonic[1] < 1.0:
+        conductance = orifice_conductance(SonicOrifice(*sonic), gas)
+        flow = conductance * supply * iso6358_flow_function(ratio, sonic[1])
+        form, origin = SONIC_FORM, _of_sonic_form(gas)
+    else:
+        return
+    yield Finding(
+        id=f"open-flow-of-{name}",
+        severity="note",
+        title=f"valve '{name}' passes {_GRAMS * flow:#.3g} g/s of {gas.species}",
+        values=evidence.values_of(*(f"{section}.{item.name}" for item in form), _SUPPLY),
+        sides=(Side("flow from supply to atmosphere", flow, "kg/s"), Side("conductance", conductance, "kg/(s Pa)")),
+        paragraph=(
+            f"Fully open from {evidence.in_set_unit(_SUPPLY, supply)} to the atmosphere it passes "
+            f"{_GRAMS * flow:#.3g} g/s "
+            f"{origin}. Compare this with the data sheet."
+        ),
+    )
+
+
+def _of_sonic_form(gas: Gas) -> str:
+    """Return the words that say what the sonic conductance counts for."""
+    return (
+        f"of {gas.species} by its sonic conductance, which counts for air as in ISO 6358 and is converted: another "
+        "gas passes sqrt(R_air / R) times as much mass at the same temperature"
+    )
+
+
+_LONGEST = 80
+_LARGEST = 1e3
+_BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+}
+
+
+def evaluate(formula: str, heat_capacity_ratio: float) -> float | None:
+    """Return the value of a formula such as ``(k + 1)/(k - 1)``, None where it is no such thing."""
+    if len(formula) > _LONGEST:
+        return None
+    try:
+        value = _value(ast.parse(formula, mode="eval").body, heat_capacity_ratio)
+    except (SyntaxError, ValueError, ZeroDivisionError, OverflowError):
+        return None
+    return value if abs(value) < _LARGEST else None
+
+
+def _value(node: ast.expr, k: float) -> float:
+    match node:
+        case ast.BinOp(left, operation, right) if type(operation) in _BINARY:
+            return _BINARY[type(operation)](_value(left, k), _value(right, k))
+        case ast.UnaryOp(ast.USub(), operand):
+            return -_value(operand, k)
+        case ast.Name("k"):
+            return k
+        case ast.Constant(int() | float() as number) if not isinstance(number, bool):
+            return float(number)
+    raise ValueError("not plain arithmetic in k")
+
+
+# Do the printed constants of orifice flow follow from the gas data? Equations (6) and (7).
+
+_C1 = "reported.choked_flow_constant"
+_EXPONENT = "reported.choked_flow_exponent"
+_ROUNDING = 1e-3
+"""Relative room beside the printed digits: other values of R, M and 273 or 273.15."""
+
+
+def check_choked_flow(evidence: Evidence) -> Iterator[Finding]:
+    """Yield a finding for each printed constant, a note where it holds, and one for the printed exponent."""
+    gas = evidence.gas()
+    if gas is None:
+        return
+    k, constant = gas.heat_capacity_ratio, gas.specific_gas_constant
+    expected = {
+        _C1: choked_flow_constant(k, constant, gas.temperature),
+        "reported.subsonic_flow_constant": subsonic_flow_constant(k, constant, gas.temperature),
+        "reported.critical_pressure_ratio": 1.0 / critical_pressure_ratio(k),
+    }
+    for path, value in expected.items():
+        yield from _constant(evidence, path, value)
+    yield from _exponent(evidence, gas)
+
+
+def _constant(evidence: Evidence, path: str, expected: float) -> Iterator[Finding]:
+    printed, digits = evidence.number(path), evidence.magnitude(path)
+    if printed is None or digits is None:
+        return
+    holds = digits.low * (1.0 - _ROUNDING) <= expected <= digits.high * (1.0 + _ROUNDING)
+    quantity = evidence.declared[path]
+    verdict = "agree to the printed digits" if holds else f"differ by {100.0 * (printed / expected - 1.0):+.2g} %"
+    remedy = "" if holds else f" Reconciled by {expected:.5g}, or by other gas data."
+    yield Finding(
+        id=path.rpartition(".")[2].replace("_", "-"),
+        severity="note" if holds else "error",
+        title=f"{quantity.summary} {'follows' if holds else 'does not follow'} from the gas data",
+        values=evidence.values_of(path, *GAS_PATHS),
+        sides=(Side("printed", printed, quantity.unit), Side("from the gas data", expected, quantity.unit)),
+        paragraph=(
+            f"Printed is {evidence.in_set_unit(path, printed)}; the gas data give {expected:.5g} "
+            f"{quantity.unit}".rstrip()
+            + f". The two {verdict}.{remedy}"
+        ),
+    )
+
+
+def _exponent(evidence: Evidence, gas: Gas) -> Iterator[Finding]:
+    """Compare C1 with the printed exponent to C1 with (k + 1)/(k - 1)."""
+    formula = evidence.text(_EXPONENT)
+    k = gas.heat_capacity_ratio
+    exponent = None if formula is None else evaluate(formula, k)
+    right = (k + 1.0) / (k - 1.0)
+    if formula is None or (exponent is not None and math.isclose(exponent, right, rel_tol=1e-9)):
+        return
+    correct = choked_flow_constant(k, gas.specific_gas_constant, gas.temperature)
+    values = evidence.values_of(_EXPONENT, _C1, *GAS_PATHS)
+    title = "the printed exponent inside C1 is not the one of choked flow"
+    if exponent is None:
+        text = f"The formula '{formula}' cannot be read as arithmetic in k; the right exponent is (k + 1)/(k - 1)."
+        yield Finding("choked-flow-exponent", "warning", title, values, (), text)
+        return
+    literal = correct * (2.0 / (k + 1.0)) ** (0.5 * (exponent - right))
+    yield Finding(
+        id="choked-flow-exponent",
+        severity="error",
+        title=title,
+        values=values,
+        sides=(Side("C1 with the printed exponent", literal, "s/m"), Side("C1 with (k+1)/(k-1)", correct, "s/m")),
+        paragraph=(
+            f"The printed exponent {formula} is {exponent:.4g} and gives C1 = {literal:.4g} s/m; the exponent "
+            f"(k + 1)/(k - 1) = {right:.4g} gives {correct:.4g} s/m{_agreement(evidence, literal, correct)}. "
+            f"Reconciled by the exponent (k + 1)/(k - 1)."
+        ),
+    )
+
+
+def _agreement(evidence: Evidence, literal: float, correct: float) -> str:
+    printed = evidence.number(_C1)
+    if printed is None:
+        return ""
+    nearer = "second" if abs(printed - correct) < abs(printed - literal) else "first"
+    return f", and the printed C1 of {printed:.4g} s/m is the {nearer} of the two"
+
+
+# Do the printed flows follow from discharge coefficient and area? Equations (6) and (7).
 
 _MODEL = 0.02
 """Relative room for the model itself: measured flow is rarely better."""
@@ -25,7 +221,7 @@ class _ValveFlow:
     agrees: bool
 
 
-def check(evidence: Evidence) -> Iterator[Finding]:
+def check_flow(evidence: Evidence) -> Iterator[Finding]:
     """Yield an error for each valve whose printed flow its Cd A does not pass, and for a shared Cd that cannot be."""
     flows = [flow for name in evidence.parameter_set.valve_kinds if (flow := _flow(evidence, name)) is not None]
     for flow in flows:
@@ -108,3 +304,45 @@ def _check_shared_coefficient(evidence: Evidence, flows: list[_ValveFlow]) -> It
                 f"and {other.measured / other.per_area / other.area:.3g}; or by two flows, measured one by one."
             ),
         )
+
+
+# Does the printed flow of a valve in the form of ISO 6358 follow from its sonic conductance?
+
+
+def check_sonic_flow(evidence: Evidence) -> Iterator[Finding]:
+    """Yield an error for each valve whose printed flow its sonic conductance does not pass."""
+    for name in evidence.parameter_set.valve_kinds:
+        yield from _valve(evidence, name)
+
+
+def _valve(evidence: Evidence, name: str) -> Iterator[Finding]:
+    valve, reported = f"valves.{name}", f"reported.valves.{name}"
+    size, flow = f"{valve}.sonic_conductance", f"{reported}.mass_flow"
+    paths = (size, f"{valve}.critical_ratio", flow, f"{reported}.flow_pressure")
+    gas, found = evidence.gas(), evidence.numbers(*paths)
+    printed, given = evidence.magnitude(flow), evidence.magnitude(size)
+    if gas is None or found is None or printed is None or given is None or min(found) <= 0.0 or found[1] >= 1.0:
+        return
+    conductance, critical_ratio, measured, pressure = found
+    psi = iso6358_flow_function(min(evidence.atmosphere() / pressure, 1.0), critical_ratio)
+    per_size = sonic_conductance_mass(1.0, gas.specific_gas_constant, gas.temperature) * pressure * psi
+    room = Interval(per_size * (1.0 - _MODEL), per_size * (1.0 + _MODEL))
+    if per_size <= 0.0 or given.times(room).meets(printed):
+        return
+    predicted, needed = conductance * per_size, measured / per_size
+    yield Finding(
+        id=f"flow-of-{name}",
+        severity="error",
+        title=f"the printed flow of valve '{name}' does not follow from its sonic conductance",
+        values=evidence.values_of(*paths),
+        sides=(
+            Side("printed flow", measured, "kg/s"),
+            Side("flow of the sonic conductance", predicted, "kg/s"),
+            Side("sonic conductance that gives the printed flow", needed, "m^3/(s Pa)"),
+        ),
+        paragraph=(
+            f"Fully open the valve '{name}' passes {evidence.in_set_unit(flow, predicted)} by its sonic conductance, "
+            f"printed is {evidence.in_set_unit(flow, measured)}: a factor {predicted / measured:.3g}. Reconciled by a "
+            f"sonic conductance of {evidence.in_set_unit(size, needed)}, or by the other flow."
+        ),
+    )

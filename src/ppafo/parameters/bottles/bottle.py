@@ -1,6 +1,12 @@
-"""Bottles and their regulators: TOML files, each value with its unit, origin and source."""
+"""Bottles of gas: their files, with the fluids in them, and bottles of the catalogue of parts.
+
+Fluids are property tables by name, made from CoolProp. A catalogue of parts knows the gas in a bottle and its empty mass.
+The bottle of the paper, filled to the same density, stands in for the rest: volume with the content, heat of the wall
+with the mass, surfaces with its two thirds power.
+"""
 
 import functools
+import json
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -18,6 +24,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.model.gas import SPECIES
 from ppafo.model.source import (
     BottleWall,
+    FluidTable,
     Regulator,
     bottle_content,
     densest_gas,
@@ -27,11 +34,81 @@ from ppafo.model.source import (
     liquid_density,
     pressure_reserve,
 )
-from ppafo.parameters.bottles.fluids import Fluid, load_fluid
-from ppafo.parameters.bottles.from_part import bottle_parts, scaled_entries
 from ppafo.parameters.declaration import is_within
-from ppafo.parameters.provenance import Entry, TextEntry
+from ppafo.parameters.parameter_set import Entry, TextEntry
+from ppafo.parameters.parts import Part, load_catalogue
 from ppafo.units import format_quantity, split_quantity, to_si
+
+_FOLDER = resources.files("ppafo.parameters.bottles") / "fluid_tables"
+_SUFFIX = ".json"
+
+
+@dataclass(frozen=True, slots=True)
+class Fluid:
+    """A fluid: name, table of its properties, and where the numbers come from."""
+
+    name: str
+    table: FluidTable
+    source: str
+
+
+def list_fluids() -> tuple[str, ...]:
+    """Return the names of the fluids that have a table."""
+    return tuple(sorted(item.name.removesuffix(_SUFFIX) for item in _FOLDER.iterdir() if item.name.endswith(_SUFFIX)))
+
+
+@functools.cache
+def load_fluid(name: str) -> Fluid:
+    """Return a fluid by name; ParameterError where there is no table of it."""
+    known = list_fluids()
+    if name not in known:
+        raise ParameterError(
+            f"there is no property table of '{name}'{nearest_name(name, known)}; available: {', '.join(known)}"
+        )
+    content = json.loads((_FOLDER / f"{name}{_SUFFIX}").read_text(encoding="utf-8"))
+    table = FluidTable(
+        gas_constant=content["gas_constant"],
+        temperatures=tuple(content["temperatures"]),
+        fractions=tuple(content["shares"]),
+        densest=tuple(content["densest"]),
+        liquid_densities=tuple(content.get("liquid_densities", ())),
+        liquid_energies=tuple(content.get("liquid_energies", ())),
+        factors=tuple(map(tuple, content["factors"])),
+        energies=tuple(map(tuple, content["energies"])),
+    )
+    return Fluid(name, table, f"{content['source']}; reference {content['reference']}")
+
+
+_SURFACES = ("bottle.content_heat_transfer", "bottle.room_heat_transfer")
+_WALL = 885.0
+"""Heat capacity of the paper's bottle over its mass [J/(kg K)]: 400 J/K and 452 g."""
+
+
+@functools.cache
+def bottle_parts() -> Mapping[str, Part]:
+    """Return the bottles of the catalogue that comes with the package, by name."""
+    return load_catalogue().groups["bottles"]
+
+
+def scaled_entries(part: Part, paper: Mapping[str, Entry]) -> dict[str, Entry]:
+    """Return the values of a bottle with the content [kg] and the empty mass [kg] of a part, from the ``paper``'s."""
+    content, empty = part.values["content"], part.values["empty_mass"]
+    ratio = 1000.0 * content / paper["bottle.gas_mass"].value
+    found = {
+        "bottle.gas_mass": _entry(1000.0 * content, "g", f"catalogue of parts, {part.name}"),
+        "bottle.volume": _entry(paper["bottle.volume"].value * ratio, "cm^3", "filled as densely as the paper's"),
+        "bottle.wall_heat_capacity": _entry(_WALL * empty, "J/K", "its empty mass, at 885 J/(kg K) as the paper's"),
+    }
+    surface = ratio ** (2.0 / 3.0)
+    for path in _SURFACES:
+        given = paper[path]
+        found[path] = _entry(given.value * surface, given.unit, "the paper's bottle, with the surface of its content")
+    return dict(paper) | found
+
+
+def _entry(value: float, unit: str, source: str) -> Entry:
+    return Entry(value=value, unit=unit, origin="derived", source=source)
+
 
 PAPER_BOTTLE = "paper-co2-9oz"
 

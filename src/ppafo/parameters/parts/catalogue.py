@@ -1,4 +1,4 @@
-"""The layout of a catalogue of parts, built from the declarations, and the way from a name or a file to one."""
+"""The catalogue of parts: what may stand in its file, real parts with figures of data sheets, and how it is read."""
 
 import math
 from collections.abc import Mapping
@@ -11,15 +11,117 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.models import NAME, make_schema, one_of, optional, table, validate
+from ppafo.documents.models import NAME, STRICT, make_schema, one_of, optional, table, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
-from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, is_within
-from ppafo.parameters.parts.declaration import GROUPS, NEEDED, figures_of
-from ppafo.parameters.parts.part import Figure, Part
+from ppafo.parameters.declaration import ACTUATOR, AREA_FORM, ORIFICE, SONIC_FORM, is_within
 from ppafo.units import to_si
+
+MASS = Quantity("mass", "kg", "mass of the part, of both valves for a pair", minimum=0.0, maximum=100.0)
+RATING = Quantity(
+    "largest_pressure", "Pa_a", "maximum pressure that the part is rated for", minimum=1.0e4, maximum=1.0e8
+)
+NOMINAL_FLOW = Quantity(
+    "nominal_flow", "m^3/s", "flow of air at normal conditions from 6 bar to 5 bar gauge", minimum=0.0, maximum=1.0
+)
+NOMINAL_DIAMETER = Quantity("nominal_diameter", "m", "diameter of the opening", minimum=0.0, maximum=0.1)
+CONTENT = Quantity("content", "kg", "gas in the full bottle", minimum=0.0, maximum=100.0, minimum_allowed=False)
+EMPTY_MASS = Quantity("empty_mass", "kg", "mass of the empty bottle with its valve", minimum=0.0, maximum=100.0)
+
+_OF_ACTUATOR = ("torque_constant", "volume_per_angle")
+
+VALVE = (MASS, RATING, NOMINAL_FLOW, NOMINAL_DIAMETER, *ORIFICE)
+GROUPS: dict[str, tuple[Quantity, ...]] = {
+    "valves": VALVE + tuple(item for kind in VALVES.values() for item in kind.quantities),
+    "actuators": (MASS, RATING, *(item for item in ACTUATOR if item.name in _OF_ACTUATOR)),
+    "regulators": (MASS, RATING),
+    "bottles": (CONTENT, EMPTY_MASS),
+}
+"""Figures by group; a valve has those of its kind."""
+
+NEEDED: dict[str, tuple[str, ...]] = {
+    "valves": ("mass",),
+    "actuators": ("mass", *_OF_ACTUATOR),
+    "regulators": ("mass",),
+    "bottles": ("content", "empty_mass"),
+}
+"""Figures without which a part is of no use to a study; a valve needs an orifice in one of its two forms besides."""
+
+
+def figures_of(group: str, kind: str) -> tuple[Quantity, ...]:
+    """Return the figures that a part of a group can have; ``kind`` is that of a valve, an empty text for others."""
+    return VALVE + VALVES[kind].quantities if group == "valves" else GROUPS[group]
+
+
+Origin = Literal["published", "datasheet", "quoted", "measured", "derived", "assumed"]
+DOUBTFUL: tuple[Origin, ...] = ("quoted", "assumed")
+"""Origins that a reader has to look at before buying: from memory of a document, or a guess."""
+
+
+class Figure(BaseModel):
+    """A figure of a part as it was given, in its own unit."""
+
+    model_config = STRICT
+
+    value: Annotated[float, Field(description="the number, in the unit beside it")]
+    unit: Annotated[str, Field(description="such as 'mm^2', 'g', 'bar_g'; '' for a number")]
+    origin: Annotated[
+        Origin,
+        Field(
+            description="'published' in a paper, read in a 'datasheet', 'quoted' from a document not opened for it, "
+            "'measured', 'derived' from other figures, or 'assumed'"
+        ),
+    ]
+    source: Annotated[
+        str, Field(min_length=1, description="where to look it up; for an assumed one, the basis of the assumption")
+    ]
+    note: Annotated[str, Field(description="reason or remark; needed where it is derived or assumed")] = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A part of the catalogue.
+
+    ``kind`` is that of a valve, else an empty text. ``figures`` as written and ``values`` in SI units (pressures
+    absolute), by name; ``unknown`` names figures that are known to exist and that nobody could name.
+    """
+
+    name: str
+    group: str
+    kind: str
+    maker: str
+    model: str
+    document: str
+    note: str
+    figures: Mapping[str, Figure]
+    values: Mapping[str, float]
+    unknown: tuple[str, ...]
+
+    @property
+    def title(self) -> str:
+        """Maker and model."""
+        return f"{self.maker} {self.model}"
+
+    @property
+    def doubtful(self) -> tuple[str, ...]:
+        """Names of the figures that are quoted or assumed."""
+        return tuple(name for name, figure in self.figures.items() if figure.origin in DOUBTFUL)
+
+    @property
+    def full_mass(self) -> float:
+        """Mass [kg] of the part as it is carried: of a bottle, with its gas."""
+        return self.values["mass"] if "mass" in self.values else self.values["empty_mass"] + self.values["content"]
+
+    @property
+    def model_numbers(self) -> dict[str, float]:
+        """Numbers of a valve by path, in SI; what its maker does not say is ideal, as the declarations have it."""
+        settings = {item.name: item.default for item in VALVES[self.kind].quantities if item.default is not None}
+        orifice = {item.name: self.values[item.name] for item in ORIFICE if item.name in self.values}
+        own = {name: self.values[name] for name in settings if name in self.values}
+        return {f"valve.{name}": number for name, number in (orifice | settings | own).items()}
+
 
 _TITLES = {"valves": "Valve", "actuators": "Actuator", "regulators": "Regulator", "bottles": "Bottle"}
 _NAMES = Annotated[tuple[str, ...], Field(strict=False)]
@@ -51,11 +153,11 @@ def _catalogue_file() -> type[BaseModel]:
         "title": (str, Field(min_length=1)),
         "notes": (str, ""),
     }
-    for group in GROUPS:
+    for group, quantities in GROUPS.items():
         parts = (
             one_of([_valve_table(kind) for kind in VALVES])
             if group == "valves"
-            else _part_table(_TITLES[group], group, GROUPS[group])
+            else _part_table(_TITLES[group], group, quantities)
         )
         fields[group] = (GenericAlias(dict, (str, parts)), Field(default_factory=dict, description=f"{group} by name"))
     return table("CatalogueFile", fields)

@@ -32,8 +32,8 @@ from ppafo.identification.new_set import NewSet, in_set_unit
 from ppafo.identification.trajectory.fitting import TrajectoryFit
 from ppafo.identification.trajectory.follow_up import Expected, Profile
 from ppafo.identification.trajectory.section import TrajectoryOutcome
+from ppafo.parameters.loading import parameter_set_toml
 from ppafo.parameters.parameter_set import ParameterSet
-from ppafo.parameters.writing import parameter_set_toml
 from ppafo.questions.question import Solved
 from ppafo.signals import Recording, RecordingKind
 from ppafo.signals.recording import Floats

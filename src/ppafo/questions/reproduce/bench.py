@@ -31,8 +31,7 @@ from ppafo.parameters import ParameterSet, load_device, load_parameter_set
 from ppafo.parameters import apply_overrides as apply_to_set
 from ppafo.parameters.audit.evidence import Interval
 from ppafo.parameters.overrides import SOURCE as OVERRIDE
-from ppafo.parameters.parameter_set import number_in_si, number_text
-from ppafo.parameters.provenance import Entry
+from ppafo.parameters.parameter_set import Entry, number_in_si, number_text
 from ppafo.questions.reproduce.claim import Claim, Printed, Verdict
 from ppafo.rig import record
 from ppafo.signals import Recording

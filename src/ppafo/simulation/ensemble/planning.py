@@ -16,7 +16,7 @@ from ppafo.model.columns import Problem, at
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.building import actuator_problem, beyond_pressures, consistency, growth_and_problem
 from ppafo.parameters.device import VANE
-from ppafo.parameters.effects import switches_of
+from ppafo.parameters.plant import switches_of
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock
 from ppafo.simulation.motion import TOLERANCE, profile_problem
 from ppafo.simulation.numbers import (

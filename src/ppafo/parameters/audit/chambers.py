@@ -1,0 +1,184 @@
+"""Do the chambers agree with the torque, the range of angles and the measured gas? Equations (2) to (5)."""
+
+import math
+from collections.abc import Iterator
+
+from ppafo.parameters.audit.evidence import Evidence, Finding, Side, density_change
+
+# Does the torque constant equal the volume per angle, as virtual work wants: T dtheta = (P1 - P2) dV?
+
+_TORQUE_CONSTANT = "actuator.torque_constant"
+_VOLUME_PER_ANGLE = "actuator.volume_per_angle"
+_EFFICIENCY = "reported.torque_efficiency"
+_SUPPLY = "supply.pressure"
+_ID = "virtual-work"
+_TOLERANCE = 0.1
+
+
+def check_virtual_work(evidence: Evidence) -> Iterator[Finding]:
+    """Yield a warning where the two differ by more than 10 %, a note where a stated efficiency explains it."""
+    found, efficiency = evidence.numbers(_TORQUE_CONSTANT, _VOLUME_PER_ANGLE), evidence.number(_EFFICIENCY)
+    if found is None or min(found) <= 0.0:
+        return
+    if efficiency is not None and abs(found[1] * efficiency / found[0] - 1.0) <= _TOLERANCE:
+        yield _closure(evidence, found[0] / found[1])
+    elif abs(found[1] / found[0] - 1.0) > _TOLERANCE:
+        yield _contradiction(evidence, *found)
+
+
+def _closure(evidence: Evidence, ratio: float) -> Finding:
+    """Return the note that the shaft's work is that of the gas less the stated loss."""
+    return Finding(
+        id=_ID,
+        severity="note",
+        title="torque constant and volume per angle agree, with the stated efficiency",
+        values=evidence.values_of(_TORQUE_CONSTANT, _VOLUME_PER_ANGLE, _EFFICIENCY),
+        sides=(Side("torque constant over volume per angle", ratio, ""),),
+        paragraph=(
+            f"Energy closes: the shaft gets {100.0 * ratio:.3g} % of the work p dV of the gas, and the other "
+            f"{100.0 * (1.0 - ratio):.3g} % are the stated loss. The model takes the same ratio where the shaft drives "
+            "the vane and compresses gas, where a real loss has the other sign."
+        ),
+    )
+
+
+def _contradiction(evidence: Evidence, torque_constant: float, volume_per_angle: float) -> Finding:
+    gas_paths, gas_sides, gas_text = _gas_use(evidence, torque_constant, volume_per_angle)
+    return Finding(
+        id=_ID,
+        severity="warning",
+        title="torque constant and volume per angle differ, against virtual work",
+        values=evidence.values_of(_TORQUE_CONSTANT, _VOLUME_PER_ANGLE, _EFFICIENCY, *gas_paths),
+        sides=(
+            Side("torque constant", torque_constant, "m^3"),
+            Side("volume per angle", volume_per_angle, "m^3/rad"),
+            *gas_sides,
+        ),
+        paragraph=(
+            f"A frictionless vane that turns by dtheta does the work T dtheta = (P1 - P2) dV, so that the torque "
+            f"constant {1e6 * torque_constant:.4g} cm^3 and the volume per angle {1e6 * volume_per_angle:.4g} cm^3/rad "
+            f"should be one number; the volume is {volume_per_angle / torque_constant:.2g} times the torque constant."
+            f"{gas_text} Reconciled by measuring the volume of gas that a full turn displaces; until then energy and "
+            f"efficiency figures are uncertain by the same factor."
+        ),
+    )
+
+
+def _gas_use(
+    evidence: Evidence, torque_constant: float, volume_per_angle: float
+) -> tuple[tuple[str, ...], tuple[Side, ...], str]:
+    """Return paths, numbers and a sentence on the volume that the gas for one filling needs."""
+    gas, supply, angles = evidence.gas(), evidence.number(_SUPPLY), evidence.angle_range()
+    path = evidence.single_fill_gas()
+    if gas is None or supply is None or supply <= evidence.atmosphere() or angles is None or path is None:
+        return (), (), ""
+    density = density_change(gas, supply - evidence.atmosphere())
+    used, turn = evidence.number(path) or 0.0, abs(angles[3] - angles[1])
+    needed, by_torque, by_volume = used / density, torque_constant * turn, volume_per_angle * turn
+    nearer = "volume per angle" if abs(needed - by_volume) < abs(needed - by_torque) else "torque constant"
+    sides = (
+        Side("volume that the gas use needs", needed, "m^3"),
+        Side("volume swept by the torque constant", by_torque, "m^3"),
+        Side("volume swept by the volume per angle", by_volume, "m^3"),
+    )
+    text = (
+        f" Filling 1 cm^3 from atmosphere to supply takes {density:.3g} mg of gas, so the "
+        f"{evidence.in_set_unit(path, used)} of one filling occupy {1e6 * needed:.3g} cm^3; over the whole "
+        "range the vane "
+        f"sweeps {1e6 * by_torque:.3g} cm^3 by the torque constant and {1e6 * by_volume:.3g} cm^3 by the volume per "
+        f"angle. The gas use favours the {nearer}."
+    )
+    return (path, _SUPPLY, angles[0], angles[2]), sides, text
+
+
+# Are both chamber volumes positive over the angles in use? Equations (4) and (5).
+
+_SLOPE = "actuator.volume_per_angle"
+_STOPS = ("actuator.angle_min", "actuator.angle_max")
+_DEAD = ("actuator.dead_volume_1", "actuator.dead_volume_2")
+
+
+def check_volumes(evidence: Evidence) -> Iterator[Finding]:
+    """Yield an error for each chamber that has no volume left at one end of the range."""
+    found, angles = evidence.numbers(_SLOPE, *_STOPS), evidence.angle_range()
+    if found is None or angles is None or found[0] <= 0.0:
+        return
+    _, stop_low, stop_high = found
+    low_path, low, high_path, high = angles
+    yield from _chamber(evidence, 1, low - stop_low, high - low, low_path)
+    yield from _chamber(evidence, 2, stop_high - high, high - low, high_path)
+
+
+def _chamber(evidence: Evidence, chamber: int, travel: float, turn: float, end_path: str) -> Iterator[Finding]:
+    """``travel`` [rad] is left between the end of the range and the angle where the swept volume is zero."""
+    slope = evidence.number(_SLOPE) or math.inf
+    dead_path, stop_path = _DEAD[chamber - 1], _STOPS[chamber - 1]
+    dead = evidence.number(dead_path) or 0.0
+    smallest = dead + slope * travel
+    if smallest > 0.0:
+        return
+    empty = min(-travel - dead / slope, turn)
+    end = evidence.in_set_unit(end_path, evidence.number(end_path) or 0.0)
+    yield Finding(
+        id=f"volume-{chamber}",
+        severity="error",
+        title=f"volume of chamber {chamber} is not positive over the range of angles",
+        values=evidence.values_of(_SLOPE, stop_path, dead_path, end_path),
+        sides=(
+            Side(f"V{chamber} at the end of the range", smallest, "m^3"),
+            Side("dead volume that is needed at least", -slope * travel, "m^3"),
+            Side("part of the range without volume", empty / turn if turn else 1.0, ""),
+        ),
+        paragraph=(
+            f"At {end} the volume of chamber {chamber} is {1e6 * smallest:.3g} cm^3; it is not positive over the last "
+            f"{math.degrees(empty):.3g} of {math.degrees(turn):.3g} deg. Reconciled by counting the volume from the "
+            f"end of the range ({stop_path} = {end}) with a dead volume for line and clearance, or by a dead volume of "
+            f"more than {-1e6 * slope * travel:.3g} cm^3."
+        ),
+    )
+
+
+# Is the gas of one filling that was measured the gas that chamber 1 holds? Equations (3) and (4).
+
+_VOLUME = ("actuator.volume_per_angle", "actuator.dead_volume_1")
+_LEAST, _MOST = 0.6, 1.1
+"""Fraction of the measured gas that a filling may hold: the rest leaks across the vane while the task lasts."""
+
+
+def check_filling(evidence: Evidence) -> Iterator[Finding]:
+    """Yield what a filling in the middle of the range takes: a note where the measured gas can be that, else a warning.
+
+    Silent where the set reports no gas of a single filling.
+    """
+    gas, supply, angles = evidence.gas(), evidence.number(_SUPPLY), evidence.angle_range()
+    path = evidence.single_fill_gas()
+    if gas is None or supply is None or supply <= evidence.atmosphere() or angles is None or path is None:
+        return
+    volume = evidence.chamber_1_volume(0.5 * (angles[1] + angles[3]))
+    if volume is None or volume <= 0.0:
+        return
+    density, used = density_change(gas, supply - evidence.atmosphere()), evidence.number(path) or 0.0
+    filled = density * volume
+    agrees = _LEAST <= filled / used <= _MOST
+    yield Finding(
+        id="gas-of-one-filling",
+        severity="note" if agrees else "warning",
+        title=f"the measured gas of one filling {'can be' if agrees else 'is not'} what chamber 1 holds",
+        values=evidence.values_of(*_VOLUME, path, _SUPPLY),
+        sides=(
+            Side("gas that fills chamber 1", filled, "kg"),
+            Side("measured gas", used, "kg"),
+            Side("volume of chamber 1 in the middle of the range", volume, "m^3"),
+        ),
+        paragraph=(
+            f"In the middle of its range chamber 1 has {1e6 * volume:.3g} cm^3, dead volume included, and takes "
+            f"{evidence.in_set_unit(path, filled)} of gas from atmosphere to supply; measured is "
+            f"{evidence.in_set_unit(path, used)}, which also covers what leaks across the vane. How the volume is "
+            f"divided into swept and dead volume makes no difference to this."
+            + (
+                ""
+                if agrees
+                else f" Reconciled by {1e6 * _LEAST * used / density:.3g} cm^3 or more, or by a longer task."
+            )
+        ),
+    )

@@ -1,0 +1,245 @@
+"""Do torques, damping, friction and inertia agree with each other and with publications? Equations (1), (2), (10)."""
+
+import math
+from collections.abc import Iterator
+
+from ppafo.errors import UnitError
+from ppafo.model.gas import choked_flow_constant
+from ppafo.model.orifice import isentropic_flow_function
+from ppafo.parameters.audit.evidence import Evidence, Finding, Interval, Severity, Side
+from ppafo.parameters.device import Gas
+from ppafo.units import to_si
+
+# Do damping and dynamic friction agree with the inertia and the printed ratios they were computed from?
+
+_INERTIA = "foot_plate.inertia"
+_DAMPING = "friction.viscous_damping"
+_FRICTION = "friction.dynamic_torque"
+_DECAY = "reported.acceleration_over_velocity"
+_DECAY_INVERSE = "reported.velocity_over_acceleration"
+_DECELERATION = "reported.stopping_deceleration"
+_SHIFTS = (-3, -2, -1, 1, 2, 3)
+
+
+def check_inertia(evidence: Evidence) -> Iterator[Finding]:
+    """Yield an error for each product that does not hold, and a note on one inertia that would make both hold."""
+    inertia = evidence.magnitude(_INERTIA)
+    decay_path, decay = _decay_rate(evidence)
+    if inertia is None:
+        return
+    implied = []
+    for product, rate_path, rate, name in (
+        (_DAMPING, decay_path, decay, "damping"),
+        (_FRICTION, _DECELERATION, evidence.magnitude(_DECELERATION), "dynamic friction"),
+    ):
+        printed = evidence.magnitude(product)
+        if printed is None or rate is None or inertia.times(rate).meets(printed):
+            continue
+        implied.append(printed.over(rate))
+        yield _product(evidence, product, rate_path, name, _middle(rate))
+    if len(implied) > 1:
+        yield from _one_inertia(evidence, implied[0], implied[1], decay_path)
+
+
+def _decay_rate(evidence: Evidence) -> tuple[str, Interval | None]:
+    """Return beta/I [1/s] and its path, from the ratio or its inverse; an inverse in 1/s is the ratio itself."""
+    direct = evidence.magnitude(_DECAY)
+    inverse = evidence.magnitude(_DECAY_INVERSE)
+    if direct is not None or inverse is None:
+        return _DECAY, direct
+    try:
+        to_si(1.0, evidence.parameter_set.numbers[_DECAY_INVERSE].unit, "s")
+    except UnitError:
+        return _DECAY_INVERSE, inverse
+    return _DECAY_INVERSE, Interval(1.0, 1.0).over(inverse)
+
+
+def _middle(interval: Interval) -> float:
+    return 0.5 * (interval.low + interval.high)
+
+
+def _product(evidence: Evidence, product: str, rate_path: str, name: str, rate: float) -> Finding:
+    inertia, printed = evidence.number(_INERTIA) or 0.0, evidence.number(product) or 0.0
+    expected, implied = inertia * rate, printed / rate
+    unit = evidence.declared[product].unit
+    ratio = evidence.values_of(rate_path)[0]
+    return Finding(
+        id=f"{name.replace(' ', '-')}-against-inertia",
+        severity="error",
+        title=f"{name} is not the product of inertia and the printed ratio",
+        values=evidence.values_of(product, _INERTIA, rate_path),
+        sides=(
+            Side(f"printed {name}", printed, unit),
+            Side("inertia times ratio", expected, unit),
+            Side("inertia that would agree", implied, "kg m^2"),
+        ),
+        paragraph=(
+            f"Inertia {evidence.in_set_unit(_INERTIA, inertia)} times {abs(float(ratio.value)):g} {ratio.unit} is "
+            f"{evidence.in_set_unit(product, expected)}, printed is {evidence.in_set_unit(product, printed)}: a factor "
+            f"{printed / expected:.3g}. Reconciled by an inertia of {evidence.in_set_unit(_INERTIA, implied)}, or by "
+            f"{evidence.in_set_unit(product, expected)} as the {name}."
+        ),
+    )
+
+
+def _one_inertia(evidence: Evidence, damping: Interval, friction: Interval, decay_path: str) -> Iterator[Finding]:
+    """Look for one inertia within the printed digits of both products, first the printed one with a moved point."""
+    if not damping.meets(friction):
+        return
+    common = damping.common(friction)
+    printed = evidence.number(_INERTIA) or 0.0
+    shifted = [printed * 10.0**shift for shift in _SHIFTS if common.low <= printed * 10.0**shift <= common.high]
+    best = shifted[0] if shifted else _middle(common)
+    written = evidence.in_set_unit(_INERTIA, best)
+    slip = (
+        f" {written} is the printed {evidence.in_set_unit(_INERTIA, printed)} with the decimal point moved: either the "
+        f"inertia or both products carry the slip, and only a weighing can tell which."
+        if shifted
+        else ""
+    )
+    yield Finding(
+        id="one-inertia-for-both",
+        severity="note",
+        title=f"damping and dynamic friction both agree with an inertia of {written}",
+        values=evidence.values_of(_INERTIA, _DAMPING, _FRICTION, decay_path, _DECELERATION),
+        sides=(
+            Side("printed inertia", printed, "kg m^2"),
+            Side("reconciling inertia", best, "kg m^2"),
+            Side("lowest that agrees", common.low, "kg m^2"),
+            Side("highest that agrees", common.high, "kg m^2"),
+        ),
+        paragraph=(
+            f"Within the printed digits both products hold for any inertia from "
+            f"{evidence.in_set_unit(_INERTIA, common.low)} to {evidence.in_set_unit(_INERTIA, common.high)}.{slip}"
+        ),
+    )
+
+
+# What torque can the supply hold at most, and is it enough? Equation (2).
+
+_TORQUE_CONSTANT = "actuator.torque_constant"
+_DEMAND = "reported.demanded_torque"
+_STATIC = "friction.static_torque"
+_SUPPLIES = ("supply.pressure", "supply.dorsiflexion_pressure", "reported.other_supply_pressure")
+
+
+def check_torque_ceiling(evidence: Evidence) -> Iterator[Finding]:
+    """Yield the ceiling for each supply: a note, a warning below the demand, an error below static friction."""
+    constant = evidence.number(_TORQUE_CONSTANT)
+    supplies = {path: value for path in _SUPPLIES if (value := evidence.number(path)) is not None}
+    if constant is None or constant <= 0.0 or not supplies:
+        return
+    ceilings = {path: constant * (value - evidence.atmosphere()) for path, value in supplies.items()}
+    severity, verdict = _verdict(evidence, max(ceilings.values()), constant)
+    per_psi = constant * to_si(1.0, "psi", "Pa")
+    pressures = {path: evidence.in_set_unit(path, value) for path, value in supplies.items()}
+    held = (f"{ceilings[path]:#.3g} N m at {pressures[path]} ({path})" for path in supplies)
+    yield Finding(
+        id="torque-ceiling",
+        severity=severity,
+        title=f"the supply holds at most {max(ceilings.values()):#.3g} N m",
+        values=evidence.values_of(_TORQUE_CONSTANT, *supplies, _DEMAND, _STATIC),
+        sides=tuple(Side(f"ceiling at {path}", value, "N m") for path, value in ceilings.items()),
+        paragraph=(
+            f"The torque constant is {per_psi:#.3g} N m/psi. With one chamber at supply and the other at atmosphere "
+            f"the vane holds {', '.join(held)}, before friction.{verdict}"
+        ),
+    )
+
+
+def _verdict(evidence: Evidence, ceiling: float, constant: float) -> tuple[Severity, str]:
+    static, demand = evidence.number(_STATIC), evidence.number(_DEMAND)
+    if static is not None and static >= ceiling:
+        needed = static / constant / 1e3
+        return "error", f" Static friction of {static:.3g} N m is more: the vane cannot move below {needed:.4g} kPa_d."
+    if demand is not None and demand > ceiling:
+        needed = demand / constant / 1e3
+        return "warning", (
+            f" The requested {demand:.3g} N m lie above it, so that every valve and controller keeps an error of "
+            f"{demand - ceiling:.3g} N m; reconciled by {needed:.4g} kPa_g of supply, or by requesting less."
+        )
+    return "note", " A reference above that cannot be followed by any valve or controller."
+
+
+# Does the set give the torques that other publications report of the device, at rest and within one push-off?
+
+_ROOM = 0.1
+"""Relative room of a torque that is published with one or two digits."""
+_REACHED = 0.9
+"""Fraction of the torque whose time counts: the rest comes ever more slowly."""
+_PUSH_OFF = 0.2
+"""Time [s] of push-off: from 42 to 61 % of the built-in gait's stride of 1.04 s."""
+_TOE_OFF = math.radians(110.0)
+"""Angle [rad] that the vane has reached by then: 20 deg of plantarflexion."""
+_PARTS = 200
+
+
+def check_published_torque(evidence: Evidence) -> Iterator[Finding]:
+    """Yield for each published torque whether the pressure holds it, and for that of walking whether it comes in time.
+
+    Notes where it does, warnings where not; silent without published torques.
+    """
+    for name in ("rated", "walking"):
+        paths = f"reported.{name}_torque", f"reported.{name}_torque_pressure"
+        found = evidence.numbers(_TORQUE_CONSTANT, *paths)
+        if found is None or min(found) <= 0.0 or found[2] <= evidence.atmosphere():
+            continue
+        yield _at_rest(evidence, name, paths, found)
+        if name == "walking":
+            yield from _while_walking(evidence, found[1], found[2])
+
+
+def _at_rest(evidence: Evidence, name: str, paths: tuple[str, str], found: tuple[float, ...]) -> Finding:
+    constant, torque, pressure = found
+    held = constant * (pressure - evidence.atmosphere())
+    agrees = abs(held / torque - 1.0) <= _ROOM
+    return Finding(
+        id=f"{name}-torque",
+        severity="note" if agrees else "warning",
+        title=f"the published {name} torque {'agrees' if agrees else 'does not agree'} with the torque constant",
+        values=evidence.values_of(_TORQUE_CONSTANT, *paths),
+        sides=(Side("torque constant times pressure", held, "N m"), Side("published", torque, "N m")),
+        paragraph=(
+            f"At {evidence.in_set_unit(paths[1], pressure)} the vane holds {held:.3g} N m, published are {torque:.3g} "
+            "N m. This speaks of the torque constant alone: a vane at rest has any volume."
+        ),
+    )
+
+
+def _while_walking(evidence: Evidence, torque: float, pressure: float) -> Iterator[Finding]:
+    """Yield for each valve how long chamber 1, as large as it is at toe-off, needs for the torque."""
+    gas, volume = evidence.gas(), evidence.chamber_1_volume(_TOE_OFF)
+    constant, atmosphere = evidence.number(_TORQUE_CONSTANT) or 0.0, evidence.atmosphere()
+    target = atmosphere + _REACHED * min(torque / constant, pressure - atmosphere)
+    for valve in evidence.parameter_set.valve_kinds:
+        sizes = f"valves.{valve}.area", f"valves.{valve}.discharge_coefficient"
+        found = evidence.numbers(*sizes)
+        if gas is None or volume is None or volume <= 0.0 or found is None or min(found) <= 0.0:
+            continue
+        time = _filling_time(gas, volume, found[0] * found[1], (atmosphere, target, pressure))
+        severity: Severity = "note" if time <= _PUSH_OFF else "warning"
+        yield Finding(
+            id=f"walking-torque-in-time-{valve}",
+            severity=severity,
+            title=f"valve '{valve}' fills chamber 1 {'within' if time <= _PUSH_OFF else 'too slowly for'} a push-off",
+            values=evidence.values_of(
+                "actuator.volume_per_angle", "actuator.dead_volume_1", *sizes, "reported.walking_torque_pressure"
+            ),
+            sides=(Side("time to fill", time, "s"), Side("time of push-off", _PUSH_OFF, "s")),
+            paragraph=(
+                f"At toe-off chamber 1 has {1e6 * volume:.3g} cm^3. Through the open valve '{valve}' "
+                f"{100.0 * _REACHED:.0f} % of the {torque:.3g} N m that were published of walking take "
+                f"{1e3 * time:.0f} ms; push-off lasts about {1e3 * _PUSH_OFF:.0f} ms. The valves of that publication "
+                "may have been others."
+            ),
+        )
+
+
+def _filling_time(gas: Gas, volume: float, area: float, pressures: tuple[float, float, float]) -> float:
+    """Return the time [s] to fill a fixed volume [m^3] through Cd A [m^2]; pressures [Pa]: from, to, supply."""
+    first, last, supply = pressures
+    choked = area * choked_flow_constant(gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature) * supply
+    part = (last - first) / _PARTS
+    middles = (first + (number + 0.5) * part for number in range(_PARTS))
+    paces = (1.0 / isentropic_flow_function(middle / supply, gas.heat_capacity_ratio) for middle in middles)
+    return volume * part * sum(paces) / (gas.specific_gas_constant * gas.temperature * choked)

@@ -1,0 +1,202 @@
+"""Are the values of a set possible: dimensions, ranges, the gas that is named, and what the ideal gas law miscounts?"""
+
+from collections.abc import Iterator
+
+from ppafo.constants import UNIVERSAL_GAS_CONSTANT
+from ppafo.errors import UnitError
+from ppafo.model.declaration import Quantity
+from ppafo.model.gas import SPECIES
+from ppafo.parameters.audit.evidence import Evidence, Finding, Side
+from ppafo.parameters.declaration import is_within
+from ppafo.parameters.parameter_set import entry_in_si, number_in_si, number_text
+from ppafo.units import to_si
+
+# Does every value have the dimension that its equation needs?
+
+_NEEDS_PLAIN = "a plain number"
+
+
+def check_dimensions(evidence: Evidence) -> Iterator[Finding]:
+    """Yield one finding for values of a foreign dimension, and one for each whose unit is that of its inverse."""
+    refused = dict(_refusals(evidence))
+    inverted = [path for path in refused if _fits_inverse(evidence, path)]
+    for path in inverted:
+        yield _upside_down(evidence, path)
+    foreign = [path for path in refused if path not in inverted]
+    if foreign:
+        yield _foreign(evidence, foreign)
+
+
+def _refusals(evidence: Evidence) -> Iterator[tuple[str, str]]:
+    for path, entry in evidence.parameter_set.numbers.items():
+        try:
+            entry_in_si(entry, evidence.declared[path], evidence.atmosphere())
+        except UnitError as error:
+            yield path, str(error)
+
+
+def _fits_inverse(evidence: Evidence, path: str) -> bool:
+    entry = evidence.parameter_set.numbers[path]
+    try:
+        return to_si(entry.value, entry.unit, _inverse_unit(evidence.declared[path].unit)) != 0.0
+    except UnitError:
+        return False
+
+
+def _inverse_unit(unit: str) -> str:
+    return f"1/({unit})" if " " in unit or "/" in unit else f"1/{unit}"
+
+
+def _upside_down(evidence: Evidence, path: str) -> Finding:
+    entry, quantity = evidence.parameter_set.numbers[path], evidence.declared[path]
+    inverse_unit = _inverse_unit(quantity.unit)
+    value = to_si(entry.value, entry.unit, inverse_unit)
+    name = path.rpartition(".")[2].replace("_", "-")
+    return Finding(
+        id=f"{name}-upside-down",
+        severity="error",
+        title=f"{path} is upside down: its unit belongs to the inverse",
+        values=evidence.values_of(path),
+        sides=(Side("as printed", value, inverse_unit), Side("taken literally", 1.0 / value, quantity.unit)),
+        paragraph=(
+            f"{path} = {number_text(entry)} is meant as: {quantity.summary}. That has the unit "
+            f"{quantity.unit}; the printed "
+            f"unit {entry.unit} is the one of its inverse. Reconciled by turning the ratio over and keeping the "
+            f"number: taken literally it would be {1.0 / value:.3g} {quantity.unit}."
+        ),
+    )
+
+
+def _foreign(evidence: Evidence, paths: list[str]) -> Finding:
+    described = "; ".join(_mismatch(evidence, path) for path in paths)
+    return Finding(
+        id="dimensions",
+        severity="error",
+        title="values whose unit does not fit their equation",
+        values=evidence.values_of(*paths),
+        sides=tuple(Side(path, evidence.number(path) or 0.0, "as given, base units") for path in paths),
+        paragraph=(
+            f"{described}. Reconciled by giving the same number in the unit that is needed, if only the unit was "
+            f"misprinted; the other checks use the number as it stands."
+        ),
+    )
+
+
+def _mismatch(evidence: Evidence, path: str) -> str:
+    needed = evidence.declared[path].unit or _NEEDS_PLAIN
+    entry = evidence.parameter_set.numbers[path]
+    return f"{path} = {number_text(entry)}, where {needed} is needed ({evidence.declared[path].summary})"
+
+
+# Is every value within the limits of its declaration, which any device keeps?
+
+
+def check_ranges(evidence: Evidence) -> Iterator[Finding]:
+    """Yield an error for each value that no device can have."""
+    for path, entry in evidence.parameter_set.numbers.items():
+        quantity, value = evidence.declared[path], number_in_si(evidence.parameter_set, path)
+        if value is None or is_within(value, quantity):
+            continue
+        yield Finding(
+            id=f"range-of-{path.replace('.', '-').replace('_', '-')}",
+            severity="error",
+            title=f"{path} is out of range",
+            values=evidence.values_of(path),
+            sides=(Side("in the set", value, quantity.unit), *_limits(quantity)),
+            paragraph=(
+                f"{path} = {number_text(entry)}: {quantity.summary} must lie between {quantity.minimum:g} and "
+                f"{quantity.maximum:g} {quantity.unit}".rstrip()
+                + ". Reconciled by a value in that range."
+            ),
+        )
+
+
+def _limits(quantity: Quantity) -> tuple[Side, Side]:
+    return Side("lower limit", quantity.minimum, quantity.unit), Side("upper limit", quantity.maximum, quantity.unit)
+
+
+# Do molar mass and heat capacity ratio belong to the gas that the set names?
+
+_TOLERANCE = 0.02
+
+
+def check_gas_data(evidence: Evidence) -> Iterator[Finding]:
+    """Yield an error for each gas constant that is more than 2 % off the named gas."""
+    name = evidence.text("gas.species")
+    if name is None:
+        return
+    species = SPECIES.get(name)
+    if species is None:
+        yield _unknown(evidence, name)
+        return
+    tabulated = {"gas.molar_mass": species.molar_mass, "gas.heat_capacity_ratio": species.heat_capacity_ratio}
+    for path, expected in tabulated.items():
+        value = evidence.number(path)
+        if value is not None and abs(value / expected - 1.0) > _TOLERANCE:
+            yield _differs(evidence, path, value, expected, species.source)
+
+
+def _unknown(evidence: Evidence, name: str) -> Finding:
+    return Finding(
+        id="gas-species",
+        severity="error",
+        title=f"no data for the gas '{name}'",
+        values=evidence.values_of("gas.species"),
+        sides=(),
+        paragraph=f"The gas '{name}' is not one of {', '.join(SPECIES)}; name one of these.",
+    )
+
+
+def _differs(evidence: Evidence, path: str, value: float, expected: float, source: str) -> Finding:
+    unit = evidence.declared[path].unit
+    return Finding(
+        id=path.replace(".", "-").replace("_", "-"),
+        severity="error",
+        title=f"{path} is not that of the named gas",
+        values=evidence.values_of("gas.species", path),
+        sides=(Side("in the set", value, unit), Side("of the gas", expected, unit)),
+        paragraph=(
+            f"{path} is {evidence.in_set_unit(path, value)}, but {evidence.text('gas.species')} has "
+            f"{evidence.in_set_unit(path, expected)} ({source}). Reconciled by that value or by naming the gas in use."
+        ),
+    )
+
+
+# How much gas does the ideal gas law miscount at supply pressure? Equation (3).
+
+SECOND_VIRIAL_COEFFICIENT = {"CO2": -123e-6, "N2": -4.5e-6, "air": -7.5e-6, "He": 11.8e-6}
+"""m^3/mol at 298 K; J. H. Dymond and E. B. Smith, The Virial Coefficients of Pure Gases and Mixtures, 1980."""
+
+_TABULATED_TEMPERATURE = 298.0
+_TEMPERATURE_ROOM = 20.0
+_WORTH_A_WARNING = 0.05
+_SUPPLY = "supply.pressure"
+
+
+def check_ideal_gas(evidence: Evidence) -> Iterator[Finding]:
+    """Yield a note on the error of the ideal gas law at supply pressure, a warning where it exceeds 5 %."""
+    gas, pressure = evidence.gas(), evidence.number(_SUPPLY)
+    virial = SECOND_VIRIAL_COEFFICIENT.get(evidence.text("gas.species") or "")
+    if gas is None or pressure is None or virial is None:
+        return
+    if abs(gas.temperature - _TABULATED_TEMPERATURE) > _TEMPERATURE_ROOM:
+        return
+    compressibility = 1.0 + virial * pressure / (UNIVERSAL_GAS_CONSTANT * gas.temperature)
+    if compressibility <= 0.0:
+        return
+    error = 1.0 - 1.0 / compressibility
+    counts = "under-counts" if error < 0.0 else "over-counts"
+    yield Finding(
+        id="ideal-gas",
+        severity="warning" if abs(error) > _WORTH_A_WARNING else "note",
+        title=f"the ideal gas law {counts} {gas.species} by {100.0 * abs(error):.2g} % at supply pressure",
+        values=evidence.values_of("gas.species", "gas.temperature", _SUPPLY),
+        sides=(Side("real-gas factor, ideal", 1.0, ""), Side("real-gas factor, real", compressibility, "")),
+        paragraph=(
+            f"With the second virial coefficient {1e6 * virial:.3g} cm^3/mol the real-gas factor at "
+            f"{evidence.in_set_unit(_SUPPLY, pressure)} is {compressibility:.4f}: the ideal gas law "
+            f"{counts} the mass in a "
+            f"full chamber by {100.0 * abs(error):.2g} %. Reconciled by a real-gas factor in equation (3), where gas "
+            f"use matters to that precision."
+        ),
+    )
