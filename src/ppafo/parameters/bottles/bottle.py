@@ -1,6 +1,6 @@
 """Bottles of gas: their files, with the fluids in them, and bottles of the catalogue of parts.
 
-Fluids are property tables by name, made from CoolProp. A catalogue of parts knows the gas in a bottle and its empty mass.
+Fluids are property tables by name, made from CoolProp. A catalogue of parts knows the gas in a bottle and its mass.
 The bottle of the paper, filled to the same density, stands in for the rest: volume with the content, heat of the wall
 with the mass, surfaces with its two thirds power.
 """
