@@ -22,7 +22,7 @@ FORMATS: dict[str, str] = {
     "gait": "ppafo.gait.document",
     "gait-map": "ppafo.gait.recorded.mapping",
     "bottle": "ppafo.parameters.bottles.bottle",
-    "publication": "ppafo.questions.reproduce.publication",
+    "publication": "ppafo.parameters.publications.publication",
 }
 """Each file format and the module whose ``json_schema()`` describes it. To add one: one line here."""
 

@@ -33,6 +33,7 @@ SYNTHETIC = {
     "step_rms_pressure_1",
     "step_rms_pressure_2",
     "step_rms_pressure_difference",
+    "step_error_correlation",
 }
 
 
@@ -72,7 +73,8 @@ def test_without_the_rig_what_needs_a_measurement_has_no_value_but_a_reason(monk
     monkeypatch.setitem(sys.modules, "sksundae.cvode", None)
     bare = reproduce(completions=1000)
     open_claims = [claim for claim in bare.claims if claim.verdict == "not_testable"]
-    assert {claim.id for claim in open_claims} == SYNTHETIC
+    assert {claim.id for claim in open_claims} == SYNTHETIC | {"large_and_heavy"}
+    open_claims = [claim for claim in open_claims if claim.id in SYNTHETIC]
     assert all(claim.value is None and claim.note.startswith("Needs") for claim in open_claims)
     assert all("pip install 'ppafo[reference]'" in claim.note for claim in open_claims)
     assert not any(claim.is_synthetic for claim in bare.claims)
@@ -93,9 +95,9 @@ def test_claims_shown_on_synthetic_data_are_counted_apart_from_those_that_are_re
     reproduction: Reproduction,
 ) -> None:
     counts = verdict_counts(reproduction.claims)
-    assert (counts["shown_on_synthetic"], counts["reproduced_with_assumptions"]) == (7, 4)
+    assert (counts["shown_on_synthetic"], counts["reproduced_with_assumptions"]) == (7, 5)
     assert reproduction.to_dict()["counts"] == counts
-    assert "4 reproduced with assumptions, 7 shown on synthetic data" in count_sentence(reproduction.claims)
+    assert "5 reproduced with assumptions, 7 shown on synthetic data" in count_sentence(reproduction.claims)
     claim = next(claim for claim in reproduction.claims if claim.is_synthetic)
     with pytest.raises(ValueError, match="does not match synthetic"):
         dataclasses.replace(claim, verdict="reproduced_with_assumptions")

@@ -177,9 +177,16 @@ class Evidence:
 
 def printed_half_width(entry: Entry) -> float:
     """Return half a unit of the last printed digit, or the stated uncertainty, in the entry's unit."""
-    if entry.uncertainty is not None:
-        return entry.uncertainty
-    exponent = Decimal(repr(entry.value)).normalize().as_tuple().exponent
+    return _half_digit(entry.value) if entry.uncertainty is None else entry.uncertainty
+
+
+def digits(value: float) -> Interval:
+    """Return the range that the digits of a printed positive number leave open."""
+    return Interval(value - _half_digit(value), value + _half_digit(value))
+
+
+def _half_digit(value: float) -> float:
+    exponent = Decimal(repr(value)).normalize().as_tuple().exponent
     return 0.5 * 10.0 ** min(int(exponent), 0)
 
 

@@ -116,17 +116,23 @@ def sampled_bound(
 
     ``commands`` are those that a control may choose from. SimulationError for a scenario that it cannot do.
     """
-    problem = sampled_problem(scenario)
-    if problem:
-        raise SimulationError(f"{scenario.name}: no bound for a sampled pair of valves: {problem}")
-    task = _task(replace(scenario, control=Control(PYTHON_CONTROLLER, {}, scenario.control.period)), commands)
+    task = _task(scenario, commands)
     progress(Progress("bound of the sampled pair: best decisions"))
     found, decisions = _best_decisions(task)
     progress(Progress("bound of the sampled pair: certificate"))
     return SampledBound(found, _certified(task, found), decisions)
 
 
+def best_decisions(scenario: Scenario, commands: Sequence[float] = COMMANDS) -> tuple[float, tuple[float, ...]]:
+    """The RMS error [N m] and commands of the best run that was found, without the certificate, which takes as long."""
+    return _best_decisions(_task(scenario, commands))
+
+
 def _task(scenario: Scenario, commands: Sequence[float]) -> _Task:
+    problem = sampled_problem(scenario)
+    if problem:
+        raise SimulationError(f"{scenario.name}: no bound for a sampled pair of valves: {problem}")
+    scenario = replace(scenario, control=Control(PYTHON_CONTROLLER, {}, scenario.control.period))
     run = plan_run(scenario)
     batch = batch_of(run)
     count, rows = batch.clock.step_count, row_numbers(batch.program.state_rows())

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import metric_level
-from ppafo.answers.writing import format_printed_quantity, inline_figure, quantity, render_page, sentence
+from ppafo.answers.writing import inline_figure, quantity, render_page, sentence
 from ppafo.identification.bench.result import synthetic_figure_3
 from ppafo.identification.estimate import Estimate
 from ppafo.live.workbench import live_part
@@ -204,7 +204,7 @@ def _claim_row(claim: Claim) -> dict[str, Any]:
         "id": claim.id,
         "statement": claim.statement,
         "source": claim.source,
-        "paper": format_printed_quantity(claim.paper, claim.unit),
+        "paper": claim.published,
         "ours": quantity(claim.value, claim.unit),
         "verdict": claim.verdict,
         "word": claim.verdict_words,
@@ -301,7 +301,7 @@ def _estimate_text(printed: Printed, path: str, estimate: Estimate) -> str:
 
 def _error_row(claim: Claim) -> tuple[str, str, str, str]:
     name = claim.statement.rpartition(" of the ")[2].rstrip(".")
-    return name, quantity(claim.paper, claim.unit, 2), quantity(claim.value, claim.unit, 2), claim.verdict_words
+    return name, claim.published, quantity(claim.value, claim.unit, 2), claim.verdict_words
 
 
 IDENTIFICATION_FIGURE = "figure-3-identification"
@@ -397,11 +397,11 @@ def _agrees(low: float | None, high: float | None, unit: str) -> str | None:
     return f"at least {low:g} {unit}".rstrip() if high is None else f"at most {high:g} {unit}".rstrip()
 
 
-def _paper_rows(reproduction: Reproduction) -> tuple[tuple[str, str, str | None, str], ...]:
+def _paper_rows(reproduction: Reproduction) -> tuple[tuple[str | None, ...], ...]:
     return tuple(
         (
             claim.id,
-            format_printed_quantity(claim.paper, claim.unit),
+            claim.published or None,
             None if claim.value is None else quantity(claim.value, claim.unit),
             claim.verdict_words,
         )
@@ -488,6 +488,6 @@ def _torque_figure(reproduction: Reproduction) -> "Drawing":
         reproduction.solenoid.recording,
         reproduction.proportional.recording,
         holding_torque(reproduction.solenoid),
-        (stated["co2_solenoid"], stated["co2_proportional"]),
+        (stated["co2_solenoid"] or 0.0, stated["co2_proportional"] or 0.0),
         None if isinstance(evidence, NoEvidence) else (evidence.solenoid, evidence.proportional),
     )

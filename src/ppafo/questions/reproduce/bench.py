@@ -29,10 +29,11 @@ from ppafo.identification.estimate import Estimate
 from ppafo.identification.source import Source
 from ppafo.parameters import ParameterSet, load_device, load_parameter_set
 from ppafo.parameters import apply_overrides as apply_to_set
-from ppafo.parameters.audit.evidence import Interval
+from ppafo.parameters.audit.evidence import Interval, digits
 from ppafo.parameters.overrides import SOURCE as OVERRIDE
 from ppafo.parameters.parameter_set import Entry, number_in_si, number_text
-from ppafo.questions.reproduce.claim import Claim, Printed, Verdict
+from ppafo.parameters.publications.publication import paper_entries
+from ppafo.questions.reproduce.claim import PRINTED_DIGITS, Claim, Printed, Verdict, stated_claim
 from ppafo.rig import record
 from ppafo.signals import Recording
 from ppafo.simulation.building import apply_overrides
@@ -240,7 +241,6 @@ def synthetic_evidence(
 
 ACCEPTABLE = 0.10
 """Fraction of the full range [-] that the paper calls an acceptable RMS error."""
-_VALIDATION = "section 'PPAFO Model Validation'"
 _NO_CURVES = "Needs the measured curves of figure 7; only a picture of them is published."
 _ONLY_THE_PROCEDURE = "The measurement is synthetic: it shows that the procedure works, not that the paper's device"
 
@@ -265,9 +265,6 @@ class _StepError:
     """
 
     id: str
-    quantity: str
-    paper: float
-    unit: str
     full_range: float
     channel: str
     scale: float
@@ -300,18 +297,10 @@ _PARAMETERS = (
     ),
 )
 _STEP_ERRORS = (
-    _StepError("step_rms_position", "vane angle", 2.1, "deg", 110.0, "angle", math.pi / 180.0),
-    _StepError("step_rms_pressure_1", "pressure in chamber 1", 3.7, "psi", 55.0, "pressure_1", PASCALS_PER_PSI),
-    _StepError("step_rms_pressure_2", "pressure in chamber 2", 1.4, "psi", 55.0, "pressure_2", PASCALS_PER_PSI),
-    _StepError(
-        "step_rms_pressure_difference",
-        "pressure difference",
-        4.8,
-        "psi",
-        110.0,
-        "pressure_difference",
-        PASCALS_PER_PSI,
-    ),
+    _StepError("step_rms_position", 110.0, "angle", math.pi / 180.0),
+    _StepError("step_rms_pressure_1", 55.0, "pressure_1", PASCALS_PER_PSI),
+    _StepError("step_rms_pressure_2", 55.0, "pressure_2", PASCALS_PER_PSI),
+    _StepError("step_rms_pressure_difference", 110.0, "pressure_difference", PASCALS_PER_PSI),
 )
 
 
@@ -339,28 +328,18 @@ def measured_claims(
                 for item in _PARAMETERS
             ),
             *(
-                Claim(
-                    id=item.id,
-                    statement=_step_statement(item),
-                    paper=item.paper,
-                    value=None,
-                    unit=item.unit,
-                    verdict="not_testable",
-                    source=_VALIDATION,
-                    note=f"{_NO_CURVES} {no_rig}",
-                )
-                for item in _STEP_ERRORS
+                stated_claim(identifier, None, "not_testable", f"{_NO_CURVES} {no_rig}")
+                for identifier in (*(item.id for item in _STEP_ERRORS), "step_error_correlation")
             ),
+            *_step_percentages(),
         ]
     rests_on = tuple(value.sentence() for value in assumed)
     return [
         *(_identification_claim(printed, item, evidence.bench) for item in _PARAMETERS),
         *(_step_error(item, evidence.step, rests_on) for item in _STEP_ERRORS),
+        *_step_percentages(),
+        _error_correlation(evidence.step),
     ]
-
-
-def _step_statement(item: _StepError) -> str:
-    return f"Step response, simulated against measured: RMS error of the {item.quantity}."
 
 
 def _identification_claim(printed: Printed, item: _Parameter, bench: BenchStudy) -> Claim:
@@ -386,6 +365,8 @@ def _identification_claim(printed: Printed, item: _Parameter, bench: BenchStudy)
         note=note,
         assumptions=(_rig(item.preset),),
         is_synthetic=True,
+        left_open=(low, high),
+        open_by="the interval of the identification",
     )
 
 
@@ -393,25 +374,22 @@ def _step_error(item: _StepError, agreement: RecordingAgreement, rests_on: tuple
     """Judge an RMS error by the range that the paper calls acceptable."""
     channel = next(channel for channel in agreement.channels if channel.channel == item.channel)
     value, plain = channel.rms / item.scale, channel.rms_unaligned / item.scale
+    unit = paper_entries()[item.id].unit
     fraction, plain_fraction = value / item.full_range, plain / item.full_range
     holds = fraction <= ACCEPTABLE
     delay = f"{1e3 * agreement.delay.correction:.1f} ms"
     note = (
         f"{_ONLY_THE_PROCEDURE} behaved so. Model against the virtual rig (preset {STEP_PRESET}): {fraction:.1%} of "
-        f"the full range of {item.full_range:g} {item.unit}, {'within' if holds else 'beyond'} the {ACCEPTABLE:.0%} "
+        f"the full range of {item.full_range:g} {unit}, {'within' if holds else 'beyond'} the {ACCEPTABLE:.0%} "
         f"that the paper calls acceptable. The rig's delay of {delay} was removed; with it the error is {plain:.2g} "
-        f"{item.unit}, {plain_fraction:.1%}{'' if plain_fraction <= ACCEPTABLE else ', which is beyond'}."
+        f"{unit}, {plain_fraction:.1%}{'' if plain_fraction <= ACCEPTABLE else ', which is beyond'}."
     )
-    return Claim(
-        id=item.id,
-        statement=_step_statement(item),
-        paper=item.paper,
-        value=value,
-        unit=item.unit,
-        verdict=_verdict(holds),
-        source=_VALIDATION,
-        note=note,
-        assumptions=(
+    return stated_claim(
+        item.id,
+        value,
+        _verdict(holds),
+        note,
+        (
             _rig(STEP_PRESET),
             f"the delay of {delay} is removed: the paper does not state whether it shifted its curves",
             f"the error is taken over {agreement.measured.duration:g} s: the paper does not state over which time",
@@ -419,6 +397,37 @@ def _step_error(item: _StepError, agreement: RecordingAgreement, rests_on: tuple
         ),
         is_synthetic=True,
     )
+
+
+def _step_percentages() -> list[Claim]:
+    """Return the printed percentages beside the printed errors over the printed ranges."""
+    claims = []
+    for item in _STEP_ERRORS:
+        identifier = item.id.replace("step_rms", "step_percent")
+        error, percent = (paper_entries()[name].published or 0.0 for name in (item.id, identifier))
+        value = 100.0 * error / item.full_range
+        low, high = (100.0 * end / item.full_range for end in digits(error))
+        holds = Interval(low, high).meets(digits(percent))
+        note = f"{error:g} over {item.full_range:g} is {value:.2f} %."
+        claim = stated_claim(identifier, value, "reproduced" if holds else "contradicted", note)
+        claims.append(replace(claim, left_open=(low, high), open_by=PRINTED_DIGITS))
+    return claims
+
+
+def _error_correlation(agreement: RecordingAgreement) -> Claim:
+    """Return the correlation of the errors of both pressures on the rig, by the same arithmetic as the paper's."""
+    entries, rms = paper_entries(), {channel.channel: channel.rms for channel in agreement.channels}
+    first, second, difference = (rms[name] for name in ("pressure_1", "pressure_2", "pressure_difference"))
+    value = (first**2 + second**2 - difference**2) / (2.0 * first * second)
+    entry = entries["step_error_correlation"]
+    holds = (entry.at_least or -1.0) <= value <= (entry.at_most or 1.0)
+    printed = [entries[f"step_rms_pressure_{number}"].published or 0.0 for number in (1, 2)]
+    ours, theirs = ("larger" if one > other else "smaller" for one, other in ((first, second), printed))
+    note = (
+        f"{entry.note} {_ONLY_THE_PROCEDURE} has such errors: the rig's error in chamber 1 is {ours} than that in "
+        f"chamber 2, the paper's is {theirs}."
+    )
+    return stated_claim(entry.id, value, _verdict(holds), note, (_rig(STEP_PRESET),), is_synthetic=True)
 
 
 def _verdict(holds: bool) -> Verdict:

@@ -1,9 +1,10 @@
 """Claims of the paper beside our numbers, the paper's numbers as printed, and the claims that are arithmetic."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+from ppafo.answers.writing import format_printed_quantity, quantity
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import ParameterError
 from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio, subsonic_flow_constant
@@ -11,6 +12,7 @@ from ppafo.model.orifice import isentropic_flow_function
 from ppafo.parameters import ParameterSet, load_parameter_set
 from ppafo.parameters.audit.evidence import Evidence, Interval
 from ppafo.parameters.device import Gas
+from ppafo.parameters.publications.publication import paper_entries
 
 Verdict = Literal["reproduced", "reproduced_with_assumptions", "shown_on_synthetic", "contradicted", "not_testable"]
 VERDICTS: dict[Verdict, str] = {
@@ -27,6 +29,10 @@ VERDICTS: dict[Verdict, str] = {
 class Claim:
     """A number that the paper states and ours, both in ``unit``; ``value`` None where there is nothing to compute.
 
+    ``paper`` is None where the paper says it in ``words``, which are empty where only ``own`` arithmetic gives it.
+    ``left_open`` are the ends of what is open about our number, ``open_by`` says by what; ``is_chosen`` marks that our
+    assumptions were chosen for this very number: ours is nearer to it than to 95 % of what they could give.
+
     ``source`` is where the paper says it, ``assumptions`` what our number rests on beside the paper, ``note`` why the
     verdict is what it is. A claim that has to hold for this package to be sound has a window that it must fall into.
     ``is_synthetic`` says that our number comes from a measurement on the virtual rig, with the paper's values planted.
@@ -35,7 +41,7 @@ class Claim:
 
     id: str
     statement: str
-    paper: float
+    paper: float | None
     value: float | None
     unit: str
     verdict: Verdict
@@ -44,6 +50,11 @@ class Claim:
     assumptions: tuple[str, ...] = ()
     window: tuple[float, float] | None = None
     is_synthetic: bool = False
+    words: str = ""
+    own: str = ""
+    left_open: tuple[float, float] | None = None
+    open_by: str = ""
+    is_chosen: bool = False
 
     def __post_init__(self) -> None:
         if (self.is_synthetic and self.verdict.startswith("reproduced")) or (
@@ -59,6 +70,20 @@ class Claim:
         return words if is_plain else f"{words}, synthetic"
 
     @property
+    def published(self) -> str:
+        """What the paper says, as it is shown; empty where only own arithmetic gives it."""
+        return self.words if self.paper is None else format_printed_quantity(self.paper, self.unit)
+
+    @property
+    def open_range(self) -> str:
+        """What is open about our number, as it is shown, with the mark of a number whose assumptions were chosen."""
+        if self.left_open is None:
+            return ""
+        low, high = (quantity(end, "-", 3) for end in self.left_open)
+        unit = "" if self.unit == "-" else f" {self.unit}"
+        return f"{low} to {high}{unit}{' *' if self.is_chosen else ''}"
+
+    @property
     def is_missed(self) -> bool:
         """True where the claim has a window and our number is not in it."""
         if self.window is None:
@@ -71,7 +96,12 @@ class Claim:
             "id": self.id,
             "statement": self.statement,
             "paper": self.paper,
+            "words": self.words,
+            "own": self.own,
             "value": self.value,
+            "left_open": None if self.left_open is None else list(self.left_open),
+            "open_by": self.open_by,
+            "chosen_for_this": self.is_chosen,
             "unit": self.unit,
             "verdict": self.verdict,
             "synthetic": self.is_synthetic,
@@ -96,6 +126,40 @@ class Observation:
     difference: str = ""
 
 
+def stated_claim(
+    identifier: str,
+    value: float | None,
+    verdict: Verdict,
+    note: str,
+    assumptions: tuple[str, ...] = (),
+    window: tuple[float, float] | None = None,
+    is_synthetic: bool = False,
+) -> Claim:
+    """Return the claim of an entry of the paper's file with our number and the verdict on it."""
+    entry = paper_entries()[identifier]
+    return Claim(
+        id=identifier,
+        statement=entry.statement,
+        paper=entry.published,
+        value=value,
+        unit=entry.unit or "-",
+        verdict=verdict,
+        source=entry.where,
+        note=note,
+        assumptions=assumptions,
+        window=window,
+        is_synthetic=is_synthetic,
+        words=entry.words,
+        own=entry.own,
+    )
+
+
+def observation(identifier: str, holds: bool, evidence: str, difference: str = "") -> Observation:
+    """Return what an entry of the paper's file tells, with whether the recording shows it."""
+    entry = paper_entries()[identifier]
+    return Observation(identifier, entry.statement, holds, evidence, entry.where, difference)
+
+
 def verdict_counts(claims: Sequence[Claim]) -> dict[Verdict, int]:
     """Return how many claims have each verdict, in the order of ``VERDICTS``."""
     return {verdict: sum(claim.verdict == verdict for claim in claims) for verdict in VERDICTS}
@@ -113,6 +177,7 @@ def count_words(verdicts: Sequence[Verdict]) -> str:
 
 
 PRINTED_SET = "ppafo2011-printed"
+PRINTED_DIGITS = "the printed digits"
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,7 +303,8 @@ def _flow_constants(printed: Printed) -> list[Claim]:
 def _product(printed: Printed, identifier: str, path: str, rate_path: str, rate_name: str) -> Claim:
     """Compare a printed product with inertia times the printed rate; a rate in 1/s is one, whatever it is called."""
     name = identifier.replace("_", " ")
-    holds = printed.range(_INERTIA).times(printed.range(rate_path)).meets(printed.range(path))
+    product = printed.range(_INERTIA).times(printed.range(rate_path))
+    holds = product.meets(printed.range(path))
     value = printed.in_printed_unit(path, printed.in_si(_INERTIA) * abs(printed.in_si(rate_path)))
     rate = f"{abs(printed.number(rate_path)):g} {printed.unit(rate_path)}"
     implied = printed.in_printed_unit(_INERTIA, printed.in_si(path) / abs(printed.in_si(rate_path)))
@@ -249,7 +315,9 @@ def _product(printed: Printed, identifier: str, path: str, rate_path: str, rate_
         else f"The product is {value:.3g} {printed.unit(path)}; the printed {printed.quotation(path)} would need an "
         f"inertia of {implied:.2g} {printed.unit(_INERTIA)}. The measured {rate_name} itself cannot be tested here."
     )
-    return _claim(printed, identifier, statement, path, value, holds, note)
+    claim = _claim(printed, identifier, statement, path, value, holds, note)
+    low, high = (printed.in_printed_unit(path, end) for end in product)
+    return replace(claim, left_open=(low, high), open_by=PRINTED_DIGITS)
 
 
 def _coefficient(printed: Printed, valve: str) -> Claim:
@@ -273,9 +341,10 @@ def _coefficient(printed: Printed, valve: str) -> Claim:
         f"supply.atmospheric_pressure = {STANDARD_ATMOSPHERE:g} Pa_a: not printed; the standard atmosphere",
         "the measured flow is choked or leaves into the atmosphere through one opening of the printed area",
     )
-    return _claim(
+    claim = _claim(
         printed, f"discharge_coefficient_{valve}", statement, coefficient, value, holds, note, assumptions, "-"
     )
+    return replace(claim, left_open=(needed.low, needed.high), open_by=PRINTED_DIGITS)
 
 
 def _flow_per_area(printed: Printed, pressure_path: str) -> float:

@@ -4,20 +4,18 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from importlib import resources
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, Field
 
 from ppafo.answers.writing import format_printed_quantity, quantity
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.models import NAME, STRICT, Text, Texts, make_schema, read_model
-from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ScenarioError, SimulationError, UnitError, first_twice, nearest_name
+from ppafo.documents.toml_text import label
+from ppafo.errors import ScenarioError, SimulationError, UnitError, nearest_name
 from ppafo.parameters import load_device
 from ppafo.parameters.chamber_volumes import PRINTED_VOLUMES, ChamberVolumes, readings
+from ppafo.parameters.publications.publication import FILE, PAPER, ClaimEntry, read_publication
 from ppafo.progress import Progress, Report
 from ppafo.questions.reproduce.claim import Verdict
 from ppafo.questions.timing.answer import WEARERS, rms_of
@@ -178,45 +176,6 @@ COMPUTATIONS: dict[str, Computation] = {
         lambda _: event_reduction("impaired"),
     ),
 }
-FILE = TomlKind(
-    "publication", "publication", resources.files("ppafo.questions.reproduce") / "publications", ScenarioError
-)
-_IDENTIFIER = r"^[a-z][a-z0-9_]*$"
-
-
-class ClaimEntry(BaseModel):
-    """One claim in the file of a publication."""
-
-    model_config = STRICT
-
-    id: str = Field(pattern=_IDENTIFIER, description="name of the claim, unique in the file")
-    statement: Text = Field(description="what is claimed, one sentence")
-    published: float | None = Field(
-        None, allow_inf_nan=False, description="published number in 'unit'; left out where only words are"
-    )
-    unit: str = Field("", description="unit of the published and of our number")
-    words: str = Field("", description="what is published where it is no number, or the range of it")
-    where: Text = Field(description="where it was read")
-    source: str = Field("", description="publication, where it is not that of the file")
-    computation: str = Field("", description="name of a computation: " + ", ".join(COMPUTATIONS))
-    arguments: dict[str, str] = Field(default_factory=dict, description="arguments of the computation, with units")
-    at_least: float | None = Field(None, allow_inf_nan=False, description="lowest value that agrees, in 'unit'")
-    at_most: float | None = Field(None, allow_inf_nan=False, description="highest value that agrees, in 'unit'")
-    assumed: Texts = Field((), description="what our number rests on beside what is published")
-    note: str = Field("", description="why the verdict is what it is")
-    not_testable: str = Field("", description="why nothing is computed, in place of a computation")
-
-
-class PublicationFile(BaseModel):
-    """The file of a publication."""
-
-    model_config = STRICT
-
-    schema_version: Literal[1] = Field(description="version of this layout")
-    name: str = Field(pattern=NAME)
-    title: Text = Field(description="what it is about")
-    citation: Text = Field(description="authors, journal, year, doi where known")
-    claims: list[ClaimEntry] = Field(min_length=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,25 +204,15 @@ class Publication:
     claims: tuple[PublishedClaim, ...]
 
 
-def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a file of a publication."""
-    return make_schema(PublicationFile, "ppafo publication")
-
-
 def load_publication(name_or_path: str | Path) -> Publication:
     """Return a publication of the package by its name, or any other by its file; ScenarioError where it is wrong."""
-    read, file = read_model(FILE, PublicationFile, name_or_path)
-    twice = first_twice(entry.id for entry in read.claims)
-    if twice is not None:
-        raise ScenarioError(f"{file}: claims: '{twice}' is there twice; give each claim a name of its own")
+    read, file = read_publication(name_or_path)
     claims = tuple(_checked(entry, read.citation, file) for entry in read.claims)
     return Publication(read.name, read.title, read.citation, claims)
 
 
 def _checked(entry: ClaimEntry, citation: str, file: str) -> PublishedClaim:
     place = f"{file}: claims.{entry.id}"
-    if entry.published is None and not entry.words:
-        raise ScenarioError(f"{place}: give what is published: a number with its unit, or words")
     source = f"{entry.source or citation}, {entry.where}"
     if bool(entry.computation) == bool(entry.not_testable):
         raise ScenarioError(f"{place}: give either computation or not_testable, which says why there is none")
@@ -323,12 +272,17 @@ def _argument(text: str, unit: str, place: str) -> str | float:
     return value
 
 
-SEED, ALL = "ppafo-2011", "all"
+SEED, ALL = PAPER, "all"
 """The study of the paper that this package is made from, and all studies one after the other."""
 _WORDS = {
-    SEED: "the paper that this package starts from: step response and torque task",
     ALL: "every study, one table",
 }
+
+
+def published_text(entry: ClaimEntry) -> str:
+    """Return what is published as it is shown, with its direction; empty where only own arithmetic is."""
+    number = "" if entry.published is None else format_printed_quantity(entry.published, entry.unit or "-")
+    return f"up to {number}" if number and entry.direction == "maximum" else entry.words or number
 
 
 @dataclass(frozen=True, slots=True)
@@ -343,7 +297,7 @@ class JudgedClaim:
     def published(self) -> str:
         """What is published, as it is shown."""
         entry = self.claim.entry
-        return entry.words or format_printed_quantity(entry.published or 0.0, entry.unit or "-")
+        return published_text(entry)
 
     @property
     def ours(self) -> str:
@@ -364,6 +318,8 @@ class JudgedClaim:
             "statement": entry.statement,
             "paper": entry.published,
             "published": self.published,
+            "direction": entry.direction,
+            "own": entry.own,
             "value": self.value,
             "unit": entry.unit,
             "agrees_from": entry.at_least,
@@ -388,12 +344,12 @@ class Study:
 
 def study_names() -> tuple[str, ...]:
     """Return every name that ``--study`` takes."""
-    return (SEED, *FILE.names(), ALL)
+    return (SEED, *(name for name in FILE.names() if name != SEED), ALL)
 
 
 def list_studies() -> list[dict[str, Any]]:
     """Return name and subject of every study."""
-    words = {name: load_publication(name).title for name in FILE.names()}
+    words = {name: read_publication(name)[0].title for name in FILE.names()}
     return [{"name": name, "title": ({**_WORDS, **words})[name]} for name in study_names()]
 
 
@@ -409,7 +365,7 @@ def check_study(study: str, overrides: Sequence[str]) -> None:
 
 def run_studies(study: str, report: Report) -> tuple[Study, ...]:
     """Return one study, or all but that of the paper, with every claim judged; ScenarioError, SimulationError."""
-    names = FILE.names() if study == ALL else (study,)
+    names = study_names()[1:-1] if study == ALL else (study,)
     return tuple(_run(load_publication(name), report) for name in names)
 
 

@@ -15,6 +15,7 @@ from ppafo.questions.reproduce.bench import (
     values_used_by,
 )
 from ppafo.questions.reproduce.claim import arithmetic_claims, load_printed
+from ppafo.questions.reproduce.law_and_valve import control_claims
 from ppafo.questions.reproduce.publication import ALL, SEED, check_study, run_studies
 from ppafo.questions.reproduce.step_response import Levels, step_events, step_observations
 from ppafo.questions.reproduce.torque_task import torque_task_claims, torque_task_observations
@@ -44,10 +45,20 @@ ORDER = (
     "step_rms_pressure_1",
     "step_rms_pressure_2",
     "step_rms_pressure_difference",
+    "step_percent_position",
+    "step_percent_pressure_1",
+    "step_percent_pressure_2",
+    "step_percent_pressure_difference",
+    "step_error_correlation",
     "torque_rms_improvement",
     "co2_solenoid",
     "co2_proportional",
     "co2_saving",
+    "gains_minimise_error",
+    "dead_zone_amplifies_delay",
+    "limited_by_switching",
+    "beyond_improved_control",
+    "large_and_heavy",
 )
 """Every claim, in the order of the paper."""
 
@@ -110,6 +121,7 @@ def _reproduce_paper(overrides: Sequence[str], report: Report, completions: int 
         *arithmetic_claims(printed),
         *measured_claims(printed, synthetic, values_used_by(assumed, STEP)),
         *torque_task_claims(solenoid, proportional, values_used_by(assumed, SOLENOID, PROPORTIONAL)),
+        *control_claims(solenoid, proportional),
     ]
     events, supply, family = step_events(step.recording), step.scenario.device.supply, None
     levels = Levels(supply.pressure, supply.atmospheric_pressure)

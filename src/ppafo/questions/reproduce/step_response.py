@@ -22,7 +22,7 @@ from ppafo.answers.style import (
     mark_kind,
 )
 from ppafo.constants import PASCALS_PER_PSI
-from ppafo.questions.reproduce.claim import Observation
+from ppafo.questions.reproduce.claim import Observation, observation
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 
@@ -91,13 +91,13 @@ def step_events(recording: Recording, resolution: float = RESOLUTION) -> StepEve
 def step_observations(recording: Recording, levels: Levels, events: StepEvents | None) -> list[Observation]:
     """Return each sentence of the text with whether the recording shows it; none holds where the vane does not move."""
     found = []
-    for identifier, statement, source, judge, beyond in _SAID:
+    for identifier, judge, beyond in _SAID:
         holds, evidence, difference = False, "the vane does not move from rest to rest", ""
         if events is not None:
             step = _Step(recording, levels, events)
             holds, evidence = judge(step)
             difference = "" if beyond is None else beyond(step)
-        found.append(Observation(identifier, statement, holds, evidence, source, difference))
+        found.append(observation(identifier, holds, evidence, difference))
     return found
 
 
@@ -232,61 +232,18 @@ def _builds_up(step: _Step) -> tuple[bool, str]:
     ) < 2.0 * _SAME * step.levels.range, f"from {first:.1f} to {last:.1f} psi"
 
 
-_TEXT = "section 'PPAFO Model Validation'"
 _Judge = Callable[[_Step], tuple[bool, str]]
-_SAID: tuple[tuple[str, str, str, _Judge, Callable[[_Step], str] | None], ...] = (
-    ("vane_turns_through_its_range", "The vane turns from 20 to 130 deg.", "figure 7, panel A", _turns, None),
-    (
-        "pressure_1_rises_until_breakaway",
-        "The pressure in chamber 1 rises until the vane breaks away.",
-        _TEXT,
-        _rises,
-        _fills_early,
-    ),
-    (
-        "pressure_1_falls_in_motion",
-        "While the vane moves, the pressure in chamber 1 falls.",
-        _TEXT,
-        _falls_in_motion,
-        _rises_again,
-    ),
-    (
-        "pressure_1_goes_to_supply",
-        "After the vane has stopped, the pressure in chamber 1 rises to the supply.",
-        _TEXT,
-        _to_supply,
-        None,
-    ),
-    (
-        "pressure_2_falls_from_supply",
-        "The pressure in chamber 2, at first the supply's, begins to fall.",
-        _TEXT,
-        _falls,
-        None,
-    ),
-    (
-        "pressure_2_slows_in_motion",
-        "Its fall slows for a while, as the moving vane compresses chamber 2.",
-        _TEXT,
-        _slows,
-        _more_than_slows,
-    ),
-    (
-        "pressure_2_goes_to_atmosphere",
-        "Then the pressure in chamber 2 goes to the atmosphere.",
-        _TEXT,
-        _to_atmosphere,
-        None,
-    ),
-    (
-        "difference_builds_up",
-        "The pressure difference builds up as the flow switches.",
-        "figure 7, panel B",
-        _builds_up,
-        None,
-    ),
+_SAID: tuple[tuple[str, _Judge, Callable[[_Step], str] | None], ...] = (
+    ("vane_turns_through_its_range", _turns, None),
+    ("pressure_1_rises_until_breakaway", _rises, _fills_early),
+    ("pressure_1_falls_in_motion", _falls_in_motion, _rises_again),
+    ("pressure_1_goes_to_supply", _to_supply, None),
+    ("pressure_2_falls_from_supply", _falls, None),
+    ("pressure_2_slows_in_motion", _slows, _more_than_slows),
+    ("pressure_2_goes_to_atmosphere", _to_atmosphere, None),
+    ("difference_builds_up", _builds_up, None),
 )
-"""What the text says and where, how that is judged, and what says what the recording shows beyond it."""
+"""What the text says, by its entry, how that is judged, and what says what the recording shows beyond it."""
 _SIZE = (7.6, 5.6)
 _MARGINS = Margins(left=0.68, right=0.15, top=0.58, bottom=0.52, row_gap=0.42, column_gap=0.78)
 """Inches."""

@@ -7,8 +7,9 @@ import numpy as np
 
 from ppafo.answers.style import BLACK, BLUE, GREY, VERMILION, WANTED, Margins, figure_of_panels, house_style, mark_kind
 from ppafo.constants import GRAMS_PER_KILOGRAM
+from ppafo.parameters.publications.publication import paper_entries
 from ppafo.questions.reproduce.bench import AssumedValue
-from ppafo.questions.reproduce.claim import Claim, Observation, Verdict
+from ppafo.questions.reproduce.claim import Claim, Observation, Verdict, observation, stated_claim
 from ppafo.signals import Recording
 from ppafo.simulation.simulate import Result
 
@@ -16,11 +17,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_TASK = "section 'Task Assessments'"
 _MEASURED = "The paper measured its number."
 _PERCENT = 100.0
-_FEWEST_OSCILLATIONS = 4
-"""Fewer torque reversals than two to and fro on the ramp are no oscillation but a single overshoot."""
+FEWEST_REVERSALS = paper_entries()["solenoid_oscillates_on_ramp"].at_least or 0.0
 
 
 def torque_task_claims(solenoid: Result, proportional: Result, assumed: Sequence[AssumedValue]) -> list[Claim]:
@@ -38,69 +37,30 @@ def torque_task_claims(solenoid: Result, proportional: Result, assumed: Sequence
         # Where there is nothing to save from, nothing can be said.
         return _PERCENT * (1.0 - new / old) if old > 0.0 else None
 
-    def claim(
-        identifier: str,
-        statement: str,
-        value: float | None,
-        note: str,
-        paper: float,
-        unit: str,
-        window: tuple[float, float],
-    ) -> Claim:
-        low, high = window
+    def claim(identifier: str, value: float | None, note: str) -> Claim:
+        entry = paper_entries()[identifier]
+        assert entry.at_least is not None, f"{identifier} has a window"
+        assert entry.at_most is not None, f"{identifier} has a window"
+        window = entry.at_least, entry.at_most
         verdict: Verdict = "not_testable"
         if value is not None:
-            verdict = "reproduced_with_assumptions" if low <= value <= high else "contradicted"
-        return Claim(
-            id=identifier,
-            statement=statement,
-            paper=paper,
-            value=value,
-            unit=unit,
-            verdict=verdict,
-            source=_TASK,
-            note=f"{note} Accepted from {low:g} to {high:g} {unit}.",
-            assumptions=rests_on,
-            window=window,
-        )
+            verdict = "reproduced_with_assumptions" if window[0] <= value <= window[1] else "contradicted"
+        note = f"{note} Accepted from {window[0]:g} to {window[1]:g} {entry.unit}."
+        return stated_claim(identifier, value, verdict, note, rests_on, window=window)
 
     supplied = f"Simulated: gas taken from the supply over the whole task. {_MEASURED}"
     return [
         claim(
             "torque_rms_improvement",
-            "The proportional valve improves the RMS torque error of the solenoid valves.",
             less_in_percent(error_proportional, error_solenoid),
             f"Simulated: {error_proportional:.3f} against {error_solenoid:.3f} N m over the whole task.",
-            15.0,
-            "%",
-            (12.0, 18.0),
         ),
-        claim(
-            "co2_solenoid",
-            "Gas that the torque task takes with the solenoid valves.",
-            gas_solenoid,
-            supplied,
-            1.1,
-            "g",
-            (1.0, 1.2),
-        ),
-        claim(
-            "co2_proportional",
-            "Gas that the torque task takes with the proportional valve.",
-            gas_proportional,
-            supplied,
-            0.4,
-            "g",
-            (0.36, 0.44),
-        ),
+        claim("co2_solenoid", gas_solenoid, supplied),
+        claim("co2_proportional", gas_proportional, supplied),
         claim(
             "co2_saving",
-            "Gas that the proportional valve saves.",
             less_in_percent(gas_proportional, gas_solenoid),
             f"Simulated: {gas_proportional:.3g} instead of {gas_solenoid:.3g} g. {_MEASURED}",
-            63.0,
-            "%",
-            (60.0, 66.0),
         ),
     ]
 
@@ -130,34 +90,18 @@ def torque_task_observations(solenoid: Result, proportional: Result) -> list[Obs
             f"on the hold {own_on_hold.value:.2f} against {on_hold.value:.2f} N m"
         )
     return [
-        Observation(
+        observation(
             "solenoid_oscillates_on_ramp",
-            "With the solenoid valves the torque oscillates on the ramp.",
-            ramp is not None and ramp >= _FEWEST_OSCILLATIONS,
+            ramp is not None and ramp >= FEWEST_REVERSALS,
             f"{reversals(ramp, 'ramp')} that swing over 5 % of the largest reference",
-            f"{_TASK}, figure 8",
         ),
-        Observation(
-            "solenoid_quiet_on_hold",
-            "The oscillation belongs to the initial ramp: on the hold the solenoid valves are quiet.",
-            hold == 0,
-            reversals(hold, "hold"),
-            f"{_TASK}, figure 8",
-        ),
-        Observation(
+        observation("solenoid_quiet_on_hold", hold == 0, reversals(hold, "hold")),
+        observation(
             "proportional_does_not_oscillate",
-            "With the proportional valve the torque does not oscillate.",
             own_ramp == 0 and own_hold == 0,
             f"{reversals(own_ramp, 'ramp')}, {reversals(own_hold, 'hold')}",
-            f"{_TASK}, figure 8",
         ),
-        Observation(
-            "proportional_tracks_better_on_ramp",
-            "The proportional valve tracks better, particularly during the initial ramp.",
-            tracks_better,
-            errors,
-            "figure 8",
-        ),
+        observation("proportional_tracks_better_on_ramp", tracks_better, errors),
     ]
 
 

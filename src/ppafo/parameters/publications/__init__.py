@@ -1,0 +1,1 @@
+"""What publications state of this device and its kin: one file each, every statement that a simulation could meet."""

@@ -1,0 +1,101 @@
+"""A publication as a file: every number and sentence that a simulation could contradict, and how firmly it is meant.
+
+What a publication says (``published``, ``words``) and what is arithmetic on it (``own``) are kept apart. The file of
+the paper that this package starts from names for each entry the experiment and the observable that it speaks of;
+claims, observations, the inference of unreported settings and the audit read it from there.
+"""
+
+from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Literal
+
+from pydantic import BaseModel, Field
+
+from ppafo.documents.models import NAME, STRICT, Text, Texts, make_schema, read_model
+from ppafo.documents.toml_text import TomlKind
+from ppafo.errors import ScenarioError, first_twice
+
+PAPER = "ppafo-2011"
+"""The publication that this package starts from."""
+FILE = TomlKind("publication", "publication", resources.files("ppafo.parameters.publications") / "files", ScenarioError)
+_IDENTIFIER = r"^[a-z][a-z0-9_]*$"
+
+
+class ClaimEntry(BaseModel):
+    """One statement in the file of a publication."""
+
+    model_config = STRICT
+
+    id: str = Field(pattern=_IDENTIFIER, description="name of the statement, unique in the file")
+    statement: Text = Field(description="what is stated, one sentence")
+    published: float | None = Field(
+        None, allow_inf_nan=False, description="published number in 'unit'; left out where only words are"
+    )
+    unit: str = Field("", description="unit of the published and of our number")
+    words: str = Field("", description="what is published where it is no number, or the range of it")
+    own: str = Field("", description="own arithmetic on published numbers, where nothing is published itself")
+    direction: Literal["equal", "maximum", "less", "more"] = Field(
+        "equal", description="what is stated: a number, a maximum ('up to'), or less or more, which needs a limit"
+    )
+    where: Text = Field(description="where it was read")
+    source: str = Field("", description="publication, where it is not that of the file")
+    computation: str = Field("", description="name of a computation of 'ppafo reproduce'")
+    arguments: dict[str, str] = Field(default_factory=dict, description="arguments of the computation, with units")
+    experiment: str = Field("", description="experiment of the paper that it speaks of")
+    observable: str = Field("", description="what of the experiment it speaks of, by name")
+    at_least: float | None = Field(None, allow_inf_nan=False, description="lowest value that agrees, in 'unit'")
+    at_most: float | None = Field(None, allow_inf_nan=False, description="highest value that agrees, in 'unit'")
+    deviation: float | None = Field(
+        None,
+        ge=0.0,
+        allow_inf_nan=False,
+        description="standard deviation of the observable about the number, or beyond the limits; 0: limits are strict",
+    )
+    likelihood: str = Field("", description="why the deviation is what it is")
+    same_data: Texts = Field((), description="other entries that state the same measurement")
+    assumed: Texts = Field((), description="what our number rests on beside what is published")
+    note: str = Field("", description="why the verdict is what it is")
+    not_testable: str = Field("", description="why nothing is computed, in place of a computation")
+
+
+class PublicationFile(BaseModel):
+    """The file of a publication."""
+
+    model_config = STRICT
+
+    schema_version: Literal[1] = Field(description="version of this layout")
+    name: str = Field(pattern=NAME)
+    title: Text = Field(description="what it is about")
+    citation: Text = Field(description="authors, journal, year, doi where known")
+    claims: list[ClaimEntry] = Field(min_length=1)
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a file of a publication."""
+    return make_schema(PublicationFile, "ppafo publication")
+
+
+def read_publication(name_or_path: str | Path) -> tuple[PublicationFile, str]:
+    """Return a publication by its name or file, and what messages call the file; ScenarioError where it is wrong."""
+    read, file = read_model(FILE, PublicationFile, name_or_path)
+    twice = first_twice(entry.id for entry in read.claims)
+    if twice is not None:
+        raise ScenarioError(f"{file}: claims: '{twice}' is there twice; give each claim a name of its own")
+    for entry in read.claims:
+        place = f"{file}: claims.{entry.id}"
+        if entry.published is None and not entry.words and not entry.own:
+            raise ScenarioError(f"{place}: give what is published: a number with its unit, words, or own arithmetic")
+        limit = {"maximum": entry.at_most, "less": entry.at_most, "more": entry.at_least}.get(entry.direction, 0.0)
+        if limit is None and not entry.not_testable:
+            name = "at_least" if entry.direction == "more" else "at_most"
+            raise ScenarioError(f"{place}: direction = '{entry.direction}' needs a size: give {name}")
+    return read, file
+
+
+@cache
+def paper_entries() -> Mapping[str, ClaimEntry]:
+    """Return every statement of the paper by its id."""
+    return MappingProxyType({entry.id: entry for entry in read_publication(PAPER)[0].claims})
