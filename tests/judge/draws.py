@@ -130,6 +130,31 @@ def free(chance: Chance, speed: float = 0.0, torque: float = 0.0, stops: float =
     }
 
 
+def leg(chance: Chance, speed: float = 0.0, torque: float = 0.0, stops: float = 0.2) -> Document:
+    """As ``free``, with a foot on a shank that rests or swings; the outside torque is that of the ankle."""
+    attitude = f"{chance.uniform(-90.0, 90.0)} deg"
+    rest = {"kind": "constant", "level": attitude}
+    swing = {
+        "kind": "sine",
+        "level": attitude,
+        "amplitude": f"{chance.uniform(5.0, 40.0)} deg",
+        "frequency": f"{logarithmic(chance, 0.5, 4.0)} Hz",
+        "phase": f"{chance.random()}",
+    }
+    start, push = free(chance, speed, 0.0, stops), chance.uniform(-torque, torque)
+    return {
+        "kind": "leg",
+        "angle": start["angle"],
+        "angular_velocity": start["angular_velocity"],
+        "foot_mass": f"{logarithmic(chance, 0.3, 3.0)} kg",
+        "foot_mass_centre": f"{chance.uniform(0.03, 0.15)} m",
+        "foot_inertia": f"{logarithmic(chance, 3e-4, 1e-2)} kg m^2",
+        "shank_length": f"{chance.uniform(0.3, 0.6)} m",
+        "ankle_torque": f"{chance.choice([0.0, push])} N m",
+        "shank": chance.choice([rest, swing]),
+    }
+
+
 def gauge(chance: Chance, high: float = 50.0) -> str:
     """An initial pressure."""
     return chance.choice(["atmosphere", "supply", f"{chance.uniform(0.0, high)} psi_g"])
@@ -264,6 +289,14 @@ def late_coarse_sensors(chance: Chance) -> Document:
     return loop(chance, (1.0, 15.0), "proportional")
 
 
+def legs(chance: Chance) -> Document:
+    """A foot on a shank that rests or swings, moved open loop or by PID."""
+    lines = gas(chance) + actuator(chance) + friction(chance) + supplies(chance) + leak(chance)
+    lines += orifice(chance, "valve", logarithmic(chance, 2.0, 40.0))
+    law = chance.choice([open_loop(chance), sampled(chance, pid(chance))])
+    return document(lines, leg(chance, 100.0, 3.0), law, initial=start(chance), reference=ramp(chance))
+
+
 def solenoid_loops(chance: Chance) -> Document:
     """A pair of solenoid valves with all their delays, switched from 1 Hz to 10 kHz by late and coarse sensors."""
     return loop(chance, (1.0, 15.0), "solenoid")
@@ -315,6 +348,8 @@ def mixed(chance: Chance) -> Document:
         level, low = f"{chance.uniform(40.0, 110.0)} deg", f"{chance.uniform(40.0, 110.0)} deg"
         path = {"kind": "ramp_hold", "start_level": low, "level": level, "ramp_start": "0.05 s", "ramp_time": "0.1 s"}
         motion = chance.choice([{"kind": "held", "angle": level}, {"kind": "prescribed", "profile": path}])
+    elif chance.random() < 0.3:
+        motion = leg(chance, 300.0, 30.0)
     more: Document = {"initial": start(chance, 90.0), "reference": ramp(chance)}
     if chance.random() < 0.5:
         more["sensors"] = sensors(chance)
@@ -339,6 +374,7 @@ FAMILIES: Mapping[str, Callable[[Chance], Document]] = {
     "dead volumes": dead_volumes,
     "loops without friction": loops_without_friction,
     "prescribed": prescribed,
+    "legs": legs,
     "mixed": mixed,
 }
 

@@ -18,6 +18,7 @@ UNIVERSAL_GAS_CONSTANT = 8.314
 REFERENCE_DENSITY = 1.185
 REFERENCE_TEMPERATURE = 293.15
 REFERENCE_PRESSURE = 1.0e5
+STANDARD_GRAVITY = 9.80665
 
 MEASURED, DECIDED, ARRIVED = range(3)
 ANGLE, VELOCITY, MASS_1, MASS_2, ENERGY_1, ENERGY_2, SPOOL, SPOOL_RATE, ASKED, TAKEN = range(10)
@@ -95,6 +96,16 @@ class Law(NamedTuple):
     bias: float
 
 
+class Leg(NamedTuple):
+    """A foot on a prescribed shank (is_worn = 1): its m c [kg m], its inertia about the ankle, length of the shank."""
+
+    is_worn: float
+    moment: float
+    inertia: float
+    shank_length: float
+    shank: Path
+
+
 class Rig(NamedTuple):
     """Everything that the equations need, in SI units."""
 
@@ -129,6 +140,7 @@ class Rig(NamedTuple):
     law: Law
     path: Path
     wish: Path
+    leg: Leg
 
 
 class Answer(NamedTuple):
@@ -158,6 +170,15 @@ def follow(path: Path, time: float) -> tuple[float, float]:
             return path.a + (path.b - path.a) * (time - path.c) / path.d, (path.b - path.a) / path.d
         return path.b, 0.0
     return path.a, 0.0
+
+
+@njit(cache=True)
+def bend(path: Path, time: float) -> float:
+    """Second derivative of a profile without corners."""
+    if path.kind == SINE:
+        turn = 2.0 * math.pi
+        return -path.b * (turn * path.c) ** 2 * math.sin(turn * (path.c * time + path.d))
+    return 0.0
 
 
 @njit(cache=True)
@@ -235,10 +256,37 @@ def shares_of(rig: Rig, y: Any, coils: Any) -> tuple[float, float, float, float]
 
 
 @njit(cache=True)
-def net_torque(rig: Rig, angle: float, pressure_1: float, pressure_2: float) -> float:
-    """What drives the vane before friction and damping [N m], equation (1)."""
+def turning_inertia(rig: Rig) -> float:
+    """What turns about the ankle [kg m^2]."""
+    return rig.inertia + rig.leg.inertia
+
+
+@njit(cache=True)
+def torque_on_foot(rig: Rig, time: float, angle: float) -> float:
+    """What shank and weight do to the body that turns about the ankle [N m], plantarflexion positive.
+
+    Newton's law of that body in the frame of the room: its angle over the horizontal is alpha, its weight acts at S
+    over the mass, and the ankle carries it along a circle about the knee.
+    """
+    shank, shank_rate = follow(rig.leg.shank, time)
+    shank_bend = bend(rig.leg.shank, time)
+    alpha = shank - angle + 0.5 * math.pi
+    s = rig.leg.moment + rig.gravity / STANDARD_GRAVITY
+    length = rig.leg.shank_length
+    forward = length * (math.cos(shank) * shank_bend - math.sin(shank) * shank_rate * shank_rate)
+    up = length * (math.sin(shank) * shank_bend + math.cos(shank) * shank_rate * shank_rate)
+    falls = s * (math.cos(alpha) * (STANDARD_GRAVITY + up) - math.sin(alpha) * forward)
+    return turning_inertia(rig) * shank_bend + falls
+
+
+@njit(cache=True)
+def net_torque(rig: Rig, time: float, angle: float, pressure_1: float, pressure_2: float) -> float:
+    """What drives the vane before friction and damping [N m], equations (1) and (11)."""
+    actuator = rig.torque_constant * (pressure_1 - pressure_2)
+    if rig.leg.is_worn > 0.0:
+        return actuator + torque_on_foot(rig, time, angle) - rig.external
     gravity = -rig.gravity * math.sin(angle)
-    return rig.torque_constant * (pressure_1 - pressure_2) - gravity - rig.external
+    return actuator - gravity - rig.external
 
 
 @njit(cache=True)
@@ -248,9 +296,9 @@ def rates(rig: Rig, time: float, y: Any, way: float, coils: Any, target: float, 
     pressure_1, pressure_2, warmth_1, warmth_2 = gas_of(rig, angle, y)
     slope[:] = 0.0
     if abs(way) == 1.0:
-        torque = net_torque(rig, angle, pressure_1, pressure_2) - rig.viscous * velocity - way * rig.dynamic
+        torque = net_torque(rig, time, angle, pressure_1, pressure_2) - rig.viscous * velocity - way * rig.dynamic
         slope[ANGLE] = velocity
-        slope[VELOCITY] = torque / rig.inertia
+        slope[VELOCITY] = torque / turning_inertia(rig)
     source_1, vent_1, source_2, vent_2 = shares_of(rig, y, coils)
     oneway = rig.relieving == 0.0
     from_1, warm_1 = exchange(rig, pressure_1, warmth_1, rig.source_1, source_1, oneway)
@@ -308,10 +356,10 @@ def trial(
 
 
 @njit(cache=True)
-def leaves(rig: Rig, y: Any) -> float:
+def leaves(rig: Rig, time: float, y: Any) -> float:
     """1 or -1 where a vane at rest begins to move that way, else 0: friction or a stop holds it, equation (10)."""
     pressure_1, pressure_2, _, _ = gas_of(rig, y[ANGLE], y)
-    torque = net_torque(rig, y[ANGLE], pressure_1, pressure_2)
+    torque = net_torque(rig, time, y[ANGLE], pressure_1, pressure_2)
     if torque > rig.static and y[ANGLE] < rig.highest:
         return 1.0
     if torque < -rig.static and y[ANGLE] > rig.lowest:
@@ -320,22 +368,22 @@ def leaves(rig: Rig, y: Any) -> float:
 
 
 @njit(cache=True)
-def happened(rig: Rig, y: Any, way: float) -> bool:
+def happened(rig: Rig, time: float, y: Any, way: float) -> bool:
     """True where a step has gone past a breakaway, a reversal or a stop."""
     if way == LED:
         return False
     if way == REST:
-        return leaves(rig, y) != 0.0
+        return leaves(rig, time, y) != 0.0
     beyond = y[ANGLE] >= rig.highest if way > 0.0 else y[ANGLE] <= rig.lowest
     return beyond or y[VELOCITY] * way <= 0.0
 
 
 @njit(cache=True)
-def what_follows(rig: Rig, y: Any, way: float) -> tuple[float, bool]:
+def what_follows(rig: Rig, time: float, y: Any, way: float) -> tuple[float, bool]:
     """The way from here on, with the state changed, and whether this was an impact."""
     impact = False
     if way == REST:
-        return leaves(rig, y), impact
+        return leaves(rig, time, y), impact
     stop = rig.highest if way > 0.0 else rig.lowest
     if (y[ANGLE] - stop) * way >= 0.0:
         y[ANGLE] = stop
@@ -346,7 +394,7 @@ def what_follows(rig: Rig, y: Any, way: float) -> tuple[float, bool]:
     if abs(y[VELOCITY]) > SLOWEST_REBOUND:
         return -way, impact
     y[VELOCITY] = 0.0
-    return leaves(rig, y), impact
+    return leaves(rig, time, y), impact
 
 
 @njit(cache=True)
@@ -448,7 +496,7 @@ def advance(
             h = step * (max(0.9 * error**-0.2, 0.2) if 1.0 < error < 1.0e8 else 0.1)
             continue
         counts[0] += 1
-        if not happened(rig, work[7], way):
+        if not happened(rig, time + step, work[7], way):
             y[:] = work[7]
             time = end if last else time + step
             if not last or step > 0.5 * h:
@@ -460,14 +508,14 @@ def advance(
             if middle <= before or middle >= after:
                 break
             trial(rig, time, middle, y, way, coils, target, work, sizes)
-            if happened(rig, work[7], way):
+            if happened(rig, time + middle, work[7], way):
                 after = middle
             else:
                 before = middle
         trial(rig, time, after, y, way, coils, target, work, sizes)
         y[:] = work[7]
         time = end if after == end - time else time + after
-        way, impact = what_follows(rig, y, way)
+        way, impact = what_follows(rig, time, y, way)
         counts[2] += 1
         if impact and counts[1] < impacts.size:
             impacts[counts[1]] = time
@@ -525,9 +573,9 @@ def first_way(rig: Rig, y: Any) -> float:
     if rig.led > 0.0:
         return LED
     if y[VELOCITY] == 0.0:
-        return leaves(rig, y)
+        return leaves(rig, 0.0, y)
     way = math.copysign(1.0, y[VELOCITY])
-    return what_follows(rig, y, way)[0] if happened(rig, y, way) else way
+    return what_follows(rig, 0.0, y, way)[0] if happened(rig, 0.0, y, way) else way
 
 
 @njit(cache=True)
@@ -579,6 +627,17 @@ def path_of(choice: Any) -> Path:
     return Path(kind, s["level"], 0.0, 0.0, 0.0)
 
 
+def leg_of(leg: Any) -> Leg:
+    """The leg as numbers; its knee must rest."""
+    if leg is None:
+        return Leg(0.0, 0.0, 0.0, 0.0, Path(CONSTANT, 0.0, 0.0, 0.0, 0.0))
+    if leg.gait is not None:
+        raise ValueError("the judge knows no gait")
+    moment = leg.foot_mass * leg.foot_mass_centre
+    inertia = leg.foot_inertia + moment * leg.foot_mass_centre
+    return Leg(1.0, moment, inertia, leg.shank_length, path_of(leg.shank))
+
+
 def valve_of(scenario: Scenario) -> Valve:
     """The valve as numbers."""
     s = scenario.device.valve.settings
@@ -605,6 +664,7 @@ def rig_of(scenario: Scenario, bias: float = 0.0, relieving: bool | None = None)
     device, motion, warm = scenario.device, scenario.motion, scenario.thermal
     actuator, friction, supply, gas = device.actuator, device.friction, device.supply, device.gas
     free = isinstance(motion, FreeMotion)
+    leg = motion.leg if free else None
     return Rig(
         actuator.torque_constant,
         actuator.volume_per_angle,
@@ -618,7 +678,7 @@ def rig_of(scenario: Scenario, bias: float = 0.0, relieving: bool | None = None)
         friction.viscous_damping,
         device.foot_plate.inertia,
         device.foot_plate.gravity_torque,
-        motion.external_torque if free else 0.0,
+        (motion.external_torque if free else 0.0) if leg is None else -leg.ankle_torque,
         supply.pressure,
         supply.dorsiflexion_pressure,
         supply.atmospheric_pressure,
@@ -637,6 +697,7 @@ def rig_of(scenario: Scenario, bias: float = 0.0, relieving: bool | None = None)
         law_of(scenario, bias),
         Path(CONSTANT, 0.0, 0.0, 0.0, 0.0) if free else path_of(motion.profile),
         path_of(scenario.reference),
+        leg_of(leg),
     )
 
 

@@ -26,5 +26,5 @@ PROFILES: Kinds[ProfileKind] = Kinds(
     "ppafo.profiles",
     "profile",
     ProfileKind,
-    (CONSTANT, RAMP_HOLD, SINE, profiles.TABLE),
+    (CONSTANT, RAMP_HOLD, SINE, profiles.TABLE, profiles.SMOOTH),
 )

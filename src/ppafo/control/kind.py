@@ -39,7 +39,8 @@ class ProfileKind:
     ``parameters`` is a NamedTuple class whose fields are the quantities in order; ``value(parameters, time)`` returns
     value, rate and second derivative at a time [s]; ``bounds(parameters)`` the lowest and highest value of all time.
     A quantity with unit ``""`` takes the unit of what is prescribed. A profile that ``is_monotone`` only rises, only
-    falls or rests, so that both ends of a stretch of time have its extremes.
+    falls or rests, so that both ends of a stretch of time have its extremes. One that ``is_smooth`` has no corners, at
+    which a foot on a shank that moves so would be struck.
     """
 
     name: str
@@ -49,6 +50,7 @@ class ProfileKind:
     value: Callable[..., Any]
     bounds: Callable[..., tuple[float, float]]
     is_monotone: bool = False
+    is_smooth: bool = False
 
 
 class PythonController(Protocol):

@@ -1,5 +1,6 @@
 """Profiles of reference and prescribed angle: a level, ramp and hold (the paper's torque task), a sine, a table."""
 
+import math
 from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import ProfileKind
@@ -31,6 +32,7 @@ CONSTANT = ProfileKind(
     value=constant_value,
     bounds=constant_bounds,
     is_monotone=True,
+    is_smooth=True,
 )
 
 
@@ -108,6 +110,7 @@ SINE = ProfileKind(
     parameters=Sine,
     value=sine_value,
     bounds=sine_bounds,
+    is_smooth=True,
 )
 
 
@@ -191,6 +194,113 @@ def table_bounds(profile: Tabulated) -> tuple[float, float]:
     return profile.level + min(values), profile.level + max(values)
 
 
+class Stretch(NamedTuple):
+    """Four knots around a place, times [s] and values: the one before, both ends of the stretch, the one after."""
+
+    earlier: Knot
+    start: Knot
+    end: Knot
+    later: Knot
+
+
+def next_stretch(stretch: Stretch, place: float, knot: Knot) -> Stretch:
+    """The stretch, or the next one, after which ``knot`` comes, where ``place`` [s] has passed its end."""
+    passed = place >= stretch.end.time
+    earlier, start, end, later = stretch.start, stretch.end, stretch.later, knot
+    return Stretch(
+        earlier=Knot(
+            earlier.time if passed else stretch.earlier.time, earlier.value if passed else stretch.earlier.value
+        ),
+        start=Knot(start.time if passed else stretch.start.time, start.value if passed else stretch.start.value),
+        end=Knot(end.time if passed else stretch.end.time, end.value if passed else stretch.end.value),
+        later=Knot(later.time if passed else stretch.later.time, later.value if passed else stretch.later.value),
+    )
+
+
+def repeated_knot(profile: Tabulated, before: Knot, knot: Knot) -> Knot:
+    """A knot; the first one or the second one of the next repetition where those of this one are used up before it."""
+    is_used = knot.time < profile.period
+    is_first = before.time < profile.period
+    second_is_used = profile.knots[0].time < profile.period
+    second_time = profile.period + (profile.knots[0].time if second_is_used else profile.period)
+    second_value = profile.knots[0].value if second_is_used else profile.value_01
+    return Knot(
+        knot.time if is_used else (profile.period if is_first else second_time),
+        knot.value if is_used else (profile.value_01 if is_first else second_value),
+    )
+
+
+def last_knot(profile: Tabulated) -> Knot:
+    """The last knot that is used, a repetition earlier."""
+    time, value = 0.0, profile.value_01
+    for knot in profile.knots:
+        is_used = knot.time < profile.period
+        time, value = (knot.time if is_used else time), (knot.value if is_used else value)
+    return Knot(time - profile.period, value)
+
+
+def stretch_at(profile: Tabulated, place: float) -> Stretch:
+    """The stretch in which a place [s] of a repetition lies; its end is later than the place."""
+    first = Knot(0.0, profile.value_01)
+    second = repeated_knot(profile, first, profile.knots[0])
+    third = repeated_knot(profile, second, profile.knots[1])
+    stretch = Stretch(earlier=last_knot(profile), start=first, end=second, later=third)
+    before = third
+    for knot in profile.knots[2:]:
+        found = repeated_knot(profile, before, knot)
+        stretch = next_stretch(stretch, place, found)
+        before = found
+    closing = repeated_knot(profile, before, Knot(profile.period, profile.value_01))
+    stretch = next_stretch(stretch, place, closing)
+    return next_stretch(stretch, place, repeated_knot(profile, closing, Knot(profile.period, profile.value_01)))
+
+
+def smooth_value(profile: Tabulated, time: float) -> tuple[float, float, float]:
+    """Value, rate and second derivative at a time [s] from 0 on, of cubic curves through the knots.
+
+    Each has at its ends the slope of the parabola through a knot and its two neighbours, so that the rate has no jump.
+    """
+    place = time - profile.period * float(int(time / profile.period))
+    at = stretch_at(profile, place)
+    length = at.end.time - at.start.time
+    chord = (at.end.value - at.start.value) / length
+    before = (at.start.value - at.earlier.value) / (at.start.time - at.earlier.time)
+    after = (at.later.value - at.end.value) / (at.later.time - at.end.time)
+    slope_start = (before * length + chord * (at.start.time - at.earlier.time)) / (at.end.time - at.earlier.time)
+    slope_end = (chord * (at.later.time - at.end.time) + after * length) / (at.later.time - at.start.time)
+    bend = (3.0 * chord - 2.0 * slope_start - slope_end) / length
+    twist = (slope_start + slope_end - 2.0 * chord) / (length * length)
+    here = place - at.start.time
+    value = at.start.value + here * (slope_start + here * (bend + here * twist))
+    rate = slope_start + here * (2.0 * bend + 3.0 * here * twist)
+    return profile.level + value, rate, 2.0 * bend + 6.0 * here * twist
+
+
+def smooth_bounds(profile: Tabulated) -> tuple[float, float]:
+    """The lowest and the highest value [N m or rad] of the cubic curves, which may go beyond their knots."""
+    lowest, highest = table_bounds(profile)
+    knots = used_knots(profile)
+    for (start, _), (end, last) in zip(knots, [*knots[1:], (profile.period, profile.value_01)], strict=True):
+        length = end - start
+        value, rate, bend = smooth_value(profile, start)
+        twist = (profile.level + last - value - length * (rate + 0.5 * length * bend)) / length**3
+        for place in turning_places(rate, bend, 3.0 * twist):
+            if 0.0 < place < length:
+                turned = value + place * (rate + place * (0.5 * bend + place * twist))
+                lowest, highest = min(lowest, turned), max(highest, turned)
+    return lowest, highest
+
+
+def turning_places(rate: float, bend: float, square: float) -> list[float]:
+    """Places at which ``rate + bend x + square x^2`` is 0."""
+    inside = bend * bend - 4.0 * square * rate
+    if inside < 0.0 or (bend == 0.0 and square == 0.0):
+        return []
+    # Without the difference of two numbers that may be nearly equal.
+    half = -0.5 * (bend + math.copysign(math.sqrt(inside), bend))
+    return [part / whole for part, whole in ((half, square), (rate, half)) if whole != 0.0]
+
+
 def _quantity(name: str) -> Quantity:
     number = int(name.rpartition("_")[2])
     if name.startswith("time"):
@@ -210,4 +320,14 @@ TABLE = ProfileKind(
     parameters=Tabulated,
     value=table_value,
     bounds=table_bounds,
+)
+
+SMOOTH = ProfileKind(
+    name="smooth",
+    summary="Up to 32 knots, the first at time 0, joined by cubic curves without corners and repeated.",
+    quantities=TABLE.quantities,
+    parameters=Tabulated,
+    value=smooth_value,
+    bounds=smooth_bounds,
+    is_smooth=True,
 )

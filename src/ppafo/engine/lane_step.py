@@ -14,6 +14,7 @@ import re
 
 from ppafo.engine.lane_rows import HANDED, LaneRows, RarePhase, count_lanes, indent
 from ppafo.engine.lane_samples import present_pressures, pressures_of, sense_end
+from ppafo.engine.led_leg import torque_lines
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.scheme import actuators, motion, pneumatics, supply_lines, thermal_gas, walking
 from ppafo.engine.source_text import woven
@@ -76,6 +77,8 @@ def opening(rows: LaneRows) -> list[str]:
     names += ["thermal", "masses"] if rows.program.is_thermal else []
     names += ["leg", "share", "gait_timing", "walk"] if rows.program.walks else []
     names += ["lines", "line_state"] if rows.program.has_lines else []
+    names += ["load", "shank"] if rows.program.shank is not None else []
+    names += ["load", "shank"] if rows.program.shank is not None else []
     names += ["held"] if rows.program.hands_chambers_on else []
     names += ["start"] if rows.program.starts_apart else []
     return [*[rows.load(name) for name in names], time_of_step(rows), "command = result.command"]
@@ -355,7 +358,8 @@ def end_motion(rows: LaneRows) -> list[str]:
             lines.append(f"after = {add(thermal_gas.after_motion)}(plant, thermal, after, {assumed}, after.angle)")
         return lines
     if program.angle is None:
-        lines = [f"angle, rate, error = {add(motion.end_part)}(plant, fed, begun, length)"]
+        lines = torque_lines(program, add, "time + length", "begun.next_angle")
+        lines.append(f"angle, rate, error = {add(motion.end_part)}(plant, fed, begun, added, length)")
         if program.is_thermal:
             lines.append(f"fed = {add(thermal_gas.after_motion)}(plant, thermal, fed, begun.next_angle, angle)")
         return [*lines, f"after = {add(motion.with_motion)}(fed, angle, rate)"]
@@ -551,7 +555,8 @@ def measure(rows: LaneRows) -> list[str]:
         hurries = "remaining == 0.0 or result.failure_time <= time"
         lines.append(f"until = remaining if {hurries} else {add(motion.part_length)}(pace, until)")
         if program.angle is None:
-            lines.append(f"begun, until = {add(motion.begin_part)}(plant, state, until)")
+            lines += torque_lines(program, add, "time", "state.angle")
+            lines.append(f"begun, until = {add(motion.begin_part)}(plant, state, added, until)")
             lines += rows.keep("begun")
     else:
         lines.append("until = remaining if result.failure_time <= time else until")

@@ -23,7 +23,7 @@ from ppafo.model.actuators.vane import MODEL as VANE
 from ppafo.model.effects.kind import Effect, State, effect_problem, laws_in_order
 from ppafo.model.gait import Course as WalkCourse
 from ppafo.model.gait import GaitNow, GaitPlace, GaitSeries, GaitTiming, Marks
-from ppafo.model.leg import LegParameters
+from ppafo.model.leg import FootLoad, LegParameters
 from ppafo.model.plant import PlantState, ThermalParameters, ThermalState
 from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import GaitSeen, GaitSensors, SensorParameters
@@ -81,7 +81,8 @@ class Program:
     samples lie between the steps. ``meters`` are updated at every sample that a recording would have, ``traced`` names
     channels, or paths of the state, that are kept at some of them. ``starts_apart`` True lets the run of each lane
     begin at a step of its own, while others of the block are under way. ``actuator`` is what stands between the
-    chambers and the joint. ``effects`` act in this order at the places of their laws.
+    chambers and the joint. ``effects`` act in this order at the places of their laws. ``shank`` None leaves a free
+    vane to itself; otherwise it carries a foot on a shank that moves so (``engine/led_leg.py``).
     """
 
     valve: ValveModel
@@ -103,6 +104,7 @@ class Program:
     starts_apart: bool = False
     actuator: ActuatorModel = VANE
     effects: tuple[Effect, ...] = ()
+    shank: ProfileKind | None = None
 
     def parameter_rows(self) -> dict[str, type]:
         """Groups of parameter rows of this program, in order."""
@@ -119,6 +121,7 @@ class Program:
             **({"gait_timing": GaitTiming, "gait_sensors": GaitSensors} if self.walks else {}),
             **({"walk_course": WalkCourse} if self.takes_course else {}),
             **({"lines": SupplyLines} if self.has_lines else {}),
+            **({} if self.shank is None else {"load": FootLoad, "shank": self.shank.parameters}),
             **{effect.name: effect.parameters for effect in self.effects},
         }
 

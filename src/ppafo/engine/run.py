@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ppafo.engine.lane_step import MAXIMUM_PARTS
 from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_batch
+from ppafo.engine.led_leg import LedLeg
 from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program
 from ppafo.engine.reference.right_hand_side import ExactOrifice
 from ppafo.engine.rows import leaves, rebuilt, table
@@ -90,6 +91,7 @@ class Run:
     walk: Walk | None = None
     lines: Lines | None = None
     effects: tuple[Any, ...] = ()
+    leg: LedLeg | None = None
 
     @property
     def period(self) -> float:
@@ -123,7 +125,8 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     plant, valve = [run.plant, run.thermal], [run.valve]
     walk, walk_states = _walk_groups(run.walk)
     lines, line_states = ([], []) if run.lines is None else ([run.lines.parameters], [run.lines.initial])
-    rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, *run.effects]
+    leg = [] if run.leg is None else [run.leg.load, run.leg.shank]
+    rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, *leg, *run.effects]
     parameters = table([timing, *plant, *valve, *rest], runs)
     controller_state = NoParameters() if program.controller is None else program.controller.initial
     # The gas begins at the reference temperature, where its true mass is what the state counts.

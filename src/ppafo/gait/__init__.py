@@ -1,7 +1,7 @@
 """Gaits: one periodic stride of a wearer, built in, imported from recordings, or read from a gait file."""
 
 from ppafo.gait.document import NORMATIVE, list_gaits, load_gait
-from ppafo.gait.gait import CURVES, Curve, Gait, at_speed, speed_range, walk_recording
+from ppafo.gait.gait import CURVES, Curve, Gait, at_speed, series_of, speed_range, walk_recording
 
 __all__ = [
     "CURVES",
@@ -11,6 +11,7 @@ __all__ = [
     "at_speed",
     "list_gaits",
     "load_gait",
+    "series_of",
     "speed_range",
     "walk_recording",
 ]

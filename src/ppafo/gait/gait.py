@@ -19,6 +19,8 @@ import numpy as np
 
 from ppafo.errors import DataError, nearest_name
 from ppafo.model.elementary import sine_and_cosine
+from ppafo.model.gait import HARMONICS as ENGINE_HARMONICS
+from ppafo.model.gait import Harmonic, Series
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
 
@@ -162,6 +164,17 @@ class Gait:
             hint = nearest_name(name, curves)
             raise DataError(f"gait '{self.name}' has no curve '{name}'{hint}; it has {', '.join(curves)}")
         return curves[name]
+
+
+def series_of(gait: Gait, name: str) -> Series:
+    """The first harmonics of a curve [SI] as the engine has them; a curve that was not measured is 0."""
+    curve = gait.curves.get(name)
+    if curve is None:
+        return Series(mean=0.0, harmonics=(Harmonic(0.0, 0.0),) * ENGINE_HARMONICS)
+    count = ENGINE_HARMONICS
+    missing = (0.0,) * count
+    pairs = zip((*curve.cosines, *missing)[:count], (*curve.sines, *missing)[:count], strict=True)
+    return Series(mean=curve.mean, harmonics=tuple(Harmonic(cosine, sine) for cosine, sine in pairs))
 
 
 HARMONICS: dict[str, int] = {

@@ -7,7 +7,7 @@ the speed, stairs, stopping.
 from typing import Annotated, NamedTuple
 
 from ppafo.model.elementary import QUARTER_TURN, TURN, TURNS_OF_RADIAN, sine_and_cosine_of_turns
-from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, torque_of_shank
+from ppafo.model.leg import LegParameters, ShankNow, foot_inertia_about_ankle, torque_of_shank
 
 HARMONICS = 8
 """Harmonics that the engine follows; those of the built-in gait above are below 0.04 deg and 0.4 % of body weight."""
@@ -119,6 +119,19 @@ class GaitSeries(NamedTuple):
     knee_up: Series
 
 
+class ShankSeries(NamedTuple):
+    """The shank of a gait without its ground: strides per second [Hz], phase in turns at time 0, and its curves.
+
+    Angle [rad], and acceleration of the knee forward and up [m/s^2], as in ``GaitSeries``.
+    """
+
+    frequency: float
+    start: float
+    shank: Series
+    knee_forward: Series
+    knee_up: Series
+
+
 class GaitTiming(NamedTuple):
     """Strides per second [Hz]; phases in turns from the heel strike; the foot's angle [rad] where it stands flat.
 
@@ -212,6 +225,18 @@ def measured_at(gait: GaitSeries, timing: GaitTiming, leg: LegParameters, place:
         ankle_acceleration=acceleration_at(gait.ankle, at, timing.frequency),
         moment=leg.body_mass * value_at(gait.moment, at),
         force=max(leg.body_mass * leg.gravity * value_at(gait.force, at), 0.0),
+        knee_forward=value_at(gait.knee_forward, at),
+        knee_up=value_at(gait.knee_up, at),
+    )
+
+
+def shank_in_gait(gait: ShankSeries, time: float) -> ShankNow:
+    """The shank that a gait prescribes at a time [s]."""
+    at = harmonics(gait.start + gait.frequency * time)
+    return ShankNow(
+        angle=value_at(gait.shank, at),
+        rate=rate_at(gait.shank, at, gait.frequency),
+        acceleration=acceleration_at(gait.shank, at, gait.frequency),
         knee_forward=value_at(gait.knee_forward, at),
         knee_up=value_at(gait.knee_up, at),
     )

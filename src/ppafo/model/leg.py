@@ -8,6 +8,8 @@ above: the shank's mass centre from the knee, the foot's from the ankle, on the 
 
 from typing import NamedTuple
 
+from ppafo.model.elementary import TURNS_OF_RADIAN, sine_and_cosine_of_turns
+
 
 class LegParameters(NamedTuple):
     """Segments of one leg and the wearer's ankle, SI units.
@@ -37,6 +39,28 @@ class LegParameters(NamedTuple):
     flat_heel_lever: float
     heel_roll_angle: float
     toe_lever: float
+    gravity: float
+
+
+class ShankNow(NamedTuple):
+    """A prescribed shank: angle [rad], rate [rad/s], acceleration [rad/s^2]; of the knee forward and up [m/s^2]."""
+
+    angle: float
+    rate: float
+    acceleration: float
+    knee_forward: float
+    knee_up: float
+
+
+class FootLoad(NamedTuple):
+    """What turns about the ankle of a prescribed shank: mass moment [kg m] and inertia about the ankle [kg m^2].
+
+    Length of the shank [m] and gravity [m/s^2] are of the leg.
+    """
+
+    mass_moment: float
+    inertia: float
+    shank_length: float
     gravity: float
 
 
@@ -159,6 +183,30 @@ def torque_of_shank_on(
     weight = cosine_alpha * (gravity + knee_up) - sine_alpha * knee_forward
     turning = (product * cosine_theta - inertia) * shank_acceleration
     return turning - product * sine_theta * shank_rate * shank_rate - mass_moment * weight
+
+
+def torque_on_foot(load: FootLoad, now: ShankNow, angle: float) -> float:
+    """Torque [N m] that shank, knee and weight put on what turns about the ankle, positive in plantarflexion.
+
+    T_shank of docs/equations.md: equation (11), its ankle's row without the term in theta''. ``angle`` [rad] is that of
+    the ankle. It is what ``torque_of_shank_on`` asks of the ankle, with the sign of a torque that drives.
+    """
+    sine_phi, cosine_phi = sine_and_cosine_of_turns(now.angle * TURNS_OF_RADIAN)
+    sine_alpha, cosine_alpha = sine_and_cosine_of_turns((now.angle - angle) * TURNS_OF_RADIAN + 0.25)
+    return -torque_of_shank_on(
+        load.mass_moment,
+        load.inertia,
+        load.shank_length,
+        load.gravity,
+        sine_phi,
+        cosine_phi,
+        sine_alpha,
+        cosine_alpha,
+        now.rate,
+        now.acceleration,
+        now.knee_forward,
+        now.knee_up,
+    )
 
 
 def passive_torque(leg: LegParameters, angle: float) -> float:

@@ -101,10 +101,12 @@ def chamber_nodes(plant: PlantParameters, rig: RigPhysics, state: RigState, angl
     return node_1, node_2
 
 
-def observables(plant: PlantParameters, rig: RigPhysics, state: RigState, angle: float) -> Observables:
-    """What a bench could observe at an angle [rad]."""
+def observables(
+    plant: PlantParameters, rig: RigPhysics, state: RigState, angle: float, added_torque: float
+) -> Observables:
+    """What a bench could observe at an angle [rad]; ``added_torque`` [N m] is that of a leg."""
     node_1, node_2 = chamber_nodes(plant, rig, state, angle)
-    torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure)
+    torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure) + added_torque
     return Observables(
         node_1=node_1,
         node_2=node_2,
@@ -200,16 +202,23 @@ def sides(
 
 
 def sliding_acceleration(
-    plant: PlantParameters, rig: RigPhysics, state: RigState, node_1: Node, node_2: Node, angle: float, direction: float
+    plant: PlantParameters,
+    rig: RigPhysics,
+    state: RigState,
+    node_1: Node,
+    node_2: Node,
+    angle: float,
+    added_torque: float,
+    direction: float,
 ) -> float:
     """Angular acceleration [rad/s^2] of a vane that slides towards ``direction`` (1 or -1). Equation (1).
 
-    0 for one that does not slide.
+    0 for one that does not slide. ``added_torque`` [N m] is that of a leg.
     """
     if direction == 0.0:
         return 0.0
     speed = state.angular_velocity
-    torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure)
+    torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure) + added_torque
     friction = direction * kinetic_friction(plant, rig, speed, node_1.pressure, node_2.pressure)
     return vane_acceleration(torque, speed, friction, plant.viscous_damping, plant.inertia)
 
@@ -224,9 +233,13 @@ def rig_rates(
     state: RigState,
     angle: float,
     rate: float,
+    added_torque: float,
     direction: float,
 ) -> RigState:
-    """Time derivatives of all unknowns [SI]; the vane slides towards ``direction`` (0: it is held or prescribed)."""
+    """Time derivatives of all unknowns [SI]; the vane slides towards ``direction`` (0: it is held or prescribed).
+
+    ``added_torque`` [N m] is that of a leg.
+    """
     node_1, node_2 = chamber_nodes(plant, rig, state, angle)
     volume_1, volume_2 = chamber_volumes(plant, angle)
     side_1, side_2 = sides(plant, rig, valve_orifice, line_orifice, openings, state, node_1, node_2)
@@ -237,7 +250,7 @@ def rig_rates(
     gas = 1.0 - rig.chambers_open
     return RigState(
         angle=sliding,
-        angular_velocity=sliding_acceleration(plant, rig, state, node_1, node_2, angle, direction),
+        angular_velocity=sliding_acceleration(plant, rig, state, node_1, node_2, angle, added_torque, direction),
         mass_1=gas * (side_1.into_mass - leak.mass),
         energy_1=gas * energy_rate(side_1.into_energy - leak.energy, node_1.pressure, grows, heat_1),
         mass_2=gas * (side_2.into_mass + leak.mass),

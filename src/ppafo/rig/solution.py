@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.engine.led_leg import torque_of_leg
 from ppafo.engine.loading import ARRAY, FLOAT, HEADER, INLINE, entry_text, load_source, with_arrays
 from ppafo.engine.reference.right_hand_side import ExactOrifice
 from ppafo.engine.reference.solver import SAME_TIME, Roots, after_stop, roots_at_rest, roots_sliding, solve_segment
@@ -87,9 +88,10 @@ UNKNOWNS = len(RigState._fields)
 OUTPUTS = 4
 """Numbers that ``show`` writes: both pressures [Pa], driving torque and static limit of friction [N m]."""
 
-ANGLE, RATE = 4, 5
-INPUTS = 6
-"""Numbers that come from outside: four openings, angle [rad] and prescribed rate [rad/s] of the vane."""
+ANGLE, RATE, ADDED = 4, 5, 6
+INPUTS = 7
+"""Numbers that come from outside: four openings, angle [rad] and prescribed rate [rad/s] of the vane, and the torque
+of a leg on it [N m]."""
 
 PARAMETER_GROUPS = {
     "plant": PlantParameters,
@@ -131,10 +133,10 @@ def rig_source() -> str:
     rows = PARAMETER_GROUPS | {"state": RigState, "openings": Openings}
     given = [f"{name} = {row_expression(row, name, cells, add)}" for name, row in rows.items()]
     orifices = "valve_orifice, leak_orifice, line_orifice"
-    motion = f"inputs[{ANGLE}], inputs[{RATE}], direction"
+    motion = f"inputs[{ANGLE}], inputs[{RATE}], inputs[{ADDED}], direction"
     fill = [f"rates = {add(rig_rates)}(plant, rig, {orifices}, openings, state, {motion})"]
     fill += [f"slopes[{number}] = rates.{field}" for number, field in enumerate(RigState._fields)]
-    show = [f"now = {add(observables)}(plant, rig, state, inputs[{ANGLE}])"]
+    show = [f"now = {add(observables)}(plant, rig, state, inputs[{ANGLE}], inputs[{ADDED}])"]
     outputs = ("node_1.pressure", "node_2.pressure", "torque", "static_limit")
     show += [f"outputs[{number}] = now.{path}" for number, path in enumerate(outputs)]
     functions = [_function("fill", "slopes", given + fill), _function("show", "outputs", given + show)]
@@ -237,8 +239,10 @@ class _Rig:
         return numbers(valve.rates(self.run.valve, state, self.command))
 
     def place_vane(self, t: float, y: Floats) -> None:
-        """Put the angle into the inputs, and the rate of a vane whose angle is prescribed."""
-        path = self.run.program.angle
+        """Put the angle into the inputs, the rate of a vane whose angle is prescribed, and the torque of a leg."""
+        path, leg = self.run.program.angle, self.run.leg
+        if leg is not None:
+            self.inputs[ADDED] = torque_of_leg(self.run.program, leg, t, float(y[0]))
         self.inputs[ANGLE], self.inputs[RATE] = (y[0], 0.0) if path is None else path.value(self.run.path, t)[:2]
 
     def root_function(self) -> Any:

@@ -220,7 +220,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         duration=clock.duration,
         time_step=clock.step,
         output_interval=clock.output_interval,
-        motion=read_motion(reading, device, clock.duration, clock.step),
+        motion=read_motion(reading, device, clock.duration, clock.step, request.folder),
         initial_pressure_1=_initial_pressure(reading, 0, device.supply),
         initial_pressure_2=_initial_pressure(reading, 1, device.supply),
         control=_control(reading, clock.period),

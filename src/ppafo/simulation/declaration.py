@@ -36,6 +36,27 @@ FREE = (
     Quantity("angular_velocity", "rad/s", "angular velocity at the start", 0.0, -1.0e4, 1.0e4),
     Quantity("external_torque", "N m", "constant torque T_ex, above 0 against plantarflexion", 0.0, -1.0e4, 1.0e4),
 )
+FOOT = {
+    item.name: item
+    for item in (
+        Quantity("shank_length", "m", "knee to ankle", 0.46, 0.1, 1.0),
+        Quantity("foot_mass_centre", "m", "ankle to the mass centre of the foot", 0.09, 0.0, 0.5),
+        Quantity("foot_mass", "kg", "mass of the foot", 1.0, 0.05, 10.0),
+        Quantity("foot_inertia", "kg m^2", "inertia of the foot about its mass centre", 0.001, 1.0e-5, 1.0),
+    )
+}
+"""The paper's subject (after equation (12)); the mass centre is half way along the foot of 0.18 m."""
+LEG = (
+    ANGLE,
+    Quantity("angular_velocity", "rad/s", "angular velocity at the start", 0.0, -1.0e4, 1.0e4),
+    *FOOT.values(),
+    Quantity(
+        "ankle_torque", "N m", "constant torque T_2 of the wearer's ankle, plantarflexion above 0", 0.0, -1.0e3, 1.0e3
+    ),
+)
+SHANK_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
+GAIT_SHANK = "gait"
+GAIT_START = Quantity("start", "1", "phase in strides at time 0, from heel strike", 0.0, 0.0, 1.0)
 INITIAL = (
     Quantity("pressure_1", "Pa_a", "pressure in chamber 1 at the start", None, 1.0e3, 1.0e8),
     Quantity("pressure_2", "Pa_a", "pressure in chamber 2 at the start", None, 1.0e3, 1.0e8),
@@ -83,7 +104,7 @@ _REGULATED = (
     Quantity("volume", "m^3", "room for gas between regulator and valve", None, 1.0e-6, 1.0e-2),
 )
 
-MOTIONS = ("free", "held", "prescribed")
+MOTIONS = ("free", "held", "prescribed", "leg")
 OLD_PRESCRIBED = "led"
 """What version 0.1 called a prescribed motion."""
 SECTIONS = (
@@ -119,7 +140,12 @@ def gas_settings(kind: str) -> tuple[Quantity, ...]:
 
 def motion_settings(kind: str) -> tuple[Quantity, ...]:
     """Return the settings of a kind of motion; a prescribed one has a profile instead."""
-    return {"free": FREE, "held": (ANGLE,)}.get(kind, ())
+    return {"free": FREE, "held": (ANGLE,), "leg": LEG}.get(kind, ())
+
+
+def shank_settings(kind: str) -> tuple[Quantity, ...]:
+    """Return the settings of the shank of a leg: those of a profile, or where in its stride a gait begins."""
+    return (GAIT_START,) if kind == GAIT_SHANK else profile_settings(kind, SHANK_LEVEL)
 
 
 def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
@@ -131,6 +157,7 @@ def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
         "motion.profile": profile_settings(kind_at(document, "motion.profile"), ANGLE_LEVEL)
         if motion == "prescribed"
         else (),
+        "motion.shank": shank_settings(kind_at(document, "motion.shank")) if motion == "leg" else (),
         "initial": INITIAL,
         "controller": SAMPLING + controller_settings(kind_at(document, "controller"), value_at(document, ARITHMETIC)),
         "reference": profile_settings(kind_at(document, "reference"), TORQUE_LEVEL),
@@ -145,7 +172,11 @@ def texts(document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the paths of every text that a document can hold."""
     kinds = ["motion.kind", "controller.kind", "reference.kind", "gas_model.kind"]
     kinds += [ARITHMETIC] if kind_at(document, "controller") in FIXED_LAWS else []
-    return (*TEXTS, *kinds, *(["motion.profile.kind"] if kind_at(document, "motion") == "prescribed" else []))
+    motion = kind_at(document, "motion")
+    kinds += ["motion.profile.kind"] if motion == "prescribed" else []
+    kinds += ["motion.shank.kind"] if motion == "leg" else []
+    kinds += ["motion.shank.gait"] if motion == "leg" and kind_at(document, "motion.shank") == GAIT_SHANK else []
+    return (*TEXTS, *kinds)
 
 
 def find_kinds(document: Mapping[str, Any], file: str) -> None:
@@ -157,6 +188,7 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
         ("controller", CONTROLLERS),
         ("reference", PROFILES),
         ("motion.profile", PROFILES),
+        *((("motion.shank", PROFILES),) if kind_at(document, "motion.shank") != GAIT_SHANK else ()),
     )
     check_motion_kind(kind_at(document, "motion"), f"{file}: motion.kind")
     for section, kinds in sections:

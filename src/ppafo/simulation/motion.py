@@ -1,25 +1,39 @@
 """What the vane does, read from a scenario and checked against the stops of the device."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 from ppafo.control.catalog import PROFILES
 from ppafo.engine.rows import rebuilt
-from ppafo.errors import ScenarioError
+from ppafo.errors import DataError, ScenarioError, one_line
+from ppafo.gait import Gait, list_gaits, load_gait
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
-from ppafo.simulation.declaration import ANGLE, ANGLE_LEVEL, FREE, kind_at, profile_settings
+from ppafo.simulation.declaration import (
+    ANGLE,
+    ANGLE_LEVEL,
+    FREE,
+    GAIT_SHANK,
+    LEG,
+    kind_at,
+    profile_settings,
+    shank_settings,
+    value_at,
+)
 from ppafo.simulation.reading import Reading, quantity_text
-from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, ProfileChoice
+from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, ProfileChoice
 
 MAXIMUM_CHECKED_TIMES = 20_000
 TOLERANCE = 1.0e-9
 _ANGLE_PATH = "motion.angle"
 
 
-def read_motion(reading: Reading, device: Device, duration: float, step: float) -> FreeMotion | PrescribedMotion:
+def read_motion(
+    reading: Reading, device: Device, duration: float, step: float, folder: Path
+) -> FreeMotion | PrescribedMotion:
     """Return the motion of the vane; every angle [rad] that it prescribes lies between the stops of the device.
 
-    ScenarioError where one does not. ``duration`` and ``step`` are in seconds.
+    ScenarioError where one does not. ``duration`` and ``step`` are in seconds; in ``folder`` relative paths begin.
     """
     kind = kind_at(reading.document, "motion")
     if kind == "prescribed":
@@ -33,7 +47,32 @@ def read_motion(reading: Reading, device: Device, duration: float, step: float) 
         raise reading.refusal(_ANGLE_PATH, f"must be between the stops of {device.name}, {_range_text(_stops(device))}")
     if kind == "held":
         return PrescribedMotion(ProfileChoice("constant", {"level": angle}))
-    return FreeMotion(**reading.section("motion", FREE))
+    if kind == "leg":
+        numbers = reading.section("motion", LEG)
+        start, rate = numbers.pop("angle"), numbers.pop("angular_velocity")
+        shank, gait = _read_shank(reading, folder)
+        return FreeMotion(start, rate, leg=Leg(**numbers, shank=shank, gait=gait))
+    numbers = reading.section("motion", FREE)
+    return FreeMotion(numbers["angle"], numbers["angular_velocity"], numbers["external_torque"])
+
+
+def _read_shank(reading: Reading, folder: Path) -> tuple[ProfileChoice, Gait | None]:
+    """Return how the shank of a leg moves: a profile without corners, or a gait."""
+    section = "motion.shank"
+    kind = kind_at(reading.document, section)
+    shank = ProfileChoice(kind, reading.section(section, shank_settings(kind)))
+    if kind != GAIT_SHANK:
+        if not PROFILES[kind].is_smooth:
+            smooth = ", ".join([name for name, item in PROFILES.items() if item.is_smooth] + [GAIT_SHANK])
+            raise reading.refusal(
+                f"{section}.kind", f"this profile has corners, at which the foot would be struck; use one of {smooth}"
+            )
+        return shank, None
+    name = str(value_at(reading.document, f"{section}.gait"))
+    try:
+        return shank, load_gait(name if name in list_gaits() else folder / name)
+    except DataError as error:
+        raise reading.refusal(f"{section}.gait", one_line(error)) from error
 
 
 def read_profile(reading: Reading, section: str, prescribed: Quantity) -> ProfileChoice:

@@ -44,7 +44,10 @@ _TEXTS = (
     declaration.ARITHMETIC,
     "reference.kind",
     "motion.profile.kind",
+    "motion.shank.kind",
+    "motion.shank.gait",
 )
+_OF_LEG = frozenset(item.name for item in declaration.LEG) - {item.name for item in declaration.FREE}
 _UNIT_OF_TIMES = {"controller.rate": "Hz"}
 
 
@@ -142,6 +145,8 @@ def other_form(device: Device, section: str) -> tuple[str, ...]:
 def _kinds(scenario: Scenario) -> dict[str, Any]:
     """Return a document that names the kinds of the scenario and nothing else; a constant command has no reference."""
     motion: dict[str, Any] = {"kind": "free"}
+    if isinstance(scenario.motion, FreeMotion) and scenario.motion.leg is not None:
+        motion = {"kind": "leg", "shank": {"kind": scenario.motion.leg.shank.kind}}
     if isinstance(scenario.motion, PrescribedMotion):
         motion = {"kind": "prescribed", "profile": {"kind": scenario.motion.profile.kind}}
     controller = {"kind": scenario.control.kind, "arithmetic": scenario.control.arithmetic}
@@ -171,7 +176,8 @@ def _place(path: str, scenario: Scenario) -> tuple[str, ...]:
     if section.startswith(f"{SUPPLY_LINE}."):
         return ("supply_lines", f"{name}_{1 + SUPPLY_LINES.index(section.removeprefix(f'{SUPPLY_LINE}.'))}")
     return {
-        "motion": ("motion", name),
+        "motion": ("motion", "leg", name) if name in _OF_LEG else ("motion", name),
+        "motion.shank": ("motion", "leg", "shank", "settings", name),
         "motion.profile": ("motion", "profile", "settings", name),
         "controller": ("control", "settings", name),
         "reference": ("reference", "settings", name),

@@ -10,10 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.fixed.torque_laws import FIXED_LAWS
 from ppafo.control.fixed.whole_numbers import SETTINGS, Converter, converter_of
 from ppafo.control.kind import ControllerKind, ProfileKind
+from ppafo.engine.led_leg import GAIT_SHANK, LedLeg
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.reference.right_hand_side import ExactOrifice
 from ppafo.engine.rows import leaves, rebuilt
@@ -21,6 +23,7 @@ from ppafo.engine.run import Lines, Run, Walk
 from ppafo.engine.scheme.actuators import volumes_of
 from ppafo.engine.scheme.pneumatics import is_slow
 from ppafo.errors import ScenarioError
+from ppafo.gait import Gait, series_of
 from ppafo.model.actuators.vane import KIND as VANE
 from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.columns import (
@@ -36,7 +39,9 @@ from ppafo.model.columns import (
     truncated,
     whole,
 )
+from ppafo.model.gait import ShankSeries
 from ppafo.model.gas import wall_exchange
+from ppafo.model.leg import FootLoad
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_mass, chamber_volumes
 from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import SensorParameters
@@ -47,10 +52,12 @@ from ppafo.simulation.reading import short_quantity_text
 from ppafo.simulation.scenario import (
     PYTHON_CONTROLLER,
     FreeMotion,
+    Leg,
     PrescribedMotion,
     ProfileChoice,
     Scenario,
     Thermal,
+    VaneMotion,
     vane_motion,
     worn_kind,
 )
@@ -96,6 +103,7 @@ class Pieces:
     supply_lines: SupplyLines | None
     signal_delay: Any = 0.0
     sections: Mapping[str, Any] = field(default_factory=dict)
+    leg: Leg | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,11 +127,15 @@ Start = Callable[[PlantParameters], PlantState]
 def compose_run(pieces: Pieces, plant: PlantParameters, rule: StepRule, start: Start, walk: Walk | None = None) -> Run:
     """Return the run of some pieces: ``rule`` says how it is stepped, ``start`` where it begins, ``walk`` adds a leg.
 
+    A leg without ground is one of the pieces, and ``plant`` the bare one.
+
     Every law, valve, motion, gas and supply goes with every other here.
     """
     settings = pieces.device.valve.settings
     delay = pieces.valve.command_delay(settings)
     plant = plant_behind_lines(plant, pieces.supply_lines)
+    leg = None if pieces.leg is None else led_leg(plant, pieces.leg)
+    plant = plant if leg is None else with_load(plant, leg.load)
     steps = rule(plant)
     return Run(
         program=_program(pieces, steps, walk, has_delay=first(delay) > 0.0),
@@ -147,6 +159,7 @@ def compose_run(pieces: Pieces, plant: PlantParameters, rule: StepRule, start: S
         walk=walk,
         lines=initial_lines(plant, pieces.supply_lines),
         effects=effect_rows(pieces.device, pieces.sections),
+        leg=leg,
     )
 
 
@@ -170,6 +183,7 @@ def _program(pieces: Pieces, steps: Steps, walk: Walk | None, has_delay: bool) -
         is_adaptive=bool(first(steps.needs_parts)),
         samples_inside=bool(first(steps.record_every % 1.0)),
         effects=effects_of(pieces.device, pieces.sections),
+        shank=None if pieces.leg is None else shank_kind(pieces.leg),
     )
 
 
@@ -183,7 +197,7 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         planned: tuple[Run, tuple[Problem, ...]] = worn.plan(scenario)
         return planned
     device, motion, control = scenario.device, vane_motion(scenario), scenario.control
-    plant = plant_parameters(device, motion.external_torque if isinstance(motion, FreeMotion) else 0.0)
+    plant = plant_parameters(device, outside_torque(motion))
     in_lanes = control.kind != PYTHON_CONTROLLER
     fixed = (
         fixed_controller(scenario, plant.torque_constant, profile_bounds(scenario.reference))
@@ -203,6 +217,7 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         supply_lines=scenario.supply_lines,
         signal_delay=scenario.sensors.delay,
         sections=scenario.effect_sections,
+        leg=motion.leg if isinstance(motion, FreeMotion) else None,
     )
     run = compose_run(
         pieces, plant, lambda fed: scenario_steps(scenario, fed), lambda fed: initial_state(scenario, fed)
@@ -221,6 +236,63 @@ def scenario_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
         record_every=counts.record_every,
         needs_parts=is_adaptive(scenario, plant, counts.step),
     )
+
+
+def outside_torque(motion: VaneMotion) -> Any:
+    """Constant torque [N m] that works against plantarflexion beside a leg, which T_2 of equation (11) does below 0."""
+    if not isinstance(motion, FreeMotion):
+        return 0.0
+    return motion.external_torque if motion.leg is None else -motion.leg.ankle_torque
+
+
+def shank_kind(leg: Leg) -> ProfileKind:
+    """What leads the shank of a leg."""
+    return GAIT_SHANK if leg.gait is not None else PROFILES[leg.shank.kind]
+
+
+def shank_parameters(leg: Leg) -> Any:
+    """Parameters of what leads the shank of a leg; its settings may be arrays (runs,)."""
+    if leg.gait is None:
+        return profile_parameters(leg.shank)
+    return shank_series(leg.gait, leg.shank.settings["start"])
+
+
+def shank_series(gait: Gait, start: Any) -> ShankSeries:
+    """The shank of a gait from a phase [strides] on; a knee whose motion was not measured rests."""
+    curves = (series_of(gait, name) for name in ("shank_angle", "knee_forward", "knee_up"))
+    return ShankSeries(1.0 / gait.stride_time, start, *curves)
+
+
+def led_leg(plant: PlantParameters, leg: Leg) -> LedLeg:
+    """A leg on a plant that has none yet."""
+    foot = (leg.foot_mass, leg.foot_mass_centre, leg.foot_inertia)
+    return LedLeg(foot_load(plant.inertia, plant.gravity_torque, *foot, leg.shank_length), shank_parameters(leg))
+
+
+def foot_load(
+    inertia: float,
+    gravity_torque: float,
+    foot_mass: float,
+    foot_mass_centre: float,
+    foot_inertia: float,
+    shank_length: float,
+) -> FootLoad:
+    """What turns about the ankle of a leg: J and S of equation (11) with (1), docs/equations.md.
+
+    Inertia [kg m^2] and largest gravity torque [N m] of foot plate and vane, then the foot and the shank as in ``Leg``.
+    """
+    moment = foot_mass * foot_mass_centre
+    return FootLoad(
+        mass_moment=moment + gravity_torque / STANDARD_GRAVITY,
+        inertia=inertia + foot_inertia + moment * foot_mass_centre,
+        shank_length=shank_length,
+        gravity=STANDARD_GRAVITY,
+    )
+
+
+def with_load(plant: PlantParameters, load: FootLoad) -> PlantParameters:
+    """The plant with the inertia of all that turns; the weight of the foot plate is accounted for in the leg."""
+    return plant._replace(inertia=load.inertia, gravity_torque=0.0)
 
 
 def valve_parameters(valve: ValveModel, settings: Mapping[str, float]) -> Any:

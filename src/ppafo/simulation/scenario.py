@@ -14,6 +14,7 @@ from typing import Any, Protocol
 from ppafo.control.fixed.torque_laws import FIXED, FLOAT
 from ppafo.control.kind import PythonController
 from ppafo.errors import ScenarioError
+from ppafo.gait import Gait
 from ppafo.model.regulator import SupplyLines
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph
@@ -32,21 +33,48 @@ class ProfileChoice:
 
 
 @dataclass(frozen=True, slots=True)
+class Leg:
+    """A foot on a shank that is led, without ground. Equation (11) with a prescribed shank.
+
+    Mass of the foot [kg], from the ankle to its mass centre [m], inertia about that [kg m^2], length of the shank [m].
+    ``ankle_torque`` [N m] is T_2, positive in plantarflexion. ``shank`` is its angle in time [rad], upright at 0; with
+    the kind ``gait`` that of ``gait``, whose knee moves too, from the phase ``start`` [strides] on.
+    """
+
+    foot_mass: float
+    foot_mass_centre: float
+    foot_inertia: float
+    shank_length: float
+    ankle_torque: float
+    shank: ProfileChoice
+    gait: Gait | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class FreeMotion:
-    """The vane moves as the torques demand.
+    """The vane moves as the torques demand, alone or with the foot of a leg.
 
     Starts at ``angle`` [rad] with ``angular_velocity`` [rad/s]; ``external_torque`` [N m] is the constant T_ex of
-    equation (1), positive where it works against plantarflexion.
+    equation (1), positive where it works against plantarflexion. With a ``leg`` T_ex follows from equation (11).
     """
 
     angle: float
     angular_velocity: float = 0.0
     external_torque: float = 0.0
+    leg: Leg | None = None
 
     @property
     def label(self) -> str:
         """The motion in a few words."""
-        return f"free, from {math.degrees(self.angle):.4g} deg"
+        start = f"from {math.degrees(self.angle):.4g} deg"
+        if self.leg is None:
+            return f"free, {start}"
+        shank = self.leg.shank
+        level = shank.settings.get("level", math.nan)
+        at_rest = f"at rest at {math.degrees(level):.4g} deg"
+        led = at_rest if shank.kind == "constant" else f"led along the profile {shank.kind}"
+        led = led if self.leg.gait is None else f"of gait {self.leg.gait.name}"
+        return f"a foot that is free, {start}, on a shank {led}"
 
 
 @dataclass(frozen=True, slots=True)

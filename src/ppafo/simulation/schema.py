@@ -83,6 +83,33 @@ def _motion() -> Any:
                 "PrescribedMotion",
                 kind_field("prescribed", "the angle of the vane is a given function of time") | prescribed,
             ),
+            table(
+                "LegMotion",
+                kind_field("leg", "the vane moves a foot that is free, on a shank that is led")
+                | quantity_fields(declaration.LEG)
+                | {"shank": (_shank(), Field(description="angle of the shank in time, 0 upright"))},
+            ),
+        ]
+    )
+
+
+def _shank() -> Any:
+    gait = {"gait": (str, Field(min_length=1, description="name of a gait, or a path relative to this file"))}
+    return one_of(
+        [
+            *(
+                table(
+                    f"{model_name(name)}Shank",
+                    kind_field(name, kind.summary) | quantity_fields(declaration.shank_settings(name)),
+                )
+                for name, kind in PROFILES.items()
+            ),
+            table(
+                "GaitShank",
+                kind_field(declaration.GAIT_SHANK, "the shank and the knee of a gait, whose ground is left out")
+                | gait
+                | quantity_fields(declaration.shank_settings(declaration.GAIT_SHANK)),
+            ),
         ]
     )
 

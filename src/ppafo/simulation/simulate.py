@@ -11,6 +11,7 @@ import numpy as np
 
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
+from ppafo.engine.led_leg import shank_at
 from ppafo.engine.program import python_place
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together
@@ -19,6 +20,7 @@ from ppafo.errors import SimulationError
 from ppafo.metrics.catalog import evaluate
 from ppafo.metrics.metric import Metric
 from ppafo.model.gas import energy_per_content
+from ppafo.model.leg import torque_on_foot
 from ppafo.model.places import friction_in_motion
 from ppafo.model.plant import gravity_torque, sliding_friction
 from ppafo.model.regulator import LineState, line_pressures
@@ -26,9 +28,17 @@ from ppafo.parameters.device import Gas
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.check import ALLOWED_CHANGE, HALF_ERROR, MOVE, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck
 from ppafo.simulation.loading import scenario_or_load
-from ppafo.simulation.plan import plan_run, profile_values
+from ppafo.simulation.plan import foot_load, plan_run, profile_values, shank_kind
 from ppafo.simulation.sampled import run_sampled, state_row_numbers
-from ppafo.simulation.scenario import PrescribedMotion, Scenario, plain, scenario_document, worn_kind
+from ppafo.simulation.scenario import (
+    FreeMotion,
+    Leg,
+    PrescribedMotion,
+    Scenario,
+    plain,
+    scenario_document,
+    worn_kind,
+)
 from ppafo.storage import dataset_of, write_result
 from ppafo.version import __version__
 
@@ -253,8 +263,10 @@ def gas_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tu
 
 
 def _external_torque(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats], torque: Floats) -> Floats:
-    """T_ex of equation (1) [N m]: the constant of a free vane, or what keeps a prescribed one on its path."""
+    """T_ex of equation (1) [N m]: of a free vane its constant or what a leg gets, or what keeps one on its path."""
     plant = run.plant
+    if isinstance(scenario.motion, FreeMotion) and scenario.motion.leg is not None:
+        return _torque_on_leg(scenario.motion.leg, run, times, rows, torque)
     if not isinstance(scenario.motion, PrescribedMotion):
         return np.full(times.size, plant.external_torque)
     acceleration = profile_values(scenario.motion.profile, times)[2]
@@ -262,6 +274,22 @@ def _external_torque(scenario: Scenario, run: Run, times: Floats, rows: Mapping[
     friction = np.array([sliding_friction(float(value), 1.0) for value in rate]) * _sizes_of_friction(run, rows)
     gravity = gravity_torque(angle, plant.gravity_torque)
     return np.asarray(torque - gravity - friction - plant.viscous_damping * rate - plant.inertia * acceleration)
+
+
+def _torque_on_leg(leg: Leg, run: Run, times: Floats, rows: Mapping[str, Floats], torque: Floats) -> Floats:
+    """T_ex [N m] by the second row of equation (11): what the foot needs beside T_2. A blow at a stop is not in it."""
+    assert run.leg is not None, "the run has the leg of its scenario"
+    angle, rate, plant = rows["state.angle"], rows["state.angular_velocity"], run.plant
+    foot = foot_load(0.0, 0.0, leg.foot_mass, leg.foot_mass_centre, leg.foot_inertia, leg.shank_length)
+    kind = shank_kind(leg)
+    at = [shank_at(kind, run.leg.shank, float(time)) for time in times]
+    places = list(zip(at, angle.tolist(), strict=True))
+    added = np.array([torque_on_foot(run.leg.load, now, place) for now, place in places])
+    needed = np.array([torque_on_foot(foot, now, place) for now, place in places])
+    net = torque + added - plant.external_torque - plant.viscous_damping * rate
+    net -= np.sign(rate) * _sizes_of_friction(run, rows)
+    acceleration = np.where(rate != 0.0, net / plant.inertia, 0.0)
+    return np.asarray(foot.inertia * acceleration - needed + plant.external_torque)
 
 
 def _sizes_of_friction(run: Run, rows: Mapping[str, Floats]) -> Floats | float:

@@ -196,7 +196,9 @@ def vane_acceleration(
     way: float,
     compare: Compare = both_sides,
     acting: Acting | None = None,
+    added_torque: Any = 0.0,
 ) -> Any:
     """Angular acceleration [rad/s^2] of a vane that slides one ``way`` (1 or -1), 0 where it is held (0)."""
-    motion = symbolic(free_motion, PlantParameters, float, float, float, float, float, compare=compare, acting=acting)
-    return motion(plant, angle, rate, *pressures, way)[1]
+    types = (PlantParameters, float, float, float, float, float, float)
+    motion = symbolic(free_motion, *types, compare=compare, acting=acting)
+    return motion(plant, angle, rate, *pressures, added_torque, way)[1]

@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.gait import Gait
+from ppafo.gait import Gait, series_of
 from ppafo.gait.gait import Curve
 from ppafo.model.columns import over_runs
 from ppafo.model.contact import NEARLY_FLAT
-from ppafo.model.gait import HARMONICS, GaitSeries, GaitTiming, Harmonic, Series
+from ppafo.model.gait import HARMONICS, GaitSeries, GaitTiming
 from ppafo.signals.recording import Floats
 from ppafo.walking.preparation import rocker_on_heel
 from ppafo.walking.wearer import HeelRocker, Wearer
@@ -32,8 +32,6 @@ EVENT_PHASES = np.linspace(0.0, 1.0, 1001)[150:]
 
 CLEARANCE_FROM, CLEARANCE_TO = 0.2, 0.9
 """Shares of the swing between which the toes must clear the ground."""
-
-ZERO = Series(mean=0.0, harmonics=(Harmonic(0.0, 0.0),) * HARMONICS)
 
 ANKLE_HEIGHT_FRACTION = 0.039 / 0.246
 """Height of the ankle over the sole as a fraction of the shank's length: both as fractions of the stature in figure
@@ -62,22 +60,13 @@ LONGER_THAN_A_FOOT = 1.0e3
 def gait_series(gait: Gait) -> GaitSeries:
     """The curves of a gait for the engine; a moment, force or knee motion that was not measured is 0."""
     return GaitSeries(
-        shank=_series(gait, "shank_angle"),
-        ankle=_series(gait, "ankle_angle"),
-        moment=_series(gait, "ankle_moment"),
-        force=_series(gait, "vertical_force"),
-        knee_forward=_series(gait, "knee_forward"),
-        knee_up=_series(gait, "knee_up"),
+        shank=series_of(gait, "shank_angle"),
+        ankle=series_of(gait, "ankle_angle"),
+        moment=series_of(gait, "ankle_moment"),
+        force=series_of(gait, "vertical_force"),
+        knee_forward=series_of(gait, "knee_forward"),
+        knee_up=series_of(gait, "knee_up"),
     )
-
-
-def _series(gait: Gait, name: str) -> Series:
-    curve = gait.curves.get(name)
-    if curve is None:
-        return ZERO
-    missing = (0.0,) * HARMONICS
-    pairs = zip((*curve.cosines, *missing)[:HARMONICS], (*curve.sines, *missing)[:HARMONICS], strict=True)
-    return Series(mean=curve.mean, harmonics=tuple(Harmonic(cosine, sine) for cosine, sine in pairs))
 
 
 def truncate(curve: Curve) -> Curve:

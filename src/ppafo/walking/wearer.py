@@ -18,18 +18,18 @@ from ppafo.gait import Gait
 from ppafo.model.declaration import Quantity
 from ppafo.model.leg import LegParameters
 from ppafo.signals.recording import Floats
-from ppafo.simulation.declaration import value_at
+from ppafo.simulation.declaration import FOOT, value_at
 from ppafo.simulation.reading import Reading
 
 WEARER = (
     Quantity("body_mass", "kg", "mass of the body", 72.5, 10.0, 300.0),
-    Quantity("shank_length", "m", "knee to ankle", 0.46, 0.1, 1.0),
+    FOOT["shank_length"],
     Quantity("shank_mass_centre", "m", "knee to the mass centre of the shank", 0.199, 0.0, 1.0),
     Quantity("shank_mass", "kg", "mass of the shank", 4.5, 0.1, 30.0),
     Quantity("shank_inertia", "kg m^2", "inertia of the shank about its mass centre", 0.1, 1.0e-4, 5.0),
-    Quantity("foot_mass_centre", "m", "ankle to the mass centre of the foot", 0.09, 0.0, 0.5),
-    Quantity("foot_mass", "kg", "mass of the foot", 1.0, 0.05, 10.0),
-    Quantity("foot_inertia", "kg m^2", "inertia of the foot about its mass centre", 0.001, 1.0e-5, 1.0),
+    FOOT["foot_mass_centre"],
+    FOOT["foot_mass"],
+    FOOT["foot_inertia"],
     Quantity("heel_lever", "m", "ankle back to the heel; bounds the lever of the ground force", 0.05, 0.0, 0.2),
     Quantity("toe_lever", "m", "ankle forward to the toes", 0.18, 0.0, 0.5),
     Quantity("ankle_stiffness", "N m/rad", "stiffness of tissue at the ankle", 4.0, 0.0, 500.0),

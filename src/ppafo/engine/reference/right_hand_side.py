@@ -4,11 +4,13 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
+from ppafo.engine.led_leg import torque_lines
 from ppafo.engine.loading import ARRAY, FLOAT, HEADER, INLINE, entry_text
 from ppafo.engine.program import NoParameters, Program, link_program
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import SourceCollector, woven
 from ppafo.model.effects.kind import Moment
+from ppafo.model.leg import FootLoad
 from ppafo.model.orifice import isentropic_flow_function, iso6358_flow_function
 from ppafo.model.places import friction_in_motion, way_in, way_out
 from ppafo.model.plant import (
@@ -204,15 +206,21 @@ def joined_thermal_rates(
 
 
 def free_motion(
-    plant: PlantParameters, angle: float, angular_velocity: float, pressure_1: float, pressure_2: float, way: float
+    plant: PlantParameters,
+    angle: float,
+    angular_velocity: float,
+    pressure_1: float,
+    pressure_2: float,
+    added_torque: float,
+    way: float,
 ) -> tuple[float, float]:
     """Slopes of angle [rad/s] and angular velocity [rad/s^2] of a vane that slides towards ``way`` (0: it is held).
 
-    Equations (1), (2), (10).
+    Equations (1), (2), (10). ``added_torque`` [N m] drives the vane beside what the plant has: that of a leg.
     """
     if way == 0.0:
         return 0.0, 0.0
-    torque = driving_torque(plant, angle, pressure_1, pressure_2)
+    torque = driving_torque(plant, angle, pressure_1, pressure_2) + added_torque
     friction = way * friction_in_motion(plant.dynamic_torque, angular_velocity, pressure_1, pressure_2)
     return angular_velocity, vane_acceleration(torque, angular_velocity, friction, plant.viscous_damping, plant.inertia)
 
@@ -243,6 +251,7 @@ def parameter_groups(program: Program) -> dict[str, type]:
         "leak_orifice": ExactOrifice,
         "valve": program.valve.parameters,
         "path": NoParameters if program.angle is None else program.angle.parameters,
+        **({} if program.shank is None else {"load": FootLoad, "shank": program.shank.parameters}),
         **{effect.name: effect.parameters for effect in program.effects},
     }
 
@@ -280,7 +289,8 @@ def right_hand_side_source(program: Program) -> str:
         "slopes[6] = gas.leaked",
     ]
     if program.angle is None:
-        lines += [f"slopes[0], slopes[1] = {add(free_motion)}(plant, y[0], y[1], pressure_1, pressure_2, way)"]
+        moved = f"{add(free_motion)}(plant, y[0], y[1], pressure_1, pressure_2, added, way)"
+        lines += [*torque_lines(program, add, "t", "y[0]"), f"slopes[0], slopes[1] = {moved}"]
     else:
         lines += ["slopes[0] = 0.0", "slopes[1] = 0.0"]
     lines += [f"moves = {add(program.valve.rates)}(valve, valve_state, command)"]

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.lanes import BatchResult, run_batch, samples_in
+from ppafo.engine.led_leg import torque_of_leg
 from ppafo.engine.loading import load_source, with_arrays
 from ppafo.engine.program import python_place
 from ppafo.engine.reference.right_hand_side import (
@@ -196,6 +197,7 @@ def load_right_hand_side(run: Run) -> RightHandSide:
         run.leak_orifice,
         run.valve,
         run.path,
+        *(() if run.leg is None else (run.leg.load, run.leg.shank)),
         *run.effects,
     )
     parameters = np.array([number for group in groups for number in numbers(group)])
@@ -228,11 +230,10 @@ class _Solution:
         self.valve_from = unknowns_before_valve(run.program)
         self.show = python_place(shown_signals, run.program.effects, run.effects)
         self.limit = python_place(friction_at_rest, run.program.effects, run.effects)
-        self.command = 0.0
+        self.command, self.time = 0.0, 0.0
         self.way = self.rest_mode() if run.program.angle is None else 0.0
         if self.y[1] != 0.0 and run.program.angle is None:
             self.way = float(np.sign(self.y[1]))
-        self.time = 0.0
         self.control = SampledControl(run, self.present_signals())
         count = samples_in(run.step_count, run.record_every)
         times = np.arange(count, dtype=np.float64) * (run.step * run.record_every)
@@ -255,8 +256,8 @@ class _Solution:
             fill(t, self.command, self.way)
             yp[:] = found
 
-        def write_roots(_t: float, y: Floats, events: Floats) -> None:
-            events[:] = self.roots(y.tolist())
+        def write_roots(t: float, y: Floats, events: Floats) -> None:
+            events[:] = self.roots(t, y.tolist())
 
         roots: Any = write_roots
         roots.terminal = [True, True]
@@ -274,24 +275,27 @@ class _Solution:
             max_num_steps=MAXIMUM_STEPS,
         )
 
-    def roots(self, y: Sequence[float]) -> Roots:
+    def roots(self, time: float, y: Sequence[float]) -> Roots:
         """Root functions of the present mode; Python's floats are several times quicker here than NumPy's."""
         plant = self.run.plant
         if self.way == 0.0:
-            return roots_at_rest(self.plant_at(y), y[0], self.torque(y))
+            return roots_at_rest(self.plant_at(y), y[0], self.torque(time, y))
         return roots_sliding(plant, y[0], y[1], self.way)
 
     def rest_mode(self) -> float:
         """Mode of the vane at rest with the present gas."""
-        return mode_at_rest(self.plant_at(self.y.tolist()), self.y[0], self.torque(self.y.tolist()))
+        y = self.y.tolist()
+        return mode_at_rest(self.plant_at(y), y[0], self.torque(self.time, y))
 
-    def torque(self, y: Sequence[float]) -> float:
-        """Driving torque [N m] with unknowns."""
-        return driving_torque_of(self.run.program.actuator, self.run.plant, y[0], y[2], y[3])
+    def torque(self, time: float, y: Sequence[float]) -> float:
+        """Driving torque [N m] with unknowns at a time [s]."""
+        run = self.run
+        alone = driving_torque_of(run.program.actuator, run.plant, y[0], y[2], y[3])
+        return alone if run.leg is None else alone + torque_of_leg(run.program, run.leg, time, y[0])
 
     def is_thrown_at_its_stop(self) -> bool:
         """True for a vane on a stop with an angular velocity into it; a root that is 0 at the start is no event."""
-        roots = self.roots(self.y.tolist())
+        roots = self.roots(self.time, self.y.tolist())
         return self.way != 0.0 and roots.second <= 0.0 < roots.first
 
     def solve(self) -> ReferenceResult:
@@ -402,10 +406,10 @@ class _Solution:
         plant = self.run.plant
         if self.way == 0.0:
             # The torque equals the static limit to rounding here, so its sign alone says which way the vane goes.
-            self.way = 1.0 if self.torque(self.y.tolist()) > 0.0 else -1.0
+            self.way = 1.0 if self.torque(self.time, self.y.tolist()) > 0.0 else -1.0
             self.result.breakaways.append(self.time)
             return
-        roots = self.roots(self.y.tolist())
+        roots = self.roots(self.time, self.y.tolist())
         if abs(roots.second) < abs(roots.first):
             self.result.impacts.append(self.time)
             self.y[0] = plant.angle_max if self.way > 0.0 else plant.angle_min

@@ -210,14 +210,17 @@ def depart(
     return clamp_angle(plant, angle), (0.0 if hits else rate)
 
 
-def begin_part(plant: PlantParameters, state: PlantState, longest: float) -> tuple[FreePart, float]:
+def begin_part(
+    plant: PlantParameters, state: PlantState, added_torque: float, longest: float
+) -> tuple[FreePart, float]:
     """Where a part of a step of at most ``longest`` [s] leads a free vane, and its length [s]: until it meets a stop.
 
     So the gas works against the motion that happens. A vane at rest whose torque is above static friction slides.
+    ``added_torque`` [N m] drives the vane at the beginning beside what the plant has: that of a leg.
     """
     velocity = state.angular_velocity
     pressure_1, pressure_2 = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
-    torque = driving_torque(plant, state.angle, pressure_1, pressure_2)
+    torque = driving_torque(plant, state.angle, pressure_1, pressure_2) + added_torque
     friction = friction_now(plant, velocity, pressure_1, pressure_2)
     stays = holds_still(torque, friction.at_rest, state.angle <= plant.angle_min, state.angle >= plant.angle_max)
     leaving = 0.0 if stays else direction_of(torque)
@@ -237,14 +240,17 @@ def begin_part(plant: PlantParameters, state: PlantState, longest: float) -> tup
     ), length
 
 
-def end_part(plant: PlantParameters, state: PlantState, begun: FreePart, length: float) -> tuple[float, float, float]:
+def end_part(
+    plant: PlantParameters, state: PlantState, begun: FreePart, added_torque: float, length: float
+) -> tuple[float, float, float]:
     """Angle [rad] and angular velocity [rad/s] at the end of a part, and the error of the angle over what is allowed.
 
-    ``state`` has the new gas and the motion of the begin.
+    ``state`` has the new gas and the motion of the begin; ``added_torque`` [N m] is that at the end, where the part
+    would lead without reversal.
     """
     velocity, way = state.angular_velocity, begun.way
     next_1, next_2 = chamber_pressures(plant, begun.next_angle, state.mass_1, state.mass_2)
-    next_torque = driving_torque(plant, begun.next_angle, next_1, next_2)
+    next_torque = driving_torque(plant, begun.next_angle, next_1, next_2) + added_torque
     friction = friction_now(plant, velocity + begun.acceleration * length, next_1, next_2)
     sliding_torque = next_torque - way * friction.in_motion
     full_velocity = next_velocity(plant, velocity, begun.acceleration, sliding_torque, length)

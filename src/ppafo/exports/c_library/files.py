@@ -21,7 +21,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.graph import Graph
 from ppafo.parameters.plant import effects_of
-from ppafo.simulation.scenario import PrescribedMotion, Scenario
+from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
@@ -336,6 +336,8 @@ def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
     """What the page of the library says of this scenario, in which settings follow others by ``links``."""
     motion = scenario.motion
     moves = f"prescribed, `{motion.profile.kind}`" if isinstance(motion, PrescribedMotion) else "free"
+    if isinstance(motion, FreeMotion) and motion.leg is not None:
+        moves = f"free with the foot of a leg, whose shank is led, `{motion.leg.shank.kind}`"
     fixed = [
         f"the valve, `{scenario.device.valve.kind}`, and the controller, `{scenario.control.kind}`",
         f"the reference, `{scenario.reference.kind}`, and the motion, {moves}",

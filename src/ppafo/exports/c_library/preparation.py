@@ -18,6 +18,7 @@ from ppafo.exports.c_library.program import COUNTS
 from ppafo.model.actuators.kind import Range, mean_growth
 from ppafo.model.catalog import VALVES, device_effects
 from ppafo.model.declaration import Quantity
+from ppafo.model.gait import ShankSeries
 from ppafo.model.gas import specific_gas_constant
 from ppafo.model.plant import PlantParameters
 from ppafo.model.regulator import SupplyLines
@@ -40,14 +41,18 @@ from ppafo.simulation.numbers import (
     time_texts,
 )
 from ppafo.simulation.plan import (
+    foot_load,
     is_slow_held,
     lines_at_start,
+    shank_kind,
+    shank_series,
     state_at_start,
     state_with_volumes,
     step_counts,
     thermal_gas,
+    with_load,
 )
-from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
+from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, Scenario
 from ppafo.units import parse_quantity
 
 ENTRY = '@njit("void(float64[::1], float64[::1], float64[::1], float64[::1])")'
@@ -339,9 +344,12 @@ def used_numbers(device: Device, declared: Mapping[str, Quantity]) -> dict[str, 
 def preparation_of(scenario: Scenario, program: Program, collector: Collector) -> str:
     """The composed function ``prepare`` of a scenario, once everything it calls is gathered."""
     writing = Writing(scenario.device, scenario.supply_lines, program, collector)
-    torque = "motion_external_torque" if isinstance(scenario.motion, FreeMotion) else "0.0"
+    leg = scenario.motion.leg if isinstance(scenario.motion, FreeMotion) else None
+    free = "motion_external_torque" if leg is None else "-motion_ankle_torque"
+    torque = free if isinstance(scenario.motion, FreeMotion) else "0.0"
     lines = [
         *writing.plant("plant", torque),
+        *([] if leg is None else _leg(leg, writing)),
         *_steps(scenario, writing),
         *_pieces(scenario, writing),
         *_start(scenario, writing),
@@ -373,6 +381,21 @@ def _pieces(scenario: Scenario, writing: Writing) -> Iterator[str]:
         held = {"level": "motion_angle"} if program.is_held else {}
         yield f"path = {_kind(writing, 'motion.profile', PROFILES[scenario.motion.profile.kind], held)}"
     yield from writing.gas()
+
+
+def _leg(leg: Leg, writing: Writing) -> Iterator[str]:
+    """Lines that put a leg on the plant; of a gait only where it begins is a setting."""
+    add = writing.add
+    foot = writing.section("motion", ["foot_mass", "foot_mass_centre", "foot_inertia", "shank_length"])
+    yield f"load = {add(foot_load)}(plant.inertia, plant.gravity_torque, {', '.join(foot.values())})"
+    yield f"plant = {add(with_load)}(plant, load)"
+    kind = shank_kind(leg)
+    if leg.gait is None:
+        yield f"shank = {_kind(writing, 'motion.shank', kind)}"
+        return
+    constant = dict(zip(leaf_paths(ShankSeries, "shank"), map(repr, numbers(shank_series(leg.gait, 0.0))), strict=True))
+    cells = constant | {"shank.start": c_identifier("motion.shank.start")}
+    yield f"shank = {row_expression(ShankSeries, 'shank', cells, add)}"
 
 
 def _kind(writing: Writing, section: str, kind: Any, given: Mapping[str, str] | None = None) -> str:

@@ -36,7 +36,7 @@ from ppafo.exports.fmu.description import (
 )
 from ppafo.exports.templates import filled, licence, template
 from ppafo.model.valves.kind import VENT
-from ppafo.simulation.plan import step_counts
+from ppafo.simulation.plan import outside_torque, step_counts
 from ppafo.simulation.scenario import (
     Control,
     FreeMotion,
@@ -337,7 +337,7 @@ def _walking_plant(configuration: Scenario) -> Interface:
 def _hidden(library: Library) -> frozenset[str]:
     """Settings that are none of the unit's variables."""
     hidden = {"run.duration", "run.output_interval", "controller.period", "controller.command"}
-    unused = ("sensors.", "motion.profile.", "motion.external_torque")
+    unused = ("sensors.", "motion.profile.", "motion.external_torque", "motion.ankle_torque")
     return frozenset(hidden | {item.path for item in library.settings if item.path.startswith(unused)})
 
 
@@ -372,7 +372,7 @@ def _plant_of_scenario(scenario: Scenario) -> Interface:
         words={
             "steps": steps_source(library),
             "highest": "1.0",
-            "follow": _FOLLOW_ANGLE if is_led else "    settings->motion_external_torque = inputs[1];",
+            "follow": _FOLLOW_ANGLE if is_led else f"    settings->{_outside(chosen)};",
             "lead": _LEAD_ANGLE if is_led else "    rows[PARAMETER_PLANT_EXTERNAL_TORQUE] = inputs[1];",
         },
     )
@@ -395,11 +395,19 @@ def _walk_of_plant(configuration: Scenario) -> Scenario:
     )
 
 
+def _outside(scenario: Scenario) -> str:
+    """How the torque that is handed in is set: T_ex of a vane alone, or T_2 of the ankle of a leg, which is opposed."""
+    motion = vane_motion(scenario)
+    has_leg = isinstance(motion, FreeMotion) and motion.leg is not None
+    return "motion_ankle_torque = -inputs[1]" if has_leg else "motion_external_torque = inputs[1]"
+
+
 def _inputs(scenario: Scenario) -> tuple[Input, ...]:
     motion = vane_motion(scenario)
     if isinstance(motion, FreeMotion):
-        said = "torque T_ex on the joint, above 0 works against plantarflexion"
-        return (COMMAND, Input("external_torque", "N m", said, motion.external_torque))
+        joint = "T_ex on the joint" if motion.leg is None else "on the ankle of the leg, -T_2"
+        said = f"torque {joint}, above 0 works against plantarflexion"
+        return (COMMAND, Input("external_torque", "N m", said, outside_torque(motion)))
     angle = motion.profile.settings["start_level"]
     return (
         COMMAND,

@@ -15,7 +15,7 @@ from ppafo.parameters.declaration import AREA_FORM, SECTIONS, SONIC_FORM
 from ppafo.parameters.device import Device, Orifice
 from ppafo.signals import Recording
 from ppafo.simulation import numbers
-from ppafo.simulation.declaration import FREE, INITIAL
+from ppafo.simulation.declaration import FREE, INITIAL, LEG, shank_settings
 from ppafo.simulation.recorded import (
     ANGLE,
     COMMAND,
@@ -108,6 +108,12 @@ def _check_inputs(experiment: Experiment, said: str) -> None:
         raise IdentificationError(
             f"{said}: the angle of the vane is prescribed, so a torque on it has no effect; remove it from inputs"
         )
+    motion = experiment.scenario.motion
+    if EXTERNAL_TORQUE in experiment.inputs and isinstance(motion, FreeMotion) and motion.leg is not None:
+        raise IdentificationError(
+            f"{said}: the vane carries the foot of a leg, which T_ex follows from; remove it from inputs, or take a "
+            "scenario whose motion is free"
+        )
     if COMMAND in experiment.inputs:
         check_command(experiment.recording, said)
     if experiment.inputs:
@@ -183,7 +189,9 @@ def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     valve = (*opening, *VALVES[device.valve.kind].quantities)
     found |= {f"valves.{device.valve_name}.{item.name}": item for item in valve}
     if isinstance(scenario.motion, FreeMotion):
-        found |= {f"motion.{item.name}": item for item in FREE}
+        leg = scenario.motion.leg
+        found |= {f"motion.{item.name}": item for item in (FREE if leg is None else LEG)}
+        found |= {} if leg is None else {f"motion.shank.{item.name}": item for item in shank_settings(leg.shank.kind)}
     found |= {f"initial.{item.name}": item for item in INITIAL}
     return found | {f"recording.{item.name}": item for item in RECORDING}
 

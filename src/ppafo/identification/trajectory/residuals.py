@@ -31,13 +31,16 @@ from ppafo.simulation.plan import (
     exact_orifice,
     initial_lines,
     initial_state,
+    led_leg,
+    outside_torque,
     plan_run,
     plant_behind_lines,
     thermal_parameters,
     valve_parameters,
+    with_load,
 )
 from ppafo.simulation.recorded import ANGLE, RecordedInputs, step_inputs, with_prescribed_angle
-from ppafo.simulation.scenario import FreeMotion, Scenario
+from ppafo.simulation.scenario import FreeMotion, Scenario, vane_motion
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -248,7 +251,7 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
     """
     base = prepared.run
     scenario = with_numbers(prepared.scenario, numbers)
-    device, motion = scenario.device, scenario.motion
+    device, motion = scenario.device, vane_motion(scenario)
     settings: Mapping[str, Any] = device.valve.settings
     delay = base.program.valve.command_delay(settings)
     counts = [value.size for value in settings.values() if isinstance(value, np.ndarray)]
@@ -265,8 +268,10 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
             f"experiment '{prepared.label}': an effect went on or off, which is another model; start above 0 and give "
             "a lower bound above 0"
         )
-    bare = plant_parameters(device, motion.external_torque if isinstance(motion, FreeMotion) else 0.0)
-    plant = plant_behind_lines(bare, scenario.supply_lines)
+    bare = plant_behind_lines(plant_parameters(device, outside_torque(motion)), scenario.supply_lines)
+    of_leg = motion.leg if isinstance(motion, FreeMotion) else None
+    leg = None if of_leg is None else led_leg(bare, of_leg)
+    plant = bare if leg is None else with_load(bare, leg.load)
     # The engine allows a fraction of the supply pressure. Where that is fitted, the error in pascals must stay.
 
     def range_of_supply(first: float, second: float, atmosphere: float) -> float:
@@ -288,6 +293,7 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
         command_delay=delay,
         lines=initial_lines(plant, scenario.supply_lines),
         effects=effect_rows(device, scenario.effect_sections),
+        leg=leg,
     )
 
 

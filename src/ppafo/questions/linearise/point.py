@@ -6,12 +6,16 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.control.profiles import CONSTANT
 from ppafo.engine.lanes import Floats, run_batch
+from ppafo.engine.led_leg import LedLeg, shank_at, torque_of_leg
 from ppafo.engine.program import Program, python_place
 from ppafo.engine.reference.solver import mode_at_rest, torque_on_vane
 from ppafo.engine.rows import leaf_paths, leaves, numbers, rebuilt
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.errors import ScenarioError, SimulationError
+from ppafo.model.elementary import TURN, sine_and_cosine_of_turns
+from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
 from ppafo.model.places import friction_at_rest
 from ppafo.model.plant import (
     Openings,
@@ -80,8 +84,8 @@ def valve_states(program: Program) -> dict[str, str]:
     return {VALVE + path.removeprefix("valve_state.").replace(".", "_"): path for path in paths}
 
 
-def plant_of(run: Run, way: float | None, compare: Compare = both_sides) -> Plant:
-    """The plant of a run without its controller and sensors.
+def plant_of(run: Run, way: float | None, compare: Compare = both_sides, time: float = 0.0) -> Plant:
+    """The plant of a run without its controller and sensors; the shank of a leg is where it is at ``time`` [s].
 
     ``way`` is the direction of a free vane, 0 for one that is held by friction or a stop; None where the ankle is
     prescribed: angle and angular velocity are inputs then.
@@ -105,9 +109,10 @@ def plant_of(run: Run, way: float | None, compare: Compare = both_sides) -> Plan
     if way:
         angle, rate = (at[name] for name in motion)
         acting = dict(zip(program.effects, run.effects, strict=True))
+        added = 0.0 if run.leg is None else _torque_of_leg(run.program, run.leg, time, angle)
         turning = {
             "angle": rate,
-            "angular_velocity": vane_acceleration(plant, angle, rate, pressures, way, compare, acting),
+            "angular_velocity": vane_acceleration(plant, angle, rate, pressures, way, compare, acting, added),
         }
     outputs = {"torque": actuator_torque(*pressures, plant.torque_constant)}
     outputs |= {name: at[name] for name in (*turning, *gas)}
@@ -117,6 +122,18 @@ def plant_of(run: Run, way: float | None, compare: Compare = both_sides) -> Plan
     kept = {name: rate for name, rate in spool.items() if casadi.depends_on(used, at[name])}
     inputs = (*driven[:3], *(motion if way is None else driven[3:] if way else ()))
     return Plant(at, turning | gas | kept, inputs, outputs | {name: at[name] for name in kept})
+
+
+def _torque_of_leg(program: Program, leg: LedLeg, time: float, angle: Any) -> Any:
+    """Torque of a leg [N m] at an angle that is a symbol, with the shank as it is at a time [s]."""
+    import casadi
+
+    def turned(_own: Any, turns: Any) -> tuple[Any, Any]:
+        return casadi.sin(TURN * turns), casadi.cos(TURN * turns)
+
+    assert program.shank is not None, "a leg has a shank"
+    torque = symbolic(torque_on_foot, FootLoad, ShankNow, float, around={sine_and_cosine_of_turns: turned})
+    return torque(leg.load, shank_at(program.shank, leg.shank, time), angle)
 
 
 def _valve(run: Run, state: list[Any], command: Any, compare: Compare) -> tuple[Any, list[Any]]:
@@ -204,7 +221,7 @@ def _after(scenario: Scenario, run: Run, steps: int) -> tuple[dict[str, float], 
     if isinstance(run.thermal, ThermalParameters):
         warm = [rows[f"state.mass_{side}"] / rows[f"masses.mass_{side}"] for side in (1, 2)]
         values |= {f"temperature_{side}": run.thermal.temperature * warm[side - 1] for side in (1, 2)}
-    return values, _way(run, values)
+    return values, _way(run, values, steps * run.step)
 
 
 def _values(run: Run, angle: float, rate: float, pressure_1: float, pressure_2: float) -> dict[str, float]:
@@ -214,8 +231,8 @@ def _values(run: Run, angle: float, rate: float, pressure_1: float, pressure_2: 
     return values | {name: float(getattr(run.plant, name)) for name in driven}
 
 
-def _way(run: Run, values: Mapping[str, float]) -> float | None:
-    """Direction of a free vane, 0 where it is held."""
+def _way(run: Run, values: Mapping[str, float], time: float) -> float | None:
+    """Direction of a free vane, 0 where it is held, at a time [s]."""
     if run.program.angle is not None:
         return None
     rate, angle = values["angular_velocity"], values["angle"]
@@ -227,7 +244,8 @@ def _way(run: Run, values: Mapping[str, float]) -> float | None:
     if limit is not None:
         pressures = values["pressure_1"], values["pressure_2"]
         plant = plant._replace(static_torque=limit({}, plant.static_torque, *pressures))
-    return mode_at_rest(plant, angle, torque_on_vane(plant, angle, *masses))
+    added = 0.0 if run.leg is None else torque_of_leg(run.program, run.leg, time, angle)
+    return mode_at_rest(plant, angle, torque_on_vane(plant, angle, *masses) + added)
 
 
 def equilibrium(scenario: Scenario) -> Point:
@@ -238,6 +256,8 @@ def equilibrium(scenario: Scenario) -> Point:
     controller is a constant command, the command is that one.
     """
     whole = plan_run(scenario)
+    if whole.leg is not None and whole.program.shank is not CONSTANT:
+        raise ScenarioError(f"{scenario.name}: no equilibrium while the shank of the leg moves; take --at with a time")
     values, _ = _after(scenario, whole, whole.step_count)
     values["angular_velocity"] = 0.0
     is_open_loop = scenario.control.kind == OPEN_LOOP
@@ -248,7 +268,7 @@ def equilibrium(scenario: Scenario) -> Point:
     found = _steady(run, held, values, wanted)
     if found is None:
         raise ScenarioError(_no_equilibrium(scenario, run, held, values, wanted))
-    way = _way(run, found)
+    way = _way(run, found, scenario.duration)
     if way:
         raise ScenarioError(
             f"{scenario.name}: no equilibrium: at {np.degrees(values['angle']):.4g} deg the torque moves the vane; "

@@ -114,11 +114,12 @@ def _model(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     """The linear model at a point, from the smooth piece that the point lies on."""
     values = dict(point.values)
     decided = _Sides(values)
-    plant = plant_of(run, point.way, decided)
+    time = point.time or 0.0
+    plant = plant_of(run, point.way, decided, time)
     matrices = _matrices(plant, values)
     edges = []
     for place, edge in decided.edges.items():
-        others = _matrices(plant_of(run, point.way, _Sides(values, place)), values)
+        others = _matrices(plant_of(run, point.way, _Sides(values, place), time), values)
         if any(_differs(one, other) for one, other in zip(matrices[:4], others[:4], strict=True)):
             edges.append(edge)
     a, b, c, d, found, shown = matrices

@@ -1,0 +1,61 @@
+"""A foot on a shank that is led, without ground: the torque that it adds to a free vane, in the lanes and in Python.
+
+Foot, foot plate and vane turn as one body, whose inertia the plant has; what shank, knee and weight do to it stands
+here. A walk's free foot has the same physics with more around it (``scheme/ankle_torque.py``).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from ppafo.control.kind import ProfileKind
+from ppafo.engine.program import Program
+from ppafo.model.gait import ShankSeries, shank_in_gait
+from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
+
+GAIT_SHANK = ProfileKind(
+    name="gait",
+    summary="The shank of a gait, whose ground is left out.",
+    quantities=(),
+    parameters=ShankSeries,
+    value=shank_in_gait,
+    bounds=lambda gait: (-gait.start, gait.start),
+)
+"""A shank whose knee moves too: its value is a ``ShankNow``. Any other profile leads a shank whose knee rests."""
+
+
+@dataclass(frozen=True, slots=True)
+class LedLeg:
+    """What a foot on a prescribed shank adds to a run: the body that turns about the ankle, and the shank's profile."""
+
+    load: FootLoad
+    shank: Any
+
+
+def shank_at(kind: ProfileKind, shank: Any, time: float) -> ShankNow:
+    """The shank at a time [s]."""
+    if kind is GAIT_SHANK:
+        return shank_in_gait(shank, time)
+    angle, rate, acceleration = kind.value(shank, time)
+    return ShankNow(angle, rate, acceleration, knee_forward=0.0, knee_up=0.0)
+
+
+def torque_of_leg(program: Program, leg: LedLeg, time: float, angle: float) -> float:
+    """Torque of a leg on the vane [N m] at a time [s] and an angle [rad], positive in plantarflexion."""
+    assert program.shank is not None, "a leg has a shank"
+    return torque_on_foot(leg.load, shank_at(program.shank, leg.shank, time), angle)
+
+
+def torque_lines(program: Program, add: Callable[..., str], time: str, angle: str) -> list[str]:
+    """Lines that make ``added`` [N m], the torque of a leg on the vane at expressions of time [s] and angle [rad]."""
+    kind = program.shank
+    if kind is None:
+        return ["added = 0.0"]
+    if kind is GAIT_SHANK:
+        lines = [f"shank_now = {add(kind.value)}(shank, {time})"]
+    else:
+        lines = [
+            f"shank_angle, shank_rate, shank_acceleration = {add(kind.value)}(shank, {time})",
+            f"shank_now = {add(ShankNow)}(shank_angle, shank_rate, shank_acceleration, 0.0, 0.0)",
+        ]
+    return [*lines, f"added = {add(torque_on_foot)}(load, shank_now, {angle})"]
