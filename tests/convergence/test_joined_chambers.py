@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from ppafo.engine.reference.right_hand_side import ExactOrifice, joined_thermal_rates, thermal_gas_rates
+from ppafo.engine.reference.right_hand_side import joined_thermal_rates, thermal_gas_rates
 from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.engine.scheme.motion import with_gas
 from ppafo.engine.scheme.pneumatics import (
@@ -21,6 +21,7 @@ from ppafo.engine.scheme.pneumatics import (
     stage_flows,
     still_change,
 )
+from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import Openings, ThermalParameters, chamber_pressures, single_port_flow, single_port_flow_slopes
 from ppafo.model.valves import solenoid_recycling
 from ppafo.parameters import load_device

@@ -11,7 +11,6 @@ from ppafo.engine.lane_step import MAXIMUM_PARTS
 from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_batch
 from ppafo.engine.led_leg import LedLeg
 from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program
-from ppafo.engine.reference.right_hand_side import ExactOrifice
 from ppafo.engine.rows import leaves, rebuilt, table
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import Pace
@@ -20,6 +19,7 @@ from ppafo.model.columns import larger, over_runs, truncated
 from ppafo.model.effects.kind import Moment, State
 from ppafo.model.gait import Course, GaitSeries, GaitTiming
 from ppafo.model.leg import LegParameters
+from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, chamber_pressures
 from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters

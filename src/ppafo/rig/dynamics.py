@@ -6,7 +6,6 @@ chamber with its own orifice, a laminar part of the leak, friction that grows wi
 
 import math
 
-from ppafo.engine.reference.right_hand_side import ExactOrifice, exact_flow
 from ppafo.model.gas import (
     energy_rate,
     gas_enthalpy,
@@ -16,6 +15,7 @@ from ppafo.model.gas import (
     real_pressure,
     temperature_flow_factor,
 )
+from ppafo.model.orifice import ExactOrifice, exact_flow
 from ppafo.model.plant import (
     Openings,
     PlantParameters,

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from ppafo.constants import PASCALS_PER_PSI
-from ppafo.engine.reference.right_hand_side import ExactOrifice
 from ppafo.engine.run import Run
 from ppafo.errors import ScenarioError
 from ppafo.model.catalog import VALVES
 from ppafo.model.gas import gas_energy, real_density
+from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import chamber_volumes
 from ppafo.parameters import load_device
 from ppafo.parameters.declaration import SECTIONS

@@ -9,11 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.reference.right_hand_side import ExactOrifice
 from ppafo.errors import ParameterError
 from ppafo.model.catalog import VALVES
 from ppafo.model.gas import heat_capacity_at_constant_volume
-from ppafo.model.orifice import area_conductance
+from ppafo.model.orifice import ExactOrifice, area_conductance
 from ppafo.model.plant import PlantParameters
 from ppafo.model.sensors import quantise
 from ppafo.parameters.device import Device, SonicOrifice

@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 from ppafo.engine.led_leg import torque_of_leg
 from ppafo.engine.loading import ARRAY, FLOAT, HEADER, INLINE, entry_text, load_source, with_arrays
-from ppafo.engine.reference.right_hand_side import ExactOrifice
 from ppafo.engine.reference.solver import SAME_TIME, Roots, after_stop, roots_at_rest, roots_sliding, solve_segment
 from ppafo.engine.rows import leaf_paths, numbers, rebuild, row_expression
 from ppafo.engine.run import Run
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import SimulationError
+from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import Openings, PlantParameters, actuator_torque, holds_still
 from ppafo.model.sensors import Measurement
 from ppafo.parameters.device import Device

@@ -17,7 +17,6 @@ from ppafo.control.fixed.whole_numbers import SETTINGS, Converter, converter_of
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.engine.led_leg import GAIT_SHANK, LedLeg
 from ppafo.engine.program import NoParameters, Program
-from ppafo.engine.reference.right_hand_side import ExactOrifice
 from ppafo.engine.rows import leaves, rebuilt
 from ppafo.engine.run import Lines, Run, Walk
 from ppafo.engine.scheme.actuators import volumes_of
@@ -42,6 +41,7 @@ from ppafo.model.columns import (
 from ppafo.model.gait import ShankSeries
 from ppafo.model.gas import wall_exchange
 from ppafo.model.leg import FootLoad
+from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_mass, chamber_volumes
 from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import SensorParameters

@@ -11,7 +11,7 @@ from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import SourceCollector, woven
 from ppafo.model.effects.kind import Moment
 from ppafo.model.leg import FootLoad
-from ppafo.model.orifice import isentropic_flow_function, iso6358_flow_function
+from ppafo.model.orifice import ExactOrifice, exact_flow
 from ppafo.model.places import friction_in_motion, way_in, way_out
 from ppafo.model.plant import (
     Openings,
@@ -23,18 +23,6 @@ from ppafo.model.plant import (
     driving_torque,
     vane_acceleration,
 )
-
-
-class ExactOrifice(NamedTuple):
-    """An orifice: conductance [kg/(s Pa)], 1 for the ISO 6358 form or 0 for the isentropic one, and its number [-].
-
-    The number is the critical ratio in the first case and the heat capacity ratio in the second.
-    """
-
-    conductance: float
-    is_iso6358: float
-    number: float
-    linear_ratio: float
 
 
 class GasRates(NamedTuple):
@@ -64,27 +52,6 @@ class ThermalGasRates(NamedTuple):
     supplied: float
     vented: float
     leaked: float
-
-
-def exact_flow_function(ratio: float, orifice: ExactOrifice) -> float:
-    """Flow over choked flow [-] with the straight line near a ratio of 1. Equations (6), (7)."""
-    inside = min(ratio, orifice.linear_ratio)
-    if orifice.is_iso6358 > 0.5:
-        value = iso6358_flow_function(inside, orifice.number)
-    else:
-        value = isentropic_flow_function(inside, orifice.number)
-    return value * min((1.0 - ratio) / (1.0 - orifice.linear_ratio), 1.0)
-
-
-def exact_flow(pressure_a: float, pressure_b: float, conductance: float, orifice: ExactOrifice) -> float:
-    """Mass flow from a to b [kg/s] through a conductance [kg/(s Pa)] with the flow function of an orifice.
-
-    Positive from a to b. Equations (6), (7).
-    """
-    upstream = max(pressure_a, pressure_b)
-    ratio = min(pressure_a, pressure_b) / upstream
-    flow = conductance * upstream * exact_flow_function(ratio, orifice)
-    return flow if pressure_a >= pressure_b else -flow
 
 
 def gas_rates(
