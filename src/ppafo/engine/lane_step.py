@@ -29,6 +29,7 @@ from ppafo.model.gait import (
     shown_toe_force,
     stands_on_toes,
 )
+from ppafo.model.places import way_across
 
 IMPOSSIBLE_RATE = 1.0e6
 IMPOSSIBLE_MASS = 1.0e3
@@ -150,6 +151,7 @@ def open_valve(rows: LaneRows) -> list[str]:
         f"shown, {after} = {add(valve.advance)}(valve, valve_state, command, time, length)",
         *connect(rows, "line_state"),
         *present_pressures(rows),
+        *leak_now(rows),
         f"flowing = {add(pneumatics.sloped_flows)}"
         f"(plant, pressure_1, pressure_2, port_1, port_2, {add(valve.port_flow_slopes)})",
         *rows.keep("flowing", "shown"),
@@ -158,17 +160,24 @@ def open_valve(rows: LaneRows) -> list[str]:
 
 
 def connect(rows: LaneRows, line_state: str) -> list[str]:
-    """The ports of both chambers; where there are lines, at the pressures that they have in ``line_state``.
+    """The ports of both chambers; where there are lines, at the pressures that they have in ``line_state``."""
+    source = "plant"
+    if rows.program.has_lines:
+        source = f"{rows.add(supply_lines.plant_at_line_pressures)}(plant, lines, {line_state})"
+    return [f"port_1, port_2 = {rows.add(rows.program.valve.connect)}({source}, shown)"]
+
+
+def leak_now(rows: LaneRows) -> list[str]:
+    """The plant with the leak that it has at the pressures of a stage, where that is not always the same.
 
     A valve that joins the chambers makes the leak between them as wide as it stands open.
     """
-    source, valve = "plant", rows.program.valve
-    if rows.program.has_lines:
-        source = f"{rows.add(supply_lines.plant_at_line_pressures)}(plant, lines, {line_state})"
-    lines = [f"port_1, port_2 = {rows.add(valve.connect)}({source}, shown)"]
-    if valve.joint is not None:
-        opening = f"{rows.add(valve.joint.opening)}(shown)"
-        lines.append(f"plant = {rows.add(pneumatics.plant_with_joined_chambers)}(plant, {opening})")
+    program, add, lines = rows.program, rows.add, []
+    if any(way_across in effect.laws for effect in program.effects):
+        lines.append(f"plant = {add(pneumatics.plant_with_leak_at)}(plant, pressure_1, pressure_2)")
+    if program.valve.joint is not None:
+        opening = f"{add(program.valve.joint.opening)}(shown)"
+        lines.append(f"plant = {add(pneumatics.plant_with_joined_chambers)}(plant, {opening})")
     return lines
 
 
@@ -218,13 +227,14 @@ def pass_gas(rows: LaneRows) -> list[str]:
     gas = chambers_of(rows)
     still = gas if program.keeps_volumes else f"{gas}.still"
     ends = f"{add(thermal_gas.end_pressures)}(plant, {gas})" if program.is_thermal else f"{still}.end_1, {still}.end_2"
-    connected = connect(rows, "gas.lines.after")
+    connected, leak = connect(rows, "gas.lines.after"), leak_now(rows)
     return [
         rows.load("gas"),
         rows.load("shown"),
-        *states_ahead(rows, connected),
+        *states_ahead(rows, [*connected, *leak]),
         *connected,
         f"pressure_1, pressure_2 = {ends}",
+        *leak,
         f"passing = {add(pneumatics.stage_flows)}"
         f"(plant, pressure_1, pressure_2, port_1, port_2, {add(program.valve.port_flow)})",
         *rows.keep("passing"),

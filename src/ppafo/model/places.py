@@ -15,6 +15,11 @@ def way_out(conductance: float) -> float:
     return conductance
 
 
+def way_across(conductance: float, pressure_1: float, pressure_2: float) -> float:
+    """Conductance [kg/(s Pa)] of the leak between the chambers, from that of its orifice; absolute pressures [Pa]."""
+    return conductance
+
+
 def shown_signals(angle: float, pressure_1: float, pressure_2: float) -> tuple[float, float, float]:
     """Angle [rad] and absolute pressures [Pa] as the sensors of a controller show them, before noise and rounding."""
     return angle, pressure_1, pressure_2

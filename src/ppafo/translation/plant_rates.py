@@ -12,6 +12,7 @@ from ppafo.engine.reference.right_hand_side import free_motion
 from ppafo.engine.scheme.thermal_gas import ThermalFlows, thermal_flows
 from ppafo.errors import SimulationError
 from ppafo.model.orifice import orifice_flow
+from ppafo.model.places import way_across
 from ppafo.model.plant import (
     Openings,
     PlantParameters,
@@ -65,7 +66,8 @@ def port_flows(
     port_1, port_2 = blended_ports(plant, openings)
     in_1 = blended_port_flow(pressure_1, port_1, plant.valve_curve)
     in_2 = blended_port_flow(pressure_2, port_2, plant.valve_curve)
-    return in_1, in_2, orifice_flow(pressure_1, pressure_2, plant.leak_conductance, plant.leak_curve)
+    leak_conductance = way_across(plant.leak_conductance, pressure_1, pressure_2)
+    return in_1, in_2, orifice_flow(pressure_1, pressure_2, leak_conductance, plant.leak_curve)
 
 
 def gas_flows(plant: PlantParameters, openings: Openings, pressure_1: float, pressure_2: float) -> GasFlows:

@@ -12,7 +12,7 @@ from ppafo.engine.source_text import SourceCollector, woven
 from ppafo.model.effects.kind import Moment
 from ppafo.model.leg import FootLoad
 from ppafo.model.orifice import ExactOrifice, exact_flow
-from ppafo.model.places import friction_in_motion, way_in, way_out
+from ppafo.model.places import friction_in_motion, way_across, way_in, way_out
 from ppafo.model.plant import (
     Openings,
     PlantParameters,
@@ -70,7 +70,8 @@ def gas_rates(
     source_2 = admitted_flow(source_2, plant.relieving)
     vent_1 = exact_flow(pressure_1, plant.atmospheric_pressure, way_out(openings.vent_1 * full), valve_orifice)
     vent_2 = exact_flow(pressure_2, plant.atmospheric_pressure, way_out(openings.vent_2 * full), valve_orifice)
-    leak = exact_flow(pressure_1, pressure_2, leak_orifice.conductance, leak_orifice)
+    leak_conductance = way_across(leak_orifice.conductance, pressure_1, pressure_2)
+    leak = exact_flow(pressure_1, pressure_2, leak_conductance, leak_orifice)
     return GasRates(
         mass_1=source_1 - vent_1 - leak,
         mass_2=source_2 - vent_2 + leak,
@@ -114,7 +115,8 @@ def thermal_gas_rates(
     supply_1, supply_2 = admitted_flow(supply_1, plant.relieving), admitted_flow(supply_2, plant.relieving)
     outlet_1 = exact_flow(pressure_1, room, way_out(openings.vent_1 * full), valve_orifice)
     outlet_2 = exact_flow(pressure_2, room, way_out(openings.vent_2 * full), valve_orifice)
-    across = exact_flow(pressure_1, pressure_2, leak_orifice.conductance, leak_orifice)
+    leak_conductance = way_across(leak_orifice.conductance, pressure_1, pressure_2)
+    across = exact_flow(pressure_1, pressure_2, leak_conductance, leak_orifice)
     source_1 = transport(thermal, source_pressure_1, pressure_1, 1.0, warmth_1, supply_1)
     source_2 = transport(thermal, source_pressure_2, pressure_2, 1.0, warmth_2, supply_2)
     vent_1 = transport(thermal, pressure_1, room, warmth_1, 1.0, outlet_1)

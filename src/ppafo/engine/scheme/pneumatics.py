@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 from ppafo.model.columns import smaller
 from ppafo.model.orifice import FlowCurve, orifice_flow, orifice_flow_slopes
+from ppafo.model.places import way_across
 from ppafo.model.plant import (
     PlantParameters,
     PlantState,
@@ -83,6 +84,14 @@ def stage_flows(
         in_2=port_flow(pressure_2, port_2, plant.valve_curve),
         leak=orifice_flow(pressure_1, pressure_2, plant.leak_conductance, plant.leak_curve),
     )
+
+
+def plant_with_leak_at(plant: PlantParameters, pressure_1: float, pressure_2: float) -> PlantParameters:
+    """The plant with the leak that it has at two chamber pressures [Pa absolute], where an effect acts on it.
+
+    The matrix of a step takes this leak as constant: the method keeps its order with any matrix.
+    """
+    return plant._replace(leak_conductance=way_across(plant.leak_conductance, pressure_1, pressure_2))
 
 
 def plant_with_joined_chambers(plant: PlantParameters, opening: float) -> PlantParameters:

@@ -1,0 +1,66 @@
+"""Effects on the ways of the gas: lanes, reference solver and linear model agree, formulas are what they name."""
+
+import numpy as np
+import pytest
+
+from ppafo.engine.reference.solver import compare_with_reference
+from ppafo.model.effects.leak_opening import LeakOpening, lifted
+from ppafo.questions.linearise.solve import linearise
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.simulate import simulate
+
+OPENING = ("effects.leak_opening.pressure=150 kPa_d",)
+THERMAL = (
+    *("gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)"),
+    "gas_model.wall_area_per_volume=100 1/m",
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "texts"),
+    [
+        ("step-response", OPENING),
+        ("step-response", (*OPENING, *THERMAL, "run.duration=0.3 s")),
+        ("torque-task-solenoid", (*OPENING, "motion.kind=free", "run.duration=0.3 s")),
+    ],
+)
+def test_a_leak_that_opens_in_the_lanes_is_that_of_the_reference_solver(name: str, texts: tuple[str, ...]) -> None:
+    agreement = compare_with_reference(plan_run(load_scenario(name, texts)))
+    assert agreement.angle < 2e-4
+    assert agreement.worst_pressure < 1e-3
+
+
+def test_a_leak_that_opens_at_a_pressure_is_tight_below_and_whole_far_above() -> None:
+    row = LeakOpening(3.0e4)
+    assert lifted(2.0e-9, 1.0e5, 1.29e5, row) == 0.0
+    assert lifted(2.0e-9, 1.0e5, 1.6e5, row) == lifted(2.0e-9, 1.6e5, 1.0e5, row) == pytest.approx(1.0e-9)
+    assert lifted(2.0e-9, 1.0e5, 3.1e6, row) == pytest.approx(2.0e-9, rel=0.011)
+
+
+def test_a_leak_that_never_opens_loses_nothing() -> None:
+    leaked = [
+        simulate(load_scenario("step-response", texts)).metrics["gas_leaked"].value
+        for texts in ((), OPENING, ("effects.leak_opening.pressure=10 bar_d",))
+    ]
+    assert leaked[0] > leaked[1] > leaked[2] == 0.0
+
+
+def test_a_valve_that_joins_the_chambers_passes_gas_where_the_leak_is_shut() -> None:
+    tight = "effects.leak_opening.pressure=10 bar_d"
+    run = plan_run(
+        load_scenario("torque-task-solenoid", ("device.valve=solenoid_recycling", tight, "run.duration=0.5 s"))
+    )
+    assert run.program.valve.joint is not None
+    agreement = compare_with_reference(run)
+    assert agreement.worst_pressure < 1e-3
+
+
+def test_a_linear_model_has_the_leak_as_a_difference_of_two_runs_has() -> None:
+    venting = ("controller.kind=constant", "controller.command=-0.4", "run.duration=0.3 s", *OPENING)
+    rates = linearise("torque-task-proportional", 0.2, venting).rates
+    step = ("run.step=0.01 ms", "run.output_interval=0.01 ms")
+    found = simulate(load_scenario("torque-task-proportional", (*venting, *step))).recording
+    here = int(np.searchsorted(found.time, 0.2 - 1e-9))
+    slope = (found["pressure_2"][here + 20] - found["pressure_2"][here - 20]) / (40 * 1e-5)
+    assert rates[1] == pytest.approx(slope, rel=1e-3)
