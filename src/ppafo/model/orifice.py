@@ -71,14 +71,14 @@ class ExactOrifice(NamedTuple):
     linear_ratio: float
 
 
-def exact_flow_function(ratio: float, orifice: ExactOrifice) -> float:
+def exact_flow_function(pressure_ratio: float, orifice: ExactOrifice) -> float:
     """Flow over choked flow [-] with the straight line near a ratio of 1. Equations (6), (7)."""
-    inside = min(ratio, orifice.linear_ratio)
+    inside = min(pressure_ratio, orifice.linear_ratio)
     if orifice.is_iso6358 > 0.5:
         value = iso6358_flow_function(inside, orifice.number)
     else:
         value = isentropic_flow_function(inside, orifice.number)
-    return value * min((1.0 - ratio) / (1.0 - orifice.linear_ratio), 1.0)
+    return value * min((1.0 - pressure_ratio) / (1.0 - orifice.linear_ratio), 1.0)
 
 
 def exact_flow(pressure_a: float, pressure_b: float, conductance: float, orifice: ExactOrifice) -> float:
