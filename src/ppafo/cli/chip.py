@@ -70,13 +70,13 @@ def run(parsed: argparse.Namespace) -> int:
     if not parsed.table and not parsed.scenarios:
         raise ScenarioError("give a SCENARIO, or --table; see 'ppafo chip --help'")
     output.check_output(parsed)
-    told = _table(parsed) if parsed.table else _one(parsed)
-    output.deliver("chip", told.text, told.document, parsed, told.draw)
-    return output.EXIT_GOOD if told.agrees else output.EXIT_CHECK_FAILED
+    outcome = _table(parsed) if parsed.table else _one(parsed)
+    output.deliver("chip", outcome.text, outcome.document, parsed, outcome.draw)
+    return output.EXIT_GOOD if outcome.agrees else output.EXIT_CHECK_FAILED
 
 
 @dataclass(frozen=True, slots=True)
-class _Told:
+class _Outcome:
     """What came of a command: text, document, whether all decisions are the same, and a figure of runs over time."""
 
     text: str
@@ -85,7 +85,7 @@ class _Told:
     draw: "Callable[[], Figure] | None" = None
 
 
-def _one(parsed: argparse.Namespace) -> _Told:
+def _one(parsed: argparse.Namespace) -> _Outcome:
     """Scenarios or one walk on one target."""
     from ppafo.loading import load_scenario
     from ppafo.simulation.scenario import worn_kind
@@ -112,7 +112,7 @@ def _one(parsed: argparse.Namespace) -> _Told:
     return _drawn(found, scenarios[0].name, scenarios[0].control.period, about)
 
 
-def _runs(scenarios: "Sequence[Scenario]", target: str) -> _Told:
+def _runs(scenarios: "Sequence[Scenario]", target: str) -> _Outcome:
     """Scenarios with the chip in charge, one after the other, and their figure."""
     from ppafo.exports.firmware.lock_step import chip_figure, run_on_chip
 
@@ -138,7 +138,7 @@ def _runs(scenarios: "Sequence[Scenario]", target: str) -> _Told:
                 "metrics": metrics,
             }
         )
-    return _Told(
+    return _Outcome(
         "\n\n".join(texts),
         documents[0] if len(documents) == 1 else {"runs": documents},
         all(one.same_bits and not one.differences for one in found),
@@ -146,7 +146,7 @@ def _runs(scenarios: "Sequence[Scenario]", target: str) -> _Told:
     )
 
 
-def _drawn(found: "Comparison", name: str, period: float, about: dict[str, Any]) -> _Told:
+def _drawn(found: "Comparison", name: str, period: float, about: dict[str, Any]) -> _Outcome:
     """Drawn samples on the chip and in Python."""
     lines = [
         f"{found.samples} drawn samples of the controller of {name} on the chip's simulator",
@@ -156,10 +156,10 @@ def _drawn(found: "Comparison", name: str, period: float, about: dict[str, Any])
         *([f"the first: {found.first_difference}"] if found.differences else []),
     ]
     document = {**about, **_compared(found), **_cost_document(found.cost)}
-    return _Told("\n".join(lines), document, not found.differences)
+    return _Outcome("\n".join(lines), document, not found.differences)
 
 
-def _boards(scenario: "Scenario", target: str, plant: str) -> _Told:
+def _boards(scenario: "Scenario", target: str, plant: str) -> _Outcome:
     """A scenario with its controller on one board and its plant on another."""
     from ppafo.exports.firmware.plant import run_on_two_boards
 
@@ -184,10 +184,10 @@ def _boards(scenario: "Scenario", target: str, plant: str) -> _Told:
         "compared": list(found.compared),
         "plant": {"target": board.name, **found.sizes._asdict(), "stack": found.stack, **work},
     }
-    return _Told("\n".join(lines), document, not found.differences)
+    return _Outcome("\n".join(lines), document, not found.differences)
 
 
-def _walk(configuration: "Scenario", parsed: argparse.Namespace) -> _Told:
+def _walk(configuration: "Scenario", parsed: argparse.Namespace) -> _Outcome:
     """A walk on the chip."""
     from ppafo.exports.firmware.walking import compare_drawn_walk, walk_on_chip
 
@@ -218,10 +218,10 @@ def _walk(configuration: "Scenario", parsed: argparse.Namespace) -> _Told:
         "level": found.level,
         "gas": found.gas,
     }
-    return _Told("\n".join(lines), document, found.same_bits)
+    return _Outcome("\n".join(lines), document, found.same_bits)
 
 
-def _table(parsed: argparse.Namespace) -> _Told:
+def _table(parsed: argparse.Namespace) -> _Outcome:
     """Every controller on every target, as a table."""
     from ppafo.exports.firmware.lock_step import table_rows
 
@@ -241,7 +241,7 @@ def _table(parsed: argparse.Namespace) -> _Told:
             f"| {cost.worst:,}, {cost.mean:,.0f} {row.target.counted} | {found.samples:,} | {found.differences} |"
         )
         documents.append({**own, **_compared(found), **_cost_document(cost)})
-    return _Told("\n".join(lines), {"rows": documents}, not any(item.get("differences") for item in documents))
+    return _Outcome("\n".join(lines), {"rows": documents}, not any(item.get("differences") for item in documents))
 
 
 def _compared(found: "ChipRun | WalkOnChip | Comparison | BoardsRun") -> dict[str, Any]:
