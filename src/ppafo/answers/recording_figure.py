@@ -12,14 +12,16 @@ from ppafo.answers.style import (
     ACTUAL,
     CHAMBER_1,
     CHAMBER_2,
-    GREEN,
+    GREY,
     ORANGE,
+    REFERENCE,
     VERMILION,
-    WANTED,
+    Look,
     Margins,
     figure_of_panels,
     house_style,
     label_lines,
+    look_of_valve,
     mark_kind,
     render_figure,
 )
@@ -48,13 +50,12 @@ _LONGEST_SHOWN = 60
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One line of a panel: channel, name in the legend, colour, and whether it keeps its value between samples."""
+    """One line of a panel: channel, name in the legend, look, and whether it keeps its value between samples."""
 
     channel: str
     name: str
-    colour: str
+    look: Look
     is_held: bool = False
-    style: str = "-"
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +102,7 @@ PANELS = (
         "Actuator torque (N m)",
         0.5,
         _as_it_is,
-        (Line("torque", "actuator", ACTUAL), Line("reference", "reference", WANTED, style="--")),
+        (Line("torque", "actuator", ACTUAL), Line("reference", "reference", REFERENCE)),
     ),
     Panel("Valve command (-1 to 1)", 2.0, _as_it_is, (Line("command", "", ACTUAL, is_held=True),), (-1.0, 1.0)),
     Panel(
@@ -110,20 +111,24 @@ PANELS = (
         _grams,
         (
             Line("supplied_mass", "supplied", ACTUAL),
-            Line("vented_mass", "vented", ORANGE),
-            Line("leaked_mass", "leaked between the chambers", GREEN),
+            Line("vented_mass", "vented", Look(ORANGE)),
+            Line("leaked_mass", "leaked between the chambers", Look(GREY, "--")),
         ),
     ),
 )
 
 
 def recording_figure(
-    recording: Recording, title: str = "", remark: str = "", atmosphere: float = STANDARD_ATMOSPHERE
+    recording: Recording,
+    title: str = "",
+    remark: str = "",
+    atmosphere: float = STANDARD_ATMOSPHERE,
+    valve: str = "",
 ) -> "Figure":
     """Return the figure of a recording, with a panel for every quantity that it has.
 
     ``remark`` stands below the title, for example why a run stopped early. Gauge pressure counts from ``atmosphere``
-    [Pa absolute].
+    [Pa absolute]. ``valve`` is the kind of valve, in whose colour the device is drawn.
     """
     panels = [panel for panel in PANELS if any(line.channel in recording for line in panel.lines)]
     if not panels:
@@ -132,7 +137,7 @@ def recording_figure(
     with house_style():
         figure, grid = _grid(len(panels), title or recording.label, remark)
         for panel, axes in zip(panels, grid, strict=True):
-            _draw(axes, panel, recording, atmosphere)
+            _draw(axes, panel, recording, atmosphere, look_of_valve(valve))
         grid[-1].set_xlabel("Time (s)")
         mark_kind(figure, recording.kind)
         if recording.duration > 0.0:
@@ -151,7 +156,8 @@ def draw_stored_result(stored: StoredResult) -> "Figure":
     if not isinstance(name, str):
         raise _other_form(file, "scenario.name", name, "a text")
     atmosphere = stated_atmosphere(file, document, "scenario", "device")
-    return recording_figure(stored.recording, one_line(name), remark, atmosphere)
+    valve = _under(file, document, "scenario", "device", "valve").get("kind", "")
+    return recording_figure(stored.recording, one_line(name), remark, atmosphere, str(valve))
 
 
 def stated_atmosphere(file: Path, document: Mapping[str, Any], *device: str) -> float:
@@ -198,12 +204,13 @@ def _grid(count: int, title: str, remark: str) -> "tuple[Figure, list[Axes]]":
     return figure, [axes for (axes,) in rows]
 
 
-def _draw(axes: "Axes", panel: Panel, recording: Recording, atmosphere: float) -> None:
+def _draw(axes: "Axes", panel: Panel, recording: Recording, atmosphere: float, device: Look) -> None:
     shown = [line for line in panel.lines if line.channel in recording]
     for line in shown:
         values = panel.convert(recording[line.channel], atmosphere)
         steps = "steps-post" if line.is_held else "default"
-        axes.plot(recording.time, values, line.style, color=line.colour, label=line.name, drawstyle=steps)
+        look = device if line.look is ACTUAL else line.look
+        axes.plot(recording.time, values, look.line, color=look.colour, label=line.name, drawstyle=steps)
     axes.set_title(panel.title)
     _set_limits(axes, panel)
     if len(shown) > 1:

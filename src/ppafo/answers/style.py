@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ppafo.signals import RecordingKind
 
@@ -19,13 +19,37 @@ BLUE = "#0072B2"
 VERMILION = "#D55E00"
 GREEN = "#009E73"
 ORANGE = "#E69F00"
+PURPLE = "#A33F77"
 """Colours that people with any kind of colour vision can tell apart (Okabe and Ito, 2008)."""
 COLOURS = (BLUE, VERMILION, GREEN, ORANGE, BLACK, GREY)
 """The order in which lines of one kind take colours."""
-CHAMBER_1 = BLUE
-CHAMBER_2 = VERMILION
-ACTUAL = BLUE
-WANTED = BLACK
+
+
+class Look(NamedTuple):
+    """How one thing looks in every figure, and on the page that simulates: colour, line and marker."""
+
+    colour: str
+    line: str = "-"
+    marker: str = "o"
+
+
+PROPORTIONAL = Look(BLUE)
+SOLENOID = Look(VERMILION, marker="s")
+CHAMBER_1 = Look(GREEN, marker="^")
+CHAMBER_2 = Look(PURPLE, marker="v")
+REFERENCE = Look(BLACK, line="--")
+EXPERIMENT = Look(GREY, marker=".")
+"""What was measured, on a bench or on the virtual rig."""
+ACTUAL = Look(BLUE)
+"""What a device does whose valve is no matter."""
+_VALVES = MappingProxyType({"proportional": PROPORTIONAL, "solenoid": SOLENOID, "solenoid_recycling": SOLENOID})
+
+
+def look_of_valve(kind: str) -> Look:
+    """Return how a device with this kind of valve looks."""
+    return _VALVES.get(kind, ACTUAL)
+
+
 RESOLUTION = 150
 """Dots per inch of a PNG file."""
 _SETTINGS: Any = MappingProxyType(

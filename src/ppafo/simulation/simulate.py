@@ -101,7 +101,8 @@ class Result:
 
         remark = "" if self.status.is_completed else self.status.message
         atmosphere = self.scenario.device.supply.atmospheric_pressure
-        return recording_figure(self.recording, self.scenario.name, remark, atmosphere)
+        valve = self.scenario.device.valve.kind
+        return recording_figure(self.recording, self.scenario.name, remark, atmosphere, valve)
 
     def check(self) -> Check:
         """Return what this run determines: it runs again with half the error, and with start and measurements moved.

@@ -11,9 +11,9 @@ from ppafo.identification.bench.result import synthetic_figure_3
 from ppafo.live.page import bundled, digest
 from ppafo.questions.reproduce.answer import Reproduction, answer_of, holding_torque, reproduction_page
 from ppafo.questions.reproduce.bench import NoEvidence, SyntheticEvidence
+from ppafo.questions.reproduce.figures import step_response_figure, torque_task_figure
 from ppafo.questions.reproduce.solve import reproduce
-from ppafo.questions.reproduce.step_response import Levels, step_response_figure
-from ppafo.questions.reproduce.torque_task import torque_task_figure
+from ppafo.questions.reproduce.step_response import Levels
 
 LEVELS = Levels(480536.0, 101325.0)
 
@@ -168,15 +168,36 @@ def test_figure_3_says_in_each_panel_that_it_is_synthetic(reproduction: Reproduc
     assert (rising.get_marker(), falling.get_marker()) == ("x", "o")
 
 
-def test_figure_7_shows_the_synthetic_measurement_as_dots_and_names_it(reproduction: Reproduction) -> None:
+def test_figure_7_names_the_synthetic_measurement_and_shows_below_what_it_differs_by(
+    reproduction: Reproduction,
+) -> None:
     evidence = reproduction.synthetic
     assert isinstance(evidence, SyntheticEvidence)
     recording = reproduction.step.recording
     figure = step_response_figure(recording, LEVELS, None, evidence.step.measured)
-    assert [axes.lines[1].get_marker() for axes in figure.axes] == ["."] * 4
-    legends = [axes.get_legend() for axes in figure.axes]
-    named = [text.get_text() for legend in legends if legend is not None for text in legend.get_texts()]
-    assert "synthetic measurement" in named
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["model", "synthetic measurement"]
+    angle, below = figure.axes[0], figure.axes[2]
+    model, measured = (line.get_ydata() for line in angle.lines[:2])
+    assert below.get_ylabel() == "Δ deg"
+    apart = below.lines[0].get_ydata()
+    assert apart[0] == pytest.approx(measured[0] - model[0])
+    assert apart[-1] == pytest.approx(measured[-1] - model[-1], abs=1e-6)
+
+
+def test_a_valve_and_a_chamber_have_one_colour_in_every_figure(reproduction: Reproduction) -> None:
+    task = torque_task_figure(reproduction.solenoid.recording, reproduction.proportional.recording, 5.0, (1.1, 0.4))
+    solenoid, proportional = (task.axes[place].lines[-1].get_color() for place in (0, 2))
+    assert [line.get_color() for line in task.axes[5].lines[::2]] == [solenoid, proportional]
+    step = step_response_figure(reproduction.step.recording, LEVELS, None)
+    for run, colour in ((reproduction.solenoid, solenoid), (reproduction.proportional, proportional)):
+        alone = run.plot()
+        torque = next(axes for axes in alone.axes if axes.get_title(loc="left").startswith("Actuator torque"))
+        pressure = next(axes for axes in alone.axes if axes.get_title(loc="left").startswith("Pressure"))
+        assert torque.lines[0].get_color() == colour
+        assert [line.get_color() for line in pressure.lines] == [
+            step.axes[2].lines[0].get_color(),
+            step.axes[3].lines[0].get_color(),
+        ]
 
 
 def test_figure_8_shows_the_synthetic_experiment_with_both_valves(reproduction: Reproduction) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from ppafo.answers.style import BLACK, BLUE, VERMILION, WANTED, Margins, figure_of_panels, house_style, mark_kind
+from ppafo.answers.style import BLACK, REFERENCE, Margins, figure_of_panels, house_style, look_of_valve, mark_kind
 from ppafo.control.fixed.torque_laws import TARGETS
 from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, Converter, Readings, read
 from ppafo.engine.rows import rebuilt
@@ -220,7 +220,6 @@ def cost_of(target: Target, image: Image, stack: int, decisions: list[Decision])
 _MARGINS = Margins(left=0.68, right=0.15, top=0.42, bottom=0.52, row_gap=0.36)
 """Inches."""
 _WIDTH, _TORQUE, _COMMAND = 7.6, 2.6, 0.9
-_COLOURS = (VERMILION, BLUE)
 _LANES = (0, (1, 3))
 
 
@@ -236,19 +235,20 @@ def chip_figure(runs: Sequence[ChipRun]) -> "Figure":
         figure, rows = figure_of_panels(size, _MARGINS, rows=len(heights), heights=heights)
         grid = [axes for (axes,) in rows]
         for place, run in enumerate(runs):
-            _draw(grid[2 * place], grid[2 * place + 1], run, _COLOURS[place % len(_COLOURS)])
+            _draw(grid[2 * place], grid[2 * place + 1], run)
         grid[-1].set_xlabel("Time (s)")
         grid[-1].set_xlim(0.0, max(run.chip.recording.duration for run in runs))
         mark_kind(figure, runs[0].chip.recording.kind)
         return figure
 
 
-def _draw(torque: "Axes", command: "Axes", run: ChipRun, colour: str) -> None:
+def _draw(torque: "Axes", command: "Axes", run: ChipRun) -> None:
     """Draw a run, and that in the lanes as dots on its lines."""
+    colour = look_of_valve(run.scenario.device.valve.kind).colour
     chip, lanes, target = run.chip.recording, run.lanes.recording, run.cost.target.name
     bits = "same bits as in the lanes" if run.same_bits else "NOT the bits of the lanes"
     torque.set_title(f"{run.scenario.name}: {run.differences} of {run.samples} decisions differ, {bits}")
-    torque.plot(chip.time, chip["reference"], "--", color=WANTED, linewidth=1.3, label="reference")
+    torque.plot(chip.time, chip["reference"], REFERENCE.line, color=REFERENCE.colour, linewidth=1.3, label="reference")
     for axes, name in ((torque, "torque"), (command, "command")):
         step = "steps-post" if name == "command" else "default"
         axes.plot(chip.time, chip[name], color=colour, drawstyle=step, label=f"{target} in its simulator")

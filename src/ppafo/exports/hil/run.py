@@ -344,7 +344,7 @@ def _histogram(axes: "Axes", values: Sequence[float], title: str) -> None:
     axes.set_yscale("log")
     shown = np.maximum(np.asarray(values) * _PER_THOUSAND, _SHORTEST_SHOWN)
     edges = np.geomspace(_SHORTEST_SHOWN, max(_LONGEST_SHOWN, 1.01 * shown.max(initial=0.0)), _BINS)
-    axes.hist(shown, edges.tolist(), color=ACTUAL)
+    axes.hist(shown, edges.tolist(), color=ACTUAL.colour)
     axes.set_xlim(edges[0], edges[-1])
     axes.set_ylim(0.5, None)
     for axis in (axes.xaxis, axes.yaxis):

@@ -236,9 +236,9 @@ def correlation_figure(
 def _channels(atmosphere: float) -> tuple[_ChannelPanel, ...]:
     degrees, gauge = float(np.degrees(1.0)), 1.0 / PASCALS_PER_PSI
     return (
-        _ChannelPanel("angle", "Vane angle", "deg", "deg", degrees, 0.0, ACTUAL),
-        _ChannelPanel("pressure_1", "Pressure in chamber 1", "psig", "psi", gauge, atmosphere, CHAMBER_1),
-        _ChannelPanel("pressure_2", "Pressure in chamber 2", "psig", "psi", gauge, atmosphere, CHAMBER_2),
+        _ChannelPanel("angle", "Vane angle", "deg", "deg", degrees, 0.0, ACTUAL.colour),
+        _ChannelPanel("pressure_1", "Pressure in chamber 1", "psig", "psi", gauge, atmosphere, CHAMBER_1.colour),
+        _ChannelPanel("pressure_2", "Pressure in chamber 2", "psig", "psi", gauge, atmosphere, CHAMBER_2.colour),
     )
 
 

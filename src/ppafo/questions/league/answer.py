@@ -9,7 +9,7 @@ import numpy as np
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.answer import Cell
 from ppafo.answers.display_units import display_value
-from ppafo.answers.style import BLACK, BLUE, GREY, VERMILION, house_style, mark_kind
+from ppafo.answers.style import house_style, look_of_valve, mark_kind
 from ppafo.progress import Report
 from ppafo.questions.league.standing import UNCERTAINTIES, Bound, Bounded, Entrant, Robustness, Standing
 from ppafo.questions.question import Solved
@@ -160,7 +160,6 @@ _MARGIN, _LEAST_RANGE = 1.2, 4.0
 """Factors: around everything drawn, and the least that an axis spans."""
 _NAMED = ((10.0, (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)), (200.0, (1.0, 2.0, 5.0)), (float("inf"), (1.0,)))
 """Which multiples of the powers of ten are named on an axis that spans less than a factor."""
-_COLOURS = {"proportional": BLUE, "solenoid": VERMILION}
 _MARKERS = "osD^v<>PX*hdpH8"
 
 
@@ -174,7 +173,7 @@ def league_figure(league: League, look: Look) -> "matplotlib.figure.Figure":
         axes = figure.subplots()
         for valve, bounded in league.bounds.items():
             errors, gas = _points(bounded)
-            axes.plot(errors, gas, color=_COLOURS.get(valve, GREY), label=f"lower bound, {valve}")
+            axes.plot(errors, gas, color=look_of_valve(valve).colour, label=f"lower bound, {valve}")
         for number, standing in enumerate(league.standings):
             _draw_standing(axes, league, standing, look, _MARKERS[number % len(_MARKERS)])
         if look.is_logarithmic:
@@ -185,7 +184,7 @@ def league_figure(league: League, look: Look) -> "matplotlib.figure.Figure":
             for axis in (axes.xaxis, axes.yaxis):
                 _name_numbers(axis)
             for valve, bounded in league.bounds.items():
-                _draw_end(axes, bounded, _COLOURS.get(valve, GREY))
+                _draw_end(axes, bounded, look_of_valve(valve).colour)
         else:
             axes.set_xscale("log")
             _name_numbers(axes.xaxis)
@@ -237,7 +236,7 @@ def _draw_standing(axes: "Axes", league: League, standing: Standing, look: Look,
     error, taken = standing.measures.get(look.error), standing.measures.get(league.contest.gas)
     if error is None or taken is None:
         return
-    gas, colour = display_value(taken, "gas mass"), _COLOURS.get(standing.entrant.valve, BLACK)
+    gas, colour = display_value(taken, "gas mass"), look_of_valve(standing.entrant.valve).colour
     robust, least = standing.robustness, league.least_gas(standing)
     if robust is not None and not robust.failed:
         across = [robust.not_exceeded(look.error, fraction) for fraction in (0.05, 0.95)]

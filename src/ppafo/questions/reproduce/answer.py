@@ -38,9 +38,9 @@ from ppafo.questions.reproduce.claim import (
     load_printed,
     verdict_counts,
 )
+from ppafo.questions.reproduce.figures import step_response_figure, torque_task_figure
 from ppafo.questions.reproduce.publication import ALL, SEED, Study
-from ppafo.questions.reproduce.step_response import Levels, StepEvents, step_response_figure
-from ppafo.questions.reproduce.torque_task import torque_task_figure
+from ppafo.questions.reproduce.step_response import Levels, StepEvents
 from ppafo.questions.unreported.answer import (
     ERRORS,
     Family,

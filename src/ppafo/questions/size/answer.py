@@ -8,7 +8,7 @@ import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import axis_unit, display_value, display_values, quantity_text
-from ppafo.answers.style import ACTUAL, BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, WANTED, house_style, mark_kind
+from ppafo.answers.style import ACTUAL, BLACK, BLUE, GREEN, GREY, ORANGE, REFERENCE, VERMILION, house_style, mark_kind
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.parameters.parts import Part
 from ppafo.questions.parts.solve import doubts_data, doubts_sections, titles_section
@@ -148,10 +148,19 @@ def sizing_figure(sizing: Sizing) -> "matplotlib.figure.Figure":
 def _torque(axes: "Axes", sizing: Sizing) -> None:
     problem = sizing.problem
     time = np.linspace(0.0, problem.scenario.duration, 3001)
-    axes.plot(time, problem.profile.at(time), color=WANTED, linestyle="--", linewidth=1.2, label="prescribed")
+    axes.plot(
+        time,
+        problem.profile.at(time),
+        color=REFERENCE.colour,
+        linestyle=REFERENCE.line,
+        linewidth=1.2,
+        label="prescribed",
+    )
     title = "Torque (N m)"
     if sizing.recording is not None and sizing.choice is not None:
-        axes.plot(sizing.recording.time, sizing.recording["torque"], color=ACTUAL, label=sizing.choice.valve.name)
+        axes.plot(
+            sizing.recording.time, sizing.recording["torque"], color=ACTUAL.colour, label=sizing.choice.valve.name
+        )
         pressure = display_value(sizing.choice.pressure, "pressure")
         title += f", {sizing.choice.valve.name} at {pressure:.1f} {axis_unit('pressure')}"
     axes.set_title(f"$\\bf{{A}}$   {title}", pad=18)

@@ -140,7 +140,7 @@ _ROW_HEIGHT = 2.9
 _MARGINS = Margins(left=0.68, right=0.15, top=0.72, bottom=0.52, row_gap=0.44, column_gap=0.78)
 """Inches."""
 _HEIGHTS = (2.4, 1.0)
-_COLOURS = {PRESSURE_1: CHAMBER_1, PRESSURE_2: CHAMBER_2}
+_LOOKS = {PRESSURE_1: CHAMBER_1, PRESSURE_2: CHAMBER_2}
 _MAXIMUM_DOTS = 400
 _NEAR_LIMIT = 0.25
 _SHORT = 3.0
@@ -184,7 +184,7 @@ def _draw_channel(
     given = measured_values(measured, name)
     if given is None:
         return
-    colour = _COLOURS.get(name, ACTUAL)
+    colour = _LOOKS.get(name, ACTUAL).colour
     line = np.interp(times - agreement.delay.correction, model.time, model[name])
     every = -(-times.size // _MAXIMUM_DOTS)
     upper.plot(

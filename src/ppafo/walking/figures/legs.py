@@ -324,8 +324,8 @@ def _legs(axes: "Axes", result: WalkResult) -> None:
 def _pressures(axes: "Axes", result: WalkResult) -> None:
     atmosphere = result.scenario.device.supply.atmospheric_pressure
     for channel, name, colour in (
-        ("pressure_1", "plantarflexion", CHAMBER_1),
-        ("pressure_2", "dorsiflexion", CHAMBER_2),
+        ("pressure_1", "plantarflexion", CHAMBER_1.colour),
+        ("pressure_2", "dorsiflexion", CHAMBER_2.colour),
     ):
         if channel in result.averages:
             curve = (result.averages[channel].mean - atmosphere) / PASCALS_PER_PSI
@@ -438,7 +438,7 @@ def _traces(axes: "Axes", result: WalkResult, turns: np.ndarray) -> None:
     recording, configuration = result.recording, result.scenario
     fine = np.linspace(turns[0], turns[-1], 400)
     atmosphere = configuration.device.supply.atmospheric_pressure
-    names = (("pressure_1", "plantarflexion", CHAMBER_1), ("pressure_2", "dorsiflexion", CHAMBER_2))
+    names = (("pressure_1", "plantarflexion", CHAMBER_1.colour), ("pressure_2", "dorsiflexion", CHAMBER_2.colour))
     for channel, name, colour in names:
         values = np.interp(fine * walk_of(configuration).gait.stride_time, recording.time, recording[channel])
         axes.plot(fine - turns[0], (values - atmosphere) / PASCALS_PER_PSI, color=colour, linewidth=1.3, label=name)
