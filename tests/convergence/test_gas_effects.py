@@ -4,8 +4,12 @@ import numpy as np
 import pytest
 
 from ppafo.engine.reference.solver import compare_with_reference
+from ppafo.errors import SimulationError
 from ppafo.model.effects.leak_opening import LeakOpening, lifted
+from ppafo.model.effects.spool_play import SpoolPlace, SpoolPlay, behind_play, settle
 from ppafo.questions.linearise.solve import linearise
+from ppafo.rig.solution import spool_position
+from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.simulate import simulate
@@ -64,3 +68,52 @@ def test_a_linear_model_has_the_leak_as_a_difference_of_two_runs_has() -> None:
     here = int(np.searchsorted(found.time, 0.2 - 1e-9))
     slope = (found["pressure_2"][here + 20] - found["pressure_2"][here - 20]) / (40 * 1e-5)
     assert rates[1] == pytest.approx(slope, rel=1e-3)
+
+
+PLAY = ("effects.spool_play.width=0.2",)
+
+
+@pytest.mark.parametrize(
+    ("name", "texts"),
+    [
+        ("torque-task-proportional", PLAY),
+        ("torque-task-proportional", (*PLAY, "motion.kind=free", "run.duration=0.3 s")),
+        ("torque-task-proportional", (*PLAY, *OPENING, "effects.ice.blockage_per_gas=3e3 1/kg")),
+    ],
+)
+def test_a_spool_with_play_in_the_lanes_is_that_of_the_reference_solver(name: str, texts: tuple[str, ...]) -> None:
+    agreement = compare_with_reference(plan_run(load_scenario(name, texts)))
+    assert agreement.angle < 2e-4
+    assert agreement.worst_pressure < 1e-3
+
+
+def test_a_spool_with_play_is_the_one_of_the_rig_and_lags_on_the_way_back() -> None:
+    row, place, rig, shown = SpoolPlay(0.2), SpoolPlace(0.0), 0.0, []
+    for command in (0.0, 0.05, 0.5, 1.0, 0.9, 0.7, -1.0, -0.95, 2.0, -0.5):
+        now = behind_play(command, row, place)
+        place = settle(row, place, now)
+        if command <= 1.5:
+            rig = spool_position(rig, command, 0.2)
+            assert now == pytest.approx(rig, abs=1e-15)
+        shown.append(now)
+    assert shown[1] == 0.0
+    assert shown[3:5] == [1.0, 1.0]
+    assert shown[6:9] == [-1.0, -1.0, 2.0]
+
+
+def test_play_changes_the_torque_and_a_column_of_it_has_the_bits_of_the_single_runs() -> None:
+    widths = np.array([0.0, 0.1, 0.2])
+    scenario = load_scenario("torque-task-proportional", ("run.duration=0.3 s",))
+    found = run_ensemble(scenario, {"effects.spool_play.width": widths}, ["rms_error"]).metrics["rms_error"]
+    alone = [
+        simulate(load_scenario("torque-task-proportional", ("run.duration=0.3 s", f"effects.spool_play.width={width}")))
+        for width in widths.tolist()
+    ]
+    assert found.tolist() == [result.metrics["rms_error"].value for result in alone]
+    assert len(set(found.tolist())) == 3
+
+
+@pytest.mark.parametrize(("text", "name"), [(PLAY[0], "spool_play"), ("effects.ice.blockage_per_gas=100 1/kg", "ice")])
+def test_a_linear_model_refuses_an_effect_with_a_state_in_one_line(text: str, name: str) -> None:
+    with pytest.raises(SimulationError, match=f"effect '{name}' has a state of its own.*switch it off"):
+        linearise("torque-task-proportional", 0.2, ("run.duration=0.3 s", text))

@@ -29,7 +29,7 @@ from ppafo.model.gait import (
     shown_toe_force,
     stands_on_toes,
 )
-from ppafo.model.places import way_across
+from ppafo.model.places import at_valve, way_across
 
 IMPOSSIBLE_RATE = 1.0e6
 IMPOSSIBLE_MASS = 1.0e3
@@ -54,7 +54,7 @@ def plant_loop(rows: LaneRows) -> list[str]:
     """Valve, gas and vane up to ``goal`` [-], a share of the step; 1 for programs that are not parted."""
     if rows.program.is_parted:
         return step_in_parts(rows)
-    return over_phases(rows, [*opening(rows), "length = timing.step"], phases(rows))
+    return over_phases(rows, [*opening(rows), *command_at_valve(rows), "length = timing.step"], phases(rows))
 
 
 def over_phases(rows: LaneRows, prelude: list[str], all_phases: list[list[str] | RarePhase]) -> list[str]:
@@ -83,6 +83,12 @@ def opening(rows: LaneRows) -> list[str]:
     names += ["held"] if rows.program.hands_chambers_on else []
     names += ["start"] if rows.program.starts_apart else []
     return [*[rows.load(name) for name in names], time_of_step(rows), "command = result.command"]
+
+
+def command_at_valve(rows: LaneRows) -> list[str]:
+    """Line that makes the command that the valve follows, where an effect stands between."""
+    is_other = any(at_valve in effect.laws for effect in rows.program.effects)
+    return [f"command = {rows.add(at_valve)}(command)"] if is_other else []
 
 
 def time_of_step(rows: LaneRows) -> str:
@@ -545,7 +551,7 @@ def part_opening(rows: LaneRows) -> list[str]:
         ]
     if rows.program.late_signals:
         lines.append("look_at = (1.0 - timing.signal_lag) * timing.step")
-    return lines
+    return [*lines, *command_at_valve(rows)]
 
 
 def measure(rows: LaneRows) -> list[str]:

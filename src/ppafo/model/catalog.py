@@ -9,7 +9,7 @@ from ppafo.errors import KindError, one_line
 from ppafo.kinds import Kinds
 from ppafo.model.actuators import bladder, cylinder, muscle_pair, table, vane
 from ppafo.model.actuators.kind import ActuatorKind
-from ppafo.model.effects import bandwidth, ice, leak_opening, seal_friction, silencer, stribeck
+from ppafo.model.effects import bandwidth, ice, leak_opening, seal_friction, silencer, spool_play, stribeck
 from ppafo.model.effects.kind import SECTION, Effect, effect_problem
 from ppafo.model.valves import proportional, solenoid, solenoid_recycling
 from ppafo.model.valves.kind import ValveKind
@@ -24,7 +24,15 @@ ACTUATORS: Kinds[ActuatorKind] = Kinds(
 )
 
 
-_OWN = (silencer.EFFECT, ice.EFFECT, leak_opening.EFFECT, seal_friction.EFFECT, stribeck.EFFECT, bandwidth.EFFECT)
+_OWN = (
+    silencer.EFFECT,
+    ice.EFFECT,
+    leak_opening.EFFECT,
+    spool_play.EFFECT,
+    seal_friction.EFFECT,
+    stribeck.EFFECT,
+    bandwidth.EFFECT,
+)
 EFFECTS: Kinds[Effect] = Kinds("ppafo.effects", "effect", Effect, _OWN)
 
 

@@ -5,6 +5,11 @@ calls the law instead (``model/effects/kind.py``). A law takes what its place ta
 """
 
 
+def at_valve(command: float) -> float:
+    """Command [-] that the valve follows, from the one that has reached it, -1 to 1, or the one that vents."""
+    return command
+
+
 def way_in(conductance: float) -> float:
     """Conductance [kg/(s Pa)] from a regulated supply to a chamber, from that of the open valve. Equation (8)."""
     return conductance

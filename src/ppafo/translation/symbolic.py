@@ -16,7 +16,7 @@ from typing import Any
 from ppafo.engine.program import link_effects
 from ppafo.engine.rows import is_number, members
 from ppafo.engine.source_text import SourceCollector, emitted_name, is_row
-from ppafo.errors import ProgramError
+from ppafo.errors import ProgramError, SimulationError
 from ppafo.model.effects.kind import Effect
 from ppafo.translation import typed
 from ppafo.translation.typed import FLOAT, INT, Function, Handed, Items, Row, Statement, Term, Type, is_empty
@@ -130,7 +130,11 @@ def _walked(
     link_effects(effects, collector)
     name = collector.add(function)
     asked = {effect.name: effect.parameters for effect in effects}
-    first = [asked[row] for row in collector.needs.get(name, ())]
+    needed = collector.needs.get(name, ())
+    stated = [row.removesuffix("_state") for row in needed if row not in asked]
+    if stated:
+        raise SimulationError(f"effect '{stated[0]}' has a state of its own, which no linear model has: switch it off")
+    first = [asked[row] for row in needed]
     types = tuple(_type_of(item, collector) for item in (*first, *given))
     module = walk_module(collector.text(), {name: types})
     places = {

@@ -25,7 +25,7 @@ from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.engine.run import Run, batch_of, states_at_start
 from ppafo.engine.scheme.actuators import driving_torque_of, measurement_of
 from ppafo.errors import SimulationError
-from ppafo.model.places import friction_at_rest, shown_signals
+from ppafo.model.places import at_valve, friction_at_rest, shown_signals
 from ppafo.model.plant import PlantParameters, chamber_pressures, driving_torque, holds_still
 from ppafo.model.sensors import Measurement, measure
 
@@ -230,6 +230,8 @@ class _Solution:
         self.valve_from = unknowns_before_valve(run.program)
         self.show = python_place(shown_signals, run.program.effects, run.effects)
         self.limit = python_place(friction_at_rest, run.program.effects, run.effects)
+        self.follows = python_place(at_valve, run.program.effects, run.effects)
+        self.arrived = 0.0
         self.command, self.time = 0.0, 0.0
         self.way = self.rest_mode() if run.program.angle is None else 0.0
         if self.y[1] != 0.0 and run.program.angle is None:
@@ -347,10 +349,26 @@ class _Solution:
             for moment, sample in looks.items():
                 if abs(moment - self.time) <= SAME_TIME:
                     self.control.keep(sample, self.present_signals())
-            self.command = self.control.arriving(self.time, self.command)
+            self.take_command()
             self.settle_valve()
             events = [*looks, *self.control.arrivals(), self.next_valve_event()]
             self.integrate(min([end, *(moment for moment in events if moment > self.time + SAME_TIME)]))
+
+    def take_command(self) -> None:
+        """Let the valve have the command that has arrived, and effects between them change with it."""
+        self.arrived = self.control.arriving(self.time, self.arrived)
+        self.command = self.arrived
+        if self.follows is None:
+            return
+        self.command = self.follows(self.states_in(self.y), self.arrived)
+        first, states = gas_unknowns(self.run.program), self.states_in(self.y)
+        for effect, row in zip(self.run.program.effects, self.run.effects, strict=True):
+            if effect.state is None:
+                continue
+            state = states[effect.state_name]
+            settled = state if effect.state.settle is None else effect.state.settle(row, state, self.command)
+            self.y[first : first + len(numbers(state))] = numbers(settled)
+            first += len(numbers(state))
 
     def settle_valve(self) -> None:
         """Let the valve make the abrupt changes that are due."""

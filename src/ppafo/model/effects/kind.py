@@ -41,7 +41,8 @@ class State:
     continuous time: the reference solver integrates them, and the second stage of a step has ``state + step * slopes``
     where a law acts on the gas. ``tolerances`` has for each number the error of one step that is allowed, for which
     ``advance`` less ``state + step * slopes`` stands; without any, as where ``advance`` is exact, the state shortens no
-    step.
+    step. ``settle(row, state, command)`` is the state after what changes at once where the valve gets a command: a
+    step does it in ``advance``, the reference solver between two stretches.
     """
 
     row: type
@@ -49,6 +50,7 @@ class State:
     advance: Callable[..., Any]
     slopes: Callable[..., Any]
     tolerances: tuple[float, ...] = ()
+    settle: Callable[..., Any] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

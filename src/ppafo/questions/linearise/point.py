@@ -16,7 +16,7 @@ from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.elementary import TURN, sine_and_cosine_of_turns
 from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
-from ppafo.model.places import friction_at_rest
+from ppafo.model.places import at_valve, friction_at_rest
 from ppafo.model.plant import (
     Openings,
     ThermalParameters,
@@ -138,8 +138,9 @@ def _torque_of_leg(program: Program, leg: LedLeg, time: float, angle: Any) -> An
 
 def _valve(run: Run, state: list[Any], command: Any, compare: Compare) -> tuple[Any, list[Any]]:
     """Openings of the valve [-] and the rates of its states, after the changes that it makes at once."""
-    valve = run.program.valve
+    valve, acting = run.program.valve, dict(zip(run.program.effects, run.effects, strict=True))
     types = (valve.parameters, valve.state, float)
+    command = symbolic(at_valve, float, compare=compare, acting=acting)(command)
     settled = symbolic(valve.settle, *types, float, compare=compare)(
         run.valve, rebuilt(valve.state, state), command, 0.0
     )

@@ -1,0 +1,78 @@
+"""Play of a spool behind its command, which makes a hysteresis: it moves only when the command has crossed the play."""
+
+from typing import Any, NamedTuple
+
+from ppafo.model.declaration import Quantity
+from ppafo.model.effects.kind import Effect, Moment, State
+from ppafo.model.places import at_valve
+from ppafo.model.valves.kind import VENTS_ABOVE
+
+
+class SpoolPlay(NamedTuple):
+    """Whole width of the play [-], in units of the command."""
+
+    play_width: float
+
+
+class SpoolPlace(NamedTuple):
+    """Command [-] that the spool follows, -1 to 1."""
+
+    spool_command: float
+
+
+def prepare(settings: Any, _device: Any) -> SpoolPlay:
+    """The row of the setting."""
+    return SpoolPlay(settings["width"])
+
+
+def behind_play(command: float, spool_play: SpoolPlay, spool_play_state: SpoolPlace) -> float:
+    """Command [-] that a spool follows with play behind its command, as the virtual rig has it.
+
+    The inside of the play, ``y``, is drawn along when the command leaves it: ``y = max(c - b/2, min(c + b/2, y))``.
+    The spool comes to ``y / (1 - b/2)``, so that it reaches full opening. A command that vents is no position.
+    """
+    given = at_valve(command)
+    half = 0.5 * spool_play.play_width
+    inner = spool_play_state.spool_command * (1.0 - half)
+    inner = max(given - half, min(given + half, inner))
+    return given if given > VENTS_ABOVE else max(-1.0, min(1.0, inner / (1.0 - half)))
+
+
+def start(_spool_play: SpoolPlay, _now: Moment) -> SpoolPlace:
+    """A spool in its middle."""
+    return SpoolPlace(0.0)
+
+
+def settle(_spool_play: SpoolPlay, spool_play_state: SpoolPlace, command: float) -> SpoolPlace:
+    """The spool where the command [-] that it follows has drawn it."""
+    return SpoolPlace(spool_play_state.spool_command if command > VENTS_ABOVE else command)
+
+
+def advance(
+    spool_play: SpoolPlay, spool_play_state: SpoolPlace, _before: Moment, after: Moment, step: float
+) -> SpoolPlace:
+    """The spool after a step [s], in which its command stays what it is; exact."""
+    return settle(spool_play, spool_play_state, after.command)
+
+
+def slopes(_spool_play: SpoolPlay, _spool_play_state: SpoolPlace, _now: Moment) -> SpoolPlace:
+    """Rates [1/s]: none between two commands."""
+    return SpoolPlace(0.0)
+
+
+EFFECT = Effect(
+    name="spool_play",
+    summary="Play between command and spool of the valve.",
+    quantities=(Quantity("width", "", "whole width of the play over the full command, 0 for none", 0.0, 0.0, 0.5),),
+    parameters=SpoolPlay,
+    prepare=prepare,
+    switch=("width",),
+    laws={at_valve: behind_play},
+    source="the law of the virtual rig, `ppafo.rig.solution.spool_position`",
+    equation="y = max(c - b/2, min(c + b/2, y)), c' = y / (1 - b/2)",
+    symbols=(
+        ("b", "play_width", "-", "whole width of the play between command and spool"),
+        ("c'", "spool_command", "-", "command that a spool with play follows"),
+    ),
+    state=State(row=SpoolPlace, start=start, advance=advance, slopes=slopes, settle=settle),
+)
