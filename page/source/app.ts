@@ -2,6 +2,7 @@
 
 import type { Overlay } from "./agreement";
 import { Bands } from "./bands";
+import { looksOf } from "./colours";
 import { type Content, programNamed, type Program, type Tab } from "./content";
 import { Controls } from "./controls";
 import { say, whenQuiet } from "./dom";
@@ -73,11 +74,13 @@ export class App implements Page {
 
   /** The configurations of the tab with names that tell them apart. */
   get named(): readonly Named[] {
-    const labels = this.bench.map(({ program }) => programNamed(this.content, program).label);
+    const programs = this.bench.map(({ program }) => programNamed(this.content, program));
+    const labels = programs.map(({ label }) => label);
+    const looks = looksOf(programs.map(({ look }) => look));
     return this.bench.map((configuration, place) => {
       const label = labels[place] ?? "";
       const earlier = labels.slice(0, place).filter((other) => other === label).length;
-      return { name: earlier > 0 ? `${label} ${earlier + 1}` : label, place, configuration };
+      return { name: earlier > 0 ? `${label} ${earlier + 1}` : label, place, look: looks[place] ?? 1, configuration };
     });
   }
 

@@ -12,9 +12,20 @@ export function colour(name: string): string {
   return found;
 }
 
-/** The colour of a configuration by its place. */
-export function colourOf(place: number): string {
-  return colour(`run-${place + 1}`);
+/** The colour of a configuration by its number. */
+export function colourOf(look: number): string {
+  return colour(`run-${look}`);
+}
+
+/** Numbers of colours: the first configuration with a valve has that of the valve in every figure, others what is left. */
+export function looksOf(wanted: readonly number[]): readonly number[] {
+  const free = new Set([1, 2, 3, 4].filter((look) => !wanted.includes(look)));
+  return wanted.map((look, place) => {
+    if (look > 0 && wanted.indexOf(look) === place) return look;
+    const found = [...free][0] ?? (place % 4) + 1;
+    free.delete(found);
+    return found;
+  });
 }
 
 /** From pale to deep: lightness alone says how much. Ends of a map of one metric, and of the pressure in a chamber. */

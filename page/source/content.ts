@@ -69,6 +69,8 @@ export interface Program {
   readonly name: string;
   readonly kind: "scenario" | "walk";
   readonly label: string;
+  /** The number of the colour that its valve has in every figure, 0 where it has none. */
+  readonly look: number;
   readonly description: string;
   readonly document: Table;
   /** Texts by key that a configuration begins with, and to which a setting is put back. */

@@ -127,10 +127,10 @@ function fillBench(bench: HTMLElement, content: Content, named: readonly Named[]
   const layout = JSON.stringify(named.map(({ name }) => name)) + app.state.tab;
   if (bench.dataset["layout"] === layout) return;
   bench.dataset["layout"] = layout;
-  const chips = named.map(({ name, place }) =>
+  const chips = named.map(({ name, place, look }) =>
     element(
       "span",
-      { class: `chip run-${place + 1}` },
+      { class: `chip run-${look}` },
       name,
       ...(named.length > 1 ? [element("button", { type: "button", "aria-label": `Remove ${name}`, onclick: () => app.removeConfiguration(place) }, "×")] : []),
     ),
@@ -158,10 +158,10 @@ function fillTarget(target: HTMLElement, named: readonly Named[], chosen: number
   const layout = JSON.stringify([named.map(({ name }) => name), app.state.tab]);
   if (target.dataset["layout"] !== layout) {
     target.dataset["layout"] = layout;
-    const items: readonly (readonly [string, number | null])[] = [["All", null], ...named.map(({ name, place }) => [name, place] as const)];
+    const items: readonly (readonly [string, number | null, string])[] = [["All", null, ""], ...named.map(({ name, place, look }) => [name, place, `run-${look}`] as const)];
     target.replaceChildren(
-      ...items.map(([name, place]) =>
-        element("label", {}, element("input", { type: "radio", name: "target", value: String(place), onchange: () => app.choose(place) }), element("span", { class: place === null ? "" : `run-${place + 1}` }, name)),
+      ...items.map(([name, place, look]) =>
+        element("label", {}, element("input", { type: "radio", name: "target", value: String(place), onchange: () => app.choose(place) }), element("span", { class: look }, name)),
       ),
     );
   }

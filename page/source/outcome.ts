@@ -7,7 +7,7 @@ import { fromSi, plain, readableUnit, scaleOf } from "./units";
 
 export interface Column {
   readonly name: string;
-  readonly place: number;
+  readonly look: number;
   readonly program: string;
   readonly run: Run;
 }
@@ -60,7 +60,7 @@ export class OutcomeTable {
       "tr",
       {},
       element("th", { scope: "col" }, "Metric"),
-      ...this.columns.map(({ name, place }) => element("th", { scope: "col", class: `number run-${place + 1}` }, name)),
+      ...this.columns.map(({ name, look }) => element("th", { scope: "col", class: `number run-${look}` }, name)),
       ...others.map(({ name }) => element("th", { scope: "col", class: "number change" }, `${others.length > 1 ? `${name} ` : ""}vs first`)),
     );
     this.rows = [...metrics.values()].map((metric) => ({

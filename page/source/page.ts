@@ -8,10 +8,11 @@ import type { Panels } from "./panels";
 import type { Configuration } from "./settings";
 import type { State } from "./state";
 
-/** A configuration with a name that tells it from the others, and its place among them. */
+/** A configuration with a name that tells it from the others, its place among them, and the number of its colour. */
 export interface Named {
   readonly name: string;
   readonly place: number;
+  readonly look: number;
   readonly configuration: Configuration;
 }
 

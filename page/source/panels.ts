@@ -34,6 +34,7 @@ export const PANELS: readonly Panel[] = [
 export interface Shown {
   readonly name: string;
   readonly place: number;
+  readonly look: number;
   readonly run: Run;
   /** Settings of the run: its gauge pressures count from its own atmosphere. */
   readonly values: Values;
@@ -102,7 +103,7 @@ export class Panels {
   show(shown: readonly Shown[], isBeside: boolean, overlay: Overlay | null): void {
     this.shown = shown;
     this.overlay = overlay;
-    const layout = JSON.stringify([isBeside, shown.map((item) => [item.name, item.place, ...item.run.channels.keys()])]);
+    const layout = JSON.stringify([isBeside, shown.map((item) => [item.name, item.look, ...item.run.channels.keys()])]);
     const present = PANELS.filter((panel) => shown.some(({ run }) => panel.channels.some((name) => run.channels.has(name))));
     // What is asked for comes first: a torque, else how the vane moves.
     const leads = (panel: Panel) => panel.channels[0] === (shown.some(({ run }) => run.channels.has("reference")) ? "torque" : "angle");
@@ -204,7 +205,7 @@ export class Panels {
     const ink = colour("ink");
     const axis = { stroke: colour("soft"), grid: { stroke: colour("line"), width: 1 }, ticks: { show: false }, font: "12px system-ui, sans-serif" };
     const series: uPlot.Series[] = lines.map((line) => ({
-      stroke: line.isWanted ? ink : colourOf(this.shown[line.place]?.place ?? 0),
+      stroke: line.isWanted ? ink : colourOf(this.shown[line.place]?.look ?? 1),
       width: line.isWanted ? 1.5 : 2,
       dash: line.isWanted ? [6, 4] : (DASHES[panel.channels.indexOf(line.channel)] ?? []),
       points: { show: false },
@@ -253,7 +254,7 @@ export class Panels {
       readout.replaceChildren(
         ...values
           .filter((value) => value !== null)
-          .map(({ line, text }) => element("b", { class: line.isWanted ? "wanted" : `run-${(this.shown[line.place]?.place ?? 0) + 1}` }, text)),
+          .map(({ line, text }) => element("b", { class: line.isWanted ? "wanted" : `run-${this.shown[line.place]?.look ?? 1}` }, text)),
       );
     }
   }
@@ -345,7 +346,7 @@ export class Panels {
       for (const place of shown) {
         const item = this.shown[place];
         const band = item?.band?.get(channel);
-        if (item !== undefined && band !== undefined) this.drawBand(plot, band, this.lineOf(channel, item), colourOf(item.place));
+        if (item !== undefined && band !== undefined) this.drawBand(plot, band, this.lineOf(channel, item), colourOf(item.look));
       }
       const recorded = this.overlay?.channels.get(channel);
       const first = this.shown[shown[0] ?? 0];

@@ -29,7 +29,7 @@ function bareUnit(unit: string): string {
 }
 
 /** All plots in one picture, with their names and those of the configurations. */
-export function savePicture(panels: Panels, names: readonly { readonly name: string; readonly place: number }[]): void {
+export function savePicture(panels: Panels, names: readonly { readonly name: string; readonly look: number }[]): void {
   const pictures = panels.pictures();
   const scale = devicePixelRatio || 1;
   const left = Math.min(...pictures.map(({ box }) => box.left));
@@ -46,8 +46,8 @@ export function savePicture(panels: Panels, names: readonly { readonly name: str
   context.fillRect(0, 0, canvas.width, canvas.height);
   context.font = "600 15px system-ui, sans-serif";
   let across = 16;
-  for (const { name, place } of names) {
-    context.fillStyle = colourOf(place);
+  for (const { name, look } of names) {
+    context.fillStyle = colourOf(look);
     context.fillText(name, across, 26);
     across += context.measureText(name).width + 24;
   }

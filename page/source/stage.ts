@@ -9,7 +9,7 @@ import { plain } from "./units";
 
 export interface Acted {
   readonly name: string;
-  readonly place: number;
+  readonly look: number;
   readonly run: Run;
   readonly values: Values;
 }
@@ -44,12 +44,12 @@ export class Stage {
 
   show(acted: readonly Acted[]): void {
     this.acted = acted;
-    const layout = JSON.stringify(acted.map(({ name, place }) => [name, place]));
+    const layout = JSON.stringify(acted.map(({ name, look }) => [name, look]));
     if (layout !== this.layout) {
       this.layout = layout;
-      this.drawn = acted.map(({ name, place }) => ({
+      this.drawn = acted.map(({ name, look }) => ({
         drawing: new Drawing(name),
-        caption: element("figcaption", { class: `run-${place + 1}` }, name),
+        caption: element("figcaption", { class: `run-${look}` }, name),
       }));
       this.drawings.replaceChildren(...this.drawn.map(({ drawing, caption }) => element("figure", {}, caption, drawing.root)));
     }

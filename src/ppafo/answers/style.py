@@ -43,6 +43,8 @@ EXPERIMENT = Look(GREY, marker=".")
 ACTUAL = Look(BLUE)
 """What a device does whose valve is no matter."""
 _VALVES = MappingProxyType({"proportional": PROPORTIONAL, "solenoid": SOLENOID, "solenoid_recycling": SOLENOID})
+PAGE_LOOKS = MappingProxyType({"proportional": 1, "solenoid": 2, "solenoid_recycling": 2})
+"""Numbers of these two colours on the page that simulates, by kind of valve."""
 
 
 def look_of_valve(kind: str) -> Look:

@@ -13,6 +13,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+from ppafo.answers.style import PAGE_LOOKS
 from ppafo.errors import UnitError
 from ppafo.exports.wasm import WasmModule
 from ppafo.parameters.graph import ATMOSPHERE_PATH
@@ -79,6 +80,8 @@ def program_content(item: Simulated, module: str, intervals: Mapping[str, Interv
         "name": told["name"],
         "kind": told["kind"],
         "label": item.label,
+        # With and without the device, a walk takes colours in their order, as its figures do.
+        "look": PAGE_LOOKS.get(item.scenario.device.valve.kind, 0) if worn_kind(item.scenario) is None else 0,
         "description": " ".join(told["title"].split()),
         "document": document,
         "usual": usual_changes(item.scenario),
