@@ -28,8 +28,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from ppafo.errors import PpafoError
 from ppafo.live.workbench import DEFAULT, workbench
+from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.simulate import Result, simulate
+from ppafo.simulation.simulate import Result
 from ppafo.units import parse_quantity
 from ppafo.walking.loading import load_walk
 from ppafo.walking.result import WalkResult

@@ -99,8 +99,8 @@ def against_simulator(_long: Path) -> list[Line]:
 
 def balances(_long: Path) -> list[Line]:
     """Gas and energy of the shipped scenarios."""
+    from ppafo.running import simulate
     from ppafo.simulation.loading import list_scenarios
-    from ppafo.simulation.simulate import simulate
 
     found = [simulate(name).metrics for name in list_scenarios()]
     gas = max(

@@ -8,10 +8,10 @@ import numpy as np
 
 from ppafo.identification.trajectory import Experiment, FreeParameter, Search, TrajectoryProblem
 from ppafo.identification.trajectory.problem import number_at
+from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Floats, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import simulate
 
 NOISE: Mapping[str, float] = {"angle": math.radians(0.1), "pressure_1": 500.0, "pressure_2": 500.0}
 """Standard deviations [rad], [Pa] of a potentiometer and of pressure sensors of 0.1 % of 500 kPa."""

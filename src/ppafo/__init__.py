@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     )
     from ppafo.gait import Gait, list_gaits, load_gait
     from ppafo.live.workbench import workbench
-    from ppafo.loading import load_scenario
+    from ppafo.loading import load_scenario, scenario_from_dict
     from ppafo.metrics import Metric, evaluate
     from ppafo.model.sensors import Measurement
     from ppafo.parameters import ParameterSet, apply_overrides, list_sets, load_device, load_parameter_set
@@ -70,10 +70,11 @@ if TYPE_CHECKING:
     from ppafo.questions.tune.solve import tune
     from ppafo.questions.unreported.solve import infer_settings
     from ppafo.questions.validate.solve import Validation, validate
+    from ppafo.running import simulate
     from ppafo.signals import Channel, Recording
-    from ppafo.simulation.loading import list_scenarios, scenario_from_dict
+    from ppafo.simulation.loading import list_scenarios
     from ppafo.simulation.scenario import Scenario
-    from ppafo.simulation.simulate import Result, Status, simulate, simulate_many
+    from ppafo.simulation.simulate import Result, Status, simulate_many
     from ppafo.storage import read_recording, read_result
     from ppafo.studies.loading import list_studies, load_study
     from ppafo.walking import compare_walks, list_walks, load_walk, walk_population
@@ -190,10 +191,11 @@ _HOMES = {
     "ppafo.parameters.device": ("Device",),
     "ppafo.parameters.parts": ("Catalogue", "Part", "load_catalogue"),
     "ppafo.signals": ("Channel", "Recording"),
-    "ppafo.loading": ("load_scenario",),
-    "ppafo.simulation.loading": ("list_scenarios", "scenario_from_dict"),
+    "ppafo.loading": ("load_scenario", "scenario_from_dict"),
+    "ppafo.running": ("simulate",),
+    "ppafo.simulation.loading": ("list_scenarios",),
     "ppafo.simulation.scenario": ("Scenario",),
-    "ppafo.simulation.simulate": ("Result", "Status", "simulate", "simulate_many"),
+    "ppafo.simulation.simulate": ("Result", "Status", "simulate_many"),
     "ppafo.storage": ("read_recording", "read_result"),
     "ppafo.studies.loading": ("list_studies", "load_study"),
     "ppafo.questions.sweep.results": ("StudyResults", "load_study_results"),

@@ -3,17 +3,31 @@
 The code of walks, which is much, is loaded only where one is asked for.
 """
 
-from collections.abc import Iterable
+import json
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 from ppafo.documents.toml_text import beside, label
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.parameters import ParameterSet
 from ppafo.simulation import loading as of_vanes
+from ppafo.simulation import schema
+from ppafo.simulation.building import ScenarioRequest
+from ppafo.simulation.declaration import WALK, kind_at
 from ppafo.simulation.scenario import Scenario
 
 _OF_A_VANE = ("motion", "initial", "reference")
-"""Sections that no walk has, and of which every other scenario has one."""
+"""Sections of which the file of a vane has one, and that of a walk none unless its motion says that it is a walk."""
+_OF_A_LEG = ("wearer", "timing", "faults", "bottle", "gait", "course")
+"""Sections that only the file of a walk has."""
+
+
+def list_all_scenarios() -> tuple[str, ...]:
+    """Return the names of the scenarios that come with the package: those of a vane alone, then walks."""
+    from ppafo.walking.loading import list_walks
+
+    return *of_vanes.list_scenarios(), *list_walks()
 
 
 def load_scenario(
@@ -26,34 +40,50 @@ def load_scenario(
     changes in its device is changed in this one. ScenarioError, ParameterError or DataError for anything that cannot be
     used.
     """
-    name = str(name_or_path)
+    name, path = str(name_or_path), Path(name_or_path)
     if name in of_vanes.list_scenarios():
         return of_vanes.load_scenario(name, overrides, parameter_set)
     from ppafo.walking.loading import FILE, list_walks, load_walk
 
     if name in list_walks():
         return load_walk(name, overrides, parameter_set=parameter_set)
-    path = Path(name_or_path)
-    if path.suffix != ".toml" and not path.is_file():
-        known = (*of_vanes.list_scenarios(), *list_walks())
+    if path.suffix != ".toml" and not path.is_file() and not path.is_dir():
+        known = list_all_scenarios()
         raise ScenarioError(
             f"there is no scenario or walk '{label(name)}'{nearest_name(name, known)}; available: {', '.join(known)}, "
             "or give a .toml file"
         )
-    document = FILE.parse(FILE.read(path), label(name))
-    is_of_vane = any(section in document for section in _OF_A_VANE)
-    if is_of_vane:
-        return of_vanes.load_scenario(path, overrides, parameter_set)
-    return load_walk(path, overrides, parameter_set=parameter_set)
+    document = of_vanes.FILE.parse(FILE.read(path), label(name))
+    request = ScenarioRequest(label(name), name, path.parent, document, tuple(overrides), parameter_set)
+    return of_vanes.scenario_of(request, _layout(document))
+
+
+def scenario_from_dict(content: Mapping[str, Any], overrides: Iterable[str] = ()) -> Scenario:
+    """Return a scenario, walks among them, from nested dictionaries that are laid out as a scenario file is.
+
+    Quantities are texts with their unit, ``{"angle": "75 deg"}``; relative paths begin in the working folder.
+    ScenarioError, ParameterError or DataError for anything that cannot be used.
+    """
+    request = of_vanes.request_of_dict(content, overrides)
+    return of_vanes.scenario_of(request, _layout(request.content))
+
+
+def _layout(document: Mapping[str, Any]) -> of_vanes.Layout:
+    """Return how a document is laid out: as its motion says, or without one, as in older files, as its sections do."""
+    is_older_walk = not any(section in document for section in _OF_A_VANE) and (
+        any(section in document for section in _OF_A_LEG) or {"device", "controller"} <= document.keys()
+    )
+    is_walk = kind_at(document, "motion") == WALK or is_older_walk
+    if not is_walk:
+        return of_vanes.VANE
+    from ppafo.walking.loading import WALKING
+
+    return WALKING
 
 
 def scenario_or_load(scenario: Scenario | str | Path, overrides: Iterable[str] = ()) -> Scenario:
     """Return a scenario as it is, or load it by name or path; ScenarioError for overrides of one that is loaded."""
-    return (
-        of_vanes.scenario_or_load(scenario, overrides)
-        if isinstance(scenario, Scenario)
-        else load_scenario(scenario, overrides)
-    )
+    return of_vanes.scenario_or_load(scenario, overrides, load_scenario)
 
 
 def placed(name: str, folder: Path) -> str:
@@ -68,8 +98,18 @@ def reloaded(scenario: Scenario, more: Iterable[str]) -> Scenario:
     """
     origin, custom = scenario.origin, scenario.control.custom
     every = (*origin.overrides, *more)
-    if origin.file is None:
-        read = of_vanes.scenario_from_dict(origin.content, every)
-    else:
-        read = load_scenario(origin.file, every)
+    read = scenario_from_dict(origin.content, every) if origin.file is None else load_scenario(origin.file, every)
     return read if custom is None else read.controlled_by(custom)
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a scenario file: of a vane alone, or of a leg that walks."""
+    from ppafo.walking import declaration as of_walks
+
+    forms = {"vane": schema.json_schema(), "walk": of_walks.json_schema()}
+    parts: dict[str, Any] = {}
+    for name, form in forms.items():
+        own = json.loads(json.dumps(form).replace('"#/$defs/', f'"#/$defs/{name}.'))
+        inner = own.pop("$defs")
+        parts |= {name: own} | {f"{name}.{part}": described for part, described in inner.items()}
+    return {"title": "ppafo scenario", "anyOf": [{"$ref": f"#/$defs/{name}"} for name in forms], "$defs": parts}

@@ -13,8 +13,8 @@ from ppafo.cli.main import main
 from ppafo.control.fixed.torque_laws import TARGETS
 from ppafo.exports.firmware.catalog import CATALOG
 from ppafo.exports.firmware.simulators import missing_tools
+from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.simulate import simulate
 
 PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "run-on-a-chip.md").read_text(encoding="utf-8")
 COMMANDS = [

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from ppafo.cli.main import main
+from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.simulate import simulate
 from ppafo.storage import read_recording
 from tests.virtual_wire import free_port, sending_bench
 

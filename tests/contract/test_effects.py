@@ -27,10 +27,10 @@ from ppafo.model.catalog import EFFECTS
 from ppafo.parameters.building import build_device
 from ppafo.parameters.loading import json_schema, parse_parameter_set
 from ppafo.questions.linearise.solve import linearise
+from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.simulate import simulate
 from ppafo.walking import load_walk
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.walk import walk

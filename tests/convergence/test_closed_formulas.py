@@ -15,10 +15,10 @@ import pytest
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.reference.solver import chamber_pressures_of, plant_states
 from ppafo.engine.run import batch_of
+from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import simulate
 from tests.judge.simulator import judge
 
 K = 1.3

@@ -10,9 +10,9 @@ from ppafo.engine.reference.solver import compare_with_reference, solve_referenc
 from ppafo.model.catalog import EFFECTS
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect, Moment, State
+from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.simulate import simulate
 
 ICE = ("effects.ice.blockage_per_gas=3e4 1/kg", "effects.ice.melting_time=30 ms")
 VENTING = (

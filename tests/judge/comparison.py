@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ppafo.errors import PpafoError
+from ppafo.running import simulate
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import simulate
 from tests.judge.simulator import Answer, judge
 
 LARGEST_ANGLE = 2.0e-4

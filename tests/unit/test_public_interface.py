@@ -41,7 +41,7 @@ def test_importing_the_package_loads_nothing_heavy() -> None:
 
 
 def test_public_functions_are_the_ones_of_their_modules() -> None:
-    assert ppafo.simulate is importlib.import_module("ppafo.simulation.simulate").simulate
+    assert ppafo.simulate is importlib.import_module("ppafo.running").simulate
     assert ppafo.audit is importlib.import_module("ppafo.parameters.audit").audit
 
 

@@ -30,10 +30,10 @@ def run(parsed: argparse.Namespace) -> int:
     if parsed.warm:
         if why_not:
             raise SimulationError(f"--warm: compiled models cannot be kept: {why_not}")
-        from ppafo.simulation.loading import list_scenarios
+        from ppafo.simulation.loading import list_scenarios, load_scenario
         from ppafo.simulation.simulate import compile_models
 
-        compile_models(list_scenarios())
+        compile_models(load_scenario(name) for name in list_scenarios())
     document = _document(folder, why_not) | ({"freed": cleared} if parsed.clear else {})
     lines = [f"folder: {document['folder'] or 'none'}"]
     if document["not_used"]:

@@ -8,13 +8,13 @@ from ppafo.errors import DataError, nearest_name
 
 FORMATS: dict[str, str] = {
     "parameters": "ppafo.parameters.loading",
-    "scenario": "ppafo.simulation.schema",
+    "scenario": "ppafo.loading",
     "study": "ppafo.studies.declaration",
     "tuning": "ppafo.questions.tune.problem",
     "parts": "ppafo.parameters.parts.catalogue",
     "design": "ppafo.questions.design.problem",
     "size": "ppafo.questions.size.problem",
-    "walk": "ppafo.walking.schema",
+    "walk": "ppafo.walking.declaration",
     "course": "ppafo.walking.course",
     "identification": "ppafo.identification.problem",
     "columns": "ppafo.storage.foreign",

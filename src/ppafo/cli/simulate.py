@@ -21,9 +21,11 @@ FIGURE = "figure"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
-    parser.add_argument("scenario", metavar="SCENARIO", nargs="?", help="name of a scenario, or a .toml file")
+    parser.add_argument(
+        "scenario", metavar="SCENARIO", nargs="?", help="name of a scenario or of a walk, or a .toml file"
+    )
     output.add_override_argument(parser)
-    parser.add_argument("--list", action="store_true", help="list the scenarios that come with the package")
+    parser.add_argument("--list", action="store_true", help="list the scenarios and walks that come with the package")
     parser.add_argument(
         "--check",
         action="store_true",
@@ -41,7 +43,7 @@ def run(parsed: argparse.Namespace) -> int:
         return _list(parsed)
     if parsed.scenario is None:
         raise ScenarioError("no scenario was given: name one or give a .toml file; 'ppafo simulate --list' shows them")
-    from ppafo.simulation.loading import load_scenario
+    from ppafo.loading import load_scenario
     from ppafo.storage import check_result_folder
 
     scenario = load_scenario(parsed.scenario, parsed.overrides)
@@ -114,9 +116,9 @@ def _answer(result: "Result", check: "Check | None") -> "Answer":
 
 
 def _list(parsed: argparse.Namespace) -> int:
-    from ppafo.simulation.loading import list_scenarios, load_scenario
+    from ppafo.loading import list_all_scenarios, load_scenario
 
-    summaries = {name: load_scenario(name).description for name in list_scenarios()}
+    summaries = {name: load_scenario(name).description for name in list_all_scenarios()}
     width = max(len(name) for name in summaries)
     text = "\n".join(f"{name:<{width}}  {' '.join(summary.split())}" for name, summary in summaries.items())
     document = {"scenarios": [{"name": name, "description": summary} for name, summary in summaries.items()]}
@@ -126,10 +128,13 @@ def _list(parsed: argparse.Namespace) -> int:
 
 def _text(result: "Result", check: "Check | None", folder: Path) -> str:
     from ppafo.answers.display_units import metrics_lines
+    from ppafo.simulation.scenario import worn_kind
 
     head = f"{result.scenario.name}: {result.status.kind}"
     checked = [] if check is None else [repr(check), ""]
     files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", "report.html"]
     written = ", ".join(files if check is None else [*files, CHECK_FILE])
     lines = metrics_lines(result.metrics, result.scenario.device.supply.atmospheric_pressure)
-    return "\n".join([head, "", *lines, "", *checked, f"written: {folder} ({written})"])
+    walked = f"'ppafo walk {result.scenario.origin.file}' compares it with the device off and with a healthy ankle"
+    beside = [] if worn_kind(result.scenario) is None else [walked]
+    return "\n".join([head, "", *lines, "", *checked, *beside, f"written: {folder} ({written})"])

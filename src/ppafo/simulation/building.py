@@ -3,7 +3,7 @@
 import copy
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from ppafo.simulation.declaration import (
     ARITHMETIC,
     AT_REST,
     INITIAL,
+    OF_A_VANE,
     PRESSURE_WORDS,
     SEED,
     SENSORS,
@@ -34,6 +35,7 @@ from ppafo.simulation.declaration import (
     THERMAL,
     THERMAL_GAS,
     TORQUE_LEVEL,
+    Declared,
     controller_settings,
     kind_at,
     line_entries,
@@ -72,27 +74,34 @@ class OverriddenDocument:
     device: tuple[str, ...]
 
 
-def apply_overrides(document: Mapping[str, Any], overrides: Iterable[str], file: str) -> OverriddenDocument:
+def apply_overrides(
+    document: Mapping[str, Any], overrides: Iterable[str], file: str, declared: Declared = OF_A_VANE
+) -> OverriddenDocument:
     """Return a changed copy of a document; ``file`` is what messages call it.
 
-    Naming another kind of motion, controller or profile drops the settings that only the old kind has; giving a rate
-    drops the period, and the reverse. A gain on the torque may leave out its unit. ScenarioError for a path that is
-    neither of the scenario nor of its device.
+    Naming another kind of motion, controller, timing or profile drops the settings that only the old kind has; giving a
+    rate drops the period, and the reverse. A gain on the torque may leave out its unit. ScenarioError for a path that
+    is neither ``declared`` nor of the device.
     """
     changed = copy.deepcopy(dict(document))
     paths: set[str] = set()
     device: list[str] = []
     for override in overrides:
-        path, text = split_override(override)
-        if is_of_device(path):
+        given, text = split_override(override)
+        path = declared.same.get(given, given)
+        if path in declared.appended:
+            section, own = declared.appended[path]
+            changed.setdefault(section, {}).setdefault("overrides", []).append(f"{own}={text}")
+        elif is_of_device(path):
             device.append(override)
             continue
-        known = scenario_paths(changed)
-        if path not in known:
-            raise unknown_value(override, known, f"{file} has")
-        if path == "motion.kind":
-            declaration.check_motion_kind(text, f"override '{override}'")
-        _set(changed, path, text, file)
+        else:
+            known = declared.paths(changed)
+            if path not in known:
+                raise unknown_value(override, known, f"{file} has")
+            if path == "motion.kind":
+                declaration.check_motion_kind(text, f"override '{override}'")
+            _set(changed, path, text, file, declared)
         paths.add(path)
     return OverriddenDocument(changed, frozenset(paths), tuple(device))
 
@@ -108,7 +117,7 @@ def split_override(override: str) -> tuple[str, str]:
 
 def scenario_paths(document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return every path of the scenario that an override can set, for the kinds that the document names."""
-    return (*declaration.texts(document), *(declaration.quantities(document) | declaration.line_paths()))
+    return OF_A_VANE.paths(document)
 
 
 def device_paths() -> tuple[str, ...]:
@@ -134,7 +143,7 @@ def unknown_value(override: str, known: tuple[str, ...], who_has: str) -> Scenar
     return ScenarioError(f"override '{one_line(override)}': {who_has} no value '{path}'{hint}")
 
 
-def _set(document: dict[str, Any], path: str, text: str, file: str) -> None:
+def _set(document: dict[str, Any], path: str, text: str, file: str, declared: Declared) -> None:
     section, _, name = path.rpartition(".")
     table = document
     for part in section.split(".") if section else ():
@@ -142,30 +151,30 @@ def _set(document: dict[str, Any], path: str, text: str, file: str) -> None:
         if not isinstance(table, dict):
             raise ScenarioError(f"override '{path}={text}': {file} has no table [{section}]")
     if name == "kind" and table.get("kind") != text:
-        _drop_settings_of_old_kind(document, section, text)
+        _drop_settings_of_old_kind(document, section, text, declared)
     table.pop(_ONE_OR_OTHER.get(path, ""), None)
-    table[name] = _seed(path, text) if path == _SEED else _with_unit_of_gain(document, path, text)
+    table[name] = _seed(path, text) if path == _SEED else _with_unit_of_gain(document, path, text, declared)
 
 
-def _drop_settings_of_old_kind(document: dict[str, Any], section: str, kind: str) -> None:
+def _drop_settings_of_old_kind(document: dict[str, Any], section: str, kind: str, declared: Declared) -> None:
     table = declaration.value_at(document, section)
-    before = _setting_names(document, section)
+    before = _setting_names(document, section, declared)
     table["kind"] = kind
-    after = _setting_names(document, section)
+    after = _setting_names(document, section, declared)
     for name in before - after - _OWN_KEYS.get(section, frozenset()):
         table.pop(name, None)
 
 
-def _setting_names(document: dict[str, Any], section: str) -> frozenset[str]:
+def _setting_names(document: dict[str, Any], section: str, declared: Declared) -> frozenset[str]:
     """Return the keys that a section can have beside its kind."""
     prefix = f"{section}."
-    paths = [path.removeprefix(prefix) for path in scenario_paths(document) if path.startswith(prefix)]
+    paths = [path.removeprefix(prefix) for path in declared.paths(document) if path.startswith(prefix)]
     return frozenset(path.partition(".")[0] for path in paths) - {"kind"}
 
 
-def _with_unit_of_gain(document: dict[str, Any], path: str, text: str) -> str:
+def _with_unit_of_gain(document: dict[str, Any], path: str, text: str, declared: Declared) -> str:
     """Return the text with the SI unit of a gain on the torque where it has none: papers print gains without units."""
-    quantity = declaration.quantities(document).get(path)
+    quantity = declared.quantities(document).get(path)
     is_gain = quantity is not None and path.startswith("controller.") and "(N m" in quantity.unit
     return f"{text} {quantity.unit}" if quantity is not None and is_gain and _NUMBER.fullmatch(text) else text
 
@@ -182,7 +191,8 @@ class ScenarioRequest:
     """A scenario that is to be built.
 
     ``file`` is what messages call it, ``path`` the file itself if there is one, ``folder`` where relative paths begin,
-    ``content`` the document as it was given. ``parameter_set`` takes the place of the set that the document names.
+    ``content`` the document as it was given. ``parameter_set`` takes the place of the set that the document names, and
+    ``instead`` has names of other files, by path in the document, whose relative paths begin in the working folder.
     """
 
     file: str
@@ -191,6 +201,7 @@ class ScenarioRequest:
     content: dict[str, Any]
     overrides: tuple[str, ...]
     parameter_set: ParameterSet | None = None
+    instead: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,15 +6,16 @@ profiles come from their own catalogues. Limits are wide: they exclude slips of 
 
 import functools
 import tomllib
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from importlib import resources
 from typing import Any
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.fixed.torque_laws import FIXED, FIXED_LAWS
 from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
-from ppafo.errors import KindError, ScenarioError
+from ppafo.documents.models import quote
+from ppafo.errors import KindError, ScenarioError, nearest_name
 from ppafo.kinds import Kinds
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.bandwidth import EFFECT as BANDWIDTH
@@ -105,6 +106,8 @@ _REGULATED = (
 )
 
 MOTIONS = ("free", "held", "prescribed", "leg")
+WALK = "walk"
+"""The motion of a leg that walks, whose files have sections of their own (``walking/declaration.py``)."""
 OLD_PRESCRIBED = "led"
 """What version 0.1 called a prescribed motion."""
 SECTIONS = (
@@ -120,6 +123,26 @@ SECTIONS = (
     "assumed",
 )
 TEXTS = ("name", "description", "device.set", "device.valve")
+
+
+@dataclass(frozen=True, slots=True)
+class Declared:
+    """What files of one kind of scenario can hold, for the kinds that a document names.
+
+    ``texts`` are paths, ``quantities`` the declarations of numbers by path; ``find_kinds`` loads the kinds of other
+    packages. ``same`` maps a path to another one of the same value, which the document keeps. ``appended`` maps a path
+    to the section whose own list of overrides has it, and to the path there.
+    """
+
+    find_kinds: Callable[[Mapping[str, Any], str], None]
+    texts: Callable[[Mapping[str, Any]], tuple[str, ...]]
+    quantities: Callable[[Mapping[str, Any]], dict[str, Quantity]]
+    same: Mapping[str, str] = field(default_factory=dict)
+    appended: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+
+    def paths(self, document: Mapping[str, Any]) -> tuple[str, ...]:
+        """Return every path that an override can set, beside those of the device."""
+        return (*self.texts(document), *self.quantities(document), *self.appended)
 
 
 def controller_settings(kind: str, arithmetic: object = None) -> tuple[Quantity, ...]:
@@ -190,7 +213,11 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
         ("motion.profile", PROFILES),
         *((("motion.shank", PROFILES),) if kind_at(document, "motion.shank") != GAIT_SHANK else ()),
     )
-    check_motion_kind(kind_at(document, "motion"), f"{file}: motion.kind")
+    motion, known = kind_at(document, "motion"), (*MOTIONS, WALK)
+    check_motion_kind(motion, f"{file}: motion.kind")
+    if motion and motion not in known:
+        hint = nearest_name(motion, known)
+        raise ScenarioError(f"{file}: motion.kind = {quote(motion)} is not known{hint}; allowed: {', '.join(known)}")
     for section, kinds in sections:
         try:
             kinds.get(kind_at(document, section))
@@ -199,9 +226,14 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
 
 
 def check_motion_kind(kind: object, place: str) -> None:
-    """Raise ScenarioError for the old name of a kind of motion; ``place`` is what the message calls it."""
+    """Raise ScenarioError for an old name, or for the motion of a leg that walks; ``place`` begins the message."""
     if kind == OLD_PRESCRIBED:
         raise ScenarioError(f"{place}: the kind of motion 'led' is now called 'prescribed'")
+    if kind == WALK:
+        raise ScenarioError(
+            f"{place}: a walk has a gait and a wearer, and here the motion of a vane alone is needed; 'ppafo new walk' "
+            "writes the file of a walk"
+        )
 
 
 def kind_at(document: Mapping[str, Any], section: str) -> str:
@@ -250,3 +282,7 @@ def line_quantities(line: str) -> tuple[Quantity, ...]:
 def line_paths() -> dict[str, Quantity]:
     """Return the declaration of every number of both lines, by path such as ``supply_line.dorsiflexion.droop``."""
     return {f"{SUPPLY_LINE}.{line}.{item.name}": item for line in SUPPLY_LINES for item in line_quantities(line)}
+
+
+OF_A_VANE = Declared(find_kinds, texts, lambda document: quantities(document) | line_paths())
+"""What the file of a vane alone can hold; one without lines can be given some."""

@@ -1,29 +1,44 @@
 """From a name, a file or plain Python values to a scenario; every mistake is one clear line."""
 
 import copy
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from ppafo.documents.models import first_problem, is_gap
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ScenarioError, one_line
 from ppafo.parameters import ParameterSet
-from ppafo.simulation.building import ScenarioRequest, apply_overrides, build_scenario
-from ppafo.simulation.declaration import find_kinds
+from ppafo.simulation.building import OverriddenDocument, ScenarioRequest, apply_overrides, build_scenario
+from ppafo.simulation.declaration import OF_A_VANE, Declared, value_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.schema import scenario_file
 
-_FILE = TomlKind("scenario", "scenario", resources.files("ppafo") / "scenarios", ScenarioError)
+FILE = TomlKind("scenario", "scenario", resources.files("ppafo") / "scenarios", ScenarioError)
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """How the files of one kind of scenario are laid out and built: the kind of file, what it holds, model, builder."""
+
+    file: TomlKind
+    declared: Declared
+    model: Callable[[], type[BaseModel]]
+    build: Callable[[ScenarioRequest, OverriddenDocument], Scenario]
+
+
+VANE = Layout(FILE, OF_A_VANE, scenario_file, build_scenario)
+"""Scenarios of a vane alone; a room above this one has those of a leg."""
 
 
 def list_scenarios() -> tuple[str, ...]:
     """Return the names of the scenarios that come with the package."""
-    return _FILE.names()
+    return FILE.names()
 
 
 def load_scenario(
@@ -35,15 +50,19 @@ def load_scenario(
     ``valve.area=12.6mm^2``. ``parameter_set`` takes the place of the set that the scenario names; what the scenario
     changes in its device is changed in this one. ScenarioError or ParameterError for anything that cannot be used.
     """
-    document = _FILE.parse(_FILE.read(name_or_path), label(str(name_or_path)))
+    document = FILE.parse(FILE.read(name_or_path), label(str(name_or_path)))
     folder, file = Path(name_or_path).parent, str(name_or_path)
-    return _scenario(ScenarioRequest(label(file), file, folder, document, tuple(overrides), parameter_set))
+    return scenario_of(ScenarioRequest(label(file), file, folder, document, tuple(overrides), parameter_set), VANE)
 
 
-def scenario_or_load(scenario: Scenario | str | Path, overrides: Iterable[str] = ()) -> Scenario:
+def scenario_or_load(
+    scenario: Scenario | str | Path,
+    overrides: Iterable[str] = (),
+    load: Callable[[str | Path, Iterable[str]], Scenario] = load_scenario,
+) -> Scenario:
     """Return a scenario as it is, or load it by name or path; ScenarioError for overrides of one that is loaded."""
     if not isinstance(scenario, Scenario):
-        return load_scenario(scenario, overrides)
+        return load(scenario, overrides)
     if tuple(overrides):
         raise ScenarioError(f"{scenario.name}: overrides are for the name or file of a scenario, not for a loaded one")
     return scenario
@@ -54,8 +73,8 @@ def parse_scenario(content: bytes, file: str, overrides: Iterable[str] = (), fol
 
     ScenarioError or ParameterError for anything that cannot be used.
     """
-    document = _FILE.parse(content, label(file))
-    return _scenario(ScenarioRequest(label(file), file, folder or Path(), document, tuple(overrides)))
+    document = FILE.parse(content, label(file))
+    return scenario_of(ScenarioRequest(label(file), file, folder or Path(), document, tuple(overrides)), VANE)
 
 
 def scenario_from_dict(content: Mapping[str, Any], overrides: Iterable[str] = ()) -> Scenario:
@@ -64,41 +83,61 @@ def scenario_from_dict(content: Mapping[str, Any], overrides: Iterable[str] = ()
     Quantities are texts with their unit, ``{"angle": "75 deg"}``; relative paths begin in the working folder.
     ScenarioError or ParameterError for anything that cannot be used.
     """
+    return scenario_of(request_of_dict(content, overrides), VANE)
+
+
+def request_of_dict(content: Mapping[str, Any], overrides: Iterable[str]) -> ScenarioRequest:
+    """Return the request for a scenario of nested dictionaries; ScenarioError where they are none or too deep."""
     if not isinstance(content, Mapping):
         raise ScenarioError(f"a scenario is a dictionary laid out as a scenario file, not a {type(content).__name__}")
     name = content.get("name")
     file = f"scenario '{label(name)}'" if isinstance(name, str) else "scenario"
-    _FILE.check_depth(content, file)
-    return _scenario(ScenarioRequest(file, None, Path(), copy.deepcopy(dict(content)), tuple(overrides)))
+    FILE.check_depth(content, file)
+    return ScenarioRequest(file, None, Path(), copy.deepcopy(dict(content)), tuple(overrides))
 
 
-def _scenario(request: ScenarioRequest) -> Scenario:
-    """Check the keys of the file itself, put the overrides in, and then ask for all that is needed."""
-    if "default_valve" in request.content and "run" not in request.content:
+def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
+    """Check the keys of the file itself, put the overrides in, and then require all that is needed."""
+    if "default_valve" in request.content and not {"run", "controller"} & request.content.keys():
         raise ScenarioError(
             f"{request.file}: is a parameter set, not a scenario; "
             f"run one with it: SCENARIO --set device.set={request.file} "
             f"--set device.valve={one_line(request.content['default_valve'])}"
         )
-    find_kinds(request.content, request.file)
+    declared, document = layout.declared, _with_one_path_each(request, layout.declared)
+    declared.find_kinds(document, request.file)
     if request.overrides:
-        wrong = [item for item in _problems(request.content) if not is_gap(item)]
-        _refuse(wrong, request.file)
-    changed = apply_overrides(request.content, request.overrides, request.file)
-    find_kinds(changed.document, request.file)
-    _refuse(_problems(changed.document), request.file)
-    return build_scenario(request, changed)
+        wrong = [item for item in _problems(document, layout) if not is_gap(item)]
+        _refuse(wrong, request.file, layout)
+    changed = apply_overrides(document, request.overrides, request.file, declared)
+    declared.find_kinds(changed.document, request.file)
+    _refuse(_problems(changed.document, layout), request.file, layout)
+    return layout.build(request, changed)
 
 
-def _problems(document: dict[str, Any]) -> list[ErrorDetails]:
+def _with_one_path_each(request: ScenarioRequest, declared: Declared) -> dict[str, Any]:
+    """Return the document of a request where each value stands at the one path that the document keeps."""
+    document = copy.deepcopy(request.content)
+    for path, kept in declared.same.items():
+        section, _, name = path.rpartition(".")
+        table = value_at(document, section)
+        if not isinstance(table, dict) or name not in table:
+            continue
+        if kept in document:
+            raise ScenarioError(f"{request.file}: give either {path} or {kept}, not both")
+        document[kept] = table.pop(name)
+    return document
+
+
+def _problems(document: dict[str, Any], layout: Layout) -> list[ErrorDetails]:
     """Return unknown keys, unknown kinds and gaps."""
     try:
-        scenario_file().model_validate(document)
+        layout.model().model_validate(document)
     except ValidationError as error:
         return error.errors(include_url=False)
     return []
 
 
-def _refuse(problems: list[ErrorDetails], file: str) -> None:
+def _refuse(problems: list[ErrorDetails], file: str, layout: Layout) -> None:
     if problems:
-        raise ScenarioError(f"{file}: {first_problem(problems, scenario_file())}")
+        raise ScenarioError(f"{file}: {first_problem(problems, layout.model())}")

@@ -6,6 +6,7 @@ which keys there can be.
 
 import functools
 import re
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, WithJsonSchema
@@ -13,6 +14,7 @@ from pydantic import BaseModel, Field, WithJsonSchema
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.fixed.torque_laws import FIXED_LAWS
 from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
+from ppafo.control.kind import ControllerKind
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table
 from ppafo.model.declaration import Quantity
 from ppafo.simulation import declaration
@@ -114,21 +116,23 @@ def _shank() -> Any:
     )
 
 
-def _controller() -> Any:
+def controller_table(
+    kinds: Mapping[str, ControllerKind], suffix: str, converter: Callable[[str], tuple[Quantity, ...]]
+) -> Any:
+    """Return the section of the controller; ``converter`` has what a kind on whole numbers has beside, () for none."""
     sampling = {item.name: optional(number_type(item), _description(item)) for item in declaration.SAMPLING}
-    arithmetic = Literal["float", "fixed"]
     said = "floats, or fixed: whole numbers as a small processor has them; float unless given"
-    whole = {"arithmetic": optional(arithmetic, said)} | quantity_fields(CONVERTER)
+    whole = {"arithmetic": optional(Literal["float", "fixed"], said)}
     return one_of(
         [
             table(
-                f"{model_name(name)}Controller",
+                f"{model_name(name)}{suffix}",
                 kind_field(name, kind.summary)
                 | sampling
-                | (whole if name in FIXED_LAWS else {})
+                | (whole | quantity_fields(converter(name)) if converter(name) else {})
                 | quantity_fields(kind.quantities),
             )
-            for name, kind in CONTROLLERS.items()
+            for name, kind in kinds.items()
         ]
     )
 
@@ -171,6 +175,26 @@ def _sensors() -> dict[str, Any]:
     return quantity_fields(declaration.SENSORS) | {"seed": (seed, Field(1, description=declaration.SEED.summary))}
 
 
+def file_model(name: str, own: dict[str, Any]) -> type[BaseModel]:
+    """Return the model of a file of a scenario: the sections that every one has, and those of its kind of motion."""
+    fields: dict[str, Any] = {
+        "schema_version": (Literal[1], Field(description="version of this layout")),
+        "name": (str, Field(pattern=NAME, max_length=_LONGEST_NAME)),
+        "description": (str, Field("", description="what this file tries, and why")),
+        "device": (table("Device", device_fields()), Field(description="the hardware")),
+        **own,
+        "gas_model": optional(gas_model_table(), "how the gas in the chambers behaves; isothermal unless given"),
+        declaration.SUPPLY_LINE: optional(
+            supply_line_table(), "regulators and lines of the gas; constant pressures unless given"
+        ),
+        "assumed": (
+            dict[str, str],
+            Field(default_factory=dict, description="assumed values, which no source gives, and why these"),
+        ),
+    }
+    return table(name, fields)
+
+
 def scenario_file() -> type[BaseModel]:
     """Return the model of a scenario file, for the controllers and profiles that are loaded."""
     return _scenario_file(*(tuple(kinds.items()) for kinds in (CONTROLLERS, PROFILES)))
@@ -181,27 +205,18 @@ def _scenario_file(*_kinds: Any) -> type[BaseModel]:
     words = tuple(declaration.PRESSURE_WORDS)
     reference = _profile(declaration.TORQUE_LEVEL, "Reference")
     initial = table("Initial", quantity_fields(declaration.INITIAL, words))
-    fields: dict[str, Any] = {
-        "schema_version": (Literal[1], Field(description="version of this layout")),
-        "name": (str, Field(pattern=NAME, max_length=_LONGEST_NAME)),
-        "description": (str, Field("", description="what this file tries, and why")),
-        "device": (table("Device", device_fields()), Field(description="the hardware")),
+    own: dict[str, Any] = {
         "run": (table("Run", quantity_fields(declaration.RUN)), Field(description="times of the run")),
         "motion": (_motion(), Field(description="what the vane does")),
         "initial": optional(initial, "state of the gas at the start; atmosphere unless given"),
-        "controller": (_controller(), Field(description="what commands the valve")),
+        "controller": (
+            controller_table(CONTROLLERS, "Controller", lambda name: CONVERTER if name in FIXED_LAWS else ()),
+            Field(description="what commands the valve"),
+        ),
         "reference": optional(reference, "torque that the controller follows; 0 N m unless given"),
         "sensors": optional(table("Sensors", _sensors()), "sensors of the controller; ideal unless given"),
-        "gas_model": optional(gas_model_table(), "how the gas in the chambers behaves; isothermal unless given"),
-        declaration.SUPPLY_LINE: optional(
-            supply_line_table(), "regulators and lines of the gas; constant pressures unless given"
-        ),
-        "assumed": (
-            dict[str, str],
-            Field(default_factory=dict, description="assumed values, which no source gives, and why these"),
-        ),
     }
-    return table("ScenarioFile", fields)
+    return file_model("ScenarioFile", own)
 
 
 def json_schema() -> dict[str, Any]:

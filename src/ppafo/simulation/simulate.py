@@ -27,7 +27,6 @@ from ppafo.model.regulator import LineState, line_pressures
 from ppafo.parameters.device import Gas
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.check import ALLOWED_CHANGE, HALF_ERROR, MOVE, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck
-from ppafo.simulation.loading import scenario_or_load
 from ppafo.simulation.plan import foot_load, plan_run, profile_values, shank_kind
 from ppafo.simulation.sampled import run_sampled, state_row_numbers
 from ppafo.simulation.scenario import (
@@ -134,14 +133,9 @@ class Result:
         return write_result(folder, self.recording, self.to_dict(), attachments or {})
 
 
-def simulate(scenario: Scenario | str | Path, overrides: Sequence[str] = ()) -> Result:
-    """Run one scenario: an object, or the name of a shipped one or a file, with ``overrides`` as on the command line.
-
-    A run that diverges is a Result with that status, up to the time of failure. ScenarioError or ParameterError for
-    bad input.
-    """
-    chosen = scenario_or_load(scenario, overrides)
-    return results_of(chosen, [plan_run(chosen)])[0]
+def simulate(scenario: Scenario) -> Result:
+    """Run one scenario. A run that diverges is a Result with that status, up to the time of failure."""
+    return results_of(scenario, [plan_run(scenario)])[0]
 
 
 def results_of(scenario: Scenario, runs: Sequence[Run]) -> list[Result]:
@@ -312,10 +306,9 @@ def _sizes_of_friction(run: Run, rows: Mapping[str, Floats]) -> Floats | float:
     )
 
 
-def compile_models(scenarios: Iterable[Scenario | str | Path]) -> None:
+def compile_models(scenarios: Iterable[Scenario]) -> None:
     """Compile the models of scenarios into the cache, unless they are there; nothing is run."""
-    chosen = [scenario_or_load(item) for item in scenarios]
-    programs = [plan_run(item).program for item in chosen]
+    programs = [plan_run(scenario).program for scenario in scenarios]
     load_programs(programs)
     for program in programs:
         load_program(program)
@@ -460,7 +453,8 @@ def _metric_range(result: Result, name: str, unit: str, pressures: float) -> flo
         "Pa": pressures,
         "N m": torques,
         "J": torques * angles,
-        "kg": max(_value(result, "gas_supplied"), float(np.max(recording["mass_1"] + recording["mass_2"]))),
+        "kg": max(_value(result, "gas_supplied"), _largest_content(recording)),
+        "m": float(np.ptp(recording["toe_height"])) if "toe_height" in recording else 0.0,
         "s": scenario.duration,
         "-": 1.0,
     }
@@ -472,6 +466,12 @@ def _metric_range(result: Result, name: str, unit: str, pressures: float) -> flo
     if not all(value > ALLOWED_CHANGE * parts[part] for part, value in values.items()):
         return math.inf
     return abs(_value(result, name)) * max(parts[part] / value for part, value in values.items())
+
+
+def _largest_content(recording: Recording) -> float:
+    """Largest mass [kg] in both chambers; 0 in a walk, which does not record it and takes more than that."""
+    masses = [recording[name] for name in ("mass_1", "mass_2") if name in recording]
+    return float(np.max(sum(masses))) if masses else 0.0
 
 
 def _largest_differences(one: Recording, other: Recording, channels: Iterable[str]) -> Floats:

@@ -1,11 +1,44 @@
-"""Every value that a walk file can hold beside those of its controller and its wearer."""
+"""Every value that the file of a walk can hold beside its device, and the layout of that file."""
 
+import functools
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import BaseModel, Field
+
+from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.fixed.walking_law import SETTINGS as CONVERTER
 from ppafo.control.fixed.walking_numbers import FIXED_WALKS
-from ppafo.control.walking.catalog import TIMINGS, walking_controllers
+from ppafo.control.walking.catalog import (
+    TIMINGS,
+    WALKING_CONTROLLERS,
+    load_walking_controller,
+    walking_controllers,
+)
+from ppafo.documents.models import make_schema, one_of, optional, table
+from ppafo.errors import KindError, ScenarioError
 from ppafo.model.declaration import Quantity
-from ppafo.simulation.declaration import PERIOD, RATE, SENSORS, THERMAL_GAS, line_paths
-from ppafo.walking.bottle import BOTTLE, BOTTLE_NUMBERS
+from ppafo.simulation.declaration import (
+    PERIOD,
+    RATE,
+    SENSORS,
+    TEXTS,
+    THERMAL_GAS,
+    WALK,
+    Declared,
+    gas_settings,
+    kind_at,
+    line_paths,
+)
+from ppafo.simulation.schema import (
+    controller_table,
+    file_model,
+    kind_field,
+    model_name,
+    number_type,
+    quantity_fields,
+)
+from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BOTTLE_NUMBERS, BOTTLE_OVERRIDES
 from ppafo.walking.wearer import WEARER
 
 THRESHOLDS = next(iter(TIMINGS))
@@ -127,3 +160,124 @@ def quantities(controller: str, timing: str = THRESHOLDS) -> dict[str, Quantity]
         items = (FAULT_TIME, PERIOD_OF_FAULT, READINGS[sensor], *DISTORTIONS[sensor])
         found |= {f"faults.{sensor}.{item.name}": item for item in items}
     return found | line_paths()
+
+
+def timing_of(document: Mapping[str, Any]) -> str:
+    """Return how a document says that the time in the stride is known."""
+    return kind_at(document, "timing") or THRESHOLDS
+
+
+def find_kinds(document: Mapping[str, Any], file: str) -> None:
+    """Load the controller that a document names, where another package has it; ScenarioError where that fails."""
+    try:
+        load_walking_controller(kind_at(document, "controller"))
+    except KindError as error:
+        raise ScenarioError(f"{file}: controller.kind: {error}") from error
+
+
+def _texts(document: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the paths of every text that a document can hold."""
+    arithmetic = (ARITHMETIC,) if kind_at(document, "controller") in FIXED_WALKS else ()
+    kinds = ("controller.kind", "timing.kind", "gas_model.kind", *(f"faults.{sensor}.kind" for sensor in FAULTY))
+    return (*TEXTS, "gait", "course", BOTTLE_NAME, *kinds, *arithmetic)
+
+
+def _quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
+    """Return the declaration of every number that a document with its kinds can hold, by path."""
+    find_kinds(document, "the file of a walk")
+    found = quantities(kind_at(document, "controller"), timing_of(document))
+    lost = {
+        f"gas_model.{item.name}" for item in THERMAL_GAS if item not in gas_settings(kind_at(document, "gas_model"))
+    }
+    return {path: item for path, item in found.items() if path not in lost}
+
+
+OF_A_WALK = Declared(
+    find_kinds,
+    _texts,
+    _quantities,
+    same={"motion.gait": "gait", "motion.course": "course"},
+    appended={path: (BOTTLE, own) for path, own in BOTTLE_OVERRIDES.items()},
+)
+"""What the file of a walk can hold. Gait and course stand at the top of the file or, as its motion, in [motion]."""
+
+
+def _timing() -> Any:
+    found = []
+    for name, kind in TIMINGS.items():
+        fields = {item.name: optional(number_type(item), item.summary) for item in kind.quantities}
+        found.append(table(f"{model_name(name)}Timing", kind_field(name, kind.summary) | fields))
+    return one_of(found)
+
+
+def _fault(sensor: str) -> Any:
+    timing = quantity_fields((FAULT_TIME, PERIOD_OF_FAULT))
+    own = {
+        "frozen": {},
+        "stuck": quantity_fields((READINGS[sensor],)),
+        "distorted": quantity_fields(DISTORTIONS[sensor]),
+    }
+    return one_of(
+        [
+            table(f"{model_name(sensor)}{kind.capitalize()}", kind_field(kind, summary) | timing | own[kind])
+            for kind, summary in FAULT_KINDS.items()
+        ]
+    )
+
+
+def _bottle() -> dict[str, Any]:
+    numbers = {item.name: optional(number_type(item), item.summary) for item in BOTTLE_NUMBERS}
+    changes: Any = (list[str], Field(default_factory=list, description="such as 'room.temperature=5 degC'"))
+    return {"name": optional(str, "name of a bottle, or the path of its file"), **numbers, "overrides": changes}
+
+
+def walk_file() -> type[BaseModel]:
+    """Return the model of a walk file, for the controllers that are loaded."""
+    return _walk_file(tuple(walking_controllers().items()))
+
+
+@functools.lru_cache(maxsize=4)
+def _walk_file(_kinds: Any) -> type[BaseModel]:
+    seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
+    sensors = quantity_fields(WALK_SENSORS)
+    sensors |= {item.name: optional(number_type(item), item.summary) for item in BANDWIDTHS}
+    sensors["seed"] = (seed, Field(1, description=SEED.summary))
+    faults = {name: optional(_fault(name), f"fault of the {name} sensor") for name in FAULTY}
+    run = {"duration": optional(number_type(DURATION), DURATION.summary)}
+    run |= quantity_fields((STEP,))
+    which = {
+        "gait": optional(
+            str, "name of a gait, or the path of a gait file; its subject walks; the built-in one unless given"
+        ),
+        "course": optional(
+            str, "name of a course, or the path of its file; stride after equal stride unless one is given"
+        ),
+    }
+    motion = table("WalkMotion", kind_field(WALK, "the device on a leg that walks") | which)
+    own: dict[str, Any] = {
+        "run": optional(table("WalkRun", run), "how long it is, and how it is computed"),
+        "motion": optional(motion, "that it is a walk; gait and course may stand here"),
+        **which,
+        "controller": (
+            controller_table(walking_controllers(), "Walking", converter_settings),
+            Field(description="what commands the valve"),
+        ),
+        "timing": optional(_timing(), "how the controller knows the time in the stride; thresholds unless given"),
+        "wearer": optional(
+            table("Wearer", quantity_fields((*WEARER, PERSON))),
+            "who walks; the subject of the gait that is named, else the paper's, unless given",
+        ),
+        "sensors": optional(table("WalkSensors", sensors), "sensors of the controller; ideal unless given"),
+        "faults": optional(table("Faults", faults), "sensors that fail during the walk"),
+        BOTTLE: optional(
+            table("WalkBottle", _bottle()), "bottle that the device hangs on; a supply without end unless given"
+        ),
+    }
+    return file_model("WalkFile", own)
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a walk file."""
+    WALKING_CONTROLLERS.load_all()
+    CONTROLLERS.load_all()
+    return make_schema(walk_file(), "ppafo walk")

@@ -1,6 +1,5 @@
 """From a name or a file to a scenario that is a walk; every mistake is one clear line."""
 
-import copy
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
@@ -9,13 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.control.fixed.torque_laws import FIXED, FLOAT
-from ppafo.control.fixed.walking_numbers import FIXED_WALKS
 from ppafo.control.kind import ControllerKind
-from ppafo.control.walking.catalog import TIMINGS, load_walking_controller, walking_controllers, with_timing
-from ppafo.documents.models import validate
+from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
-from ppafo.gait import NORMATIVE, Gait, load_gait
+from ppafo.errors import ParameterError, ScenarioError, one_line
+from ppafo.gait import NORMATIVE, load_gait
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG, Quantity
 from ppafo.model.regulator import SupplyLines
@@ -24,44 +21,44 @@ from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.graph import Follows, Graph, Term
 from ppafo.simulation.building import (
     Hardware,
+    OverriddenDocument,
     ScenarioRequest,
     assumed_lines,
-    device_paths,
-    is_of_device,
     read_device,
     read_hardware,
     read_supply_lines,
     read_thermal,
     split_override,
 )
-from ppafo.simulation.declaration import ISOTHERMAL, PERIOD, RATE, SUPPLY_LINE, kind_at, value_at
+from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE, kind_at, value_at
+from ppafo.simulation.loading import Layout, scenario_of
 from ppafo.simulation.reading import Reading
 from ppafo.simulation.scenario import Assumption, Control, MotionKind, Origin, Scenario, Sensors
-from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BOTTLE_OVERRIDES, BottleSupply, read_bottle
+from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk, rules
-from ppafo.walking.course import WalkingCourse, load_course
+from ppafo.walking.course import load_course
 from ppafo.walking.declaration import (
     ARITHMETIC,
     BANDWIDTHS,
     DURATION,
     FAULTY,
     FORCES,
+    OF_A_WALK,
     PERSON,
     SEED,
     STEP,
     THRESHOLDS,
     WALK_SENSORS,
-    controller_settings,
     converter_settings,
     fault_numbers,
-    quantities,
+    timing_of,
     timing_settings,
+    walk_file,
 )
 from ppafo.walking.motion import WalkMotion, walk_of
 from ppafo.walking.planning import NO_REFERENCE, course_of_walk, noise, plan_walks, switches, walking_valve
 from ppafo.walking.preparation import FaultSettings, SensorSettings
 from ppafo.walking.result import lacks, measured
-from ppafo.walking.schema import walk_file
 from ppafo.walking.varying import (
     PLACES,
     clock_with,
@@ -73,17 +70,6 @@ from ppafo.walking.varying import (
 from ppafo.walking.wearer import read_wearer, wearer_origin
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
-_TEXTS = (
-    "gait",
-    "course",
-    "device.set",
-    "device.valve",
-    "controller.kind",
-    "timing.kind",
-    "gas_model.kind",
-    BOTTLE_NAME,
-    *(f"faults.{sensor}.kind" for sensor in FAULTY),
-)
 DEFAULT_PERIOD = 1.0e-3
 DEFAULT_DURATION, BOTTLE_DURATION = 60.0, 600.0
 """Length of a walk [s], and of one on a bottle, unless given or ended by the bottle before."""
@@ -111,25 +97,33 @@ def load_walk(
     subject as the default wearer; ``parameter_set`` takes the place of the set that is named. ScenarioError,
     ParameterError or DataError for anything that cannot be used.
     """
-    file = label(str(name_or_path))
-    given = tuple(overrides)
-    _check_given_once(given, {"gait": gait, "course": course, BOTTLE_NAME: bottle}, file)
+    file, given = label(str(name_or_path)), tuple(overrides)
+    named = {"gait": gait, "course": course, BOTTLE_NAME: bottle}
+    instead = {path: str(item) for path, item in named.items() if item is not None}
+    _check_given_once(given, instead, file)
     content = FILE.parse(FILE.read(name_or_path), file)
-    document = _apply_overrides(content, given, file)
-    if bottle is not None:
-        document.setdefault(BOTTLE, {})["name"] = str(bottle)
-    load_walking_controller(kind_at(document, "controller"))
-    validate(walk_file(), document, file, ScenarioError)
-    reading = Reading(file, document, frozenset(split_override(text)[0] for text in given))
     folder = Path(name_or_path).parent
+    return scenario_of(
+        ScenarioRequest(file, str(name_or_path), folder, content, given, parameter_set, instead), WALKING
+    )
+
+
+def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenario:
+    """Return the walk of a document that has the right keys.
+
+    ScenarioError, ParameterError or DataError for the first value that cannot be used.
+    """
+    document, instead = changed.document, request.instead
+    if BOTTLE_NAME in instead:
+        document.setdefault(BOTTLE, {})["name"] = instead[BOTTLE_NAME]
+    reading = Reading(request.file, document, changed.paths)
     law = walking_controllers()[kind_at(document, "controller")]
-    of_device = tuple(text for text in given if is_of_device(split_override(text)[0]))
-    request = ScenarioRequest(file, str(name_or_path), folder, content, given, parameter_set)
-    hardware = read_hardware(reading, request, of_device)
+    hardware = read_hardware(reading, request, changed.device)
     device = _device(reading, hardware)
-    walked = _gait(gait or document.get("gait", NORMATIVE), folder, gait is None)
-    is_named = gait is not None or "gait" in document
-    carried = read_bottle(reading, device, folder if bottle is None else Path())
+    walked = load_gait(_named_file("gait", request, document) or NORMATIVE)
+    is_named = "gait" in instead or "gait" in document
+    course = _named_file("course", request, document)
+    carried = read_bottle(reading, device, Path() if BOTTLE_NAME in instead else request.folder)
     lines = _lines(reading, document, device, carried)
     settings = _sensor_settings(reading)
     links = _links(reading, law, device)
@@ -138,16 +132,15 @@ def load_walk(
         kind=WALK,
         gait=walked,
         wearer=read_wearer(reading, walked, is_named),
-        timing=_timing_kind(document),
+        timing=timing_of(document),
         forces={name: number for name, number in settings.numbers.items() if name in FORCES},
         faults=settings.faults,
-        course=_course(course or document.get("course"), folder, course is None),
+        course=None if course is None else load_course(course),
         bottle=carried,
         wearer_origin=wearer_origin(reading, walked, is_named),
         person=_person(reading),
     )
-    said = {"gait": gait, "course": course, BOTTLE_NAME: bottle}
-    more = tuple(f"{path}={_absolute(item)}" for path, item in said.items() if item is not None)
+    more = tuple(f"{path}={_absolute(item)}" for path, item in instead.items())
     supply, step = device.supply, reading.number("run.step", STEP)
     scenario = Scenario(
         name=document["name"],
@@ -163,7 +156,9 @@ def load_walk(
         reference=NO_REFERENCE,
         sensors=_sensors(reading, settings),
         assumptions=_assumed(reading, carried),
-        origin=Origin(str(name_or_path), document["device"]["set"], hardware.valve, (*given, *more), content),
+        origin=Origin(
+            request.path, document["device"]["set"], hardware.valve, (*request.overrides, *more), request.content
+        ),
         thermal=read_thermal(reading),
         supply_lines=lines,
         links=links,
@@ -172,10 +167,19 @@ def load_walk(
     return with_duration(scenario, _duration(reading, scenario))
 
 
-def _absolute(name: str | Path) -> str:
+def _named_file(path: str, request: ScenarioRequest, document: Mapping[str, Any]) -> str | None:
+    """Return the name or file of a gait or a course; a path in the document begins in the folder of the document."""
+    if path in request.instead:
+        return request.instead[path]
+    name = document.get(path)
+    if name is None or Path(name).suffix != ".toml" or Path(name).is_absolute():
+        return name
+    return str(request.folder / name)
+
+
+def _absolute(name: str) -> str:
     """Return a name as it is and the path of a file in full, which means the same from any folder."""
-    path = Path(name)
-    return str(path.absolute()) if path.suffix == ".toml" else str(name)
+    return str(Path(name).absolute()) if Path(name).suffix == ".toml" else name
 
 
 def _person(reading: Reading) -> float:
@@ -210,11 +214,11 @@ def _assumed(reading: Reading, carried: BottleSupply | None) -> tuple[Assumption
     return tuple({**found, **lines}.values())
 
 
-def _check_given_once(overrides: tuple[str, ...], others: Mapping[str, object], file: str) -> None:
-    """Refuse an override beside another word for the same value; ``others`` by path, None where nothing was said."""
+def _check_given_once(overrides: tuple[str, ...], others: Mapping[str, str], file: str) -> None:
+    """Refuse an override beside another word for the same value, by path in ``others``."""
     for override in overrides:
         path, text = split_override(override)
-        other = others.get(path)
+        other = others.get(OF_A_WALK.same.get(path, path))
         if other is not None:
             raise ScenarioError(
                 f"{file}: override '{path}={text}': the {path.partition('.')[0]} is given as '{one_line(other)}' "
@@ -222,41 +226,17 @@ def _check_given_once(overrides: tuple[str, ...], others: Mapping[str, object], 
             )
 
 
-def _apply_overrides(document: dict[str, Any], overrides: tuple[str, ...], file: str) -> dict[str, Any]:
-    """Return a copy of the document with the overrides of the walk in it; those of the device are left out."""
-    changed = copy.deepcopy(document)
-    for override in overrides:
-        path, text = split_override(override)
-        load_walking_controller(text if path == "controller.kind" else kind_at(changed, "controller"))
-        known = (*quantities(kind_at(changed, "controller"), _timing_kind(changed, path, text)), *_TEXTS)
-        is_arithmetic = path == ARITHMETIC and kind_at(changed, "controller") in FIXED_WALKS
-        if path in known or is_arithmetic:
-            _set(changed, path, text)
-        elif path in BOTTLE_OVERRIDES:
-            own = changed.setdefault(BOTTLE, {}).setdefault("overrides", [])
-            own.append(f"{BOTTLE_OVERRIDES[path]}={text}")
-        elif not is_of_device(path):
-            hint = nearest_name(path, [*known, *BOTTLE_OVERRIDES, *device_paths()])
-            raise ScenarioError(f"override '{one_line(override)}': {file} has no value '{path}'{hint}")
-    return changed
-
-
-def _timing_kind(document: dict[str, Any], path: str = "", text: str = "") -> str:
-    """Return how the time in the stride is known, also by an override that is about to say it."""
-    return text if path == "timing.kind" else kind_at(document, "timing") or THRESHOLDS
-
-
 def _check_timing(law: ControllerKind, reading: Reading) -> None:
     """Raise ScenarioError for a timing of a controller that goes by no time in the stride."""
     try:
-        with_timing(law, TIMINGS[_timing_kind(dict(reading.document))])
+        with_timing(law, TIMINGS[timing_of(reading.document)])
     except ScenarioError as error:
         raise ScenarioError(f"{reading.file}: {error}") from error
 
 
 def _links(reading: Reading, law: ControllerKind, device: Device) -> Graph:
     """Return which settings of controller and timing follow others because the file does not give them."""
-    timing = timing_settings(_timing_kind(dict(reading.document)))
+    timing = timing_settings(timing_of(reading.document))
     found = links_of_defaults({"controller": law.quantities, "timing": timing}, device)
     return {path: links for path, links in found.items() if value_at(reading.document, path) is None}
 
@@ -267,7 +247,7 @@ def _settings(
     """Return the settings of controller and timing [SI]; what is not given may follow valve and sensors."""
     present = {f"valve.{name}": number for name, number in device.valve.settings.items()}
     present |= {f"sensors.{name}": number for name, number in sensors.numbers.items()}
-    sections = {"controller": law.quantities, "timing": timing_settings(_timing_kind(dict(reading.document)))}
+    sections = {"controller": law.quantities, "timing": timing_settings(timing_of(reading.document))}
     found: dict[str, float] = {}
     for section, items in sections.items():
         paths = {f"{section}.{item.name}": item for item in items}
@@ -287,32 +267,13 @@ def _converter(reading: Reading, law: ControllerKind) -> dict[str, float]:
     """Return the settings of the converter [SI] of a controller on whole numbers, none where it has floats."""
     items = converter_settings(law.name)
     if value_at(reading.document, ARITHMETIC) == FIXED:
-        if _timing_kind(dict(reading.document)) != THRESHOLDS:
+        if timing_of(reading.document) != THRESHOLDS:
             raise reading.refusal(ARITHMETIC, f"whole numbers know the time in the stride by {THRESHOLDS} only")
         return reading.section("controller", items)
     for item in items:
         if value_at(reading.document, f"controller.{item.name}") is not None:
             raise reading.refusal(f"controller.{item.name}", f'needs {ARITHMETIC} = "{FIXED}"')
     return {}
-
-
-def _set(document: dict[str, Any], path: str, text: str) -> None:
-    section, _, name = path.rpartition(".")
-    table = document
-    for part in section.split(".") if section else ():
-        table = table.setdefault(part, {})
-    if path == "gas_model.kind" and text == ISOTHERMAL:
-        table.clear()
-    if path == "controller.kind" and table.get("kind") != text:
-        kept = {item.name for item in (RATE, PERIOD, *controller_settings(text))}
-        for key in set(table) - kept:
-            del table[key]
-    if path == "timing.kind":
-        kept = {item.name for item in timing_settings(text)}
-        for key in set(table) - kept:
-            del table[key]
-    table.pop({"controller.rate": "period", "controller.period": "rate"}.get(path, ""), None)
-    table[name] = int(text) if path == "sensors.seed" and text.isdecimal() and len(text) < 20 else text
 
 
 def _device(reading: Reading, hardware: Hardware) -> Device:
@@ -332,20 +293,6 @@ def _lines(
         document.setdefault(SUPPLY_LINE, {})
     lines = read_supply_lines(reading, device)
     return lines if lines is None or carried is None else carried.lines(lines)
-
-
-def _course(name: str | Path | None, folder: Path, relative: bool) -> WalkingCourse | None:
-    if name is None:
-        return None
-    path = Path(name)
-    is_path = path.suffix == ".toml"
-    return load_course(folder / path if is_path and relative and not path.is_absolute() else name)
-
-
-def _gait(name: str | Path, folder: Path, relative: bool) -> Gait:
-    path = Path(name)
-    is_path = path.suffix == ".toml"
-    return load_gait(folder / path if is_path and relative and not path.is_absolute() else name)
 
 
 def _sensors(reading: Reading, settings: SensorSettings) -> Sensors:
@@ -400,6 +347,9 @@ WALK = MotionKind(
     measured=measured,
 )
 """The motion of a scenario that walks."""
+
+WALKING = Layout(FILE, OF_A_WALK, walk_file, build_walk)
+"""Scenarios whose motion is a walk."""
 
 
 def lag_of_bandwidth(bandwidth: float) -> float:

@@ -62,7 +62,7 @@ def plan_walk(scenario: Scenario) -> Run:
     run, problems = plan_walks(scenario)
     for is_bad, line in problems:
         if is_bad:
-            raise ScenarioError(f"{scenario.origin.file}: {line(0)}")
+            raise ScenarioError(f"{scenario.origin.file or scenario.name}: {line(0)}")
     return run
 
 

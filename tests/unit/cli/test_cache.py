@@ -9,7 +9,9 @@ from ppafo.cli.main import main
 from ppafo.engine import loading
 from ppafo.engine.cache import load_generated
 from ppafo.engine.numba_compiler import NumbaCompiler
+from ppafo.loading import load_scenario
 from ppafo.simulation import simulate
+from ppafo.simulation.scenario import Scenario
 
 SOURCE = 'from numba import njit\n\n\n@njit("float64(float64)", cache=True)\ndef thrice(x):\n    return 3.0 * x\n'
 
@@ -43,16 +45,16 @@ def test_warming_compiles_every_scenario_of_the_package(
 ) -> None:
     from ppafo.simulation.loading import list_scenarios
 
-    asked: list[str] = []
+    asked: list[Scenario] = []
     monkeypatch.setattr(simulate, "compile_models", asked.extend)
     assert main(["cache", "--warm"]) == 0
-    assert asked == list(list_scenarios())
+    assert [scenario.name for scenario in asked] == list(list_scenarios())
     assert "programs: 0" in capsys.readouterr().out
 
 
 def test_model_that_was_compiled_for_later_is_the_one_that_a_run_uses(fresh_cache: Path) -> None:
     loading._load_by.cache_clear()
-    simulate.compile_models(["torque-task-proportional"])
+    simulate.compile_models([load_scenario("torque-task-proportional")])
     wanted = loading._load_by.cache_info().misses
-    simulate.simulate("torque-task-proportional", ["run.duration=10 ms"])
+    simulate.simulate(load_scenario("torque-task-proportional", ["run.duration=10 ms"]))
     assert loading._load_by.cache_info().misses == wanted == 1

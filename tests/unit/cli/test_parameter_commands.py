@@ -69,7 +69,7 @@ def test_an_unwritable_folder_is_one_line_and_exit_code_2(tmp_path: Path, capsys
         (["audit", "ppafo2011"], "ppafo.parameters.load_parameter_set"),
         (["sets"], "ppafo.parameters.load_parameter_set"),
         (["sets", "show", "ppafo2011"], "ppafo.parameters.load_parameter_set"),
-        (["schema", "scenario"], "ppafo.simulation.schema.json_schema"),
+        (["schema", "scenario"], "ppafo.loading.json_schema"),
         (["reproduce"], "ppafo.questions.reproduce.solve.reproduce"),
         (["simulate", "step-response"], "ppafo.simulation.simulate.simulate"),
     ],

@@ -15,9 +15,11 @@ import pytest
 
 from ppafo.answers.recording_figure import figure_files, recording_figure
 from ppafo.cli.main import main
+from ppafo.loading import load_scenario
+from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import Result, Status, compile_models, simulate
+from ppafo.simulation.simulate import Result, Status, compile_models
 from ppafo.storage import read_result
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
@@ -251,9 +253,12 @@ def test_a_damaged_result_is_one_line_and_exit_code_2(
 def test_a_diverged_run_is_written_and_told_on_the_side_with_exit_code_1(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    simulated = simulate(load_scenario("step-response"))
+
     def diverging(scenario: Scenario) -> Result:
+        assert scenario.name == "step-response"
         status = Status("diverged", 0.01, "diverged at t = 0.01 s; try a smaller run.step")
-        return dataclasses.replace(simulate(scenario), status=status)
+        return dataclasses.replace(simulated, status=status)
 
     monkeypatch.setattr("ppafo.simulation.simulate.simulate", diverging)
     folder = tmp_path / "step"
@@ -284,7 +289,7 @@ sys.exit(main(["simulate", "step-response", "--out", sys.argv[1]]))
 
 @pytest.mark.skipif(os.name == "nt", reason="signals work differently there")
 def test_an_interrupt_while_writing_ends_with_130_and_leaves_nothing(tmp_path: Path) -> None:
-    compile_models(["step-response"])
+    compile_models([load_scenario("step-response")])
     command = [sys.executable, "-c", HELD_UP, str(tmp_path / "step")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None

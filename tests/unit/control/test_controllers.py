@@ -25,9 +25,9 @@ from ppafo.engine.rows import rebuilt
 from ppafo.model.orifice import iso6358_flow_function
 from ppafo.model.sensors import Measurement
 from ppafo.parameters.plant import plant_parameters
+from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.simulate import simulate
 
 PERIOD = 1.0e-3
 WITHIN_REACH = ["reference.level=4 N m", "controller.rate=1 kHz"]

@@ -21,12 +21,13 @@ from ppafo.exports.c_library import c_library, scenario_library
 from ppafo.exports.c_library.files import c_identifier
 from ppafo.metrics.catalog import METRICS
 from ppafo.metrics.metric import Readings
+from ppafo.running import simulate
 from ppafo.signals.meter import SAME_LEVEL, Course, Sample, advance_course
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import TIMES, with_numbers
 from ppafo.simulation.plan import plan_run, plan_runs
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import Result, simulate
+from ppafo.simulation.simulate import Result
 from ppafo.translation.c99 import program_source
 from ppafo.translation.native import build, run_native
 from tests.built_once import shared_library

@@ -21,8 +21,8 @@ from ppafo.errors import ScenarioError
 from ppafo.exports.c_library import c_library
 from ppafo.exports.fmu import closed_loop, functional_unit, host_platform
 from ppafo.exports.fmu.description import FIXED_NAMES
+from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.simulate import simulate
 from scripts.instances import Instance, growth_of
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed (pip install -e .[dev])")

@@ -12,8 +12,8 @@ import pytest
 
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports.fmu import closed_loop, component, functional_unit
+from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.simulate import simulate
 
 missing = [name for name in ("wasmtime", "ziglang") if importlib.util.find_spec(name) is None]
 needs_both = pytest.mark.skipif(bool(missing), reason=f"not on this machine: {', '.join(missing)}")

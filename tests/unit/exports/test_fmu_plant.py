@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from ppafo.exports.fmu import functional_unit, host_platform, plant_alone
+from ppafo.running import simulate
 from ppafo.signals.recording import Recording
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.simulate import simulate
 from scripts.instances import STEP, Instance, begin
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed (pip install -e .[dev])")

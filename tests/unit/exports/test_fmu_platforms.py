@@ -15,8 +15,8 @@ import pytest
 from ppafo.errors import SimulationError
 from ppafo.exports import fmu
 from ppafo.exports.fmu import PLATFORMS, closed_loop, compiler_for, functional_unit
+from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.simulate import simulate
 
 DRIVER = Path(__file__).parent / "drive_unit.c"
 SHORT = ("run.duration=0.3 s", "reference.ramp_time=0.1 s")

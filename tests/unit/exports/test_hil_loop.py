@@ -18,8 +18,9 @@ from ppafo.exports.hil.wire import OVER, VENTED, Answer, Sample, answer_bytes
 from ppafo.model.sensors import Measurement
 from ppafo.model.valves.kind import VENT
 from ppafo.parameters.device import Device
+from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.simulate import result_of, simulate
+from ppafo.simulation.simulate import result_of
 from tests.virtual_wire import (
     Fault,
     ProportionalLaw,

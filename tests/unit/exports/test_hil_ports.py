@@ -23,8 +23,8 @@ from ppafo.cli.main import main
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil.example import example_controller
 from ppafo.exports.hil.wire import Answer, Reader, Sample, answer_bytes, open_port, sample_bytes
+from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.simulate import simulate
 from ppafo.storage import read_recording
 from tests.example_board import COMPILER, SENT, WHOLE, built, running
 from tests.virtual_wire import ProportionalPartner, free_port

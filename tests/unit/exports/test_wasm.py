@@ -14,9 +14,9 @@ from ppafo.exports import wasm
 from ppafo.exports.c_library import library_of
 from ppafo.exports.wasm import module_of
 from ppafo.loading import load_scenario
+from ppafo.running import simulate
 from ppafo.simulation.loading import list_scenarios
 from ppafo.simulation.numbers import with_numbers
-from ppafo.simulation.simulate import simulate
 from ppafo.walking import list_walks, load_walk
 from scripts.wasm_programs import FOLDER, shipped_programs
 from tests.modules_under_node import DIVERGED, REFUSED, assert_alike, assert_same, compared, drawn, drawn_walks, driven

@@ -19,9 +19,9 @@ from ppafo.parameters.device import Orifice
 from ppafo.parameters.loading import load_device, parameter_set_toml, parse_parameter_set
 from ppafo.questions.identify.answer import Identification
 from ppafo.questions.identify.solve import identify
+from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.simulate import simulate
 from ppafo.storage import write_csv
 
 HEAD = 'schema_version = 1\nname = "fitted"\ndevice.set = "ppafo2011"\n'

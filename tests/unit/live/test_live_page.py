@@ -437,7 +437,7 @@ def test_everything_can_be_reached_and_changed_by_keyboard_alone(chromium: Any, 
 def test_a_recording_of_one_s_own_is_compared_as_validate_does(chromium: Any, file: Path) -> None:
     import numpy as np
 
-    from ppafo.simulation.simulate import simulate
+    from ppafo.running import simulate
     from ppafo.validation.agreement import DEFAULT_LIMIT, Comparison, Curve, channel_agreement, estimate_delay
 
     recording = simulate(load_scenario("torque-task-solenoid")).recording

@@ -12,7 +12,7 @@ from ppafo.rig.hardware import SECOND_VIRIAL
 from ppafo.rig.preset import Preset, load_preset
 from ppafo.rig.rows import RigState
 from ppafo.rig.solution import RigRun, RigSolution, solve_rig, spool_position
-from ppafo.simulation.simulate import simulate
+from ppafo.running import simulate
 
 OnTheRig = Callable[[str, Preset], RigRun]
 Numbers = np.ndarray[tuple[int], np.dtype[np.float64]]

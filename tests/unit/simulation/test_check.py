@@ -12,10 +12,11 @@ from ppafo.answers.display_units import metric_change
 from ppafo.cli.main import main
 from ppafo.errors import SimulationError
 from ppafo.model.sensors import Measurement
+from ppafo.running import simulate
 from ppafo.simulation.check import HALF_ERROR, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import Status, simulate
+from ppafo.simulation.simulate import Status
 
 CHAOTIC = (
     "motion.kind=free",

@@ -9,9 +9,9 @@ from ppafo.exports.c_library import c_library
 from ppafo.exports.firmware import chip_controller
 from ppafo.exports.firmware.lock_step import PythonChip
 from ppafo.model.sensors import Measurement
+from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
-from ppafo.simulation.simulate import simulate
 
 FIXED = "controller.arithmetic=fixed"
 

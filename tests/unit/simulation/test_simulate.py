@@ -18,12 +18,13 @@ from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.sensors import Measurement
+from ppafo.running import simulate
 from ppafo.simulation.ensemble import _result as ensemble_result
 from ppafo.simulation.ensemble.running import Outcome, Request
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PrescribedMotion, ProfileChoice, Scenario
-from ppafo.simulation.simulate import REMEDY, simulate, simulate_many
+from ppafo.simulation.simulate import REMEDY, simulate_many
 from ppafo.walking.result import _status as walk_status
 
 CHANNELS = {

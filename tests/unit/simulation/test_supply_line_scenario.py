@@ -10,11 +10,11 @@ from ppafo.model.orifice import orifice_flow
 from ppafo.model.plant import chamber_volumes
 from ppafo.model.regulator import SupplyLines
 from ppafo.questions.league.bound import check_bounded
+from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import scenario_document
-from ppafo.simulation.simulate import simulate
 
 LINES = ("supply_line.plantarflexion.droop=3e6 Pa s/kg",)
 WARM = (

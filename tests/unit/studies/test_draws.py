@@ -8,8 +8,8 @@ import pytest
 
 from ppafo.errors import StudyError
 from ppafo.progress import Progress
+from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.simulate import simulate
 from ppafo.studies.distributions import effective_sample_size, fraction_interval, quantile_interval, replicates_interval
 from ppafo.studies.draws import (
     Outcomes,

@@ -5,9 +5,9 @@ from collections.abc import Callable
 import pytest
 
 from ppafo.parameters.device import Device
+from ppafo.running import simulate
 from ppafo.signals import Recording
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.simulate import simulate
 from ppafo.validation.agreement import ReplaySettings, compare_recording
 from ppafo.validation.measured import check_recording
 

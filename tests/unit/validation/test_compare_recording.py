@@ -10,9 +10,9 @@ import pytest
 from ppafo.errors import DataError
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
+from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.simulate import simulate
 from ppafo.validation.measured import parse_thresholds
 
 Agree = Callable[..., Any]

@@ -14,9 +14,9 @@ from ppafo.gait import load_gait
 from ppafo.gait.document import gait_toml
 from ppafo.walking import list_walks, load_walk, walk, walk_population
 from ppafo.walking.contradictions import COMPRESSION
+from ppafo.walking.declaration import json_schema
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import gait_sensors_of, has_ideal_sensors
-from ppafo.walking.schema import json_schema
 
 MISTAKES = {
     "controller.unload_threshold=80 N": "must be below controller.load_threshold, which is 60 N",

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from ppafo.identification.trajectory import Experiment
+from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import simulate
 
 NOISE = {"angle": math.radians(0.1), "pressure_1": 500.0, "pressure_2": 500.0}
 

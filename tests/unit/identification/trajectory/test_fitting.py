@@ -22,12 +22,12 @@ from ppafo.identification.trajectory.fitting import residuals_of
 from ppafo.identification.trajectory.problem import number_at, with_numbers
 from ppafo.identification.trajectory.residuals import FIT_TOLERANCE, run_with, trajectories
 from ppafo.identification.trajectory.search import Optimum
+from ppafo.running import simulate
 from ppafo.signals.recording import Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import simulate
 
 INERTIA = FreeParameter("foot_plate.inertia", start=0.010)
 FLOW = FreeParameter("valve.discharge_coefficient", start=0.10)

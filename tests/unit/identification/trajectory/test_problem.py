@@ -16,8 +16,8 @@ from ppafo.identification.trajectory.problem import (
     with_numbers,
 )
 from ppafo.identification.trajectory.residuals import FIT_TOLERANCE, noise_of, prepare, with_half_steps
+from ppafo.running import simulate
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import simulate
 
 INERTIA = FreeParameter("foot_plate.inertia")
 

@@ -10,10 +10,10 @@ from ppafo.errors import DataError, IdentificationError
 from ppafo.identification.trajectory import Experiment, FreeParameter, TrajectoryProblem, fit, profile
 from ppafo.identification.trajectory.fitting import residuals_of
 from ppafo.identification.trajectory.residuals import prepare, trajectories
+from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import simulate
 
 NOISE = {"angle": 0.0017, "pressure_1": 500.0, "pressure_2": 500.0}
 FLOW = FreeParameter("valve.discharge_coefficient", start=0.10)

@@ -13,9 +13,9 @@ from ppafo.questions.design.answer import Design, answer_of, front_table
 from ppafo.questions.design.problem import json_schema, load_design
 from ppafo.questions.design.search import Candidates
 from ppafo.questions.design.solve import Evaluation, design, design_columns, noise_streams
+from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers
-from ppafo.simulation.simulate import simulate
 
 SHIPPED = Path(__file__).parents[4] / "src" / "ppafo" / "questions" / "design" / "library" / "torque-task.toml"
 FILE = """

@@ -11,9 +11,9 @@ from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.errors import SimulationError
 from ppafo.questions.league.sampled_bound import COMMANDS, SampledBound, sampled_bound
+from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.simulate import simulate
 
 THERMAL = (
     *("gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)"),

@@ -35,8 +35,8 @@ from ppafo.questions.unreported.settings import (
     values_of,
 )
 from ppafo.questions.unreported.solve import infer_settings
+from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.simulate import simulate
 from ppafo.studies.distributions import jackknife_reach
 from ppafo.studies.draws import replicate_seed
 

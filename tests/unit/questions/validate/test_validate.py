@@ -8,9 +8,9 @@ import pytest
 
 import ppafo
 from ppafo.cli.main import main
+from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.simulate import simulate
 from ppafo.storage import read_csv, write_csv, write_netcdf
 
 SUPPLY = ["--set", "supply.pressure=55 psi_g", "--set", "supply.dorsiflexion_pressure=55 psi_g"]

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from ppafo.engine.lanes import add_meters
 from ppafo.errors import ScenarioError
 from ppafo.metrics import METRICS
+from ppafo.running import simulate
 from ppafo.simulation.ensemble import COMPLETED, DIVERGED, REFUSED, EnsembleResult, run_ensemble, running
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import TIMES, declared_numbers, with_numbers
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import Result, simulate
+from ppafo.simulation.simulate import Result
 
 Floats = NDArray[np.float64]
 

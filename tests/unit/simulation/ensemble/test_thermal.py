@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from ppafo.errors import ScenarioError
+from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.simulate import simulate
 
 THERMAL = (
     "gas_model.kind=thermal",
