@@ -12,6 +12,7 @@ from ppafo.live.page import bundled, digest
 from ppafo.questions.reproduce.answer import Reproduction, answer_of, holding_torque, reproduction_page
 from ppafo.questions.reproduce.bench import NoEvidence, SyntheticEvidence
 from ppafo.questions.reproduce.figures import step_response_figure, torque_task_figure
+from ppafo.questions.reproduce.open_range import with_open_ranges
 from ppafo.questions.reproduce.solve import reproduce
 from ppafo.questions.reproduce.step_response import Levels
 
@@ -47,8 +48,21 @@ def test_the_table_aligns_its_columns(reproduction: Reproduction) -> None:
 
 
 def test_the_last_line_of_the_table_counts_the_verdicts(reproduction: Reproduction) -> None:
-    last = text_of(answer_of(reproduction)).splitlines()[-1]
-    assert last.startswith(f"{len(reproduction.claims)} claims: ")
+    *_, counts, _, _, last = text_of(answer_of(reproduction)).splitlines()
+    assert counts.startswith(f"{len(reproduction.claims)} claims: ")
+    assert last.startswith("stated and tested by nothing here: unmodelled_dynamics (")
+    assert [entry.id for entry in reproduction.unread] == ["unmodelled_dynamics", "temperature_would_help"]
+
+
+def test_the_mark_of_a_number_whose_assumptions_were_chosen_is_computed(reproduction: Reproduction) -> None:
+    assert reproduction.family is not None
+    claim = next(item for item in reproduction.claims if item.id == "torque_rms_improvement")
+    assert claim.left_open is not None
+    assert claim.left_open[1] - claim.left_open[0] > 10.0
+    (far,) = with_open_ranges([dataclasses.replace(claim, value=-200.0)], reproduction.family)
+    (near,) = with_open_ranges([dataclasses.replace(claim, value=15.0000001)], reproduction.family)
+    assert (far.is_chosen, near.is_chosen) == (False, True)
+    assert near.open_range.endswith("% *")
 
 
 def test_figure_7_has_the_four_panels_of_the_paper_in_its_units(reproduction: Reproduction) -> None:

@@ -15,6 +15,7 @@ from ppafo.live.workbench import live_part
 from ppafo.metrics import Metric
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.audit import Finding
+from ppafo.parameters.publications.publication import ClaimEntry
 from ppafo.questions.question import Solved
 from ppafo.questions.reproduce.bench import (
     IDEAL,
@@ -39,6 +40,7 @@ from ppafo.questions.reproduce.claim import (
     verdict_counts,
 )
 from ppafo.questions.reproduce.figures import step_response_figure, torque_task_figure
+from ppafo.questions.reproduce.open_range import unread
 from ppafo.questions.reproduce.publication import ALL, SEED, Study
 from ppafo.questions.reproduce.step_response import Levels, StepEvents
 from ppafo.questions.unreported.answer import (
@@ -46,8 +48,10 @@ from ppafo.questions.unreported.answer import (
     Family,
     conclusion_rows,
     conclusions,
+    reach_sentence,
     setting_rows,
     unreported_figure,
+    within_reach,
 )
 from ppafo.simulation.simulate import Result
 from ppafo.storage.comma_separated import marked_csv_bytes
@@ -83,6 +87,12 @@ class Reproduction(Solved):
     completed_findings: tuple[Finding, ...]
     overrides: tuple[str, ...]
     family: Family | None
+
+    @property
+    def unread(self) -> list[ClaimEntry]:
+        """Statements of the paper that nothing here tests."""
+        observations = (*self.step_observations, *self.torque_observations)
+        return unread([*(claim.id for claim in self.claims), *(item.id for item in observations)])
 
     @property
     def missed(self) -> tuple[Claim, ...]:
@@ -181,6 +191,7 @@ def _unreported_data(reproduction: Reproduction, figure: bytes | None) -> dict[s
         "errors": ERRORS,
         "settings": setting_rows(family),
         "conclusions": conclusion_rows(conclusions(family)),
+        "within_reach": reach_sentence(within_reach(family)),
     }
 
 
@@ -192,6 +203,7 @@ def _summary(reproduction: Reproduction) -> dict[str, Any]:
         "count_sentence": count_sentence(reproduction.claims),
         "counts": [(verdict, VERDICTS[verdict], _SYMBOLS[verdict], count) for verdict, count in counts.items()],
         "claims": [_claim_row(claim) for claim in reproduction.claims],
+        "unread": [(entry.statement, entry.where, entry.not_testable) for entry in reproduction.unread],
         "missed": [claim.id for claim in reproduction.missed],
         "overrides": reproduction.overrides,
         "step_observations": reproduction.step_observations,
@@ -205,7 +217,10 @@ def _claim_row(claim: Claim) -> dict[str, Any]:
         "statement": claim.statement,
         "source": claim.source,
         "paper": claim.published,
+        "own": claim.own,
         "ours": quantity(claim.value, claim.unit),
+        "left_open": claim.open_range,
+        "open_by": claim.open_by,
         "verdict": claim.verdict,
         "word": claim.verdict_words,
         "symbol": _SYMBOLS[claim.verdict],
@@ -308,9 +323,9 @@ IDENTIFICATION_FIGURE = "figure-3-identification"
 STEP_FIGURE = "figure-7-step-response"
 TORQUE_FIGURE = "figure-8-torque-task"
 UNSAID_FIGURE = "unreported-settings"
-_HEAD = ("claim", "paper", "ours", "verdict")
+_HEAD = ("claim", "paper", "own arithmetic", "ours", "left open", "verdict")
 _PAPER = "'ppafo reproduce' without --study makes the page of these claims, with sources, figures and assumptions."
-_STUDIES_HEAD = ("study", "claim", "published", "ours", "verdict")
+_STUDIES_HEAD = ("study", "claim", "published", "own arithmetic", "ours", "left open", "verdict")
 _RULE = (
     "'Ours' is computed anew whenever this is run. 'Reproduced' follows from printed numbers alone; 'with assumptions' "
     "rests on values and experiments that the publication does not print; 'contradicted' lies outside what is listed "
@@ -329,7 +344,16 @@ def _studies_answer(solved: Studies) -> Answer:
     for study in solved.studies:
         name = study.publication.name
         rows += [
-            (name, item.claim.entry.id, item.published, item.ours, VERDICTS[item.verdict]) for item in study.claims
+            (
+                name,
+                item.claim.entry.id,
+                item.published or None,
+                item.claim.entry.own or None,
+                item.ours,
+                None,
+                VERDICTS[item.verdict],
+            )
+            for item in study.claims
         ]
         claims += [item.document(name) for item in study.claims]
         verdicts += [item.verdict for item in study.claims]
@@ -402,7 +426,9 @@ def _paper_rows(reproduction: Reproduction) -> tuple[tuple[str | None, ...], ...
         (
             claim.id,
             claim.published or None,
+            claim.own or None,
             None if claim.value is None else quantity(claim.value, claim.unit),
+            claim.open_range or None,
             claim.verdict_words,
         )
         for claim in reproduction.claims
@@ -422,7 +448,15 @@ def _paper_answer(reproduction: Reproduction) -> Answer:
         title="The paper's claims",
         lead=_override_remarks(reproduction.overrides),
         sections=(
-            Section(table=table, remarks=("", count_sentence(reproduction.claims), *_missed_claims(reproduction))),
+            Section(
+                table=table,
+                remarks=(
+                    "",
+                    count_sentence(reproduction.claims),
+                    *_left_open(reproduction),
+                    *_missed_claims(reproduction),
+                ),
+            ),
             *(Section(figure=figure, is_detail=True) for figure in _figures(reproduction)),
         ),
         data={
@@ -449,6 +483,17 @@ def _override_remarks(overrides: tuple[str, ...]) -> tuple[str, ...]:
         return ()
     words = f"not the paper's device: values changed with --set {', '.join(overrides)}"
     return (f"{words}; the verdicts compare it with the paper all the same",)
+
+
+def _left_open(reproduction: Reproduction) -> list[str]:
+    """Return what the column of ranges is, where there are any by completions, and what nothing tests."""
+    found = [
+        "left open: by the printed digits, or by an interval of the identification; of the torque task the 5 to 95 % "
+        "of completions that agree with everything else that the paper says",
+        "*: ours is nearer to the published number than 95 % of that; the assumptions were chosen for this row",
+    ]
+    words = "; ".join(f"{entry.id} ({entry.not_testable.rstrip('.')})" for entry in reproduction.unread)
+    return [*(found if reproduction.family is not None else []), f"stated and tested by nothing here: {words}"]
 
 
 def _missed_claims(reproduction: Reproduction) -> list[str]:

@@ -16,6 +16,7 @@ from ppafo.questions.reproduce.bench import (
 )
 from ppafo.questions.reproduce.claim import arithmetic_claims, load_printed
 from ppafo.questions.reproduce.law_and_valve import control_claims
+from ppafo.questions.reproduce.open_range import with_open_ranges
 from ppafo.questions.reproduce.publication import ALL, SEED, check_study, run_studies
 from ppafo.questions.reproduce.step_response import Levels, step_events, step_observations
 from ppafo.questions.reproduce.torque_task import torque_task_claims, torque_task_observations
@@ -26,7 +27,7 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate
 
-COMPLETIONS = 49_152
+COMPLETIONS = 98_304
 """Completions of the torque task in the report; ``ppafo unreported`` takes more."""
 EXPERIMENTS = (STEP, SOLENOID, PROPORTIONAL)
 """Shipped scenarios that stand for the paper's experiments."""
@@ -129,6 +130,7 @@ def _reproduce_paper(overrides: Sequence[str], report: Report, completions: int 
         count = completions or COMPLETIONS
         report(Progress(f"drawing {count} completions of the torque task"))
         family = infer_settings(count)
+        claims = with_open_ranges(claims, family)
     return Reproduction(
         claims=tuple(sorted(claims, key=lambda claim: ORDER.index(claim.id))),
         step_observations=tuple(step_observations(step.recording, levels, events)),

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,18 +10,24 @@ from numpy.typing import NDArray
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.style import BLUE, GREY, VERMILION, house_style
+from ppafo.parameters.publications.publication import paper_entries
 from ppafo.questions.question import Solved
 from ppafo.questions.unreported.settings import (
+    DISCHARGE,
+    EVIDENCE,
     GAS,
     IMPROVEMENT,
-    REPORTED,
+    ON_OFF_RATE,
+    QUIET,
     SETTINGS,
-    STATED,
+    VOLTS,
     Draws,
     Floats,
     Metrics,
     Setting,
     agreement,
+    agreement_with,
+    demand_over_ceiling,
     effective,
     improvement,
     saving,
@@ -33,7 +39,7 @@ if TYPE_CHECKING:
     import matplotlib.figure
     from matplotlib.axes import Axes
 
-REPLICATES = 8
+REPLICATES = 4
 ENOUGH = 100.0
 
 
@@ -132,19 +138,37 @@ class Implication:
 
 @dataclass(frozen=True, slots=True)
 class Conclusion:
-    """A statement of the paper, and in which fraction of all completions, and of their weight, it holds [-].
+    """A statement under a reading of U, and in which fraction of all completions, and of their weight, it holds [-].
 
-    ``by_the_rest`` is the fraction of the weight that follows without the results that already say it, and
-    ``rest_effective`` the number of completions that equal weights would need to say as much about that. ``error`` are
-    the half widths of the 95 % intervals of the three fractions, from the spread between the replicates.
+    Weights are those by the evidence that does not say the statement already, the same for every statement, so that no
+    two statements hold more often than one of them. ``effective`` completions of equal weight would say as much under
+    this reading. ``error`` are the half widths of the 95 % intervals, from the spread between the replicates.
     """
 
     statement: str
+    reading: str
     of_all: float
     of_weight: float
-    by_the_rest: float
-    rest_effective: float
-    error: tuple[float, float, float]
+    effective: float
+    error: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class WithinReach:
+    """The comparison where U is the opening, Cd and 20 Hz are as printed, and every other setting is drawn evenly.
+
+    Completions in which the proportional valve oscillates on the ramp are left out: the text says that it does not.
+    ``better`` is the fraction of the ``count`` completions whose demand is below 0.95 of what the supply holds that
+    tracks better with the proportional valve, ``improvement`` the quantiles 5, 50 and 95 % of by how much [%].
+    ``demand`` has those of the demand over what the supply holds where the improvement is the printed one, to its
+    deviation twice.
+    """
+
+    count: int
+    better: float
+    improvement: tuple[float, float, float]
+    printed_count: int
+    demand: tuple[float, float, float]
 
 
 def implications_of(family: Family) -> list[Implication]:
@@ -214,34 +238,72 @@ def weighted_quantiles(values: Floats, weight: Floats, levels: tuple[float, ...]
     return [float(values[order[min(place, order.size - 1)]]) for place in places]
 
 
+BETTER, LESS, BOTH = (
+    "The proportional valve tracks better.",
+    "The proportional valve uses less gas.",
+    "It does both.",
+)
+SAYS_IT = (IMPROVEMENT, *GAS)
+"""Entries that already say what the statements say."""
+
+
 def conclusions(family: Family) -> list[Conclusion]:
-    """How firmly the paper's conclusions hold over all completions."""
+    """How firmly the paper's conclusions hold under each reading of U."""
     others = family.without_each()
+    readings = next(setting for setting in SETTINGS if setting.name == VOLTS)
     found = []
-    for statement, left_out in _STATEMENTS.items():
-        fractions = _fractions(family, statement, left_out)
-        error = _error([_fractions(other, statement, left_out) for other in others])
-        rest = effective(family.weights_without(left_out))
-        found.append(Conclusion(statement, *fractions, rest, (error[0], error[1], error[2])))
+    for volts, reading in zip(readings.choices, readings.words, strict=True):
+        weight = np.where(family.draws[VOLTS] == volts, family.weights_without(SAYS_IT), 0.0)
+        for statement in (BETTER, LESS, BOTH):
+            fractions = _fractions(family, statement, volts)
+            error = _error([_fractions(other, statement, volts) for other in others])
+            found.append(Conclusion(statement, reading, *fractions, effective(weight), (error[0], error[1])))
     return found
 
 
-_BETTER, _LESS = "The proportional valve tracks better.", "The proportional valve uses less gas."
-_STATEMENTS: dict[str, tuple[str, ...]] = {
-    _BETTER: (IMPROVEMENT,),
-    _LESS: GAS,
-    "It does both.": (IMPROVEMENT, *GAS),
-}
-"""What the paper concludes, and the results that already say it."""
+def weight_of_readings(family: Family) -> dict[str, float]:
+    """Return what the evidence leaves of each reading of U [-]."""
+    readings = next(setting for setting in SETTINGS if setting.name == VOLTS)
+    pairs = zip(readings.words, readings.choices, strict=True)
+    return {words: float(family.weights[family.draws[VOLTS] == volts].sum()) for words, volts in pairs}
 
 
-def _fractions(family: Family, statement: str, left_out: Collection[str]) -> tuple[float, float, float]:
-    """In which fraction of all completions, of the weight, and of that without some results a statement holds [-]."""
+def _fractions(family: Family, statement: str, volts: float) -> tuple[float, float]:
+    """In which fraction of all completions of a reading, and of their weight by the other evidence, it holds [-]."""
     better, less = improvement(family.metrics) > 0.0, saving(family.metrics) > 0.0
-    holds = {_BETTER: better, _LESS: less}.get(statement, better & less)
-    weights = (family.weights, family.weights_without(left_out))
-    of_weight, by_the_rest = (float(weight[holds].sum()) for weight in weights)
-    return float(holds[: family.even].mean()), of_weight, by_the_rest
+    holds = {BETTER: better, LESS: less}.get(statement, better & less)
+    here = family.draws[VOLTS] == volts
+    even, weight = here[: family.even], np.where(here, family.weights_without(SAYS_IT), 0.0)
+    total = weight.sum()
+    of_weight = float(weight[holds].sum() / total) if total > 0.0 else math.nan
+    return float(holds[: family.even][even].mean()), of_weight
+
+
+REACH = 0.95
+"""Fraction of what the supply holds below which a demand is within its reach."""
+
+
+def within_reach(family: Family) -> WithinReach:
+    """Return the comparison within reach of the supply, and where the printed improvement comes from."""
+    draws = {name: values[: family.even] for name, values in family.draws.items()}
+    gain = improvement(family.metrics)[: family.even]
+    quiet = agreement_with(QUIET, family.metrics)[: family.even] > 0.0
+    chosen = quiet & (draws[VOLTS] == 1.0) & (draws[DISCHARGE] == 0.0) & (draws[ON_OFF_RATE] == 20.0)
+    demand = demand_over_ceiling(draws)
+    near, entry = chosen & (demand < REACH), paper_entries()[IMPROVEMENT]
+    like_printed = chosen & (np.abs(gain - (entry.published or 0.0)) <= 2.0 * (entry.deviation or 0.0))
+    return WithinReach(
+        int(near.sum()),
+        float((gain[near] > 0.0).mean()) if near.any() else math.nan,
+        _quantiles(gain[near]),
+        int(like_printed.sum()),
+        _quantiles(demand[like_printed]),
+    )
+
+
+def _quantiles(values: Floats) -> tuple[float, float, float]:
+    low, median, high = weighted_quantiles(values, np.ones(values.size), (0.05, 0.5, 0.95))
+    return low, median, high
 
 
 def strongest_links(family: Family, count: int = 4) -> list[tuple[str, str, float]]:
@@ -353,7 +415,7 @@ ERRORS = (
 )
 _CAPTION = "Grey: prior; blue: posterior. Dots: improvement over saving, with the paper's as a cross."
 _SETTINGS = ("setting", "allowed", "posterior: median and 90 % interval", "verdict")
-_CONCLUSIONS = ("conclusion", "of all completions", "of those that agree", "by the other results alone")
+_CONCLUSIONS = ("reading", "conclusion", "of all completions", "by the other evidence")
 
 
 def answer_of(family: Family) -> Answer:
@@ -371,11 +433,21 @@ def answer_of(family: Family) -> Answer:
                 remarks=(_links(family),),
                 figure=Figure("unreported-settings", _CAPTION, lambda: unreported_figure(family)),
             ),
-            Section("Conclusions", table=Table(tuple(map(Column, _CONCLUSIONS)), tuple(found), left=len(_CONCLUSIONS))),
+            Section(
+                "Conclusions, each under one reading of U",
+                table=Table(tuple(map(Column, _CONCLUSIONS)), tuple(found), left=len(_CONCLUSIONS)),
+                remarks=(_readings(family), reach_sentence(within_reach(family))),
+            ),
         ),
         data=_data(family),
         passed=family.effective > 0.0,
     )
+
+
+def _readings(family: Family) -> str:
+    """Return what all the evidence leaves of each reading of U."""
+    left = ", ".join(f"{words} {100.0 * weight:.0f} %" for words, weight in weight_of_readings(family).items())
+    return f"what all the evidence leaves of each reading: {left}"
 
 
 def _links(family: Family) -> str:
@@ -415,19 +487,34 @@ def posterior_text(item: Implication) -> str:
 
 
 def conclusion_rows(found: Sequence[Conclusion]) -> list[tuple[str, str, str, str]]:
-    """Return each statement with its shares in percent: of all, of the weight, by the other results alone."""
+    """Return reading and statement with the fractions in percent: of all, and by the evidence that does not say it."""
     return [
         (
+            item.reading,
             item.statement,
             _percent(item.of_all, item.error[0], 1),
-            _percent(item.of_weight, item.error[1], 1),
-            f"{_percent(item.by_the_rest, item.error[2], 0)} (effective sample size {item.rest_effective:.0f})",
+            f"{_percent(item.of_weight, item.error[1], 0)} (effective sample size {item.effective:.0f})",
         )
         for item in found
     ]
 
 
+def reach_sentence(found: WithinReach) -> str:
+    """Return the statement that does not hang on how the evidence is weighed."""
+    low, median, high = found.improvement
+    least, middle, most = found.demand
+    return (
+        f"where U is the opening, with the printed Cd and 20 Hz, a proportional valve that does not oscillate, and a "
+        f"demand below {REACH:g} of what the supply holds, the proportional valve tracks better in "
+        f"{100.0 * found.better:.1f} % of {found.count} completions, by {median:.0f} % ({low:.0f} to {high:.0f} %); "
+        f"the printed improvement comes with a demand of {middle:.2f} ({least:.2f} to {most:.2f}) times what the supply "
+        f"holds ({found.printed_count} completions)"
+    )
+
+
 def _percent(fraction: float, error: float, digits: int) -> str:
+    if math.isnan(fraction):
+        return "no completion agrees"
     # No fraction is off by more than all of it.
     reach = f"{100.0 * min(error, 1.0):.{0 if error >= 0.1 else 1 if error >= 0.01 else 2}f}"
     return f"{100.0 * fraction:.{digits}f} ± {reach} %"
@@ -441,7 +528,7 @@ def count_sentence(family: Family) -> str:
     )
 
 
-_FRACTIONS = ("share_of_all", "share_of_those_that_agree", "share_by_the_other_results_alone")
+_FRACTIONS = ("share_of_all", "share_by_the_other_evidence")
 
 
 def _data(family: Family) -> dict[str, Any]:
@@ -451,19 +538,30 @@ def _data(family: Family) -> dict[str, Any]:
         "conclusions": [
             {
                 "statement": item.statement,
+                "reading": item.reading,
                 "share_of_all": item.of_all,
-                "share_of_those_that_agree": item.of_weight,
-                "share_by_the_other_results_alone": item.by_the_rest,
-                "effective_of_the_other_results": item.rest_effective,
+                "share_by_the_other_evidence": plain(item.of_weight),
+                "effective": item.effective,
                 "error": dict(zip(_FRACTIONS, plain(list(item.error)), strict=True)),
             }
             for item in conclusions(family)
         ],
+        "within_reach": plain(asdict(within_reach(family))),
+        "readings": weight_of_readings(family),
         "evidence": [
-            {"name": item.name, "value": item.value, "tolerance": item.tolerance, "unit": item.unit, "why": item.why}
-            for item in REPORTED
+            {
+                "id": entry.id,
+                "where": entry.where,
+                "observable": entry.observable,
+                "value": entry.published,
+                "at_least": entry.at_least,
+                "at_most": entry.at_most,
+                "deviation": entry.deviation,
+                "unit": entry.unit,
+                "why": entry.likelihood,
+            }
+            for entry in EVIDENCE
         ],
-        "told": [item.name for item in STATED],
         "drawn": family.drawn,
         "replicates": REPLICATES,
         "errors": "half widths of 95 % intervals, from the spread between the replicates",

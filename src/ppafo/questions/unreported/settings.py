@@ -14,22 +14,26 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.constants import GRAMS_PER_KILOGRAM
+from ppafo.constants import GRAMS_PER_KILOGRAM, PASCALS_PER_PSI
 from ppafo.parameters import load_device, load_parameter_set
 from ppafo.parameters.parameter_set import number_in_si
 from ppafo.parameters.plant import orifice_conductance
+from ppafo.parameters.publications.publication import ClaimEntry, paper_entries
 from ppafo.simulation.loading import load_scenario
 from ppafo.units import parse_quantity
 
 Floats = NDArray[np.float64]
 DEVICE = "ppafo2011"
-SOLENOID, PROPORTIONAL = "solenoid", "proportional"
+SOLENOID, PROPORTIONAL, STEP = "solenoid", "proportional", "step"
 VOLTS = "full scale of U"
 DISCHARGE = "reading of Cd"
 HOLD = "hold time"
 ON_OFF_RATE = "on/off rate"
 PID_RATE = "PID rate"
 DEAD_VOLUME = "dead volume"
+VOLUME = "volume per angle"
+LEVEL, SUPPLY, DORSIFLEXION = "reference level", "source pressure", "dorsiflexion pressure"
+START, DELAY = "start level", "coil delay"
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,14 +63,25 @@ class Setting:
 
 
 SETTINGS: tuple[Setting, ...] = (
-    Setting("reference level", "N m", "not printed; 5.5 N m is the maximum that 55 psi_g can hold", 3.0, 9.0),
+    Setting(LEVEL, "N m", "not printed; 5.5 N m is the maximum that 55 psi_g can hold", 3.0, 9.0),
     Setting("ramp time", "s", "not printed", 0.25, 3.0, is_logarithmic=True),
     Setting(
         HOLD, "s", "not printed; with the ramp rounded up to half a second", choices=(0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
     ),
     Setting("angle", "deg", "not printed; within the range of figure 7", 25.0, 125.0),
-    Setting(DEAD_VOLUME, "cm^3", "lines are in V_i, no number is printed", 0.5, 30.0, is_logarithmic=True),
-    Setting("source pressure", "psi_g", "55 psi_g is printed for the step response, 50 for the flow", 45.0, 60.0),
+    Setting(
+        VOLUME,
+        "cm^3/rad",
+        "51 is printed from a data sheet, 14.5 follows from the torque constant by virtual work",
+        14.5,
+        51.0,
+        is_logarithmic=True,
+    ),
+    Setting(DEAD_VOLUME, "cm^3", "lines are in V_i, no number is printed", 0.5, 40.0, is_logarithmic=True),
+    Setting(SUPPLY, "psi_g", "55 psi_g is printed for the step response, 50 for the flow", 45.0, 60.0),
+    Setting(DORSIFLEXION, "psi_g", "a second regulator is named, its setting is not", 20.0, 60.0),
+    Setting(START, "N m", "not printed; both chambers at atmosphere give 0", 0.0, 2.0),
+    Setting(DELAY, "ms", "not printed; data sheets of such valves have 2 to 20 ms", 0.0, 20.0),
     Setting(
         DISCHARGE,
         "",
@@ -105,7 +120,7 @@ def values_of(points: Floats) -> Draws:
 
 def in_si(values: Floats, unit: str) -> Floats:
     """Values of a shown unit in SI; all units here are straight lines to SI."""
-    si_unit = {"deg": "rad", "psi_g": "Pa_a", "cm^3": "m^3"}.get(unit, unit)
+    si_unit = {"deg": "rad", "psi_g": "Pa_a", "cm^3": "m^3", "cm^3/rad": "m^3/rad", "ms": "s"}.get(unit, unit)
     zero, one = (parse_quantity(f"{number} {unit}", si_unit) for number in (0.0, 1.0))
     return np.asarray(zero + (one - zero) * values)
 
@@ -113,20 +128,90 @@ def in_si(values: Floats, unit: str) -> Floats:
 def columns(draws: Draws, valve: str) -> dict[str, Floats]:
     """What varies in the torque task with one of the valves, in SI units by path."""
     ramp = draws["ramp time"]
-    pressure = in_si(draws["source pressure"], "psi_g")
-    dead_volume = in_si(draws[DEAD_VOLUME], "cm^3")
     shared = {
-        "reference.level": draws["reference level"],
+        "reference.level": draws[LEVEL],
+        "reference.start_level": draws[START],
         "reference.ramp_time": ramp,
         "motion.angle": in_si(draws["angle"], "deg"),
+        "supply.pressure": in_si(draws[SUPPLY], "psi_g"),
+        "supply.dorsiflexion_pressure": in_si(draws[DORSIFLEXION], "psi_g"),
+        "run.duration": whole_durations(ramp + draws[HOLD]),
+        **_of_device(draws, valve),
+    }
+    if valve == PROPORTIONAL:
+        return shared | _pid(draws)
+    delay = in_si(draws[DELAY], "ms")
+    return shared | {
+        "controller.rate": draws[ON_OFF_RATE],
+        "valve.opening_delay": delay,
+        "valve.closing_delay": delay,
+    }
+
+
+def _of_device(draws: Draws, valve: str) -> dict[str, Floats]:
+    """What varies of the device in every experiment, in SI units by path."""
+    dead_volume = in_si(draws[DEAD_VOLUME], "cm^3")
+    return {
+        "actuator.volume_per_angle": in_si(draws[VOLUME], "cm^3/rad"),
         "actuator.dead_volume_1": dead_volume,
         "actuator.dead_volume_2": dead_volume,
-        "supply.pressure": pressure,
-        "supply.dorsiflexion_pressure": pressure,
         "valve.discharge_coefficient": discharge_coefficients(draws[DISCHARGE], valve),
-        "run.duration": whole_durations(ramp + draws[HOLD]),
     }
-    return shared | (_pid(draws) if valve == PROPORTIONAL else {"controller.rate": draws[ON_OFF_RATE]})
+
+
+STEP_TIME = 0.3
+"""Time [s] of the step response that is looked at: until the vane is at its stop in nearly every completion."""
+PLATEAU, FALL, RISE = (
+    "time at the supply pressure before breakaway",
+    "fall of pressure 1 in motion",
+    "rise of pressure 2 in motion",
+)
+
+
+def step_columns(draws: Draws) -> dict[str, Floats]:
+    """What varies in the step response, in SI units by path; attitude and inertia of a foot belong here."""
+    return _of_device(draws, PROPORTIONAL)
+
+
+def step_observables(
+    times: Floats, traces: Mapping[str, Floats], supply: float, atmosphere: float
+) -> dict[str, Floats]:
+    """What the text of figure 7 speaks of [ms], [psi], by name (runs,), from traces (times, runs) in SI.
+
+    nan where the vane does not move; breakaway is the last sample at which the vane is where it started.
+    """
+    angle, first, second = (traces[name] for name in ("angle", "pressure_1", "pressure_2"))
+    moved = np.abs(angle - angle[0]) > STEP_RESOLUTION
+    breakaway = np.maximum(np.argmax(moved, axis=0) - 1, 0)
+    at_end = np.abs(angle - angle[-1]) > STEP_RESOLUTION
+    stop = times.size - np.argmax(at_end[::-1], axis=0)
+    place = np.arange(times.size)[:, None]
+    moving = (place >= breakaway) & (place <= stop)
+    full = first > supply - SAME_PRESSURE * (supply - atmosphere)
+    before = full & (place <= breakaway)
+    since = np.where(before.any(axis=0), times[np.argmax(before, axis=0)], times[breakaway])
+    column = np.arange(breakaway.size)
+    lowest = np.min(np.where(moving, first, np.inf), axis=0)
+    falling = np.minimum.accumulate(np.where(moving, second, np.inf), axis=0)
+    rise = np.max(np.where(moving, second - falling, 0.0), axis=0)
+    found = {
+        PLATEAU: 1.0e3 * (times[breakaway] - since),
+        FALL: (first[breakaway, column] - lowest) / PASCALS_PER_PSI,
+        RISE: rise / PASCALS_PER_PSI,
+    }
+    return {name: np.where(moved.any(axis=0), values, np.nan) for name, values in found.items()}
+
+
+STEP_RESOLUTION = 1.0e-5
+"""Smallest angle [rad] that counts as motion."""
+SAME_PRESSURE = 0.01
+"""Fraction of the pressure range within which a pressure is that of the supply."""
+
+
+def demand_over_ceiling(draws: Draws) -> Floats:
+    """The largest torque that is wanted over what the supply holds at rest [-]. Equation (2)."""
+    constant = load_device(DEVICE).actuator.torque_constant
+    return np.asarray(draws[LEVEL] / (constant * draws[SUPPLY] * PASCALS_PER_PSI))
 
 
 def whole_durations(times: Floats) -> Floats:
@@ -160,29 +245,6 @@ def _pid(draws: Draws) -> dict[str, Floats]:
 Metrics = Mapping[str, Mapping[str, Floats]]
 """Metrics by valve and name, each (draws,)."""
 METRICS = ("rms_error", "gas_supplied", "oscillations_ramp", "oscillations_hold")
-FEWEST_REVERSALS = 4.0
-"""Fewer reversals on the ramp are an overshoot, not an oscillation, as in the reproduction report."""
-MAXIMUM_REVERSALS = 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class Reported:
-    """A number of the paper: its value, standard deviation of the tolerance, and how a completion gives it."""
-
-    name: str
-    value: float
-    tolerance: float
-    unit: str
-    why: str
-    of: Callable[[Metrics], Floats]
-
-
-@dataclass(frozen=True, slots=True)
-class Stated:
-    """Something that the text states: a completion that does not show it counts for nothing."""
-
-    name: str
-    of: Callable[[Metrics], NDArray[np.bool_]]
 
 
 def improvement(metrics: Metrics) -> Floats:
@@ -202,45 +264,66 @@ def grams(valve: str) -> Callable[[Metrics], Floats]:
     return lambda metrics: GRAMS_PER_KILOGRAM * metrics[valve]["gas_supplied"]
 
 
-def _oscillates_on_ramp_only(metrics: Metrics) -> NDArray[np.bool_]:
-    solenoid = metrics[SOLENOID]
-    return (solenoid["oscillations_ramp"] >= FEWEST_REVERSALS) & (solenoid["oscillations_hold"] <= MAXIMUM_REVERSALS)
+def _reversals(valve: str, part: str) -> Callable[[Metrics], Floats]:
+    return lambda metrics: metrics[valve][f"oscillations_{part}"]
 
 
-def _is_quiet(metrics: Metrics) -> NDArray[np.bool_]:
-    return metrics[PROPORTIONAL]["oscillations_ramp"] < FEWEST_REVERSALS
+def _of_step(name: str) -> Callable[[Metrics], Floats]:
+    return lambda metrics: metrics[STEP][name]
 
 
-IMPROVEMENT = "improvement"
-GAS = ("gas, solenoid", "gas, proportional", "saving")
-REPORTED: tuple[Reported, ...] = (
-    Reported(IMPROVEMENT, 15.0, 2.0, "%", "printed to 1 %; the model's error is of this size", improvement),
-    Reported(GAS[0], 1.1, 0.06, "g", "printed to 0.1 g, measured", grams(SOLENOID)),
-    Reported(GAS[1], 0.4, 0.03, "g", "printed to 0.1 g, measured", grams(PROPORTIONAL)),
-    Reported(GAS[2], 63.0, 2.0, "%", "printed to 1 %; sharper than the two rounded gases it is made of", saving),
+OBSERVABLES: Mapping[str, Callable[[Metrics], Floats]] = {
+    "improvement": improvement,
+    "saving": saving,
+    "gas, solenoid": grams(SOLENOID),
+    "gas, proportional": grams(PROPORTIONAL),
+    "reversals on the ramp, solenoid": _reversals(SOLENOID, "ramp"),
+    "reversals on the hold, solenoid": _reversals(SOLENOID, "hold"),
+    "reversals on the ramp, proportional": _reversals(PROPORTIONAL, "ramp"),
+    PLATEAU: _of_step(PLATEAU),
+    FALL: _of_step(FALL),
+    RISE: _of_step(RISE),
+}
+"""What a completion gives of the observables that entries of the paper speak of, in the units of the entries."""
+EVIDENCE = tuple(
+    entry for entry in paper_entries().values() if entry.observable in OBSERVABLES and entry.deviation is not None
 )
-STATED: tuple[Stated, ...] = (
-    Stated("the solenoid pair oscillates on the ramp and not on the hold", _oscillates_on_ramp_only),
-    Stated("the proportional valve does not oscillate on the ramp", _is_quiet),
-)
+"""What the paper reports that completions have to agree with."""
+IMPROVEMENT = "torque_rms_improvement"
+QUIET = ("proportional_does_not_oscillate",)
+GAS = ("co2_solenoid", "co2_proportional", "co2_saving")
 
 
 def agreement(metrics: Metrics, left_out: Collection[str] = ()) -> Floats:
-    """How well each completion (draws,) agrees with what is reported, 0 to 1; ``left_out`` names do not count."""
+    """How well each completion (draws,) agrees with what is reported, 0 to 1; ``left_out`` entries do not count."""
+    return agreement_with([entry.id for entry in EVIDENCE if entry.id not in left_out], metrics)
+
+
+def agreement_with(identifiers: Collection[str], metrics: Metrics) -> Floats:
+    """How well each completion (draws,) agrees with some entries, 0 to 1."""
     logarithm = np.zeros(metrics[SOLENOID]["rms_error"].size)
-    for item in REPORTED:
-        if item.name in left_out:
-            continue
-        away = (item.of(metrics) - item.value) / item.tolerance
-        logarithm -= 0.5 * away * away
+    for entry in EVIDENCE:
+        if entry.id in identifiers:
+            logarithm -= _misfit(entry, OBSERVABLES[entry.observable](metrics))
     agrees = np.isfinite(logarithm)
-    for stated in STATED:
-        agrees &= stated.of(metrics)
     return np.where(agrees, np.exp(np.where(agrees, logarithm, 0.0)), 0.0)
 
 
-ANYWHERE = 0.2
-KEEPS_CHOICE = 0.7
+def _misfit(entry: ClaimEntry, found: Floats) -> Floats:
+    """Half the square of how far an observable is from a number, or beyond limits, in deviations."""
+    if entry.published is not None:
+        away = np.abs(found - entry.published)
+    else:
+        low = -np.inf if entry.at_least is None else entry.at_least
+        high = np.inf if entry.at_most is None else entry.at_most
+        away = np.maximum(0.0, np.maximum(low - found, found - high))
+    if not entry.deviation:
+        return np.where(away > 0.0, np.inf, 0.0)
+    return np.asarray(0.5 * (away / entry.deviation) ** 2)
+
+
+ANYWHERE = 0.1
+KEEPS_CHOICE = 0.9
 CENTRES = 200
 NARROWEST = 0.02
 """Smallest standard deviation of a bell along any direction, of the side of the cube."""

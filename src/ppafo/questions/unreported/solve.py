@@ -20,17 +20,25 @@ from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.unreported.answer import REPLICATES, Family
 from ppafo.questions.unreported.settings import (
     CELLS,
+    FALL,
     GAS,
     IMPROVEMENT,
     METRICS,
+    PLATEAU,
     PROPORTIONAL,
+    RISE,
     SOLENOID,
+    STEP,
+    STEP_TIME,
+    Draws,
     Floats,
     Proposal,
     agreement,
     columns,
     next_proposal,
     spread,
+    step_columns,
+    step_observables,
     values_of,
 )
 from ppafo.simulation.ensemble import COMPLETED, run_ensemble
@@ -45,17 +53,18 @@ FEWEST, MOST = 1_000, 20_000_000
 def infer_settings(draws: int = 262_144, seed: int = 2011, progress: Report | None = None) -> Family:
     """Return completions of the paper's torque task, each run with both valves, weighed by what the paper reports.
 
-    They are divided among searches. A third of each is spread evenly; the rest follows in rounds, each drawn near what
-    agreed best so far in that search. In the end every completion is weighed as if all had been drawn from the mixture
-    of all searches. ``seed`` is the random seed. The arrays of the result have shape (completions,): settings in the
-    units of ``settings.SETTINGS``, metrics in SI, weights [-] that add up to 1. ScenarioError for fewer than 1000 draws
-    or more than 20 million.
+    They are divided among searches. A quarter of each is spread evenly; the rest follows in rounds, each drawn near
+    what agreed best so far in that search. In the end every completion is weighed as if all had been drawn from the
+    mixture of all searches. ``seed`` is the random seed. The arrays of the result have shape (completions,): settings
+    in the units of ``settings.SETTINGS``, metrics in SI, weights [-] that add up to 1. ScenarioError for fewer than
+    1000 draws or more than 20 million.
     """
     if not FEWEST <= draws <= MOST:
         raise ScenarioError(f"draws = {draws}: must be from {FEWEST} to {MOST}")
     report, started = progress or report_nothing, time.monotonic()
     each = draws // REPLICATES
-    rounds = [each // 3, *[(each - each // 3) // ROUNDS] * ROUNDS]
+    even = each // 4
+    rounds = [even, *[(each - even) // ROUNDS] * ROUNDS]
     seeds = [replicate_seed(seed, number) for number in range(REPLICATES)]
     searches = [_Search(np.random.default_rng(own), rounds, spread(rounds[0], own)) for own in seeds]
     added = [search.points for search in searches]
@@ -190,8 +199,28 @@ def _run(points: Floats) -> _Ran:
             result = run_ensemble(load_scenario(f"torque-task-{valve}"), columns(draws, valve), METRICS)
             completed &= result.status == COMPLETED
             metrics[valve] = result.metrics
+        metrics[STEP] = _step_metrics(draws) if completed.size else {name: np.empty(0) for name in STEP_METRICS}
         parts.append(_Ran(metrics, completed))
     return _join(parts)
+
+
+STEP_METRICS = (PLATEAU, FALL, RISE)
+STEP_CHUNK = 4096
+"""Step responses whose traces are kept at once."""
+
+
+def _step_metrics(draws: Draws) -> dict[str, Floats]:
+    """What the step response of each completion shows of the text of figure 7."""
+    base = load_scenario("step-response", [f"run.duration={STEP_TIME} s"])
+    supply = base.device.supply
+    varied = step_columns(draws)
+    count = next(iter(varied.values())).size
+    parts = []
+    for first in range(0, count, STEP_CHUNK):
+        part = {path: values[first : first + STEP_CHUNK] for path, values in varied.items()}
+        result = run_ensemble(base, part, (), ("angle", "pressure_1", "pressure_2"))
+        parts.append(step_observables(result.times, result.traces, supply.pressure, supply.atmospheric_pressure))
+    return {name: np.concatenate([part[name] for part in parts]) for name in STEP_METRICS}
 
 
 def _density(proposal: Proposal | None, points: Floats) -> Floats:
