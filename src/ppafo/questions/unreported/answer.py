@@ -507,8 +507,8 @@ def reach_sentence(found: WithinReach) -> str:
         f"where U is the opening, with the printed Cd and 20 Hz, a proportional valve that does not oscillate, and a "
         f"demand below {REACH:g} of what the supply holds, the proportional valve tracks better in "
         f"{100.0 * found.better:.1f} % of {found.count} completions, by {median:.0f} % ({low:.0f} to {high:.0f} %); "
-        f"the printed improvement comes with a demand of {middle:.2f} ({least:.2f} to {most:.2f}) times what the supply "
-        f"holds ({found.printed_count} completions)"
+        f"the printed improvement comes with a demand of {middle:.2f} ({least:.2f} to {most:.2f}) times what the "
+        f"supply holds ({found.printed_count} completions)"
     )
 
 
