@@ -9,7 +9,15 @@ import pytest
 from ppafo.answers.writing import text_of, typeset
 from ppafo.identification.bench.result import synthetic_figure_3
 from ppafo.live.page import bundled, digest
-from ppafo.questions.reproduce.answer import Reproduction, answer_of, holding_torque, reproduction_page
+from ppafo.questions.reproduce.answer import (
+    DEVICE_FIGURE,
+    STEP_FIGURE,
+    TORQUE_FIGURE,
+    Reproduction,
+    answer_of,
+    holding_torque,
+    reproduction_page,
+)
 from ppafo.questions.reproduce.bench import NoEvidence, SyntheticEvidence
 from ppafo.questions.reproduce.figures import step_response_figure, torque_task_figure
 from ppafo.questions.reproduce.open_range import with_open_ranges
@@ -19,6 +27,9 @@ from ppafo.questions.reproduce.step_response import Levels
 LEVELS = Levels(480536.0, 101325.0)
 
 
+DRAWN = {DEVICE_FIGURE: b"<svg>device</svg>", STEP_FIGURE: b"<svg>seven</svg>", TORQUE_FIGURE: b"<svg>eight</svg>"}
+
+
 @pytest.fixture(scope="module")
 def reproduction() -> Reproduction:
     return reproduce(completions=1000)
@@ -26,7 +37,7 @@ def reproduction() -> Reproduction:
 
 @pytest.fixture(scope="module")
 def page(reproduction: Reproduction) -> str:
-    return reproduction_page(reproduction, b"<svg>seven</svg>", b"<svg>eight</svg>")
+    return reproduction_page(reproduction, DRAWN)
 
 
 def words(page: str) -> str:
@@ -115,8 +126,8 @@ def test_the_page_states_every_claim_with_both_numbers_and_the_verdict(reproduct
     assert "shown on synthetic data" in text
 
 
-def test_the_page_holds_both_figures_and_fetches_nothing(page: str) -> None:
-    assert page.count("data:image/svg+xml;base64,") == 2
+def test_the_page_holds_its_three_figures_and_fetches_nothing(page: str) -> None:
+    assert page.count("data:image/svg+xml;base64,") == 3
     outside = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL).replace("http-equiv", "")
     assert "http" not in outside
     assert re.findall(r'(?:src|href)="(?!data:|#)', page) == []
@@ -148,7 +159,7 @@ def test_every_tag_of_the_page_is_closed(page: str) -> None:
 
 def test_a_run_with_overrides_says_so_and_gives_the_command(reproduction: Reproduction, page: str) -> None:
     changed = dataclasses.replace(reproduction, overrides=("reference.level=5 N m",))
-    told = words(reproduction_page(changed, b"", b""))
+    told = words(reproduction_page(changed, DRAWN))
     assert "departs from the paper" in told
     assert "--set 'reference.level=5 N m'" in told
     assert "departs from the paper" not in words(page)
@@ -156,7 +167,7 @@ def test_a_run_with_overrides_says_so_and_gives_the_command(reproduction: Reprod
 
 def test_without_the_rig_the_page_says_why_and_shows_nothing_synthetic(reproduction: Reproduction) -> None:
     bare = dataclasses.replace(reproduction, synthetic=NoEvidence("the solver is missing"))
-    told = reproduction_page(bare, b"", b"")
+    told = reproduction_page(bare, DRAWN)
     assert "There are no synthetic measurements in this report: the solver is missing." in words(told)
     assert 'id="identification"' not in told
 
@@ -224,4 +235,4 @@ def test_figure_8_shows_the_synthetic_experiment_with_both_valves(reproduction: 
 
 
 def test_the_same_reproduction_gives_the_same_page(reproduction: Reproduction, page: str) -> None:
-    assert reproduction_page(reproduction, b"<svg>seven</svg>", b"<svg>eight</svg>") == page
+    assert reproduction_page(reproduction, DRAWN) == page

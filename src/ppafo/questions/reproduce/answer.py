@@ -39,6 +39,7 @@ from ppafo.questions.reproduce.claim import (
     load_printed,
     verdict_counts,
 )
+from ppafo.questions.reproduce.drawing import device_figure
 from ppafo.questions.reproduce.figures import step_response_figure, torque_task_figure
 from ppafo.questions.reproduce.open_range import unread
 from ppafo.questions.reproduce.publication import ALL, SEED, Study
@@ -132,14 +133,8 @@ _TASK_METRICS = (
 )
 
 
-def reproduction_page(
-    reproduction: Reproduction,
-    step_figure: bytes,
-    torque_figure: bytes,
-    identification_figure: bytes | None = None,
-    unsaid_figure: bytes | None = None,
-) -> str:
-    """Return the page as HTML; figures are the contents of SVG files and become part of the page."""
+def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) -> str:
+    """Return the page as HTML; ``drawn`` has SVG files by the names of the figures, which become part of the page."""
     printed = reproduction.printed_findings
     groups: dict[tuple[str, ...], list[AssumedValue]] = {}
     for value in reproduction.assumed:
@@ -155,10 +150,11 @@ def reproduction_page(
         "remarks": _of_severity(printed, "warning"),
         "notes": _of_severity(printed, "note"),
         "kept": [finding for finding in reproduction.completed_findings if finding.severity != "note"],
-        **_synthetic(reproduction, identification_figure),
-        "unsaid": _unreported_data(reproduction, unsaid_figure),
-        "step_figure": inline_figure(step_figure),
-        "torque_figure": inline_figure(torque_figure),
+        **_synthetic(reproduction, drawn.get(IDENTIFICATION_FIGURE)),
+        "unsaid": _unreported_data(reproduction, drawn.get(UNSAID_FIGURE)),
+        "device_figure": inline_figure(drawn[DEVICE_FIGURE]),
+        "step_figure": inline_figure(drawn[STEP_FIGURE]),
+        "torque_figure": inline_figure(drawn[TORQUE_FIGURE]),
         "task_rows": _task_rows(reproduction.solenoid.metrics, reproduction.proportional.metrics),
         "ceiling": f"{holding_torque(reproduction.solenoid):.1f}",
         "assumed_groups": [(_users(users), values) for users, values in ordered],
@@ -319,6 +315,7 @@ def _error_row(claim: Claim) -> tuple[str, str, str, str]:
     return name, claim.published, quantity(claim.value, claim.unit, 2), claim.verdict_words
 
 
+DEVICE_FIGURE = "device"
 IDENTIFICATION_FIGURE = "figure-3-identification"
 STEP_FIGURE = "figure-7-step-response"
 TORQUE_FIGURE = "figure-8-torque-task"
@@ -468,13 +465,8 @@ def _paper_answer(reproduction: Reproduction) -> Answer:
         passed=not reproduction.missed or bool(reproduction.overrides),
         files={f"{run.scenario.name}.csv": partial(marked_csv_bytes, run.recording) for run in runs},
         command="reproduce",
-        page=lambda drawn: _page(reproduction, drawn),
+        page=lambda drawn: reproduction_page(reproduction, drawn).encode(),
     )
-
-
-def _page(reproduction: Reproduction, drawn: Mapping[str, bytes]) -> bytes:
-    identification, unsaid = drawn.get(IDENTIFICATION_FIGURE), drawn.get(UNSAID_FIGURE)
-    return reproduction_page(reproduction, drawn[STEP_FIGURE], drawn[TORQUE_FIGURE], identification, unsaid).encode()
 
 
 def _override_remarks(overrides: tuple[str, ...]) -> tuple[str, ...]:
@@ -506,6 +498,7 @@ def _missed_claims(reproduction: Reproduction) -> list[str]:
 
 def _figures(reproduction: Reproduction) -> list[Figure]:
     figures = [
+        Figure(DEVICE_FIGURE, "", device_figure),
         Figure(STEP_FIGURE, "", partial(_step_figure, reproduction)),
         Figure(TORQUE_FIGURE, "", partial(_torque_figure, reproduction)),
     ]
