@@ -73,6 +73,7 @@ REPORTED = (
     Quantity("stopping_deceleration", "rad/s^2", "deceleration near standstill, dynamic friction over inertia"),
     Quantity("smallest_angle", "rad", "smallest angle that was used or measured"),
     Quantity("largest_angle", "rad", "largest angle that was used or measured"),
+    Quantity("rated_rotation", "rad", "angle through which the actuator turns by its designation"),
     Quantity("other_supply_pressure", "Pa_a", "a second supply pressure used in experiments"),
     Quantity("demanded_torque", "N m", "maximum torque that a task requires"),
     Quantity("torque_efficiency", "", "work at the shaft over the work p dV of the gas"),

@@ -138,6 +138,32 @@ def _chamber(evidence: Evidence, chamber: int, travel: float, turn: float, end_p
     )
 
 
+# Does the actuator turn as far as it is used?
+
+_RATED = "reported.rated_rotation"
+_SAME_TURN = 1.01
+
+
+def check_rotation(evidence: Evidence) -> Iterator[Finding]:
+    """Yield a warning where the range of angles is larger than the actuator turns by its designation."""
+    rated, angles = evidence.number(_RATED), evidence.angle_range()
+    if rated is None or angles is None or angles[3] - angles[1] <= _SAME_TURN * rated:
+        return
+    turn = angles[3] - angles[1]
+    yield Finding(
+        id="rotation",
+        severity="warning",
+        title="the vane turns further than the actuator does",
+        values=evidence.values_of(_RATED, angles[0], angles[2]),
+        sides=(Side("range of angles", turn, "rad"), Side("rotation by the designation", rated, "rad")),
+        paragraph=(
+            f"The range of angles is {math.degrees(turn):.3g} deg, the actuator turns by {math.degrees(rated):.3g} "
+            "deg. Either another actuator or a gear was used, or the angle is not that of the vane; volumes and torque "
+            "constant then belong to another shaft. Reconciled by the designation of what was on the bench."
+        ),
+    )
+
+
 # Is the gas of one filling that was measured the gas that chamber 1 holds? Equations (3) and (4).
 
 _VOLUME = ("actuator.volume_per_angle", "actuator.dead_volume_1")

@@ -31,6 +31,45 @@ def check_orifices(evidence: Evidence) -> Iterator[Finding]:
         yield from _open_flow(evidence, name, section)
 
 
+# Are areas of valves the bores of tubes?
+
+_INCH = 25.4e-3
+_TUBES = {
+    "4 mm": 4.0e-3,
+    "6 mm": 6.0e-3,
+    "8 mm": 8.0e-3,
+    "10 mm": 10.0e-3,
+    "1/8 inch": _INCH / 8.0,
+    "1/4 inch": _INCH / 4.0,
+    "3/8 inch": 3.0 * _INCH / 8.0,
+}
+"""Diameters [m] in which tube and ports come."""
+_SAME_BORE = 0.005
+
+
+def check_bores(evidence: Evidence) -> Iterator[Finding]:
+    """Yield a note for each valve whose area is that of a tube: its coefficient is then no property of an orifice."""
+    for valve in evidence.parameter_set.valve_kinds:
+        path = f"valves.{valve}.area"
+        area = evidence.number(path) or 0.0
+        for name, diameter in _TUBES.items():
+            bore = 0.25 * math.pi * diameter * diameter
+            if abs(area / bore - 1.0) > _SAME_BORE:
+                continue
+            yield Finding(
+                id=f"bore-of-{valve}",
+                severity="note",
+                title=f"the area of valve '{valve}' is the bore of a {name} tube",
+                values=evidence.values_of(path, f"valves.{valve}.discharge_coefficient"),
+                sides=(Side("area", area, "m^2"), Side(f"bore of {name}", bore, "m^2")),
+                paragraph=(
+                    f"A bore of {name} has {1e6 * bore:.4g} mm^2, the valve {1e6 * area:.4g} mm^2. An orifice within a "
+                    "valve is smaller than its ports: the discharge coefficient stands for everything between them, "
+                    "and only its product with the area has a meaning."
+                ),
+            )
+
+
 def _two_forms(evidence: Evidence, section: str, names: tuple[str, ...]) -> Finding:
     return Finding(
         id=f"forms-of-{section.rpartition('.')[2]}",

@@ -6,9 +6,9 @@ The checks are in the order of the report. To add one: a function in the module 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from ppafo.parameters.audit.chambers import check_filling, check_virtual_work, check_volumes
+from ppafo.parameters.audit.chambers import check_filling, check_rotation, check_virtual_work, check_volumes
 from ppafo.parameters.audit.evidence import Evidence, Finding
-from ppafo.parameters.audit.flow import check_choked_flow, check_flow, check_orifices, check_sonic_flow
+from ppafo.parameters.audit.flow import check_bores, check_choked_flow, check_flow, check_orifices, check_sonic_flow
 from ppafo.parameters.audit.torque import check_inertia, check_published_torque, check_torque_ceiling
 from ppafo.parameters.audit.values import check_dimensions, check_gas_data, check_ideal_gas, check_ranges
 from ppafo.parameters.overrides import overridden_paths
@@ -19,12 +19,14 @@ CHECKS: dict[str, Callable[[Evidence], Iterator[Finding]]] = {
     "ranges": check_ranges,
     "gas data": check_gas_data,
     "orifices": check_orifices,
+    "bores": check_bores,
     "choked flow": check_choked_flow,
     "flow": check_flow,
     "sonic flow": check_sonic_flow,
     "inertia": check_inertia,
     "virtual work": check_virtual_work,
     "volumes": check_volumes,
+    "rotation": check_rotation,
     "filling": check_filling,
     "torque ceiling": check_torque_ceiling,
     "published torque": check_published_torque,

@@ -191,6 +191,7 @@ def check_published_torque(evidence: Evidence) -> Iterator[Finding]:
 
 def _at_rest(evidence: Evidence, name: str, paths: tuple[str, str], found: tuple[float, ...]) -> Finding:
     constant, torque, pressure = found
+    note = evidence.parameter_set.numbers[paths[0]].note
     held = constant * (pressure - evidence.atmosphere())
     agrees = abs(held / torque - 1.0) <= _ROOM
     return Finding(
@@ -202,6 +203,7 @@ def _at_rest(evidence: Evidence, name: str, paths: tuple[str, str], found: tuple
         paragraph=(
             f"At {evidence.in_set_unit(paths[1], pressure)} the vane holds {held:.3g} N m, published are {torque:.3g} "
             "N m. This speaks of the torque constant alone: a vane at rest has any volume."
+            f"{f' {note}' if note else ''}"
         ),
     )
 

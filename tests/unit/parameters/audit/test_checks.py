@@ -1,5 +1,6 @@
 """Each check of the audit, on sets other than the paper's: it fires where it should and is silent where it should."""
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -193,3 +194,20 @@ def test_a_set_without_reports_is_asked_nothing() -> None:
     silent = {path: entry for path, entry in BASE.numbers.items() if not path.startswith("reported.")}
     found = {finding.id for finding in audit(replace(BASE, numbers=silent))}
     assert not found & {"gas-of-one-filling", "walking-torque", "rated-torque", "walking-torque-in-time-solenoid"}
+
+
+def test_a_vane_that_turns_further_than_its_actuator_is_a_warning() -> None:
+    found = findings()["rotation"]
+    assert [side.value for side in found.sides] == pytest.approx([math.radians(110.0), math.radians(90.0)])
+    assert "rotation" not in findings("reported.largest_angle=110 deg")
+
+
+def test_an_area_that_is_the_bore_of_a_tube_is_noted() -> None:
+    found = findings()
+    assert side(found["bore-of-solenoid"], "bore of 4 mm") == pytest.approx(12.566e-6, rel=1e-4)
+    assert side(found["bore-of-proportional"], "bore of 1/4 inch") == pytest.approx(31.669e-6, rel=1e-4)
+    assert "bore-of-proportional" not in findings("valve.area=30 mm^2")
+
+
+def test_a_torque_of_another_actuator_says_so() -> None:
+    assert "Of another actuator: the original one was a Parker" in findings()["rated-torque"].paragraph

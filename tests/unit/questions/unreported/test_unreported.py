@@ -6,6 +6,7 @@ import pytest
 from ppafo.answers.writing import text_of
 from ppafo.cli.main import main
 from ppafo.errors import ScenarioError
+from ppafo.parameters import load_device
 from ppafo.questions.unreported.answer import (
     REPLICATES,
     TOO_FEW,
@@ -22,6 +23,7 @@ from ppafo.questions.unreported.settings import (
     FALL,
     GAS,
     IMPROVEMENT,
+    METRICS,
     PLATEAU,
     PROPORTIONAL,
     RISE,
@@ -160,7 +162,27 @@ def test_within_reach_of_the_supply_the_proportional_valve_tracks_better_and_15_
     assert found.demand[1] > 1.0
 
 
-def test_no_shipped_volume_agrees_with_all_that_the_text_of_figure_7_says() -> None:
+def test_of_the_shipped_sets_the_fitted_one_agrees_best_with_all_that_the_paper_says() -> None:
+    sets = ("ppafo2011", "ppafo2011-consistent", "ppafo2011-fitted")
+    actuators = [load_device(name).actuator for name in sets]
+    device = {
+        path: np.array([getattr(actuator, path.partition(".")[2]) for actuator in actuators])
+        for path in ("actuator.volume_per_angle", "actuator.dead_volume_1", "actuator.dead_volume_2")
+    }
+    metrics = {
+        valve: run_ensemble(load_scenario(f"torque-task-{valve}"), device, METRICS).metrics
+        for valve in (SOLENOID, PROPORTIONAL)
+    }
+    base = load_scenario("step-response", [f"run.duration={STEP_TIME} s"])
+    result = run_ensemble(base, device, (), ("angle", "pressure_1", "pressure_2"))
+    supply = base.device.supply
+    metrics[STEP] = step_observables(result.times, result.traces, supply.pressure, supply.atmospheric_pressure)
+    printed, consistent, fitted = np.log(agreement(metrics))
+    assert fitted > consistent + 1.0
+    assert fitted > printed + 20.0
+
+
+def test_neither_of_two_earlier_volumes_agrees_with_all_that_the_text_of_figure_7_says() -> None:
     """With 51 cm^3/rad and 2 cm^3 chamber 2 is compressed; with 18.1 and 32 the pressure in chamber 1 never falls."""
     columns_si = {
         "actuator.volume_per_angle": np.array([51e-6, 18.1e-6]),
