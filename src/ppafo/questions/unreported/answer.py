@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.style import BLUE, GREY, VERMILION, house_style
 from ppafo.parameters.publications.publication import paper_entries
 from ppafo.questions.question import Solved
+from ppafo.questions.unreported.figure import draw_settings
 from ppafo.questions.unreported.settings import (
     DISCHARGE,
     EVIDENCE,
@@ -37,7 +37,6 @@ from ppafo.studies.distributions import jackknife_reach
 
 if TYPE_CHECKING:
     import matplotlib.figure
-    from matplotlib.axes import Axes
 
 REPLICATES = 4
 ENOUGH = 100.0
@@ -333,87 +332,21 @@ def _ranks(values: Floats) -> Floats:
     return np.asarray(middle[places] / values.size)
 
 
-_SIZE = (9.6, 7.6)
-_COLUMNS = 4
-_BINS = 30
-_SHOWN_DOTS = 4000
-
-
 def unreported_figure(family: Family) -> "matplotlib.figure.Figure":
-    """Return the panels of all settings, allowed in grey and implied in blue, and one of the two main results."""
-    import matplotlib.figure
-
-    rows = -(-(len(SETTINGS) + 1) // _COLUMNS)
-
-    with house_style():
-        figure = matplotlib.figure.Figure(figsize=_SIZE)
-        figure.subplots_adjust(left=0.03, right=0.98, top=0.9, bottom=0.07, hspace=0.62, wspace=0.22)
-        panels = figure.subplots(rows, _COLUMNS).ravel().tolist()
-        weights = family.weights
-        for axes, setting, result in zip(panels, SETTINGS, implications_of(family), strict=False):
-            _drawn_setting(axes, setting, family.draws[setting.name], weights, result)
-        _results(panels[len(SETTINGS)], family)
-        for axes in panels[len(SETTINGS) + 1 :]:
-            axes.set_axis_off()
-        figure.text(
-            0.01,
-            0.985,
-            "What the paper left unsaid: prior in grey, posterior in blue (simulated; effective sample size "
-            f"{family.effective:.0f})",
-            va="top",
-            fontsize=11,
-        )
-        return figure
-
-
-def _drawn_setting(axes: "Axes", setting: Setting, values: Floats, weights: Floats, result: Implication) -> None:
-    axes.set_title(f"{setting.name}{f' ({setting.unit})' if setting.unit else ''}", fontsize=9.5)
-    axes.set_xlabel(result.verdict, fontsize=9, color=BLUE if result.verdict == "implied" else GREY)
-    axes.set_yticks([])
-    if setting.choices:
-        places = np.arange(len(setting.choices))
-        axes.bar(places, np.full(places.size, 1.0 / places.size), width=0.85, color=GREY, alpha=0.3)
-        axes.bar(places, result.fractions, width=0.5, color=BLUE)
-        names = setting.words or [f"{choice:g}" for choice in setting.choices]
-        axes.set_xticks(places, [_short(name) for name in names], fontsize=7.5)
-        return
-    scale = np.log10 if setting.is_logarithmic else np.asarray
-    edges = np.linspace(scale(setting.low), scale(setting.high), _BINS + 1)
-    axes.hist(edges[:-1], bins=list(edges), weights=np.full(_BINS, 1.0 / _BINS), color=GREY, alpha=0.3)
-    axes.hist(scale(values), bins=list(edges), weights=weights, color=BLUE)
-    if setting.is_logarithmic:
-        ticks = np.array(
-            [value for value in (0.3, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0) if setting.low <= value <= setting.high]
-        )
-        axes.set_xticks(np.log10(ticks), [f"{tick:g}" for tick in ticks])
-
-
-def _short(words: str) -> str:
-    """Return the words on two lines."""
-    parts = words.split()
-    half = (len(parts) + 1) // 2
-    return " ".join(parts[:half]) + ("\n" + " ".join(parts[half:]) if parts[half:] else "")
-
-
-def _results(axes: "Axes", family: Family) -> None:
-    better, less = improvement(family.metrics), saving(family.metrics)
-    even = slice(0, min(family.even, _SHOWN_DOTS))
-    axes.plot(less[even], better[even], ".", markersize=1.5, color=GREY, alpha=0.5)
-    likely = np.argsort(-family.weights)[: _SHOWN_DOTS // 8]
-    likely = likely[family.weights[likely] > 0.0]
-    axes.plot(less[likely], better[likely], ".", markersize=2.0, color=BLUE)
-    axes.plot([63.0], [15.0], "+", markersize=11, markeredgewidth=1.6, color=VERMILION)
-    axes.set_xlim(-20.0, 100.0)
-    axes.set_ylim(-60.0, 60.0)
-    axes.set_title("improvement (%) over saving (%)", fontsize=9.5)
-    axes.set_xlabel("+ the paper", fontsize=9, color=VERMILION)
+    """Return the panels of all settings, of the two main results and of the level over the supply pressure."""
+    found = implications_of(family)
+    fractions = {item.setting.name: item.fractions for item in found}
+    return draw_settings(family, [item.verdict for item in found], fractions)
 
 
 ERRORS = (
     f"each ±: 95 % by the spread between {REPLICATES} independent searches; the effective sample size shows how "
     "unequal the weights are, not how precise a fraction is"
 )
-_CAPTION = "Grey: prior; blue: posterior. Dots: improvement over saving, with the paper's as a cross."
+_CAPTION = (
+    "Grey: prior; blue: posterior, smoothed; black: the scenarios of the package. Improvement over saving has the "
+    "paper as a cross; level over supply shows where the improvement is the printed one."
+)
 _SETTINGS = ("setting", "allowed", "posterior: median and 90 % interval", "verdict")
 _CONCLUSIONS = ("reading", "conclusion", "of all completions", "by the other evidence")
 
