@@ -119,8 +119,8 @@ def test_the_schema_has_it_and_a_set_file_may_give_it() -> None:
 def test_it_can_be_fitted() -> None:
     scenario = load_scenario(NAME, (*SHORT, NARROW))
     assert declaration_of(AREA, scenario).unit == "m^2"
-    (row,) = plan_run(with_fitted(scenario, {AREA: 8e-6})).effects
-    assert row.resistance == pytest.approx(plan_run(scenario).effects[0].resistance / 4.0)
+    *_, row = plan_run(with_fitted(scenario, {AREA: 8e-6})).effects
+    assert row.resistance == pytest.approx(plan_run(scenario).effects[-1].resistance / 4.0)
 
 
 def test_the_reference_solver_has_the_same_law() -> None:

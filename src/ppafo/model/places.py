@@ -30,6 +30,11 @@ def shown_signals(angle: float, pressure_1: float, pressure_2: float) -> tuple[f
     return angle, pressure_1, pressure_2
 
 
+def rebound(angular_velocity: float) -> float:
+    """Angular velocity [rad/s] with which the vane leaves a stop, from that with which it meets it: 0, it stays."""
+    return 0.0
+
+
 def friction_at_rest(torque: float, pressure_1: float, pressure_2: float) -> float:
     """Largest friction torque at rest [N m], from that without gas; absolute pressures [Pa]. Equation (10)."""
     return torque

@@ -32,7 +32,6 @@ class PlantParameters(NamedTuple):
     angle_max: float
     dead_volume_1: float
     dead_volume_2: float
-    restitution: float
     static_torque: float
     dynamic_torque: float
     viscous_damping: float

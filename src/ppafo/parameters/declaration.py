@@ -13,6 +13,7 @@ from ppafo.model.actuators.vane import KIND as VANE
 from ppafo.model.catalog import ACTUATORS, VALVES, device_effects
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect
+from ppafo.model.effects.restitution import EFFECT as RESTITUTION
 
 SPECIES_PATH = "gas.species"
 RELIEVING_PATH = "supply.relieving"
@@ -45,7 +46,7 @@ ACTUATOR = (
     Quantity("angle_max", "rad", "upper stop, where chamber 2 is smallest", minimum=-10.0, maximum=10.0),
     Quantity("dead_volume_1", "m^3", "line and clearance of chamber 1", minimum=0.0, minimum_allowed=False),
     Quantity("dead_volume_2", "m^3", "line and clearance of chamber 2", minimum=0.0, minimum_allowed=False),
-    Quantity("restitution", "", "rebound speed over impact speed at a stop", minimum=0.0, maximum=1.0),
+    *RESTITUTION.quantities,
 )
 _OF_A_VANE = frozenset(quantity.name for quantity in VANE.quantities)
 FRICTION = (

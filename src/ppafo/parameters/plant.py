@@ -93,7 +93,6 @@ def plant_with(device: Device, valve: Restriction, leak: Restriction, external_t
         angle_max=actuator.angle_max,
         dead_volume_1=actuator.dead_volume_1,
         dead_volume_2=actuator.dead_volume_2,
-        restitution=actuator.restitution,
         static_torque=device.friction.static_torque,
         dynamic_torque=device.friction.dynamic_torque,
         viscous_damping=device.friction.viscous_damping,
@@ -122,8 +121,9 @@ _NO_SECTIONS: Sections = {}
 
 def settings_of(device: Device, effect: Effect, others: Sections = _NO_SECTIONS) -> dict[str, Any]:
     """Return the settings [SI] of an effect, arrays (runs,) where they vary; its defaults where nothing is said."""
-    if effect.section in others:
-        return {item.name: getattr(others[effect.section], item.name) for item in effect.quantities}
+    if effect.section in others or effect.always:
+        section = others[effect.section] if effect.section in others else getattr(device, effect.section)
+        return {item.name: getattr(section, item.name) for item in effect.quantities}
     return {**effect.defaults(), **device.effects.get(effect.name, {})}
 
 
@@ -152,13 +152,15 @@ def effect_rows(device: Device, others: Sections = _NO_SECTIONS) -> tuple[Any, .
 
 
 def _row(effect: Effect, device: Device, others: Sections) -> Any:
-    settings, names = settings_of(device, effect, others), _names(device.actuator.kind)
+    settings, names, prepare = settings_of(device, effect, others), _names(device.actuator.kind), effect.prepare
+    if prepare is None:
+        return effect.parameters(*settings.values())
     given = [_number(device, section, name) for section, inner in names.items() for name in inner]
 
     def prepared(*numbers: float) -> Any:
         own, rest = numbers[: len(settings)], iter(numbers[len(settings) :])
         parts = [_part(section, inner)(*[next(rest) for _ in inner]) for section, inner in names.items()]
-        return effect.prepare(dict(zip(settings, own, strict=True)), _part("device", tuple(names))(*parts))
+        return prepare(dict(zip(settings, own, strict=True)), _part("device", tuple(names))(*parts))
 
     return over_runs(prepared, *settings.values(), *given)
 

@@ -388,7 +388,7 @@ class _Rig:
         if abs(roots.second) < abs(roots.first):
             self.result.impacts.append(self.time)
             self.y[0] = plant.angle_max if self.direction > 0.0 else plant.angle_min
-            self.y[1] = after_stop(plant, float(self.y[1]))
+            self.y[1] = after_stop(self.run, {}, float(self.y[1]))
         else:
             self.y[1] = 0.0
         self.direction = float(np.sign(self.y[1])) if self.y[1] != 0.0 else self.rest_mode()

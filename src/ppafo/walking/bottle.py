@@ -368,8 +368,9 @@ def run_on_bottle(
 
     ``stride_time`` [s] is how long a stride takes; ``progress`` gets the minutes done and in all.
     """
-    if run.effects:
-        names = ", ".join(f"'{effect.name}'" for effect in run.program.effects)
+    switched = [f"'{effect.name}'" for effect in run.program.effects if effect.switch]
+    if switched:
+        names = ", ".join(switched)
         raise ScenarioError(
             f"effects ({names}) do not follow the temperature of a bottle: switch them off, or walk without"
         )

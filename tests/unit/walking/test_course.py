@@ -125,10 +125,10 @@ def test_a_walk_takes_the_nearest_whole_number_of_strides(tmp_path: Path) -> Non
 
 def test_a_walk_without_a_course_is_composed_without_one() -> None:
     text = lane_source(plan_walk(with_duration(load_walk("solenoid"), 60.0)).program)
-    assert "course_gait_on_course" not in text
+    assert "gait_on_course(" not in text
     assert "scuff" not in text
     with_course = lane_source(plan_walk(with_duration(load_walk("solenoid", course="stairs"), 60.0)).program)
-    assert "course_gait_on_course" in with_course
+    assert "gait_on_course(" in with_course
     assert "model_gait_measured_at" in text
     assert "model_gait_measured_at" not in with_course
 

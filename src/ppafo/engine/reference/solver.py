@@ -4,7 +4,7 @@ First the sampled controller beside a solution in continuous time, with what it 
 and stops as the modes between which the solver switches; then the solution; last how far the lanes are from it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -25,7 +25,7 @@ from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.engine.run import Run, batch_of, states_at_start
 from ppafo.engine.scheme.actuators import driving_torque_of, measurement_of
 from ppafo.errors import SimulationError
-from ppafo.model.places import at_valve, friction_at_rest, shown_signals
+from ppafo.model.places import at_valve, friction_at_rest, rebound, shown_signals
 from ppafo.model.plant import PlantParameters, chamber_pressures, driving_torque, holds_still
 from ppafo.model.sensors import Measurement, measure
 
@@ -150,10 +150,11 @@ def roots_sliding(plant: PlantParameters, angle: float, angular_velocity: float,
     return Roots(way * angular_velocity, ahead)
 
 
-def after_stop(plant: PlantParameters, angular_velocity: float) -> float:
+def after_stop(run: Run, states: Mapping[str, Any], angular_velocity: float) -> float:
     """Angular velocity [rad/s] after an impact on a stop; 0 where the rebound is not worth following."""
-    rebound = -plant.restitution * angular_velocity
-    return rebound if abs(rebound) > SLOWEST_REBOUND else 0.0
+    law = python_place(rebound, run.program.effects, run.effects)
+    thrown_back = 0.0 if law is None else float(law(states, angular_velocity))
+    return thrown_back if abs(thrown_back) > SLOWEST_REBOUND else 0.0
 
 
 MASS_TOLERANCE = 1e-15
@@ -431,7 +432,7 @@ class _Solution:
         if abs(roots.second) < abs(roots.first):
             self.result.impacts.append(self.time)
             self.y[0] = plant.angle_max if self.way > 0.0 else plant.angle_min
-            self.y[1] = after_stop(plant, self.y[1])
+            self.y[1] = after_stop(self.run, self.states_in(self.y), self.y[1])
         else:
             self.y[1] = 0.0
         self.way = float(np.sign(self.y[1])) if self.y[1] != 0.0 else self.rest_mode()

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from ppafo.engine.scheme.pneumatics import GasChange, HeldChambers, held_pressures
-from ppafo.model.places import friction_at_rest, friction_in_motion
+from ppafo.model.places import friction_at_rest, friction_in_motion, rebound
 from ppafo.model.plant import (
     PlantParameters,
     PlantState,
@@ -263,8 +263,8 @@ def end_part(
     left_torque = begun.torque + fraction * (next_torque - begun.torque)
     departure = Departure(fraction, turning_angle, 0.0)
     left_angle, left_velocity = depart(plant, departure, left_torque, next_torque, friction, length)
-    rebound = rebound_velocity(plant, full_velocity, next_torque)
-    slid_velocity = rebound if begun.meets_stop > 0.5 else full_velocity
+    thrown_back = rebound_velocity(plant, full_velocity, next_torque)
+    slid_velocity = thrown_back if begun.meets_stop > 0.5 else full_velocity
     angle = begun.next_angle if slides else left_angle
     rate = slid_velocity if slides else left_velocity
 
@@ -280,7 +280,7 @@ def end_part(
 
 def rebound_velocity(plant: PlantParameters, angular_velocity: float, torque: float) -> float:
     """Angular velocity [rad/s] after an impact; a vane that the torque [N m] would not let rise from the stop rests."""
-    after = -plant.restitution * angular_velocity
+    after = rebound(angular_velocity)
     pressing = max(torque * direction_of(angular_velocity), 0.0)
     lowest = LOWEST_REBOUND * (plant.angle_max - plant.angle_min)
     return after if 0.5 * plant.inertia * after * after > pressing * lowest else 0.0
@@ -310,8 +310,8 @@ def first_event(
     turning_angle = clamp_angle(plant, state.angle + 0.5 * reversal * step * velocity)
     fraction = impact if hits_first else (reversal if reverses else 0.0)
     angle = stop if hits_first else (turning_angle if reverses else state.angle)
-    rebound = -plant.restitution * (velocity - impact * fall)
-    return Departure(fraction, angle, rebound if hits_first else 0.0)
+    thrown_back = rebound(velocity - impact * fall)
+    return Departure(fraction, angle, thrown_back if hits_first else 0.0)
 
 
 def begin_free(

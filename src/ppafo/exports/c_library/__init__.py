@@ -160,7 +160,9 @@ def _switches(device: Device, others: Iterable[tuple[Sequence[str], bool]]) -> t
     given = device.valve.settings
     of_valve = [((f"valve_{name}",), given[name] > 0.0) for name in choosing(device)]
     of_effects = [
-        ([c_identifier(f"{effect.section}.{name}") for name in effect.switch], True) for effect in effects_of(device)
+        ([c_identifier(f"{effect.section}.{name}") for name in effect.switch], True)
+        for effect in effects_of(device)
+        if effect.switch
     ]
     return tuple(Switch(tuple(names), is_above) for names, is_above in (*of_valve, *of_effects, *others))
 

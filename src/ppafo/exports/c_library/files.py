@@ -395,7 +395,7 @@ def _fixed_of_device(device: Device, is_thermal: bool, has_lines: bool) -> list[
     """What no setting of a device changes."""
     forms = {"valve": device.valve.orifice, "leak": device.actuator.leak}
     lines = "with lines behind the regulators" if has_lines else "constant supply pressures"
-    effects = ", ".join(f"`{effect.name}`" for effect in effects_of(device))
+    effects = ", ".join(f"`{effect.name}`" for effect in effects_of(device) if effect.switch)
     return [
         *(f"the form of the {name}, `{_form(orifice)}`" for name, orifice in forms.items()),
         f"the gas, `{'thermal' if is_thermal else 'isothermal'}`; {lines}, which "

@@ -173,6 +173,9 @@ class Writing:
         yield f"leak_restriction = {self._restriction('actuator.leak', self.device.actuator.leak)}"
         for effect in self.program.effects:
             own = self.section(effect.section, [item.name for item in effect.quantities])
+            if effect.prepare is None:
+                yield f"{effect.name} = {add(effect.parameters)}({', '.join(own.values())})"
+                continue
             settings = self.row(f"{effect.name.title().replace('_', '')}Settings", own)
             yield f"{effect.name} = {add(effect.prepare)}({settings}, device)"
         made = f"vane_{name}" if self.program.has_shape else name

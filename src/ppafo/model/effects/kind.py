@@ -58,11 +58,13 @@ class Effect:
     """A physical effect: its name in files, what it is, its settings in SI, its row of numbers, and its laws.
 
     ``switch`` names settings, none of them ever below 0; where all of them are 0 the effect is off, and programs are
-    composed without it: they have the bits that they would have if it did not exist.
+    composed without it: they have the bits that they would have if it did not exist. One that is ``always`` on has no
+    switch, and its settings are numbers that every device has, in a section of its own of a parameter set.
 
     ``prepare(settings, device)`` makes the NamedTuple ``parameters`` from the settings by name and the numbers of the
     device (``device.gas``, ``.actuator``, ``.friction``, ``.foot_plate`` and ``.supply``, by their names in a parameter
-    set). It must be in the subset that is compiled, for an exported library has it in C.
+    set). It must be in the subset that is compiled, for an exported library has it in C. None where the row is the
+    settings in their order, which columns of an ensemble then fill without a call for each run.
 
     ``laws`` has for places of ``ppafo.model.places`` the functions that act there. A law takes what its place takes,
     and its row by the effect's name as a further parameter, which whoever calls the place then hands on. A law that
@@ -78,7 +80,7 @@ class Effect:
     summary: str
     quantities: tuple[Quantity, ...]
     parameters: type
-    prepare: Callable[..., Any]
+    prepare: Callable[..., Any] | None
     switch: tuple[str, ...]
     laws: Mapping[Callable[..., Any], Callable[..., Any]]
     source: str = ""
@@ -86,6 +88,7 @@ class Effect:
     symbols: tuple[tuple[str, str, str, str], ...] = ()
     state: State | None = None
     section_of_files: str = ""
+    always: bool = False
 
     @property
     def section(self) -> str:
@@ -113,7 +116,7 @@ class Effect:
 
     def is_on(self, settings: Mapping[str, Any]) -> Any:
         """Whether the effect is on with some settings; for arrays (runs,) among them an array of truth values."""
-        found: Any = False
+        found: Any = self.always
         for name in self.switch:
             found = found | (settings[name] > 0.0)
         return found
@@ -141,6 +144,17 @@ def effect_problem(effect: Effect) -> str:
 def _problems(effect: Effect) -> Iterator[str]:
     if not effect.name.isidentifier():
         yield "its name is the parameter by which laws ask for its row, and must be an identifier"
+    if effect.always and (effect.switch or effect.is_of_device):
+        yield "is always on: it has no switch, and names the section of a parameter set that its settings have"
+    if not effect.always:
+        yield from _problems_of_switch(effect)
+    for place, law in effect.laws.items():
+        given, taken = _parameters(place), [name for name in _parameters(law) if name not in effect.rows]
+        if taken != given:
+            yield f"{law.__name__}({', '.join(taken)}) must take ({', '.join(given)}), as {place.__name__} does"
+
+
+def _problems_of_switch(effect: Effect) -> Iterator[str]:
     for item in effect.quantities:
         if item.default is None:
             yield f"'{item.name}' has no default: a device that says nothing of an effect must be without it"
@@ -152,10 +166,6 @@ def _problems(effect: Effect) -> Iterator[str]:
             yield f"switch names '{name}', which is no quantity with a minimum of 0"
     if effect.is_on(effect.defaults()):
         yield "its defaults leave it on: a device that says nothing of an effect must be without it"
-    for place, law in effect.laws.items():
-        given, taken = _parameters(place), [name for name in _parameters(law) if name not in effect.rows]
-        if taken != given:
-            yield f"{law.__name__}({', '.join(taken)}) must take ({', '.join(given)}), as {place.__name__} does"
 
 
 def laws_in_order(effects: Sequence[Effect]) -> dict[Any, Any]:

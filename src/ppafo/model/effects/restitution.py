@@ -1,0 +1,34 @@
+"""Rebound of the vane from its stops: every device has it, with a coefficient that may be 0."""
+
+from typing import NamedTuple
+
+from ppafo.model.declaration import Quantity
+from ppafo.model.effects.kind import Effect
+from ppafo.model.places import rebound
+
+
+class Restitution(NamedTuple):
+    """Rebound speed over impact speed at a stop [-], 0 to 1."""
+
+    restitution: float
+
+
+def thrown_back(angular_velocity: float, restitution: Restitution) -> float:
+    """Angular velocity [rad/s] with which the vane leaves a stop: ``-e w``, Newton's law of impact."""
+    return -restitution.restitution * angular_velocity
+
+
+EFFECT = Effect(
+    name="restitution",
+    summary="Rebound of the vane from its stops.",
+    quantities=(Quantity("restitution", "", "rebound speed over impact speed at a stop", minimum=0.0, maximum=1.0),),
+    parameters=Restitution,
+    prepare=None,
+    switch=(),
+    laws={rebound: thrown_back},
+    source="Newton's law of impact",
+    equation="w_after = -e w_before",
+    symbols=(("e", "restitution", "-", "rebound speed over impact speed at a stop"),),
+    section_of_files="actuator",
+    always=True,
+)

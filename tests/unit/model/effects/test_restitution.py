@@ -1,0 +1,37 @@
+"""Restitution is an effect that every device has: its number is one of the actuator, and it has no switch."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ppafo.model.catalog import device_effects
+from ppafo.model.effects.kind import effect_problem
+from ppafo.model.effects.restitution import EFFECT, Restitution, thrown_back
+from ppafo.parameters.loading import load_device
+from ppafo.parameters.plant import effect_rows, effects_of
+
+
+def test_a_vane_leaves_a_stop_with_its_share_of_the_speed() -> None:
+    assert thrown_back(3.0, Restitution(0.4)) == pytest.approx(-1.2)
+    assert thrown_back(-3.0, Restitution(0.0)) == 0.0
+
+
+def test_it_is_on_at_0_too_and_no_section_of_effects_has_it() -> None:
+    device = load_device("ppafo2011", overrides=("actuator.restitution=0",))
+    assert effects_of(device) == (EFFECT,)
+    assert effect_rows(device) == (Restitution(0.0),)
+    assert EFFECT not in device_effects()
+
+
+def test_a_column_of_it_needs_no_call_for_each_run() -> None:
+    device = load_device("ppafo2011")
+    column = np.linspace(0.0, 1.0, 5)
+    (row,) = effect_rows(replace(device, actuator=replace(device.actuator, restitution=column)))
+    assert row.restitution is column
+
+
+def test_an_effect_that_is_always_on_with_a_switch_or_without_a_section_is_refused() -> None:
+    assert "always on" in effect_problem(replace(EFFECT, switch=("restitution",)))
+    assert "always on" in effect_problem(replace(EFFECT, section_of_files=""))
+    assert effect_problem(EFFECT) == ""
