@@ -3,8 +3,6 @@
 The shapes are those of ``page/source/content.ts``, which says what each entry means.
 """
 
-import copy
-import functools
 import math
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,8 +15,8 @@ from ppafo.answers.style import PAGE_LOOKS
 from ppafo.errors import UnitError
 from ppafo.exports.wasm import WasmModule
 from ppafo.parameters.graph import ATMOSPHERE_PATH
-from ppafo.simulation.building import apply_overrides, is_of_device, split_override
-from ppafo.simulation.declaration import PRESSURE_WORDS
+from ppafo.simulation.building import apply_overrides, is_of_device
+from ppafo.simulation.declaration import OF_A_VANE, PRESSURE_WORDS
 from ppafo.simulation.scenario import Scenario, worn_kind
 from ppafo.units import conversion, from_si, to_si
 from ppafo.version import __version__
@@ -155,15 +153,13 @@ def _as_in_files(entry: Mapping[str, Any], item: Scenario) -> dict[str, Any]:
 
 def _document(told: Mapping[str, Any]) -> dict[str, Any]:
     """The file of a scenario or walk with the overrides in it; those of the device stay overrides."""
-    if told["kind"] == "scenario":
-        changed = apply_overrides(told["document"], told["overrides"], told["name"])
-        document, own = changed.document, changed.device
-    else:
-        document = copy.deepcopy(told["document"])
-        own = tuple(text for text in told["overrides"] if is_of_device(split_override(text)[0]))
-        for path, text in (split_override(text) for text in told["overrides"] if text not in own):
-            *tables, name = path.split(".")
-            functools.reduce(lambda table, key: table.setdefault(key, {}), tables, document)[name] = text
+    declared = OF_A_VANE
+    if told["kind"] == "walk":
+        from ppafo.walking.declaration import OF_A_WALK
+
+        declared = OF_A_WALK
+    changed = apply_overrides(told["document"], told["overrides"], told["name"], declared)
+    document, own = changed.document, changed.device
     overrides = [*document.get("device", {}).get("overrides", ()), *own]
     document["device"] = {**document.get("device", {}), **({"overrides": overrides} if overrides else {})}
     return document

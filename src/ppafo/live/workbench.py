@@ -107,7 +107,7 @@ def _simulated(given: "Sequence[str | Scenario]", overrides: Sequence[str]) -> l
     found: dict[str, Scenario] = {}
     for scenario in loaded:
         if scenario.name in found:
-            raise ScenarioError(f"two scenarios are called '{scenario.name}'; a workbench tells them apart by name")
+            raise ScenarioError(f"two scenarios are called '{scenario.name}'; a workbench distinguishes them by name")
         found[scenario.name] = scenario
     return [Simulated(scenario, module_of(scenario), _label(scenario)) for scenario in loaded]
 

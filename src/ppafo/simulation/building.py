@@ -83,7 +83,7 @@ def apply_overrides(
     rate drops the period, and the reverse. A gain on the torque may leave out its unit. ScenarioError for a path that
     is neither ``declared`` nor of the device.
     """
-    changed = copy.deepcopy(dict(document))
+    changed = _with_one_path_each(document, file, declared)
     paths: set[str] = set()
     device: list[str] = []
     for override in overrides:
@@ -104,6 +104,20 @@ def apply_overrides(
             _set(changed, path, text, file, declared)
         paths.add(path)
     return OverriddenDocument(changed, frozenset(paths), tuple(device))
+
+
+def _with_one_path_each(document: Mapping[str, Any], file: str, declared: Declared) -> dict[str, Any]:
+    """Return a copy of a document where each value stands at the one path that the document keeps."""
+    changed = copy.deepcopy(dict(document))
+    for path, kept in declared.same.items():
+        section, _, name = path.rpartition(".")
+        table = value_at(changed, section)
+        if not isinstance(table, dict) or name not in table:
+            continue
+        if kept in changed:
+            raise ScenarioError(f"{file}: give either {path} or {kept}, not both")
+        changed[kept] = table.pop(name)
+    return changed
 
 
 def split_override(override: str) -> tuple[str, str]:

@@ -15,7 +15,7 @@ from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ScenarioError, one_line
 from ppafo.parameters import ParameterSet
 from ppafo.simulation.building import OverriddenDocument, ScenarioRequest, apply_overrides, build_scenario
-from ppafo.simulation.declaration import OF_A_VANE, Declared, value_at
+from ppafo.simulation.declaration import OF_A_VANE, Declared
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.schema import scenario_file
 
@@ -104,29 +104,15 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
             f"run one with it: SCENARIO --set device.set={request.file} "
             f"--set device.valve={one_line(request.content['default_valve'])}"
         )
-    declared, document = layout.declared, _with_one_path_each(request, layout.declared)
-    declared.find_kinds(document, request.file)
+    declared = layout.declared
+    declared.find_kinds(request.content, request.file)
     if request.overrides:
-        wrong = [item for item in _problems(document, layout) if not is_gap(item)]
+        wrong = [item for item in _problems(request.content, layout) if not is_gap(item)]
         _refuse(wrong, request.file, layout)
-    changed = apply_overrides(document, request.overrides, request.file, declared)
+    changed = apply_overrides(request.content, request.overrides, request.file, declared)
     declared.find_kinds(changed.document, request.file)
     _refuse(_problems(changed.document, layout), request.file, layout)
     return layout.build(request, changed)
-
-
-def _with_one_path_each(request: ScenarioRequest, declared: Declared) -> dict[str, Any]:
-    """Return the document of a request where each value stands at the one path that the document keeps."""
-    document = copy.deepcopy(request.content)
-    for path, kept in declared.same.items():
-        section, _, name = path.rpartition(".")
-        table = value_at(document, section)
-        if not isinstance(table, dict) or name not in table:
-            continue
-        if kept in document:
-            raise ScenarioError(f"{request.file}: give either {path} or {kept}, not both")
-        document[kept] = table.pop(name)
-    return document
 
 
 def _problems(document: dict[str, Any], layout: Layout) -> list[ErrorDetails]:

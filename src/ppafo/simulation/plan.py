@@ -514,7 +514,7 @@ class FixedController:
 def fixed_controller(scenario: Scenario, torque_constant: Any, reference: tuple[Any, Any]) -> FixedController:
     """The integer form of the controller; any number may be an array (runs,).
 
-    It is told the device's torque constant [N m/Pa], and the lowest and highest ``reference`` [N m].
+    It needs the device's torque constant [N m/Pa], and the lowest and highest ``reference`` [N m].
     """
     control = scenario.control
     law = FIXED_LAWS[control.kind]

@@ -15,7 +15,7 @@ from ppafo.metrics import METRICS
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.progress import Progress, Report
 from ppafo.simulation.ensemble import run_ensemble
-from ppafo.simulation.ensemble.running import lacking
+from ppafo.simulation.ensemble.running import lacking, offered
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.loading import load_study
@@ -222,8 +222,8 @@ def check_metrics(metrics: Sequence[str], scenario: Scenario) -> None:
     """Refuse a metric that does not exist, or that needs what the scenario has not."""
     for name in metrics:
         if name not in METRICS:
-            hint = nearest_name(name, METRICS)
-            raise StudyError(f"there is no metric '{name}'{hint}; available: {', '.join(METRICS)}")
+            known = offered(scenario)
+            raise StudyError(f"there is no metric '{name}'{nearest_name(name, known)}; available: {', '.join(known)}")
         reason = lacking(scenario, METRICS[name])
         if reason:
             raise StudyError(f"scenario '{scenario.name}' has no '{name}': {reason}")

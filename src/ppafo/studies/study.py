@@ -10,7 +10,7 @@ from ppafo.engine.lane_samples import TRACED
 from ppafo.errors import StudyError, UnitError, first_twice, nearest_name
 from ppafo.loading import reloaded, scenario_or_load
 from ppafo.metrics import METRICS
-from ppafo.simulation.ensemble.running import lacking
+from ppafo.simulation.ensemble.running import lacking, offered
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import OPEN_LOOP
 from ppafo.studies import declaration as declared
@@ -39,7 +39,9 @@ class Outputs:
 def valid_outputs(outputs: declared.Outputs, scenarios: Sequence[Scenario], refusal: Refusal) -> Outputs:
     """Return the outputs in SI units; an error that ``refusal`` makes for a name that does not exist."""
     metrics = tuple(METRICS) if outputs.metrics == "all" else tuple(outputs.metrics)
-    _check_names("metrics", metrics, METRICS, refusal)
+    _check_names(
+        "metrics", metrics, METRICS, refusal, dict.fromkeys(name for item in scenarios for name in offered(item))
+    )
     _check_names("trajectories", outputs.trajectories, tuple(TRACED), refusal)
     _check_names("bands", outputs.bands, tuple(TRACED), refusal)
     channels = (*outputs.trajectories, *outputs.bands)
@@ -59,12 +61,15 @@ def valid_outputs(outputs: declared.Outputs, scenarios: Sequence[Scenario], refu
     )
 
 
-def _check_names(key: str, given: Sequence[str], known: Collection[str], refusal: Refusal) -> None:
+def _check_names(
+    key: str, given: Sequence[str], known: Collection[str], refusal: Refusal, shown: Collection[str] = ()
+) -> None:
+    """Refuse a name that is not known, or that is there twice; ``shown`` are those that apply, all unless given."""
     for name in given:
         if name not in known:
-            what = "metric" if key == "metrics" else "channel"
-            hint = nearest_name(name, known)
-            raise refusal(f"outputs.{key}: there is no {what} '{name}'{hint}; available: {', '.join(known)}")
+            what, apply = "metric" if key == "metrics" else "channel", shown or known
+            hint = nearest_name(name, apply)
+            raise refusal(f"outputs.{key}: there is no {what} '{name}'{hint}; available: {', '.join(apply)}")
     repeated = first_twice(given)
     if repeated is not None:
         raise refusal(f"outputs.{key}: '{repeated}' is named twice")

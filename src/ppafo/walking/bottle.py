@@ -47,7 +47,7 @@ BOTTLE_NAME = f"{BOTTLE}.name"
 FILL = Quantity("fill", "1", "gas in the bottle over that of a full one", 1.0, 0.0, 1.0, minimum_allowed=False)
 TEMPERATURE = Quantity("temperature", "K", "temperature of bottle, regulator and hose at the start", None, 200.0, 400.0)
 LEAST_TORQUE = Quantity("least_torque", "1", "torque that ends the walk, over that at the set pressure", 0.9, 0.0, 1.0)
-COUPLING = Quantity("coupling", "s", "how often bottle and device tell each other", 0.1, 1.0e-3, 1.0)
+COUPLING = Quantity("coupling", "s", "time between two exchanges of bottle and device", 0.1, 1.0e-3, 1.0)
 _SET_PRESSURE = "regulator.set_pressure"
 BOTTLE_OVERRIDES = {path if path.startswith(f"{BOTTLE}.") else f"{BOTTLE}.{path}": path for path in PATHS}
 """What an override may set of the bottle's own file, ``bottle.volume`` and ``bottle.regulator.area``, by its path."""

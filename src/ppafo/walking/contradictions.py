@@ -52,8 +52,8 @@ def check_no_bottle(scenario: Scenario) -> None:
     """Raise ScenarioError for a walk on a bottle, which only ``walk`` takes."""
     if walk_of(scenario).bottle is not None:
         raise ScenarioError(
-            f"{scenario.name}: a walk on a bottle goes by 'ppafo walk' alone, as bottle and device take turns; leave "
-            "the bottle out, or give the device lines with [supply_line]"
+            f"{scenario.name}: a walk on a bottle goes by 'ppafo walk' alone, as bottle and device are advanced in "
+            "alternation; leave the bottle out, or give the device lines with [supply_line]"
         )
 
 

@@ -219,7 +219,7 @@ def _forward(foot: Floats, wearer: Wearer, height: float, toe_off: float, length
 
 
 class RockerFit(NamedTuple):
-    """What a gait tells of its heel: lever [m] nearly flat, what it gains far up, the tilt [rad] half way up."""
+    """What a gait shows of its heel: lever [m] nearly flat, what it gains far up, the tilt [rad] half way up."""
 
     flat: float
     rise: float

@@ -172,7 +172,7 @@ def _less_help(rows: Mapping[str, Floats], good: NDArray[np.bool_]) -> tuple[int
 
 
 def _run_in_groups(batch: Batch, progress: Progress) -> Floats:
-    """Final states, in groups small enough for an interrupt to be seen and for progress to be told."""
+    """Final states, in groups small enough for an interrupt to be seen and for progress to be reported."""
     count = batch.states.shape[1]
     group = max(1, int(STEPS_AT_ONCE / batch.clock.step_count / LANES)) * LANES
     found = []

@@ -83,7 +83,7 @@ def lasting(scenario: Scenario, minutes: float | None) -> Scenario:
 
 
 def _run_in_parts(batch: Batch, step: float, progress: Progress) -> BatchResult:
-    """Run in parts short enough for an interrupt to be seen and for progress to be told."""
+    """Run in parts short enough for an interrupt to be seen and for progress to be reported."""
     block = begin_block(batch)
     count = batch.clock.step_count
     for done in range(0, count, STEPS_PER_CALL):

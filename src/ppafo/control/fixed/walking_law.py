@@ -1,13 +1,12 @@
 """Event-based on/off control of walking on whole numbers: the law ``event_on_off``, its phases and its safety.
 
 What the converter shows is in counts of 14 bits, whatever its own number of bits is; times are counted up to
-``LONGEST`` samples. The stride time is kept in halves of a sample, and so are its fractions worked out: a fraction of
-up to two strides has 15 bits then, and nothing takes more than 16.
+``LONGEST`` samples. The stride time is kept in halves of a sample, and so are its fractions: a fraction of up to two
+strides then has 15 bits, and no number needs more than 16.
 
-Phases, signs and levels are those of ``control.walking``; the sign that comes first there is the first that is looked
-for. One number serves for the highest angle of a swing and then for the angle of a strike in doubt: the one ends where
-the other begins. The valve only knows three commands, so that one count and the command say how long it has fed or
-vented.
+Phases, signs and levels are those of ``control.walking``; the first sign there is the first that is looked for. One
+number holds the highest angle of a swing and then the angle of a strike in doubt: the one ends where the other begins.
+The valve has only three commands, so that one count and the command say how long it has fed or vented.
 """
 
 from typing import NamedTuple
@@ -547,7 +546,7 @@ def range_sign(numbers: RangeNumbers, squeezes: int, given: GaitReadings, thin: 
 
 
 def valve_sign(numbers: SafetyNumbers, now: SafetyCounts, phase: PhaseCounts, given: GaitReadings) -> int:
-    """The sign of a pressure that is not what the valve was told long enough."""
+    """The sign of a pressure that does not follow although the valve has been commanded for long enough."""
     filled = numbers.emptying.filled
     if now.held > numbers.valve.fill and (
         (now.side > 0 and given.pressure_1 < filled) or (now.side < 0 and given.pressure_2 < filled)

@@ -1,12 +1,12 @@
 """The signs by which a controller of walking helps less, and how they show in the readings.
 
-Each sign lifts only, pauses or stops. Where the heel is missed the foot is still held up in the swing, and not pushed.
-A pause vents both chambers, for what walking does too: help comes back after some good strides. A stop is for what only
-a fault does: it is for good. A sign is a number in the lanes, and 0 is none.
+Each sign reduces help to lifting, pauses it or stops it. Where the heel is missed the foot is still lifted in the
+swing, but not pushed. A pause vents both chambers and is for readings that walking can cause too: help comes back after
+some good strides. A stop is permanent, for what only a fault causes. A sign is a number in the lanes, and 0 is none.
 
-Readings show a sign as such where they are out of range, gone at once, the same while others move, or late. Where
-forces come late the ankle tells. A foot on its heel turns down until it is flat, and up from then on: one that has
-turned up before the heel is seen, and does so until the toes are, was on the ground long before.
+A reading is a sign where it is out of range, lost, frozen while others change, or late. That forces are late is seen
+at the ankle: a foot on its heel turns down until it is flat, and up from then on. A foot that has turned up before the
+heel is detected, and goes on until the toes are, was on the ground long before.
 
 Signs are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep the lanes from running side by side.
 """

@@ -82,8 +82,8 @@ def check_can_leave(configuration: Scenario) -> None:
         )
     if walk_of(configuration).bottle is not None:
         raise ScenarioError(
-            f"{configuration.name}: a walk on a bottle cannot be exported: bottle and device take turns in Python; "
-            "leave the bottle out, or give it lines with [supply_line]"
+            f"{configuration.name}: a walk on a bottle cannot be exported: bottle and device are advanced in "
+            "alternation, in Python; leave the bottle out, or give it lines with [supply_line]"
         )
 
 

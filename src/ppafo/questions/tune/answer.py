@@ -234,6 +234,7 @@ def answer_of(tuning: Tuning) -> Answer:
     problem = tuning.problem
     task = Figure("task", "The nominal device.", lambda: task_figure(tuning))
     course = Figure("search", _COURSE, lambda: search_figure(tuning))
+    file = problem.scenario.origin.file or problem.scenario.name
     return Answer(
         name="tune",
         kicker="Tuning",
@@ -243,7 +244,10 @@ def answer_of(tuning: Tuning) -> Answer:
             Section("Gains", table=_gains(tuning)),
             Section("Before and after", table=_metrics(tuning), figure=task),
             Section("The search", remarks=tuple(remarks(tuning)), figure=course),
-            Section("To use the gains", code=f"ppafo {_verb(problem)} {problem.scenario.name} {_options(tuning)}"),
+            Section(
+                "To use the gains",
+                code=f"ppafo {_verb(problem)} {file} {_options(tuning)}",
+            ),
         ),
         data=_data(tuning),
         passed=tuning.after.is_feasible,

@@ -13,7 +13,7 @@ from ppafo.errors import ScenarioError, nearest_name
 from ppafo.metrics.catalog import METRICS
 from ppafo.metrics.metric import MetricKind
 from ppafo.simulation.ensemble.planning import EnsemblePlan, plan_ensemble
-from ppafo.simulation.ensemble.running import REFERENCE, Outcome, Request, intervals, samples_of
+from ppafo.simulation.ensemble.running import REFERENCE, Outcome, Request, intervals, offered, samples_of
 from ppafo.simulation.numbers import check_columns
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import OPEN_LOOP, REMEDY
@@ -29,7 +29,7 @@ class EnsembleResult:
     ``status`` (runs,) is COMPLETED, DIVERGED or REFUSED; ``failure_time`` (runs,) [s] is nan where a run did not
     diverge; ``reasons`` has one line for each run, by its index, that diverged or was refused. ``metrics`` maps a name
     to values (runs,) in SI units, nan where a run failed or has no such metric. ``times`` (times,) [s] and ``traces``,
-    channel to values (times, runs), are there for the channels that were asked for; nan where a run failed.
+    channel to values (times, runs), are there for the channels that were requested; nan where a run failed.
     """
 
     status: NDArray[np.int8]
@@ -104,7 +104,7 @@ def _times(plan: EnsemblePlan, every: float) -> Floats:
 
 def _metric(base: Scenario, name: str) -> MetricKind:
     if name not in METRICS:
-        raise ScenarioError(f"{base.name}: there is no metric '{name}'{_hint(name, METRICS)}")
+        raise ScenarioError(f"{base.name}: there is no metric '{name}'{_hint(name, offered(base))}")
     return METRICS[name]
 
 

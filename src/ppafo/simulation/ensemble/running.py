@@ -14,6 +14,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.errors import ScenarioError
+from ppafo.metrics.catalog import METRICS
 from ppafo.metrics.gas import ENERGIES
 from ppafo.metrics.metric import REQUEST, STEADY, WALK, MetricKind, Readings
 from ppafo.model.gas import energy_per_content
@@ -241,10 +242,20 @@ def lacking(scenario: Scenario, kind: MetricKind) -> str:
     return "its controller follows no reference" if is_open and REFERENCE in kind.channels else ""
 
 
+def offered(scenario: Scenario) -> dict[str, MetricKind]:
+    """The metrics that runs of a scenario have, for messages: those of walks are not for a vane, nor the reverse."""
+    missing = frozenset() if scenario.thermal is not None else _WITH_ENERGY_BALANCE
+    return {
+        name: kind
+        for name, kind in METRICS.items()
+        if not lacking(scenario, kind) and not missing.intersection(kind.channels)
+    }
+
+
 def _meter_batch(plain: Batch, request: Request) -> _MeteredBatch:
     program = plain.program
     available = {name: kind for name, kind in request.metrics.items() if has_channels(program, kind)}
-    # In one order, so that the same metrics are one program in whatever order they are asked for.
+    # In one order, so that the same metrics are one program in whatever order they are requested.
     meters = sorted({meter.name: meter for kind in available.values() for meter in kind.meters}.items())
     read_from_traces = dict.fromkeys(channel for kind in available.values() for channel in kind.traced)
     interval = intervals(plain)

@@ -1,0 +1,175 @@
+"""The file of a walk is that of a scenario: one loading, a motion that says it, the older form, and one run of it."""
+
+import json
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import jsonschema  # type: ignore[import-untyped]
+import numpy as np
+import pytest
+
+import ppafo
+from ppafo.cli.main import main
+from ppafo.errors import ScenarioError
+from ppafo.loading import json_schema, list_all_scenarios, load_scenario, scenario_from_dict
+from ppafo.simulation.loading import load_scenario as load_vane
+from ppafo.simulation.numbers import declared_numbers
+from ppafo.simulation.scenario import Scenario
+from ppafo.studies.draws import check_metrics
+from ppafo.walking.loading import load_walk
+from ppafo.walking.motion import walk_of
+
+NAME, SHORT = "proportional", "run.duration=6 s"
+MOTION = '\n[motion]\nkind = "walk"\n'
+
+
+def text_of(name: str) -> str:
+    folder = "walking/configurations" if name in ppafo.list_walks() else "scenarios"
+    return (resources.files("ppafo") / folder / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "mine.toml"
+    path.write_text(text)
+    return path
+
+
+def recorded(scenario: Scenario) -> dict[str, list[float]]:
+    recording = ppafo.simulate(scenario).recording
+    return {name: recording[name].tolist() for name in recording.names}
+
+
+def test_a_file_whose_motion_is_a_walk_gives_the_bits_of_the_older_form(tmp_path: Path) -> None:
+    older, new = load_scenario(NAME, [SHORT]), load_scenario(written(tmp_path, text_of(NAME) + MOTION), [SHORT])
+    assert recorded(new) == recorded(older)
+    assert load_walk(tmp_path / "mine.toml", [SHORT]).motion == new.motion == older.motion
+
+
+def test_gait_and_course_may_stand_in_the_motion_or_above_and_not_in_both(tmp_path: Path) -> None:
+    course = 'course = "stairs"\n'
+    inside = load_scenario(written(tmp_path, text_of(NAME) + MOTION + course))
+    above = load_scenario(written(tmp_path, course + text_of(NAME)))
+    assert walk_of(inside).course == walk_of(above).course
+    assert walk_of(inside).course is not None
+    assert inside.duration == above.duration
+    with pytest.raises(ScenarioError, match=r"mine\.toml: give either motion\.course or course, not both"):
+        load_scenario(written(tmp_path, course + text_of(NAME) + MOTION + course))
+
+
+def test_an_override_means_the_same_under_either_path() -> None:
+    one, other = (load_scenario(NAME, [f"{path}=stairs"]) for path in ("course", "motion.course"))
+    assert walk_of(one).course == walk_of(other).course
+    with pytest.raises(ScenarioError, match=r"override 'motion\.course=stairs': the motion is given as 'rise' already"):
+        load_walk(NAME, ["motion.course=stairs"], course="rise")
+
+
+def test_a_course_beside_a_file_in_another_folder_is_found_by_its_relative_path(tmp_path: Path) -> None:
+    course = (resources.files("ppafo") / "walking" / "courses" / "stairs.toml").read_text(encoding="utf-8")
+    (tmp_path / "own.toml").write_text(course)
+    found = load_scenario(written(tmp_path, text_of(NAME) + MOTION + 'course = "own.toml"\n'))
+    own, shipped = (walk_of(item).course for item in (found, load_scenario(NAME, ["course=stairs"])))
+    assert own is not None
+    assert shipped is not None
+    assert (own.file, own.segments) == (str(tmp_path / "own.toml"), shipped.segments)
+
+
+def test_a_dictionary_may_describe_a_walk() -> None:
+    content = tomllib.loads(text_of(NAME) + MOTION)
+    assert scenario_from_dict(content, [SHORT]).motion == load_scenario(NAME).motion
+    assert ppafo.scenario_from_dict(tomllib.loads(text_of(NAME)), ["wearer.body_mass=80 kg"]).name == NAME
+
+
+MISTAKES: dict[str, tuple[str, str]] = {
+    "a reference": (
+        '[reference]\nkind = "constant"\nlevel = "3 N m"\n',
+        "unknown key 'reference'; allowed here: .*motion",
+    ),
+    "an angle": ('angle = "90 deg"\n', r"unknown key 'motion\.angle'; allowed here: kind"),
+    "a gait that is a number": ("gait = 3\n", "gait = 3 must be a text"),
+}
+
+
+@pytest.mark.parametrize("what", MISTAKES)
+def test_a_mistake_in_a_walk_is_one_line(what: str, tmp_path: Path) -> None:
+    added, message = MISTAKES[what]
+    with pytest.raises(ScenarioError, match=message):
+        load_scenario(written(tmp_path, text_of(NAME) + MOTION + added))
+
+
+def test_a_misspelt_motion_is_told_of_walks_too(tmp_path: Path) -> None:
+    text = (text_of(NAME) + MOTION).replace('"walk"', '"wlak"')
+    with pytest.raises(
+        ScenarioError, match=r"motion\.kind = 'wlak' is not known, did you mean 'walk'\?; allowed: free"
+    ):
+        load_scenario(written(tmp_path, text))
+
+
+def test_where_only_a_vane_will_do_a_walk_is_refused_by_its_motion(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match="a walk has a gait and a wearer, and here the motion of a vane alone"):
+        load_vane(written(tmp_path, text_of(NAME) + MOTION))
+    with pytest.raises(ScenarioError, match=r"override 'motion\.kind=walk': a walk has a gait"):
+        load_scenario("torque-task-proportional", ["motion.kind=walk"])
+
+
+def test_the_schema_of_scenarios_takes_every_shipped_one_and_a_motion_that_is_a_walk() -> None:
+    validator = jsonschema.Draft202012Validator(json_schema())
+    validator.check_schema(json_schema())
+    documents = [tomllib.loads(text_of(name)) for name in list_all_scenarios()]
+    documents.append(tomllib.loads(text_of(NAME) + MOTION + 'gait = "mine.toml"\n'))
+    assert [list(validator.iter_errors(document)) for document in documents] == [[]] * len(documents)
+    assert list(validator.iter_errors(documents[-1] | {"reference": {"kind": "constant", "level": "1 N m"}}))
+
+
+def test_another_kind_drops_the_settings_of_the_old_one_as_in_every_scenario() -> None:
+    on_off = load_scenario(NAME, ["controller.peak_torque=5 N m", "controller.kind=event_on_off"])
+    assert "peak_torque" not in on_off.control.settings
+    cold = [f"gas_model.{text}" for text in ("kind=thermal", "heat_transfer_coefficient=50 W/(m^2 K)")]
+    assert (
+        load_scenario(NAME, [*cold, "gas_model.wall_area_per_volume=100 1/m", "gas_model.kind=isothermal"]).thermal
+        is None
+    )
+
+
+def test_simulate_runs_a_walk_with_its_metrics_and_its_figure(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "out"
+    assert main(["simulate", NAME, "--set", SHORT, "--out", str(folder), "--json"]) == 0
+    metrics: Any = json.loads(capsys.readouterr().out)["metrics"]
+    walked = ppafo.walk(NAME, overrides=[SHORT]).metrics
+    assert {name: metrics[name]["value"] for name in walked} == {name: item.value for name, item in walked.items()}
+    assert "rms_error" not in metrics
+    assert {"figure.svg", "recording.nc", "report.html", "run.json"} <= {path.name for path in folder.iterdir()}
+
+
+def test_a_walk_that_is_simulated_names_the_command_that_compares_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = written(tmp_path, text_of(NAME) + MOTION)
+    assert main(["simulate", str(path), "--set", SHORT, "--out", str(tmp_path / "out")]) == 0
+    assert f"'ppafo walk {path}' compares it" in capsys.readouterr().out
+
+
+def test_a_run_of_a_walk_says_what_it_determines() -> None:
+    check = ppafo.simulate(NAME, [SHORT]).check()
+    rows = {row.name: row for row in check.metrics}
+    assert rows["toe_clearance"].is_determined
+    assert all(np.isfinite(row.allowed) for row in rows.values())
+
+
+def test_messages_offer_a_scenario_only_the_metrics_that_it_has() -> None:
+    for name, own, other in (
+        (NAME, "toe_clearance", "rms_error"),
+        ("torque-task-solenoid", "rms_error", "toe_clearance"),
+    ):
+        with pytest.raises(ppafo.StudyError) as caught:
+            check_metrics(["misspelt"], load_scenario(name))
+        assert own in str(caught.value)
+        assert other not in str(caught.value)
+
+
+def test_every_number_of_a_walk_can_vary_from_either_form(tmp_path: Path) -> None:
+    new = load_scenario(written(tmp_path, text_of(NAME) + MOTION))
+    assert declared_numbers(new).keys() == declared_numbers(load_scenario(NAME)).keys()
