@@ -71,7 +71,7 @@ def test_a_squeezed_chamber_gives_gas_back_to_a_relieving_supply_only(
 
 @pytest.mark.parametrize("is_relieving", [False, True])
 def test_a_vane_that_is_pushed_back_is_held_by_the_gas_that_cannot_leave(is_relieving: bool) -> None:
-    pushed = ("motion.external_torque=12 N m", "motion.angle=100 deg")
+    pushed = ("motion.kind=free", "motion.external_torque=12 N m", "motion.angle=100 deg")
     filled = ("initial.pressure_1=supply", "initial.pressure_2=atmosphere")
     overrides = (*pushed, *filled, f"supply.relieving={str(is_relieving).lower()}")
     run = plan_run(load_scenario("step-response", overrides))

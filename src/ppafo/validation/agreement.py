@@ -13,6 +13,7 @@ from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded import SUPPLY, regular_interval, with_fixed_volume
+from ppafo.simulation.scenario import Leg
 from ppafo.validation.measured import (
     ANGLE,
     COMPARED,
@@ -127,9 +128,9 @@ class ReplaySettings:
     """How recordings are replayed and judged.
 
     ``motion`` ``free`` lets the vane move as the model demands, ``measured`` prescribes the recorded angle,
-    ``held`` holds it where it starts. With a ``volume`` [m^3] there is no vane: chamber 1 is a fixed volume that the
-    valve fills and vents. ``initial`` values [SI] by channel go before the first samples; ``longest_delay`` [s] limits
-    the delay looked for.
+    ``held`` holds it where it starts, ``leg`` gives it the foot of ``leg``, else that on the fixture of figure 7. With
+    a ``volume`` [m^3] there is no vane: chamber 1 is a fixed volume that the valve fills and vents. ``initial`` values
+    [SI] by channel go before the first samples; ``longest_delay`` [s] limits the delay looked for.
     """
 
     motion: Motion = "free"
@@ -137,6 +138,7 @@ class ReplaySettings:
     longest_delay: float = DEFAULT_LIMIT
     thresholds: Thresholds = field(default_factory=parse_thresholds)
     volume: float | None = None
+    leg: Leg | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,7 +258,7 @@ def compare_recording(measured: Measured, device: Device, settings: ReplaySettin
     if settings.motion == "measured" and not measured.has(ANGLE):
         raise DataError(f"{measured.file}: there is no channel '{ANGLE}' to prescribe (--motion measured)")
     start = start_of(measured, device, settings.initial)
-    replayed = replay_recording(measured, device, start, settings.motion, settings.longest_delay)
+    replayed = replay_recording(measured, device, start, settings.motion, settings.longest_delay, settings.leg)
     items = _comparisons(measured, replayed, device, settings)
     delay = common_delay(items, settings.longest_delay)
     channels = tuple(channel_agreement(item, delay.correction, settings.longest_delay) for item in items)

@@ -13,6 +13,7 @@ from ppafo.errors import DataError, SimulationError, UnitError, nearest_name, on
 from ppafo.model.plant import chamber_pressures
 from ppafo.parameters.device import Device
 from ppafo.signals import Channel, Recording
+from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.recorded import (
     COMMAND,
@@ -31,11 +32,12 @@ from ppafo.simulation.recorded import (
     with_prescribed_angle,
 )
 from ppafo.simulation.sampled import state_row_numbers
+from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion
 from ppafo.units import parse_quantity
 from ppafo.validation.measured import ANGLE, PRESSURE_1, PRESSURE_2, Measured
 
-Motion = Literal["free", "measured", "held"]
-MOTIONS: tuple[Motion, ...] = ("free", "measured", "held")
+Motion = Literal["free", "measured", "held", "leg"]
+MOTIONS: tuple[Motion, ...] = ("free", "measured", "held", "leg")
 
 MAXIMUM_STEPS = 20_000_000
 _WHOLE = 1.0e-9
@@ -52,9 +54,14 @@ class Replayed:
     inputs: tuple[str, ...]
 
 
-def replay_recording(measured: Measured, device: Device, start: Start, motion: Motion, extra: float) -> Replayed:
-    """Run the model on the inputs of a recording and ``extra`` seconds longer, with the last inputs."""
-    run = _plan(measured, device, start, motion, extra)
+def replay_recording(
+    measured: Measured, device: Device, start: Start, motion: Motion, extra: float, leg: Leg | None = None
+) -> Replayed:
+    """Run the model on the inputs of a recording and ``extra`` seconds longer, with the last inputs.
+
+    The motion ``leg`` is that with ``leg``, or on the fixture of figure 7.
+    """
+    run = _plan(measured, device, start, motion, extra, leg)
     if motion == "measured":
         run = with_prescribed_angle(run, start.angle)
     # The torque on a prescribed vane is what moves it, not an input.
@@ -74,13 +81,15 @@ def replay_recording(measured: Measured, device: Device, start: Start, motion: M
     return Replayed(_recording(measured, run, outcome.record[:, :, 0]), run.step, inputs.names)
 
 
-def _plan(measured: Measured, device: Device, start: Start, motion: Motion, extra: float) -> Run:
-    """The run of a free or a held vane; the steps of a free one are fine enough for a prescribed one too."""
+def _plan(measured: Measured, device: Device, start: Start, motion: Motion, extra: float, leg: Leg | None) -> Run:
+    """The run of a vane that is free, held or on a leg; a free one's steps are fine enough for a prescribed one too."""
     recording = measured.recording
     duration = recording.duration + max(extra, sample_period(recording.time))
     highest = with_highest_supply(device, recording, recording.names)
-    held = held_vane(start.angle) if motion == "held" else None
-    scenario = replay_scenario(recording, highest, start, duration, measured.file, held)
+    given: FreeMotion | PrescribedMotion | None = held_vane(start.angle) if motion == "held" else None
+    if motion == "leg":
+        given = FreeMotion(start.angle, start.angular_velocity, leg=leg or leg_of_fixture())
+    scenario = replay_scenario(recording, highest, start, duration, measured.file, given)
     run = plan_run(scenario)
     if run.step_count > MAXIMUM_STEPS:
         raise DataError(
@@ -94,6 +103,12 @@ def _plan(measured: Measured, device: Device, start: Start, motion: Motion, extr
     most = max(1, int(_RECORD_INTERVAL / run.step * (1.0 + _WHOLE)))
     every = max(count for count in range(1, most + 1) if run.steps_per_sample % count == 0)
     return replace(run, plant=plant, record_every=every, step_count=samples * run.steps_per_sample)
+
+
+def leg_of_fixture() -> Leg | None:
+    """The leg on the test fixture, as the scenario of figure 7 has it."""
+    motion = load_scenario("step-response").motion
+    return motion.leg if isinstance(motion, FreeMotion) else None
 
 
 def _recording(measured: Measured, run: Run, record: Floats) -> Recording:

@@ -79,6 +79,6 @@ def test_a_supply_below_the_atmosphere_is_refused_in_one_line() -> None:
 
 
 def test_an_empty_bottle_has_no_full_range_to_validate_against(tmp_path: Path) -> None:
-    ppafo.simulate("step-response", [*EMPTY, "motion.external_torque=-5 N m"]).save(tmp_path / "bench")
+    ppafo.simulate("step-response", [*EMPTY, "motion.ankle_torque=5 N m"]).save(tmp_path / "bench")
     with pytest.raises(PpafoError, match="is not above the atmosphere"):
         ppafo.validate("ppafo2011", [tmp_path / "bench"], overrides=EMPTY)

@@ -195,7 +195,7 @@ def test_separate_dorsiflexion_pressure_is_what_chamber_2_gets() -> None:
 
 
 def test_external_torque_holds_the_vane_back() -> None:
-    held = simulate(load_scenario("step-response", ["motion.external_torque=6 N m"]))
+    held = simulate(load_scenario("step-response", ["motion.ankle_torque=-6 N m"]))
     assert held.recording["angle"][-1] == pytest.approx(held.recording["angle"][0])
     free = simulate(load_scenario("step-response"))
     assert free.recording["angle"][-1] > free.recording["angle"][0] + 1.5

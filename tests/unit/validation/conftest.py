@@ -15,7 +15,7 @@ from ppafo.validation.measured import check_recording
 @pytest.fixture(scope="session")
 def step() -> tuple[Device, Recording]:
     """The step response of figure 7: device and recording of the model."""
-    scenario = load_scenario("step-response")
+    scenario = load_scenario("step-response", ["motion.kind=free"])
     return scenario.device, simulate(scenario).recording
 
 

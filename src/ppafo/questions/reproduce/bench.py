@@ -38,7 +38,7 @@ from ppafo.rig import record
 from ppafo.signals import Recording
 from ppafo.simulation.building import apply_overrides
 from ppafo.simulation.declaration import quantities
-from ppafo.simulation.scenario import PrescribedMotion, Scenario
+from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
 from ppafo.validation import RecordingAgreement, ReplaySettings, compare_recording
 from ppafo.validation.measured import check_recording
 
@@ -231,12 +231,18 @@ def synthetic_evidence(
         measured = check_recording(recording, step.device, "step-response on the virtual rig (synthetic)")
         return SyntheticEvidence(
             bench=bench_study(),
-            step=compare_recording(measured, step.device, ReplaySettings()),
+            step=compare_recording(measured, step.device, replay_of(step)),
             solenoid=recorded["solenoid"],
             proportional=recorded["proportional"],
         )
     except (SimulationError, DataError) as error:
         return NoEvidence(str(error))
+
+
+def replay_of(step: Scenario) -> ReplaySettings:
+    """How a recording of the step response is replayed: with the leg that the scenario has."""
+    leg = step.motion.leg if isinstance(step.motion, FreeMotion) else None
+    return ReplaySettings() if leg is None else ReplaySettings(motion="leg", leg=leg)
 
 
 ACCEPTABLE = 0.10

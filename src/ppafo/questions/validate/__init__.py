@@ -19,8 +19,8 @@ QUESTION = Question(
             ("--motion",),
             "motion",
             "free: the model moves the vane; measured: the vane follows the recorded angle; held: the vane stays "
-            "at its initial angle (default free)",
-            metavar="free|measured|held",
+            "at its initial angle; leg: the model moves vane and foot on the fixture of step-response (default free)",
+            metavar="free|measured|held|leg",
             default="free",
         ),
         Argument(

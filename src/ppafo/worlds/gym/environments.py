@@ -43,7 +43,10 @@ FLAWED_WALK_SENSORS = (
 """Late from the beginning, which is a fault with a delay and nothing else."""
 DEFAULTS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "torque": ("torque-task-proportional", (CONSISTENT, *FLAWED_SENSORS)),
-    "angle": ("step-response", (CONSISTENT, "controller.rate=1 kHz", "run.duration=1 s", *FLAWED_SENSORS)),
+    "angle": (
+        "step-response",
+        ("motion.kind=free", CONSISTENT, "controller.rate=1 kHz", "run.duration=1 s", *FLAWED_SENSORS),
+    ),
     "walk": ("proportional", FLAWED_WALK_SENSORS),
 }
 """Scenario or walk of each task where none is given, and the overrides that make it."""

@@ -18,7 +18,7 @@ NOISE = {"angle": math.radians(0.1), "pressure_1": 500.0, "pressure_2": 500.0}
 @pytest.fixture(scope="session")
 def step() -> Scenario:
     """The first 0.35 s of the paper's step response: breakaway, motion, impact, filling."""
-    return load_scenario("step-response", ["run.duration=0.35 s"])
+    return load_scenario("step-response", ["motion.kind=free", "run.duration=0.35 s"])
 
 
 @pytest.fixture(scope="session")
