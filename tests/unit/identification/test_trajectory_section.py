@@ -226,7 +226,8 @@ def test_a_scenario_file_beside_the_problem_and_a_column_map_are_found(solve: So
     scenario = 'schema_version = 1\nname = "own"\ndevice.set = "ppafo2011-printed"\n'
     scenario += 'device.overrides = ["supply.pressure=55 psi_g", "supply.dorsiflexion_pressure=55 psi_g"]\n'
     scenario += (
-        'run = { duration = "0.35 s", output_interval = "1 ms" }\nmotion = { kind = "free", angle = "20 deg" }\n'
+        'run = { duration = "0.35 s", output_interval = "1 ms" }\n'
+        'motion = { kind = "leg", angle = "20 deg", shank = { kind = "constant", level = "0 deg" } }\n'
     )
     scenario += 'initial = { pressure_2 = "dorsiflexion_supply" }\n'
     scenario += 'controller = { kind = "constant", command = 1, rate = "1 kHz" }\n'

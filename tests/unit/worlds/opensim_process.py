@@ -19,7 +19,13 @@ from ppafo.walking.walk import walk
 SECONDS = 3.0
 FRICTIONLESS = ["friction.static_torque=0 N m", "friction.dynamic_torque=0 N m"]
 START = [*FRICTIONLESS, "initial.pressure_1=atmosphere", "initial.pressure_2=atmosphere", "motion.angle=70 deg"]
-FREE = ["motion.kind=free", *START, "foot_plate.gravity_torque=0.3 N m", "controller.command=0.15", "run.duration=0.2 s"]
+FREE = [
+    "motion.kind=free",
+    *START,
+    "foot_plate.gravity_torque=0.3 N m",
+    "controller.command=0.15",
+    "run.duration=0.2 s",
+]
 PULL = 3.0
 TORQUE = "torque\nendheader\ntime\tankle_angle_r_device\n0\t1\n1\t2\n"
 FORCE, LEVER = 600.0, 0.1

@@ -24,6 +24,7 @@ def content(tmp_path: Path, experiment: Experiment) -> dict[str, Any]:
             {
                 "label": "step",
                 "scenario": "step-response",
+                "overrides": ["motion.kind=free"],
                 "recording": "step.csv",
                 "noise": {"angle": "0.1 deg", "pressure_1": "500 Pa_d"},
             }

@@ -13,6 +13,7 @@ import pytest
 import ppafo
 from ppafo.answers.writing import text_of
 from ppafo.cli.main import main
+from ppafo.constants import STANDARD_GRAVITY
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
 from ppafo.errors import ScenarioError
@@ -39,7 +40,8 @@ POINTS: dict[str, tuple[str, str | float, tuple[str, ...]]] = {
     "an ankle that is led": ("torque-task-moving-ankle", 0.7, ()),
     "warm gas": (TASK, 0.5, (*HOLD, *WARM)),
     "a slow valve": ("torque-task-slow-valve", 0.5, ()),
-    "a sliding vane": ("step-response", 0.1, ("controller.command=0.9",)),
+    "a sliding vane": ("step-response", 0.1, ("motion.kind=free", "controller.command=0.9")),
+    "a foot that turns": ("step-response", 0.1, ("controller.command=0.9",)),
 }
 
 
@@ -87,7 +89,9 @@ def of_the_textbook(run: Run, way: float | None, at: Mapping[str, float]) -> dic
     if way:
         slowed = way * plant.dynamic_torque + plant.viscous_damping * at["angular_velocity"]
         moves["angle"] = at["angular_velocity"]
-        moves["angular_velocity"] = (torque - at["external_torque"] - slowed) / plant.inertia
+        # On an upright shank at rest the foot's weight has the lever of the sine of the ankle angle.
+        weight = 0.0 if run.leg is None else run.leg.load.mass_moment * STANDARD_GRAVITY * math.sin(at["angle"])
+        moves["angular_velocity"] = (torque + weight - at["external_torque"] - slowed) / plant.inertia
     outputs = {"torque": torque, "supplied_flow": supplied, "vented_flow": vented}
     return {f"rate of {name}": rate for name, rate in moves.items()} | {**at, **outputs}
 
@@ -169,7 +173,9 @@ def test_which_side_was_taken_is_said(steady: LinearModel) -> None:
     assert "the command's column is 0" in deaf.sides["valve"]
     assert not deaf.b[:, 0].any()
     assert deaf.answer().figures == ()
-    stuck = linearise("step-response", 0.0, ["initial.pressure_2=atmosphere", "motion.angle=60 deg"])
+    stuck = linearise(
+        "step-response", 0.0, ["motion.kind=free", "initial.pressure_2=atmosphere", "motion.angle=60 deg"]
+    )
     assert stuck.sides["ankle"] == "sticks: friction holds it"
     assert [item.name for item in stuck.states] == ["pressure_1", "pressure_2"]
     assert linearise("step-response", 0.1).sides["ankle"] == "slides in plantarflexion"
