@@ -631,7 +631,7 @@ def leg_of(leg: Any) -> Leg:
     """The leg as numbers; its knee must rest."""
     if leg is None:
         return Leg(0.0, 0.0, 0.0, 0.0, Path(CONSTANT, 0.0, 0.0, 0.0, 0.0))
-    if leg.gait is not None:
+    if leg.curves is not None:
         raise ValueError("the judge knows no gait")
     moment = leg.foot_mass * leg.foot_mass_centre
     inertia = leg.foot_inertia + moment * leg.foot_mass_centre

@@ -2,12 +2,13 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from ppafo.control.catalog import PROFILES
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import DataError, ScenarioError, one_line
-from ppafo.gait import Gait, list_gaits, load_gait
 from ppafo.model.declaration import Quantity
+from ppafo.model.gait import ShankSeries
 from ppafo.parameters.device import Device
 from ppafo.simulation.declaration import (
     ANGLE,
@@ -50,14 +51,13 @@ def read_motion(
     if kind == "leg":
         numbers = reading.section("motion", LEG)
         start, rate = numbers.pop("angle"), numbers.pop("angular_velocity")
-        shank, gait = _read_shank(reading, folder)
-        return FreeMotion(start, rate, leg=Leg(**numbers, shank=shank, gait=gait))
+        return FreeMotion(start, rate, leg=_read_leg(reading, numbers, folder))
     numbers = reading.section("motion", FREE)
     return FreeMotion(numbers["angle"], numbers["angular_velocity"], numbers["external_torque"])
 
 
-def _read_shank(reading: Reading, folder: Path) -> tuple[ProfileChoice, Gait | None]:
-    """Return how the shank of a leg moves: a profile without corners, or a gait."""
+def _read_leg(reading: Reading, numbers: dict[str, Any], folder: Path) -> Leg:
+    """Return a leg with these numbers of its foot, whose shank goes along a profile without corners or as in a gait."""
     section = "motion.shank"
     kind = kind_at(reading.document, section)
     shank = ProfileChoice(kind, reading.section(section, shank_settings(kind)))
@@ -67,12 +67,18 @@ def _read_shank(reading: Reading, folder: Path) -> tuple[ProfileChoice, Gait | N
             raise reading.refusal(
                 f"{section}.kind", f"this profile has corners, at which the foot would be struck; use one of {smooth}"
             )
-        return shank, None
+        return Leg(**numbers, shank=shank)
+    # A vane alone, or on a shank at rest, loads no gaits.
+    from ppafo.gait import list_gaits, load_gait, series_of
+
     name = str(value_at(reading.document, f"{section}.gait"))
     try:
-        return shank, load_gait(name if name in list_gaits() else folder / name)
+        gait = load_gait(name if name in list_gaits() else folder / name)
     except DataError as error:
         raise reading.refusal(f"{section}.gait", one_line(error)) from error
+    curves = (series_of(gait, curve) for curve in ("shank_angle", "knee_forward", "knee_up"))
+    series = ShankSeries(1.0 / gait.stride_time, shank.settings["start"], *curves)
+    return Leg(**numbers, shank=shank, gait=gait.name, curves=series)
 
 
 def read_profile(reading: Reading, section: str, prescribed: Quantity) -> ProfileChoice:

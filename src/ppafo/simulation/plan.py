@@ -22,7 +22,6 @@ from ppafo.engine.run import Lines, Run, Walk
 from ppafo.engine.scheme.actuators import volumes_of
 from ppafo.engine.scheme.pneumatics import is_slow
 from ppafo.errors import ScenarioError
-from ppafo.gait import Gait, series_of
 from ppafo.model.actuators.vane import KIND as VANE
 from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.columns import (
@@ -38,7 +37,6 @@ from ppafo.model.columns import (
     truncated,
     whole,
 )
-from ppafo.model.gait import ShankSeries
 from ppafo.model.gas import wall_exchange
 from ppafo.model.leg import FootLoad
 from ppafo.model.orifice import ExactOrifice
@@ -247,20 +245,14 @@ def outside_torque(motion: VaneMotion) -> Any:
 
 def shank_kind(leg: Leg) -> ProfileKind:
     """What leads the shank of a leg."""
-    return GAIT_SHANK if leg.gait is not None else PROFILES[leg.shank.kind]
+    return PROFILES[leg.shank.kind] if leg.curves is None else GAIT_SHANK
 
 
 def shank_parameters(leg: Leg) -> Any:
     """Parameters of what leads the shank of a leg; its settings may be arrays (runs,)."""
-    if leg.gait is None:
+    if leg.curves is None:
         return profile_parameters(leg.shank)
-    return shank_series(leg.gait, leg.shank.settings["start"])
-
-
-def shank_series(gait: Gait, start: Any) -> ShankSeries:
-    """The shank of a gait from a phase [strides] on; a knee whose motion was not measured rests."""
-    curves = (series_of(gait, name) for name in ("shank_angle", "knee_forward", "knee_up"))
-    return ShankSeries(1.0 / gait.stride_time, start, *curves)
+    return leg.curves._replace(start=leg.shank.settings["start"])
 
 
 def led_leg(plant: PlantParameters, leg: Leg) -> LedLeg:

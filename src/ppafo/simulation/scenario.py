@@ -14,7 +14,7 @@ from typing import Any, Protocol
 from ppafo.control.fixed.torque_laws import FIXED, FLOAT
 from ppafo.control.kind import PythonController
 from ppafo.errors import ScenarioError
-from ppafo.gait import Gait
+from ppafo.model.gait import ShankSeries
 from ppafo.model.regulator import SupplyLines
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph
@@ -38,7 +38,7 @@ class Leg:
 
     Mass of the foot [kg], from the ankle to its mass centre [m], inertia about that [kg m^2], length of the shank [m].
     ``ankle_torque`` [N m] is T_2, positive in plantarflexion. ``shank`` is its angle in time [rad], upright at 0; with
-    the kind ``gait`` that of ``gait``, whose knee moves too, from the phase ``start`` [strides] on.
+    the kind ``gait`` that of a ``gait`` by its ``curves``, whose knee moves too, from the phase ``start`` [strides] on.
     """
 
     foot_mass: float
@@ -47,7 +47,8 @@ class Leg:
     shank_length: float
     ankle_torque: float
     shank: ProfileChoice
-    gait: Gait | None = None
+    gait: str = ""
+    curves: ShankSeries | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +74,7 @@ class FreeMotion:
         level = shank.settings.get("level", math.nan)
         at_rest = f"at rest at {math.degrees(level):.4g} deg"
         led = at_rest if shank.kind == "constant" else f"led along the profile {shank.kind}"
-        led = led if self.leg.gait is None else f"of gait {self.leg.gait.name}"
+        led = f"of gait {self.leg.gait}" if self.leg.gait else led
         return f"a foot that is free, {start}, on a shank {led}"
 
 

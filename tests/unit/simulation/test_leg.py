@@ -19,7 +19,7 @@ from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
 from ppafo.simulation.ensemble.planning import plan_ensemble
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.numbers import check_columns
-from ppafo.simulation.plan import plan_run, shank_series
+from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.simulation.simulate import simulate
 
@@ -131,7 +131,9 @@ def shank_now(scenario: Scenario, time: float) -> ShankNow:
 
 def test_the_shank_of_a_gait_is_that_of_its_file_from_the_phase_on() -> None:
     gait = load_gait(GAIT)
-    now = shank_in_gait(shank_series(gait, 0.6), 0.1)
+    run = plan_run(on_leg({**SHANKS["gait"], "start": 0.6}))
+    assert run.leg is not None
+    now = shank_in_gait(run.leg.shank, 0.1)
     phase = 0.6 + 0.1 / gait.stride_time
     assert now.angle == pytest.approx(float(gait.shank_angle.values_at(phase)), abs=1e-6)
     assert gait.knee_up is not None

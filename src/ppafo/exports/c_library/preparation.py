@@ -45,7 +45,6 @@ from ppafo.simulation.plan import (
     is_slow_held,
     lines_at_start,
     shank_kind,
-    shank_series,
     state_at_start,
     state_with_volumes,
     step_counts,
@@ -393,10 +392,10 @@ def _leg(leg: Leg, writing: Writing) -> Iterator[str]:
     yield f"load = {add(foot_load)}(plant.inertia, plant.gravity_torque, {', '.join(foot.values())})"
     yield f"plant = {add(with_load)}(plant, load)"
     kind = shank_kind(leg)
-    if leg.gait is None:
+    if leg.curves is None:
         yield f"shank = {_kind(writing, 'motion.shank', kind)}"
         return
-    constant = dict(zip(leaf_paths(ShankSeries, "shank"), map(repr, numbers(shank_series(leg.gait, 0.0))), strict=True))
+    constant = dict(zip(leaf_paths(ShankSeries, "shank"), map(repr, numbers(leg.curves)), strict=True))
     cells = constant | {"shank.start": c_identifier("motion.shank.start")}
     yield f"shank = {row_expression(ShankSeries, 'shank', cells, add)}"
 
