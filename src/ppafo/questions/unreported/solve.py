@@ -211,7 +211,8 @@ STEP_CHUNK = 4096
 
 def _step_metrics(draws: Draws) -> dict[str, Floats]:
     """What the step response of each completion shows of the text of figure 7."""
-    base = load_scenario("step-response", [f"run.duration={STEP_TIME} s"])
+    # Without the leg, whose attitude on the fixture is not among the settings yet.
+    base = load_scenario("step-response", ["motion.kind=free", f"run.duration={STEP_TIME} s"])
     supply = base.device.supply
     varied = step_columns(draws)
     count = next(iter(varied.values())).size
