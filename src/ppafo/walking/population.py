@@ -16,6 +16,7 @@ from ppafo.engine.lanes import Batch, Floats, run_batch
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED
 from ppafo.errors import ScenarioError
+from ppafo.metrics.strides import PER_STRIDE
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.course import turns_walked
 from ppafo.walking.events import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
@@ -66,13 +67,7 @@ class Number:
 
 
 OUTCOMES: dict[str, Number] = {
-    "gas": Number("kg", "gas taken from the supply in one stride"),
-    "push_off_work": Number("J", "work of T_ex while the foot rolls over the toes, in one stride"),
-    "slap_rate": Number(
-        "rad/s", "rate of the toes as they come down after the heel, below 0; 0 where they always came first"
-    ),
-    "toe_clearance": Number("m", "lowest toe height in mid-swing, relative to the wearer's healthy gait"),
-    "toe_landing": Number("-", "fraction of the strides in which the toes met the ground before the heel"),
+    name: Number(item.unit, f"{item.summary}, mean over all strides of a wearer") for name, item in PER_STRIDE.items()
 }
 TRAITS: dict[str, Number] = {
     "body_mass": Number("kg", "mass of the body"),
@@ -187,13 +182,8 @@ def _run_in_groups(batch: Batch, progress: Progress) -> Floats:
 def _outcomes(rows: Mapping[str, Floats], strides: Floats) -> dict[str, Floats]:
     """Numbers of each wearer from the totals; ``strides`` walked, parts of one included."""
     strikes, landings = np.maximum(rows["walk.strides"], 1.0), np.maximum(rows["walk.landings"], 1.0)
-    return {
-        "gas": rows["state.supplied_mass"] / strides,
-        "push_off_work": rows["walk.push_off_work"] / strides,
-        "slap_rate": rows["walk.slap_rates"] / landings,
-        "toe_clearance": rows["walk.clearances"] / strikes,
-        "toe_landing": rows["walk.toe_landings"] / strikes,
-    }
+    over = {"slap_rate": landings, "toe_clearance": strikes, "toe_landing": strikes}
+    return {name: rows[item.total] / over.get(name, strides) for name, item in PER_STRIDE.items()}
 
 
 def population_figure(population: Population) -> "Figure":
