@@ -24,6 +24,7 @@ ON = (
     "effects.ice.blockage_per_gas=100 1/kg",
     "effects.leak_opening.pressure=30 kPa_d",
     "effects.spool_play.width=0.05",
+    "effects.coil_heating.steady_rise=60 K",
     "effects.seal_friction.dynamic_per_pressure=1e-7 N m/Pa",
     "effects.stribeck.velocity=0.1 rad/s",
     "sensors.pressure_bandwidth=80 Hz",

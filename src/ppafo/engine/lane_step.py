@@ -565,8 +565,11 @@ def measure(rows: LaneRows) -> list[str]:
         soon = f"look_at - before > {motion.SAME_INSTANT!r}"
         lines.append(f"until = min(until, look_at - before) if {soon} else until")
     if program.valve.jumps:
-        functions = f"{add(program.valve.next_event)}, {add(program.valve.settle)}"
-        lines.append(f"until = {add(motion.until_jump)}(valve, valve_state, command, time, until, {functions})")
+        lines += [
+            f"settled = {add(program.valve.settle)}(valve, valve_state, command, time)",
+            f"jump = {add(program.valve.next_event)}(valve, settled, command, time)",
+            f"until = {add(motion.until_jump)}(jump - time, until)",
+        ]
     if program.is_adaptive:
         hurries = "remaining == 0.0 or result.failure_time <= time"
         lines.append(f"until = remaining if {hurries} else {add(motion.part_length)}(pace, until)")

@@ -280,14 +280,16 @@ def python_place(
 ) -> Callable[..., Any] | None:
     """Return a place as Python calls it with effects and their rows; None where no effect acts there.
 
-    Before its own arguments it takes the states of effects by name.
+    Before its own arguments it takes the states of effects by name. Any other function of the model will do too.
     """
-    if not any(place in effect.laws for effect in effects):
+    if not effects:
         return None
     given = {effect.name: row for effect, row in zip(effects, rows, strict=True)}
     collector = SourceCollector("")
     link_effects(effects, collector)
     name = collector.add(place)
+    if name not in collector.needs:
+        return None
     scope: dict[str, Any] = {"math": math, "namedtuple": namedtuple}
     exec(collector.text(), scope)
     composed, needed = scope[name], collector.needs[name]

@@ -9,7 +9,17 @@ from ppafo.errors import KindError, one_line
 from ppafo.kinds import Kinds
 from ppafo.model.actuators import bladder, cylinder, muscle_pair, table, vane
 from ppafo.model.actuators.kind import ActuatorKind
-from ppafo.model.effects import bandwidth, ice, leak_opening, restitution, seal_friction, silencer, spool_play, stribeck
+from ppafo.model.effects import (
+    bandwidth,
+    coil_heating,
+    ice,
+    leak_opening,
+    restitution,
+    seal_friction,
+    silencer,
+    spool_play,
+    stribeck,
+)
 from ppafo.model.effects.kind import SECTION, Effect, effect_problem
 from ppafo.model.valves import proportional, solenoid, solenoid_recycling
 from ppafo.model.valves.kind import ValveKind
@@ -30,6 +40,7 @@ _OWN = (
     ice.EFFECT,
     leak_opening.EFFECT,
     spool_play.EFFECT,
+    coil_heating.EFFECT,
     seal_friction.EFFECT,
     stribeck.EFFECT,
     bandwidth.EFFECT,

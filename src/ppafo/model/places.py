@@ -10,6 +10,11 @@ def at_valve(command: float) -> float:
     return command
 
 
+def opening_time(time: float, is_coil_a: float) -> float:
+    """Time [s] from energising a coil to flow, from that of a cold one; 1 for coil A (chamber 1), 0 for coil B."""
+    return time
+
+
 def way_in(conductance: float) -> float:
     """Conductance [kg/(s Pa)] from a regulated supply to a chamber, from that of the open valve. Equation (8)."""
     return conductance

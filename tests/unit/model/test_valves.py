@@ -140,8 +140,8 @@ def parts_of_a_step(settings: dict[str, float], command: float, step: float) -> 
     state = solenoid.settle_timed(valve, state, 1.0, 0.5)
     time, remaining, lengths = 1.0, step, []
     while remaining > 0.0:
-        args = (valve, state, command, time, remaining)
-        length = until_jump(*args, solenoid.next_timed_event, solenoid.settle_timed)
+        settled = solenoid.settle_timed(valve, state, command, time)
+        length = until_jump(solenoid.next_timed_event(valve, settled, command, time) - time, remaining)
         _, state = solenoid.advance_timed(valve, state, command, time, length)
         lengths.append(length)
         time, remaining = time + length, 0.0 if length == remaining else remaining - length

@@ -232,6 +232,7 @@ class _Solution:
         self.show = python_place(shown_signals, run.program.effects, run.effects)
         self.limit = python_place(friction_at_rest, run.program.effects, run.effects)
         self.follows = python_place(at_valve, run.program.effects, run.effects)
+        self.settle = python_place(run.program.valve.settle, run.program.effects, run.effects)
         self.arrived = 0.0
         self.command, self.time = 0.0, 0.0
         self.way = self.rest_mode() if run.program.angle is None else 0.0
@@ -374,7 +375,8 @@ class _Solution:
     def settle_valve(self) -> None:
         """Let the valve make the abrupt changes that are due."""
         valve = self.run.program.valve
-        state = valve.settle(self.run.valve, self.valve_state(), self.command, self.time)
+        given = self.run.valve, self.valve_state(), self.command, self.time
+        state = valve.settle(*given) if self.settle is None else self.settle(self.states_in(self.y), *given)
         self.y[self.valve_from :] = numbers(state)
 
     def valve_state(self) -> Any:

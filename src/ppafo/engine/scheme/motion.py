@@ -9,8 +9,7 @@ A step may be done in parts, each of which ends where something changes abruptly
 """
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ppafo.engine.scheme.pneumatics import GasChange, HeldChambers, held_pressures
 from ppafo.model.places import friction_at_rest, friction_in_motion, rebound
@@ -39,21 +38,11 @@ class Pace(NamedTuple):
     length: float
 
 
-def until_jump(
-    valve: Any,
-    state: Any,
-    command: float,
-    time: float,
-    remaining: float,
-    next_event: Callable[..., float],
-    settle: Callable[..., Any],
-) -> float:
-    """Length [s] of the part of a step that begins at ``time`` [s] with ``remaining`` [s] left of the step.
+def until_jump(jump: float, remaining: float) -> float:
+    """Length [s] of the part of a step with ``remaining`` [s] left of it and a jump of the valve in ``jump`` [s].
 
-    The jumps that are due at ``time`` happen first; a jump within 1 ns of the end belongs to the next step.
+    The jumps that are due at its beginning happen first; a jump within 1 ns of the end belongs to the next step.
     """
-    settled = settle(valve, state, command, time)
-    jump = next_event(valve, settled, command, time) - time
     return jump if jump < remaining - SAME_INSTANT else remaining
 
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from ppafo.model.declaration import Quantity
-from ppafo.model.places import way_in, way_out
+from ppafo.model.places import opening_time, way_in, way_out
 from ppafo.model.plant import Openings, PlantParameters, SinglePort, single_port_flow, single_port_flow_slopes
 from ppafo.model.valves.kind import VENTS_ABOVE, ValveKind, ValveModel
 
@@ -102,14 +102,14 @@ def flow_position(coil: Coil, time: float) -> float:
     return coil.target if coil.change_time <= time + SAME_INSTANT else coil.position
 
 
-def command_coil(valve: TimedSolenoid, coil: Coil, wanted: float, time: float) -> Coil:
+def command_coil(valve: TimedSolenoid, coil: Coil, wanted: float, time: float, opening_delay: float) -> Coil:
     """A coil at ``time`` [s] with an order standing: the flow moves if it is due, then the order is taken if it may be.
 
     A change that is still waiting when the coil is commanded otherwise is lost.
     """
     position = flow_position(coil, time)
     accepts = wanted != coil.target and accept_time(coil, valve.switching_interval, time) <= time + SAME_INSTANT
-    delay = valve.opening_delay if wanted > 0.5 else valve.closing_delay
+    delay = opening_delay if wanted > 0.5 else valve.closing_delay
     at_once = accepts and delay <= SAME_INSTANT
     return Coil(
         position=wanted if at_once else position,
@@ -130,7 +130,8 @@ def settle_timed(valve: TimedSolenoid, state: PairState, command: float, time: f
     """Both coils after the changes and orders that are due at ``time`` [s]."""
     wanted_a, wanted_b = coil_commands(command)
     return PairState(
-        command_coil(valve, state.coil_a, wanted_a, time), command_coil(valve, state.coil_b, wanted_b, time)
+        command_coil(valve, state.coil_a, wanted_a, time, opening_time(valve.opening_delay, 1.0)),
+        command_coil(valve, state.coil_b, wanted_b, time, opening_time(valve.opening_delay, 0.0)),
     )
 
 

@@ -141,7 +141,7 @@ def _valve(run: Run, state: list[Any], command: Any, compare: Compare) -> tuple[
     valve, acting = run.program.valve, dict(zip(run.program.effects, run.effects, strict=True))
     types = (valve.parameters, valve.state, float)
     command = symbolic(at_valve, float, compare=compare, acting=acting)(command)
-    settled = symbolic(valve.settle, *types, float, compare=compare)(
+    settled = symbolic(valve.settle, *types, float, compare=compare, acting=acting)(
         run.valve, rebuilt(valve.state, state), command, 0.0
     )
     openings = symbolic(valve.instant, *types, compare=compare)(run.valve, settled, command)
