@@ -45,7 +45,6 @@ _UNITS: dict[str, tuple[str, ...]] = {
 }
 """Units in which a person may type a value, beside the unit in which it is shown and that in SI."""
 _GAUGES = ("psi_g", "kPa_g", "bar_g", "Pa_g")
-_OTHER_ATMOSPHERE = 90000.0
 _FIRST_STRIDE = "controller.first_stride_time"
 _WALKED = 6
 """Length [s] of a walk in a page, unless somebody wants more: five strides."""

@@ -114,8 +114,9 @@ def test_where_only_a_vane_will_do_a_walk_is_refused_by_its_motion(tmp_path: Pat
 
 
 def test_the_schema_of_scenarios_takes_every_shipped_one_and_a_motion_that_is_a_walk() -> None:
-    validator = jsonschema.Draft202012Validator(json_schema())
-    validator.check_schema(json_schema())
+    schema = json_schema()
+    validator = jsonschema.Draft202012Validator(schema)
+    validator.check_schema(schema)
     documents = [tomllib.loads(text_of(name)) for name in list_all_scenarios()]
     documents.append(tomllib.loads(text_of(NAME) + MOTION + 'gait = "mine.toml"\n'))
     assert [list(validator.iter_errors(document)) for document in documents] == [[]] * len(documents)
@@ -173,3 +174,46 @@ def test_messages_offer_a_scenario_only_the_metrics_that_it_has() -> None:
 def test_every_number_of_a_walk_can_vary_from_either_form(tmp_path: Path) -> None:
     new = load_scenario(written(tmp_path, text_of(NAME) + MOTION))
     assert declared_numbers(new).keys() == declared_numbers(load_scenario(NAME)).keys()
+
+
+STUDY = """
+schema_version = 1
+name = "lifting"
+description = "What decides how high the toes are?"
+
+[[configurations]]
+name = "mine"
+scenario = "walks/mine.toml"
+overrides = ["run.duration=6 s"]
+
+[sample]
+method = "sobol"
+runs = 64
+seed = 1
+
+[[vary]]
+path = "wearer.body_mass"
+kind = "uniform"
+minimum = "70 kg"
+maximum = "75 kg"
+
+[[vary]]
+path = "supply.dorsiflexion_pressure"
+kind = "uniform"
+minimum = "20 psi_g"
+maximum = "40 psi_g"
+
+[outputs]
+metrics = ["toe_clearance"]
+"""
+
+
+def test_sensitivity_ranks_what_varies_in_a_walk_whose_file_lies_in_another_folder(tmp_path: Path) -> None:
+    folder = tmp_path / "studies"
+    (folder / "walks").mkdir(parents=True)
+    written(folder / "walks", text_of(NAME) + MOTION)
+    (folder / "study.toml").write_text(STUDY)
+    found = ppafo.sensitivity(folder / "study.toml", method="morris", samples=8)
+    (metric,) = found.metrics
+    shares = dict(zip(found.paths, metric.indices.values[found.method.shown[0]], strict=True))
+    assert shares["supply.dorsiflexion_pressure"] > 10.0 * shares["wearer.body_mass"] > 0.0
