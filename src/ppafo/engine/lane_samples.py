@@ -5,15 +5,17 @@ the reference, of which meters are told, is looked at once before the first samp
 """
 
 from ppafo.engine.lane_rows import LaneRows, indent
+from ppafo.engine.led_leg import GAIT_SHANK
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.scheme.actuators import seen_with_torque, torque_at
 from ppafo.engine.scheme.motion import SAME_INSTANT
 from ppafo.engine.scheme.pneumatics import held_pressures
+from ppafo.model.gait import foot_in_gait
 from ppafo.model.places import shown_signals
 from ppafo.model.plant import actuator_torque, chamber_pressures
 from ppafo.model.sensors import GaitMeasurement, Measurement, late_measurement, measure, measure_gait, samples_late
-from ppafo.signals.meter import SAME_LEVEL, Sample, WalkSample, advance_course, is_away
+from ppafo.signals.meter import SAME_LEVEL, Sample, SwingSample, WalkSample, advance_course, is_away
 
 SIGNALS = ("angle", "pressure_1", "pressure_2")
 READINGS = {
@@ -253,14 +255,24 @@ def sample_lines(rows: LaneRows, moment: str) -> list[str]:
     of_walk: dict[str, str] = {}
     if program.walks:
         wanted, of_walk = _of_state(rows, REQUEST), _walk_values(rows)
-    groups = ("walk", "controller_state") if program.walks else ()
+    groups: tuple[str, ...] = ("walk", "controller_state") if program.walks else ()
+    kind: type = WalkSample if program.walks else Sample
+    on_gait: list[str] = []
+    if program.shank is GAIT_SHANK:
+        groups, kind = ("shank",), SwingSample
+        on_gait = [f"foot = {add(foot_in_gait)}(shank, {moment} * timing.step, state.angle)"]
+        values |= {
+            "foot_angle": "foot.angle",
+            "measured_foot_angle": "foot.measured_angle",
+            "toe_difference": "foot.toe_difference",
+        }
     return [
         *[rows.load(group) for group in ("timing", "plant", "state", "result", "reference", *thermal, *groups)],
         *present_pressures(rows),
         torque_line(rows, "state.angle"),
         f"wanted = {wanted}",
-        f"sample = {add(WalkSample if of_walk else Sample)}"
-        f"({', '.join(f'{name}={value}' for name, value in (values | of_walk).items())})",
+        *on_gait,
+        f"sample = {add(kind)}({', '.join(f'{name}={value}' for name, value in (values | of_walk).items())})",
     ]
 
 

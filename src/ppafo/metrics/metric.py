@@ -14,8 +14,9 @@ from ppafo.signals.meter import SAME_LEVEL, MeterKind
 
 Floats = NDArray[np.float64]
 
-WALK, STEADY, REQUEST = "walk", "steady strides", "requested torque"
-"""What a metric may need beside channels: a walk, one of equal strides, a controller of it that wants a torque."""
+WALK, STEADY, REQUEST, LED_SHANK = "walk", "steady strides", "requested torque", "shank of a gait"
+"""What a metric may need beside channels: a walk, one of equal strides, a controller of it that wants a torque; or a
+leg whose shank a gait leads."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,9 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.metrics.metric import Floats, MetricKind, Readings
+from ppafo.metrics.metric import LED_SHANK, Floats, MetricKind, Readings
+from ppafo.model.columns import root
 from ppafo.signals import Recording
-from ppafo.signals.meter import Course, MeterKind, Sample
+from ppafo.signals.meter import Course, MeterKind, Sample, SwingSample
 
 TRAVEL_FRACTION = 0.01
 """A move has begun when this fraction of its travel is done, and has arrived when this fraction is left."""
@@ -118,7 +119,73 @@ def read_arrival_time(readings: Readings) -> Floats:
     return _read_time_of_fraction(readings, 1.0 - TRAVEL_FRACTION)
 
 
+def foot_angle_error(recording: Recording) -> float:
+    """Root of the time average of the foot's angle less the measured one, squared [rad], by the trapezoidal rule."""
+    error = recording["foot_angle"] - recording["measured_foot_angle"]
+    return float(np.sqrt(np.trapezoid(error**2, recording.time) / recording.duration))
+
+
+def toe_clearance_error(recording: Recording) -> float:
+    """Lowest height of the toes against the measured ones at the same instant [m]; below 0 where they hang lower."""
+    return float(np.min(recording["toe_difference"]))
+
+
+class FootError(NamedTuple):
+    """Squared error of the foot's angle at the last sample [rad^2], trapezoidal sum of it, and lowest toes [m]."""
+
+    last: float
+    total: float
+    lowest: float
+
+
+def start_foot_error(course: Course, sample: SwingSample) -> FootError:
+    """The error of the first sample."""
+    error = sample.foot_angle - sample.measured_foot_angle
+    return FootError(error * error, 0.0, sample.toe_difference)
+
+
+def update_foot_error(state: FootError, course: Course, sample: SwingSample) -> FootError:
+    """One interval more."""
+    error = sample.foot_angle - sample.measured_foot_angle
+    square = error * error
+    return FootError(square, state.total + 0.5 * (state.last + square), min(state.lowest, sample.toe_difference))
+
+
+FOOT_ERROR = MeterKind("foot_error", FootError, start_foot_error, update_foot_error)
+
+
+def read_foot_angle_error(readings: Readings) -> Floats:
+    """``foot_angle_error`` [rad]."""
+    return root(readings.meters[FOOT_ERROR.name].total / (readings.samples - 1))
+
+
+def read_toe_clearance_error(readings: Readings) -> Floats:
+    """``toe_clearance_error`` [m]."""
+    lowest: Floats = readings.meters[FOOT_ERROR.name].lowest
+    return lowest
+
+
 METRICS = (
+    MetricKind(
+        "foot_angle_error",
+        "rad",
+        "RMS difference of the angle of the foot from that of the measured gait",
+        ("foot_angle", "measured_foot_angle"),
+        foot_angle_error,
+        read_foot_angle_error,
+        (FOOT_ERROR,),
+        needs=(LED_SHANK,),
+    ),
+    MetricKind(
+        "toe_clearance_error",
+        "m",
+        "lowest height of the toes against those of the measured gait, below 0 where they hang lower",
+        ("toe_difference",),
+        toe_clearance_error,
+        read_toe_clearance_error,
+        (FOOT_ERROR,),
+        needs=(LED_SHANK,),
+    ),
     MetricKind(
         "angle_range",
         "rad",

@@ -122,12 +122,15 @@ class GaitSeries(NamedTuple):
 class ShankSeries(NamedTuple):
     """The shank of a gait without its ground: strides per second [Hz], phase in turns at time 0, and its curves.
 
-    Angle [rad], and acceleration of the knee forward and up [m/s^2], as in ``GaitSeries``.
+    Angle of the shank and of the ankle as measured [rad], and acceleration of the knee forward and up [m/s^2], as in
+    ``GaitSeries``. ``toe_lever`` [m] reaches from the ankle forward to the toes.
     """
 
     frequency: float
     start: float
+    toe_lever: float
     shank: Series
+    ankle: Series
     knee_forward: Series
     knee_up: Series
 
@@ -239,6 +242,28 @@ def shank_in_gait(gait: ShankSeries, time: float) -> ShankNow:
         acceleration=acceleration_at(gait.shank, at, gait.frequency),
         knee_forward=value_at(gait.knee_forward, at),
         knee_up=value_at(gait.knee_up, at),
+    )
+
+
+class FootInGait(NamedTuple):
+    """Angles of a foot and of the measured one over the horizontal [rad], and how much higher its toes are [m]."""
+
+    angle: float
+    measured_angle: float
+    toe_difference: float
+
+
+def foot_in_gait(gait: ShankSeries, time: float, angle: float) -> FootInGait:
+    """The foot on the shank of a gait, with an ankle angle [rad] at a time [s], beside the foot that was measured."""
+    at = harmonics(gait.start + gait.frequency * time)
+    shank = value_at(gait.shank, at)
+    own, measured = shank - angle, shank - value_at(gait.ankle, at)
+    sine, _ = sine_and_cosine_of_turns(own * TURNS_OF_RADIAN + 0.25)
+    measured_sine, _ = sine_and_cosine_of_turns(measured * TURNS_OF_RADIAN + 0.25)
+    return FootInGait(
+        angle=own + QUARTER_TURN,
+        measured_angle=measured + QUARTER_TURN,
+        toe_difference=gait.toe_lever * (sine - measured_sine),
     )
 
 

@@ -31,6 +31,9 @@ CHANNELS: dict[str, ChannelKind] = {
     ),
     "external_torque": ChannelKind("N m", "torque on the wearer, T_ex of equation (1)"),
     "shank_angle": ChannelKind("rad", "shank from the vertical, above 0 while the ankle is in front of the knee"),
+    "foot_angle": ChannelKind("rad", "foot over the horizontal, above 0 with the toes up"),
+    "measured_foot_angle": ChannelKind("rad", "foot of the measured gait over the horizontal at the same instant"),
+    "toe_difference": ChannelKind("m", "toes over those of the measured gait at the same instant"),
     "healthy_angle": ChannelKind(
         "rad", "ankle angle of the gait that the wearer would walk, growing in plantarflexion"
     ),

@@ -27,6 +27,27 @@ class Sample(NamedTuple):
     temperature_2: float
 
 
+class SwingSample(NamedTuple):
+    """One sample of a foot on the shank of a gait: what ``Sample`` has, and the foot.
+
+    Angles of the foot and of the measured one over the horizontal [rad], and how much higher its toes are [m].
+    """
+
+    number: float
+    angle: float
+    angular_velocity: float
+    pressure_1: float
+    pressure_2: float
+    torque: float
+    command: float
+    reference: float
+    temperature_1: float
+    temperature_2: float
+    foot_angle: float
+    measured_foot_angle: float
+    toe_difference: float
+
+
 class WalkSample(NamedTuple):
     """One sample of a walk: what ``Sample`` has, and where the stride is.
 
@@ -105,8 +126,9 @@ class MeterKind:
     """Something worked out from samples: ``state`` is a NamedTuple class of floats, so are its nested ones.
 
     ``start(course, sample)`` makes it at the first sample, ``update(state, course, sample)`` at each later one; samples
-    of a walk are ``WalkSample``. What ``course`` says of the hold is right up to this sample. A meter without
-    ``needs_course`` must not look at it; one that is ``of_motion`` stays as it started while the vane stands still.
+    of a walk are ``WalkSample``, of a foot on the shank of a gait ``SwingSample``. What ``course`` says of the hold is
+    right up to this sample. A meter without ``needs_course`` must not look at it; one that is ``of_motion`` stays as it
+    started while the vane stands still.
     """
 
     name: str

@@ -44,6 +44,7 @@ FOOT = {
         Quantity("foot_mass_centre", "m", "ankle to the mass centre of the foot", 0.09, 0.0, 0.5),
         Quantity("foot_mass", "kg", "mass of the foot", 1.0, 0.05, 10.0),
         Quantity("foot_inertia", "kg m^2", "inertia of the foot about its mass centre", 0.001, 1.0e-5, 1.0),
+        Quantity("toe_lever", "m", "ankle forward to the toes", 0.18, 0.0, 0.5),
     )
 }
 """The paper's subject (after equation (12)); the mass centre is half way along the foot of 0.18 m."""

@@ -76,8 +76,8 @@ def _read_leg(reading: Reading, numbers: dict[str, Any], folder: Path) -> Leg:
         gait = load_gait(name if name in list_gaits() else folder / name)
     except DataError as error:
         raise reading.refusal(f"{section}.gait", one_line(error)) from error
-    curves = (series_of(gait, curve) for curve in ("shank_angle", "knee_forward", "knee_up"))
-    series = ShankSeries(1.0 / gait.stride_time, shank.settings["start"], *curves)
+    curves = (series_of(gait, curve) for curve in ("shank_angle", "ankle_angle", "knee_forward", "knee_up"))
+    series = ShankSeries(1.0 / gait.stride_time, shank.settings["start"], numbers["toe_lever"], *curves)
     return Leg(**numbers, shank=shank, gait=gait.name, curves=series)
 
 

@@ -252,7 +252,7 @@ def shank_parameters(leg: Leg) -> Any:
     """Parameters of what leads the shank of a leg; its settings may be arrays (runs,)."""
     if leg.curves is None:
         return profile_parameters(leg.shank)
-    return leg.curves._replace(start=leg.shank.settings["start"])
+    return leg.curves._replace(start=leg.shank.settings["start"], toe_lever=leg.toe_lever)
 
 
 def led_leg(plant: PlantParameters, leg: Leg) -> LedLeg:

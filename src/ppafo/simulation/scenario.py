@@ -36,7 +36,8 @@ class ProfileChoice:
 class Leg:
     """A foot on a shank that is led, without ground. Equation (11) with a prescribed shank.
 
-    Mass of the foot [kg], from the ankle to its mass centre [m], inertia about that [kg m^2], length of the shank [m].
+    Mass of the foot [kg], from the ankle to its mass centre [m], inertia about that [kg m^2], length of the shank [m],
+    from the ankle to the toes [m], which nothing but the height of the toes asks for.
     ``ankle_torque`` [N m] is T_2, positive in plantarflexion. ``shank`` is its angle in time [rad], upright at 0; with
     the kind ``gait`` that of a ``gait`` by its ``curves``, whose knee moves too, from the phase ``start`` [strides] on.
     """
@@ -45,6 +46,7 @@ class Leg:
     foot_mass_centre: float
     foot_inertia: float
     shank_length: float
+    toe_lever: float
     ankle_torque: float
     shank: ProfileChoice
     gait: str = ""

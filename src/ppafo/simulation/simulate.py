@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from ppafo.control.profiles import CONSTANT
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
-from ppafo.engine.led_leg import shank_at
+from ppafo.engine.led_leg import GAIT_SHANK, shank_at
 from ppafo.engine.program import python_place
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together
@@ -19,6 +20,7 @@ from ppafo.engine.scheme.actuators import pressures_of, torque_of, volumes_of
 from ppafo.errors import SimulationError
 from ppafo.metrics.catalog import evaluate
 from ppafo.metrics.metric import Metric
+from ppafo.model.gait import foot_in_gait
 from ppafo.model.gas import energy_per_content
 from ppafo.model.leg import torque_on_foot
 from ppafo.model.places import friction_in_motion
@@ -218,8 +220,27 @@ def _recording(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, F
     if scenario.control.kind != OPEN_LOOP:
         channels["reference"] = (profile_values(scenario.reference, _moments(run, times.size))[0], "N m")
     channels |= gas_channels(scenario.device.gas, run, rows)
+    channels |= _leg_channels(run, times, angle)
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
     return Recording(scenario.name, times, values, kind="simulated")
+
+
+def _leg_channels(run: Run, times: Floats, angle: Floats) -> dict[str, tuple[Floats, str]]:
+    """Shank and foot of a leg whose shank moves; where a gait leads it, beside the foot that was measured."""
+    kind, leg = run.program.shank, run.leg
+    if kind is None or leg is None or kind is CONSTANT:
+        return {}
+    shank = np.array([shank_at(kind, leg.shank, float(time)).angle for time in times])
+    if kind is not GAIT_SHANK:
+        return {"shank_angle": (shank, "rad"), "foot_angle": (shank - angle + 0.5 * np.pi, "rad")}
+    feet = [foot_in_gait(leg.shank, time, place) for time, place in zip(times.tolist(), angle.tolist(), strict=True)]
+    own, measured, higher = np.array(feet).T
+    return {
+        "shank_angle": (shank, "rad"),
+        "foot_angle": (own, "rad"),
+        "measured_foot_angle": (measured, "rad"),
+        "toe_difference": (higher, "m"),
+    }
 
 
 def _moments(run: Run, count: int) -> Floats:

@@ -13,7 +13,7 @@ from ppafo.engine.program import LaneResult
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run
 from ppafo.gait.opensim_names import opensim_recording
 from ppafo.metrics import METRICS, Metric, evaluate
-from ppafo.metrics.metric import REQUEST, STEADY, MetricKind
+from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, MetricKind
 from ppafo.model.contact import SWING
 from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix, passive_torque
 from ppafo.model.plant import chamber_pressures
@@ -258,6 +258,8 @@ def lacks(scenario: Scenario, kind: MetricKind) -> str:
         return "a walk has no one reference that its torque follows: push_off_error is the error in push-off"
     if kind.traced:
         return "it needs the course of the whole run, which is not kept of a walk"
+    if LED_SHANK in kind.needs:
+        return "it needs a leg without ground, whose shank is that of a gait"
     if STEADY in kind.needs and walk_of(scenario).course is not None:
         return "it is a mean over equal strides, and a course has others: leave the course out"
     is_outside = scenario.control.kind == PYTHON_CONTROLLER

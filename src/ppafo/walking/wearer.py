@@ -31,7 +31,7 @@ WEARER = (
     FOOT["foot_mass"],
     FOOT["foot_inertia"],
     Quantity("heel_lever", "m", "ankle back to the heel; bounds the lever of the ground force", 0.05, 0.0, 0.2),
-    Quantity("toe_lever", "m", "ankle forward to the toes", 0.18, 0.0, 0.5),
+    FOOT["toe_lever"],
     Quantity("ankle_stiffness", "N m/rad", "stiffness of tissue at the ankle", 4.0, 0.0, 500.0),
     Quantity("ankle_rest_angle", "rad", "angle at which passive tissue exerts no torque", 1.92, 0.5, 3.0),
     Quantity("ankle_damping", "N m s/rad", "damping of tissue at the ankle", 0.2, 0.0, 50.0),

@@ -396,7 +396,7 @@ def _leg(leg: Leg, writing: Writing) -> Iterator[str]:
         yield f"shank = {_kind(writing, 'motion.shank', kind)}"
         return
     constant = dict(zip(leaf_paths(ShankSeries, "shank"), map(repr, numbers(leg.curves)), strict=True))
-    cells = constant | {"shank.start": c_identifier("motion.shank.start")}
+    cells = constant | {"shank.start": c_identifier("motion.shank.start"), "shank.toe_lever": "motion_toe_lever"}
     yield f"shank = {row_expression(ShankSeries, 'shank', cells, add)}"
 
 

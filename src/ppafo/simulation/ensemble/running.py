@@ -10,17 +10,18 @@ from ppafo.control.kind import PythonController
 from ppafo.engine.lane_samples import REQUEST as REQUEST_ROW
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import Batch, BatchResult, Floats, add_meters, group_of, meters_of, run_blocks
+from ppafo.engine.led_leg import GAIT_SHANK
 from ppafo.engine.program import Program
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.errors import ScenarioError
 from ppafo.metrics.catalog import METRICS
 from ppafo.metrics.gas import ENERGIES
-from ppafo.metrics.metric import REQUEST, STEADY, WALK, MetricKind, Readings
+from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, WALK, MetricKind, Readings
 from ppafo.model.gas import energy_per_content
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
 from ppafo.simulation.sampled import run_in_turn
-from ppafo.simulation.scenario import Scenario, worn_kind
+from ppafo.simulation.scenario import FreeMotion, Scenario, worn_kind
 from ppafo.simulation.simulate import OPEN_LOOP
 
 REFERENCE = "reference"
@@ -222,6 +223,7 @@ def has_channels(program: Program, kind: MetricKind) -> bool:
     has = {
         WALK: program.walks,
         STEADY: not program.takes_course,
+        LED_SHANK: program.shank is GAIT_SHANK,
         REQUEST: REQUEST_ROW in row_numbers(program.state_rows()),
     }
     return (
@@ -238,6 +240,9 @@ def lacking(scenario: Scenario, kind: MetricKind) -> str:
         return worn.lacks(scenario, kind)
     if WALK in kind.needs:
         return "it needs a walk"
+    motion = scenario.motion
+    if LED_SHANK in kind.needs and not (isinstance(motion, FreeMotion) and motion.leg is not None and motion.leg.gait):
+        return "it needs a leg whose shank is that of a gait"
     is_open = scenario.control.kind == OPEN_LOOP
     return "its controller follows no reference" if is_open and REFERENCE in kind.channels else ""
 
