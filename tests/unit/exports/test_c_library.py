@@ -304,6 +304,7 @@ SPREAD = (0.7, 1.4)
 """Smallest and largest factor on a setting of a draw; one that is 0 stays 0, as another program would be needed."""
 VARIED: dict[str, tuple[str, ...]] = {
     "step-response": (),
+    "swing-foot": (),
     "torque-task-anti-windup": (),
     "torque-task-moving-ankle": ("valve.sonic_conductance=9e-10 m^3/(s Pa)", "valve.critical_ratio=0.3"),
     "torque-task-proportional": (),

@@ -14,9 +14,12 @@ from ppafo.engine.rows import rebuilt
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
 from ppafo.gait import load_gait
+from ppafo.metrics import METRICS
 from ppafo.model.gait import shank_in_gait
 from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
+from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.ensemble.planning import plan_ensemble
+from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.numbers import check_columns
 from ppafo.simulation.plan import plan_run
@@ -203,3 +206,58 @@ def test_a_smooth_profile_goes_through_its_knots_without_corners(count: int) -> 
     lowest, highest = smooth_bounds(profile)
     assert lowest == pytest.approx(values.min(), abs=1e-4)
     assert highest == pytest.approx(values.max(), abs=1e-4)
+
+
+SWING = "swing-foot"
+
+
+def test_the_reference_of_the_swing_is_the_torque_that_moves_the_measured_foot() -> None:
+    """Newton's second law of the foot on the measured angles, which are differentiated numerically here."""
+    scenario = load_scenario(SWING)
+    run, device = plan_run(scenario), scenario.device
+    gait = load_gait(GAIT)
+    assert run.leg is not None
+    settings = scenario.reference.settings
+    step = 1.0e-4
+
+    def ankle(time: float) -> float:
+        phases = gait.stance_share + time / gait.stride_time
+        turns = 2.0 * math.pi * np.arange(1, 9) * phases
+        curve = gait.ankle_angle
+        return curve.mean + float(np.cos(turns) @ curve.cosines[:8] + np.sin(turns) @ curve.sines[:8])
+
+    for number in range(1, 13):
+        time = 0.0 if number == 1 else settings[f"time_{number:02}"]
+        before, here, after = (ankle(time + shift) for shift in (-step, 0.0, step))
+        rate, bend = (after - before) / (2.0 * step), (after - 2.0 * here + before) / step**2
+        needed = run.leg.load.inertia * bend - torque_on_foot(run.leg.load, shank_in_gait(run.leg.shank, time), here)
+        needed += device.friction.viscous_damping * rate + math.copysign(device.friction.dynamic_torque, rate)
+        assert settings[f"value_{number:02}"] == pytest.approx(needed, abs=0.012)
+
+
+def test_the_device_lifts_the_foot_in_swing_and_the_proportional_valve_does_it_better() -> None:
+    nothing = ("controller.kind=constant", "controller.command=0", "initial.pressure_2=atmosphere")
+    laws = ((), ("device.valve=solenoid", "controller.kind=on_off"), nothing)
+    found = [simulate(load_scenario(SWING, law)).metrics for law in laws]
+    errors = [metrics["foot_angle_error"].value for metrics in found]
+    toes = [metrics["toe_clearance_error"].value for metrics in found]
+    assert errors == sorted(errors)
+    assert errors[0] < 0.5 * errors[1]
+    assert toes == sorted(toes, reverse=True)
+    assert found[0]["gas_supplied"].value < 0.5 * found[1]["gas_supplied"].value
+
+
+def test_metrics_of_the_swing_are_the_same_in_a_study() -> None:
+    pressures = np.array([2.5e5, 3.0e5, 4.0e5])
+    names = ("foot_angle_error", "toe_clearance_error")
+    study = run_ensemble(load_scenario(SWING), {"initial.pressure_2": pressures}, names)
+    for run, pressure in enumerate(pressures):
+        alone = simulate(load_scenario(SWING, (f"initial.pressure_2={float(pressure)!r} Pa_a",))).metrics
+        for name in names:
+            assert study.metrics[name][run] == pytest.approx(alone[name].value, rel=1e-9)
+
+
+def test_a_leg_at_rest_has_no_error_of_the_foot() -> None:
+    assert "foot_angle_error" not in simulate(on_leg(AT_REST)).metrics
+    assert lacking(on_leg(AT_REST), METRICS["foot_angle_error"]) == "it needs a leg whose shank is that of a gait"
+    assert lacking(load_scenario(SWING), METRICS["foot_angle_error"]) == ""
