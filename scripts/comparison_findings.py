@@ -1,0 +1,212 @@
+"""Every number of docs/what-the-comparison-shows.md, and its figure.
+
+    python scripts/comparison_findings.py [--draws 98304] [--figure docs/images/comparison.png]
+
+Needs the extra ``optimal`` for the bound of the proportional valve, and takes some minutes.
+"""
+
+import argparse
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ppafo.answers.style import BLUE, GREY, VERMILION, house_style, mark_kind
+from ppafo.constants import GRAMS_PER_KILOGRAM
+from ppafo.parameters import load_device
+from ppafo.parameters.publications.publication import paper_entries
+from ppafo.questions.league.bound import lower_bound
+from ppafo.questions.league.sampled_bound import sampled_bound
+from ppafo.questions.league.standing import ENTRANTS
+from ppafo.questions.reproduce.law_and_valve import FASTER
+from ppafo.questions.unreported.answer import (
+    Family,
+    conclusions,
+    reach_sentence,
+    weight_of_readings,
+    weighted_quantiles,
+    within_reach,
+)
+from ppafo.questions.unreported.settings import (
+    DEAD_VOLUME,
+    DISCHARGE,
+    EVIDENCE,
+    FALL,
+    IMPROVEMENT,
+    OBSERVABLES,
+    ON_OFF_RATE,
+    PLATEAU,
+    QUIET,
+    RISE,
+    STEP_TIME,
+    VOLTS,
+    VOLUME,
+    agreement_with,
+    demand_over_ceiling,
+    effective,
+    improvement,
+    step_observables,
+)
+from ppafo.questions.unreported.solve import infer_settings
+from ppafo.running import simulate
+from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.loading import load_scenario
+from ppafo.walking import load_walk
+from ppafo.walking.walk import compare_walks
+
+SETS = ("ppafo2011", "ppafo2011-consistent", "ppafo2011-fitted")
+BY_NAME = {entrant.name: entrant for entrant in ENTRANTS}
+CHANGES: dict[str, tuple[str, ...]] = {
+    "as completed": (),
+    **{f"level {level:g} N m": (f"reference.level={level} N m",) for level in (4, 5, 5.5, 5.85, 6.15, 6.5, 7)},
+    **{
+        f"supply {pressure} psi_g": (
+            f"supply.pressure={pressure} psi_g",
+            f"supply.dorsiflexion_pressure={pressure} psi_g",
+        )
+        for pressure in (45, 49, 51, 55)
+    },
+    **{f"hold {time:g} s": (f"run.duration={1.0 + time} s",) for time in (0.5, 4.0)},
+    "dead volume 10 cm^3": ("actuator.dead_volume_1=10 cm^3", "actuator.dead_volume_2=10 cm^3"),
+    "ramp 0.5 s": ("reference.ramp_time=0.5 s",),
+}
+"""One thing changed at a time."""
+
+
+def where_it_comes_from() -> Iterator[str]:
+    """Yield the improvement of the RMS error and the gas saved, with one thing changed."""
+    for name, overrides in (*CHANGES.items(), ("on/off at 100 Hz", ())):
+        faster = FASTER if name.startswith("on/off") else ()
+        pair = simulate(load_scenario("torque-task-solenoid", [*overrides, *faster])).metrics
+        spool = simulate(load_scenario("torque-task-proportional", list(overrides))).metrics
+        better, saved = (100.0 * (1.0 - spool[key].value / pair[key].value) for key in ("rms_error", "gas_supplied"))
+        yield f"{name:22} error {better:6.1f} % less, gas {saved:5.1f} % less"
+
+
+def law_and_valve(level: float) -> Iterator[str]:
+    """Yield the RMS error of laws and of bounds of both valves at a level [N m]."""
+    words = [f"reference.level={level} N m"]
+
+    def played(name: str) -> tuple[float, float]:
+        entrant = BY_NAME[name]
+        metrics = simulate(load_scenario("torque-task-proportional", [*entrant.overrides, *words])).metrics
+        return metrics["rms_error"].value, GRAMS_PER_KILOGRAM * metrics["gas_supplied"].value
+
+    for name in ("on_off", "on_off_dead_zone-solenoid", "pid-paper", "pid-tuned", "feedback_linearisation"):
+        error, gas = played(name)
+        yield f"{level:g} N m  {BY_NAME[name].valve:12} {name:26} {error:.4f} N m  {gas:.3f} g"
+    pair = load_scenario("torque-task-solenoid", words)
+    for name, commands in (("A or B", (1.0, -1.0)), ("A, B or neither", (1.0, 0.0, -1.0))):
+        bound = sampled_bound(pair, commands)
+        found = f"{bound.found:.4f} N m, none below {bound.certified:.4f}"
+        yield f"{level:g} N m  solenoid     best decisions, {name:16} {found}"
+    error, gas = played("pid-paper")
+    spool = lower_bound(load_scenario("torque-task-proportional", words), [error])
+    least, least_gas = spool.least_error.rms_error, GRAMS_PER_KILOGRAM * spool.gas_at(error)
+    yield f"{level:g} N m  proportional any control foreseen           {least:.4f} N m"
+    more = 100.0 * (gas / least_gas - 1.0)
+    yield f"{level:g} N m  pid-paper: {error / least:.3g} times that error, {more:.1f} % more gas than its error needs"
+
+
+def figure_7() -> Iterator[str]:
+    """Yield what each shipped set gives of the text of figure 7."""
+    actuators = [load_device(name).actuator for name in SETS]
+    names = ("volume_per_angle", "dead_volume_1", "dead_volume_2")
+    columns = {f"actuator.{name}": np.array([getattr(actuator, name) for actuator in actuators]) for name in names}
+    base = load_scenario("step-response", [f"run.duration={STEP_TIME} s"])
+    result = run_ensemble(base, columns, (), ("angle", "pressure_1", "pressure_2"))
+    supply = base.device.supply
+    found = step_observables(result.times, result.traces, supply.pressure, supply.atmospheric_pressure)
+    for place, name in enumerate(SETS):
+        waits, falls, rises = (found[key][place] for key in (PLATEAU, FALL, RISE))
+        first = f"P1 at the supply {waits:.0f} ms before breakaway, falls by {falls:.1f} psi"
+        yield f"{name:21} {first}; P2 rises by {rises:.1f} psi"
+
+
+def what_is_open(family: Family) -> Iterator[str]:
+    """Yield what the evidence leaves of volumes, readings, conclusions and of the four printed numbers."""
+    yield f"{family.density.size} completions, effective sample size {family.effective:.0f}"
+    for name, unit in ((VOLUME, "cm^3/rad"), (DEAD_VOLUME, "cm^3")):
+        low, median, high = weighted_quantiles(family.draws[name], family.weights, (0.05, 0.5, 0.95))
+        yield f"{name}: {median:.3g} ({low:.3g} to {high:.3g}) {unit}"
+    yield ", ".join(f"{words} {100.0 * weight:.0f} %" for words, weight in weight_of_readings(family).items())
+    for item in conclusions(family):
+        fractions = f"{100.0 * item.of_all:5.1f} % of all, {100.0 * item.of_weight:5.1f} % by the rest"
+        yield f"{item.reading:20} {item.statement:39} {fractions}"
+    yield reach_sentence(within_reach(family))
+    for entry in EVIDENCE:
+        if entry.published is not None:
+            weights = family.weights_without((entry.id, *entry.same_data))
+            low, high = weighted_quantiles(OBSERVABLES[entry.observable](family.metrics), weights, (0.05, 0.95))
+            rest = f"by the rest {low:.3g} to {high:.3g} {entry.unit} (effective sample size {effective(weights):.0f})"
+            yield f"{entry.id:23} {entry.published:g} {entry.unit}; {rest}"
+
+
+def for_a_builder() -> Iterator[str]:
+    """Yield what the device does on a walking leg, for each set."""
+    for name in SETS:
+        compared = compare_walks(load_walk("solenoid", (f"device.set={name}",)), 0.3)
+        found, without = compared.with_device.metrics, compared.without_device.metrics
+        peak = compared.with_device.averages["torque"].mean.max()
+        falls, bare = (np.degrees(metrics["slap_rate"].value) for metrics in (found, without))
+        share, gas = 100.0 * found["push_off_share"].value, GRAMS_PER_KILOGRAM * found["gas"].value
+        yield f"{name:21} peak {peak:.2f} N m, push-off {share:.1f} % of a healthy ankle's work, {gas:.3f} g a stride"
+        yield f"{'':21} the foot comes down at {falls:.0f} deg/s, at {bare:.0f} without the device"
+
+
+def draw(family: Family, file: str) -> None:
+    """Draw where the improvement comes from, and which volumes the evidence leaves."""
+    import matplotlib.figure
+
+    draws = {name: values[: family.even] for name, values in family.draws.items()}
+    quiet = agreement_with(QUIET, family.metrics)[: family.even] > 0.0
+    chosen = quiet & (draws[VOLTS] == 1.0) & (draws[DISCHARGE] == 0.0) & (draws[ON_OFF_RATE] == 20.0)
+    demand, gain = demand_over_ceiling(draws)[chosen], improvement(family.metrics)[: family.even][chosen]
+    entry = paper_entries()[IMPROVEMENT]
+    printed, deviation = entry.published or 0.0, entry.deviation or 0.0
+    with house_style():
+        figure = matplotlib.figure.Figure(figsize=(9.0, 3.9), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        left.axhspan(printed - deviation, printed + deviation, color=VERMILION, alpha=0.25, linewidth=0.0)
+        left.axvline(1.0, color=GREY, linewidth=0.9, linestyle=(0, (1, 2)))
+        left.plot(demand, gain, ".", color=BLUE, markersize=3.0)
+        left.set(ylim=(-60.0, 100.0), xlabel="Demand over what the supply holds", ylabel="RMS error less (%)")
+        left.set_title("U as the opening, printed Cd, 20 Hz; band: the printed 15 %")
+        weights = family.weights / family.weights.max()
+        kept = weights > 1.0e-3
+        right.scatter(
+            family.draws[VOLUME][kept], family.draws[DEAD_VOLUME][kept], s=25.0 * weights[kept], color=BLUE, alpha=0.5
+        )
+        for name, marker in zip(SETS, "sDo", strict=True):
+            actuator = load_device(name).actuator
+            at = 1.0e6 * actuator.volume_per_angle, 1.0e6 * actuator.dead_volume_1
+            right.plot(*at, marker, color=VERMILION, markersize=7.0, linestyle="none", label=name)
+        right.set(xlabel="Volume per angle (cm$^3$/rad)", ylabel="Dead volume (cm$^3$)")
+        right.set_title("What all the evidence leaves of the volumes")
+        right.legend(loc="upper right")
+        mark_kind(figure, "simulated")
+        figure.savefig(file, dpi=150)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print every number, section by section, and draw the figure."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("--draws", type=int, default=98_304, help="completions of the torque task; default 98304")
+    parser.add_argument("--figure", default="docs/images/comparison.png", help="where the figure is written")
+    chosen = parser.parse_args(arguments)
+    family = infer_settings(chosen.draws)
+    for title, lines in (
+        ("Where 15 % comes from", where_it_comes_from()),
+        ("Law and valve", (line for level in (6.0, 4.0) for line in law_and_valve(level))),
+        ("Figure 7", figure_7()),
+        ("What is open", what_is_open(family)),
+        ("For a builder", for_a_builder()),
+    ):
+        print(f"{title}\n")
+        for line in lines:
+            print(f"    {line}", flush=True)
+        print()
+    draw(family, chosen.figure)
+
+
+if __name__ == "__main__":
+    main()
