@@ -87,7 +87,9 @@ def test_what_a_synthetic_measurement_tests_is_marked_in_file_and_report(out: Pa
     claims = json.loads((out / "claims.json").read_text(encoding="utf-8"))["claims"]
     marked = [claim for claim in claims if claim["synthetic"]]
     assert len(marked) == 8
-    assert all(claim["verdict"] == "shown_on_synthetic" and "synthetic" in claim["note"] for claim in marked)
+    assert all(
+        claim["verdict"] in ("shown_on_synthetic", "contradicted") and "synthetic" in claim["note"] for claim in marked
+    )
     page = (out / "report.html").read_text(encoding="utf-8")
     assert page.count("◇ shown on<br>synthetic data</span></td>") == 7
     assert "Figure 3 of the paper, from synthetic recordings" in page
