@@ -170,7 +170,7 @@ def draw(family: Family, file: str) -> None:
         left.axvline(1.0, color=GREY, linewidth=0.9, linestyle=(0, (1, 2)))
         left.plot(demand, gain, ".", color=BLUE, markersize=3.0)
         left.set(ylim=(-60.0, 100.0), xlabel="Demand over what the supply holds", ylabel="RMS error less (%)")
-        left.set_title("U as the opening, printed Cd, 20 Hz; band: the printed 15 %")
+        left.set_title("Where the printed 15 % (band) comes from")
         weights = family.weights / family.weights.max()
         kept = weights > 1.0e-3
         right.scatter(
@@ -181,10 +181,10 @@ def draw(family: Family, file: str) -> None:
             at = 1.0e6 * actuator.volume_per_angle, 1.0e6 * actuator.dead_volume_1
             right.plot(*at, marker, color=VERMILION, markersize=7.0, linestyle="none", label=name)
         right.set(xlabel="Volume per angle (cm$^3$/rad)", ylabel="Dead volume (cm$^3$)")
-        right.set_title("What all the evidence leaves of the volumes")
-        right.legend(loc="upper right")
+        right.set_title("What the evidence leaves of the volumes")
+        right.legend(loc="center right")
         mark_kind(figure, "simulated")
-        figure.savefig(file, dpi=150)
+        figure.savefig(file, dpi=90)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
