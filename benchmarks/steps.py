@@ -75,7 +75,7 @@ def steps_of_run(scenario: str, folder: Path) -> list[dict[str, Any]]:
     step("imports to read the scenario", lambda: load("ppafo.simulation.loading", "ppafo.storage"))
     step("scenario", lambda: sys.modules["ppafo.simulation.loading"].load_scenario(scenario))
     step("imports to run it", lambda: load("ppafo.simulation.simulate"))
-    step("run", lambda: command._simulate(state["scenario"]))
+    step("run", lambda: sys.modules["ppafo.simulation.simulate"].simulate(state["scenario"]))
     result = state["run"]
     step("imports to draw", sys.modules["ppafo.cli.output"].load_drawing)
     step("figure", lambda: load("ppafo.answers.recording_figure")[0].figure_files(result.plot()))

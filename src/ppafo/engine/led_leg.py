@@ -1,7 +1,7 @@
 """A foot on a shank that is led, without ground: the torque that it adds to a free vane, in the lanes and in Python.
 
 Foot, foot plate and vane turn as one body, whose inertia the plant has; what shank, knee and weight do to it stands
-here. A walk's free foot has the same physics with more around it (``scheme/ankle_torque.py``).
+here. A walk's free foot has the same physics with more around it (``scheme/walking.py``).
 """
 
 from collections.abc import Callable
