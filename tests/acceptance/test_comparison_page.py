@@ -1,0 +1,17 @@
+"""The numbers on the page about the comparison are those that its script prints."""
+
+from pathlib import Path
+
+from scripts.comparison_findings import figure_7, where_it_comes_from
+
+PAGE = (Path(__file__).parents[2] / "docs" / "what-the-comparison-shows.md").read_text(encoding="utf-8")
+
+
+def test_the_page_shows_what_one_change_at_a_time_gives() -> None:
+    lines = list(where_it_comes_from())
+    assert len(lines) > 10
+    assert [line for line in lines if f"    {line}\n" not in PAGE] == []
+
+
+def test_the_page_shows_what_each_set_gives_of_figure_7() -> None:
+    assert [line for line in figure_7() if f"    {line}\n" not in PAGE] == []
