@@ -71,7 +71,7 @@ def thrown(angle: float, speed: float, duration: float, *more: str) -> Scenario:
     """A free vane between two sealed chambers at the pressure of the atmosphere."""
     lines = (*SEALED, f"motion.angle={angle} deg", f"motion.angular_velocity={speed} rad/s")
     lines += (f"run.duration={duration} s", "initial.pressure_2=atmosphere")
-    return load_scenario("step-response", (*lines, *more))
+    return load_scenario("step-response", ("motion.kind=free", *lines, *more))
 
 
 @pytest.mark.parametrize(("gas", "exponent"), [((), 1.0), (ADIABATIC, K)], ids=["isothermal", "adiabatic"])
