@@ -217,3 +217,18 @@ def test_sensitivity_ranks_what_varies_in_a_walk_whose_file_lies_in_another_fold
     (metric,) = found.metrics
     shares = dict(zip(found.paths, metric.indices.values[found.method.shown[0]], strict=True))
     assert shares["supply.dorsiflexion_pressure"] > 10.0 * shares["wearer.body_mass"] > 0.0
+
+
+def test_the_page_knows_every_rule_by_which_a_default_of_a_walk_follows_others() -> None:
+    page = (Path(__file__).parents[3] / "page" / "source" / "following.ts").read_text(encoding="utf-8")
+    terms = [
+        term
+        for name in ppafo.list_walks()
+        for path, links in load_scenario(name).links.items()
+        if path.startswith(("controller.", "timing."))
+        for link in links
+        for term in link.terms
+    ]
+    rules = {f"{term.function.__module__.rpartition('.')[2]}.{term.function.__name__}" for term in terms}
+    assert "loading.lag_of_bandwidth" in rules
+    assert {rule for rule in rules if f'"{rule}":' not in page} == set()
