@@ -190,6 +190,9 @@ def test_a_compiler_that_is_set_to_join_or_reorder_operations_is_left_out(
     assert result_of(text("x[0, 0] + 0.125")) == 2.125
     assert "the compiler joins or reorders sums and products" in caplog.messages[0]
     assert list(list_left_out(fresh_cache)) == ["gcc"]
+    smallest = np.nextafter(0.0, 1.0)
+    assert smallest / 2.0 == 0.0 < smallest  # its start-up code would have flushed small numbers to zero
+    assert float(np.float64(2.0**-1022) / 2.0) > 0.0
 
 
 @needs_gcc
