@@ -9,6 +9,7 @@ from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.lanes import RECORDED_ANGLE
 from ppafo.engine.program import Program
 from ppafo.metrics import METRICS
+from ppafo.metrics.metric import MetricKind
 from ppafo.model.catalog import EFFECTS, VALVES
 from ppafo.model.valves import dump
 from ppafo.model.valves.kind import ValveModel
@@ -27,9 +28,14 @@ def valve_models(walks: bool) -> list[ValveModel]:
     return list(found.values())
 
 
+def is_of_any(kind: MetricKind) -> bool:
+    """Whether a metric is read from a recording of any vane, not of a walk or of a foot on the shank of a gait."""
+    return kind.compute is not None and not kind.needs
+
+
 def meters() -> tuple[MeterKind, ...]:
     """Every meter of the metrics of recordings; those of walks have samples of their own."""
-    return tuple({meter.name: meter for kind in METRICS.values() if kind.compute for meter in kind.meters}.values())
+    return tuple({meter.name: meter for kind in METRICS.values() if is_of_any(kind) for meter in kind.meters}.values())
 
 
 def drawn_programs(count: int, seed: int = 1) -> Iterator[Program]:

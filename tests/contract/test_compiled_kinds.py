@@ -18,7 +18,7 @@ from ppafo.engine.numba_compiler import NumbaCompiler
 from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.engine.source_text import SourceCollector
 from ppafo.metrics import METRICS
-from ppafo.metrics.metric import WALK
+from ppafo.metrics.metric import LED_SHANK, WALK
 from ppafo.model.catalog import EFFECTS, VALVES
 from ppafo.model.effects.kind import Moment
 from ppafo.model.sensors import (
@@ -31,7 +31,7 @@ from ppafo.model.sensors import (
     measure,
     measure_gait,
 )
-from ppafo.signals.meter import Course, MeterKind, Sample, WalkSample
+from ppafo.signals.meter import Course, MeterKind, Sample, SwingSample, WalkSample
 
 QUICKLY = '@njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)'
 ROUNDING = 1.0e-12
@@ -175,11 +175,12 @@ def meters(draw: random.Random) -> Iterator[Entry]:
         )
         for number, sample in enumerate(samples)
     ]
-    kinds: dict[str, tuple[MeterKind, bool]] = {
-        meter.name: (meter, WALK in kind.needs) for kind in METRICS.values() for meter in kind.meters
+    kinds: dict[str, tuple[MeterKind, tuple[str, ...]]] = {
+        meter.name: (meter, kind.needs) for kind in METRICS.values() for meter in kind.meters
     }
-    for name, (kind, is_of_walk) in kinds.items():
-        seen: list[Sample] | list[WalkSample] = walked if is_of_walk else samples
+    swung = [SwingSample(*sample, sample.angle + 0.1, 0.9 * sample.angle, 0.01 * sample.command) for sample in samples]
+    for name, (kind, needs) in kinds.items():
+        seen: list[Any] = walked if WALK in needs else swung if LED_SHANK in needs else list(samples)
         state = kind.start(course, seen[0])
         tried = []
         for sample in seen[1:]:

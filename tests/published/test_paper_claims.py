@@ -5,6 +5,8 @@ import pytest
 from ppafo.questions.reproduce.answer import Reproduction
 from ppafo.questions.reproduce.claim import Claim
 from ppafo.questions.reproduce.solve import reproduce
+from ppafo.questions.reproduce.step_response import step_events
+from ppafo.running import simulate
 
 
 @pytest.fixture(scope="module")
@@ -77,11 +79,18 @@ def test_the_step_response_goes_as_the_text_tells(reproduction: Reproduction, se
     assert told[sentence].holds, told[sentence].evidence
 
 
-def test_the_vane_breaks_away_at_the_printed_static_friction(reproduction: Reproduction) -> None:
+def test_a_vane_without_a_leg_breaks_away_at_the_printed_static_friction() -> None:
+    recording = simulate("step-response", ["motion.kind=free"]).recording
+    events = step_events(recording)
+    assert events is not None
+    torque = recording["torque"][events.breakaway - 1 : events.breakaway + 2]
+    assert torque[0] <= 0.45 <= torque[-1]
+
+
+def test_the_weight_of_the_foot_helps_the_vane_to_break_away(reproduction: Reproduction) -> None:
     events = reproduction.step_events
     assert events is not None
-    torque = reproduction.step.recording["torque"][events.breakaway - 1 : events.breakaway + 2]
-    assert torque[0] <= 0.45 <= torque[-1]
+    assert reproduction.step.recording["torque"][events.breakaway] < 0.45
 
 
 @pytest.mark.parametrize(
@@ -91,7 +100,7 @@ def test_the_vane_breaks_away_at_the_printed_static_friction(reproduction: Repro
         ("static_friction", 0.45, 0.445, 0.455, "N m"),
         ("leak_area", 0.3, 0.298, 0.302, "mm^2"),
         ("step_rms_position", 2.1, 0.5, 4.0, "deg"),
-        ("step_rms_pressure_1", 3.7, 0.5, 3.0, "psi"),
+        ("step_rms_pressure_1", 3.7, 3.0, 4.5, "psi"),
         ("step_rms_pressure_2", 1.4, 3.0, 5.5, "psi"),
         ("step_rms_pressure_difference", 4.8, 3.0, 7.0, "psi"),
     ],
@@ -128,7 +137,6 @@ def test_the_printed_numbers_are_judged_by_their_own_arithmetic(
 
 def test_report_says_where_the_step_response_differs_from_the_telling(reproduction: Reproduction) -> None:
     differences = {seen.id: seen.difference for seen in reproduction.step_observations if seen.difference}
-    assert "chamber 2" in differences["pressure_1_rises_until_breakaway"]
     assert "rises again by" in differences["pressure_1_falls_in_motion"]
     assert "it rises by" in differences["pressure_2_slows_in_motion"]
-    assert len(differences) == 3
+    assert len(differences) == 2

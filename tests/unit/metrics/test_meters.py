@@ -14,21 +14,21 @@ from ppafo.metrics.gas import ENERGIES
 from ppafo.metrics.metric import Readings
 from ppafo.metrics.switching import UNDECIDED, Swing, count_of, next_swing, reversals
 from ppafo.signals import Channel, Recording
-from ppafo.signals.meter import SAME_LEVEL, Course, MeterKind, Sample, advance_course
+from ppafo.signals.meter import SAME_LEVEL, Course, MeterKind, SwingSample, advance_course
 
 Floats = NDArray[np.float64]
 
 INTERVAL = 0.01
 
 
-def samples_of(recording: Recording) -> list[Sample]:
+def samples_of(recording: Recording) -> list[SwingSample]:
     names = ("angle", "angular_velocity", "pressure_1", "pressure_2", "torque", "command", "reference")
-    names += ("temperature_1", "temperature_2")
+    names += ("temperature_1", "temperature_2", "foot_angle", "measured_foot_angle", "toe_difference")
     columns = zip(*(recording[name].tolist() for name in names), strict=True)
-    return [Sample(float(number), *values) for number, values in enumerate(columns)]
+    return [SwingSample(float(number), *values) for number, values in enumerate(columns)]
 
 
-def metered(meter: MeterKind, samples: Sequence[Sample], course: Course) -> tuple[Any, Course]:
+def metered(meter: MeterKind, samples: Sequence[SwingSample], course: Course) -> tuple[Any, Course]:
     course = advance_course(course, samples[0])
     state = meter.start(course, samples[0])
     for sample in samples[1:]:
@@ -80,6 +80,9 @@ def recorded(torque: Floats, reference: Floats, command: Floats, angle: Floats) 
         "mass_2": (3e-5 + 2e-5 * time, "kg"),
         "temperature_1": (293.0 - torque, "K"),
         "temperature_2": (293.0 + 2.0 * torque, "K"),
+        "foot_angle": (angle - 1.0, "rad"),
+        "measured_foot_angle": (0.9 * angle - 1.1, "rad"),
+        "toe_difference": (0.01 * torque, "m"),
         **{name: (number * time, "J") for number, name in enumerate(ENERGIES, 1)},
     }
     return Recording("metered", time, {name: Channel(channel, unit) for name, (channel, unit) in values.items()})

@@ -21,7 +21,7 @@ SET = ["validate", "ppafo2011", *SUPPLY]
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with one step response as CSV and NetCDF, measured late and with noise by a device like the set."""
     folder = tmp_path_factory.mktemp("bench")
-    run = simulate(load_scenario("step-response")).recording
+    run = simulate(load_scenario("step-response", ["motion.kind=free"])).recording
     random = np.random.default_rng(4)
     channels = {
         name: Channel(np.interp(run.time - 0.003, run.time, run[name]) + noise * random.standard_normal(len(run)), unit)

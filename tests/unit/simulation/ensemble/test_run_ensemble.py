@@ -45,6 +45,7 @@ CASES: tuple[tuple[str, tuple[str, ...]], ...] = (
     (TASK, ("run.duration=0.5 s", "reference.kind=sine", "reference.amplitude=2 N m", "reference.frequency=9 Hz")),
     (TASK, ("run.duration=0.4 s", "reference.kind=constant", "reference.level=2 N m")),
     ("step-response", ()),
+    ("swing-foot", ()),
     ("torque-task-moving-ankle", ("run.duration=1.9 s", *WARM)),
     ("step-response", ("controller.kind=pid", "reference.kind=ramp_hold", "reference.level=2 N m", "run.duration=1 s")),
 )
