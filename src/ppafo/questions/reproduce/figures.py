@@ -100,9 +100,9 @@ def _curves(recording: Recording, levels: Levels) -> tuple[_Curve, ...]:
     )
     return (
         _Curve("Vane angle", "deg", np.degrees(recording["angle"]), ACTUAL, None),
-        _Curve("Pressure difference, $P_1 - P_2$", "psi", difference, ACTUAL, (0.2, 0.09, 0.34, 0.3)),
-        _Curve("Chamber 1 (plantarflexion), $P_1$", "psig", pressure_1, CHAMBER_1, (0.3, 0.13, 0.34, 0.44)),
-        _Curve("Chamber 2 (dorsiflexion), $P_2$", "psig", pressure_2, CHAMBER_2, (0.13, 0.1, 0.34, 0.38)),
+        _Curve("Pressure difference, $P_1 - P_2$", "psi", difference, ACTUAL, (0.69, 0.14, 0.29, 0.34)),
+        _Curve("Chamber 1 (plantarflexion), $P_1$", "psig", pressure_1, CHAMBER_1, (0.3, 0.12, 0.34, 0.34)),
+        _Curve("Chamber 2 (dorsiflexion), $P_2$", "psig", pressure_2, CHAMBER_2, (0.69, 0.3, 0.29, 0.4)),
     )
 
 
