@@ -9,6 +9,8 @@ import pytest
 
 from ppafo.cli.main import main
 
+pytestmark = pytest.mark.thorough
+
 PAGES = Path(__file__).parents[2] / "docs" / "how-to"
 
 

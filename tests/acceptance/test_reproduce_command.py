@@ -49,7 +49,7 @@ IDS = [
     "beyond_improved_control",
     "large_and_heavy",
 ]
-FIGURES = ("figure-3-identification", "figure-7-step-response", "figure-8-torque-task", "unreported-settings")
+FIGURES = ("device", "figure-3-identification", "figure-7-step-response", "figure-8-torque-task", "unreported-settings")
 RECORDINGS = ("step-response", "torque-task-solenoid", "torque-task-proportional")
 
 
@@ -146,7 +146,7 @@ def test_the_table_and_the_path_of_the_report_are_printed_and_progress_goes_asid
     printed = capsys.readouterr()
     assert all(any(line.startswith(f"{name} ") for line in printed.out.splitlines()) for name in IDS)
     assert printed.out.splitlines()[-1] == f"report: {tmp_path / 'report.html'}"
-    assert max(len(line) for line in printed.out.splitlines()[:-1]) <= 100
+    assert max(len(line) for line in printed.out.splitlines()[:-1]) <= 125
     assert "simulating step-response" in printed.err
     assert "simulating" not in printed.out
 

@@ -76,8 +76,15 @@ def _read_leg(reading: Reading, numbers: dict[str, Any], folder: Path) -> Leg:
         gait = load_gait(name if name in list_gaits() else folder / name)
     except DataError as error:
         raise reading.refusal(f"{section}.gait", one_line(error)) from error
-    curves = (series_of(gait, curve) for curve in ("shank_angle", "ankle_angle", "knee_forward", "knee_up"))
-    series = ShankSeries(1.0 / gait.stride_time, shank.settings["start"], numbers["toe_lever"], *curves)
+    series = ShankSeries(
+        frequency=1.0 / gait.stride_time,
+        start=shank.settings["start"],
+        toe_lever=numbers["toe_lever"],
+        shank=series_of(gait, "shank_angle"),
+        ankle=series_of(gait, "ankle_angle"),
+        knee_forward=series_of(gait, "knee_forward"),
+        knee_up=series_of(gait, "knee_up"),
+    )
     return Leg(**numbers, shank=shank, gait=gait.name, curves=series)
 
 

@@ -320,7 +320,7 @@ IDENTIFICATION_FIGURE = "figure-3-identification"
 STEP_FIGURE = "figure-7-step-response"
 TORQUE_FIGURE = "figure-8-torque-task"
 UNSAID_FIGURE = "unreported-settings"
-_HEAD = ("claim", "paper", "own arithmetic", "ours", "left open", "verdict")
+_HEAD = ("claim", "paper", "ours", "left open", "verdict")
 _PAPER = "'ppafo reproduce' without --study makes the page of these claims, with sources, figures and assumptions."
 _STUDIES_HEAD = ("study", "claim", "published", "own arithmetic", "ours", "left open", "verdict")
 _RULE = (
@@ -422,8 +422,7 @@ def _paper_rows(reproduction: Reproduction) -> tuple[tuple[str | None, ...], ...
     return tuple(
         (
             claim.id,
-            claim.published or None,
-            claim.own or None,
+            claim.published or (f"{claim.own} (own sum)" if claim.own else None),
             None if claim.value is None else quantity(claim.value, claim.unit),
             claim.open_range or None,
             claim.verdict_words,
@@ -480,12 +479,12 @@ def _override_remarks(overrides: tuple[str, ...]) -> tuple[str, ...]:
 def _left_open(reproduction: Reproduction) -> list[str]:
     """Return what the column of ranges is, where there are any by completions, and what nothing tests."""
     found = [
-        "left open: by the printed digits, or by an interval of the identification; of the torque task the 5 to 95 % "
-        "of completions that agree with everything else that the paper says",
+        "left open: by the printed digits, or by an interval of the identification;",
+        "of the torque task the 5 to 95 % of completions that agree with everything else that the paper says",
         "*: ours is nearer to the published number than 95 % of that; the assumptions were chosen for this row",
     ]
-    words = "; ".join(f"{entry.id} ({entry.not_testable.rstrip('.')})" for entry in reproduction.unread)
-    return [*(found if reproduction.family is not None else []), f"stated and tested by nothing here: {words}"]
+    unread = [f"  {entry.id}: {entry.not_testable.rstrip('.')}" for entry in reproduction.unread]
+    return [*(found if reproduction.family is not None else []), "stated, and tested by nothing here:", *unread]
 
 
 def _missed_claims(reproduction: Reproduction) -> list[str]:

@@ -99,10 +99,28 @@ def _curves(recording: Recording, levels: Levels) -> tuple[_Curve, ...]:
         ((recording[name] - levels.atmosphere) / PASCALS_PER_PSI) for name in ("pressure_1", "pressure_2")
     )
     return (
-        _Curve("Vane angle", "deg", np.degrees(recording["angle"]), ACTUAL, None),
-        _Curve("Pressure difference, $P_1 - P_2$", "psi", difference, ACTUAL, (0.69, 0.14, 0.29, 0.34)),
-        _Curve("Chamber 1 (plantarflexion), $P_1$", "psig", pressure_1, CHAMBER_1, (0.3, 0.12, 0.34, 0.34)),
-        _Curve("Chamber 2 (dorsiflexion), $P_2$", "psig", pressure_2, CHAMBER_2, (0.69, 0.3, 0.29, 0.4)),
+        _Curve(name="Vane angle", unit="deg", values=np.degrees(recording["angle"]), look=ACTUAL, inset=None),
+        _Curve(
+            name="Pressure difference, $P_1 - P_2$",
+            unit="psi",
+            values=difference,
+            look=ACTUAL,
+            inset=(0.69, 0.14, 0.29, 0.34),
+        ),
+        _Curve(
+            name="Chamber 1 (plantarflexion), $P_1$",
+            unit="psig",
+            values=pressure_1,
+            look=CHAMBER_1,
+            inset=(0.3, 0.12, 0.34, 0.34),
+        ),
+        _Curve(
+            name="Chamber 2 (dorsiflexion), $P_2$",
+            unit="psig",
+            values=pressure_2,
+            look=CHAMBER_2,
+            inset=(0.69, 0.3, 0.29, 0.4),
+        ),
     )
 
 

@@ -17,6 +17,8 @@ from ppafo.engine.rows import rebuild
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
 
+pytestmark = pytest.mark.thorough
+
 PERIOD = 1.0e-3
 STRIDE = 1.1
 LAWS = ("event_on_off", "event_pid")

@@ -157,7 +157,9 @@ def test_a_model_that_lacks_something_caps_its_verdicts(experiment: Experiment) 
     whole = fitted(experiment, FLOW)
     wrong = dataclasses.replace(
         experiment,
-        scenario=load_scenario("step-response", ["run.duration=0.35 s", "foot_plate.gravity_torque=0.4 N m"]),
+        scenario=load_scenario(
+            "step-response", ["motion.kind=free", "run.duration=0.35 s", "foot_plate.gravity_torque=0.4 N m"]
+        ),
     )
     poor = fitted(wrong, FLOW)
     # Wider, but nowhere near the error: residuals alone cannot say how far a wrong model is off.
@@ -209,9 +211,13 @@ def test_a_number_limited_to_one_recording_leaves_the_other_alone(
     experiment: Experiment, step: Scenario, recorded: Callable[..., Recording]
 ) -> None:
     start = f"initial.pressure_2={step.initial_pressure_2} Pa_a"
-    low = load_scenario("step-response", ["run.duration=0.35 s", "supply.pressure=45 psi_g", start, "name=low"])
+    low = load_scenario(
+        "step-response", ["motion.kind=free", "run.duration=0.35 s", "supply.pressure=45 psi_g", start, "name=low"]
+    )
     # The model of the second starts there too, and not at the supply that is fitted.
-    second = Experiment("low", load_scenario("step-response", ["run.duration=0.35 s", start]), recorded(low))
+    second = Experiment(
+        "low", load_scenario("step-response", ["motion.kind=free", "run.duration=0.35 s", start]), recorded(low)
+    )
     supplies = tuple(FreeParameter("supply.pressure", recordings=(label,)) for label in ("step", "low"))
     found = fit(TrajectoryProblem(supplies, (experiment, second)))
     high, less = (estimate.value for estimate in found.estimates)

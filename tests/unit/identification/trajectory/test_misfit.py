@@ -103,7 +103,7 @@ def test_a_prediction_holds_new_recordings_of_the_same_bench(wrong: list[Traject
 def test_a_fitted_initial_state_starts_from_the_recording_and_not_from_the_scenario(
     experiment: Experiment, step: Scenario
 ) -> None:
-    room = load_scenario("step-response", ["run.duration=0.35 s", "initial.pressure_2=atmosphere"])
+    room = load_scenario("step-response", ["motion.kind=free", "run.duration=0.35 s", "initial.pressure_2=atmosphere"])
     other = dataclasses.replace(experiment, scenario=room, initial_state="recording")
     starts = tuple(FreeParameter(f"initial.{name}", recordings=("step",)) for name in ("pressure_1", "pressure_2"))
     problem = TrajectoryProblem((FreeParameter("foot_plate.inertia", start=0.010), *starts), (other,))

@@ -69,7 +69,12 @@ def test_a_recorded_supply_takes_the_place_of_both_regulators(
 ) -> None:
     low = load_scenario(
         "step-response",
-        ["run.duration=0.35 s", "supply.pressure=45 psi_g", "supply.dorsiflexion_pressure=45 psi_g"],
+        [
+            "motion.kind=free",
+            "run.duration=0.35 s",
+            "supply.pressure=45 psi_g",
+            "supply.dorsiflexion_pressure=45 psi_g",
+        ],
     )
     recording = recorded(low)
     start = dataclasses.replace(step, initial_pressure_2=low.initial_pressure_2)

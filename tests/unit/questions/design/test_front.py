@@ -25,6 +25,8 @@ from ppafo.questions.design.search import (
     survivors_of_many,
 )
 
+pytestmark = pytest.mark.thorough
+
 
 def random_worth(seed: int, count: int, whole: bool = False) -> Worth:
     """Points with three objectives, some of which break constraints; whole numbers make many equal ones."""

@@ -18,6 +18,8 @@ from ppafo.questions.league.walking.measures import walk_measures
 from ppafo.questions.league.walking.solver import StrideOptimum
 from ppafo.questions.league.walking.task import walking_task
 
+pytestmark = pytest.mark.thorough
+
 TASK = walking_task(minutes=0.1)
 KINDS = ("event_proportional", "event_damped_learning", "event_feedback_linearisation")
 
