@@ -11,6 +11,8 @@ from ppafo.cli.main import main
 from ppafo.walking import load_walk
 from ppafo.walking.planning import gait_sensors_of, has_ideal_sensors
 
+pytestmark = pytest.mark.thorough
+
 PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "let-it-walk.md").read_text(encoding="utf-8")
 
 

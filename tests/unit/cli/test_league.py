@@ -12,6 +12,8 @@ from ppafo.questions.league.walking import bound, contest
 from ppafo.questions.league.walking.task import CONFIGURATION
 from ppafo.storage.owned_folder import MARK
 
+pytestmark = pytest.mark.thorough
+
 NAMES = ("league.txt", "league.json", "league.png", "league.svg", "report.html")
 SHORT = ["--set", "run.duration=0.4 s", "--set", "reference.ramp_time=0.2 s", "--set", "reference.level=2 N m"]
 

@@ -322,7 +322,7 @@ TORQUE_FIGURE = "figure-8-torque-task"
 UNSAID_FIGURE = "unreported-settings"
 _HEAD = ("claim", "paper", "ours", "left open", "verdict")
 _PAPER = "'ppafo reproduce' without --study makes the page of these claims, with sources, figures and assumptions."
-_STUDIES_HEAD = ("study", "claim", "published", "own arithmetic", "ours", "left open", "verdict")
+_STUDIES_HEAD = ("study", "claim", "published", "ours", "left open", "verdict")
 _RULE = (
     "'Ours' is computed anew whenever this is run. 'Reproduced' follows from printed numbers alone; 'with assumptions' "
     "rests on values and experiments that the publication does not print; 'contradicted' lies outside what is listed "
@@ -344,8 +344,7 @@ def _studies_answer(solved: Studies) -> Answer:
             (
                 name,
                 item.claim.entry.id,
-                item.published or None,
-                item.claim.entry.own or None,
+                item.published or _own_sum(item.claim.entry.own),
                 item.ours,
                 None,
                 VERDICTS[item.verdict],
@@ -418,11 +417,16 @@ def _agrees(low: float | None, high: float | None, unit: str) -> str | None:
     return f"at least {low:g} {unit}".rstrip() if high is None else f"at most {high:g} {unit}".rstrip()
 
 
+def _own_sum(own: str) -> str | None:
+    """Return a number that only own arithmetic on published ones gives, as it stands in a table."""
+    return f"{own} (own sum)" if own else None
+
+
 def _paper_rows(reproduction: Reproduction) -> tuple[tuple[str | None, ...], ...]:
     return tuple(
         (
             claim.id,
-            claim.published or (f"{claim.own} (own sum)" if claim.own else None),
+            claim.published or _own_sum(claim.own),
             None if claim.value is None else quantity(claim.value, claim.unit),
             claim.open_range or None,
             claim.verdict_words,

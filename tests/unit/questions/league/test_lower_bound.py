@@ -28,6 +28,8 @@ from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.symbolic import symbolic
 
+pytestmark = pytest.mark.thorough
+
 casadi = pytest.importorskip("casadi", reason="the lower bound needs the extra 'optimal'")
 SHORT = ("run.duration=1 s", "reference.ramp_time=0.4 s")
 
