@@ -245,6 +245,6 @@ def test_an_entry_gives_the_same_compiled_and_interpreted(compiled: Any, name: s
         results.add(tuple(expected))
     assert (
         len(results) > 1
-        or entry.name in ("off", "constant")
+        or entry.name in ("off", "constant", "spool_play_slopes")
         or entry.name.endswith(("_rates", "_next_event", "_start"))
     )
