@@ -18,7 +18,6 @@ from ppafo.engine.numba_compiler import NumbaCompiler
 from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.engine.source_text import SourceCollector
 from ppafo.metrics import METRICS
-from ppafo.metrics.metric import LED_SHANK, WALK
 from ppafo.model.catalog import EFFECTS, VALVES
 from ppafo.model.effects.kind import Moment
 from ppafo.model.sensors import (
@@ -31,7 +30,7 @@ from ppafo.model.sensors import (
     measure,
     measure_gait,
 )
-from ppafo.signals.meter import Course, MeterKind, Sample, SwingSample, WalkSample
+from ppafo.signals.meter import Course, FootSample, MeterKind, Sample, StrideSample
 
 QUICKLY = '@njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)'
 ROUNDING = 1.0e-12
@@ -151,18 +150,11 @@ def effects(draw: random.Random) -> Iterator[Entry]:
 def meters(draw: random.Random) -> Iterator[Entry]:
     """What is worked out sample by sample for the metrics."""
     course = Course(2.0, 2.0, 1.0e-6, 20.0)
-    samples = [
-        Sample(
-            float(number),
-            *(draw.uniform(-2.0, 2.0) for _ in range(6)),
-            min(0.1 * number, 2.0),
-            *(draw.uniform(250.0, 350.0) for _ in range(2)),
-        )
-        for number in range(60)
-    ]
-    walked = [
-        WalkSample(
-            *sample,
+    samples = []
+    for number in range(60):
+        drawn = [draw.uniform(-2.0, 2.0) for _ in range(6)]
+        temperatures = [draw.uniform(250.0, 350.0) for _ in range(2)]
+        stride = StrideSample(
             supplied_mass=1.0e-4 * number,
             strides=float(number // 8),
             push_off_work=0.1 * number,
@@ -173,20 +165,16 @@ def meters(draw: random.Random) -> Iterator[Entry]:
             level=1.0 if 40 < number < 44 else 0.0,
             time=0.01 * number,
         )
-        for number, sample in enumerate(samples)
-    ]
-    kinds: dict[str, tuple[MeterKind, tuple[str, ...]]] = {
-        meter.name: (meter, kind.needs) for kind in METRICS.values() for meter in kind.meters
-    }
-    swung = [SwingSample(*sample, sample.angle + 0.1, 0.9 * sample.angle, 0.01 * sample.command) for sample in samples]
-    for name, (kind, needs) in kinds.items():
-        seen: list[Any] = walked if WALK in needs else swung if LED_SHANK in needs else list(samples)
-        state = kind.start(course, seen[0])
+        foot = FootSample(drawn[0] + 0.1, 0.9 * drawn[0], 0.01 * drawn[5])
+        samples.append(Sample(float(number), *drawn, min(0.1 * number, 2.0), *temperatures, foot, stride))
+    kinds: dict[str, MeterKind] = {meter.name: meter for kind in METRICS.values() for meter in kind.meters}
+    for name, kind in kinds.items():
+        state = kind.start(course, samples[0])
         tried = []
-        for sample in seen[1:]:
+        for sample in samples[1:]:
             tried.append((state, course, sample))
             state = kind.update(*tried[-1])
-        yield Entry(f"{name}_start", kind.start, [(course, sample) for sample in seen])
+        yield Entry(f"{name}_start", kind.start, [(course, sample) for sample in samples])
         yield Entry(f"{name}_update", kind.update, tried)
 
 

@@ -1,7 +1,7 @@
 """What the lanes do at a sample: sense, control, keep what sensors and valve get late; and meters, and traces.
 
-Meters and traces stand where nothing is recorded. Their samples are the ones that a recording would have. The course of
-the reference, of which meters are told, is looked at once before the first sample, then followed.
+Meters and traces stand where nothing is recorded. Their samples are the ones that a recording would have. Meters
+get the course of the reference too, which is looked at once before the first sample and followed from there.
 """
 
 from ppafo.engine.lane_rows import LaneRows, indent
@@ -15,7 +15,7 @@ from ppafo.model.gait import foot_in_gait
 from ppafo.model.places import shown_signals
 from ppafo.model.plant import actuator_torque, chamber_pressures
 from ppafo.model.sensors import GaitMeasurement, Measurement, late_measurement, measure, measure_gait, samples_late
-from ppafo.signals.meter import SAME_LEVEL, Sample, SwingSample, WalkSample, advance_course, is_away
+from ppafo.signals.meter import SAME_LEVEL, FootSample, Sample, StrideSample, advance_course, is_away
 
 SIGNALS = ("angle", "pressure_1", "pressure_2")
 READINGS = {
@@ -183,7 +183,7 @@ def remember_commands(rows: LaneRows) -> list[str]:
 
 
 TRACED: dict[str, str] = {
-    **{name: f"sample.{name}" for name in Sample._fields if name != "number"},
+    **{name: f"sample.{name}" for name in Sample._fields if name not in ("number", "foot", "stride")},
     **{name: f"state.{name}" for name in ("mass_1", "mass_2", "supplied_mass", "vented_mass", "leaked_mass")},
 }
 """Channels that can be traced, and where a sample has them."""
@@ -252,32 +252,38 @@ def sample_lines(rows: LaneRows, moment: str) -> list[str]:
         "temperature_1": warm[0] if thermal else "0.0",
         "temperature_2": warm[1] if thermal else "0.0",
     }
-    of_walk: dict[str, str] = {}
+    groups: tuple[str, ...] = ()
+    foot, stride, on_gait = _zeros(FootSample), _zeros(StrideSample), []
     if program.walks:
-        wanted, of_walk = _of_state(rows, REQUEST), _walk_values(rows)
-    groups: tuple[str, ...] = ("walk", "controller_state") if program.walks else ()
-    kind: type = WalkSample if program.walks else Sample
-    on_gait: list[str] = []
+        groups = ("walk", "controller_state")
+        wanted, stride = _of_state(rows, REQUEST), _stride_values(rows)
     if program.shank is GAIT_SHANK:
-        groups, kind = ("shank",), SwingSample
+        groups = ("shank",)
         on_gait = [f"foot = {add(foot_in_gait)}(shank, {moment} * timing.step, state.angle)"]
-        values |= {
-            "foot_angle": "foot.angle",
-            "measured_foot_angle": "foot.measured_angle",
-            "toe_difference": "foot.toe_difference",
-        }
+        foot = {name: f"foot.{name}" for name in FootSample._fields}
+    values |= {"foot": _row(add(FootSample), foot), "stride": _row(add(StrideSample), stride)}
     return [
         *[rows.load(group) for group in ("timing", "plant", "state", "result", "reference", *thermal, *groups)],
         *present_pressures(rows),
         torque_line(rows, "state.angle"),
         f"wanted = {wanted}",
         *on_gait,
-        f"sample = {add(kind)}({', '.join(f'{name}={value}' for name, value in (values | of_walk).items())})",
+        f"sample = {_row(add(Sample), values)}",
     ]
 
 
-def _walk_values(rows: LaneRows) -> dict[str, str]:
-    """What a sample of a walk has beside the others."""
+def _zeros(row: type[FootSample] | type[StrideSample]) -> dict[str, str]:
+    """A row of what a run does not have."""
+    return dict.fromkeys(row._fields, "0.0")
+
+
+def _row(name: str, values: dict[str, str]) -> str:
+    """Expression that makes a row."""
+    return f"{name}({', '.join(f'{field}={value}' for field, value in values.items())})"
+
+
+def _stride_values(rows: LaneRows) -> dict[str, str]:
+    """Where a walk is in its stride."""
     totals = ("strides", "push_off_work", "slap_rates", "clearances", "toe_landings")
     return {
         "supplied_mass": "state.supplied_mass",

@@ -7,7 +7,7 @@ import numpy as np
 from ppafo.metrics.metric import LED_SHANK, Floats, MetricKind, Readings
 from ppafo.model.columns import root
 from ppafo.signals import Recording
-from ppafo.signals.meter import Course, MeterKind, Sample, SwingSample
+from ppafo.signals.meter import Course, MeterKind, Sample
 
 TRAVEL_FRACTION = 0.01
 """A move has begun when this fraction of its travel is done, and has arrived when this fraction is left."""
@@ -138,17 +138,17 @@ class FootError(NamedTuple):
     lowest: float
 
 
-def start_foot_error(course: Course, sample: SwingSample) -> FootError:
+def start_foot_error(course: Course, sample: Sample) -> FootError:
     """The error of the first sample."""
-    error = sample.foot_angle - sample.measured_foot_angle
-    return FootError(error * error, 0.0, sample.toe_difference)
+    error = sample.foot.angle - sample.foot.measured_angle
+    return FootError(error * error, 0.0, sample.foot.toe_difference)
 
 
-def update_foot_error(state: FootError, course: Course, sample: SwingSample) -> FootError:
+def update_foot_error(state: FootError, course: Course, sample: Sample) -> FootError:
     """One interval more."""
-    error = sample.foot_angle - sample.measured_foot_angle
+    error = sample.foot.angle - sample.foot.measured_angle
     square = error * error
-    return FootError(square, state.total + 0.5 * (state.last + square), min(state.lowest, sample.toe_difference))
+    return FootError(square, state.total + 0.5 * (state.last + square), min(state.lowest, sample.foot.toe_difference))
 
 
 FOOT_ERROR = MeterKind("foot_error", FootError, start_foot_error, update_foot_error)

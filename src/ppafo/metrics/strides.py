@@ -1,7 +1,7 @@
 """Metrics of a walk stride by stride, without a recording: one meter that goes through the samples once.
 
-What is counted is that of ``walking/strides.py`` and ``walking/strides.py``, which count it in a recording with
-its mean curves; tests hold both together.
+What is counted is that of ``walking/strides.py``, which counts it in a recording with its mean curves; tests compare
+the two.
 """
 
 import math
@@ -13,7 +13,7 @@ from ppafo.control.walking.phases import PUSH_OFF
 from ppafo.control.walking.signs import HELPS
 from ppafo.metrics.metric import REQUEST, STEADY, WALK, Floats, MetricKind, Readings
 from ppafo.model.columns import choose, larger, root
-from ppafo.signals.meter import Course, MeterKind, WalkSample
+from ppafo.signals.meter import Course, MeterKind, Sample, StrideSample
 
 SETTLING = 2
 """First strides that are left out of averages: the controller learns the stride time in them."""
@@ -95,14 +95,14 @@ class Strides(NamedTuple):
     safe_time: float
 
 
-def totals_at(sample: WalkSample) -> StrideTotals:
+def totals_at(now: StrideSample) -> StrideTotals:
     """Totals since the start."""
     return StrideTotals(
-        gas=sample.supplied_mass,
-        push_off_work=sample.push_off_work,
-        slap_rate=sample.slap_rates,
-        toe_clearance=sample.clearances,
-        toe_landing=sample.toe_landings,
+        gas=now.supplied_mass,
+        push_off_work=now.push_off_work,
+        slap_rate=now.slap_rates,
+        toe_clearance=now.clearances,
+        toe_landing=now.toe_landings,
     )
 
 
@@ -117,51 +117,55 @@ def sum_with(sums: StrideTotals, now: StrideTotals, begun: StrideTotals, on_toes
     )
 
 
-def _start(_course: Course, sample: WalkSample) -> Strides:
+def _start(_course: Course, sample: Sample) -> Strides:
     nothing = StrideTotals(gas=0.0, push_off_work=0.0, slap_rate=0.0, toe_clearance=0.0, toe_landing=0.0)
     return Strides(
-        strikes=sample.strides,
-        first_gas=sample.supplied_mass,
-        gas=sample.supplied_mass,
-        stride=StrideNow(is_whole=0.0, on_toes=0.0, begun=totals_at(sample), was_vented=0.0, squares=0.0, samples=0.0),
+        strikes=sample.stride.strides,
+        first_gas=sample.stride.supplied_mass,
+        gas=sample.stride.supplied_mass,
+        stride=StrideNow(
+            is_whole=0.0, on_toes=0.0, begun=totals_at(sample.stride), was_vented=0.0, squares=0.0, samples=0.0
+        ),
         counted=Counted(whole=0.0, helped=0.0, counted=0.0, slaps=0.0, sums=nothing, squares=0.0, samples=0.0),
-        safe_time=sample.time if sample.level > HELPS else NOT_YET,
+        safe_time=sample.stride.time if sample.stride.level > HELPS else NOT_YET,
     )
 
 
-def _update(strides: Strides, _course: Course, sample: WalkSample) -> Strides:
-    strikes = sample.strides - strides.strikes > 0.5
-    on_toes = sample.toe_landings - strides.stride.begun.toe_landing
-    begun = StrideNow(is_whole=1.0, on_toes=on_toes, begun=totals_at(sample), was_vented=0.0, squares=0.0, samples=0.0)
+def _update(strides: Strides, _course: Course, sample: Sample) -> Strides:
+    strikes = sample.stride.strides - strides.strikes > 0.5
+    on_toes = sample.stride.toe_landings - strides.stride.begun.toe_landing
+    begun = StrideNow(
+        is_whole=1.0, on_toes=on_toes, begun=totals_at(sample.stride), was_vented=0.0, squares=0.0, samples=0.0
+    )
     stride = begun if strikes else strides.stride
-    is_first = sample.level > HELPS and strides.safe_time < 0.0
+    is_first = sample.stride.level > HELPS and strides.safe_time < 0.0
     return Strides(
-        strikes=sample.strides,
+        strikes=sample.stride.strides,
         first_gas=strides.first_gas,
-        gas=sample.supplied_mass,
+        gas=sample.stride.supplied_mass,
         stride=go_on(stride, sample),
         counted=count(strides.counted, strides.stride, sample) if strikes else strides.counted,
-        safe_time=sample.time if is_first else strides.safe_time,
+        safe_time=sample.stride.time if is_first else strides.safe_time,
     )
 
 
-def go_on(stride: StrideNow, sample: WalkSample) -> StrideNow:
+def go_on(stride: StrideNow, sample: Sample) -> StrideNow:
     """The stride under way with one sample more."""
     error = sample.reference - sample.torque
-    pushes = sample.phase == PUSH_OFF
+    pushes = sample.stride.phase == PUSH_OFF
     return StrideNow(
         is_whole=stride.is_whole,
         on_toes=stride.on_toes,
         begun=stride.begun,
-        was_vented=1.0 if sample.level > HELPS else stride.was_vented,
+        was_vented=1.0 if sample.stride.level > HELPS else stride.was_vented,
         squares=stride.squares + (error * error if pushes else 0.0),
         samples=stride.samples + (1.0 if pushes else 0.0),
     )
 
 
-def count(counted: Counted, stride: StrideNow, sample: WalkSample) -> Counted:
+def count(counted: Counted, stride: StrideNow, sample: Sample) -> Counted:
     """The strides with the one that ends at the first sample after a heel strike."""
-    now = totals_at(sample)
+    now = totals_at(sample.stride)
     helps = stride.is_whole > 0.5 and stride.was_vented < 0.5
     counts = helps and counted.whole >= float(SETTLING)
     slaps = counts and now.slap_rate - stride.begun.slap_rate < 0.0
@@ -185,61 +189,6 @@ def mean_of(total: Floats, count: Floats) -> Floats:
     return found
 
 
-def _gas(readings: Readings) -> Floats:
-    counted = readings.meters["strides"].counted
-    return mean_of(counted.sums.gas, counted.counted)
-
-
-def _work(readings: Readings) -> Floats:
-    counted = readings.meters["strides"].counted
-    return mean_of(counted.sums.push_off_work, counted.counted)
-
-
-def _slap_rate(readings: Readings) -> Floats:
-    counted = readings.meters["strides"].counted
-    return mean_of(counted.sums.slap_rate, counted.slaps)
-
-
-def _clearance(readings: Readings) -> Floats:
-    counted = readings.meters["strides"].counted
-    return mean_of(counted.sums.toe_clearance, counted.counted)
-
-
-def _landing(readings: Readings) -> Floats:
-    counted = readings.meters["strides"].counted
-    return mean_of(counted.sums.toe_landing, counted.counted)
-
-
-def _counted(readings: Readings) -> Floats:
-    counted = readings.meters["strides"].counted
-    found: Floats = counted.counted
-    return found
-
-
-def _whole(readings: Readings) -> Floats:
-    counted = readings.meters["strides"].counted
-    found: Floats = counted.whole
-    return found
-
-
-def _helped(readings: Readings) -> Floats:
-    counted = readings.meters["strides"].counted
-    found: Floats = counted.helped
-    return found
-
-
-def _vented(readings: Readings) -> Floats:
-    counted = readings.meters["strides"].counted
-    found: Floats = counted.whole - counted.helped
-    return found
-
-
-def _total_gas(readings: Readings) -> Floats:
-    strides = readings.meters["strides"]
-    found: Floats = strides.gas - strides.first_gas
-    return found
-
-
 def _push_off_error(readings: Readings) -> Floats:
     counted = readings.meters["strides"].counted
     found: Floats = root(mean_of(counted.squares, counted.samples))
@@ -256,19 +205,26 @@ def _kind(name: str, unit: str, summary: str, read: Callable[[Readings], Floats]
     return MetricKind(name, unit, summary, (), None, read, (METER,), needs=(WALK, *needs))
 
 
-def _mean(name: str, read: Callable[[Readings], Floats]) -> MetricKind:
+def _mean(name: str, strides: str = "counted") -> MetricKind:
     """A mean over the strides with help, without the first ones; on a course it would be over other strides."""
+
+    def read(readings: Readings) -> Floats:
+        counted = readings.meters["strides"].counted
+        return mean_of(getattr(counted.sums, name), getattr(counted, strides))
+
     item = PER_STRIDE[name]
     return _kind(name, item.unit, f"{item.summary}, mean", read, STEADY)
 
 
 METRICS = (
-    _mean("gas", _gas),
-    _mean("push_off_work", _work),
-    _mean("slap_rate", _slap_rate),
-    _mean("toe_clearance", _clearance),
-    _mean("toe_landing", _landing),
-    _kind("counted_strides", "-", "strides over which the means are taken", _counted, STEADY),
+    *(_mean(name, "slaps" if name == "slap_rate" else "counted") for name in StrideTotals._fields),
+    _kind(
+        "counted_strides",
+        "-",
+        "strides over which the means are taken",
+        lambda readings: readings.meters["strides"].counted.counted,
+        STEADY,
+    ),
     _kind(
         "push_off_error",
         "N m",
@@ -277,15 +233,25 @@ METRICS = (
         STEADY,
         REQUEST,
     ),
-    _kind("strides", "-", "whole strides of the walk", _whole),
-    _kind("helped_strides", "-", "whole strides with help from strike to strike", _helped),
+    _kind("strides", "-", "whole strides of the walk", lambda readings: readings.meters["strides"].counted.whole),
+    _kind(
+        "helped_strides",
+        "-",
+        "whole strides with help from strike to strike",
+        lambda readings: readings.meters["strides"].counted.helped,
+    ),
     _kind(
         "vented_strides",
         "-",
         "whole strides with less help (lifted only, paused or stopped) in at least a part of them",
-        _vented,
+        lambda readings: readings.meters["strides"].counted.whole - readings.meters["strides"].counted.helped,
     ),
-    _kind("total_gas", "kg", "gas taken from the supply in the whole walk", _total_gas),
+    _kind(
+        "total_gas",
+        "kg",
+        "gas taken from the supply in the whole walk",
+        lambda readings: readings.meters["strides"].gas - readings.meters["strides"].first_gas,
+    ),
     _kind("safe_state_time", "s", "time at which the controller first lifted only, paused or stopped", _safe_time),
 )
 """Those of ``walk_metrics`` that need neither a mean curve nor the healthy gait."""

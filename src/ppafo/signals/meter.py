@@ -9,64 +9,25 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 
-class Sample(NamedTuple):
-    """One sample of a recording: its number from 0, and channels in SI units.
+class FootSample(NamedTuple):
+    """A foot on the shank of a gait: its angle and the measured one over the horizontal [rad].
 
-    A run without reference has 0 there, gas without an energy balance has 0 for its temperatures.
+    ``toe_difference`` is how much higher its toes are than the measured ones [m].
     """
 
-    number: float
     angle: float
-    angular_velocity: float
-    pressure_1: float
-    pressure_2: float
-    torque: float
-    command: float
-    reference: float
-    temperature_1: float
-    temperature_2: float
-
-
-class SwingSample(NamedTuple):
-    """One sample of a foot on the shank of a gait: what ``Sample`` has, and the foot.
-
-    Angles of the foot and of the measured one over the horizontal [rad], and how much higher its toes are [m].
-    """
-
-    number: float
-    angle: float
-    angular_velocity: float
-    pressure_1: float
-    pressure_2: float
-    torque: float
-    command: float
-    reference: float
-    temperature_1: float
-    temperature_2: float
-    foot_angle: float
-    measured_foot_angle: float
+    measured_angle: float
     toe_difference: float
 
 
-class WalkSample(NamedTuple):
-    """One sample of a walk: what ``Sample`` has, and where the stride is.
+class StrideSample(NamedTuple):
+    """Where a walk is in its stride.
 
-    ``reference`` is the torque that the controller wants, 0 of one that wants none. ``supplied_mass`` [kg],
-    ``strides``, ``push_off_work`` [J], ``slap_rates`` [rad/s], ``clearances`` [m] and ``toe_landings`` are totals since
-    the start, as in the state of the leg; ``phase`` is the one that the controller sees, ``level`` how much it helps.
-    ``time`` [s] since the start.
+    ``supplied_mass`` [kg], ``strides``, ``push_off_work`` [J], ``slap_rates`` [rad/s], ``clearances`` [m] and
+    ``toe_landings`` are totals since the start, as in the state of the leg; ``phase`` is the one that the controller
+    sees, ``level`` how much it helps. ``time`` [s] since the start.
     """
 
-    number: float
-    angle: float
-    angular_velocity: float
-    pressure_1: float
-    pressure_2: float
-    torque: float
-    command: float
-    reference: float
-    temperature_1: float
-    temperature_2: float
     supplied_mass: float
     strides: float
     push_off_work: float
@@ -76,6 +37,27 @@ class WalkSample(NamedTuple):
     phase: float
     level: float
     time: float
+
+
+class Sample(NamedTuple):
+    """One sample of a recording: its number from 0, channels in SI units, and those of a foot and of a stride.
+
+    What a run does not have is 0: reference, temperatures of gas without an energy balance, ``foot`` but on the shank
+    of a gait, ``stride`` but in a walk. In a walk ``reference`` is the torque that the controller requests.
+    """
+
+    number: float
+    angle: float
+    angular_velocity: float
+    pressure_1: float
+    pressure_2: float
+    torque: float
+    command: float
+    reference: float
+    temperature_1: float
+    temperature_2: float
+    foot: FootSample
+    stride: StrideSample
 
 
 class Course(NamedTuple):
@@ -125,15 +107,14 @@ def starts_hold(course: Course, sample: Sample) -> bool:
 class MeterKind:
     """Something worked out from samples: ``state`` is a NamedTuple class of floats, so are its nested ones.
 
-    ``start(course, sample)`` makes it at the first sample, ``update(state, course, sample)`` at each later one; samples
-    of a walk are ``WalkSample``, of a foot on the shank of a gait ``SwingSample``. What ``course`` says of the hold is
-    right up to this sample. A meter without ``needs_course`` must not look at it; one that is ``of_motion`` stays as it
-    started while the vane stands still.
+    ``start(course, sample)`` makes it at the first sample, ``update(state, course, sample)`` at each later one. What
+    ``course`` says of the hold is right up to this sample. A meter without ``needs_course`` must not look at it; one
+    that is ``of_motion`` stays as it started while the vane stands still.
     """
 
     name: str
     state: type
-    start: Callable[[Course, Any], Any]
-    update: Callable[[Any, Course, Any], Any]
+    start: Callable[[Course, Sample], Any]
+    update: Callable[[Any, Course, Sample], Any]
     needs_course: bool = False
     of_motion: bool = False

@@ -14,21 +14,25 @@ from ppafo.metrics.gas import ENERGIES
 from ppafo.metrics.metric import Readings
 from ppafo.metrics.switching import UNDECIDED, Swing, count_of, next_swing, reversals
 from ppafo.signals import Channel, Recording
-from ppafo.signals.meter import SAME_LEVEL, Course, MeterKind, SwingSample, advance_course
+from ppafo.signals.meter import SAME_LEVEL, Course, FootSample, MeterKind, Sample, StrideSample, advance_course
 
 Floats = NDArray[np.float64]
 
 INTERVAL = 0.01
 
 
-def samples_of(recording: Recording) -> list[SwingSample]:
+def samples_of(recording: Recording) -> list[Sample]:
     names = ("angle", "angular_velocity", "pressure_1", "pressure_2", "torque", "command", "reference")
     names += ("temperature_1", "temperature_2", "foot_angle", "measured_foot_angle", "toe_difference")
     columns = zip(*(recording[name].tolist() for name in names), strict=True)
-    return [SwingSample(float(number), *values) for number, values in enumerate(columns)]
+    stride = StrideSample(*[0.0] * len(StrideSample._fields))
+    return [
+        Sample(float(number), *values[:9], foot=FootSample(*values[9:]), stride=stride)
+        for number, values in enumerate(columns)
+    ]
 
 
-def metered(meter: MeterKind, samples: Sequence[SwingSample], course: Course) -> tuple[Any, Course]:
+def metered(meter: MeterKind, samples: Sequence[Sample], course: Course) -> tuple[Any, Course]:
     course = advance_course(course, samples[0])
     state = meter.start(course, samples[0])
     for sample in samples[1:]:

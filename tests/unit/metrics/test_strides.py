@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ppafo.metrics.strides import METER, PER_STRIDE, SETTLING, Strides
-from ppafo.signals.meter import Course, WalkSample
+from ppafo.signals.meter import Course, FootSample, Sample, StrideSample
 from ppafo.walking.strides import per_stride, stride_starts
 
 NO_COURSE = Course(*[0.0] * len(Course._fields))
@@ -32,11 +32,12 @@ def totals() -> dict[str, np.ndarray]:
 
 def metered(columns: dict[str, np.ndarray], first: int = 0) -> Strides:
     """The meter after all samples from one on."""
-    blank = WalkSample(*[0.0] * len(WalkSample._fields))
-    rows = [
+    blank = StrideSample(*[0.0] * len(StrideSample._fields))
+    strides = [
         blank._replace(time=0.01 * at, **{name: float(column[at]) for name, column in columns.items()})
         for at in range(first, SAMPLES)
     ]
+    rows = [Sample(*[0.0] * 10, foot=FootSample(0.0, 0.0, 0.0), stride=stride) for stride in strides]
     state: Strides = METER.start(NO_COURSE, rows[0])
     for row in rows[1:]:
         state = METER.update(state, NO_COURSE, row)
