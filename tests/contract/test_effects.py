@@ -4,7 +4,7 @@ import ctypes
 import importlib.util
 import shutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 from ppafo.cli.main import main
+from ppafo.engine.lanes import LaneBlock
 from ppafo.engine.reference.solver import compare_with_reference
+from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
-from ppafo.errors import ScenarioError
 from ppafo.exports.c_library import c_library, library_of
 from ppafo.exports.c_library.files import c_identifier
 from ppafo.exports.fmu import closed_loop, functional_unit, host_platform
@@ -26,6 +27,7 @@ from ppafo.live.content import words
 from ppafo.model.catalog import EFFECTS
 from ppafo.parameters.building import build_device
 from ppafo.parameters.loading import json_schema, parse_parameter_set
+from ppafo.questions.league.walking.solver import STICKING_SPEED, largest_friction
 from ppafo.questions.linearise.solve import linearise
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
@@ -40,6 +42,7 @@ from tests.modules_under_node import compared, drawn
 AREA = "effects.mesh.area"
 NARROW = f"{AREA}=4 mm^2"
 NAME, SHORT = "step-response", ("run.duration=0.3 s",)
+BOTTLE = "bottle.name=paper-co2-9oz"
 ICE = ("effects.ice.blockage_per_gas=3e4 1/kg", "effects.ice.melting_time=30 ms")
 EXAMPLE = files("ppafo.examples") / "add-an-effect"
 
@@ -201,6 +204,34 @@ def test_it_walks() -> None:
         assert slower(one, other)
 
 
-def test_a_walk_on_a_bottle_refuses_effects_in_one_line() -> None:
-    with pytest.raises(ScenarioError, match=r"effects \('mesh'\) do not follow the temperature of a bottle"):
-        walk(load_walk("proportional", [NARROW, "bottle.name=paper-co2-9oz"]), 0.1)
+def test_it_walks_on_a_bottle_and_follows_the_temperature_of_its_gas(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[dict[str, float]] = []
+    names = list(row_numbers(plan_walk(load_walk("proportional", [NARROW, BOTTLE])).program.parameter_rows()))
+    passed_on = LaneBlock.set_parameters
+
+    def watched(self: LaneBlock, rows: Sequence[int], values: Any) -> None:
+        given.append(dict(zip([names[row] for row in rows], values, strict=True)))
+        passed_on(self, rows, values)
+
+    monkeypatch.setattr(LaneBlock, "set_parameters", watched)
+    with_mesh = walk(load_walk("proportional", [NARROW, BOTTLE]), 0.1)
+    assert with_mesh.status.is_completed
+    assert with_mesh.supply is not None
+    warmth = with_mesh.supply.values["gas_temperature"]
+    assert warmth.min() < 0.995 * warmth[0]
+    resistances = np.array([row["mesh.resistance"] for row in given])
+    np.testing.assert_allclose(resistances / resistances[0], warmth[: len(given)] / warmth[0], rtol=1e-12)
+    assert slower(with_mesh, walk(load_walk("proportional", [BOTTLE]), 0.1))
+
+
+def test_the_walking_leagues_programme_has_the_friction_of_effects() -> None:
+    casadi = pytest.importorskip("casadi", reason="the lower bound needs the extra 'optimal'")
+    texts = ("effects.seal_friction.static_per_pressure=2e-6 N m/Pa", "effects.stribeck.velocity=0.5 rad/s")
+    run = plan_walk(load_walk("proportional", texts))
+    rates, pressures = np.array([[0.0, 0.5, -3.0]]), np.array([[3e5, 2e5, 4e5], [1e5, 5e5, 1e5]])
+    found = largest_friction(run, casadi.DM(rates), casadi.DM(pressures), 1.0)
+    plant, rise = run.plant, 0.9 * (run.plant.static_torque - run.plant.dynamic_torque)
+    moving = plant.dynamic_torque + rise / (1.0 + (rates[0] / 0.5) ** 2)
+    resting = plant.static_torque + 2e-6 * np.abs(pressures[0] - pressures[1])
+    sticks = np.exp(-((rates[0] / STICKING_SPEED) ** 2))
+    np.testing.assert_allclose(np.array(found)[0], moving + (resting - moving) * sticks, rtol=1e-12)

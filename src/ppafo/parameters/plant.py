@@ -148,10 +148,11 @@ def switches_of(device: Device) -> dict[Effect, Any]:
 
 def effect_rows(device: Device, others: Sections = _NO_SECTIONS) -> tuple[Any, ...]:
     """Return the rows of the effects that are on; numbers are arrays (runs,) where settings or the device vary."""
-    return tuple(_row(effect, device, others) for effect in effects_of(device, others))
+    return tuple(effect_row(effect, device, others) for effect in effects_of(device, others))
 
 
-def _row(effect: Effect, device: Device, others: Sections) -> Any:
+def effect_row(effect: Effect, device: Device, others: Sections = _NO_SECTIONS) -> Any:
+    """Return the row of an effect for a device, whether it is on or not; numbers are arrays (runs,) where they vary."""
     settings, names, prepare = settings_of(device, effect, others), _names(device.actuator.kind), effect.prepare
     if prepare is None:
         return effect.parameters(*settings.values())

@@ -16,7 +16,7 @@ import numpy as np
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.engine.lanes import BatchResult, Floats, begin_block
-from ppafo.engine.rows import row_numbers
+from ppafo.engine.rows import leaf_paths, leaves, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.errors import ParameterError, ScenarioError
 from ppafo.model.cold_gas import (
@@ -31,12 +31,14 @@ from ppafo.model.cold_gas import (
     supply_now,
 )
 from ppafo.model.declaration import Quantity
+from ppafo.model.effects.kind import Effect
 from ppafo.model.plant import PlantParameters
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.source import bottle_content, content_energy, densest_gas, has_liquid, liquid_density
 from ppafo.parameters.bottles.bottle import PATHS, Bottle, load_bottle
 from ppafo.parameters.device import Device
 from ppafo.parameters.parameter_set import Entry
+from ppafo.parameters.plant import effect_row
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.declaration import SUPPLY_LINE, THERMAL, kind_at, value_at
 from ppafo.simulation.reading import Reading, quantity_text
@@ -362,18 +364,17 @@ class SupplyCourse:
 
 
 def run_on_bottle(
-    run: Run, supply: BottleSupply, stride_time: float, progress: Callable[[float, float], None]
+    run: Run,
+    device: Device,
+    supply: BottleSupply,
+    stride_time: float,
+    progress: Callable[[float, float], None],
 ) -> tuple[BatchResult, SupplyCourse]:
     """Return what a run gives on a bottle, up to where that ends it, and the course of the bottle.
 
-    ``stride_time`` [s] is how long a stride takes; ``progress`` gets the minutes done and in all.
+    ``device`` is what the run was planned for; ``stride_time`` [s] is how long a stride takes; ``progress`` gets the
+    minutes done and in all.
     """
-    switched = [f"'{effect.name}'" for effect in run.program.effects if effect.switch]
-    if switched:
-        names = ", ".join(switched)
-        raise ScenarioError(
-            f"effects ({names}) do not follow the temperature of a bottle: switch them off, or walk without"
-        )
     batch = batch_of(run)
     count = batch.clock.step_count
     block = begin_block(batch)
@@ -382,7 +383,7 @@ def run_on_bottle(
     every = max(1, round(supply.coupling / run.step))
     state, table = supply.start(), supply.bottle.fluid.table
     met = [(0.0, state, supply.offers_first())]
-    lanes = _lanes_of(run, met[0][2])
+    lanes = _lanes_of(run, device, met[0][2])
     window = max(2, math.ceil(_STRIDES * stride_time / (every * run.step))) * every
     gauges = [(0, 1.0)]
     ending, done, before = None, 0, float(batch.states[regulated, 0])
@@ -429,19 +430,29 @@ def _divergence(states: Floats, failure: int, state: SupplyState, time: float) -
 
 @dataclass(frozen=True, slots=True)
 class _Lanes:
-    """The lanes as their supply sees them: rows that follow it, and the numbers with gas of the ``start`` [K]."""
+    """The lanes as their supply sees them: rows that follow it, and the numbers with gas of the ``start`` [K].
+
+    ``effects`` are those of the ``device`` that are on, whose rows may be of the temperature of its gas.
+    """
 
     rows: list[int]
     plant: PlantParameters
     volume: float
     start: float
+    device: Device
+    effects: tuple[Effect, ...]
 
     def offered(self, now: SupplyNow) -> Floats:
-        """Return the parameters: gas of its temperature, flows through openings with 1 over its root, the regulator."""
+        """Return the parameters: gas of its temperature, flows through openings with 1 over its root, the regulator.
+
+        Then the rows of the effects, prepared anew for gas of that temperature.
+        """
         plant, warmth = self.plant, now.gas_temperature / self.start
         slower = 1.0 / math.sqrt(warmth)
         product, valve, leak = plant.gas_product, plant.valve_conductance, plant.leak_conductance
-        return np.array([product * warmth, valve * slower, leak * slower, now.set_pressure, now.largest_flow])
+        own = [product * warmth, valve * slower, leak * slower, now.set_pressure, now.largest_flow]
+        device = replace(self.device, gas=replace(self.device.gas, temperature=now.gas_temperature))
+        return np.array([*own, *(number for effect in self.effects for number in leaves(effect_row(effect, device)))])
 
     def gauge(self, mass: float, now: SupplyNow) -> float:
         """Return the gauge pressure of the line with a mass [kg] in it over that to which the regulator is set [-]."""
@@ -450,11 +461,19 @@ class _Lanes:
         return (pressure - plant.atmospheric_pressure) / (plant.supply_pressure - plant.atmospheric_pressure)
 
 
-def _lanes_of(run: Run, first: SupplyNow) -> _Lanes:
+def _lanes_of(run: Run, device: Device, first: SupplyNow) -> _Lanes:
     assert run.lines is not None, "a bottle feeds lines"
     names = row_numbers(run.program.parameter_rows())
-    rows = [names[path] for path in _PARAMETERS]
-    return _Lanes(rows, run.plant, run.lines.parameters.volume_1, first.gas_temperature)
+    effects = tuple(effect for effect in run.program.effects if effect.is_of_device)
+    rows = [path for effect in effects for path in leaf_paths(effect.parameters, effect.name)]
+    return _Lanes(
+        rows=[names[path] for path in (*_PARAMETERS, *rows)],
+        plant=run.plant,
+        volume=run.lines.parameters.volume_1,
+        start=first.gas_temperature,
+        device=device,
+        effects=effects,
+    )
 
 
 def _ending(

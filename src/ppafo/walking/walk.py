@@ -21,7 +21,7 @@ from ppafo.walking.declaration import THRESHOLDS
 from ppafo.walking.gait_series import landing_phase
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
-from ppafo.walking.planning import plan_walk
+from ppafo.walking.planning import fed_device, plan_walk
 from ppafo.walking.result import WalkResult, result_of_walk
 from ppafo.walking.strides import PHASES, healthy_positive_work, healthy_toe_height, lowest_toes
 from ppafo.walking.varying import SHORTEST_STRIDES, duration_problems, with_duration
@@ -68,7 +68,7 @@ def walk(
         return result_of_walk(chosen, run, run_sampled(batch_of(run), custom), None)
     if carried is None:
         return result_of_walk(chosen, run, _run_in_parts(batch_of(run), run.step, progress), None)
-    outcome, supply = run_on_bottle(run, carried, walk_of(chosen).gait.stride_time, progress)
+    outcome, supply = run_on_bottle(run, fed_device(chosen), carried, walk_of(chosen).gait.stride_time, progress)
     return result_of_walk(chosen, run, outcome, supply)
 
 

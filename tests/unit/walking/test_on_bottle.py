@@ -147,7 +147,7 @@ def test_a_walk_that_diverges_ends_so_and_says_what_was_let_through_before(
     rows = row_numbers(run.program.state_rows())
     monkeypatch.setattr(bottle, "begin_block", lambda batch: Breaking(wrong, good, rows, batch.states))
     assert walk_of(chosen).bottle is not None
-    _, course = bottle.run_on_bottle(run, walk_of(chosen).bottle, 1.1, lambda *_: None)
+    _, course = bottle.run_on_bottle(run, chosen.device, walk_of(chosen).bottle, 1.1, lambda *_: None)
     assert course.ending.kind == "diverged"
     assert "diverged, and 255 g were left" in course.ending.message
     assert course.ending.time == pytest.approx(min(0.25, 0.1 * (good + 1)) if "failure" in wrong else 0.1 * (good + 1))

@@ -8,6 +8,7 @@ import numpy as np
 
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run, Walk
+from ppafo.engine.scheme.motion import friction_now
 from ppafo.engine.scheme.walking import Direction, leg_torque
 from ppafo.errors import SimulationError
 from ppafo.model.contact import FLAT, foot_angle, prescribed_ankle
@@ -26,6 +27,7 @@ from ppafo.questions.league.bound import (
 )
 from ppafo.questions.league.walking.measures import DEGREE, Grid, Stride
 from ppafo.questions.league.walking.task import PROFILE_KIND, PROFILE_VALVE, WalkingTask
+from ppafo.translation.symbolic import symbolic
 from ppafo.walking.gait_series import AnklePath
 from ppafo.walking.walk import walk
 
@@ -96,7 +98,8 @@ def programme(run: Run, stride: Stride, path: AnklePath) -> Programme:
     slopes = casadi.vertcat(rates.pressure_1, rates.pressure_2) / scale
     torque = actuator_torque(scale * pressures[0, :], scale * pressures[1, :], plant.torque_constant)
     motion = casadi.vertcat(unknowns.angle, unknowns.rate)
-    turning = casadi.vertcat(unknowns.rate, _accelerations(run.walk, plant, stride, unknowns, torque, sticking))
+    largest = largest_friction(run, unknowns.rate, scale * pressures[:, : grid.free_points], sticking)
+    turning = casadi.vertcat(unknowns.rate, _accelerations(run.walk, plant, stride, unknowns, torque, largest))
     flat = [_flat_angle(run.walk, now) for now in stride.now[: grid.free_points]]
     left = [
         casadi.vec(_residuals(grid, pressures, pressures[:, -1], slopes)),
@@ -157,21 +160,37 @@ def _chamber_rates(run: Run, stride: Stride, unknowns: _Unknowns, scale: float) 
     return chamber_rates(run, WAYS, (angle, rate), scale * unknowns.pressures, here)
 
 
+def largest_friction(run: Run, rates: Any, pressures: Any, sticking: Any) -> Any:
+    """Largest friction torque [N m] at some points, by the laws of the engine with the effects of the run.
+
+    ``rates`` [rad/s] (1, points) and absolute ``pressures`` [Pa] (2, points) are matrices of CasADi.
+    """
+    import casadi
+
+    acting = dict(zip(run.program.effects, run.effects, strict=True))
+    sizes = symbolic(friction_now, PlantParameters, float, float, float, acting=acting)
+    found = []
+    for place in range(rates.shape[1]):
+        friction = sizes(run.plant, rates[place], pressures[0, place], pressures[1, place])
+        breakaway = sticking * (friction.at_rest - friction.in_motion)
+        found.append(friction.in_motion + breakaway * casadi.exp(-((rates[place] / STICKING_SPEED) ** 2)))
+    return casadi.horzcat(*found)
+
+
 def _accelerations(
-    walk: Walk, plant: PlantParameters, stride: Stride, unknowns: _Unknowns, torque: Any, sticking: Any
+    walk: Walk, plant: PlantParameters, stride: Stride, unknowns: _Unknowns, torque: Any, largest: Any
 ) -> Any:
     """Angular accelerations [rad/s^2] of the free foot at every free point, by the engine's own torque of the leg."""
     import casadi
 
-    found, breakaway = [], sticking * (plant.static_torque - plant.dynamic_torque)
+    found = []
     for place in range(stride.grid.free_points):
         angle, rate, now = unknowns.angle[place], unknowns.rate[place], stride.now[place]
         standing = foot_angle(now.shank, angle)
         foot = Direction(casadi.sin(standing), casadi.cos(standing))
         level = walk.timing.ground_angle
         added = leg_torque(walk.leg, walk.share, stride.contacts[place], now, level, angle, foot)
-        largest = plant.dynamic_torque + breakaway * casadi.exp(-((rate / STICKING_SPEED) ** 2))
-        friction = unknowns.friction[place] * largest
+        friction = unknowns.friction[place] * largest[place]
         found.append(vane_acceleration(torque[place] + added, rate, friction, plant.viscous_damping, plant.inertia))
     return casadi.horzcat(*found)
 
