@@ -243,7 +243,7 @@ SECTIONS: Mapping[str, Mapping[str, Check]] = {
         "c": tested("The library in C and C++", "gcc, clang", "tests/unit/exports/test_c_library.py"),
         "fmu": tested("FMUs, FMI 2.0 and 3.0", "FMPy and its checker", "tests/unit/exports/test_fmu.py"),
         "platforms": tested("FMUs for other computers", "Wine, QEMU", "tests/unit/exports/test_fmu_platforms.py"),
-        "wasm": tested("WebAssembly", "node and wasmtime", "tests/unit/exports/test_wasm.py"),
+        "wasm": tested("WebAssembly", "node", "tests/unit/exports/test_wasm.py"),
         "page": tested("The page that simulates", "Chromium, Firefox, WebKit; axe-core; Python", "tests/unit/live"),
         "firmware": tested("The controller on chips", "mspdebug, QEMU", "tests/unit/exports/test_firmware.py"),
     },

@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ppafo.cli import output
-from ppafo.control.fixed.torque_laws import PLANT_TARGETS, TARGETS, WALK_TARGETS
+from ppafo.control.fixed.torque_laws import TARGETS, WALK_TARGETS
 from ppafo.errors import ScenarioError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ppafo.exports.firmware.lock_step import ChipRun, Comparison, Cost
-    from ppafo.exports.firmware.plant import BoardsRun
     from ppafo.exports.firmware.walking import WalkOnChip
     from ppafo.simulation.scenario import Scenario
 
@@ -44,11 +43,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="compare N drawn samples with the integer controller instead, with edges, jumps and sensor faults",
     )
     parser.add_argument(
-        "--plant",
-        choices=PLANT_TARGETS,
-        help="let a second simulated chip be the plant, and compare both with the lanes",
-    )
-    parser.add_argument(
         "--table",
         action="store_true",
         help=f"compare every integer controller on every target instead (with {SAMPLES_OF_TABLE} samples each)",
@@ -61,12 +55,10 @@ def run(parsed: argparse.Namespace) -> int:
     """Run a scenario with the chip's simulator in charge of the valve; 1 where any decision differs."""
     if parsed.samples is not None and not 1 <= parsed.samples <= MOST_SAMPLES:
         raise ScenarioError(f"--samples {parsed.samples}: must be 1 to {MOST_SAMPLES}")
-    if parsed.table and (parsed.scenarios or parsed.overrides or parsed.plant or parsed.minutes is not None):
-        raise ScenarioError("--table: takes no SCENARIO, --set, --plant or --minutes; its scenarios are given")
+    if parsed.table and (parsed.scenarios or parsed.overrides or parsed.minutes is not None):
+        raise ScenarioError("--table: takes no SCENARIO, --set or --minutes; its scenarios are given")
     if parsed.table and parsed.target in WALK_TARGETS:
         raise ScenarioError(f"--table: its scenarios run on {', '.join(TARGETS)}; {parsed.target} is for walks")
-    if parsed.plant and parsed.samples is not None:
-        raise ScenarioError("--plant and --samples: give one of them; drawn samples have no plant")
     if not parsed.table and not parsed.scenarios:
         raise ScenarioError("give a SCENARIO, or --table; see 'ppafo chip --help'")
     output.check_output(parsed)
@@ -94,15 +86,13 @@ def _one(parsed: argparse.Namespace) -> _Outcome:
     scenarios = [chosen for chosen in every if worn_kind(chosen) is None]
     if len(every) == 1 and not scenarios:
         return _walk(every[0], parsed)
-    if len(every) > 1 and (parsed.plant or parsed.samples is not None or len(scenarios) < len(every)):
+    if len(every) > 1 and (parsed.samples is not None or len(scenarios) < len(every)):
         raise ScenarioError(
-            "several SCENARIOs: are run in turn and drawn in one figure; give one for a walk, --samples or --plant"
+            "several SCENARIOs: are run in turn and drawn in one figure; give one for a walk or --samples"
         )
     target = parsed.target or TARGETS[0]
     if target not in TARGETS or parsed.minutes is not None:
         raise ScenarioError(f"{scenarios[0].name}: {', '.join(WALK_TARGETS)} and --minutes are for walks")
-    if parsed.plant:
-        return _boards(scenarios[0], target, parsed.plant)
     if parsed.samples is None:
         return _runs(scenarios, target)
     from ppafo.exports.firmware.lock_step import compare_drawn
@@ -159,41 +149,11 @@ def _drawn(found: "Comparison", name: str, period: float, about: dict[str, Any])
     return _Outcome("\n".join(lines), document, not found.differences)
 
 
-def _boards(scenario: "Scenario", target: str, plant: str) -> _Outcome:
-    """A scenario with its controller on one board and its plant on another."""
-    from ppafo.exports.firmware.plant import run_on_two_boards
-
-    found = run_on_two_boards(scenario, target, plant)
-    board = found.plant
-    share = found.worst / board.clock / scenario.control.period
-    lines = [
-        f"{scenario.name} with the controller on a simulated {target}, the plant on a simulated {board.name}",
-        "",
-        f"plant       {found.sizes.flash} bytes of flash, {found.sizes.data} of data, {found.stack} of stack",
-        f"a sample    {found.worst} {board.counted} at worst, {found.mean:.0f} on average; "
-        f"at one cycle each {share:.2%} of a sample at {board.clock / 1.0e6:g} MHz",
-        f"samples     {found.samples}, {found.differences} with other bits than in the lanes",
-        f"compared    {', '.join(found.compared)}",
-        *([f"the first: {found.first_difference}"] if found.differences else []),
-    ]
-    work = {f"worst_{board.counted}": found.worst, f"mean_{board.counted}": found.mean}
-    document = {
-        "scenario": scenario.name,
-        "target": target,
-        **_compared(found),
-        "compared": list(found.compared),
-        "plant": {"target": board.name, **found.sizes._asdict(), "stack": found.stack, **work},
-    }
-    return _Outcome("\n".join(lines), document, not found.differences)
-
-
 def _walk(configuration: "Scenario", parsed: argparse.Namespace) -> _Outcome:
     """A walk on the chip."""
     from ppafo.exports.firmware.walking import compare_drawn_walk, walk_on_chip
 
     name, target = configuration.name, parsed.target or WALK_TARGETS[0]
-    if parsed.plant:
-        raise ScenarioError(f"{name}: --plant is for scenarios; the plant of a walk is the lanes")
     if target not in WALK_TARGETS:
         raise ScenarioError(f"{name}: a walk's controller runs on {', '.join(WALK_TARGETS)}, not on '{target}'")
     about = {"walk": name, "target": target}
@@ -244,7 +204,7 @@ def _table(parsed: argparse.Namespace) -> _Outcome:
     return _Outcome("\n".join(lines), {"rows": documents}, not any(item.get("differences") for item in documents))
 
 
-def _compared(found: "ChipRun | WalkOnChip | Comparison | BoardsRun") -> dict[str, Any]:
+def _compared(found: "ChipRun | WalkOnChip | Comparison") -> dict[str, Any]:
     return {"samples": found.samples, "differences": found.differences}
 
 

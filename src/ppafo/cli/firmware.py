@@ -1,12 +1,11 @@
-"""``ppafo firmware``: the controller of a scenario or a walk, or a plant, as firmware for a small processor."""
+"""``ppafo firmware``: the controller of a scenario or a walk as firmware for a small processor."""
 
 import argparse
 import shlex
 from pathlib import Path
 
 from ppafo.cli import output
-from ppafo.control.fixed.torque_laws import PLANT_TARGETS, TARGETS, WALK_TARGETS
-from ppafo.errors import ScenarioError
+from ppafo.control.fixed.torque_laws import TARGETS, WALK_TARGETS
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,21 +16,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=(*TARGETS, *WALK_TARGETS),
         help=f"the processor (default: {TARGETS[0]}, of a walk {WALK_TARGETS[0]})",
     )
-    parser.add_argument(
-        "--plant",
-        action="store_true",
-        help=f"write a scenario's plant instead of the controller ({', '.join(PLANT_TARGETS)})",
-    )
     output.add_override_argument(parser)
     output.add_json_argument(parser)
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="the folder to write")
 
 
 def run(parsed: argparse.Namespace) -> int:
-    """Write the firmware of the controller of a scenario or a walk, or of a plant, and say what to do next."""
+    """Write the firmware of the controller of a scenario or a walk, and say what to do next."""
     output.check_output(parsed)
     from ppafo.exports.firmware import firmware
-    from ppafo.exports.firmware.plant import plant_firmware
     from ppafo.exports.firmware.walking import walk_firmware
     from ppafo.loading import load_scenario
     from ppafo.simulation.scenario import worn_kind
@@ -39,10 +32,8 @@ def run(parsed: argparse.Namespace) -> int:
     chosen = load_scenario(parsed.scenario, parsed.overrides)
     if worn_kind(chosen) is None:
         target = parsed.target or TARGETS[0]
-        contents = (plant_firmware if parsed.plant else firmware)(chosen, target)
+        contents = firmware(chosen, target)
     else:
-        if parsed.plant:
-            raise ScenarioError(f"{chosen.name}: --plant is for scenarios; of a walk the controller alone is written")
         target = parsed.target or WALK_TARGETS[0]
         contents = walk_firmware(chosen, target)
     output.write_files(parsed, contents)

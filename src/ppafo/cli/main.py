@@ -52,7 +52,7 @@ COMMANDS: dict[str, str] = {
     "parts": QUESTIONS["parts"],
     "audit": "check a parameter set for contradictions",
     "export": "write a scenario or a walk for other tools: a library in C, an FMU, a controller for 'ppafo hil'",
-    "firmware": "write the controller of a scenario or a walk, or a plant, as firmware for a small processor",
+    "firmware": "write the controller of a scenario or a walk as firmware for a small processor",
     "chip": "run a scenario or a walk with its controller on the simulator of a small processor",
     "hil": "run a scenario's plant in real time against a controller at a serial port or over UDP",
     "bits": QUESTIONS["bits"],

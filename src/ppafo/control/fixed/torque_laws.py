@@ -43,8 +43,6 @@ FLOAT, FIXED = "float", "fixed"
 """The two arithmetics of a controller."""
 TARGETS = ("msp430f2013", "cortex-m0", "cortex-m4")
 """Processors that an integer controller can be written for."""
-PLANT_TARGETS = ("cortex-m4",)
-"""Those that the plant can be written for too."""
 WALK_TARGETS = ("msp430g2553",)
 """And those that an integer controller of walking can be written for: the smallest has no room for it."""
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from ppafo.errors import ScenarioError
-from ppafo.exports.firmware.simulators import Doubles, Machine, Memory, MspdebugSimulator, QemuSimulator, Target
+from ppafo.exports.firmware.simulators import Machine, Memory, MspdebugSimulator, QemuSimulator, Target
 
 _VARIABLES = """\
 # Others do as well: make COMPILER="clang --target=arm-none-eabi" LINKER='$(COMPILER) -fuse-ld=lld',
@@ -156,7 +156,6 @@ CORTEX_M4 = Target(
     counted="instructions",
     simulator=QemuSimulator,
     machine=Machine("mps2-an386", 25.0e6),
-    doubles=Doubles("-mcpu=cortex-m4", "its floats have 64 bits, which this processor computes by a library"),
 )
 CATALOG: dict[str, Target] = {item.name: item for item in (MSP430F2013, CORTEX_M0, CORTEX_M4)}
 

@@ -18,7 +18,6 @@ from shutil import which
 from typing import NamedTuple, Protocol, final
 from weakref import finalize
 
-from ppafo.control.fixed.whole_numbers import Readings
 from ppafo.errors import SimulationError, one_line, reason
 
 
@@ -42,13 +41,6 @@ class Machine(NamedTuple):
 
 NO_MACHINE = Machine("", 0.0)
 """That of a target which QEMU does not simulate."""
-
-
-class Doubles(NamedTuple):
-    """How a target computes floats of 64 bits: flags of the compiler, and the same in words."""
-
-    flags: str
-    said: str
 
 
 class Decision(NamedTuple):
@@ -109,7 +101,7 @@ class Target:
 
     ``tools`` are the programs that building and simulating need, ``packages`` those of Debian that have them.
     ``simulator`` starts one with an image, ``machine`` is what QEMU has to know, ``counted`` what is counted of a
-    sample: cycles or instructions. The plant can be written for a target that has ``doubles``.
+    sample: cycles or instructions.
     """
 
     name: str
@@ -128,7 +120,6 @@ class Target:
     counted: str
     simulator: Callable[["Target", Image], ChipSimulator]
     machine: Machine = NO_MACHINE
-    doubles: Doubles | None = None
 
 
 UNTOUCHED = 0xA5
@@ -191,7 +182,7 @@ def built_image(contents: Mapping[str, bytes], target: Target) -> Iterator[Image
 
 
 def read_image(folder: Path, target: Target) -> Image:
-    """The image for the simulator in a folder where a firmware was built; a plant has no other one."""
+    """The image for the simulator in a folder where a firmware was built."""
     file, shipped = folder / "simulated.elf", folder / "firmware.elf"
     content = file.read_bytes()
     own = _sizes(content, target)
@@ -372,7 +363,6 @@ class MspdebugSimulator:
 
 DEEPEST = 1024
 """How far below the end of RAM the stack is looked for [bytes]."""
-DEEPEST_OF_PLANT = 16384
 _SHIFT = 7
 _NANOSECONDS = 2**_SHIFT
 """What an instruction takes of the machine's time [ns]: more than two ticks of the counter, so that none is missed."""
@@ -489,50 +479,3 @@ class QemuSimulator:
     def stack(self) -> int:
         """How deep the stack has been [bytes]: what it has written of the RAM that was filled before."""
         return depth_of_stack(self.debugger.read(self._bottom, DEEPEST))
-
-
-class PlantSample(NamedTuple):
-    """What the plant shows at a sample: readings, 1 while it is well, values; instructions since the last sample."""
-
-    readings: Readings
-    is_well: int
-    values: tuple[float, ...]
-    work: int
-
-
-@final
-class QemuPlant:
-    """QEMU with the image of a plant in it, which waits for a command."""
-
-    def __init__(self, target: Target, image: Image, value_count: int) -> None:
-        self._stop = image.symbols["simulated_stop"] & ~_THUMB
-        self._command, self._plant = image.symbols["simulated_command"], image.symbols["simulated_plant"]
-        self._form = struct.Struct(f"<4h{value_count}dII")
-        self._ticks = target.machine.clock * _NANOSECONDS * 1.0e-9
-        self._bottom = target.ram.start + target.ram.size - DEEPEST_OF_PLANT
-        self._debugger = Debugger(target.machine.name, image)
-        self._debugger.write(self._bottom, bytes([UNTOUCHED]) * DEEPEST_OF_PLANT)
-        self._debugger.stop_at(self._stop)
-        self._debugger.go_on()
-
-    def close(self) -> None:
-        """End the simulator."""
-        self._debugger.close()
-
-    def shown(self) -> PlantSample:
-        """The sample that it shows."""
-        reference, first, second, is_well, *values, begun, ended = self._form.unpack(
-            self._debugger.read(self._plant, self._form.size)
-        )
-        work = round((begun - ended) % 2**32 / self._ticks)
-        seen = Readings(reference, first, second)
-        return PlantSample(readings=seen, is_well=is_well, values=tuple(values), work=work)
-
-    def go_on(self, command: int) -> None:
-        """Hand it the command for the sample that it shows; it then shows the next one."""
-        self._debugger.write(self._command, command.to_bytes(2, "little", signed=True))
-        self._debugger.go_on(self._stop + _LENGTH_OF_NOP)
-
-    def stack(self) -> int:
-        """How deep the stack has been [bytes]."""
-        return depth_of_stack(self._debugger.read(self._bottom, DEEPEST_OF_PLANT))

@@ -24,7 +24,6 @@ from ppafo.errors import ProgramError, ScenarioError, nearest_name
 from ppafo.exports.c_library import commanded, library_of, scenario_library, walk_library
 from ppafo.exports.c_library.files import Library, library_files, steps_source
 from ppafo.exports.c_library.walk_preparation import check_can_leave
-from ppafo.exports.fmu import component
 from ppafo.exports.fmu.description import (
     Input,
     Interface,
@@ -78,7 +77,6 @@ PLATFORMS = {
     "linux-aarch64": Platform(None, "aarch64-linux", "aarch64-linux-gnu.2.17", ".so", "run under qemu"),
     "darwin64": Platform("darwin64", "x86_64-darwin", "x86_64-macos", ".dylib", "not run"),
     "darwin-aarch64": Platform(None, "aarch64-darwin", "aarch64-macos", ".dylib", "not run"),
-    "wasm32": Platform(None, "wasm32-wasip2", "wasm32-wasi", ".wasm", "after a draft, fmi-ls-wasm; run under wasmtime"),
 }
 """Platforms by the name under which they are asked for."""
 
@@ -95,9 +93,6 @@ def host_platform() -> str | None:
 
 def build(name: str, sources: Mapping[str, bytes], main: str) -> bytes:
     """The library of a unit for a platform. ProgramError where no compiler is there for it, or it refuses."""
-    if name == "wasm32":
-        around = component.sources_of_component(sources, main)
-        return component.component_of(build_library(name, around, component.SOURCE, component.FLAGS))
     return build_library(name, sources, main, HIDDEN)
 
 
@@ -108,7 +103,7 @@ def build_library(name: str, sources: Mapping[str, bytes], main: str, flags: Seq
         for file, content in sources.items():
             (Path(folder) / file).write_bytes(content)
         library = Path(folder) / f"unit{PLATFORMS[name].suffix}"
-        mathematics = [] if name in ("win64", "wasm32") else ["-lm"]
+        mathematics = [] if name == "win64" else ["-lm"]
         done = asked([*command, main, "-o", library.name, *mathematics], _ANOTHER, folder)
         if done.returncode != 0:
             raise ProgramError(f"{command[0]} does not build the library for {name}: {complaint(done)}")
@@ -173,8 +168,6 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
     }
     if fmi == 3:
         contents["sources/buildDescription.xml"] = build_description_of_fmi3(identifier, " ".join(FLAGS[1:]))
-    if "wasm32" in chosen:
-        contents[f"{component.FOLDER}/manifest.xml"] = component.MANIFEST
     for name, item in chosen.items():
         folder = item.folder_2 if fmi == 2 else item.folder_3
         contents[f"binaries/{folder}/{identifier}{item.suffix}"] = build(name, sources, main)
