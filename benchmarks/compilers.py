@@ -1,7 +1,7 @@
 """``python -m benchmarks.compilers``: how long each compiler takes for a model, and how quickly its model runs.
 
-Compilers take turns, on one thread, so that a noisy machine does
-as much to one as to the others. A ratio above 1 is quicker than Numba. Their bits are compared too.
+Runs are timed in CPU seconds of one thread, and compilers take turns, so that other work on the machine disturbs none
+more than another. A ratio above 1 is quicker than Numba. Their bits are compared too.
 """
 
 import argparse
@@ -29,7 +29,7 @@ MODELS = ("torque-task-proportional", "step-response", "thermal-gas-behind-lines
 
 @dataclass(slots=True)
 class Timed:
-    """One model by one compiler: seconds of its compilation and of each repetition, and the hash of its results."""
+    """One model by one compiler: seconds of its compilation, CPU seconds of each repetition, hash of its results."""
 
     compiled: float
     runs: list[float] = field(default_factory=list)
@@ -69,11 +69,13 @@ def run(parsed: argparse.Namespace) -> int:
                     _run_once(batch, compiler, found[name][compiler])
     is_same = all(len({timed.bits for timed in by.values()}) == 1 for by in found.values())
     machine = describe_machine()
-    lines = [f"{machine.processor}; one thread, best of {parsed.repetitions} repetitions of {parsed.runs} runs"]
+    lines = [
+        f"{machine.processor}; CPU time of one thread, best of {parsed.repetitions} repetitions of {parsed.runs} runs"
+    ]
     for name, by in found.items():
         quickest = {compiler: min(timed.runs) for compiler, timed in by.items()}
         lines += [
-            f"{name:28} {compiler:6} compiled in {timed.compiled:6.1f} s, runs {quickest[compiler]:7.3f} s"
+            f"{name:28} {compiler:6} compiled in {timed.compiled:6.1f} s, runs {quickest[compiler]:7.3f} CPU s"
             + (f", {quickest[NUMBA] / quickest[compiler]:5.2f} of Numba's speed" if NUMBA in quickest else "")
             for compiler, timed in by.items()
         ]
@@ -129,9 +131,9 @@ def _compiled(batch: Batch, compiler: str, name: str) -> Timed:
 
 def _run_once(batch: Batch, compiler: str, timed: Timed) -> None:
     with _setting(BACKEND_VARIABLE, compiler):
-        start = time.perf_counter()
+        start = time.process_time()
         result = run_batch(batch, threads=1)
-        timed.runs.append(time.perf_counter() - start)
+        timed.runs.append(time.process_time() - start)
         timed.bits = digest(result)
 
 
