@@ -6,7 +6,10 @@ import pytest
 from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.errors import SimulationError
 from ppafo.model.effects.leak_opening import LeakOpening, lifted
+from ppafo.model.effects.line_resistance import fed_through_line, prepare
 from ppafo.model.effects.spool_play import SpoolPlace, SpoolPlay, behind_play, settle
+from ppafo.model.orifice import area_conductance
+from ppafo.parameters.loading import load_device
 from ppafo.questions.linearise.solve import linearise
 from ppafo.rig.solution import spool_position
 from ppafo.simulation.ensemble import run_ensemble
@@ -117,3 +120,43 @@ def test_play_changes_the_torque_and_a_column_of_it_has_the_bits_of_the_single_r
 def test_a_linear_model_refuses_an_effect_with_a_state_in_one_line(text: str, name: str) -> None:
     with pytest.raises(SimulationError, match=f"effect '{name}' has a state of its own.*switch it off"):
         linearise("torque-task-proportional", 0.2, ("run.duration=0.3 s", text))
+
+
+LINE = ("effects.line_resistance.area=8 mm^2",)
+
+
+@pytest.mark.parametrize(
+    ("name", "texts"),
+    [
+        ("step-response", (*LINE, "run.duration=0.5 s")),
+        (
+            "step-response",
+            (*LINE, "effects.silencer.sonic_conductance=2e-8 m^3/(s Pa)", *THERMAL, "run.duration=0.3 s"),
+        ),
+        ("torque-task-solenoid", (*LINE, "motion.kind=free", "run.duration=0.3 s")),
+    ],
+)
+def test_lines_with_resistance_in_the_lanes_are_those_of_the_reference_solver(
+    name: str, texts: tuple[str, ...]
+) -> None:
+    agreement = compare_with_reference(plan_run(load_scenario(name, texts)))
+    assert agreement.angle < 2e-4
+    assert agreement.worst_pressure < 1e-3
+
+
+def test_lines_slow_the_filling_of_one_chamber_and_the_venting_of_the_other() -> None:
+    held = ("motion.kind=held", "motion.angle=90 deg", "controller.kind=constant", "controller.command=1")
+    plain, narrow = (
+        simulate(load_scenario("step-response", (*held, "run.duration=0.1 s", *texts))).recording
+        for texts in ((), ("effects.line_resistance.area=1 mm^2",))
+    )
+    for name in ("pressure_1", "pressure_2"):
+        slow, quick = (abs(one[name][-1] - one[name][0]) for one in (narrow, plain))
+        assert 0.05 * quick < slow < 0.5 * quick
+
+
+def test_a_line_counts_as_the_orifice_of_the_rig_does() -> None:
+    row = prepare({"area": 2e-5, "discharge_coefficient": 0.6}, load_device("ppafo2011"))
+    alone = area_conductance(2e-5, 0.6, 1.289, 188.92, 293.15)
+    assert row.resistance == pytest.approx(alone**-2, rel=0.02)
+    assert fed_through_line(1.0, row) == pytest.approx(row.resistance**-0.5)

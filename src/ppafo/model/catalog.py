@@ -14,6 +14,7 @@ from ppafo.model.effects import (
     coil_heating,
     ice,
     leak_opening,
+    line_resistance,
     restitution,
     seal_friction,
     silencer,
@@ -36,6 +37,7 @@ ACTUATORS: Kinds[ActuatorKind] = Kinds(
 
 _OWN = (
     restitution.EFFECT,
+    line_resistance.EFFECT,
     silencer.EFFECT,
     ice.EFFECT,
     leak_opening.EFFECT,

@@ -252,6 +252,16 @@ def sonic_conductance_mass(sonic_conductance: float, gas_constant: float, temper
     return same_gas * root(air_constant / gas_constant)
 
 
+def conductance_in_series(conductance: float, resistance: float) -> float:
+    """Conductance [kg/(s Pa)] of an orifice with a second one behind it, one over whose square is ``resistance``.
+
+    ``1/C^2 = 1/C_1^2 + 1/C_2^2``: pressure drops of a subsonic flow add up, each as the square of the flow. Written as
+    ``C_1 / sqrt(1 + (C_1/C_2)^2)``, it holds for a shut orifice too. Exact where the flow is far from choked; where it
+    is choked, up to 12 % low for a second orifice as narrow as the first, 5 % for one three times as wide (ISO 6358-3).
+    """
+    return conductance / math.sqrt(1.0 + conductance * conductance * resistance)
+
+
 def _polynomial_through(places: Terms, values: Terms) -> Terms:
     """Coefficients, from the constant one upwards, of the polynomial that has some values at some places (Newton)."""
     differences = values

@@ -1,0 +1,57 @@
+"""Lines with resistance between valve and chambers: what enters or leaves a chamber passes its line and the valve."""
+
+from typing import Any, NamedTuple
+
+from ppafo.model.declaration import Quantity
+from ppafo.model.effects.kind import Effect
+from ppafo.model.orifice import area_conductance, conductance_in_series
+from ppafo.model.places import way_in, way_out
+
+
+class LineResistance(NamedTuple):
+    """One over the square of the conductance of each line [(s Pa/kg)^2]; 0 where there is none."""
+
+    resistance: float
+
+
+def prepare(settings: Any, device: Any) -> LineResistance:
+    """The row of an orifice that loses as much pressure as a line does, with the gas of the device. Equation (6)."""
+    area, gas = settings["area"], device.gas
+    conductance = area_conductance(
+        area,
+        settings["discharge_coefficient"],
+        gas.heat_capacity_ratio,
+        gas.specific_gas_constant,
+        gas.temperature,
+    )
+    return LineResistance(1.0 / (conductance * conductance) if area > 0.0 else 0.0)
+
+
+def fed_through_line(conductance: float, line_resistance: LineResistance) -> float:
+    """Conductance [kg/(s Pa)] from a supply to a chamber, from that of the valve: ``1/C^2 = 1/C_v^2 + 1/C_r^2``.
+
+    The volume of a line belongs to the dead volume of its chamber, and is filled at the pressure of the chamber: right
+    where the line is small beside it. Gas by which a valve joins both chambers passes no line.
+    """
+    return way_in(conductance_in_series(conductance, line_resistance.resistance))
+
+
+def vented_through_line(conductance: float, line_resistance: LineResistance) -> float:
+    """Conductance [kg/(s Pa)] from a chamber to the atmosphere, likewise."""
+    return way_out(conductance_in_series(conductance, line_resistance.resistance))
+
+
+EFFECT = Effect(
+    name="line_resistance",
+    summary="Lines with resistance between valve and chambers.",
+    quantities=(
+        Quantity("area", "m^2", "area of an orifice with the pressure loss of a line, 0 for no loss", 0.0, 0.0, 1.0e-2),
+        Quantity("discharge_coefficient", "", "discharge coefficient of that orifice", 0.6, 0.01, 2.0),
+    ),
+    parameters=LineResistance,
+    prepare=prepare,
+    switch=("area",),
+    laws={way_in: fed_through_line, way_out: vented_through_line},
+    source="equation (6) of the paper, ISO 6358-3:2014, and the orifice of the virtual rig's lines",
+    equation="1/C^2 = 1/C_v^2 + 1/C_r^2",
+)
