@@ -1,15 +1,23 @@
 """The channels that the package knows by name: SI unit, meaning, and how to read between two samples."""
 
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 TIME = "time"
 TIME_UNIT = "s"
 PLAIN_NUMBER = "-"
 
+Between = Literal["hold", "linear"]
+"""What a channel does between two samples: it keeps the earlier value, or runs straight from one to the other."""
+BETWEEN: tuple[Between, ...] = get_args(Between)
+
 
 @dataclass(frozen=True, slots=True)
 class ChannelKind:
-    """A known channel; a held one keeps its value until the next sample, the others run straight to it."""
+    """A known channel; a held one keeps its value until the next sample, the others run straight to it.
+
+    So it is where a recording does not declare otherwise.
+    """
 
     unit: str
     summary: str

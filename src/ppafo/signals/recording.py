@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ppafo.errors import DataError, nearest_name
-from ppafo.signals.channels import CHANNELS, TIME
+from ppafo.signals.channels import BETWEEN, CHANNELS, TIME, Between
 
 Floats = NDArray[np.float64]
 
@@ -23,16 +23,28 @@ _KINDS: tuple[RecordingKind, ...] = get_args(RecordingKind)
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Channel:
-    """Values of one quantity, read-only, and their unit as SI text: ``rad``, ``Pa`` (absolute), ``N m``, ``-``."""
+    """Values of one quantity, read-only, and their unit as SI text: ``rad``, ``Pa`` (absolute), ``N m``, ``-``.
+
+    ``between`` says what it does between two samples, ``hold`` or ``linear``; None is what its name usually means: a
+    command holds.
+    """
 
     values: Floats
     unit: str
+    between: Between | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", _read_only(self.values))
+        if self.between is not None and self.between not in BETWEEN:
+            hint = nearest_name(str(self.between), BETWEEN)
+            raise DataError(f"a channel is {' or '.join(BETWEEN)} between its samples, not {self.between!r}{hint}")
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Channel) and self.unit == other.unit and np.array_equal(self.values, other.values)
+        return (
+            isinstance(other, Channel)
+            and (self.unit, self.between) == (other.unit, other.between)
+            and np.array_equal(self.values, other.values)
+        )
 
     __hash__ = None  # type: ignore[assignment]  # arrays have no hash
 
@@ -41,7 +53,7 @@ class Channel:
 
     def __reduce__(self) -> tuple[Callable[..., "Channel"], tuple[Any, ...]]:
         """Copy and unpickle through the constructor, so that the values stay read-only."""
-        return Channel, (self.values, self.unit)
+        return Channel, (self.values, self.unit, self.between)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -112,9 +124,15 @@ class Recording:
         """Return the SI unit of a channel; ``-`` for a plain number."""
         return self._channel(name).unit
 
+    def is_held(self, name: str) -> bool:
+        """Return whether a channel keeps its value from sample to sample; it runs straight to the next one if not."""
+        between = self._channel(name).between
+        return (name in CHANNELS and CHANNELS[name].is_held) if between is None else between == "hold"
+
     def with_channel(self, name: str, values: ArrayLike, unit: str) -> "Recording":
-        """Return the recording with one channel added or replaced."""
-        channel = Channel(np.asarray(values, dtype=np.float64), unit)
+        """Return the recording with one channel added or replaced; one that is replaced stays held or linear."""
+        between = self.channels[name].between if name in self.channels else None
+        channel = Channel(np.asarray(values, dtype=np.float64), unit, between)
         return Recording(self.label, self.time, {**self.channels, name: channel}, self.kind)
 
     def between(self, start: float, end: float) -> "Recording":
@@ -122,7 +140,10 @@ class Recording:
         inside = (self.time >= start) & (self.time <= end)
         if not inside.any():
             raise DataError(f"{self.label}: there is no sample between {start:g} s and {end:g} s; {_span(self)}")
-        kept = {name: Channel(channel.values[inside], channel.unit) for name, channel in self.channels.items()}
+        kept = {
+            name: Channel(channel.values[inside], channel.unit, channel.between)
+            for name, channel in self.channels.items()
+        }
         return Recording(self.label, self.time[inside], kept, self.kind)
 
     def resample(self, times: ArrayLike) -> "Recording":
@@ -132,7 +153,10 @@ class Recording:
             raise DataError(
                 f"{self.label}: nothing is known from {wanted.min():g} s to {wanted.max():g} s; {_span(self)}"
             )
-        moved = {name: Channel(_values_at(self, name, wanted), self.unit(name)) for name in self.names}
+        moved = {
+            name: Channel(between_samples(self, name, wanted), channel.unit, channel.between)
+            for name, channel in self.channels.items()
+        }
         return Recording(self.label, wanted, moved, self.kind)
 
     def _channel(self, name: str) -> Channel:
@@ -159,11 +183,15 @@ def align(first: Recording, second: Recording) -> tuple[Recording, Recording]:
     return common, second.resample(common.time)
 
 
-def _values_at(recording: Recording, name: str, times: Floats) -> Floats:
-    values = recording[name]
-    if name in CHANNELS and CHANNELS[name].is_held:
-        return values[np.searchsorted(recording.time, times, side="right") - 1]
-    return np.interp(times, recording.time, values)
+def between_samples(recording: Recording, name: str, times: Floats, start: float = 0.0) -> Floats:
+    """Return a channel [SI] at times [s] that count from ``start``, as it declares: held, or on a line.
+
+    Before its first sample and after its last one it stands still.
+    """
+    values, own_times = recording[name], recording.time - start
+    if recording.is_held(name):
+        return values[np.maximum(np.searchsorted(own_times, times, side="right") - 1, 0)]
+    return np.interp(times, own_times, values)
 
 
 def _check_time(recording: Recording) -> None:

@@ -1,5 +1,6 @@
 """What a run takes from a recording: its inputs step by step, its start, its scenario, and what is refused."""
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 
@@ -11,7 +12,7 @@ from ppafo.errors import DataError
 from ppafo.parameters.device import Device, Orifice
 from ppafo.signals import Recording
 from ppafo.signals.faults import longest_gap
-from ppafo.signals.recording import Floats
+from ppafo.signals.recording import Floats, between_samples
 from ppafo.simulation.scenario import (
     PYTHON_CONTROLLER,
     Control,
@@ -42,6 +43,11 @@ _UNIFORM = 0.02
 
 REST_WINDOW = 0.05
 """Seconds before the first command over which the start is averaged; short, so that no leak shows in it."""
+
+_FEWEST_ON_LINE = 8
+_SEEN_SLOPE = 4.0
+"""Standard errors from which something moves: white noise at rest is that far off once in 16,000 times."""
+_ROUNDING, _SPREAD_OF_MEDIAN = 1.0e-9, 1.4826
 
 PRESSURES = ("pressure_1", "pressure_2", SUPPLY, DORSIFLEXION_SUPPLY)
 
@@ -98,7 +104,7 @@ def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
 
     A run that follows the angle is one of ``with_prescribed_angle``.
     """
-    command = last_values(inputs, COMMAND, run) if inputs.has(COMMAND) else None
+    command = _input_values(inputs, COMMAND, run) if inputs.has(COMMAND) else None
     path = _path(inputs, device, run) if inputs.has(ANGLE) else {}
     return StepInputs(command, {**recorded_parameters(inputs, device, run), **path})
 
@@ -131,29 +137,30 @@ def between_stops(angles: Floats, device: Device, file: str) -> Floats:
 
 
 def recorded_parameters(inputs: RecordedInputs, device: Device, run: Run) -> dict[str, Floats]:
-    """Return the parameters that follow a recording [SI], for every step; each is a mean over a millisecond."""
+    """Return the parameters that follow a recording [SI], for every step."""
     followed: dict[str, Floats] = {}
     if inputs.has(SUPPLY):
-        followed |= dict.fromkeys(supply_paths(device), _between_samples(inputs, SUPPLY, run))
+        followed |= dict.fromkeys(supply_paths(device), _input_values(inputs, SUPPLY, run))
     if inputs.has(DORSIFLEXION_SUPPLY):
-        followed["plant.dorsiflexion_pressure"] = _between_samples(inputs, DORSIFLEXION_SUPPLY, run)
+        followed["plant.dorsiflexion_pressure"] = _input_values(inputs, DORSIFLEXION_SUPPLY, run)
     if inputs.has(EXTERNAL_TORQUE):
-        followed["plant.external_torque"] = _between_samples(inputs, EXTERNAL_TORQUE, run)
+        followed["plant.external_torque"] = _input_values(inputs, EXTERNAL_TORQUE, run)
     return followed
 
 
-def last_values(inputs: RecordedInputs, name: str, run: Run) -> Floats:
-    """Return the last recorded value of a channel [SI] at each step; a change falls on the nearest step."""
-    own_times = inputs.recording.time - inputs.start
-    index = np.searchsorted(own_times, step_times(run) + 0.5 * run.step, side="right") - 1
-    return inputs.recording[name][np.maximum(index, 0)]
+def _input_values(inputs: RecordedInputs, name: str, run: Run) -> Floats:
+    """Return an input [SI] at each step, as its recording declares it.
 
-
-def _between_samples(inputs: RecordedInputs, name: str, run: Run) -> Floats:
-    together = max(1, min(run.steps_per_sample, round(LONGEST_STEP / run.step)))
-    first = (np.arange(run.step_count) // together * together).astype(np.float64)
-    middle = run.step * (first + 0.5 * together)
-    return np.interp(middle, inputs.recording.time - inputs.start, inputs.recording[name])
+    A change of a held one falls on the nearest step. One on a line is a mean over a step or, so that there are fewer
+    changes, a millisecond; a command over a step, as a valve answers within less.
+    """
+    if inputs.recording.is_held(name):
+        middle = step_times(run) + 0.5 * run.step
+    else:
+        together = 1 if name == COMMAND else max(1, min(run.steps_per_sample, round(LONGEST_STEP / run.step)))
+        first = (np.arange(run.step_count) // together * together).astype(np.float64)
+        middle = run.step * (first + 0.5 * together)
+    return between_samples(inputs.recording, name, middle, inputs.start)
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,6 +180,34 @@ def samples_at_rest(recording: Recording) -> int:
         return 1
     quiet = command.size if not command.any() else int(np.argmax(command != 0.0))
     return max(1, min(quiet, int((time < time[0] + REST_WINDOW).sum())))
+
+
+def value_at_rest(time: Floats, values: Floats, at_end: bool = False) -> float:
+    """Return the value [SI] with which a stretch at rest begins, or ends: the mean of its samples if they do not move.
+
+    A chamber that leaks does move while valve and vane rest. Where a straight line has a slope that is seen, the value
+    is that of the line; where that is seen to bend, the same of the half that is nearer.
+    """
+    while values.size >= _FEWEST_ON_LINE:
+        away = (time - (time[-1] if at_end else time[0])) / (time[-1] - time[0])
+        if not _is_seen(np.vander(away, 2), values):
+            return float(np.mean(values))
+        if not _is_seen(np.vander(away, 3), values):
+            return float(np.linalg.lstsq(np.vander(away, 2), values)[0][-1])
+        kept = slice(values.size // 2, None) if at_end else slice(None, values.size // 2)
+        time, values = time[kept], values[kept]
+    return float(values[-1 if at_end else 0])
+
+
+def _is_seen(columns: Floats, values: Floats) -> bool:
+    """Return whether the coefficient of the first column is far from 0 for the noise from sample to sample.
+
+    By the median of second differences, which neither a slope nor a jump changes.
+    """
+    found = np.linalg.lstsq(columns, values)[0]
+    noise = _SPREAD_OF_MEDIAN * float(np.median(np.abs(np.diff(values, n=2)))) / math.sqrt(6.0)
+    error = noise * math.sqrt(float(np.linalg.inv(columns.T @ columns)[0, 0]))
+    return bool(abs(found[0]) > _SEEN_SLOPE * error + _ROUNDING * float(np.abs(values).max()))
 
 
 def usual_interval(time: Floats) -> float:

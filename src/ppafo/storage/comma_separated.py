@@ -1,5 +1,8 @@
 """Recordings as CSV: one header line ``time [s],angle [rad],...``, then one line a sample, exact to the last bit.
 
+A column whose channel is held where such channels usually run straight says so: ``supply_pressure [Pa] hold``; the
+other way round it is ``linear``.
+
 Files from elsewhere may use other units (``angle [deg]``, ``pressure_1 [psi_g]``) and begin with lines of comment (#).
 """
 
@@ -17,22 +20,23 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, UnitError, first_twice, one_line
+from ppafo.errors import DataError, UnitError, first_twice, nearest_name, one_line
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
-from ppafo.signals.channels import PLAIN_NUMBER, TIME, TIME_UNIT
+from ppafo.signals.channels import BETWEEN, PLAIN_NUMBER, TIME, TIME_UNIT, Between
 from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes, write_file
 
-_HEADER = re.compile(r"\s*(\w+)\s*\[\s*([^\[\]]+?)\s*\]\s*", re.ASCII)
+_HEADER = re.compile(r"\s*(\w+)\s*\[\s*([^\[\]]+?)\s*\]\s*(\w*)\s*", re.ASCII)
 _LEVEL = "Pa_a"
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """What a header says of a column: channel (or time) and the unit of its numbers."""
+    """What a header says of a column: channel (or time), the unit of its numbers, what it does between samples."""
 
     name: str
     unit: str
+    between: Between | None = None
 
     @property
     def si_unit(self) -> str:
@@ -55,7 +59,7 @@ def parse_header(cells: list[str]) -> list[Column]:
         if match is None:
             shown = cell if len(cell) <= 40 else f"{cell[:36]} ..."
             raise DataError(f"the header must name columns as 'name [unit]', separated by commas; '{shown}' is not one")
-        columns.append(Column(match[1], match[2]))
+        columns.append(Column(match[1], match[2], _between(match[3], match[1])))
     names = [column.name for column in columns]
     if names[0] != TIME:
         raise DataError(f"the first column must be '{TIME} [{TIME_UNIT}]', it is '{names[0]}'")
@@ -63,6 +67,17 @@ def parse_header(cells: list[str]) -> list[Column]:
     if twice is not None:
         raise DataError(f"there are two columns '{twice}'")
     return columns
+
+
+def _between(word: str, name: str) -> Between | None:
+    """Return what stands behind the unit of a column, None for nothing."""
+    for known in BETWEEN:
+        if word == known and name != TIME:
+            return known
+    if word:
+        hint = nearest_name(word, BETWEEN)
+        raise DataError(f"column '{name}': behind its unit may stand {' or '.join(BETWEEN)}, not '{word}'{hint}")
+    return None
 
 
 def check_clock(time: Floats, lines: Sequence[int]) -> None:
@@ -133,11 +148,17 @@ def csv_bytes(recording: Recording) -> bytes:
     """Return the bare table of a recording; its label and its kind are not in it."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow([f"{TIME} [{TIME_UNIT}]", *(f"{name} [{recording.unit(name)}]" for name in recording.names)])
+    writer.writerow(
+        [f"{TIME} [{TIME_UNIT}]", *(_heading(name, channel) for name, channel in recording.channels.items())]
+    )
     columns = [recording.time, *(recording[name] for name in recording.names)]
     rows = map(",".join, zip(*(map(repr, column.tolist()) for column in columns), strict=True))
     buffer.writelines(f"{row}\n" for row in rows)
     return buffer.getvalue().encode()
+
+
+def _heading(name: str, channel: Channel) -> str:
+    return f"{name} [{channel.unit}] {channel.between or ''}".rstrip()
 
 
 def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STANDARD_ATMOSPHERE) -> Recording:
@@ -158,7 +179,10 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
             raise DataError("has a header but no samples")
         check_clock(values[:, 0], range(first + 2, first + 2 + len(values)))
         series = [in_si(column, values[:, index], atmosphere) for index, column in enumerate(columns)]
-        named = {column.name: Channel(one, column.si_unit) for column, one in zip(columns[1:], series[1:], strict=True)}
+        named = {
+            column.name: Channel(one, column.si_unit, column.between)
+            for column, one in zip(columns[1:], series[1:], strict=True)
+        }
         return Recording(label or one_line(Path(path).stem), series[0], named, kind_of_comments(lines[:first]))
     except csv.Error as error:
         raise DataError(f"{path}: is not a CSV file: {error}") from error

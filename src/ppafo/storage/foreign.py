@@ -22,7 +22,7 @@ from ppafo.documents.models import STRICT, Text, make_schema, read_model
 from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import DataError, UnitError, nearest_name, one_line
 from ppafo.signals import Channel, Recording
-from ppafo.signals.channels import PLAIN_NUMBER, TIME, TIME_UNIT
+from ppafo.signals.channels import PLAIN_NUMBER, TIME, TIME_UNIT, Between
 from ppafo.signals.recording import Floats
 from ppafo.storage.comma_separated import Column, check_clock, in_si, kind_of_comments
 from ppafo.storage.files import read_bytes
@@ -45,6 +45,10 @@ class MappedChannel(BaseModel):
     offset: Annotated[float, Field(description="added after the factor, in unit")] = 0.0
     times: Annotated[Text | None, Field(description="a quantity to multiply by, such as a lever arm '0.13 m'")] = None
     thousands: Annotated[Thousands | None, Field(description="mark between groups of digits")] = None
+    between: Annotated[
+        Between | None,
+        Field(description="between two samples: 'hold' the earlier value, or 'linear'; left out, a command holds"),
+    ] = None
 
 
 class MappedDirection(BaseModel):
@@ -132,7 +136,7 @@ def read_foreign(
             raise DataError(f"the column map has no channel '{TIME}'")
         table = _read_table(lines, columns)
         channels = {
-            name: _constant(name, item.constant, len(table.lines), atmosphere)
+            name: _constant(name, item, len(table.lines), atmosphere)
             if item.constant is not None
             else _convert(name, item, np.array(table.numbers[name]), atmosphere)
             for name, item in columns.channels.items()
@@ -242,15 +246,16 @@ def _place(name: str, item: MappedChannel, names: list[str], width: int) -> int:
     return places[0] - 1
 
 
-def _constant(name: str, text: str, count: int, atmosphere: float) -> Channel:
+def _constant(name: str, item: MappedChannel, count: int, atmosphere: float) -> Channel:
     from ppafo.units import split_quantity
 
+    text = str(item.constant)
     try:
         value, unit = split_quantity(text)
     except UnitError as error:
         raise DataError(f"channel '{name}', constant = {text!r}: {error}") from error
     column = Column(name, unit or PLAIN_NUMBER)
-    return Channel(in_si(column, np.full(count, value), atmosphere), column.si_unit)
+    return Channel(in_si(column, np.full(count, value), atmosphere), column.si_unit, item.between)
 
 
 def _number(cell: str, thousands: str | None, decimal: str, column: str, line: int) -> float:
@@ -293,7 +298,7 @@ def _convert(name: str, item: MappedChannel, numbers: Floats, atmosphere: float)
             raise DataError(f"channel '{name}', times = {item.times!r}: {error}") from error
         values, unit = values * multiple, f"{unit} {times_unit}".removeprefix(f"{PLAIN_NUMBER} ").strip()
     column = Column(name, unit)
-    return Channel(in_si(column, values, atmosphere), TIME_UNIT if name == TIME else column.si_unit)
+    return Channel(in_si(column, values, atmosphere), TIME_UNIT if name == TIME else column.si_unit, item.between)
 
 
 def _with_direction(recording: Recording, wanted: MappedDirection) -> Recording:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import xarray
 
 _PLAIN_NUMBER_IN_NETCDF = "1"
+_BETWEEN = "between_samples"
 
 
 def dataset_of(recording: Recording, scenario: Mapping[str, Any] | None = None) -> "xarray.Dataset":
@@ -50,7 +51,9 @@ def channel_attributes(recording: Recording, name: str) -> dict[str, str]:
     """Return unit and long name of a channel; a plain number has the unit 1, as the NetCDF conventions ask."""
     unit = recording.unit(name)
     summary = CHANNELS[name].summary if name in CHANNELS else name.replace("_", " ")
-    return {"units": _PLAIN_NUMBER_IN_NETCDF if unit == PLAIN_NUMBER else unit, "long_name": summary}
+    between = recording.channels[name].between
+    declared = {} if between is None else {_BETWEEN: between}
+    return {"units": _PLAIN_NUMBER_IN_NETCDF if unit == PLAIN_NUMBER else unit, "long_name": summary, **declared}
 
 
 def unit_of_attribute(text: str) -> str:
@@ -204,7 +207,9 @@ def _channel(name: str, variable: Any) -> Channel:
     for key in _GAPS:
         if key in variable.attrs and np.isin(values, np.asarray(variable.attrs[key], dtype=np.float64)).any():
             raise DataError(f"'{name}' has gaps ('{key}'); fill them or cut the file there")
-    return Channel(values, unit_of_attribute(_attribute(variable, "units")))
+    # The channel itself refuses a word that is none.
+    between: Any = _attribute(variable, _BETWEEN) or None
+    return Channel(values, unit_of_attribute(_attribute(variable, "units")), between)
 
 
 def _attribute(place: Any, name: str) -> str:

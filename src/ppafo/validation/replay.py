@@ -28,6 +28,7 @@ from ppafo.simulation.recorded import (
     sample_period,
     samples_at_rest,
     step_inputs,
+    value_at_rest,
     with_highest_supply,
     with_prescribed_angle,
 )
@@ -177,4 +178,4 @@ def _first(measured: Measured, name: str, count: int) -> float:
             f"{measured.file}: there is no channel '{name}' to start from; give its initial value, --initial "
             f'"{_EXAMPLES[name]}"'
         )
-    return float(np.mean(measured.recording[name][:count]))
+    return value_at_rest(measured.recording.time[:count], measured.recording[name][:count])

@@ -172,3 +172,25 @@ def test_a_recording_is_shown_without_its_numbers() -> None:
     ]
     assert repr(shown.channels["angle"]) == "Channel of 5 values in rad"
     assert "1 sample from 0.5 s to 0.5 s" in repr(shown.between(0.5, 0.9))
+
+
+def test_a_channel_that_declares_it_is_held_or_runs_straight_against_the_habit_of_its_name() -> None:
+    usual = recording()
+    declared = Recording(
+        "bench",
+        usual.time,
+        {
+            "angle": Channel(usual["angle"], "rad", "hold"),
+            "command": Channel(usual["command"], "-", "linear"),
+        },
+    )
+    moved = declared.between(0.0, 4.0).resample([0.5, 1.75])
+    assert moved["angle"].tolist() == [0.0, 1.0]
+    assert moved["command"].tolist() == [0.0, 0.5]
+    assert moved.is_held("angle")
+    assert not moved.with_channel("command", [1.0, 1.0], "-").is_held("command")
+
+
+def test_a_channel_that_is_neither_held_nor_straight_is_refused_with_the_nearest_word() -> None:
+    with pytest.raises(DataError, match="hold or linear between its samples, not 'held', did you mean 'hold'"):
+        Channel([1.0, 2.0], "-", "held")  # type: ignore[arg-type]

@@ -20,6 +20,7 @@ from ppafo.simulation.recorded import (
     samples_at_rest,
     step_inputs,
     supply_paths,
+    value_at_rest,
     with_highest_supply,
 )
 
@@ -94,3 +95,33 @@ def test_a_scenario_runs_on_another_set_with_what_it_changes_in_its_own() -> Non
     without = dataclasses.replace(other, valve_kinds={"main": "proportional"}, default_valve="main")
     with pytest.raises(ParameterError, match="there is no valve 'proportional'"):
         load_scenario("step-response", parameter_set=without)
+
+
+def test_an_input_is_held_or_runs_straight_at_the_steps_of_a_run_as_its_channel_declares() -> None:
+    time = np.array([0.0, 0.01, 0.02])
+    command, supply = np.array([0.0, 1.0, 1.0]), np.array([4.0e5, 5.0e5, 5.0e5])
+    device = load_device("ppafo2011")
+    declared = Recording(
+        "bench", time, {"command": Channel(command, "-", "linear"), "supply_pressure": Channel(supply, "Pa", "hold")}
+    )
+    found = []
+    for one in (recording(time, command, supply), declared):
+        run = plan_run(replay_scenario(one, device, Start(1.0, 0.0, 1.0e5, 1.0e5), 0.02, "r.csv"))
+        given = step_inputs(RecordedInputs(one, ("command", "supply_pressure"), 0.0), device, run)
+        assert given.command is not None
+        middle = round(0.005 / run.step)
+        found.append((given.command[middle], given.parameters["plant.supply_pressure"][middle]))
+    usual, other = found
+    assert usual == pytest.approx((0.0, 4.5e5), rel=0.02)
+    assert other == pytest.approx((0.5, 4.0e5), abs=0.1)
+
+
+def test_a_chamber_that_leaks_before_the_valve_opens_starts_where_it_was_and_not_at_the_mean() -> None:
+    time = np.arange(0.0, 0.05, 1e-3)
+    pressure = 1.0e5 + 3.0e5 * (1.0 - np.exp(-time / 0.03))
+    noise = 300.0 * np.random.default_rng(1).standard_normal(time.size)
+    assert abs(float(np.mean(pressure)) - pressure[0]) > 1.0e5
+    assert value_at_rest(time, pressure + noise) == pytest.approx(pressure[0], abs=1500.0)
+    assert value_at_rest(time, pressure + noise, at_end=True) == pytest.approx(pressure[-1], abs=1000.0)
+    still = 1.0e5 + noise
+    assert value_at_rest(time, still) == float(np.mean(still))

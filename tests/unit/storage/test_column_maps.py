@@ -256,3 +256,21 @@ def test_the_published_schema_of_maps_takes_a_map(tmp_path: Path) -> None:
     jsonschema.validate(tomllib.loads(MAPS), json_schema())
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(tomllib.loads(MAPS.replace("unit", "unti")), json_schema())
+
+
+def test_a_column_map_says_what_a_channel_does_between_its_samples(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("t,u,p\n0,0,4\n1,1,5\n2,0,6\n")
+    found = read_foreign(
+        tmp_path / "log.csv",
+        ColumnMap.model_validate(
+            {
+                "channels": {
+                    "time": {"column": "t", "unit": "s"},
+                    "command": {"column": "u", "between": "linear"},
+                    "supply_pressure": {"column": "p", "unit": "bar_a", "between": "hold"},
+                }
+            }
+        ),
+    ).resample([0.5])
+    assert found["command"].tolist() == [0.5]
+    assert found["supply_pressure"].tolist() == [4.0e5]

@@ -137,3 +137,14 @@ def test_table_with_very_many_columns_or_blank_lines_is_refused_at_once(tmp_path
     with pytest.raises(DataError, match="line 3 has 0 values for 2 columns"):
         read_csv(written(tmp_path, "time [s],angle [rad]\n0,1\n\n\n1,1\n"))
     assert len(read_csv(written(tmp_path, "time [s],angle [rad]\n0,1\n1,1\n\n\n"))) == 2
+
+
+def test_what_a_channel_declares_between_its_samples_is_in_the_header(tmp_path: Path) -> None:
+    supply = Channel(np.array([4.0e5, 5.0e5]), "Pa", "hold")
+    declared = Recording("bench", np.array([0.0, 1.0]), {"supply_pressure": supply})
+    path = write_csv(tmp_path / "bench.csv", declared)
+    assert path.read_text().splitlines()[0] == "time [s],supply_pressure [Pa] hold"
+    assert read_csv(path).is_held("supply_pressure")
+    path.write_text("time [s],command [-] linaer\n0,1\n")
+    with pytest.raises(DataError, match=r"column 'command': .* hold or linear, not 'linaer', did you mean 'linear'"):
+        read_csv(path)

@@ -119,3 +119,9 @@ def test_a_channel_of_two_dimensions_is_refused(tmp_path: Path) -> None:
     made.to_netcdf(path, engine="h5netcdf")
     with pytest.raises(DataError, match="'angle' must be numbers over 'time' alone"):
         read_netcdf(path)
+
+
+def test_what_a_channel_declares_between_its_samples_is_an_attribute(tmp_path: Path) -> None:
+    supply = Channel(np.array([4.0e5, 5.0e5]), "Pa", "hold")
+    declared = Recording("bench", np.array([0.0, 1.0]), {"supply_pressure": supply})
+    assert read_netcdf(write_netcdf(tmp_path / "bench.nc", declared)) == declared

@@ -28,6 +28,7 @@ from ppafo.simulation.recorded import (
     check_gaps,
     replay_control,
     supply_paths,
+    value_at_rest,
     with_highest_supply,
 )
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, Scenario, Sensors
@@ -52,8 +53,8 @@ class Experiment:
     recording. ``channels`` are those that are compared, to the end of the recording. ``inputs`` names measured channels
     that the run follows sample by sample: ``command``, in place of the scenario's controller, ``supply_pressure`` (of
     both inlets where they have one pressure), ``dorsiflexion_pressure``, ``external_torque``, ``angle``.
-    ``initial_state`` takes angle and pressures at the start from the scenario or, as means of the samples up to the
-    start, from the recording. ``source`` names the file and its hash.
+    ``initial_state`` takes angle and pressures at the start from the scenario or, by the samples up to the start, from
+    the recording: their mean, or where a line through them ends if they move. ``source`` names the file and its hash.
     """
 
     label: str
@@ -130,7 +131,7 @@ _FITS = 1.0e-6
 def scenario_of(experiment: Experiment) -> Scenario:
     """Return the scenario of an experiment with all that it takes from the recording, but for the samples of inputs.
 
-    A state that is taken from the recording is that of the means of the samples up to the start.
+    A state that is taken from the recording is that of the samples up to the start.
     """
     scenario, recording = experiment.scenario, experiment.recording
     if {SUPPLY, DORSIFLEXION_SUPPLY} & set(experiment.inputs):
@@ -151,14 +152,15 @@ def scenario_of(experiment: Experiment) -> Scenario:
             f"{said}: {recording.label} has no sample up to {experiment.start:g} s, from which the initial state could "
             f"be taken"
         )
-    means = {name: float(np.mean(recording[name][before])) for name in recording.names}
+    time = recording.time[before]
+    rest = {name: value_at_rest(time, recording[name][before], at_end=True) for name in recording.names}
     scenario = replace(
         scenario,
-        initial_pressure_1=means.get("pressure_1", scenario.initial_pressure_1),
-        initial_pressure_2=means.get("pressure_2", scenario.initial_pressure_2),
+        initial_pressure_1=rest.get("pressure_1", scenario.initial_pressure_1),
+        initial_pressure_2=rest.get("pressure_2", scenario.initial_pressure_2),
     )
-    if ANGLE in means and ANGLE not in experiment.inputs and isinstance(scenario.motion, FreeMotion):
-        start = float(between_stops(np.array([means[ANGLE]]), scenario.device, said)[0])
+    if ANGLE in rest and ANGLE not in experiment.inputs and isinstance(scenario.motion, FreeMotion):
+        start = float(between_stops(np.array([rest[ANGLE]]), scenario.device, said)[0])
         scenario = replace(scenario, motion=replace(scenario.motion, angle=start))
     return scenario
 

@@ -58,6 +58,7 @@ from ppafo.simulation.recorded import (
     held_vane,
     replay_scenario,
     samples_at_rest,
+    value_at_rest,
     with_fixed_volume,
 )
 from ppafo.simulation.scenario import Scenario
@@ -426,10 +427,10 @@ def _fix_vane(item: ExperimentSection, device: Device, said: str) -> tuple[Devic
 
 
 def _start_of(recording: Recording, device: Device, known: Mapping[str, float], said: str) -> Start:
-    """Return the mean of the samples at rest, at most 50 ms; the first one where the valve is open from the start."""
+    """Return the value of the samples at rest, at most 50 ms; the first one where the valve is open from the start."""
     count = samples_at_rest(recording)
 
-    def mean(name: str) -> float:
+    def first(name: str) -> float:
         if name in known:
             return known[name]
         if name not in recording:
@@ -437,10 +438,10 @@ def _start_of(recording: Recording, device: Device, known: Mapping[str, float], 
                 f"{said}: there is no channel '{name}' to start from; give a scenario, which prescribes the "
                 "initial state"
             )
-        return float(np.mean(recording[name][:count]))
+        return value_at_rest(recording.time[:count], recording[name][:count])
 
-    angle, pressure_1, pressure_2 = (mean(name) for name in FITTED_CHANNELS)
-    rate = mean("angular_velocity") if "angular_velocity" in recording and ANGLE not in known else 0.0
+    angle, pressure_1, pressure_2 = (first(name) for name in FITTED_CHANNELS)
+    rate = first("angular_velocity") if "angular_velocity" in recording and ANGLE not in known else 0.0
     return Start(float(between_stops(np.array([angle]), device, said)[0]), rate, pressure_1, pressure_2)
 
 
