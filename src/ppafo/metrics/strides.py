@@ -189,6 +189,64 @@ def mean_of(total: Floats, count: Floats) -> Floats:
     return found
 
 
+# What reads a meter is compiled into exported libraries: plain functions, no closures.
+
+
+def _gas(readings: Readings) -> Floats:
+    counted = readings.meters["strides"].counted
+    return mean_of(counted.sums.gas, counted.counted)
+
+
+def _work(readings: Readings) -> Floats:
+    counted = readings.meters["strides"].counted
+    return mean_of(counted.sums.push_off_work, counted.counted)
+
+
+def _slap_rate(readings: Readings) -> Floats:
+    counted = readings.meters["strides"].counted
+    return mean_of(counted.sums.slap_rate, counted.slaps)
+
+
+def _clearance(readings: Readings) -> Floats:
+    counted = readings.meters["strides"].counted
+    return mean_of(counted.sums.toe_clearance, counted.counted)
+
+
+def _landing(readings: Readings) -> Floats:
+    counted = readings.meters["strides"].counted
+    return mean_of(counted.sums.toe_landing, counted.counted)
+
+
+def _counted(readings: Readings) -> Floats:
+    counted = readings.meters["strides"].counted
+    found: Floats = counted.counted
+    return found
+
+
+def _whole(readings: Readings) -> Floats:
+    counted = readings.meters["strides"].counted
+    found: Floats = counted.whole
+    return found
+
+
+def _helped(readings: Readings) -> Floats:
+    counted = readings.meters["strides"].counted
+    found: Floats = counted.helped
+    return found
+
+
+def _vented(readings: Readings) -> Floats:
+    counted = readings.meters["strides"].counted
+    found: Floats = counted.whole - counted.helped
+    return found
+
+
+def _total_gas(readings: Readings) -> Floats:
+    strides = readings.meters["strides"]
+    found: Floats = strides.gas - strides.first_gas
+    return found
+
+
 def _push_off_error(readings: Readings) -> Floats:
     counted = readings.meters["strides"].counted
     found: Floats = root(mean_of(counted.squares, counted.samples))
@@ -205,26 +263,19 @@ def _kind(name: str, unit: str, summary: str, read: Callable[[Readings], Floats]
     return MetricKind(name, unit, summary, (), None, read, (METER,), needs=(WALK, *needs))
 
 
-def _mean(name: str, strides: str = "counted") -> MetricKind:
+def _mean(name: str, read: Callable[[Readings], Floats]) -> MetricKind:
     """A mean over the strides with help, without the first ones; on a course it would be over other strides."""
-
-    def read(readings: Readings) -> Floats:
-        counted = readings.meters["strides"].counted
-        return mean_of(getattr(counted.sums, name), getattr(counted, strides))
-
     item = PER_STRIDE[name]
     return _kind(name, item.unit, f"{item.summary}, mean", read, STEADY)
 
 
 METRICS = (
-    *(_mean(name, "slaps" if name == "slap_rate" else "counted") for name in StrideTotals._fields),
-    _kind(
-        "counted_strides",
-        "-",
-        "strides over which the means are taken",
-        lambda readings: readings.meters["strides"].counted.counted,
-        STEADY,
-    ),
+    _mean("gas", _gas),
+    _mean("push_off_work", _work),
+    _mean("slap_rate", _slap_rate),
+    _mean("toe_clearance", _clearance),
+    _mean("toe_landing", _landing),
+    _kind("counted_strides", "-", "strides over which the means are taken", _counted, STEADY),
     _kind(
         "push_off_error",
         "N m",
@@ -233,25 +284,15 @@ METRICS = (
         STEADY,
         REQUEST,
     ),
-    _kind("strides", "-", "whole strides of the walk", lambda readings: readings.meters["strides"].counted.whole),
-    _kind(
-        "helped_strides",
-        "-",
-        "whole strides with help from strike to strike",
-        lambda readings: readings.meters["strides"].counted.helped,
-    ),
+    _kind("strides", "-", "whole strides of the walk", _whole),
+    _kind("helped_strides", "-", "whole strides with help from strike to strike", _helped),
     _kind(
         "vented_strides",
         "-",
         "whole strides with less help (lifted only, paused or stopped) in at least a part of them",
-        lambda readings: readings.meters["strides"].counted.whole - readings.meters["strides"].counted.helped,
+        _vented,
     ),
-    _kind(
-        "total_gas",
-        "kg",
-        "gas taken from the supply in the whole walk",
-        lambda readings: readings.meters["strides"].gas - readings.meters["strides"].first_gas,
-    ),
+    _kind("total_gas", "kg", "gas taken from the supply in the whole walk", _total_gas),
     _kind("safe_state_time", "s", "time at which the controller first lifted only, paused or stopped", _safe_time),
 )
 """Those of ``walk_metrics`` that need neither a mean curve nor the healthy gait."""
