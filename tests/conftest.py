@@ -12,6 +12,8 @@ import pytest
 
 from ppafo.engine import cache
 from ppafo.engine.loading import BACKEND_VARIABLE, NUMBA
+from ppafo.questions.reproduce.answer import Reproduction
+from ppafo.questions.reproduce.solve import reproduce
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 
@@ -71,6 +73,12 @@ def torque_task() -> Callable[[str], Scenario]:
 def shorter() -> Callable[[Scenario, float], Scenario]:
     """A scenario that ends earlier [s]."""
     return lambda scenario, duration: dataclasses.replace(scenario, duration=duration)
+
+
+@pytest.fixture(scope="session")
+def reproduction() -> Reproduction:
+    """The paper's experiments with few completions: most of its time goes into them, and no test reads their digits."""
+    return reproduce(completions=1000)
 
 
 @pytest.fixture

@@ -4,14 +4,8 @@ import pytest
 
 from ppafo.questions.reproduce.answer import Reproduction
 from ppafo.questions.reproduce.claim import Claim
-from ppafo.questions.reproduce.solve import reproduce
 from ppafo.questions.reproduce.step_response import step_events
 from ppafo.running import simulate
-
-
-@pytest.fixture(scope="module")
-def reproduction() -> Reproduction:
-    return reproduce(completions=1000)
 
 
 @pytest.fixture(scope="module")

@@ -37,11 +37,6 @@ SYNTHETIC = {
 }
 
 
-@pytest.fixture(scope="module")
-def reproduction() -> Reproduction:
-    return reproduce(completions=1000)
-
-
 def printed_with(**values: float) -> Printed:
     """The printed set with some numbers exchanged, each in its printed unit; ``__`` stands for a dot."""
     printed = load_printed()

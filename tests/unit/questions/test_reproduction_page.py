@@ -21,18 +21,12 @@ from ppafo.questions.reproduce.answer import (
 from ppafo.questions.reproduce.bench import NoEvidence, SyntheticEvidence
 from ppafo.questions.reproduce.figures import step_response_figure, torque_task_figure
 from ppafo.questions.reproduce.open_range import with_open_ranges
-from ppafo.questions.reproduce.solve import reproduce
 from ppafo.questions.reproduce.step_response import Levels
 
 LEVELS = Levels(480536.0, 101325.0)
 
 
 DRAWN = {DEVICE_FIGURE: b"<svg>device</svg>", STEP_FIGURE: b"<svg>seven</svg>", TORQUE_FIGURE: b"<svg>eight</svg>"}
-
-
-@pytest.fixture(scope="module")
-def reproduction() -> Reproduction:
-    return reproduce(completions=1000)
 
 
 @pytest.fixture(scope="module")

@@ -34,7 +34,7 @@ def test_every_scenario_and_walk_has_golden_hashes_and_the_quick_ones_are_among_
         ("", CHEAP),
         ("", "solenoid"),
         ("", "proportional"),
-        ("numba", CHEAP),
+        pytest.param("numba", CHEAP, marks=pytest.mark.long),
         pytest.param("numba", "off", marks=pytest.mark.long),
     ],
 )
