@@ -32,8 +32,8 @@ from ppafo.errors import PpafoError
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.c_library.program import COUNTS
-from ppafo.exports.wasm.description import description_of
-from ppafo.live.content import page_content, program_content
+from ppafo.exports.wasm import description_of
+from ppafo.live.workbench import page_content, program_content
 from ppafo.loading import load_scenario
 from ppafo.parameters.graph import ATMOSPHERE_PATH, counts_from
 from ppafo.questions.sweep.manifest import drawn_values, varied_columns

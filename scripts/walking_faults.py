@@ -30,9 +30,8 @@ from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.events import SAFE_ROW
 from ppafo.walking.loading import load_walk
-from ppafo.walking.motion import walk_of
+from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import converter_of_walk, gait_sensors_of, plan_walk
-from ppafo.walking.varying import with_duration
 from ppafo.walking.walk import with_device_off
 
 CONFIGURATIONS = ("solenoid", "proportional", "solenoid-regulators", "proportional-regulators")

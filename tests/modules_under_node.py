@@ -17,8 +17,8 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate_many
 from ppafo.walking import load_walk
+from ppafo.walking.motion import record_interval
 from ppafo.walking.result import WalkResult
-from ppafo.walking.varying import record_interval
 from ppafo.walking.walk import walk
 
 Floats = NDArray[np.float64]

@@ -57,14 +57,12 @@ if TYPE_CHECKING:
     from ppafo.questions.reproduce.answer import Reproduction
     from ppafo.questions.reproduce.solve import reproduce
     from ppafo.questions.sensitivity.solve import Sensitivity, sensitivity
-    from ppafo.questions.size.answer import Sizing
+    from ppafo.questions.size.answer import Sizing, size
     from ppafo.questions.size.problem import load_sizing
-    from ppafo.questions.size.solve import size
     from ppafo.questions.sweep.answer import StudyResults
     from ppafo.questions.sweep.results import load_study_results
     from ppafo.questions.sweep.solve import sweep
-    from ppafo.questions.timing.answer import Timing
-    from ppafo.questions.timing.solve import event_timing
+    from ppafo.questions.timing.answer import Timing, event_timing
     from ppafo.questions.tune.answer import Tuning
     from ppafo.questions.tune.problem import list_tunings, load_tuning
     from ppafo.questions.tune.solve import tune
@@ -213,11 +211,11 @@ _HOMES = {
     "ppafo.questions.montecarlo.solve": ("MonteCarlo", "monte_carlo"),
     "ppafo.questions.parts.solve": ("Parts", "parts"),
     "ppafo.questions.size.problem": ("load_sizing",),
-    "ppafo.questions.size.solve": ("Sizing", "size"),
+    "ppafo.questions.size.answer": ("Sizing", "size"),
     "ppafo.questions.sensitivity.solve": ("Sensitivity", "sensitivity"),
     "ppafo.questions.unreported.solve": ("infer_settings",),
     "ppafo.questions.validate.solve": ("Validation", "validate"),
-    "ppafo.questions.timing.solve": ("Timing", "event_timing"),
+    "ppafo.questions.timing.answer": ("Timing", "event_timing"),
     "ppafo.questions.tune.problem": ("list_tunings", "load_tuning"),
     "ppafo.questions.tune.solve": ("Tuning", "tune"),
     "ppafo.walking": ("compare_walks", "list_walks", "load_walk", "walk", "walk_population"),

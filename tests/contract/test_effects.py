@@ -23,7 +23,7 @@ from ppafo.exports.fmu import closed_loop, functional_unit, host_platform
 from ppafo.exports.wasm import module_of
 from ppafo.identification.trajectory.problem import declaration_of
 from ppafo.identification.trajectory.problem import with_numbers as with_fitted
-from ppafo.live.content import words
+from ppafo.live.workbench import words
 from ppafo.model.catalog import EFFECTS
 from ppafo.parameters.building import build_device
 from ppafo.parameters.loading import json_schema, parse_parameter_set

@@ -93,7 +93,7 @@ def _library(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
 
 
 def _controller(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
-    from ppafo.exports.hil.example import example_controller
+    from ppafo.exports.hil.run import example_controller
     from ppafo.simulation.loading import load_scenario
 
     contents = example_controller(load_scenario(parsed.scenario, parsed.overrides))

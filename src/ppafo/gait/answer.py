@@ -14,8 +14,7 @@ from ppafo.answers.style import BLACK, BLUE, GREY, ORANGE, Margins, figure_of_pa
 from ppafo.gait.document import gait_toml
 from ppafo.gait.gait import CURVES, Gait, clinical_angle, plain_unit
 from ppafo.gait.recorded.footfalls import Stride
-from ppafo.gait.recorded.importing import ImportedGait
-from ppafo.gait.recorded.strides import phases
+from ppafo.gait.recorded.importing import ImportedGait, phases
 from ppafo.signals.recording import Floats
 
 if TYPE_CHECKING:

@@ -22,10 +22,12 @@ from ppafo.model.plant import chamber_volumes
 from ppafo.parameters import load_device
 from ppafo.parameters.declaration import SECTIONS
 from ppafo.parameters.device import Device
-from ppafo.rig.dynamics import ambient_node, leak_exchange, orifice_exchange
-from ppafo.rig.hardware import (
+from ppafo.rig.dynamics import RigPhysics, RigState, ambient_node, leak_exchange, orifice_exchange
+from ppafo.rig.preset import (
     CHANNEL_SENSORS,
     Floats,
+    Outcome,
+    Request,
     line_orifice,
     random_stream,
     real_device,
@@ -33,8 +35,6 @@ from ppafo.rig.hardware import (
     rig_plant,
     sensor,
 )
-from ppafo.rig.preset import Outcome, Request
-from ppafo.rig.rows import RigPhysics, RigState
 from ppafo.rig.solution import RigRun, RigSolution, sensor_signals, solve_rig, spool_position
 from ppafo.signals.channels import CHANNELS
 from ppafo.signals.recording import Channel, Recording

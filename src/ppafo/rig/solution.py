@@ -29,9 +29,8 @@ from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import Openings, PlantParameters, actuator_torque, holds_still
 from ppafo.model.sensors import Measurement
 from ppafo.parameters.device import Device
-from ppafo.rig.dynamics import observables, rig_rates
-from ppafo.rig.hardware import Sensor
-from ppafo.rig.rows import RigPhysics, RigState
+from ppafo.rig.dynamics import RigPhysics, RigState, observables, rig_rates
+from ppafo.rig.preset import Sensor
 
 Floats = NDArray[np.float64]
 

@@ -55,18 +55,19 @@ from ppafo.walking.declaration import (
     timing_settings,
     walk_file,
 )
-from ppafo.walking.motion import WalkMotion, walk_of
-from ppafo.walking.planning import NO_REFERENCE, course_of_walk, noise, plan_walks, switches, walking_valve
-from ppafo.walking.preparation import FaultSettings, SensorSettings
-from ppafo.walking.result import lacks, measured
-from ppafo.walking.varying import (
+from ppafo.walking.motion import (
     PLACES,
+    WalkMotion,
     clock_with,
     duration_problems,
     numbers_of_scenario,
     record_interval,
+    walk_of,
     with_duration,
 )
+from ppafo.walking.planning import NO_REFERENCE, course_of_walk, noise, plan_walks, switches, walking_valve
+from ppafo.walking.preparation import FaultSettings, SensorSettings
+from ppafo.walking.result import lacks, measured
 from ppafo.walking.wearer import read_wearer, wearer_origin
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)

@@ -1,16 +1,36 @@
-"""The motion of a walk: who walks how, with which sensors, as frozen values in SI units. It makes a scenario a walk."""
+"""The motion of a walk: who walks how, with which sensors, as frozen values in SI units. It makes a scenario a walk.
+
+What may vary in it stands below: its numbers by path, and its times, one by one or as columns of an ensemble.
+"""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
+from ppafo.control.walking.catalog import TIMINGS
 from ppafo.gait import Gait
 from ppafo.gait.plausible import gait_file_remarks
+from ppafo.model.columns import Problem, at, over_runs
+from ppafo.model.declaration import Quantity
+from ppafo.simulation.clock import Clock
+from ppafo.simulation.declaration import gas_settings, line_paths
 from ppafo.simulation.scenario import MotionKind, Scenario
 from ppafo.walking.bottle import BottleSupply
 from ppafo.walking.course import WalkingCourse
+from ppafo.walking.declaration import (
+    FAULTY,
+    FORCES,
+    PERSON,
+    controller_settings,
+    converter_settings,
+    fault_numbers,
+    quantities,
+    timing_settings,
+)
 from ppafo.walking.preparation import FaultSettings
-from ppafo.walking.wearer import Wearer, who_walks
+from ppafo.walking.wearer import WEARER, Wearer, who_walks
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,3 +74,75 @@ def person_remarks(scenario: Scenario) -> list[str]:
     motion = walk_of(scenario)
     remarks = [f"remark: {text}" for text in gait_file_remarks(motion.gait)]
     return [who_walks(motion.wearer, motion.gait, motion.wearer_origin), *remarks]
+
+
+SHORTEST_STRIDES = 5
+SHORTEST_COURSE = 1.0
+LONGEST_MINUTES = 60.0
+
+PLACES: Mapping[str, tuple[str, ...]] = {
+    **{f"wearer.{item.name}": ("motion", "wearer", item.name) for item in WEARER},
+    **{f"timing.{item.name}": ("control", "settings", item.name) for kind in TIMINGS for item in timing_settings(kind)},
+    f"wearer.{PERSON.name}": ("motion", PERSON.name),
+    **{f"sensors.{name}": ("motion", "forces", name) for name in FORCES},
+    **{
+        f"faults.{sensor}.{item.name}": ("motion", "faults", sensor, "numbers", item.name)
+        for sensor in FAULTY
+        for kind in ("stuck", "distorted")
+        for item in fault_numbers(sensor, kind)
+    },
+}
+"""The attributes, or keys, that lead to the numbers of a walk that other scenarios have not."""
+
+
+def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
+    """The declaration of every number of a walk beside those of its device, by path."""
+    motion, control = walk_of(scenario), scenario.control
+    own = controller_settings(control.kind) + (converter_settings(control.kind) if control.is_fixed else ())
+    known = quantities(control.kind, motion.timing)
+    kept = {f"controller.{item.name}" for item in own} | {"controller.rate", "controller.period"}
+    kept |= {path for path in known if path.partition(".")[0] in ("wearer", "timing", "sensors", "run")}
+    kept |= {f"gas_model.{item.name}" for item in gas_settings("" if scenario.thermal is None else "thermal")}
+    kept |= set() if scenario.supply_lines is None else set(line_paths())
+    for sensor, fault in motion.faults.items():
+        kept |= {f"faults.{sensor}.{name}" for name in fault.numbers}
+    # An object in charge has no settings, and a timing is one of a controller that has some.
+    lost = {path for path in kept if path.startswith("timing.") and path.partition(".")[2] not in control.settings}
+    return {path: item for path, item in known.items() if path in kept - lost}
+
+
+def record_interval(seconds: float) -> float:
+    """Time [s] between two samples of the record of a walk of this length [s]; an hour of milliseconds does not fit."""
+    return 1.0e-3 if seconds <= 61.0 else (5.0e-3 if seconds <= 601.0 else 2.0e-2)
+
+
+def with_duration(scenario: Scenario, seconds: float) -> Scenario:
+    """A walk of another length [s], recorded as often as that allows."""
+    return replace(scenario, duration=seconds, output_interval=record_interval(seconds))
+
+
+def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
+    """What is wrong with the length of a walk [s], which may be an array (runs,)."""
+    has_course = walk_of(scenario).course is not None
+    shortest = SHORTEST_COURSE if has_course else SHORTEST_STRIDES * walk_of(scenario).gait.stride_time
+    fits = np.logical_and(seconds >= shortest, seconds <= 60.0 * LONGEST_MINUTES)
+
+    def line(run: int) -> str:
+        return (
+            f"a walk of {at(seconds, run) / 60.0:.6g} min: must be {shortest / 60.0:.2g} min "
+            f"({'a second of a course' if has_course else f'{SHORTEST_STRIDES} strides'}) or more, and "
+            f"at most {LONGEST_MINUTES:g} min"
+        )
+
+    return ((np.logical_not(fits), line),)
+
+
+def clock_with(scenario: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tuple[Problem, ...]]:
+    """The clock of a walk with other times [s] by path, which may be arrays (runs,), and what is wrong with it."""
+    duration = times.get("run.duration", scenario.duration)
+    period = times.get("controller.period", scenario.control.period)
+    if "controller.rate" in times:
+        period = 1.0 / times["controller.rate"]
+    output = over_runs(record_interval, duration) if "run.duration" in times else scenario.output_interval
+    problems = duration_problems(scenario, duration) if "run.duration" in times else ()
+    return Clock(duration, times.get("run.step", scenario.time_step), output, period), problems

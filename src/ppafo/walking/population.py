@@ -20,11 +20,10 @@ from ppafo.metrics.strides import PER_STRIDE
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.course import turns_walked
 from ppafo.walking.events import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
-from ppafo.walking.motion import walk_of
+from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.person import crowd_of, draw_gaits
 from ppafo.walking.planning import course_of_walk, plan_walks, unrecorded
 from ppafo.walking.result import REMEDY
-from ppafo.walking.varying import with_duration
 from ppafo.walking.walk import Progress, lasting, silent
 from ppafo.walking.wearer import draw_builds
 

@@ -20,11 +20,10 @@ from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.declaration import THRESHOLDS
 from ppafo.walking.gait_series import landing_phase
 from ppafo.walking.loading import load_walk
-from ppafo.walking.motion import walk_of
+from ppafo.walking.motion import SHORTEST_STRIDES, duration_problems, walk_of, with_duration
 from ppafo.walking.planning import fed_device, plan_walk
 from ppafo.walking.result import WalkResult, result_of_walk
 from ppafo.walking.strides import PHASES, healthy_positive_work, healthy_toe_height, lowest_toes
-from ppafo.walking.varying import SHORTEST_STRIDES, duration_problems, with_duration
 
 Progress = Callable[[float, float], None]
 

@@ -11,7 +11,7 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.live.page import bundled, digest
-from ppafo.questions.walk import solve
+from ppafo.questions.walk import answer
 from ppafo.storage import read_csv, read_netcdf
 from ppafo.storage.result_folder import read_recording
 from ppafo.walking import loading
@@ -289,7 +289,7 @@ def bursting(monkeypatch: pytest.MonkeyPatch) -> None:
         supply = replace(configuration.device.supply, pressure=1.0e18)
         return replace(configuration, device=replace(configuration.device, supply=supply))
 
-    monkeypatch.setattr(solve, "load_walk", changed)
+    monkeypatch.setattr(answer, "load_walk", changed)
 
 
 @pytest.mark.usefixtures("bursting")

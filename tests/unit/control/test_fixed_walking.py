@@ -22,7 +22,7 @@ from ppafo.control.fixed.walking_numbers import EVENT_ON_OFF
 from ppafo.control.walking import phases, signs
 from ppafo.control.walking.event_on_off import EVENT_ON_OFF as FLOAT_KIND
 from ppafo.engine.rows import leaf_paths, rebuilt
-from ppafo.exports.firmware.walking.drawn import DrawnGait, Manner
+from ppafo.exports.firmware.walking import DrawnGait, Manner
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENTS_ABOVE
 

@@ -6,8 +6,8 @@ from ppafo.engine.source_text import SourceCollector
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.walking.loading import load_walk
+from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk
-from ppafo.walking.varying import with_duration
 
 
 def test_loads_that_nothing_asks_for_are_left_out_and_what_others_need_stays() -> None:

@@ -38,9 +38,9 @@ from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.plan import initial_lines
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.walking import load_walk
+from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.preparation import vented_state
-from ppafo.walking.varying import with_duration
 
 ANGLE = 1.7
 DURATION = 0.06

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.exports.hil.example import example_controller
+from ppafo.exports.hil.run import example_controller
 from ppafo.exports.hil.wire import Sample, sample_bytes
 from ppafo.simulation.loading import load_scenario
 from tests.example_board import COMPILER, SENT, WHOLE, built, plug, running

@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 
 from ppafo.cli.main import main
 from ppafo.errors import ScenarioError
-from ppafo.exports.hil.example import example_controller
+from ppafo.exports.hil.run import example_controller
 from ppafo.exports.hil.wire import Answer, Reader, Sample, answer_bytes, open_port, sample_bytes
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from ppafo.control.fixed.walking_law import HALVES, LONGEST, LONGEST_STRIDE, TOP, next_stride
 from ppafo.control.fixed.whole_numbers import FRACTION_BITS, HALF, LARGEST_FRACTION, nearest_fraction_of
 from ppafo.exports.firmware.lock_step import PythonChip
-from ppafo.exports.firmware.walking import walk_chip, walk_firmware
-from ppafo.exports.firmware.walking.drawn import SAMPLES, gait_readings
+from ppafo.exports.firmware.walking import SAMPLES, gait_readings, walk_chip, walk_firmware
 from ppafo.walking.loading import load_walk
 from tests.unit.control.test_fixed_walking import RULES
 from tests.unit.exports.test_firmware_conditions import TOOLS, reached

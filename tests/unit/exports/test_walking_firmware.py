@@ -14,8 +14,7 @@ from ppafo.exports.firmware import proof
 from ppafo.exports.firmware.catalog import MSP430G2553
 from ppafo.exports.firmware.lock_step import PythonChip
 from ppafo.exports.firmware.simulators import built, missing_tools, sizes
-from ppafo.exports.firmware.walking import compare_drawn_walk, walk_chip, walk_firmware, walk_on_chip
-from ppafo.exports.firmware.walking.drawn import DrawnGait
+from ppafo.exports.firmware.walking import DrawnGait, compare_drawn_walk, walk_chip, walk_firmware, walk_on_chip
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.widths import Interval
 from ppafo.walking.loading import load_walk

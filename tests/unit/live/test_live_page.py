@@ -87,7 +87,7 @@ def test_the_same_scenarios_give_the_same_page(file: Path) -> None:
 
 def test_every_default_of_the_page_is_what_its_text_says() -> None:
     from ppafo.exports.wasm import module_of
-    from ppafo.live.content import Simulated, program_content
+    from ppafo.live.workbench import Simulated, program_content
 
     for name in DEFAULT:
         scenario = load_walk(name) if name in list_walks() else load_scenario(name)

@@ -8,9 +8,8 @@ import pytest
 
 from ppafo.model.gas import SPECIES
 from ppafo.rig import record
-from ppafo.rig.hardware import SECOND_VIRIAL
-from ppafo.rig.preset import Preset, load_preset
-from ppafo.rig.rows import RigState
+from ppafo.rig.dynamics import RigState
+from ppafo.rig.preset import SECOND_VIRIAL, Preset, load_preset
 from ppafo.rig.solution import RigRun, RigSolution, solve_rig, spool_position
 from ppafo.running import simulate
 

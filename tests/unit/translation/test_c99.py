@@ -19,8 +19,8 @@ from ppafo.translation.c99 import c_source, program_source
 from ppafo.translation.native import build, run_native
 from ppafo.translation.walk import entries_of, walk_module
 from ppafo.walking.loading import load_walk
+from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk
-from ppafo.walking.varying import with_duration
 from scripts.bits import digest, drawn_batch, failures, plain_batch
 from tests.composed_programs import drawn_programs
 

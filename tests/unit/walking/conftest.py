@@ -15,10 +15,9 @@ from ppafo.model.sensors import Fault
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import load_walk
-from ppafo.walking.motion import walk_of
+from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.preparation import FaultSettings
-from ppafo.walking.varying import with_duration
 from ppafo.walking.wearer import paper_subject
 
 

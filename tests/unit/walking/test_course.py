@@ -16,11 +16,10 @@ from ppafo.questions.endurance.draw import walk_gas
 from ppafo.questions.walk.course import course_sections
 from ppafo.walking import load_walk, walk, walk_population
 from ppafo.walking.course import WalkingCourse, list_courses, load_course
-from ppafo.walking.motion import walk_of
+from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import plan_walk, planned_course
 from ppafo.walking.result import WalkResult, integral_of_a_stride
 from ppafo.walking.strides import course_metrics, steady_strides
-from ppafo.walking.varying import with_duration
 from ppafo.walking.walk import Comparison
 
 HEAD = 'schema_version = 1\nname = "tried"\n'

@@ -20,9 +20,8 @@ from ppafo.simulation.sampled import state_row_numbers
 from ppafo.units import parse_quantity
 from ppafo.walking import load_walk, walk_population
 from ppafo.walking.events import SAFE_ROW
-from ppafo.walking.motion import walk_of
+from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import gait_sensors_of, plan_walk
-from ppafo.walking.varying import with_duration
 
 PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "let-it-walk.md").read_text(encoding="utf-8")
 SECTION = PAGE.partition("## When a sensor fails")[2].partition("\n## ")[0]

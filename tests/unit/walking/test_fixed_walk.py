@@ -20,10 +20,9 @@ from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.sampled import run_sampled, state_row_numbers
 from ppafo.walking.events import SAFE_ROW
 from ppafo.walking.loading import load_walk
-from ppafo.walking.motion import walk_of
+from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.person import draw_gaits
 from ppafo.walking.planning import batch_of_many, converter_of_walk, gait_sensors_of, plan_walk
-from ppafo.walking.varying import with_duration
 from ppafo.walking.walk import walk, with_device_off
 from ppafo.walking.wearer import draw_builds
 

@@ -11,13 +11,12 @@ from ppafo.engine.rows import row_numbers
 from ppafo.errors import ParameterError, ScenarioError, SimulationError
 from ppafo.parameters.bottles.bottle import FILE as BOTTLES
 from ppafo.questions.league.walking.task import walking_task
-from ppafo.questions.timing.solve import event_timing
+from ppafo.questions.timing.answer import event_timing
 from ppafo.walking import bottle, load_walk, walk, walk_population
 from ppafo.walking.loading import FILE
-from ppafo.walking.motion import walk_of
+from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.result import WalkResult
-from ppafo.walking.varying import with_duration
 from ppafo.walking.walk import compare_walks, with_device_off
 from tests.judge import bottle as independent
 

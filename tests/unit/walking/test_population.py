@@ -13,10 +13,9 @@ from ppafo.gait.gait import KNEE, Curve
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.walking import load_walk, walk_population
 from ppafo.walking.gait_series import gait_timing
-from ppafo.walking.motion import walk_of
+from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.person import SERIES, START_VARIATION, THRESHOLD_VARIATION, SeriesOfMany, draw_gaits
 from ppafo.walking.planning import batch_of_many, plan_walk
-from ppafo.walking.varying import with_duration
 from ppafo.walking.wearer import (
     MASS_VARIATION,
     STATURE_VARIATION,

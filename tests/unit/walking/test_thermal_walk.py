@@ -9,8 +9,8 @@ from ppafo.errors import ScenarioError
 from ppafo.metrics.gas import energy_imbalance, gas_imbalance
 from ppafo.simulation.scenario import Thermal
 from ppafo.walking import load_walk, walk, walk_population
+from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk
-from ppafo.walking.varying import with_duration
 
 WALLS = ("gas_model.kind=thermal", "gas_model.wall_area_per_volume=100 1/m")
 WARM = (*WALLS, "gas_model.heat_transfer_coefficient=50 W/(m^2 K)")

@@ -24,7 +24,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.walking.course import flat_foot
 from ppafo.walking.declaration import SEED, STEP, WALK_SENSORS, fault_numbers
 from ppafo.walking.gait_series import fit_rocker, gait_series, gait_timing
-from ppafo.walking.motion import walk_of
+from ppafo.walking.motion import record_interval, walk_of
 from ppafo.walking.planning import NO_REFERENCE, course_of_walk, law_of, sensor_settings
 from ppafo.walking.preparation import (
     DISTORTED,
@@ -45,7 +45,6 @@ from ppafo.walking.preparation import (
     walk_step_counts,
     with_leg,
 )
-from ppafo.walking.varying import record_interval
 from ppafo.walking.wearer import WEARER, leg_parameters
 
 _FORCES = ("force_bandwidth", "force_noise", "force_resolution", "lost_share")

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ppafo.errors import DataError
-from ppafo.gait.recorded.c3d import PLATE
 from ppafo.gait.recorded.mapping import (
     AngleMap,
     ForceMap,
@@ -20,7 +19,7 @@ from ppafo.gait.recorded.mapping import (
     opensim_map,
     package_map,
 )
-from ppafo.gait.recorded.table import CSV, OPENSIM, MotionTable
+from ppafo.gait.recorded.table import CSV, OPENSIM, PLATE, MotionTable
 from ppafo.signals.recording import Floats
 
 _WORD = re.compile(r"[a-z]+|\d+")

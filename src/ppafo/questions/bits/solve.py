@@ -26,8 +26,8 @@ from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.walking import list_walks
 from ppafo.walking.loading import load_walk
+from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk
-from ppafo.walking.varying import with_duration
 
 Runner = Callable[[Batch], BatchResult]
 VARIED = {

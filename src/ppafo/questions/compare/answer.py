@@ -1,4 +1,4 @@
-"""The answer of a comparison: a table for each task, the statistics of pairs, error against gas, the changes."""
+"""The answer of a comparison: a table for each task, paired statistics, error against gas, the changes."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import (
@@ -29,16 +30,117 @@ from ppafo.answers.style import (
 )
 from ppafo.live.workbench import live_part
 from ppafo.metrics import Metric
-from ppafo.questions.compare.paired import Paired, best_probabilities, compare_pairs, pareto_front
 from ppafo.questions.question import Solved
 from ppafo.simulation.scenario import Scenario, plain
 from ppafo.simulation.simulate import Status
-from ppafo.studies.distributions import FEWEST_EFFECTIVE, Floats, Interval, fraction_text
-from ppafo.studies.draws import Outcomes
+from ppafo.studies.distributions import (
+    FEWEST_EFFECTIVE,
+    Floats,
+    Interval,
+    effective_sample_size,
+    fraction_interval,
+    fraction_text,
+    noise_interval,
+    replicates_interval,
+)
+from ppafo.studies.draws import REPLICATES, Outcomes
 
 if TYPE_CHECKING:
     import matplotlib.figure
     from matplotlib.axes import Axes
+
+Masks = NDArray[np.bool_]
+OUTER_QUANTILES = (0.05, 0.95)
+"""The quantiles over the draws that tables show beside a median."""
+
+
+@dataclass(frozen=True, slots=True)
+class Paired:
+    """One metric of a configuration against that of the baseline, over the pairs in which both have it.
+
+    ``difference`` is the mean of configuration less baseline [SI] with its confidence interval; ``change`` the median
+    over the draws of the same as a fraction of the baseline (nan where that is 0), ``change_low`` and ``change_high``
+    its 5 and 95 % quantiles: how uncertain the change is, however many draws are made. ``better`` is the probability
+    that the configuration is better in a draw, with its confidence interval: how well that is known from these draws;
+    None where neither end of the metric is better. ``equal`` is the fraction of draws in which both are the same.
+    ``effective_size`` is how many pairs determine the mean difference, ``noise`` the fraction of the variance of the
+    difference that is due to sensor noise, None where there is none.
+    """
+
+    metric: str
+    pairs: int
+    difference: Interval
+    change: float
+    change_low: float
+    change_high: float
+    better: Interval | None
+    equal: float
+    effective_size: float
+    noise: Interval | None = None
+
+
+def pareto_front(points: Floats) -> Masks:
+    """Return which points (points, goals) are not dominated: no other is at least as low in all goals, lower in one."""
+    front = np.zeros(len(points), dtype=np.bool_)
+    for row, point in enumerate(points):
+        if np.all(np.isfinite(point)):
+            is_dominating = np.all(points <= point, axis=1) & np.any(points < point, axis=1)
+            front[row] = not bool(np.any(is_dominating))
+    return front
+
+
+def compare_pairs(
+    metric: str,
+    baseline: Floats,
+    other: Floats,
+    better: int,
+    confidence: float,
+    other_noise: tuple[Floats, Floats] | None = None,
+) -> Paired | None:
+    """Return the statistics of values (draws,) [SI], nan where there is none; None without any pair.
+
+    The draws are dealt out to replicates in turn. ``other_noise`` are both again, for the first draws with other noise.
+    ``better`` is -1 where less is better, 1 where more is, 0 where neither is. A draw in which both are the same counts
+    for neither.
+    """
+    both = np.isfinite(baseline) & np.isfinite(other)
+    first, second = baseline[both], other[both]
+    if first.size == 0:
+        return None
+    change = (second - first)[first != 0.0] / np.abs(first[first != 0.0])
+    low, middle, high = (
+        np.quantile(change, (OUTER_QUANTILES[0], 0.5, OUTER_QUANTILES[1])) if change.size else (np.nan,) * 3
+    )
+    difference = other - baseline
+    noise = None
+    if other_noise is not None:
+        again = other_noise[1] - other_noise[0]
+        noise = noise_interval(difference[: again.size], again, confidence)
+    wins = int(np.count_nonzero(better * (second - first) > 0.0))
+    return Paired(
+        metric=metric,
+        pairs=first.size,
+        difference=replicates_interval(difference, REPLICATES, confidence),
+        change=float(middle),
+        change_low=float(low),
+        change_high=float(high),
+        better=fraction_interval(wins, first.size, confidence) if better else None,
+        equal=float(np.mean(first == second)),
+        effective_size=effective_sample_size(second - first),
+        noise=noise,
+    )
+
+
+def best_probabilities(values: Sequence[Floats], better: int, confidence: float) -> list[Interval]:
+    """Return the probability of each configuration to be the best in a draw; ties count for all of them."""
+    table = better * np.stack(values)
+    table = table[:, np.all(np.isfinite(table), axis=0)]
+    draws = table.shape[1]
+    if draws == 0:
+        return []
+    is_best = table == np.max(table, axis=0)
+    return [fraction_interval(int(np.count_nonzero(row)), draws, confidence) for row in is_best]
+
 
 COMPARED: dict[str, int] = {
     "rms_error": -1,

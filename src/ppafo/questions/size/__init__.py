@@ -3,7 +3,7 @@
 from ppafo.questions.question import THREADS, Argument, Question
 
 QUESTION = Question(
-    solve="ppafo.questions.size.solve:size",
+    solve="ppafo.questions.size.answer:size",
     arguments=(
         Argument(("SIZING",), "problem", "name of a sizing file, or a .toml file", "SIZING", nargs="?"),
         THREADS,

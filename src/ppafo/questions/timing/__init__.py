@@ -3,7 +3,7 @@
 from ppafo.questions.question import SET, Argument, Question, minutes
 
 QUESTION = Question(
-    solve="ppafo.questions.timing.solve:event_timing",
+    solve="ppafo.questions.timing.answer:event_timing",
     arguments=(
         Argument(
             ("WALK",),

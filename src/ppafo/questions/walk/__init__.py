@@ -3,7 +3,7 @@
 from ppafo.questions.question import SET, Argument, Question, counting_number, minutes, whole_number
 
 QUESTION = Question(
-    solve="ppafo.questions.walk.solve:walk_with_and_without",
+    solve="ppafo.questions.walk.answer:walk_with_and_without",
     arguments=(
         Argument(
             ("WALK",),
@@ -40,6 +40,6 @@ QUESTION = Question(
         SET,
     ),
     library="ppafo.walking.loading:FILE",
-    listing="ppafo.questions.walk.solve:list_files",
-    default_folder="ppafo.questions.walk.solve:default_folder",
+    listing="ppafo.questions.walk.answer:list_files",
+    default_folder="ppafo.questions.walk.answer:default_folder",
 )

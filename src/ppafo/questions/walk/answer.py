@@ -1,8 +1,9 @@
-"""The answer of a walk, of one wearer with and without the device, or of many wearers."""
+"""A walk and its answer, of one wearer with and without the device, or of many wearers."""
 
 import platform
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,10 @@ from ppafo.answers.display_units import display_value, title_with_unit
 from ppafo.live.workbench import live_part
 from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE
+from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.endurance.answer import Endurance
 from ppafo.questions.endurance.draw import FORMAT
+from ppafo.questions.endurance.solve import endurance_of_walk
 from ppafo.questions.question import Solved
 from ppafo.questions.walk.course import (
     bottle_data,
@@ -30,6 +33,8 @@ from ppafo.questions.walk.volumes import (
     VolumeReading,
     volumes_data,
     volumes_sections,
+    walks_by_volume,
+    wearers_by_volume,
     wearers_volumes_data,
     wearers_volumes_sections,
 )
@@ -38,17 +43,19 @@ from ppafo.simulation.scenario import UNITS, Scenario, plain
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.version import __version__
+from ppafo.walking import course as courses
 from ppafo.walking.events import event_lines
 from ppafo.walking.figures.legs import animation, frames_figure, strip_figure
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.over_time import failures, over_time_figure
+from ppafo.walking.loading import FILE, load_walk
 from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
 from ppafo.walking.planning import law_of, sensor_settings
 from ppafo.walking.population import OUTCOMES, SHOWN, TRAITS, Number, Population, population_figure
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES
-from ppafo.walking.walk import Comparison
+from ppafo.walking.walk import Comparison, compare_walks
 from ppafo.walking.wearer import CORRELATION, MASS_VARIATION, MAXIMUM_DEVIATIONS, STATURE_VARIATION
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -479,3 +486,67 @@ def _csv(columns: Mapping[str, Floats]) -> bytes:
     lines = ["# simulated: a model's own output, not measured", ",".join(columns)]
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     return ("\n".join([*lines, *(",".join(map(repr, row)) for row in rows)]) + "\n").encode()
+
+
+_LONG = 12.0
+"""Minutes above which a walk reports how far it is."""
+
+
+def walk_with_and_without(
+    configuration: Scenario | str | Path,
+    minutes: float | None = None,
+    gait: str | Path | None = None,
+    course: str | Path | None = None,
+    bottle: str | Path | None = None,
+    wearers: int | None = None,
+    seed: int = 1,
+    overrides: Sequence[str] = (),
+    progress: Report | None = None,
+) -> WalkPair | Wearers:
+    """Walk with the device, with it switched off, and beside the healthy gait; or let many wearers walk with it.
+
+    ``configuration`` is a walk file, its name or a loaded one; ``minutes`` the length of the walk [min], one or
+    that of its course unless given; ``gait``, ``course`` and ``bottle`` stand in place of those of the configuration;
+    ``wearers`` the number of different wearers, drawn with ``seed``. ScenarioError for bad input; a walk that diverges
+    is an answer that has not passed.
+    """
+    chosen = configuration
+    if not isinstance(chosen, Scenario):
+        chosen = load_walk(chosen, overrides, gait, course, bottle)
+    report = progress or report_nothing
+    if wearers is not None:
+        advance = _reporter(report, "walking", "wearers", 0.0)
+        return Wearers(*wearers_by_volume(chosen, minutes, wearers, seed, advance))
+    comparison = compare_walks(chosen, minutes, _reporter(report, "walking", "min", _LONG))
+    life = endurance_of_walk(comparison.with_device) if walk_of(chosen).bottle is None else None
+    return WalkPair(comparison, life, walks_by_volume(comparison.with_device, life, minutes))
+
+
+def list_files() -> list[dict[str, Any]]:
+    """Return the walks and the courses that come with the package: name, what it is, description."""
+    found = []
+    for library in (FILE, courses.FILE):
+        files = {name: library.parse(library.read(name), name) for name in library.names()}
+        found += [
+            {"name": name, "kind": library.noun, "description": str(file.get("description", ""))}
+            for name, file in files.items()
+        ]
+    return found
+
+
+def default_folder(values: Mapping[str, Any]) -> Path:
+    """Return where the command writes by default: by the name of the configuration."""
+    configuration = load_walk(
+        values["configuration"], values["overrides"], values["gait"], values["course"], values["bottle"]
+    )
+    walked, bottled = walk_of(configuration).course, walk_of(configuration).bottle
+    along = ("" if walked is None else f"-{walked.name}") + ("" if bottled is None else f"-{bottled.bottle.name}")
+    return Path("out") / f"{'walk' if values['wearers'] is None else 'wearers'}-{configuration.name}{along}"
+
+
+def _reporter(report: Report, activity: str, noun: str, above: float) -> "Any":
+    def forward(done: float, total: float) -> None:
+        if total > above:
+            report(Progress(activity, round(done), round(total), noun=noun))
+
+    return forward

@@ -16,8 +16,17 @@ from ppafo.parameters.device import Device
 from ppafo.simulation.loading import load_scenario
 from ppafo.walking.loading import load_walk
 from ppafo.walking.walk import lasting
-from ppafo.worlds.gym.episodes import Episodes, Ranges, scenario_episodes, walk_episodes
-from ppafo.worlds.gym.kernel import Environments, Flags, Judging, Places, Seen
+from ppafo.worlds.gym.episodes import (
+    Environments,
+    Episodes,
+    Flags,
+    Judging,
+    Places,
+    Ranges,
+    Seen,
+    scenario_episodes,
+    walk_episodes,
+)
 from ppafo.worlds.gym.tasks import BAR, LONGEST_SINCE, TASKS, Task
 
 CONSISTENT = "device.set=ppafo2011-consistent"

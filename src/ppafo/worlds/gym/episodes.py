@@ -1,18 +1,33 @@
-"""Where episodes begin: the scenario or walk as it stands, or one that is drawn from what is not known about it."""
+"""Where episodes begin, as the file has it or drawn from what is not known about it, and the kernel that steps them.
+
+One compiled call for one step of all environments: commands in; physics, sensors, observations and rewards out.
+
+The lane loop is that of every other run; what stands around it is written from the same pieces. Each environment is a
+lane, whose episode began at a step of its own.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.control.walking.assistance import TorqueProfile
-from ppafo.engine.lanes import Batch, Clock, Floats
-from ppafo.engine.program import Program
-from ppafo.engine.rows import numbers
+from ppafo.engine.lane_rows import VECTOR, LaneRows, indent, lanes_of
+from ppafo.engine.lane_samples import SIGNALS, current_readings, pressures_of, sense, sense_gait
+from ppafo.engine.lane_source import HEADER, INLINE, lane_loop
+from ppafo.engine.lanes import SIGNAL_ROWS, Batch, Clock, Floats
+from ppafo.engine.loading import ARRAY, ARRAY_2D, ARRAY_3D, FLOAT, INT, entry_text, load_source, with_arrays
+from ppafo.engine.program import LaneStart, Program
+from ppafo.engine.rows import leaf_paths, numbers, row_expression
 from ppafo.engine.run import batch_of
+from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers
+from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ScenarioError, UnitError
+from ppafo.model.plant import actuator_torque
 from ppafo.model.sensors import Measurement
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.device import Device
@@ -26,13 +41,267 @@ from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.varying import VariedPath, in_its_unit, varied_path
 from ppafo.units import parse_quantity
-from ppafo.walking.motion import walk_of
+from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.person import draw_gaits
 from ppafo.walking.planning import batch_of_many, plan_walk
-from ppafo.walking.varying import with_duration
 from ppafo.walking.wearer import draw_builds
-from ppafo.worlds.gym.kernel import Columns, episode_program
-from ppafo.worlds.gym.tasks import Goal
+from ppafo.worlds.gym.tasks import (
+    Goal,
+    Memory,
+    Requested,
+    Task,
+    finite,
+    reward_of,
+    valve_command,
+    valve_or_dump,
+    within,
+)
+
+Flags = NDArray[np.bool_]
+Places = NDArray[np.intp]
+
+OWN = {"goal": Goal, "memory": Memory}
+"""Rows of an environment beside those of its run."""
+OWN_PATHS = [path for name, row in OWN.items() for path in leaf_paths(row, name)]
+OUTCOMES = 5
+REWARD, ERROR, SUPPLIED, FAILED, THROUGH = range(OUTCOMES)
+"""Rows of the outcomes: reward, error, gas since the episode began [kg], 1 where it fails or is through, else 0."""
+
+_PARAMETERS = {
+    **dict.fromkeys(("all_states", "all_parameters"), ARRAY_2D),
+    **{"all_signals": ARRAY_3D, "all_commands": ARRAY_2D, "record": ARRAY_3D, "trace": ARRAY_3D, "all_own": ARRAY_2D},
+    **{"actions": ARRAY_2D, "bounds": ARRAY_2D, "chosen": ARRAY, "observations": ARRAY_2D, "outcomes": ARRAY_2D},
+    **dict.fromkeys(("error_weight", "gas_weight"), FLOAT),
+    **dict.fromkeys(("now", "steps", "steps_in_all", "steps_per_sample", "signal_delay", "command_delay"), INT),
+}
+"""Of ``go_on``; what begins with ``all`` has the rows of all blocks, one block after another."""
+
+
+@lru_cache(maxsize=16)
+def kernel_source(program: Program, task: Task) -> str:
+    """Source text of the module whose ``go_on`` takes all environments of a program a step further."""
+    collector = SourceCollector(INLINE)
+    loop = lane_loop(program, collector, "advance")
+    step = _step(LaneRows(program, collector), task)
+    return "\n\n\n".join([HEADER, collector.text(), loop, entry_text("go_on", _PARAMETERS, step)])
+
+
+def _step(rows: LaneRows, task: Task) -> list[str]:
+    """Lines of ``go_on``: block by block the commands, the lane loop, and what is observed at its end."""
+    # The rows are those of the arrays between two calls of the lane loop, the held chambers those of now.
+    rows.cells.update({path: f"states[{row}, lane]" for path, row in rows.state_at.items()})
+    first = len(rows.state_at)
+    rows.cells.update({path: f"parameters[{row - first}, lane]" for path, row in rows.parameter_at.items()})
+    rows.cells.update({path: f"own[{row}, lane]" for row, path in enumerate(OWN_PATHS)})
+    if rows.program.hands_chambers_on:
+        rows.cells.update({path: f"chambers{path.removeprefix('held')}" for path in leaf_paths(HeldChambers, "held")})
+    command = rows.add(valve_or_dump if task.walks else valve_command)
+    given = f"{command}(actions[place, 0], actions[place, actions.shape[1] - 1])"
+    call = (
+        "advance(states, parameters, signal_history, command_history, record, trace, "
+        "now - steps, steps, -1, steps_per_sample, 1.0, -1, 0, 0, signal_delay, command_delay)"
+    )
+    heights = {
+        "states": str(len(rows.state_at)),
+        "parameters": str(len(rows.parameter_at)),
+        "own": str(len(OWN_PATHS)),
+        "signal_history": str(SIGNAL_ROWS),
+        "command_history": "(command_delay + 2)",
+    }
+    whole = {"signal_history": "all_signals", "command_history": "all_commands"}
+    parts = [
+        f"{name} = {whole.get(name, f'all_{name}')}[block * {height}:(block + 1) * {height}]"
+        for name, height in heights.items()
+    ]
+    late = "late = (now - signal_delay) % signal_history.shape[1]"
+    body = [
+        *parts,
+        "first = block * states.shape[1]",
+        "width = min(states.shape[1], actions.shape[0] - first)",
+        "if steps > 0:",
+        "    for lane in range(states.shape[1]):",
+        "        place = min(first + lane, actions.shape[0] - 1)",
+        f"        {rows.cells['result.command']} = {given}",
+        f"    {call}",
+        *([late] if rows.program.late_signals else []),
+        *rows.over_lanes(_observed(rows, task)),
+    ]
+    return [f"for block in range(all_states.shape[0] // {heights['states']}):", *indent(body)]
+
+
+def _observed(rows: LaneRows, task: Task) -> list[str]:
+    """Lines that sense, observe and judge one environment, and say whether its episode ends."""
+    program, add = rows.program, rows.add
+    groups = ["timing", "plant", "state", "result", "reference", "start", *(["walk"] if program.walks else [])]
+    held = [f"chambers = {add(held_chambers)}(plant, state.angle)"] if program.hands_chambers_on else []
+    reference = add(program.reference.value)
+    view, error, kept = (f"{add(function)}({given})" for function, given in (task.observed, task.error, task.kept))
+    observation = "observations[first + lane, {0}] = {1}({2}, bounds[0, {0}], bounds[1, {0}])"
+    pressures = f"true_1, true_2 = {pressures_of(rows, 'state')}"
+    weights = "error_weight, gas_weight, timing.period"
+    return [
+        "if chosen[first + lane] == 0.0:",
+        "    continue",
+        *[rows.load(group) for group in groups],
+        *[f"{name} = {row_expression(row, name, rows.cells, add)}" for name, row in OWN.items()],
+        "step_index = now - int(start.step)",
+        "sample_index = step_index // steps_per_sample",
+        "time = step_index * timing.step",
+        *held,
+        *_signals_at_start(rows),
+        *(sense_gait(rows) if program.walks else sense(rows)),
+        f"wanted, wanted_rate, _ = {reference}(reference, time)",
+        f"requested = {add(Requested)}(wanted, wanted_rate)",
+        pressures,
+        f"torque = {add(actuator_torque)}(true_1, true_2, plant.torque_constant)",
+        "gas = state.supplied_mass - memory.supplied_mass",
+        f"memory = {kept}",
+        *[f"{rows.cells[path]} = {path}" for path in leaf_paths(Memory, "memory")],
+        f"view = {view}",
+        f"error = {error}",
+        *[observation.format(column, add(within), path) for column, path in enumerate(task.observed_paths)],
+        f"outcomes[{REWARD}, first + lane] = {add(finite)}({add(reward_of)}(error, gas, {weights}))",
+        f"outcomes[{ERROR}, first + lane] = {add(finite)}(error)",
+        f"outcomes[{SUPPLIED}, first + lane] = {add(finite)}(state.supplied_mass)",
+        f"outcomes[{FAILED}, first + lane] = 1.0 if result.failure_time <= time else 0.0",
+        f"outcomes[{THROUGH}, first + lane] = 1.0 if step_index >= steps_in_all else 0.0",
+    ]
+
+
+def _signals_at_start(rows: LaneRows) -> list[str]:
+    """Lines that fill the late signals of an episode that begins with those at its start."""
+    if not rows.program.late_signals:
+        return []
+    stored = [f"signal_history[{row}, slot, lane] = {name}" for row, name in enumerate(SIGNALS)]
+    filled = ["for slot in range(signal_history.shape[1]):", *indent(stored)]
+    return ["if step_index == 0:", *indent([*current_readings(rows), *filled])]
+
+
+@dataclass(frozen=True, slots=True)
+class Columns:
+    """Starts of episodes: parameters and states as the program has them, and goals (rows, episodes)."""
+
+    parameters: Floats
+    states: Floats
+    goals: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Judging:
+    """Weights of the reward for squared error and gas, and bounds (2, observed) of what is observed."""
+
+    error_weight: float
+    gas_weight: float
+    bounds: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What a step shows of every environment: observations (environments, observed), the rest (environments,)."""
+
+    observations: NDArray[np.float32]
+    rewards: Floats
+    errors: Floats
+    supplied: Floats
+    terminated: Flags
+    truncated: Flags
+
+
+def episode_program(batch: Batch) -> tuple[Program, Clock]:
+    """Program and clock of a run whose commands come from outside; ScenarioError for samples inside a step."""
+    if batch.program.samples_inside:
+        raise ScenarioError("run.output_interval: an environment needs one that is a whole number of steps")
+    return replace(batch.program, controller=None, starts_apart=True), batch.clock
+
+
+@final
+class Environments:
+    """Some environments of one program side by side, each a lane with an episode of its own."""
+
+    def __init__(self, program: Program, clock: Clock, task: Task, count: int, judging: Judging) -> None:
+        self.count = count
+        self._clock, self._judging = clock, judging
+        width = min(lanes_of(program), -(-count // VECTOR) * VECTOR)
+        blocks = -(-count // width)
+        state_rows = [path for name, row in program.state_rows().items() for path in leaf_paths(row, name)]
+        parameter_rows = [path for name, row in program.parameter_rows().items() for path in leaf_paths(row, name)]
+        self.rows = {path: row for row, path in enumerate(state_rows)}
+        self._start = self.rows[leaf_paths(LaneStart, "start")[0]]
+        self._states = np.zeros((blocks, len(state_rows), width))
+        self._parameters = np.zeros((blocks, len(parameter_rows), width))
+        self._commands = np.zeros((blocks, clock.command_delay + 2, width))
+        self._own = np.zeros((blocks, len(OWN_PATHS), width))
+        self._actions = np.zeros((count, 1 + task.walks))
+        self._chosen = np.zeros(count)
+        self._observations = np.zeros((count, len(task.observed_paths)))
+        self._outcomes = np.zeros((OUTCOMES, count))
+        self._now = 0
+        self._go_on = with_arrays(
+            load_source(kernel_source(program, task)).go_on,
+            self._states.reshape(-1, width),
+            self._parameters.reshape(-1, width),
+            np.zeros((blocks * SIGNAL_ROWS, clock.signal_delay + 2, width)),
+            self._commands.reshape(-1, width),
+            np.empty((0, len(state_rows), width)),
+            np.empty((0, 0, width)),
+            self._own.reshape(-1, width),
+            self._actions,
+            np.ascontiguousarray(judging.bounds),
+            self._chosen,
+            self._observations,
+            self._outcomes,
+        )
+
+    @property
+    def actions(self) -> Floats:
+        """Where the next actions are written (environments, 1 or 2)."""
+        return self._actions
+
+    def begin(self, places: Places, columns: Columns) -> Seen:
+        """Begin episodes of some environments at once; what the others show is not to be used."""
+        lanes = self._states.shape[2]
+        # Lanes without an environment repeat the last one, so that each has a run that goes on.
+        spare = np.arange(self.count, self._states.shape[0] * lanes)
+        last = np.flatnonzero(places == self.count - 1)
+        every = np.concatenate([np.arange(places.size), np.repeat(last, spare.size)])
+        blocks, own = np.divmod(np.concatenate([places, spare[: spare.size * last.size]]), lanes)
+        self._states[blocks, :-1, own] = columns.states.T[every]
+        self._states[blocks, self._start, own] = float(self._now)
+        self._parameters[blocks, :, own] = columns.parameters.T[every]
+        self._own[blocks, :, own] = 0.0
+        self._own[blocks, : columns.goals.shape[0], own] = columns.goals.T[every]
+        self._commands[blocks, :, own] = 0.0
+        self._chosen[:] = 0.0
+        self._chosen[places] = 1.0
+        return self._call(0)
+
+    def step(self) -> Seen:
+        """Take ``actions`` for a sample period, and show what follows."""
+        self._chosen[:] = 1.0
+        return self._call(self._clock.steps_per_sample)
+
+    def numbers(self, place: int) -> dict[str, float]:
+        """The state of one environment as the engine has it, in SI units, by path such as ``state.angle``."""
+        block, lane = divmod(place, self._states.shape[2])
+        return {path: float(self._states[block, row, lane]) for path, row in self.rows.items()}
+
+    def _call(self, steps: int) -> Seen:
+        clock = self._clock
+        self._now += steps
+        self._go_on(
+            self._judging.error_weight,
+            self._judging.gas_weight,
+            self._now,
+            steps,
+            clock.step_count,
+            clock.steps_per_sample,
+            clock.signal_delay,
+            clock.command_delay,
+        )
+        rewards, errors, supplied = self._outcomes[:FAILED].copy()
+        failed, through = self._outcomes[FAILED:] != 0.0
+        return Seen(self._observations.astype(np.float32), rewards, errors, supplied, failed, through)
+
 
 Generators = Sequence[np.random.Generator]
 Ranges = Mapping[str, tuple[str | float, str | float]]

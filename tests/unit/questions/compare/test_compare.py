@@ -8,8 +8,7 @@ import pytest
 
 import ppafo
 from ppafo.errors import StudyError
-from ppafo.questions.compare.answer import all_remarks
-from ppafo.questions.compare.paired import best_probabilities, compare_pairs, pareto_front
+from ppafo.questions.compare.answer import all_remarks, best_probabilities, compare_pairs, pareto_front
 from ppafo.questions.compare.solve import compare
 from ppafo.studies.distributions import NormalAround
 from ppafo.studies.draws import Uncertainty

@@ -15,10 +15,9 @@ from ppafo.control.profiles import KNOTS
 from ppafo.errors import PpafoError
 from ppafo.parameters.parts import load_catalogue
 from ppafo.questions.size import search
-from ppafo.questions.size.answer import Sizing
+from ppafo.questions.size.answer import Sizing, size, smallest_bottle
 from ppafo.questions.size.problem import choose_knots, json_schema, load_sizing
 from ppafo.questions.size.search import Floats, Trials, ceiling, ceiling_pressure, cut_error
-from ppafo.questions.size.solve import size, smallest_bottle
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.storage import write_csv

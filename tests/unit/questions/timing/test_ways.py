@@ -3,7 +3,7 @@
 import pytest
 
 from ppafo.errors import ScenarioError
-from ppafo.questions.timing.solve import event_timing
+from ppafo.questions.timing.answer import event_timing
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,7 @@ from ppafo.errors import DataError
 from ppafo.questions.endurance.answer import Endurance
 from ppafo.questions.endurance.draw import read_walk_gas
 from ppafo.questions.endurance.solve import endurance
-from ppafo.questions.walk.answer import WalkPair, Wearers
-from ppafo.questions.walk.solve import walk_with_and_without
+from ppafo.questions.walk.answer import WalkPair, Wearers, walk_with_and_without
 
 MINUTES = 0.1
 

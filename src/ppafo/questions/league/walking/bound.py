@@ -28,9 +28,8 @@ from ppafo.questions.league.walking.solver import FREE, MODES, Guess, StrideOpti
 from ppafo.questions.league.walking.task import WalkingTask
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.plant_rates import check_without_opensim
-from ppafo.walking.motion import walk_of
+from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import plan_walk
-from ppafo.walking.varying import with_duration
 
 STEP = 1.0e-4
 """Step [s] of a played stride: short enough for an interval to be shared out between the ways of the valve."""

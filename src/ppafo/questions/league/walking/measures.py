@@ -35,12 +35,11 @@ from ppafo.walking.events import (
     within,
 )
 from ppafo.walking.gait_series import AnklePath, ankle_path, gait_timing, truncate
-from ppafo.walking.motion import walk_of
+from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.person import VariedGaits, draw_gaits
 from ppafo.walking.planning import batch_of_many, has_ideal_sensors, plan_walk
 from ppafo.walking.preparation import vented_state, with_leg
 from ppafo.walking.result import REMEDY
-from ppafo.walking.varying import with_duration
 from ppafo.walking.wearer import Build, Wearer, draw_builds
 
 DEGREE = 2

@@ -8,8 +8,8 @@ from ppafo.questions.league.standing import UNCERTAINTIES
 from ppafo.questions.league.walking import measures
 from ppafo.questions.league.walking.measures import CHANGED, MEASURES, draw_measures, draw_plants, walk_measures
 from ppafo.questions.league.walking.task import walking_task
+from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk
-from ppafo.walking.varying import with_duration
 
 TASK = walking_task(minutes=0.1)
 WALKED = TASK.configuration("event_proportional", "proportional")
