@@ -1,14 +1,16 @@
 """Catalogues of kinds: those of this package, and those that other packages offer, found when they are requested.
 
-Another package offers a kind as an entry point of the catalogue's group; a module that is no package is named with its
-object, ``my_module:KIND``. Nothing is looked for before a name is requested that is not here.
+A catalogue names the place of a kind of this package, ``module:KIND``, which is loaded when the kind is looked up: a
+run loads the valve and the controller that it has, and no other. Another package offers a kind as an entry point of the
+catalogue's group; a module that is no package is named with its object, ``my_module:KIND``. Nothing is looked for
+before a name is requested that is not here.
 """
 
 import importlib
 import logging
 import re
 import sys
-from collections.abc import Iterable, Iterator, MutableMapping
+from collections.abc import Iterator, Mapping, MutableMapping
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
@@ -36,22 +38,24 @@ Kind = TypeVar("Kind", bound=Named)
 
 
 class Kinds(MutableMapping[str, Kind], Generic[Kind]):
-    """Kinds by name. Looking a name up finds those of other packages too; going through all gives what is loaded.
+    """Kinds by name. Looking a name up loads its kind, that of another package too; names are those that are known.
 
     ``group`` is that of the entry points, ``word`` what messages call a kind, ``kind_type`` what each of them is.
+    ``own`` are those of this package by name, in their order: kinds, or where each is, as ``module:KIND``.
     """
 
-    def __init__(self, group: str, word: str, kind_type: type[Kind], own: Iterable[Kind]) -> None:
+    def __init__(self, group: str, word: str, kind_type: type[Kind], own: Mapping[str, Kind | str]) -> None:
         self.group = group
         self.word = word
         self._kind_type = kind_type
-        self._kinds = {kind.name: kind for kind in own}
-        self._own = frozenset(self._kinds)
+        self._places = {name: kind for name, kind in own.items() if isinstance(kind, str)}
+        self._kinds = {name: kind for name, kind in own.items() if not isinstance(kind, str)}
+        self._own = dict.fromkeys(own)
 
     def __getitem__(self, name: str) -> Kind:
         """Return a kind; KeyError where there is none, KindError where it is there and cannot be used."""
         if name not in self._kinds:
-            found = self._find(name)
+            found = kind_at(self._places[name]) if name in self._places else self._find(name)
             if found is None:
                 raise KeyError(name)
             self._kinds[name] = found
@@ -66,15 +70,28 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         del self._kinds[name]
 
     def __iter__(self) -> Iterator[str]:
-        """Names of the kinds that are loaded, those of this package first."""
-        return iter(tuple(self._kinds))
+        """Names of the kinds of this package, then of those of others that are loaded."""
+        return iter((*self._own, *(name for name in self._kinds if name not in self._own)))
 
     def __len__(self) -> int:
-        """Return how many kinds are loaded."""
-        return len(self._kinds)
+        """Return how many names are known."""
+        return len(self._own.keys() | self._kinds.keys())
+
+    def loaded(self) -> dict[str, Kind]:
+        """Return the kinds that are loaded by name, those of this package first, in their order."""
+        return {name: self._kinds[name] for name in self if name in self._kinds}
+
+    def is_own(self, name: str) -> bool:
+        """Tell whether a name is that of a kind of this package."""
+        return name in self._own
+
+    def load_own(self) -> None:
+        """Load every kind of this package."""
+        self._kinds |= {name: kind_at(place) for name, place in self._places.items() if name not in self._kinds}
 
     def load_all(self) -> tuple[str, ...]:
         """Load every kind that is installed; return one line for each that cannot be used, and log it."""
+        self.load_own()
         problems = []
         for point in _entry_points(self.group, tuple(sys.path)):
             try:
@@ -123,6 +140,12 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         if ":" not in point.name and kind.name != point.name:
             raise KindError(f"{where} calls itself '{one_line(kind.name)}'; entry point and kind need one name")
         return kind
+
+
+def kind_at(place: str) -> Any:
+    """Return what stands at ``module:NAME``, a place in this package."""
+    module, _, name = place.partition(":")
+    return getattr(importlib.import_module(module), name)
 
 
 @lru_cache(maxsize=32)

@@ -151,7 +151,7 @@ def test_misspelt_names_are_still_told_with_the_nearest_one(install: Install) ->
 
 
 def test_kinds_are_a_mapping_that_can_be_changed_for_a_while() -> None:
-    kinds: Kinds[object] = Kinds("ppafo.none", "thing", object, ())  # type: ignore[type-var]
+    kinds: Kinds[object] = Kinds("ppafo.none", "thing", object, {})  # type: ignore[type-var]
     kinds["a"] = 1.0
     assert list(kinds) == ["a"]
     assert kinds["a"] == 1.0

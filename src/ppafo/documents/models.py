@@ -179,6 +179,8 @@ def optional(annotation: Any, description: str) -> Any:
 
 def one_of(models: list[Any]) -> Any:
     """Return the union of tables that are distinguished by their ``kind``."""
+    if len(models) == 1:
+        return models[0]
     return Annotated[Union[tuple(models)], Field(discriminator="kind")]  # noqa: UP007
 
 
@@ -188,11 +190,22 @@ def read_model(kind: TomlKind, model: type[Model], name_or_path: str | Path) -> 
     return validate(model, kind.parse(kind.read(name_or_path), file), file, kind.error), file
 
 
-def validate(model: type[Model], document: object, file: str, refusal: type[PpafoError]) -> Model:
-    """Return a document as its model; ``refusal`` with the first problem where it has another layout."""
+def validate(
+    model: type[Model],
+    document: object,
+    file: str,
+    refusal: type[PpafoError],
+    whole: Callable[[], type[Model]] | None = None,
+) -> Model:
+    """Return a document as its model; ``refusal`` with the first problem where it has another layout.
+
+    Where ``model`` has only the kinds that are loaded, ``whole`` gives the one with all, of which messages speak.
+    """
     try:
         return model.model_validate(document)
     except ValidationError as error:
+        if whole is not None:
+            return validate(whole(), document, file, refusal)
         raise refusal(f"{file}: {first_problem(error.errors(include_url=False), model)}") from error
 
 

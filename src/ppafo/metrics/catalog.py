@@ -9,7 +9,10 @@ METRICS: Kinds[MetricKind] = Kinds(
     "ppafo.metrics",
     "metric",
     MetricKind,
-    (*tracking.METRICS, *gas.METRICS, *switching.METRICS, *motion.METRICS, *strides.METRICS),
+    {
+        kind.name: kind
+        for kind in (*tracking.METRICS, *gas.METRICS, *switching.METRICS, *motion.METRICS, *strides.METRICS)
+    },
 )
 
 

@@ -7,58 +7,66 @@ from collections.abc import Iterable
 
 from ppafo.errors import KindError, one_line
 from ppafo.kinds import Kinds
-from ppafo.model.actuators import bladder, cylinder, muscle_pair, table, vane
 from ppafo.model.actuators.kind import ActuatorKind
-from ppafo.model.effects import (
-    bandwidth,
-    coil_heating,
-    ice,
-    leak_opening,
-    line_resistance,
-    restitution,
-    seal_friction,
-    silencer,
-    spool_play,
-    stribeck,
-)
+from ppafo.model.effects import bandwidth, restitution
 from ppafo.model.effects.kind import SECTION, Effect, effect_problem
-from ppafo.model.valves import proportional, solenoid, solenoid_recycling
 from ppafo.model.valves.kind import ValveKind
 
 VALVES: Kinds[ValveKind] = Kinds(
-    "ppafo.valves", "valve", ValveKind, (proportional.KIND, solenoid.KIND, solenoid_recycling.KIND)
+    "ppafo.valves",
+    "valve",
+    ValveKind,
+    {
+        "proportional": "ppafo.model.valves.proportional:KIND",
+        "solenoid": "ppafo.model.valves.solenoid:KIND",
+        "solenoid_recycling": "ppafo.model.valves.solenoid_recycling:KIND",
+    },
 )
 
 
 ACTUATORS: Kinds[ActuatorKind] = Kinds(
-    "ppafo.actuators", "actuator", ActuatorKind, (vane.KIND, cylinder.KIND, muscle_pair.KIND, bladder.KIND, table.KIND)
+    "ppafo.actuators",
+    "actuator",
+    ActuatorKind,
+    {
+        "vane": "ppafo.model.actuators.vane:KIND",
+        "cylinder": "ppafo.model.actuators.cylinder:KIND",
+        "muscle_pair": "ppafo.model.actuators.muscle_pair:KIND",
+        "bladder": "ppafo.model.actuators.bladder:KIND",
+        "table": "ppafo.model.actuators.table:KIND",
+    },
 )
 
 
-_OWN = (
-    restitution.EFFECT,
-    line_resistance.EFFECT,
-    silencer.EFFECT,
-    ice.EFFECT,
-    leak_opening.EFFECT,
-    spool_play.EFFECT,
-    coil_heating.EFFECT,
-    seal_friction.EFFECT,
-    stribeck.EFFECT,
-    bandwidth.EFFECT,
+EFFECTS: Kinds[Effect] = Kinds(
+    "ppafo.effects",
+    "effect",
+    Effect,
+    {
+        "restitution": restitution.EFFECT,
+        "line_resistance": "ppafo.model.effects.line_resistance:EFFECT",
+        "silencer": "ppafo.model.effects.silencer:EFFECT",
+        "ice": "ppafo.model.effects.ice:EFFECT",
+        "leak_opening": "ppafo.model.effects.leak_opening:EFFECT",
+        "spool_play": "ppafo.model.effects.spool_play:EFFECT",
+        "coil_heating": "ppafo.model.effects.coil_heating:EFFECT",
+        "seal_friction": "ppafo.model.effects.seal_friction:EFFECT",
+        "stribeck": "ppafo.model.effects.stribeck:EFFECT",
+        "bandwidth": bandwidth.EFFECT,
+    },
 )
-EFFECTS: Kinds[Effect] = Kinds("ppafo.effects", "effect", Effect, _OWN)
+"""Those whose settings have another section than their own are named by no path: they are there from the beginning."""
 
 
 def find_effects(paths: Iterable[str]) -> None:
-    """Load the effects that some paths name, where they are those of other packages.
+    """Load the effects that some paths name, those of other packages too.
 
     KindError for one that is there and cannot be used.
     """
     for path in paths:
         section, _, rest = path.partition(".")
         name = rest.partition(".")[0]
-        if section == SECTION and name and name not in tuple(EFFECTS):
+        if section == SECTION and name and name not in EFFECTS.loaded():
             effect = EFFECTS.get(name)
             problem = "" if effect is None else effect_problem(effect)
             if problem:
@@ -68,8 +76,9 @@ def find_effects(paths: Iterable[str]) -> None:
 
 def ordered_effects() -> tuple[Effect, ...]:
     """Return all effects that are loaded, in the order in which they act: those of the package, then by name."""
-    others = sorted((effect for effect in EFFECTS.values() if effect not in _OWN), key=lambda effect: effect.name)
-    return (*_OWN, *others)
+    loaded = EFFECTS.loaded()
+    others = sorted((effect for name, effect in loaded.items() if not EFFECTS.is_own(name)), key=lambda item: item.name)
+    return (*(effect for name, effect in loaded.items() if EFFECTS.is_own(name)), *others)
 
 
 def device_effects() -> tuple[Effect, ...]:

@@ -14,6 +14,7 @@ from pydantic import BaseModel, Field
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name
+from ppafo.kinds import Kinds
 from ppafo.model.actuators.table import Table
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES, device_effects, find_effects
 from ppafo.model.declaration import Quantity
@@ -79,7 +80,7 @@ def _sections() -> dict[str, Any]:
     }
     return {
         "gas": _section("Gas", declaration.GAS, {"species": optional(TextEntry, "name of the gas")}),
-        "actuator": one_of([_actuator_section(kind) for kind in ACTUATORS]),
+        "actuator": one_of([_actuator_section(kind) for kind in ACTUATORS.loaded()]),
         "friction": _section("Friction", declaration.FRICTION),
         "foot_plate": _section("FootPlate", declaration.FOOT_PLATE),
         "supply": _section("Supply", declaration.SUPPLY, {"relieving": optional(FlagEntry, declaration.RELIEVING)}),
@@ -97,7 +98,17 @@ def _sections() -> dict[str, Any]:
 
 def parameter_file() -> type[BaseModel]:
     """Return the model of a parameter set file, for the valves, actuators and effects that are loaded."""
-    return _parameter_file((*VALVES.items(), *ACTUATORS.items(), *EFFECTS.items()))
+    return _parameter_file(tuple(item for kinds in _KINDS for item in kinds.loaded().items()))
+
+
+def whole_parameter_file() -> type[BaseModel]:
+    """Return the same for all valves, actuators and effects of this package too."""
+    for kinds in _KINDS:
+        kinds.load_own()
+    return parameter_file()
+
+
+_KINDS: tuple[Kinds[Any], ...] = (VALVES, ACTUATORS, EFFECTS)
 
 
 @functools.lru_cache(maxsize=4)
@@ -114,7 +125,7 @@ def _parameter_file(_kinds: Any) -> type[BaseModel]:
     }
     fields |= {name: optional(model, f"section {name}") for name, model in _sections().items()}
     fields["valves"] = (
-        _by_name(one_of([_valve_section(kind) for kind in VALVES])),
+        _by_name(one_of([_valve_section(kind) for kind in VALVES.loaded()])),
         Field(min_length=1, description="valves by name"),
     )
     return table("ParameterFile", fields)
@@ -122,9 +133,8 @@ def _parameter_file(_kinds: Any) -> type[BaseModel]:
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema of a parameter set file, with the valves, actuators and effects of all packages."""
-    VALVES.load_all()
-    EFFECTS.load_all()
-    ACTUATORS.load_all()
+    for kinds in _KINDS:
+        kinds.load_all()
     return make_schema(parameter_file(), "ppafo parameter set")
 
 
@@ -161,14 +171,14 @@ def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -
     _find_actuator(document)
     effects = document.get(SECTION)
     find_effects(f"{SECTION}.{name}" for name in (effects if isinstance(effects, dict) else ()))
-    parsed: Any = validate(parameter_file(), document, file, ParameterError)
+    parsed: Any = validate(parameter_file(), document, file, ParameterError, whole_parameter_file)
     parameter_set = _flatten(parsed, file, _read_table(parsed.actuator, folder or Path()))
     _check(parameter_set)
     return parameter_set
 
 
 def _find_valves(document: dict[str, Any]) -> None:
-    """Load the kinds of valves that a set names, where they are those of other packages."""
+    """Load the kinds of valves that a set names, those of other packages too."""
     valves = document.get("valves")
     for valve in valves.values() if isinstance(valves, dict) else ():
         kind = valve.get("kind") if isinstance(valve, dict) else None
@@ -177,7 +187,7 @@ def _find_valves(document: dict[str, Any]) -> None:
 
 
 def _find_actuator(document: dict[str, Any]) -> None:
-    """Say that an actuator without a kind is a vane, and load its kind where it is one of other packages."""
+    """Say that an actuator without a kind is a vane, and load its kind."""
     actuator = document.get("actuator")
     if not isinstance(actuator, dict):
         return

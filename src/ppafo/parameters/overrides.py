@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
-from ppafo.model.catalog import find_effects
+from ppafo.model.catalog import EFFECTS, find_effects
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.declaration import AREA_FORM, RELIEVING_PATH, SONIC_FORM, SPECIES_PATH
 from ppafo.parameters.graph import acting
@@ -89,6 +89,8 @@ def _with_number(parameter_set: ParameterSet, order: _Order) -> ParameterSet:
     find_effects([path])
     declared = parameter_set.declarations()
     if path not in declared:
+        EFFECTS.load_own()
+        declared = parameter_set.declarations()
         allowed = [order.typed_path(known) for known in (*declared, SPECIES_PATH, RELIEVING_PATH)]
         hint = nearest_name(order.typed, allowed) or f"; for example {', '.join(_neighbours(order.typed, allowed))}"
         raise order.refusal(f"{parameter_set.file} has no value '{order.typed}'{hint}")

@@ -6,9 +6,9 @@ from functools import cache
 from typing import Any, NamedTuple, cast
 
 from ppafo.model.actuators.kind import Range, mean_growth, plant_in_shape
-from ppafo.model.catalog import ACTUATORS, device_effects, ordered_effects
+from ppafo.model.catalog import ACTUATORS, find_effects, ordered_effects
 from ppafo.model.columns import first, over_runs
-from ppafo.model.effects.kind import Effect
+from ppafo.model.effects.kind import SECTION, Effect
 from ppafo.model.orifice import FlowCurve, area_conductance, isentropic_curve, iso6358_curve, sonic_conductance_mass
 from ppafo.model.plant import PlantParameters
 from ppafo.parameters.declaration import members
@@ -129,21 +129,27 @@ def settings_of(device: Device, effect: Effect, others: Sections = _NO_SECTIONS)
 
 def all_settings(device: Device) -> dict[str, dict[str, Any]]:
     """Return the settings [SI] of all effects of devices that are loaded, by name."""
-    return {effect.name: settings_of(device, effect) for effect in device_effects()}
+    return {effect.name: settings_of(device, effect) for effect in _effects(device) if effect.is_of_device}
 
 
 def effects_of(device: Device, others: Sections = _NO_SECTIONS) -> tuple[Effect, ...]:
     """Return the effects that are on, in the order in which they act; of columns those of the first run."""
     return tuple(
         effect
-        for effect in ordered_effects()
+        for effect in _effects(device)
         if effect.is_on({name: first(value) for name, value in settings_of(device, effect, others).items()})
     )
 
 
 def switches_of(device: Device) -> dict[Effect, Any]:
     """Return for each effect of a device whether it is on; an array (runs,) where settings that switch it vary."""
-    return {effect: effect.is_on(settings_of(device, effect)) for effect in device_effects()}
+    return {effect: effect.is_on(settings_of(device, effect)) for effect in _effects(device) if effect.is_of_device}
+
+
+def _effects(device: Device) -> tuple[Effect, ...]:
+    """Return the effects that may act, in their order: a device from another process may name what is not loaded."""
+    find_effects(f"{SECTION}.{name}" for name in device.effects)
+    return ordered_effects()
 
 
 def effect_rows(device: Device, others: Sections = _NO_SECTIONS) -> tuple[Any, ...]:

@@ -10,12 +10,13 @@ from typing import Any
 from ppafo.control.fixed.torque_laws import FIXED, FLOAT
 from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
-from ppafo.model.catalog import VALVES
+from ppafo.model.catalog import EFFECTS, VALVES
 from ppafo.model.declaration import Quantity
+from ppafo.model.effects.kind import SECTION as EFFECTS_SECTION
 from ppafo.model.regulator import SupplyLines
 from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set
 from ppafo.parameters import apply_overrides as apply_device_overrides
-from ppafo.parameters.declaration import ORIFICE, RELIEVING_PATH, SPECIES_PATH
+from ppafo.parameters.declaration import ORIFICE, RELIEVING_PATH, SECTIONS, SPECIES_PATH
 from ppafo.parameters.declaration import quantities as device_quantities
 from ppafo.parameters.device import Device, Supply
 from ppafo.parameters.graph import Follows, Graph, follows, gauge_link
@@ -143,13 +144,13 @@ def device_paths() -> tuple[str, ...]:
 
 def is_of_device(path: str) -> bool:
     """Tell whether a path begins in the device, which then has the say about the rest of it."""
-    sections = {path.partition(".")[0] for path in device_paths()} | {"valves", "reported"}
-    return path.partition(".")[0] in sections
+    return path.partition(".")[0] in {*SECTIONS, EFFECTS_SECTION, "valve", "valves"}
 
 
 def unknown_value(override: str, known: tuple[str, ...], who_has: str) -> ScenarioError:
     """Return the error for a path that is neither known nor of the device; ``who_has`` begins as ``task.toml has``."""
     path, _ = split_override(override)
+    EFFECTS.load_own()
     allowed = [*known, *device_paths()]
     section = path.partition(".")[0]
     near = [name for name in known if name.startswith(f"{section}.")]

@@ -17,22 +17,26 @@ from ppafo.parameters import ParameterSet
 from ppafo.simulation.building import OverriddenDocument, ScenarioRequest, apply_overrides, build_scenario
 from ppafo.simulation.declaration import OF_A_VANE, Declared
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.schema import scenario_file
+from ppafo.simulation.schema import scenario_file, whole_scenario_file
 
 FILE = TomlKind("scenario", "scenario", resources.files("ppafo") / "scenarios", ScenarioError)
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """How the files of one kind of scenario are laid out and built: the kind of file, what it holds, model, builder."""
+    """How the files of one kind of scenario are laid out and built: the kind of file, what it holds, model, builder.
+
+    ``model`` has the kinds that are loaded, ``whole`` all of them: messages speak of these.
+    """
 
     file: TomlKind
     declared: Declared
     model: Callable[[], type[BaseModel]]
+    whole: Callable[[], type[BaseModel]]
     build: Callable[[ScenarioRequest, OverriddenDocument], Scenario]
 
 
-VANE = Layout(FILE, OF_A_VANE, scenario_file, build_scenario)
+VANE = Layout(FILE, OF_A_VANE, scenario_file, whole_scenario_file, build_scenario)
 """Scenarios of a vane alone; a room above this one has those of a leg."""
 
 
@@ -117,13 +121,16 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
 
 def _problems(document: dict[str, Any], layout: Layout) -> list[ErrorDetails]:
     """Return unknown keys, unknown kinds and gaps."""
-    try:
-        layout.model().model_validate(document)
-    except ValidationError as error:
-        return error.errors(include_url=False)
-    return []
+    for model in (layout.model, layout.whole):
+        try:
+            model().model_validate(document)
+        except ValidationError as error:
+            found = error.errors(include_url=False)
+        else:
+            return []
+    return found
 
 
 def _refuse(problems: list[ErrorDetails], file: str, layout: Layout) -> None:
     if problems:
-        raise ScenarioError(f"{file}: {first_problem(problems, layout.model())}")
+        raise ScenarioError(f"{file}: {first_problem(problems, layout.whole())}")

@@ -65,7 +65,7 @@ def _profile(prescribed: Quantity, purpose: str) -> Any:
                 f"{model_name(name)}{purpose}",
                 kind_field(name, kind.summary) | quantity_fields(declaration.profile_settings(name, prescribed)),
             )
-            for name, kind in PROFILES.items()
+            for name, kind in PROFILES.loaded().items()
         ]
     )
 
@@ -104,7 +104,7 @@ def _shank() -> Any:
                     f"{model_name(name)}Shank",
                     kind_field(name, kind.summary) | quantity_fields(declaration.shank_settings(name)),
                 )
-                for name, kind in PROFILES.items()
+                for name, kind in PROFILES.loaded().items()
             ),
             table(
                 "GaitShank",
@@ -197,7 +197,13 @@ def file_model(name: str, own: dict[str, Any]) -> type[BaseModel]:
 
 def scenario_file() -> type[BaseModel]:
     """Return the model of a scenario file, for the controllers and profiles that are loaded."""
-    return _scenario_file(*(tuple(kinds.items()) for kinds in (CONTROLLERS, PROFILES)))
+    return _scenario_file(*(tuple(kinds.loaded().items()) for kinds in (CONTROLLERS, PROFILES)))
+
+
+def whole_scenario_file() -> type[BaseModel]:
+    """Return the same for all controllers of this package too."""
+    CONTROLLERS.load_own()
+    return scenario_file()
 
 
 @functools.lru_cache(maxsize=4)
@@ -210,7 +216,7 @@ def _scenario_file(*_kinds: Any) -> type[BaseModel]:
         "motion": (_motion(), Field(description="what the vane does")),
         "initial": optional(initial, "state of the gas at the start; atmosphere unless given"),
         "controller": (
-            controller_table(CONTROLLERS, "Controller", lambda name: CONVERTER if name in FIXED_LAWS else ()),
+            controller_table(CONTROLLERS.loaded(), "Controller", lambda name: CONVERTER if name in FIXED_LAWS else ()),
             Field(description="what commands the valve"),
         ),
         "reference": optional(reference, "torque that the controller follows; 0 N m unless given"),

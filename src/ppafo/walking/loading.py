@@ -349,7 +349,7 @@ WALK = MotionKind(
 )
 """The motion of a scenario that walks."""
 
-WALKING = Layout(FILE, OF_A_WALK, walk_file, build_walk)
+WALKING = Layout(FILE, OF_A_WALK, walk_file, walk_file, build_walk)
 """Scenarios whose motion is a walk."""
 
 

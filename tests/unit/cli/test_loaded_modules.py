@@ -19,7 +19,7 @@ HEAVY = frozenset(
 )
 READING, DRAWING = {"numpy", "pydantic"}, {"matplotlib", "PIL"}
 WRITING = {"h5netcdf", "h5py", "jinja2"}
-MOST_BEFORE_THE_RUN, MOST = 200, 230
+MOST_BEFORE_THE_RUN, MOST = 140, 160
 """Modules of the package that a run of a scenario may load; what has no part in it stays out."""
 
 CODE = """
@@ -82,6 +82,16 @@ def test_a_run_of_a_scenario_loads_no_walks_studies_rigs_and_questions(
         "ppafo.questions.catalogue",
         "ppafo.questions.question",
     }
+
+
+def test_a_run_loads_the_valve_the_controller_and_the_actuator_that_it_has_and_no_others(
+    simulated: tuple[list[str], list[str]],
+) -> None:
+    before, _ = simulated
+    others = ("valves.solenoid", "actuators.cylinder", "actuators.bladder", "effects.silencer", "effects.coil_heating")
+    assert "ppafo.model.valves.proportional" in before
+    assert not {f"ppafo.model.{name}" for name in others} & own(before)
+    assert "ppafo.control.controllers.model_based" not in before
 
 
 def test_the_number_of_modules_of_a_run_does_not_grow_unnoticed(simulated: tuple[list[str], list[str]]) -> None:

@@ -267,7 +267,7 @@ _ORDER = (
 )
 
 WALKING_CONTROLLERS: Kinds[ControllerKind] = Kinds(
-    "ppafo.walking_controllers", "controller of walking", ControllerKind, _ORDER
+    "ppafo.walking_controllers", "controller of walking", ControllerKind, {kind.name: kind for kind in _ORDER}
 )
 """Those with gains for walking, which compete with each other."""
 
@@ -302,7 +302,7 @@ TIMINGS: Kinds[TimingKind] = Kinds(
     "ppafo.walking_timings",
     "timing of walking",
     TimingKind,
-    (THRESHOLDS, FRACTIONAL, ESTIMATED),
+    {kind.name: kind for kind in (THRESHOLDS, FRACTIONAL, ESTIMATED)},
 )
 """The ways to know the time in the stride. The first one is that of every controller unless another is chosen."""
 
