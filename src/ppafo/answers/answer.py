@@ -67,10 +67,14 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class LivePart:
-    """A part of a page that simulates: HTML with its own script, and the policy that allows that script alone."""
+    """A part of a page that simulates: HTML with its own script, and the policy that allows that script alone.
+
+    ``difference`` is a sentence on how its runs begin otherwise than those of the page, empty where they do not.
+    """
 
     policy: str
     html: str
+    difference: str = ""
 
 
 @dataclass(frozen=True, slots=True)

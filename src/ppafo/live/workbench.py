@@ -361,7 +361,18 @@ def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
         content, modules = _content(list(reversed(named.values())), (), TITLE, "block")
     except PpafoError:
         return None
-    return LivePart(policy_of_block(), block_of(content, modules))
+    differences = [_difference(item) for item in named.values() if isinstance(item, Scenario)]
+    return LivePart(policy_of_block(), block_of(content, modules), max(differences, default=""))
+
+
+def _difference(scenario: Scenario) -> str:
+    """A sentence where a configuration of a page begins shorter than the scenario is; empty where it does not."""
+    shorter = usual_changes(scenario).get("run.duration", "")
+    if not shorter or scenario.duration <= float(shorter.removesuffix(" s")):
+        return ""
+    return (
+        f"It begins with {shorter} of the {scenario.duration:g} s above: lengthen run.duration to compare the numbers."
+    )
 
 
 def _content(

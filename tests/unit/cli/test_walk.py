@@ -11,10 +11,12 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.live.page import bundled, digest
+from ppafo.live.workbench import live_part
 from ppafo.questions.walk import answer
 from ppafo.storage import read_csv, read_netcdf
 from ppafo.storage.result_folder import read_recording
 from ppafo.walking import loading
+from ppafo.walking.loading import load_walk
 
 SHORT = ["--minutes", "0.1"]
 FILES = [
@@ -332,3 +334,12 @@ def test_many_wearers_are_written_with_quantiles_and_histograms(
     assert quantiles["0.05"] < quantiles["0.5"] < quantiles["0.95"]
     assert main(["walk", *SHORT, "--wearers", "50", "--seed", "4", "--json", "--out", str(folder)]) == 0
     assert json.loads(capsys.readouterr().out)["outcomes"]["gas"]["quantiles"] == quantiles
+
+
+def test_the_page_says_that_its_live_part_begins_with_a_shorter_walk() -> None:
+    scenario = load_walk("solenoid")
+    found, same = live_part([scenario]), live_part([replace(scenario, duration=6.0)])
+    assert found is not None
+    assert found.difference.startswith("It begins with 6 s of the 60 s above")
+    assert same is not None
+    assert same.difference == ""
