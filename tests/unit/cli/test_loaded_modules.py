@@ -84,11 +84,17 @@ def test_a_run_of_a_scenario_loads_no_walks_studies_rigs_and_questions(
     }
 
 
-def test_a_run_loads_the_valve_the_controller_and_the_actuator_that_it_has_and_no_others(
+def test_a_run_loads_the_valves_of_its_set_and_the_controller_and_actuator_that_it_has_and_no_others(
     simulated: tuple[list[str], list[str]],
 ) -> None:
     before, _ = simulated
-    others = ("valves.solenoid", "actuators.cylinder", "actuators.bladder", "effects.silencer", "effects.coil_heating")
+    others = (
+        "actuators.muscle_pair",
+        "actuators.cylinder",
+        "actuators.bladder",
+        "effects.silencer",
+        "effects.coil_heating",
+    )
     assert "ppafo.model.valves.proportional" in before
     assert not {f"ppafo.model.{name}" for name in others} & own(before)
     assert "ppafo.control.controllers.model_based" not in before
