@@ -1,6 +1,6 @@
 """Every number of docs/what-the-comparison-shows.md, and its figure.
 
-    python scripts/comparison_findings.py [--draws 98304] [--figure docs/images/comparison.png]
+    python scripts/comparison_findings.py [--draws 262144] [--figure docs/images/comparison.png]
 
 Needs the extra ``optimal`` for the bound of the proportional valve, and takes some minutes.
 """
@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ppafo.answers.style import BLUE, GREY, VERMILION, house_style, mark_kind
+from ppafo.answers.style import BLUE, GREY, VERMILION, Margins, figure_of_free_panels, house_style, mark_kind
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.parameters import load_device
 from ppafo.parameters.publications.publication import paper_entries
@@ -20,39 +20,50 @@ from ppafo.questions.league.standing import ENTRANTS
 from ppafo.questions.reproduce.law_and_valve import FASTER
 from ppafo.questions.unreported.answer import (
     Family,
+    conclusion_rows,
     conclusions,
+    implications_of,
+    posterior_text,
     reach_sentence,
-    weight_of_readings,
     weighted_quantiles,
     within_reach,
 )
 from ppafo.questions.unreported.settings import (
+    ATTITUDE,
     DEAD_VOLUME,
     DISCHARGE,
     EVIDENCE,
     FALL,
     IMPROVEMENT,
+    METRICS,
     OBSERVABLES,
     ON_OFF_RATE,
     PLATEAU,
+    PROPORTIONAL,
     QUIET,
     RISE,
-    STEP_TIME,
+    SOLENOID,
+    STEP,
+    TEXT_OF_STEP,
     VOLTS,
     VOLUME,
+    Floats,
     agreement_with,
     demand_over_ceiling,
     effective,
     improvement,
-    step_observables,
 )
-from ppafo.questions.unreported.solve import infer_settings
+from ppafo.questions.unreported.solve import infer_settings, step_metrics
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.walking import load_walk
 from ppafo.walking.walk import compare_walks
 
+MARGINS = Margins(left=0.65, right=0.15, top=0.62, bottom=0.55, row_gap=0.0, column_gap=0.75)
+"""The top has a line for what kind of figure it is, above the titles."""
+SHOWN_ATTITUDES = np.array([-90.0, 0.0, 90.0])
+"""Of the shank in figure 7 [deg]: lying either way, and upright."""
 SETS = ("ppafo2011", "ppafo2011-consistent", "ppafo2011-fitted")
 BY_NAME = {entrant.name: entrant for entrant in ENTRANTS}
 CHANGES: dict[str, tuple[str, ...]] = {
@@ -107,31 +118,62 @@ def law_and_valve(level: float) -> Iterator[str]:
     yield f"{level:g} N m  pid-paper: {error / least:.3g} times that error, {more:.1f} % more gas than its error needs"
 
 
+def volumes(per_angle: Floats, dead: Floats) -> dict[str, Floats]:
+    """Columns of an ensemble with volumes per angle [m^3/rad] and dead volumes [m^3]."""
+    return {
+        "actuator.volume_per_angle": per_angle,
+        "actuator.dead_volume_1": dead,
+        "actuator.dead_volume_2": dead,
+    }
+
+
 def figure_7() -> Iterator[str]:
-    """Yield what each shipped set gives of the text of figure 7, without the leg, as the inference has it."""
-    actuators = [load_device(name).actuator for name in SETS]
-    names = ("volume_per_angle", "dead_volume_1", "dead_volume_2")
-    columns = {f"actuator.{name}": np.array([getattr(actuator, name) for actuator in actuators]) for name in names}
-    base = load_scenario("step-response", ["motion.kind=free", f"run.duration={STEP_TIME} s"])
-    result = run_ensemble(base, columns, (), ("angle", "pressure_1", "pressure_2"))
-    supply = base.device.supply
-    found = step_observables(result.times, result.traces, supply.pressure, supply.atmospheric_pressure)
-    for place, name in enumerate(SETS):
-        waits, falls, rises = (found[key][place] for key in (PLATEAU, FALL, RISE))
-        first = f"P1 at the supply {waits:.0f} ms before breakaway, falls by {falls:.1f} psi"
-        yield f"{name:21} {first}; P2 rises by {rises:.1f} psi"
+    """Yield what each shipped set gives of the text of figure 7, with the shank lying either way and upright."""
+    for name in SETS:
+        actuator = load_device(name).actuator
+        chambers = volumes(*(np.full(3, getattr(actuator, item)) for item in ("volume_per_angle", "dead_volume_1")))
+        found = step_metrics(chambers | {"motion.shank.level": np.radians(SHOWN_ATTITUDES)})
+        for place, degrees in enumerate(SHOWN_ATTITUDES):
+            waits, falls, rises = (found[key][place] for key in (PLATEAU, FALL, RISE))
+            first = f"P1 at the supply {waits:.0f} ms before breakaway, falls by {falls:.1f} psi"
+            yield f"{name:21} {degrees:3.0f} deg  {first}; P2 rises by {rises:.1f} psi"
+
+
+def best_volumes() -> Iterator[str]:
+    """Yield the volumes that agree best with torque task and text, the attitude of the leg averaged over its prior."""
+    per_angle, dead = (
+        part.ravel() for part in np.meshgrid(np.arange(14.5, 51.1, 0.5), np.arange(0.5, 40.1, 0.5), indexing="ij")
+    )
+    chambers = volumes(1.0e-6 * per_angle, 1.0e-6 * dead)
+    metrics = {
+        valve: run_ensemble(load_scenario(f"torque-task-{valve}"), chambers, METRICS).metrics
+        for valve in (SOLENOID, PROPORTIONAL)
+    }
+    of_task = agreement_with([entry.id for entry in EVIDENCE if entry.id not in TEXT_OF_STEP], metrics)
+    kept = np.flatnonzero(of_task > np.exp(-8.0) * of_task.max())
+    attitudes, centres = (part.ravel() for part in np.meshgrid(np.arange(-90.0, 90.1, 15.0), np.linspace(4.5, 13.5, 5)))
+    varied = {path: np.repeat(values[kept], attitudes.size) for path, values in chambers.items()}
+    varied["motion.shank.level"] = np.tile(np.radians(attitudes), kept.size)
+    varied["motion.foot_mass_centre"] = np.tile(0.01 * centres, kept.size)
+    of_text = agreement_with(TEXT_OF_STEP, {STEP: step_metrics(varied)}).reshape(kept.size, attitudes.size)
+    both = of_task[kept] * of_text.mean(axis=1)
+    best, near = int(np.argmax(both)), both > np.exp(-1.92) * both.max()
+    for name, values, unit in (("volume per angle", per_angle[kept], "cm^3/rad"), ("dead volume", dead[kept], "cm^3")):
+        yield f"{name:16} {values[best]:g} ({values[near].min():g} to {values[near].max():g}) {unit}"
+    row, column = np.unravel_index(int(np.argmax(of_task[kept][:, None] * of_text)), of_text.shape)
+    most = f"{per_angle[kept][row]:g} cm^3/rad and {dead[kept][row]:g} cm^3"
+    yield f"of single attitudes {attitudes[column]:g} deg agrees best, with {most}"
 
 
 def what_is_open(family: Family) -> Iterator[str]:
     """Yield what the evidence leaves of volumes, readings, conclusions and of the four printed numbers."""
     yield f"{family.density.size} completions, effective sample size {family.effective:.0f}"
-    for name, unit in ((VOLUME, "cm^3/rad"), (DEAD_VOLUME, "cm^3")):
+    for name, unit in ((VOLUME, "cm^3/rad"), (DEAD_VOLUME, "cm^3"), (ATTITUDE, "deg")):
         low, median, high = weighted_quantiles(family.draws[name], family.weights, (0.05, 0.5, 0.95))
         yield f"{name}: {median:.3g} ({low:.3g} to {high:.3g}) {unit}"
-    yield ", ".join(f"{words} {100.0 * weight:.0f} %" for words, weight in weight_of_readings(family).items())
-    for item in conclusions(family):
-        fractions = f"{100.0 * item.of_all:5.1f} % of all, {100.0 * item.of_weight:5.1f} % by the rest"
-        yield f"{item.reading:20} {item.statement:39} {fractions}"
+    yield next(posterior_text(item) for item in implications_of(family) if item.setting.name == VOLTS)
+    for reading, statement, of_all, of_weight in conclusion_rows(conclusions(family)):
+        yield f"{reading:20} {statement:39} {of_all} of all; by the rest {of_weight}"
     yield reach_sentence(within_reach(family))
     for entry in EVIDENCE:
         if entry.published is not None:
@@ -155,8 +197,6 @@ def for_a_builder() -> Iterator[str]:
 
 def draw(family: Family, file: str) -> None:
     """Draw where the improvement comes from, and which volumes the evidence leaves."""
-    import matplotlib.figure
-
     draws = {name: values[: family.even] for name, values in family.draws.items()}
     quiet = agreement_with(QUIET, family.metrics)[: family.even] > 0.0
     chosen = quiet & (draws[VOLTS] == 1.0) & (draws[DISCHARGE] == 0.0) & (draws[ON_OFF_RATE] == 20.0)
@@ -164,8 +204,7 @@ def draw(family: Family, file: str) -> None:
     entry = paper_entries()[IMPROVEMENT]
     printed, deviation = entry.published or 0.0, entry.deviation or 0.0
     with house_style():
-        figure = matplotlib.figure.Figure(figsize=(9.0, 3.9), layout="constrained")
-        left, right = figure.subplots(1, 2)
+        figure, [[left, right]] = figure_of_free_panels((9.0, 4.1), MARGINS, 1, 2)
         left.axhspan(printed - deviation, printed + deviation, color=VERMILION, alpha=0.25, linewidth=0.0)
         left.axvline(1.0, color=GREY, linewidth=0.9, linestyle=(0, (1, 2)))
         left.plot(demand, gain, ".", color=BLUE, markersize=3.0)
@@ -190,7 +229,7 @@ def draw(family: Family, file: str) -> None:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print every number, section by section, and draw the figure."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("--draws", type=int, default=98_304, help="completions of the torque task; default 98304")
+    parser.add_argument("--draws", type=int, default=262_144, help="completions; default 262144")
     parser.add_argument("--figure", default="docs/images/comparison.png", help="where the figure is written")
     chosen = parser.parse_args(arguments)
     family = infer_settings(chosen.draws)
@@ -198,6 +237,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         ("Where 15 % comes from", where_it_comes_from()),
         ("Law and valve", (line for level in (6.0, 4.0) for line in law_and_valve(level))),
         ("Figure 7", figure_7()),
+        ("The volumes that fit", best_volumes()),
         ("What is open", what_is_open(family)),
         ("For a builder", for_a_builder()),
     ):

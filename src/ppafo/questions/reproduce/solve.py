@@ -27,8 +27,8 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate
 
-COMPLETIONS = 98_304
-"""Completions of the torque task in the report; ``ppafo unreported`` takes more."""
+COMPLETIONS = 32_768
+"""Completions of the experiments in the report; ``ppafo unreported`` takes more."""
 EXPERIMENTS = (STEP, SOLENOID, PROPORTIONAL)
 """Shipped scenarios that stand for the paper's experiments."""
 ORDER = (
@@ -92,7 +92,7 @@ def reproduce(
 
     ``overrides`` change the experiments (not the paper's printed numbers): a path of a scenario reaches those that
     have it, a path of the device all of them. The virtual rig stands in for the paper's measurements, where it can.
-    ``progress`` hears what is being done; ``completions`` of the torque task (default COMPLETIONS) are weighed by
+    ``progress`` hears what is being done; ``completions`` of them (default COMPLETIONS) are weighed by
     what the paper reports, none where values are changed. ``study`` is a publication, by name or by its file, or
     ``all``. SimulationError where a run diverges, ScenarioError for a study that is none.
     """
@@ -128,7 +128,7 @@ def _reproduce_paper(overrides: Sequence[str], report: Report, completions: int 
     levels = Levels(supply.pressure, supply.atmospheric_pressure)
     if not overrides:
         count = completions or COMPLETIONS
-        report(Progress(f"drawing {count} completions of the torque task"))
+        report(Progress(f"drawing {count} completions of the experiments"))
         family = infer_settings(count)
         claims = with_open_ranges(claims, family)
     return Reproduction(

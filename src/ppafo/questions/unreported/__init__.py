@@ -10,7 +10,7 @@ QUESTION = Question(
         Argument(
             ("--draws",),
             "draws",
-            "number of completions of the torque task; default 262144",
+            "number of completions of the experiments; default 262144",
             "N",
             whole_number,
             262_144,

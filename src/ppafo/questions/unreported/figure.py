@@ -8,18 +8,21 @@ import numpy as np
 
 from ppafo.answers.style import BLACK, BLUE, GREY, VERMILION, house_style, mark_kind
 from ppafo.questions.unreported.settings import (
+    ATTITUDE,
     DEAD_VOLUME,
     DELAY,
     DISCHARGE,
     DORSIFLEXION,
     HOLD,
     LEVEL,
+    MASS_CENTRE,
     ON_OFF_RATE,
     PID_RATE,
     PROPORTIONAL,
     SETTINGS,
     SOLENOID,
     START,
+    STEP_RUN,
     SUPPLY,
     VOLTS,
     VOLUME,
@@ -38,7 +41,7 @@ if TYPE_CHECKING:
     import matplotlib.figure
     from matplotlib.axes import Axes
 
-_SIZE = (9.8, 9.8)
+_SIZE = (9.8, 11.6)
 _COLUMNS = 4
 _GRID = 240
 """Points of a smoothed density."""
@@ -113,8 +116,10 @@ def draw_settings(
 
 
 def shipped_values() -> dict[str, float]:
-    """Return the value of each setting, in its shown unit, in the torque tasks that come with the package."""
+    """Return the value of each setting, in its shown unit, in the experiments that come with the package."""
     solenoid, proportional = (load_scenario(f"torque-task-{valve}") for valve in (SOLENOID, PROPORTIONAL))
+    leg = load_scenario("step-response", STEP_RUN).motion.leg  # type: ignore[union-attr]  # the vane is free
+    assert leg is not None, "the step response has a leg"
     device, reference = solenoid.device, solenoid.reference.settings
     held = solenoid.motion.profile.settings["level"]  # type: ignore[union-attr]  # the ankle is held
     return {
@@ -128,6 +133,8 @@ def shipped_values() -> dict[str, float]:
         DORSIFLEXION: _shown(device.supply.dorsiflexion_pressure, "psi_g"),
         START: reference["start_level"],
         DELAY: _shown(device.valve.settings["opening_delay"], "ms"),
+        ATTITUDE: _shown(leg.shank.settings["level"], "deg"),
+        MASS_CENTRE: _shown(leg.foot_mass_centre, "cm"),
         DISCHARGE: 0.0,
         VOLTS: 1.0,
         PID_RATE: 1.0 / proportional.control.period,

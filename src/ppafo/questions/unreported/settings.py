@@ -34,6 +34,7 @@ DEAD_VOLUME = "dead volume"
 VOLUME = "volume per angle"
 LEVEL, SUPPLY, DORSIFLEXION = "reference level", "source pressure", "dorsiflexion pressure"
 START, DELAY = "start level", "coil delay"
+ATTITUDE, MASS_CENTRE = "shank attitude", "foot mass centre"
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +84,20 @@ SETTINGS: tuple[Setting, ...] = (
     Setting(START, "N m", "not printed; both chambers at atmosphere give 0", 0.0, 2.0),
     Setting(DELAY, "ms", "not printed; data sheets of such valves have 2 to 20 ms", 0.0, 20.0),
     Setting(
+        ATTITUDE,
+        "deg",
+        "not printed; the shank of the fixture of figure 7 rests, 0 is upright and 90 has the ankle in front",
+        -90.0,
+        90.0,
+    ),
+    Setting(
+        MASS_CENTRE,
+        "cm",
+        "the foot's length is printed, 18 cm, not where its mass is; its inertia about the ankle is then 3 to 19 g m^2",
+        4.5,
+        13.5,
+    ),
+    Setting(
         DISCHARGE,
         "",
         "0.113 is printed, and an open flow of 1.5 g/s that disagrees with it for both valves",
@@ -118,9 +133,14 @@ def values_of(points: Floats) -> Draws:
     return {setting.name: setting.values_at(points[:, column]) for column, setting in enumerate(SETTINGS)}
 
 
+_SI_UNITS = {"deg": "rad", "psi_g": "Pa_a", "cm^3": "m^3", "cm^3/rad": "m^3/rad", "cm": "m", "ms": "s"}
+
+
 def in_si(values: Floats, unit: str) -> Floats:
     """Values of a shown unit in SI; all units here are straight lines to SI."""
-    si_unit = {"deg": "rad", "psi_g": "Pa_a", "cm^3": "m^3", "cm^3/rad": "m^3/rad", "ms": "s"}.get(unit, unit)
+    si_unit = {"deg": "rad", "psi_g": "Pa_a", "cm^3": "m^3", "cm^3/rad": "m^3/rad", "cm": "m", "ms": "s"}.get(
+        unit, unit
+    )
     zero, one = (parse_quantity(f"{number} {unit}", si_unit) for number in (0.0, 1.0))
     return np.asarray(zero + (one - zero) * values)
 
@@ -159,8 +179,9 @@ def _of_device(draws: Draws, valve: str) -> dict[str, Floats]:
     }
 
 
-STEP_TIME = 0.3
-"""Time [s] of the step response that is looked at: until the vane is at its stop in nearly every completion."""
+STEP_RUN = ("run.duration=0.4 s",)
+"""The step response that is looked at, with the leg of its fixture: until the vane is at its stop in nearly every
+completion."""
 PLATEAU, FALL, RISE = (
     "time at the supply pressure before breakaway",
     "fall of pressure 1 in motion",
@@ -169,8 +190,11 @@ PLATEAU, FALL, RISE = (
 
 
 def step_columns(draws: Draws) -> dict[str, Floats]:
-    """What varies in the step response, in SI units by path; attitude and inertia of a foot belong here."""
-    return _of_device(draws, PROPORTIONAL)
+    """What varies in the step response, in SI units by path: the device, and the leg of the fixture."""
+    return _of_device(draws, PROPORTIONAL) | {
+        "motion.shank.level": in_si(draws[ATTITUDE], "deg"),
+        "motion.foot_mass_centre": in_si(draws[MASS_CENTRE], "cm"),
+    }
 
 
 def step_observables(
@@ -292,6 +316,9 @@ EVIDENCE = tuple(
 IMPROVEMENT = "torque_rms_improvement"
 QUIET = ("proportional_does_not_oscillate",)
 GAS = ("co2_solenoid", "co2_proportional", "co2_saving")
+TEXT_OF_STEP = tuple(entry.id for entry in EVIDENCE if entry.observable in (PLATEAU, FALL, RISE))
+TEXT_OF_SOLENOID = ("solenoid_oscillates_on_ramp", "solenoid_quiet_on_hold")
+"""What the text says of the step response, and of the torque task with the solenoid pair; never left out."""
 
 
 def agreement(metrics: Metrics, left_out: Collection[str] = ()) -> Floats:
@@ -301,10 +328,8 @@ def agreement(metrics: Metrics, left_out: Collection[str] = ()) -> Floats:
 
 def agreement_with(identifiers: Collection[str], metrics: Metrics) -> Floats:
     """How well each completion (draws,) agrees with some entries, 0 to 1."""
-    logarithm = np.zeros(metrics[SOLENOID]["rms_error"].size)
-    for entry in EVIDENCE:
-        if entry.id in identifiers:
-            logarithm -= _misfit(entry, OBSERVABLES[entry.observable](metrics))
+    chosen = [entry for entry in EVIDENCE if entry.id in identifiers]
+    logarithm = -sum((_misfit(entry, OBSERVABLES[entry.observable](metrics)) for entry in chosen), np.zeros(1))
     agrees = np.isfinite(logarithm)
     return np.where(agrees, np.exp(np.where(agrees, logarithm, 0.0)), 0.0)
 
@@ -318,16 +343,16 @@ def _misfit(entry: ClaimEntry, found: Floats) -> Floats:
         high = np.inf if entry.at_most is None else entry.at_most
         away = np.maximum(0.0, np.maximum(low - found, found - high))
     if not entry.deviation:
-        return np.where(away > 0.0, np.inf, 0.0)
+        return np.where(away <= 0.0, 0.0, np.inf)
     return np.asarray(0.5 * (away / entry.deviation) ** 2)
 
 
 ANYWHERE = 0.1
 KEEPS_CHOICE = 0.9
-CENTRES = 200
+CENTRES = 100
 NARROWEST = 0.02
 """Smallest standard deviation of a bell along any direction, of the side of the cube."""
-ENOUGH = 100.0
+ENOUGH = 30.0
 """Effective number of completions that the bells are laid around; weights are tempered until there are as many."""
 _ROWS = 512
 """Points whose densities are computed together: few enough that their table of bells stays in the cache of a core."""
@@ -367,7 +392,7 @@ class Proposal:
     def density(self, points: Floats) -> Floats:
         """Density (points,) over the even spread, of points in the cube."""
         parts = [self._density(points[first : first + _ROWS]) for first in range(0, len(points), _ROWS)]
-        return np.concatenate(parts)
+        return np.concatenate([np.empty(0), *parts])
 
     def _density(self, points: Floats) -> Floats:
         here, there = (np.linalg.solve(self.shape, rows[:, self.numbers].T).T for rows in (points, self.centres))
@@ -401,18 +426,66 @@ def temper(weights: Floats) -> Floats:
     return np.asarray(flat / flat.sum())
 
 
+@dataclass(frozen=True, slots=True)
+class Aim:
+    """What points gave of some observables (points, observables), what is wanted of them and how sharply."""
+
+    found: Floats
+    wanted: Floats
+    deviation: Floats
+
+
+def aim_of(metrics: Metrics, left_out: Collection[str]) -> Aim:
+    """Return what completions gave of the numbers that the paper prints of the torque task."""
+    entries = [entry for entry in EVIDENCE if entry.published is not None and entry.id not in left_out]
+    return Aim(
+        np.array([OBSERVABLES[entry.observable](metrics) for entry in entries]).T,
+        np.array([entry.published for entry in entries], dtype=np.float64),
+        np.array([entry.deviation for entry in entries], dtype=np.float64),
+    )
+
+
 def next_proposal(
-    points: Floats, weights: Floats, cells: tuple[int, ...], chance: np.random.Generator
+    points: Floats, weights: Floats, cells: tuple[int, ...], chance: np.random.Generator, aim: Aim | None = None
 ) -> Proposal | None:
-    """The proposal after points with weights; None where nothing has any weight."""
+    """The proposal after points with weights; None where nothing has any weight.
+
+    With an ``aim`` each bell is moved and narrowed to what is wanted, as far as the observables are straight lines
+    (the update of an ensemble Kalman filter).
+    """
     if not weights.sum() > 0.0:
         return None
     flat = temper(weights)
-    centres = points[chance.choice(len(points), size=CENTRES, p=flat)]
-    numbers = points[:, [column for column, count in enumerate(cells) if not count]]
+    chosen = chance.choice(len(points), size=CENTRES, p=flat)
+    columns = [column for column, count in enumerate(cells) if not count]
+    centres, numbers = points[chosen], points[:, columns]
     away = numbers - flat @ numbers
     covariance = (flat[:, None] * away).T @ away
-    narrowing = effective(flat) ** (-1.0 / (numbers.shape[1] + 4.0))
-    return Proposal(
-        centres, np.linalg.cholesky(narrowing**2 * covariance + NARROWEST**2 * np.eye(len(covariance))), cells
-    )
+    if aim is not None:
+        gain, seen = _gain(points, flat, cells, covariance, aim)
+        moved = centres[:, columns] + (aim.wanted - aim.found[chosen]) @ gain.T
+        centres[:, columns] = np.clip(moved, 0.0, 1.0)
+        covariance = covariance - gain @ seen
+    shape = np.asarray(np.linalg.cholesky(covariance + NARROWEST**2 * np.eye(len(covariance))), dtype=np.float64)
+    return Proposal(centres, shape, cells)
+
+
+def _gain(
+    points: Floats, weights: Floats, cells: tuple[int, ...], covariance: Floats, aim: Aim
+) -> tuple[Floats, Floats]:
+    """Return the gain (numbers, observables) of a bell, and the covariance of observables with numbers."""
+    numbers = [points[:, [column]] for column, count in enumerate(cells) if not count]
+    chosen = [
+        (np.floor(points[:, [column]] * count) == np.arange(count)).astype(np.float64)
+        for column, count in enumerate(cells)
+        if count
+    ]
+    # A constant, for where there are no choices.
+    regressors = np.hstack([*numbers, *chosen, np.ones((len(points), 1))])
+    root = np.sqrt(weights)[:, None]
+    slopes = np.linalg.lstsq(root * regressors, root * aim.found, rcond=1.0e-6)[0]
+    left = aim.found - regressors @ slopes
+    noise = (weights[:, None] * left).T @ left + np.diag(aim.deviation**2)
+    jacobian = slopes[: len(covariance)].T
+    seen = jacobian @ covariance
+    return np.linalg.solve(seen @ jacobian.T + noise, seen).T, seen

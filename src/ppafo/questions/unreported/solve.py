@@ -1,4 +1,4 @@
-"""Draws completions of the torque task, runs each with both valves, and weighs them by what the paper reports.
+"""Draws completions of the experiments, runs each with both valves, and weighs them by what the paper reports.
 
 Rounds that follow what agreed so far may all miss the same corner, which no count of effective draws shows. So the
 draws are shared out to replicates, none of which knows where another looks, and the spread between them is the error.
@@ -6,7 +6,7 @@ draws are shared out to replicates, none of which knows where another looks, and
 
 import os
 import time
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import repeat
@@ -29,11 +29,15 @@ from ppafo.questions.unreported.settings import (
     RISE,
     SOLENOID,
     STEP,
-    STEP_TIME,
+    STEP_RUN,
+    TEXT_OF_SOLENOID,
+    TEXT_OF_STEP,
     Draws,
     Floats,
     Proposal,
     agreement,
+    agreement_with,
+    aim_of,
     columns,
     next_proposal,
     spread,
@@ -66,11 +70,12 @@ def infer_settings(draws: int = 262_144, seed: int = 2011, progress: Report | No
     even = each // 4
     rounds = [even, *[(each - even) // ROUNDS] * ROUNDS]
     seeds = [replicate_seed(seed, number) for number in range(REPLICATES)]
-    searches = [_Search(np.random.default_rng(own), rounds, spread(rounds[0], own)) for own in seeds]
-    added = [search.points for search in searches]
+    searches = [_Search(np.random.default_rng(own), rounds) for own in seeds]
+    added = [spread(even, own) for own in seeds]
+    done = 0
     for number in range(ROUNDS + 1):
-        _run_together(searches, added)
-        done = sum(len(search.points) for search in searches)
+        _run_together(searches, added, all_of_it=number == 0)
+        done += sum(map(len, added))
         report(Progress("", done, draws, elapsed=time.monotonic() - started, noun="completions"))
         if number < ROUNDS:
             # Every third round looks where the improvement does not count, so that it can be judged by the rest.
@@ -82,45 +87,54 @@ def infer_settings(draws: int = 262_144, seed: int = 2011, progress: Report | No
 
 @final
 class _Search:
-    """One search: the points so far, what came of them, the proposals and how densely each draws at the points."""
+    """One search: the points that count so far, what came of them, the proposals and how densely each draws there."""
 
-    def __init__(self, chance: np.random.Generator, rounds: Sequence[int], points: Floats) -> None:
-        self.chance, self.rounds, self.points = chance, rounds, points
+    def __init__(self, chance: np.random.Generator, rounds: Sequence[int]) -> None:
+        self.chance, self.rounds = chance, rounds
+        self.points = np.empty((0, len(CELLS)))
         self.ran: _Ran | None = None
         self.proposals: list[Proposal | None] = [None]
-        self.known = [np.ones(len(points))]
+        self.known = [np.empty(0)]
+        self.drawn = self.even = 0
 
     @property
     def size(self) -> int:
         """How many points were requested from its proposals."""
         return sum(self.rounds[: len(self.proposals)])
 
+    def take(self, added: Floats, ran: "_Ran") -> None:
+        """Keep those of the new points that count, with what came of them."""
+        kept = ran.part(ran.completed)
+        points = added[ran.completed]
+        self.drawn += len(added)
+        self.even = self.even or len(points)
+        self.ran = kept if self.ran is None else self.ran.join(kept)
+        pairs = zip(self.known, self.proposals, strict=True)
+        self.known = [np.concatenate([known, _density(one, points)]) for known, one in pairs]
+        self.points = np.concatenate([self.points, points])
+
     def next_points(self, number: int, left_out: Collection[str]) -> Floats:
         """Draw the points of a round near what agreed best so far; none where no completion agrees."""
         assert self.ran is not None, "the points so far have been run"
-        agrees = np.where(self.ran.completed, agreement(self.ran.metrics, left_out), 0.0)
-        proposal = next_proposal(self.points, agrees / _mixture(self.known, self.rounds), CELLS, self.chance)
+        agrees = agreement(self.ran.metrics, left_out)
+        weights, aim = agrees / _mixture(self.known, self.rounds), aim_of(self.ran.metrics, left_out)
+        proposal = next_proposal(self.points, weights, CELLS, self.chance, aim)
         if proposal is None or len(self.proposals) < number:
             return np.empty((0, self.points.shape[1]))
-        added = proposal.draw(self.rounds[number], self.chance)
-        earlier = zip(self.known, self.proposals, strict=True)
-        self.known = [np.concatenate([known, _density(one, added)]) for known, one in earlier]
-        self.points = np.concatenate([self.points, added])
         self.proposals.append(proposal)
         self.known.append(_density(proposal, self.points))
-        return added
+        return proposal.draw(self.rounds[number], self.chance)
 
     def density(self, points: Floats) -> Floats:
         """How densely this search draws at points, over the even spread."""
         return _mixture([_density(one, points) for one in self.proposals], self.rounds)
 
 
-def _run_together(searches: Sequence[_Search], added: Sequence[Floats]) -> None:
+def _run_together(searches: Sequence[_Search], added: Sequence[Floats], all_of_it: bool) -> None:
     """Run the new points of all searches, which is quicker together, and hand each its own."""
-    whole, ends = _run(np.concatenate(added)), np.cumsum([len(points) for points in added])
-    for search, first, last in zip(searches, [0, *ends[:-1].tolist()], ends.tolist(), strict=True):
-        part = whole.part(slice(first, last))
-        search.ran = part if search.ran is None else search.ran.join(part)
+    whole, ends = _run(np.concatenate(added), all_of_it), np.cumsum([len(points) for points in added])
+    for search, points, last in zip(searches, added, ends.tolist(), strict=True):
+        search.take(points, whole.part(slice(last - len(points), last)))
 
 
 def _family(searches: Sequence[_Search], seed: int) -> Family:
@@ -130,12 +144,11 @@ def _family(searches: Sequence[_Search], seed: int) -> Family:
         assert search.ran is not None, "every search has run"
         ran.append(search.ran)
         replicate.append(np.full(len(search.points), number))
-        is_even.append(np.arange(len(search.points)) < search.rounds[0])
+        is_even.append(np.arange(len(search.points)) < search.even)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         densities = list(pool.map(_densities, searches, repeat(searches)))
     whole, even = _join(ran), np.concatenate(is_even)
-    rows = np.flatnonzero(whole.completed)
-    rows = rows[np.argsort(~even[rows], kind="stable")]
+    rows = np.argsort(~even, kind="stable")
     points = np.concatenate([search.points for search in searches])
     metrics = {valve: {name: item[rows] for name, item in of.items()} for valve, of in whole.metrics.items()}
     sizes = np.array([search.size for search in searches], dtype=np.float64)
@@ -145,8 +158,8 @@ def _family(searches: Sequence[_Search], seed: int) -> Family:
         np.concatenate(densities)[rows],
         sizes,
         np.concatenate(replicate)[rows],
-        int(np.count_nonzero(even[rows])),
-        len(points),
+        int(np.count_nonzero(even)),
+        sum(search.drawn for search in searches),
         seed,
     )
 
@@ -167,7 +180,7 @@ def _densities(search: _Search, searches: Sequence[_Search]) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class _Ran:
-    """What came of completions: metrics by valve and name, and which were completed with both valves; each (draws,)."""
+    """What came of completions: metrics by experiment and name, and which completed all of them; each (draws,)."""
 
     metrics: dict[str, dict[str, Floats]]
     completed: NDArray[np.bool_]
@@ -175,7 +188,7 @@ class _Ran:
     def join(self, later: "_Ran") -> "_Ran":
         return _join([self, later])
 
-    def part(self, rows: slice) -> "_Ran":
+    def part(self, rows: slice | NDArray[np.bool_]) -> "_Ran":
         metrics = {valve: {name: item[rows] for name, item in of.items()} for valve, of in self.metrics.items()}
         return _Ran(metrics, self.completed[rows])
 
@@ -188,20 +201,42 @@ def _join(parts: Sequence[_Ran]) -> _Ran:
     return _Ran(metrics, np.concatenate([part.completed for part in parts]))
 
 
-def _run(points: Floats) -> _Ran:
-    """Run completions with both valves, chunk by chunk."""
+NEGLIGIBLE = 1.0e-6
+"""What agrees less than this with the text (1 is in full) counts for nothing, and its other experiments are not run."""
+
+
+def _run(points: Floats, all_of_it: bool) -> _Ran:
+    """Run completions, chunk by chunk: the cheapest experiment first, the next where the text leaves it any weight.
+
+    ``all_of_it`` runs every experiment of all.
+    """
     parts = []
     for first in range(0, max(1, len(points)), CHUNK):
         draws = values_of(points[first : first + CHUNK])
-        completed = np.ones(len(points[first : first + CHUNK]), dtype=bool)
-        metrics = {valve: {name: np.empty(0) for name in METRICS} for valve in (SOLENOID, PROPORTIONAL)}
-        for valve in metrics if completed.size else ():
-            result = run_ensemble(load_scenario(f"torque-task-{valve}"), columns(draws, valve), METRICS)
-            completed &= result.status == COMPLETED
-            metrics[valve] = result.metrics
-        metrics[STEP] = _step_metrics(draws) if completed.size else {name: np.empty(0) for name in STEP_METRICS}
-        parts.append(_Ran(metrics, completed))
+        counts = np.ones(len(points[first : first + CHUNK]), dtype=bool)
+        metrics = {STEP: step_metrics(step_columns(draws))}
+        if not all_of_it:
+            counts &= agreement_with(TEXT_OF_STEP, metrics) > NEGLIGIBLE
+        for valve in (SOLENOID, PROPORTIONAL):
+            metrics[valve], completed = _task_metrics(draws, valve, counts)
+            counts &= completed
+            if valve == SOLENOID and not all_of_it:
+                counts &= agreement_with(TEXT_OF_SOLENOID, metrics) > NEGLIGIBLE
+        parts.append(_Ran(metrics, counts))
     return _join(parts)
+
+
+def _task_metrics(draws: Draws, valve: str, chosen: NDArray[np.bool_]) -> tuple[dict[str, Floats], NDArray[np.bool_]]:
+    """Return metrics of the torque task with a valve, nan where a completion is not chosen, and which completed it."""
+    metrics = {name: np.full(chosen.size, np.nan) for name in METRICS}
+    completed = np.zeros(chosen.size, dtype=bool)
+    if chosen.any():
+        varied = columns({name: values[chosen] for name, values in draws.items()}, valve)
+        result = run_ensemble(load_scenario(f"torque-task-{valve}"), varied, METRICS)
+        completed[chosen] = result.status == COMPLETED
+        for name, values in metrics.items():
+            values[chosen] = result.metrics[name]
+    return metrics, completed
 
 
 STEP_METRICS = (PLATEAU, FALL, RISE)
@@ -209,19 +244,17 @@ STEP_CHUNK = 4096
 """Step responses whose traces are kept at once."""
 
 
-def _step_metrics(draws: Draws) -> dict[str, Floats]:
-    """What the step response of each completion shows of the text of figure 7."""
-    # Without the leg, whose attitude on the fixture is not among the settings yet.
-    base = load_scenario("step-response", ["motion.kind=free", f"run.duration={STEP_TIME} s"])
+def step_metrics(varied: Mapping[str, Floats]) -> dict[str, Floats]:
+    """Return what step responses show of the text of figure 7 [ms], [psi], by name (runs,), from columns in SI."""
+    base = load_scenario("step-response", STEP_RUN)
     supply = base.device.supply
-    varied = step_columns(draws)
     count = next(iter(varied.values())).size
     parts = []
     for first in range(0, count, STEP_CHUNK):
         part = {path: values[first : first + STEP_CHUNK] for path, values in varied.items()}
         result = run_ensemble(base, part, (), ("angle", "pressure_1", "pressure_2"))
         parts.append(step_observables(result.times, result.traces, supply.pressure, supply.atmospheric_pressure))
-    return {name: np.concatenate([part[name] for part in parts]) for name in STEP_METRICS}
+    return {name: np.concatenate([np.empty(0), *(part[name] for part in parts)]) for name in STEP_METRICS}
 
 
 def _density(proposal: Proposal | None, points: Floats) -> Floats:

@@ -19,10 +19,13 @@ from ppafo.questions.unreported.answer import (
     within_reach,
 )
 from ppafo.questions.unreported.settings import (
+    ATTITUDE,
     CELLS,
+    EVIDENCE,
     FALL,
     GAS,
     IMPROVEMENT,
+    MASS_CENTRE,
     METRICS,
     PLATEAU,
     PROPORTIONAL,
@@ -30,19 +33,25 @@ from ppafo.questions.unreported.settings import (
     SETTINGS,
     SOLENOID,
     STEP,
-    STEP_TIME,
+    STEP_RUN,
+    TEXT_OF_SOLENOID,
+    TEXT_OF_STEP,
+    VOLUME,
+    Aim,
     Proposal,
     agreement,
+    agreement_with,
     columns,
     effective,
     improvement,
     next_proposal,
     spread,
+    step_columns,
     step_observables,
     temper,
     values_of,
 )
-from ppafo.questions.unreported.solve import infer_settings
+from ppafo.questions.unreported.solve import NEGLIGIBLE, infer_settings, step_metrics
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
@@ -65,7 +74,7 @@ def metrics_with(**changed: float) -> dict[str, dict[str, np.ndarray]]:
 
 @pytest.fixture(scope="module")
 def family() -> Family:
-    return infer_settings(3000, seed=1)
+    return infer_settings(4096, seed=1)
 
 
 def test_a_completion_that_gives_what_is_printed_agrees_fully() -> None:
@@ -125,9 +134,9 @@ def test_a_proposal_has_the_density_that_it_draws_from() -> None:
 
 
 def test_tempering_leaves_enough_weights_and_keeps_their_order() -> None:
-    weights = np.exp(-np.linspace(0.0, 60.0, 2000))
+    weights = np.exp(-np.linspace(0.0, 300.0, 2000))
     flat = temper(weights)
-    assert effective(flat) >= 99.0 > effective(weights)
+    assert effective(flat) >= 29.0 > effective(weights)
     assert (np.diff(flat) < 0.0).all()
 
 
@@ -173,35 +182,78 @@ def test_of_the_shipped_sets_the_fitted_one_agrees_best_with_all_that_the_paper_
         valve: run_ensemble(load_scenario(f"torque-task-{valve}"), device, METRICS).metrics
         for valve in (SOLENOID, PROPORTIONAL)
     }
-    base = load_scenario("step-response", ["motion.kind=free", f"run.duration={STEP_TIME} s"])
-    result = run_ensemble(base, device, (), ("angle", "pressure_1", "pressure_2"))
-    supply = base.device.supply
-    metrics[STEP] = step_observables(result.times, result.traces, supply.pressure, supply.atmospheric_pressure)
-    printed, consistent, fitted = np.log(agreement(metrics))
+    of_task = agreement_with([entry.id for entry in EVIDENCE if entry.id not in TEXT_OF_STEP], metrics)
+    attitudes = np.arange(-90.0, 91.0, 15.0)
+    lying = {path: np.repeat(values, attitudes.size) for path, values in device.items()}
+    lying["motion.shank.level"] = np.tile(np.radians(attitudes), len(sets))
+    of_text = agreement_with(TEXT_OF_STEP, {STEP: step_metrics(lying)}).reshape(len(sets), attitudes.size)
+    printed, consistent, fitted = np.log(of_task * of_text.mean(axis=1) + 1e-300)
     assert fitted > consistent + 1.0
-    assert fitted > printed + 20.0
+    assert fitted > printed + 5.0
 
 
-def test_neither_of_two_earlier_volumes_agrees_with_all_that_the_text_of_figure_7_says() -> None:
-    """With 51 cm^3/rad and 2 cm^3 chamber 2 is compressed; with 18.1 and 32 the pressure in chamber 1 never falls."""
-    columns_si = {
-        "actuator.volume_per_angle": np.array([51e-6, 18.1e-6]),
-        "valve.discharge_coefficient": np.full(2, 0.113),
-    }
-    columns_si |= {f"actuator.dead_volume_{number}": np.array([2e-6, 32e-6]) for number in (1, 2)}
-    base = load_scenario("step-response", ["motion.kind=free", f"run.duration={STEP_TIME} s"])
-    result = run_ensemble(base, columns_si, (), ("angle", "pressure_1", "pressure_2"))
+def test_the_attitude_of_the_leg_changes_what_the_text_of_figure_7_says_of_a_volume() -> None:
+    """With 51 cm^3/rad and 2 cm^3 pressure 2 rises at every attitude; with 18.1 and 32 pressure 1 never falls."""
+    degrees = np.array([-90.0, 0.0, 90.0])
+    volumes = np.repeat([51e-6, 18.1e-6], 3), np.repeat([2e-6, 32e-6], 3)
+    varied = {"actuator.volume_per_angle": volumes[0], "motion.shank.level": np.tile(np.radians(degrees), 2)}
+    varied |= {f"actuator.dead_volume_{number}": volumes[1] for number in (1, 2)}
+    found = step_metrics(varied)
+    assert found[RISE][:3] == pytest.approx([8.4, 43.6, 46.7], abs=0.1)
+    assert found[PLATEAU][:3] == pytest.approx([0.0, 0.0, 32.0], abs=1.1)
+    assert found[FALL][3:] == pytest.approx([0.0, 0.0, 0.0], abs=0.1)
+
+
+def test_the_step_response_is_inferred_with_its_leg_and_the_attitude_of_its_shank(family: Family) -> None:
+    first = {name: values[:1] for name, values in family.draws.items()}
+    texts = [
+        f"motion.shank.level={float(family.draws[ATTITUDE][0])!r} deg",
+        f"motion.foot_mass_centre={float(family.draws[MASS_CENTRE][0])!r} cm",
+        *(
+            f"{path}={float(values[0])!r} {'' if 'coefficient' in path else 'm^3'}".strip()
+            for path, values in step_columns(first).items()
+            if path.startswith(("actuator.dead", "valve."))
+        ),
+        f"actuator.volume_per_angle={float(family.draws[VOLUME][0])!r} cm^3/rad",
+    ]
+    base = load_scenario("step-response", [*STEP_RUN, *texts])
+    recording = simulate(base).recording
+    traces = {name: recording[name][:, None] for name in ("angle", "pressure_1", "pressure_2")}
     supply = base.device.supply
-    found = step_observables(result.times, result.traces, supply.pressure, supply.atmospheric_pressure)
-    assert found[PLATEAU] == pytest.approx([8.0, 0.0], abs=1.1)
-    assert found[RISE] == pytest.approx([5.9, 0.2], abs=0.15)
-    assert found[FALL] == pytest.approx([14.9, 0.0], abs=0.1)
+    alone = step_observables(recording.time, traces, supply.pressure, supply.atmospheric_pressure)
+    for name, value in alone.items():
+        assert family.metrics[STEP][name][0] == pytest.approx(value[0], abs=1e-6)
+
+
+def test_an_aim_moves_and_narrows_a_proposal_to_what_is_wanted() -> None:
+    """An observable that is a straight line of two numbers, with a choice beside them, wanted to 0.01."""
+    chance = np.random.default_rng(2)
+    cells = (0, 0, 3)
+    points = chance.random((4000, 3))
+    found = (points[:, 0] + points[:, 1] + np.floor(3.0 * points[:, 2]))[:, None]
+    weights = np.exp(-0.5 * ((found[:, 0] - 1.7) / 0.3) ** 2)
+    aim = Aim(found, np.array([1.7]), np.array([0.01]))
+    met = []
+    for proposal in (next_proposal(points, weights, cells, chance, item) for item in (None, aim)):
+        assert proposal is not None
+        drawn = proposal.draw(4000, chance)
+        met.append((np.abs(drawn[:, 0] + drawn[:, 1] + np.floor(3.0 * drawn[:, 2]) - 1.7) < 0.05).mean())
+    assert met[1] > 3.0 * met[0]
+
+
+def test_what_the_text_rules_out_is_not_run_any_further(family: Family) -> None:
+    later = slice(family.even, None)
+    assert family.drawn > family.weights.size
+    assert np.isfinite(family.metrics[PROPORTIONAL]["rms_error"]).all()
+    text = (*TEXT_OF_STEP, *TEXT_OF_SOLENOID)
+    assert (agreement_with(text, family.metrics)[later] > NEGLIGIBLE).all()
+    assert (agreement_with(text, family.metrics)[: family.even] <= NEGLIGIBLE).any(), "even draws are all run"
 
 
 def test_every_setting_gets_a_verdict(family: Family) -> None:
     found = implications_of(family)
     assert [item.setting.name for item in found] == [setting.name for setting in SETTINGS]
-    assert {item.verdict for item in found} == {TOO_FEW}, "3000 draws are worth only a few"
+    assert {item.verdict for item in found} == {TOO_FEW}, "4096 draws are worth only a few"
     ramp = found[1]
     assert ramp.low <= ramp.median <= ramp.high
     assert len(strongest_links(family)) == 4
@@ -243,7 +295,7 @@ def test_weighted_quantiles_are_those_of_repeated_values() -> None:
 
 
 def test_the_same_seed_gives_the_same_family(family: Family) -> None:
-    again = infer_settings(3000, seed=1)
+    again = infer_settings(4096, seed=1)
     np.testing.assert_array_equal(again.weights, family.weights)
 
 
