@@ -1,11 +1,16 @@
 """Every error that ppafo raises on purpose: one tree, one clear line each."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 
 class PpafoError(Exception):
-    """Something a user can put right; the message is one line that says what and how."""
+    """Something a user can put right; the message is one line that says what and how.
+
+    ``parts`` are what it says, one by one, where it says several things.
+    """
+
+    parts: tuple[str, ...] = ()
 
 
 class UnitError(PpafoError):
@@ -42,6 +47,28 @@ class StudyError(PpafoError):
 
 class IdentificationError(PpafoError):
     """A recording does not allow the requested estimate."""
+
+
+def check_all(chains: Iterable[Sequence[Callable[[], None]]]) -> None:
+    """Call all checks; raise one PpafoError, of the class of the first, that says everything that they found.
+
+    A check of a chain rests on those before it: it is not called where one of them failed.
+    """
+    found: list[PpafoError] = []
+    for chain in chains:
+        try:
+            for check in chain:
+                check()
+        except PpafoError as error:
+            found.append(error)
+    parts = tuple(part for error in found for part in error.parts or (str(error),))
+    if len(parts) == 1:
+        raise found[0]
+    if parts:
+        listed = "; ".join(f"({number}) {part}" for number, part in enumerate(parts, 1))
+        several = type(found[0])(f"{len(parts)} things are wrong: {listed}")
+        several.parts = parts
+        raise several
 
 
 def nearest_name(name: str, allowed: Iterable[str]) -> str:

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ppafo.gait.recorded.importing import LONGEST_HELD, constant_stretch
+from ppafo.gait.recorded.importing import LONGEST_HELD, constant_stretches
 
 RATE = 200.0
 TIME = np.arange(0.0, 8.0, 1.0 / RATE)
@@ -26,10 +26,10 @@ def test_a_filled_drop_out_is_found_where_it_covers_the_strides(seed: int, start
     values[inside] = values[inside[0]]
     first, last = float(TIME[inside[0]]), float(TIME[inside[-1]])
     covered = sum(max(0.0, min(last, high) - max(first, low)) for low, high in SPANS)
-    assert constant_stretch(TIME, values, SPANS) == ((first, last) if covered > LONGEST_HELD else None)
+    assert constant_stretches(TIME, values, SPANS) == ([(first, last)] if covered > LONGEST_HELD else [])
 
 
 @settings(max_examples=100)
 @given(seed=st.integers(0, 10**6), step=st.sampled_from([0.0, 0.02, 0.05, 0.1]))
 def test_a_sensor_that_only_has_coarse_steps_is_let_pass(seed: int, step: float) -> None:
-    assert constant_stretch(TIME, moving(seed, step), SPANS) is None
+    assert constant_stretches(TIME, moving(seed, step), SPANS) == []

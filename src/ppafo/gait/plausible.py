@@ -1,16 +1,18 @@
 """Whether a stride can be true: limits wide enough for impaired walking, that exclude what no leg does.
 
-Each refusal names file, curve, number and limits, and the remedy for what is wrong with units, signs and sides.
+Each refusal names file, curve, number and limits, and the remedy for what is wrong with units, signs and sides. A sign
+is refused only where the other one fits clearly better: impaired walking breaks every rule of healthy walking a little.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.errors import DataError
+from ppafo.errors import DataError, check_all
 from ppafo.gait.gait import HARMONICS, KNEE, Gait, fit_curve
 from ppafo.signals.recording import Floats
 
@@ -54,9 +56,9 @@ def check_gait(gait: Gait, file: str) -> None:
 
 
 def check_plausible(walk: MeanStride) -> None:
-    """Raise DataError for a mean stride that is not plausible; names file, curve, number, limits and remedy."""
-    for check in (check_times, check_shank, check_ankle, check_moment, check_force, check_knee):
-        check(walk)
+    """Raise DataError for a mean stride that is not plausible; names file, curve, number, limits and remedy of all."""
+    chains = ((check_times, check_moment_time), (check_shank, check_ankle, check_knee), (check_moment,), (check_force,))
+    check_all([partial(check, walk) for check in chain] for chain in chains)
 
 
 def check_times(walk: MeanStride) -> None:
@@ -89,6 +91,13 @@ ANKLE_LIMITS = (40.0, 150.0)
 MIDSTANCE = slice(15, 41)
 """Percent of the stride in which the foot stands: the ankle then turns as the shank does."""
 _MINIMUM_SHANK_TRAVEL = 8.0
+_TURNED_BACK = 0.1
+"""Of its range, by which a shank has to rotate backwards over the standing foot for its sign to be reversed.
+
+Recorded ones rotate forward by 0.15 to 0.25 of it.
+"""
+_CLEARLY_BETTER = 2.0
+"""Times that a curve has to fit better, or be larger, with the other sign for its sign to be reversed."""
 REMARKED_TILT, REFUSED_TILT = 5.0, 20.0
 """Degrees that the standing foot may be tilted, on average over mid-stance, before it is remarked and refused.
 
@@ -109,9 +118,10 @@ def check_shank(walk: MeanStride) -> None:
             f"{place} covers a range of {travel:.3g} deg in a stride, plausible is {low:g} to {high:g} deg; "
             f"{_unit_hint(travel, low, high)}"
         )
-    if float(np.mean(phi[MIDSTANCE][:5])) < float(np.mean(phi[MIDSTANCE][-5:])):
+    growth = float(np.mean(phi[MIDSTANCE][-5:]) - np.mean(phi[MIDSTANCE][:5]))
+    if growth > _TURNED_BACK * travel:
         raise DataError(
-            f"{place} grows while the foot stands: the shank would rotate backwards over it; "
+            f"{place} grows by {growth:.2g} deg while the foot stands: the shank would rotate backwards over it; "
             f"{walk.other_sign('shank_angle.positive')}{_other_foot(walk)}"
         )
     if float(phi[0]) < -10.0 or float(np.mean(phi)) > 10.0 or float(np.mean(phi)) < -50.0:
@@ -133,13 +143,12 @@ def check_ankle(walk: MeanStride) -> None:
             f"{place} covers a range of {travel:.3g} deg in a stride, plausible is {low:g} to {high:g} deg; "
             f"{_unit_hint(travel, low, high)}"
         )
-    stand, lean = theta[MIDSTANCE], phi[MIDSTANCE]
-    slope = float(np.polyfit(lean, stand, 1)[0]) if np.ptp(lean) > _MINIMUM_SHANK_TRAVEL else 1.0
-    if slope < 0.0:
+    turned, reversed_turned = standing_turns(walk.curves["shank_angle"], walk.curves["ankle_angle"])
+    if np.ptp(phi[MIDSTANCE]) > _MINIMUM_SHANK_TRAVEL and turned > _CLEARLY_BETTER * reversed_turned:
         raise DataError(
-            f"{place} goes into plantarflexion while the shank rotates forward over the standing foot "
-            f"({slope:.2g} deg per deg, plausible is about 1): its sign is reversed; "
-            f"{walk.other_sign('ankle_angle.positive', 'the other sign about 90 deg')}"
+            f"{place} goes into plantarflexion while the shank rotates forward over the standing foot, which would "
+            f"turn by {turned:.2g} deg (RMS), and by {reversed_turned:.2g} deg with the other sign: its sign is "
+            f"reversed; {walk.other_sign('ankle_angle.positive', 'the other sign about 90 deg')}"
         )
     foot = standing_tilt(walk.curves["shank_angle"], walk.curves["ankle_angle"])
     if abs(foot) > REFUSED_TILT or float(theta.min()) < ANKLE_LIMITS[0] or float(theta.max()) > ANKLE_LIMITS[1]:
@@ -156,6 +165,26 @@ def standing_tilt(shank: Floats, ankle: Floats) -> float:
     """
     foot = np.degrees(ankle - shank)[MIDSTANCE] - 90.0
     return float(np.mean(foot))
+
+
+def standing_turns(shank: Floats, ankle: Floats) -> tuple[float, float]:
+    """Return how far the foot turns [deg, RMS] from 15 to 40 % of the stride, as it is and with the ankle reversed.
+
+    ``shank`` and ``ankle`` are curves [rad] of 101 samples in the signs of the package; a foot that stands turns by 0.
+    """
+    lean, stand = np.degrees(shank)[MIDSTANCE], np.degrees(ankle)[MIDSTANCE]
+    return float(np.std(stand - lean)), float(np.std(stand + lean))
+
+
+def sign_remarks(shank: Floats, ankle: Floats) -> list[str]:
+    """Return what there is to say of an ankle whose sign the standing foot does not show."""
+    turned, reversed_turned = standing_turns(shank, ankle)
+    if turned <= reversed_turned:
+        return []
+    return [
+        f"mid-stance does not show the sign of ankle_angle: the standing foot turns by {turned:.2g} deg (RMS), and by "
+        f"{reversed_turned:.2g} deg with the other sign; check that the angle grows into plantarflexion"
+    ]
 
 
 def zero_remarks(tilt: float, correction: str) -> list[str]:
@@ -224,7 +253,7 @@ def check_force_scale(file: str, force: Floats, signs_from: SignSource) -> None:
     loaded = force[np.abs(force) > _ON_GROUND]
     lowest, highest = np.percentile(loaded if loaded.size else force, (2.0, 98.0)).tolist()
     low, high = FORCE_PEAK
-    if -lowest > highest:
+    if -lowest > _CLEARLY_BETTER * highest:
         raise DataError(
             f"{file}: vertical_force is {lowest:.3g} body weights at its largest, downwards: its sign is reversed; "
             f"{other_sign(signs_from, 'vertical_force.positive')}"
@@ -242,7 +271,7 @@ def check_moment(walk: MeanStride) -> None:
         return
     moment = walk.curves["ankle_moment"]
     place = f"{walk.file['ankle_moment']}: ankle_moment"
-    if float(np.mean(moment)) < 0.0 and float(-np.min(moment)) > float(np.max(moment)):
+    if float(np.mean(moment)) < 0.0 and float(-np.min(moment)) > _CLEARLY_BETTER * float(np.max(moment)):
         raise DataError(
             f"{place} is {np.min(moment):.3g} N m/kg at its largest, into dorsiflexion: its sign is reversed; "
             f"{walk.other_sign('ankle_moment.positive')}"
@@ -253,7 +282,14 @@ def check_moment(walk: MeanStride) -> None:
             f"{place} reaches {peak:.3g} N m/kg, plausible is {low:g} to {high:g} N m/kg; is the unit right "
             "(N m, N m/kg, N mm/kg) and the body mass?"
         )
-    # A moment that works while the foot is off the ground.
+
+
+def check_moment_time(walk: MeanStride) -> None:
+    """Raise DataError for an ankle moment, where there is one, that works while the foot is off the ground."""
+    if "ankle_moment" not in walk.curves:
+        return
+    moment = walk.curves["ankle_moment"]
+    peak, place = float(np.max(moment)), f"{walk.file['ankle_moment']}: ankle_moment"
     fraction, phase = walk.stance_share, np.linspace(0.0, 1.0, moment.size)
     at, swing = float(phase[np.argmax(moment)]), float(np.max(moment[phase > fraction + _AFTER_TOE_OFF]))
     if at < fraction and swing < max(_LEFT_IN_SWING * peak, _FOOT_ALONE):
@@ -307,7 +343,7 @@ SHANK_LENGTHS = (0.25, 0.6)
 
 _FITS = 0.6
 """Largest misfit of the turning, relative and root mean square: true recordings have 0.3 to 0.46."""
-_CLEARLY = 0.7
+_LEFT_BY_MISTAKE = 0.7
 """A mistake is named where correcting it leaves less than this fraction of the misfit."""
 
 Factors = tuple[float, float]
@@ -375,7 +411,7 @@ def check_turning(walk: MeanStride) -> None:
     missed = _misfit(given, expected)
     for mistake in _MISTAKES:
         left = _misfit(np.array([mistake.forward, mistake.up]) @ given, expected)
-        if left < _FITS and left < _CLEARLY * missed:
+        if left < _FITS and left < _LEFT_BY_MISTAKE * missed:
             raise DataError(
                 f"{walk.file['knee_forward']}: knee_forward and knee_up {mistake.words}: while the foot is flat the "
                 f"knee turns about the resting ankle, which they miss by {100.0 * missed:.0f} %, and by "
@@ -409,6 +445,11 @@ def _misfit(given: Floats, expected: Floats) -> float:
 
 KNEE_TRAVEL = (0.5, 80.0)
 KNEE_MEAN = 1.5
+_HELD_BACK = 0.2
+"""Of its range, by which a knee has to be held back where others are driven for its sign to be reversed.
+
+A measured knee is driven by 0.8 to 0.9 of it.
+"""
 
 _PARTS = {"knee_forward": ((-0.3, 0.0), (0.3, 0.6)), "knee_up": ((0.0, 0.3), (0.4, 0.7))}
 """Parts of the swing, from toe-off, in which the knee is driven on and up, and in which it is held back and falls."""
@@ -436,7 +477,7 @@ def check_knee(walk: MeanStride) -> None:
             )
         swung = (np.linspace(0.0, 1.0, values.size) - walk.stance_share) / (1.0 - walk.stance_share)
         driven, held = (float(np.mean(values[(swung >= start) & (swung <= end)])) for start, end in _PARTS[name])
-        if driven < held:
+        if held - driven > _HELD_BACK * travel:
             raise DataError(
                 f"{place} is {driven:.3g} m/s^2 about toe-off and {held:.3g} m/s^2 in the middle of the swing, and it "
                 "is the other way round in walking: its sign is reversed, or it is of the other knee; "

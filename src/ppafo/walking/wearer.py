@@ -192,6 +192,14 @@ def read_wearer(reading: Reading, gait: Gait, is_named: bool) -> Wearer:
     return Wearer(**reading.section("wearer", quantities))
 
 
+SCALED_MASS = (0.6, 1.7)
+"""Body masses, in those of the gait's subject, over which moment and force are scaled without a remark.
+
+About the 2nd to the 98th percentile of adults seen from a subject in their middle: 45 to 120 kg from 72 kg. Children
+walk otherwise, and not only with less mass.
+"""
+
+
 def wearer_origin(reading: Reading, gait: Gait, is_named: bool) -> str:
     """Return where the body mass of the wearer comes from, in words."""
     if value_at(reading.document, "wearer.body_mass") is not None:
@@ -206,7 +214,14 @@ def who_walks(wearer: Wearer, gait: Gait, origin: str) -> str:
         return line if gait.stature is None else f"{line}, {gait.stature:.4g} m"
     if abs(wearer.body_mass - gait.body_mass) <= _SAME * gait.body_mass:
         return line
-    return (
+    scaled = (
         f"{line}; the subject of gait '{gait.name}' has {gait.body_mass:.4g} kg: moment and force of the gait are "
         "scaled by body mass"
+    )
+    low, high = (share * gait.body_mass for share in SCALED_MASS)
+    if low <= wearer.body_mass <= high:
+        return scaled
+    return (
+        f"{scaled}, which is not known to hold for a body so different (outside {low:.0f} to {high:.0f} kg): "
+        "take a gait of such a person"
     )

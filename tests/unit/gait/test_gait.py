@@ -106,7 +106,7 @@ def turned(amplitudes: tuple[float, ...]) -> tuple[float, ...]:
 
 
 IMPLAUSIBLE = {
-    "shank": ({"shank_angle": negative}, "shank_angle grows while the foot stands"),
+    "shank": ({"shank_angle": negative}, "while the foot stands: the shank would rotate backwards over it"),
     "ankle": (
         {"ankle_angle": lambda c: dataclasses.replace(negative(c), mean=math.pi - c.mean)},
         "its sign is reversed; write mean, cosine and sine with the other sign about 90 deg",

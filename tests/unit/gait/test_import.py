@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from ppafo.errors import DataError
 from ppafo.gait import CURVES, Gait, walk_recording
@@ -140,6 +141,29 @@ def test_opensim_angles_give_the_knee_once_the_thigh_is_known(opensim_files: dic
     assert "thigh of 0.400 m: 0.245 of the stature (Winter 2009)" in found.remarks
     taller = import_gait(files, ImportSettings(62.0, stature=1.9)).gait
     assert largest_difference(taller, normative, "knee_forward") > 10.0 * KNEE_LIMIT
+
+
+@pytest.mark.parametrize("facing", [30.0, 90.0, 180.0, -120.0])
+def test_a_walk_in_any_direction_is_that_along_x(
+    opensim_files: dict[str, Path], normative: Gait, facing: float
+) -> None:
+    """The pelvis in the laboratory by SciPy's rotations: the walker turned about y, the angles about z, x and y."""
+    path = opensim_files["ik"]
+    head, _, body = path.read_text().partition("endheader\n")
+    names, *lines = body.splitlines()
+    table = dict(zip(names.split("\t"), np.array([line.split("\t") for line in lines], dtype=float).T, strict=True))
+    forward, turned = table["pelvis_tx"], np.radians(facing)
+    table["pelvis_tx"], table["pelvis_tz"] = np.cos(turned) * forward, -np.sin(turned) * forward
+    placed = Rotation.from_euler("y", facing, degrees=True) * Rotation.from_euler("z", 4.0, degrees=True)
+    for name, angle in zip(("tilt", "list", "rotation"), placed.as_euler("ZXY", degrees=True), strict=True):
+        table[f"pelvis_{name}"] = np.full(forward.size, angle)
+    rows = ["\t".join(f"{cell:.10f}" for cell in row) for row in np.column_stack(list(table.values()))]
+    head = head.replace("nColumns=6", f"nColumns={len(table)}")
+    path.write_text("\n".join([head + "endheader", "\t".join(table), *rows]) + "\n")
+    found = import_gait(list(opensim_files.values()), ImportSettings(62.0, stature=0.4 / 0.245))
+    assert max(largest_difference(found.gait, normative, name) for name in KNEE) < KNEE_LIMIT
+    assert largest_difference(found.gait, normative, "shank_angle") < 0.01
+    assert any("to the left of x (pelvis_rotation)" in remark for remark in found.remarks)
 
 
 def test_a_hip_that_does_not_move_is_refused(opensim_files: dict[str, Path]) -> None:

@@ -230,6 +230,30 @@ def test_nonsense_in_subject_and_events_is_as_if_it_were_absent(trial: Trial) ->
     found = read_table(path).trial
     assert found is not None
     assert (found.body_mass, found.events) == (None, {})
+    (said,) = (line for line in read_table(path).remarks if "events" in line)
+    assert "labels and 3 times, which do not fit together" in said
+
+
+@pytest.mark.parametrize(
+    ("flat", "said"),
+    [(lambda times: times[1], "a flat list of seconds"), (lambda times: times.T.ravel(), "a flat list of minutes and")],
+)
+def test_a_flat_list_of_events_is_read_and_remarked(trial: Trial, flat: Any, said: str) -> None:
+    import ezc3d
+
+    path = trial()
+    true = read_table(path).trial
+    file = ezc3d.c3d(str(path))
+    times = np.asarray(file["parameters"]["EVENT"]["TIMES"]["value"])
+    file.add_parameter("EVENT", "TIMES", flat(times).tolist())
+    file.write(str(path))
+    table = read_table(path)
+    assert true is not None
+    assert table.trial is not None
+    assert set(table.trial.events) == set(true.events) != set()
+    for key, expected in true.events.items():
+        assert table.trial.events[key] == pytest.approx(expected, abs=1e-6)
+    assert any(said in line for line in table.remarks)
 
 
 def test_plates_without_outputs_of_the_model_are_chosen_by_their_contacts(trial: Trial) -> None:

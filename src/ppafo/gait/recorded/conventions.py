@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -106,6 +106,39 @@ def _of_opensim(table: MotionTable, side: Side) -> Convention:
     if len(numbered) == 1 and side == "right":
         return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=numbered)}))
     return Convention(usual.model_copy(update={"vertical_force": None}), numbered)
+
+
+_ALONG = np.radians(5.0)
+"""Mean rotation of the pelvis up to which a walk counts as one along x."""
+
+
+def turned_forward(table: MotionTable) -> MotionTable:
+    """Return an OpenSim table with ``pelvis_tx``, ``_tz`` and ``_tilt`` of a walk along x, whichever way it goes.
+
+    The pelvis is turned about z by the tilt t, about x by the list l, then about y by the rotation. A walker who faces
+    by r (its mean) to the left of x goes along h = (cos r, 0, -sin r) and leans against it by what the upright of the
+    pelvis, (-sin t cos l, cos t cos l, sin l), has in that direction. A walk within 5 deg of x stays as it is.
+    """
+    names = ("pelvis_tx", "pelvis_tz", "pelvis_rotation")
+    if table.form != OPENSIM or any(name not in table.columns for name in names):
+        return table
+    degree = {name: np.pi / 180.0 if table.units.get(name) == "deg" else 1.0 for name in table.columns}
+    rotation = table.columns["pelvis_rotation"] * degree["pelvis_rotation"]
+    facing = float(np.arctan2(np.nanmean(np.sin(rotation)), np.nanmean(np.cos(rotation))))
+    if abs(facing) <= _ALONG:
+        return table
+    cosine, sine = np.cos(facing), np.sin(facing)
+    x, z = table.columns["pelvis_tx"], table.columns["pelvis_tz"]
+    columns = {**table.columns, "pelvis_tx": cosine * x - sine * z, "pelvis_tz": sine * x + cosine * z}
+    if "pelvis_tilt" in columns:
+        tilt = columns["pelvis_tilt"] * degree["pelvis_tilt"]
+        tipped = columns["pelvis_list"] * degree["pelvis_list"] if "pelvis_list" in columns else 0.0 * tilt
+        forward = -np.sin(tilt) * np.cos(tipped) * cosine - np.sin(tipped) * sine
+        columns["pelvis_tilt"] = np.arctan2(-forward, np.cos(tilt) * np.cos(tipped)) / degree["pelvis_tilt"]
+    said = (
+        f"the walk goes {np.degrees(facing):.0f} deg to the left of x (pelvis_rotation): the pelvis is turned into it"
+    )
+    return replace(table, columns=columns, remarks=(*table.remarks, said))
 
 
 def _own_columns(table: MotionTable, foot: str) -> dict[str, object]:

@@ -8,14 +8,23 @@ last value, and strides that scatter too much, or that no series comes near.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from ppafo.errors import DataError
+from ppafo.errors import DataError, check_all
 from ppafo.gait.gait import HARMONICS, REQUIRED, Curve, FitError, Gait, Origin, fit_curve
-from ppafo.gait.plausible import MeanStride, SignSource, check_plausible, force_remarks, standing_tilt, zero_remarks
-from ppafo.gait.recorded.conventions import Convention, column_names, find_convention
+from ppafo.gait.plausible import (
+    MeanStride,
+    SignSource,
+    check_plausible,
+    force_remarks,
+    sign_remarks,
+    standing_tilt,
+    zero_remarks,
+)
+from ppafo.gait.recorded.conventions import Convention, column_names, find_convention, turned_forward
 from ppafo.gait.recorded.footfalls import (
     LEAST_STRIDES,
     SHANK,
@@ -115,13 +124,32 @@ def _bridge_swing(result: CurveStatistics) -> CurveStatistics:
     return CurveStatistics(result.curves, mean, deviation, result.strides)
 
 
-def without_outliers(strides: Sequence[Stride], largest: float) -> tuple[list[Stride], list[Stride]]:
-    """Return the strides whose time is within ``largest`` [-] of the median, relative to it, and the others."""
+@dataclass(frozen=True, slots=True)
+class Strides:
+    """Strides that are taken, those that are left out, each with the reason, and the least number to take."""
+
+    taken: tuple[Stride, ...]
+    left_out: tuple[tuple[Stride, str], ...]
+    least: int
+
+    def without(self, odd: Sequence[Stride], why: str, else_refused: str = "") -> "Strides":
+        """Return these without some; where too few remain all stay, or DataError with the words for that case."""
+        kept = tuple(item for item in self.taken if item not in odd)
+        if len(kept) >= self.least:
+            return Strides(kept, (*self.left_out, *((item, why) for item in odd)), self.least)
+        if else_refused:
+            raise DataError(else_refused)
+        return self
+
+
+def of_usual_time(strides: Sequence[Stride], least: int) -> Strides:
+    """Return strides, those left out whose time differs from the median by more than LARGEST_STRIDE_CHANGE of it."""
     if not strides:
-        return [], []
+        return Strides((), (), least)
     median = float(np.median([item.time for item in strides]))
-    kept = [item for item in strides if abs(item.time - median) <= largest * median]
-    return kept, [item for item in strides if item not in kept]
+    kept = [item for item in strides if abs(item.time - median) <= LARGEST_STRIDE_CHANGE * median]
+    why = "{:.3g} s long, the others are about " + f"{_mean([item.time for item in kept]):.3g} s"
+    return Strides(tuple(kept), tuple((item, why.format(item.time)) for item in strides if item not in kept), least)
 
 
 LONGEST_HELD = 0.1
@@ -133,24 +161,19 @@ _COARSE = 0.002
 """Fraction of the range; a sensor with coarser steps keeps a value where its curve turns round."""
 
 
-def check_constant(
-    walk: Mapping[str, Signal],
-    tables: Sequence[MotionTable],
-    strides: Sequence[Stride],
-    covered: Mapping[str, Sequence[Stride]],
-    left_out: Sequence[Stride],
-) -> None:
-    """Raise DataError for a column that keeps one value for more than 0.1 s within the strides; a load may in swing.
+def without_drop_outs(
+    walk: Mapping[str, Signal], tables: Sequence[MotionTable], covered: Mapping[str, Sequence[Stride]], strides: Strides
+) -> Strides:
+    """Leave out strides in which a column keeps one value for more than 0.1 s; a load may in swing.
 
-    Loads are checked in the strides that they cover, motions in strides that are left out too: a drop-out made
-    those longer. A column that never moves is no drop-out, and a stretch that a coarse sensor enters and leaves by its
-    smallest step is none either.
+    Loads are looked at in the strides that they cover. A column that never moves is no drop-out, and a stretch that a
+    coarse sensor enters and leaves by its smallest step is none either. DataError where too few strides are left.
     """
     by_file = {table.file: table for table in tables}
     for name, signal in walk.items():
         table = by_file[signal.file]
         # Between the times of a span a column of this curve moves all the time.
-        spans = [(item.start, item.end) for item in (*strides, *left_out)]
+        spans = [(item.start, item.end) for item in strides.taken]
         if name in LOADS:
             loaded = [(item, _ABOUT_STANCE * item.time) for item in covered[name]]
             spans = [(item.start + slack, item.toe_off - slack) for item, slack in loaded]
@@ -159,28 +182,55 @@ def check_constant(
             # Plates that are summed rest in turn, so their sum is looked at.
             columns = [(" + ".join(signal.columns), np.sum([np.abs(values) for _, values in columns], axis=0))]
         for column, values in columns:
-            found = constant_stretch(table.time, values, spans)
-            if found is not None:
-                raise DataError(
-                    f"{table.file}: column {column!r} of {name} keeps one value from {found[0]:.4g} to "
-                    f"{found[1]:.4g} s while the wearer walks: a drop-out was filled with it; cut the file there and "
-                    "give the longer part"
+            for start, end in constant_stretches(table.time, values, spans):
+                what = f"column {column!r} of {name} keeps one value from {start:.4g} to {end:.4g} s"
+                strides = strides.without(
+                    [item for item in strides.taken if item.start < end and start < item.end],
+                    f"{what}: a drop-out was filled with it",
+                    f"{table.file}: {what} while the wearer walks: a drop-out was filled with it; cut the file there "
+                    "and give the longer part",
                 )
+    return strides
 
 
-def constant_stretch(time: Floats, values: Floats, spans: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
-    """Return start and end [s] of the first stretch with one value that covers more than 0.1 s of the spans."""
+def constant_stretches(time: Floats, values: Floats, spans: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return start and end [s] of all stretches with one value that cover more than 0.1 s of the spans."""
     moves = np.flatnonzero(np.diff(values) != 0.0)
     if moves.size == 0:
-        return None
+        return []
     starts, ends = np.concatenate([[0], moves + 1]), np.concatenate([moves, [values.size - 1]])
     long = time[ends] - time[starts] > LONGEST_HELD
+    found = []
     for first, last in zip(starts[long].tolist(), ends[long].tolist(), strict=True):
         start, end = float(time[first]), float(time[last])
         inside = sum(max(0.0, min(end, high) - max(start, low)) for low, high in spans)
         if inside > LONGEST_HELD and not _by_coarse_steps(values, first, last):
-            return start, end
-    return None
+            found.append((start, end))
+    return found
+
+
+ODD_SHAPE, ODD_AGAINST_OTHERS = 0.25, 4.0
+"""A stride is odd whose curve is off the median one by this fraction of its range, RMS, and by as many times the
+median distance of all strides. Impaired walking varies more, but then in every stride."""
+_FEWEST_TO_COMPARE = 4
+_MOST_ODD = 0.4
+"""Fraction of the strides; where more are odd, none is the exception."""
+
+
+def without_odd_shapes(curves: Mapping[str, CurveStatistics], strides: Strides) -> Strides:
+    """Leave out strides whose curve is unlike those of all others: a stumble, a turn, markers that were exchanged."""
+    for name, item in curves.items():
+        if len(item.strides) < _FEWEST_TO_COMPARE or name == "centre_of_pressure":
+            continue
+        middle = np.median(item.curves, axis=0)
+        distances = np.sqrt(np.mean((item.curves - middle) ** 2, axis=1))
+        limit = max(ODD_SHAPE * float(np.ptp(middle)), ODD_AGAINST_OTHERS * float(np.median(distances)))
+        odd = [stride for stride, far in zip(item.strides, distances, strict=True) if far > limit]
+        if len(odd) <= _MOST_ODD * len(item.strides):
+            strides = strides.without(
+                [stride for stride in odd if stride in strides.taken], f"{name} is unlike all others"
+            )
+    return strides
 
 
 def _by_coarse_steps(values: Floats, first: int, last: int) -> bool:
@@ -266,6 +316,8 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings) -> Source
     if not files:
         raise DataError("no file was given; a gait needs at least the angles of shank and ankle")
     tables = [read_table(path, settings.longest_gap, settings.start, settings.end) for path in files]
+    if settings.columns is None:
+        tables = [turned_forward(table) for table in tables]
     settings, said = _with_subject(settings, tables)
     person = Person(settings.body_mass or 0.0, settings.stature)
     convention = (
@@ -367,39 +419,59 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     signs_from, settings = source.signs_from, source.settings
     footfalls = find_footfalls(source.walk, source.tables, settings.side, signs_from, settings.least_strides)
     walk, events, found = footfalls.walk, footfalls.events, footfalls.strides
-    strides, left_out = without_outliers(usable_strides(walk, found), LARGEST_STRIDE_CHANGE)
     least = settings.least_strides or (1 if footfalls.is_one_cycle or footfalls.is_overground else LEAST_STRIDES)
-    _check_enough(strides, found, {name: walk[name] for name in (*REQUIRED, events) if name in walk}, least)
-    covered = {name: strides_of_curve(footfalls, name, signal, strides) for name, signal in walk.items()}
-    unmeasured = [name for name in LOADS if name in walk and not covered[name] and strides_within(walk[name], strides)]
+    strides = of_usual_time(usable_strides(walk, found), least)
+    _check_enough(strides, found, {name: walk[name] for name in (*REQUIRED, events) if name in walk})
+    covered = _covered(footfalls, walk, strides)
+    unmeasured = [
+        name for name in LOADS if name in walk and not covered[name] and strides_within(walk[name], strides.taken)
+    ]
     walk = {name: signal for name, signal in walk.items() if name not in unmeasured}
-    check_constant(walk, source.tables, strides, covered, left_out)
+    strides = without_drop_outs(walk, source.tables, covered, strides)
     smooth = walk if settings.low_pass is None else {n: low_pass(s, settings.low_pass) for n, s in walk.items()}
-    curves = {name: mean_curve(name, signal, strides, covered[name]) for name, signal in smooth.items()}
+    strides = without_odd_shapes(_curves(footfalls, smooth, strides), strides)
+    curves = _curves(footfalls, smooth, strides)
     missing = [f"{name} is left out: in no whole stride was it measured throughout the stance" for name in unmeasured]
     remarks = [*source.remarks, *footfalls.remarks, *missing]
-    return _finish(source, replace(footfalls, walk=walk), curves, (strides, left_out), remarks)
+    return _finish(source, replace(footfalls, walk=walk), curves, strides, remarks)
+
+
+def _covered(footfalls: Footfalls, walk: Mapping[str, Signal], strides: Strides) -> dict[str, list[Stride]]:
+    """The strides that each curve covers."""
+    return {name: strides_of_curve(footfalls, name, signal, strides.taken) for name, signal in walk.items()}
+
+
+def _curves(footfalls: Footfalls, walk: Mapping[str, Signal], strides: Strides) -> dict[str, CurveStatistics]:
+    """The curves over the strides that each covers."""
+    covered = _covered(footfalls, walk, strides)
+    return {name: mean_curve(name, signal, strides.taken, covered[name]) for name, signal in walk.items()}
 
 
 def _finish(
     source: Source,
     footfalls: Footfalls,
     curves: Mapping[str, CurveStatistics],
-    strides: tuple[list[Stride], list[Stride]],
+    strides: Strides,
     remarks: Sequence[str],
 ) -> ImportedGait:
-    """Return the gait of mean curves that legs can have; ``strides`` are those taken and those left out."""
-    (taken, left_out), walk, settings, signs_from = strides, footfalls.walk, source.settings, source.signs_from
+    """Return the gait of mean curves that legs can have."""
+    taken, walk, settings, signs_from = strides.taken, footfalls.walk, source.settings, source.signs_from
     share, time = _mean([item.stance_share for item in taken]), _mean([item.time for item in taken])
     means = {name: item.mean for name, item in curves.items()}
     fitted = {name: fit_curve(item.mean, HARMONICS[name], item.spread) for name, item in curves.items()}
     errors = {name: error for name, (_, error) in fitted.items()}
-    check_scatter(curves, errors, walk)
-    check_plausible(MeanStride({name: signal.file for name, signal in walk.items()}, means, share, time, signs_from))
-    check_way(walk, signs_from)
+    mean_stride = MeanStride({name: signal.file for name, signal in walk.items()}, means, share, time, signs_from)
+    check_all(
+        [
+            [partial(check_scatter, curves, errors, walk)],
+            [partial(check_plausible, mean_stride)],
+            [partial(check_way, walk, signs_from)],
+        ]
+    )
     gait = _gait(settings, source.tables, taken, {name: curve for name, (curve, _) in fitted.items()}, footfalls.events)
-    said = [*remarks, *_remarks(curves, taken, left_out, footfalls.events)]
+    said = [*remarks, *_remarks(curves, strides, footfalls.events)]
     said += knee_remarks(source.columns.knee, walk, settings.stature)
+    said += sign_remarks(means["shank_angle"], means["ankle_angle"])
     tilt = standing_tilt(means["shank_angle"], means["ankle_angle"])
     sign, taken_off = source.columns.ankle_angle.sign_and_neutral()
     # The reading of the file that would be neutral.
@@ -408,15 +480,23 @@ def _finish(
     said += scatter_remarks(curves, errors)
     names = tuple(table.file for table in source.tables)
     return ImportedGait(
-        gait, tuple(taken), tuple(left_out), curves, errors, footfalls.events, names, tuple(dict.fromkeys(said))
+        gait,
+        taken,
+        tuple(item for item, _ in strides.left_out),
+        curves,
+        errors,
+        footfalls.events,
+        names,
+        tuple(dict.fromkeys(said)),
     )
 
 
-def _check_enough(strides: list[Stride], found: list[Stride], walk: Mapping[str, Signal], least: int) -> None:
-    if len(strides) >= least:
+def _check_enough(strides: Strides, found: list[Stride], walk: Mapping[str, Signal]) -> None:
+    taken, least = len(strides.taken), strides.least
+    if taken >= least:
         return
     spans = ", ".join(f"{name} {item.time[0]:.4g} to {item.time[-1]:.4g} s" for name, item in walk.items())
-    count = f"{len(strides)} whole stride{'' if len(strides) == 1 else 's'}"
+    count = f"{taken} whole stride{'' if taken == 1 else 's'}"
     where = list(walk)[-1]
     events = (
         f"{len(found)} in the events" if found else f"no heel strikes were found in {where}: is it the right column?"
@@ -467,18 +547,12 @@ def _gait(
     )
 
 
-def _remarks(
-    curves: Mapping[str, CurveStatistics], strides: Sequence[Stride], left_out: Sequence[Stride], events: str
-) -> list[str]:
-    remarks = [
-        f"stride from {item.start:.4g} to {item.end:.4g} s left out: {item.time:.3g} s long, the others are about "
-        f"{_mean([stride.time for stride in strides]):.3g} s"
-        for item in left_out
-    ]
+def _remarks(curves: Mapping[str, CurveStatistics], strides: Strides, events: str) -> list[str]:
+    remarks = [f"stride from {item.start:.4g} to {item.end:.4g} s left out: {why}" for item, why in strides.left_out]
     remarks += [
-        f"{name} covers {len(item.strides)} of {len(strides)} strides"
+        f"{name} covers {len(item.strides)} of {len(strides.taken)} strides"
         for name, item in curves.items()
-        if len(item.strides) < len(strides)
+        if len(item.strides) < len(strides.taken)
     ]
     if "vertical_force" in curves:
         return remarks + force_remarks(curves["vertical_force"].mean)

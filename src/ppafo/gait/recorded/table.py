@@ -47,11 +47,15 @@ Events = dict[tuple[str, str], list[float]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trial:
-    """What a C3D file says beside its columns: subject (kg, m; None where not), events [s] by side and kind."""
+    """What a C3D file says beside its columns: subject (kg, m; None where not), events [s] by side and kind.
+
+    ``remarks`` say how its events were read, or why they were not.
+    """
 
     body_mass: float | None = None
     stature: float | None = None
     events: Events = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
 
     def strikes(self, side: str) -> list[float]:
         """Return the heel strikes of a foot."""
@@ -204,7 +208,7 @@ def _trial(parameters: Any) -> Trial:
     return Trial(
         mass if mass is not None and 1.0 <= mass <= 500.0 else None,
         stature if stature is not None and 0.5 <= stature <= 2.5 else None,
-        _events(parameters.get("EVENT", {})),
+        *_events(parameters.get("EVENT", {})),
     )
 
 
@@ -217,19 +221,35 @@ def _number(group: Any, names: Iterable[str]) -> float | None:
     return None
 
 
-def _events(group: Any) -> Events:
-    """Return the times of strikes and offs; a time is stored as minutes and seconds."""
-    if any(name not in group for name in ("CONTEXTS", "LABELS", "TIMES")):
-        return {}
-    times = np.atleast_2d(np.asarray(group["TIMES"]["value"], dtype=np.float64))
-    if times.shape[0] != 2:
-        return {}
-    seconds = (60.0 * times[0] + times[1]).tolist()
+def _events(group: Any) -> tuple[Events, tuple[str, ...]]:
+    """Return the times of strikes and offs, and what there is to say of them.
+
+    A time is stored as minutes and seconds, in two rows; some programs write a flat list, of such pairs or of seconds.
+    """
+    present = [name for name in ("CONTEXTS", "LABELS", "TIMES") if name in group]
+    if len(present) < 3:
+        return {}, ("its events are not read: one of EVENT:CONTEXTS, LABELS and TIMES is missing",) if present else ()
+    sides, kinds = _texts(group, "CONTEXTS"), _texts(group, "LABELS")
+    times = np.asarray(group["TIMES"]["value"], dtype=np.float64)
+    count, said = len(kinds), ""
+    if times.shape == (2, count) or (count < 2 and times.size == 2 * count):
+        pairs = times.reshape(2, count)
+    elif times.size == 2 * count:
+        pairs, said = times.reshape(count, 2).T, "a flat list of minutes and seconds"
+    elif times.size == count:
+        pairs, said = np.array([np.zeros(count), times.reshape(-1)]), "a flat list of seconds"
+    else:
+        pairs = np.zeros((2, 0))
+    if not count == len(sides) == pairs.shape[1]:
+        return {}, (
+            f"its events are not read: EVENT has {len(sides)} contexts, {count} labels and {times.size} times, which "
+            "do not fit together",
+        )
     found: Events = {}
-    for side, kind, time in zip(_texts(group, "CONTEXTS"), _texts(group, "LABELS"), seconds, strict=False):
+    for side, kind, time in zip(sides, kinds, (60.0 * pairs[0] + pairs[1]).tolist(), strict=True):
         if np.isfinite(time):
             found.setdefault((side.strip().lower(), kind.strip().lower()), []).append(time)
-    return {key: sorted(found[key]) for key in found}
+    return {key: sorted(found[key]) for key in found}, (f"times of its events read as {said}",) if said else ()
 
 
 _LARGEST_JUMP = 3.0
@@ -278,7 +298,8 @@ def read_table(
         table = MotionTable(str(path), TRC, trc.time, columns, dict.fromkeys(columns, trc.unit))
     elif suffix == ".c3d":
         found = read_c3d(path)
-        table = MotionTable(str(path), C3D, found.time, found.columns, found.units, trial=found.trial)
+        remarks = found.trial.remarks
+        table = MotionTable(str(path), C3D, found.time, found.columns, found.units, "measured", remarks, found.trial)
     else:
         raise DataError(f"{path}: is not a {FILES} file")
     if table.time.size < 3:

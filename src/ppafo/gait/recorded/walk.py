@@ -7,12 +7,13 @@ that turns against it), or, for the knee, from hip and thigh.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.errors import DataError, UnitError, nearest_name, one_line
+from ppafo.errors import DataError, UnitError, check_all, nearest_name, one_line
 from ppafo.gait.gait import HARMONICS, REQUIRED, fit_curve
 from ppafo.gait.plausible import SignSource, other_sign
 from ppafo.gait.recorded.conventions import column_names
@@ -352,25 +353,32 @@ def walk_signals(
     """Return the signals that a map finds in tables.
 
     With a convention of the package (``is_default``) only both angles have to be there; what a map of the user names
-    has to be there. A motion goes from its first number to its last, a load is 0 where it was not measured.
+    has to be there. A motion goes from its first number to its last, a load is 0 where it was not measured. DataError
+    names all that is wrong with the columns.
     """
     walk: dict[str, Signal] = {}
-    for name, read in _READERS.items():
+
+    def read_curve(name: str) -> None:
         mapped = getattr(columns, name)
-        if mapped is None:
-            continue
         optional = is_default and name not in REQUIRED
-        found = find_columns(name, column_names(mapped), tables, optional, is_default)
-        if found is not None:
-            if isinstance(mapped, AngleMap) and mapped.terms is None:
-                signal = foot_markers_angle(found, mapped, walk["shank_angle"])
-            else:
-                signal = read(found, mapped, person.body_mass)
-            signal = replace(signal, columns=tuple(column for _, column in found.terms))
-            walk[name] = with_absence(signal) if name in LOADS else without_ends(signal)
-    if columns.knee is not None:
-        knee = knee_signals(columns.knee, tables, person.stature, is_default)
-        walk |= {name: without_ends(signal) for name, signal in knee.items()}
+        found = None if mapped is None else find_columns(name, column_names(mapped), tables, optional, is_default)
+        if found is None:
+            return
+        if isinstance(mapped, AngleMap) and mapped.terms is None:
+            if "shank_angle" not in walk:
+                return
+            signal = foot_markers_angle(found, mapped, walk["shank_angle"])
+        else:
+            signal = _READERS[name](found, mapped, person.body_mass)
+        signal = replace(signal, columns=tuple(column for _, column in found.terms))
+        walk[name] = with_absence(signal) if name in LOADS else without_ends(signal)
+
+    def read_knee() -> None:
+        if columns.knee is not None:
+            knee = knee_signals(columns.knee, tables, person.stature, is_default)
+            walk.update((name, without_ends(signal)) for name, signal in knee.items())
+
+    check_all([*([partial(read_curve, name)] for name in _READERS), [read_knee]])
     return walk
 
 
