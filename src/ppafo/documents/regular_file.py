@@ -1,5 +1,6 @@
 """The bytes of a file, and only of a file: devices never end, and a named pipe waits for a writer for ever."""
 
+import codecs
 import stat
 from pathlib import Path
 
@@ -24,3 +25,13 @@ def read_regular_file(path: Path, maximum: int | None = None) -> bytes:
         if maximum is None or len(content) <= maximum:
             return content
     raise OSError(None, f"it is larger than {maximum / 1e6:g} MB, the maximum size of such a file")
+
+
+def decoded(content: bytes) -> str:
+    """Return the text of a file in UTF-8, with its byte-order mark or without, or in UTF-16 with one.
+
+    UnicodeDecodeError where it is neither. Spreadsheets and loggers on Windows write UTF-16.
+    """
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return content.decode("utf-16")
+    return content.decode("utf-8-sig")

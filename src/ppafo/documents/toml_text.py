@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.documents.json_text import MAXIMUM_LEVELS, is_nested_too_deeply
-from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, read_regular_file
+from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, decoded, read_regular_file
 from ppafo.errors import PpafoError, nearest_name, one_line, reason
 
 _SUFFIX = ".toml"
@@ -54,7 +54,7 @@ class TomlKind:
     def parse(self, content: bytes, file: str) -> dict[str, Any]:
         """Return the document in the bytes of a file; ``file`` is what messages call it."""
         try:
-            text = content.decode("utf-8")
+            text = decoded(content)
         except UnicodeDecodeError as error:
             raise self.error(f"{file}: is not a text file in UTF-8 (byte {error.start})") from error
         if not text.strip():

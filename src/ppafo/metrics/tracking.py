@@ -11,6 +11,16 @@ from ppafo.signals.meter import Course, MeterKind, Sample, ends_before_hold
 
 _NEEDED = ("torque", "reference")
 
+ONE_INSTANT = "final_error"
+"""A metric that reads one sample: of a loop that oscillates it says where that sample happened to fall."""
+SUSTAINED = 4
+"""Reversals of the torque on the hold from which a loop oscillates; one that settles has one or two."""
+
+
+def settled_error(final: Floats, on_hold: Floats, reversals: Floats) -> Floats:
+    """Return ``final_error`` [N m] or, where the loop oscillates on the hold, ``rms_error_hold`` if that is larger."""
+    return np.where((reversals >= SUSTAINED) & (on_hold > final), on_hold, final)
+
 
 def rms_error(recording: Recording) -> float:
     """Root of the time average of (reference - torque)^2 [N m], by the trapezoidal rule: any sampling will do."""

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, read_regular_file
+from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, decoded, read_regular_file
 from ppafo.documents.toml_text import label
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, reason
 from ppafo.model.actuators.table import (
@@ -47,7 +47,7 @@ def read_actuator_table(path: Path) -> Table:
     """Return the curves of a measured actuator; ParameterError says in one line what is wrong with its file."""
     file = label(str(path))
     try:
-        text = read_regular_file(path, MAXIMUM_BYTES_TYPED).decode("utf-8-sig")
+        text = decoded(read_regular_file(path, MAXIMUM_BYTES_TYPED))
     except UnicodeDecodeError as error:
         raise ParameterError(f"{file}: is not a text file in UTF-8 (byte {error.start})") from error
     except (OSError, ValueError) as error:

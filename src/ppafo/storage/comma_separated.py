@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.documents.regular_file import decoded
 from ppafo.errors import DataError, UnitError, first_twice, nearest_name, one_line
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.signals.channels import BETWEEN, PLAIN_NUMBER, TIME, TIME_UNIT, Between
@@ -58,7 +59,10 @@ def parse_header(cells: list[str]) -> list[Column]:
         match = _HEADER.fullmatch(cell)
         if match is None:
             shown = cell if len(cell) <= 40 else f"{cell[:36]} ..."
-            raise DataError(f"the header must name columns as 'name [unit]', separated by commas; '{shown}' is not one")
+            remedy = f"; {DECIMAL_COMMAS}" if ";" in cell else ""
+            raise DataError(
+                f"the header must name columns as 'name [unit]', separated by commas; '{shown}' is not one{remedy}"
+            )
         columns.append(Column(match[1], match[2], _between(match[3], match[1])))
     names = [column.name for column in columns]
     if names[0] != TIME:
@@ -129,6 +133,7 @@ _LONGEST_CELL = 40
 _UNDERSCORE = "_"
 """Python takes 1_000 for a thousand; in a table it is a slip."""
 
+DECIMAL_COMMAS = 'numbers with a decimal comma need a column map with decimal = "comma" and their delimiter'
 _SIMILAR = 0.8
 """How near a word has to be to a kind to be a misspelling of it; 'measurement: run 3' is a remark like any other."""
 
@@ -208,12 +213,12 @@ def kind_of_comments(comments: Iterable[str]) -> RecordingKind:
 
 def _lines(path: str | Path) -> list[str]:
     content = read_bytes(path)
-    if b"\0" in content:
-        raise DataError(f"{path}: is not a text file (byte {content.index(0)} is zero)")
     try:
-        text = content.decode("utf-8-sig")
+        text = decoded(content)
     except UnicodeDecodeError as error:
         raise DataError(f"{path}: is not a text file in UTF-8 (byte {error.start})") from error
+    if "\0" in text:
+        raise DataError(f"{path}: is not a text file (byte {text.index(chr(0))} is zero)")
     if not text.endswith(("\n", "\r")):
         raise DataError(f"{path}: the last line has no end: the file is cut off, or lacks its final line break")
     return text.splitlines()
@@ -229,7 +234,8 @@ def _table(header: list[str], rows: Iterable[list[str]], skipped: int) -> Floats
         if blank is not None:
             raise DataError(f"line {blank} has 0 values for {len(header)} columns")
         if len(row) != len(header):
-            raise DataError(f"line {line} has {len(row)} values for {len(header)} columns")
+            remedy = f"; {DECIMAL_COMMAS}" if len(row) == 2 * len(header) else ""
+            raise DataError(f"line {line} has {len(row)} values for {len(header)} columns{remedy}")
         try:
             values = [float(cell) for cell in row]
         except ValueError as error:

@@ -19,12 +19,13 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.models import STRICT, Text, make_schema, read_model
+from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import DataError, UnitError, nearest_name, one_line
 from ppafo.signals import Channel, Recording
 from ppafo.signals.channels import PLAIN_NUMBER, TIME, TIME_UNIT, Between
 from ppafo.signals.recording import Floats
-from ppafo.storage.comma_separated import Column, check_clock, in_si, kind_of_comments
+from ppafo.storage.comma_separated import DECIMAL_COMMAS, Column, check_clock, in_si, kind_of_comments
 from ppafo.storage.files import read_bytes
 
 Thousands = Literal["point", "comma", "apostrophe", "blank"]
@@ -171,7 +172,9 @@ def _read_table(lines: list[str], columns: ColumnMap) -> _Table:
     table = _Table(array("q"), {name: array("d") for name in places})
     for line, row in rows:
         if len(row) != width:
-            raise DataError(f"line {line} has {len(row)} values for {width} columns")
+            is_split = columns.decimal == "point" and columns.delimiter == "comma" and len(row) == 2 * width
+            remedy = f"; {DECIMAL_COMMAS}" if is_split else ""
+            raise DataError(f"line {line} has {len(row)} values for {width} columns{remedy}")
         table.lines.append(line)
         for name, place in places.items():
             thousands = columns.channels[name].thousands
@@ -197,7 +200,7 @@ def _rows(lines: list[str], columns: ColumnMap) -> tuple[list[str], int, Rows]:
 def _lines(path: str | Path, encoding: str) -> list[str]:
     content = read_bytes(path)
     try:
-        text = content.decode("utf-8-sig" if encoding == "utf-8" else encoding)
+        text = decoded(content) if encoding == "utf-8" else content.decode(encoding)
     except UnicodeDecodeError as error:
         raise DataError(
             f'is not text in UTF-8 (byte {error.start}); give encoding = "latin-1" if it is that'
@@ -268,7 +271,9 @@ def _number(cell: str, thousands: str | None, decimal: str, column: str, line: i
     value = float(text) if _NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(value):
         shown = one_line(cell)[:_LONGEST_SHOWN]
-        raise DataError(f"line {line}, column {column!r}: {shown!r} is not a finite number")
+        with_point = cell.strip().replace(",", ".") if decimal == "point" else ""
+        remedy = '; give decimal = "comma"' if "," in cell and _NUMBER.fullmatch(with_point) else ""
+        raise DataError(f"line {line}, column {column!r}: {shown!r} is not a finite number{remedy}")
     return value
 
 

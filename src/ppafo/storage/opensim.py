@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ppafo.documents.regular_file import decoded
 from ppafo.errors import DataError, first_twice, one_line
 from ppafo.signals import Recording, RecordingKind
 from ppafo.signals.channels import TIME
@@ -113,7 +114,7 @@ def _without_repeats(values: Floats) -> tuple[Floats, list[str]]:
 def text_lines(content: bytes) -> list[str]:
     """Return the lines of a text file in UTF-8, with any line ends; DataError where it is none."""
     try:
-        text = content.decode("utf-8-sig")
+        text = decoded(content)
     except UnicodeDecodeError as error:
         raise DataError(f"is not a text file in UTF-8 (byte {error.start})") from error
     if "\0" in text:

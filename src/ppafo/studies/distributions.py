@@ -185,6 +185,23 @@ def replicates_interval(values: Floats, replicates: int, confidence: float) -> I
     return Interval(mean, mean - reach, mean + reach)
 
 
+def floored_interval(values: Floats, replicates: int, confidence: float) -> Interval:
+    """Return the mean with the interval of replicates or, where that is narrower, that of as many independent draws.
+
+    Evenly placed draws make replicates agree on what all of them miss: where rare values decide, the spread between
+    them says less than that of the values, and nobody knows beforehand that none do.
+    """
+    from scipy.special import ndtri
+
+    spread = replicates_interval(values, replicates, confidence)
+    known = values[np.isfinite(values)]
+    if not math.isfinite(spread.width):
+        return spread
+    plain = float(ndtri(0.5 + 0.5 * confidence)) * float(np.std(known)) / math.sqrt(known.size)
+    reach = max(0.5 * spread.width, plain)
+    return Interval(spread.value, spread.value - reach, spread.value + reach)
+
+
 def jackknife_reach(left_out: Floats, confidence: float) -> Floats:
     """Return the half width of the interval of an estimate from independent replicates, by Student's distribution.
 

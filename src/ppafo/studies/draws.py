@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import ScenarioError, StudyError, UnitError, first_twice, nearest_name
 from ppafo.metrics import METRICS
+from ppafo.metrics.tracking import ONE_INSTANT, settled_error
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.progress import Progress, Report
 from ppafo.simulation.ensemble import run_ensemble
@@ -216,6 +217,26 @@ def scenario_model(
         return join(pieces)
 
     return outcomes
+
+
+OSCILLATES = ("rms_error_hold", "oscillations_hold")
+"""What says whether a metric at one instant can be believed."""
+
+
+def with_companions(metrics: Sequence[str], scenario: Scenario) -> tuple[str, ...]:
+    """Return metrics with those that a metric at one instant needs beside it, where the scenario offers them."""
+    if ONE_INSTANT not in metrics or any(lacking(scenario, METRICS[name]) for name in OSCILLATES):
+        return tuple(metrics)
+    return tuple(dict.fromkeys((*metrics, *OSCILLATES)))
+
+
+def settled(outcomes: Outcomes, metrics: Sequence[str]) -> Outcomes:
+    """Return the outcomes of some metrics for a judgement: no instant of a loop that oscillates counts as its error."""
+    found = {name: outcomes.metrics[name] for name in metrics}
+    if ONE_INSTANT in found and set(OSCILLATES) <= set(outcomes.metrics):
+        on_hold, reversals = (outcomes.metrics[name] for name in OSCILLATES)
+        found[ONE_INSTANT] = settled_error(found[ONE_INSTANT], on_hold, reversals)
+    return replace(outcomes, metrics=found)
 
 
 def check_metrics(metrics: Sequence[str], scenario: Scenario) -> None:

@@ -274,3 +274,18 @@ def test_a_column_map_says_what_a_channel_does_between_its_samples(tmp_path: Pat
     ).resample([0.5])
     assert found["command"].tolist() == [0.5]
     assert found["supply_pressure"].tolist() == [4.0e5]
+
+
+@pytest.mark.parametrize(("delimiter", "row"), [("semicolon", "0,5;1,5"), ("comma", "0,5,1,5")])
+def test_a_decimal_comma_is_named_where_it_is_met(tmp_path: Path, delimiter: str, row: str) -> None:
+    (tmp_path / "log.csv").write_text(f"{';' if delimiter == 'semicolon' else ','}".join(["t", "u"]) + f"\n{row}\n")
+    channels = {"time": {"column": "t", "unit": "s"}, "command": {"column": "u"}}
+    wanted = ColumnMap.model_validate({"delimiter": delimiter, "channels": channels})
+    with pytest.raises(DataError, match='decimal = "comma"'):
+        read_foreign(tmp_path / "log.csv", wanted)
+
+
+def test_a_file_in_utf_16_is_read(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("t,Öffnung\n0,1\n1,0\n", encoding="utf-16")
+    channels = {"time": {"column": "t", "unit": "s"}, "command": {"column": "Öffnung"}}
+    assert read_foreign(tmp_path / "log.csv", ColumnMap.model_validate({"channels": channels}))["command"][0] == 1.0

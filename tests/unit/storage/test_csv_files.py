@@ -148,3 +148,18 @@ def test_what_a_channel_declares_between_its_samples_is_in_the_header(tmp_path: 
     path.write_text("time [s],command [-] linaer\n0,1\n")
     with pytest.raises(DataError, match=r"column 'command': .* hold or linear, not 'linaer', did you mean 'linear'"):
         read_csv(path)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_a_table_is_read_whatever_mark_its_encoding_has(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "bench.csv"
+    path.write_text("time [s],angle [rad]\n0,1\n1,2\n", encoding=encoding)
+    assert read_csv(path)["angle"].tolist() == [1.0, 2.0]
+
+
+@pytest.mark.parametrize("text", ["time [s];angle [rad]\n0,0;1,5\n", "time [s],angle [rad]\n0,0,1,5\n"])
+def test_a_decimal_comma_is_named_where_it_breaks_a_table(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "bench.csv"
+    path.write_text(text)
+    with pytest.raises(DataError, match='decimal = "comma"'):
+        read_csv(path)

@@ -19,6 +19,7 @@ from ppafo.studies.draws import (
     choose_configuration,
     join,
     scenario_model,
+    settled,
     study_of,
     uncertainty_in,
     uncertainty_of,
@@ -193,3 +194,14 @@ def test_a_quantile_that_few_draws_cannot_bound_has_an_open_end() -> None:
     interval = quantile_interval(np.arange(20.0), 0.99, 0.95)
     assert interval.high == math.inf
     assert interval.width == math.inf
+
+
+def test_only_a_loop_that_oscillates_on_the_hold_has_its_last_error_replaced() -> None:
+    metrics = {
+        "final_error": np.array([0.1, 0.1, 0.5]),
+        "rms_error_hold": np.array([0.4, 0.4, 0.4]),
+        "oscillations_hold": np.array([20.0, 2.0, 20.0]),
+    }
+    found = settled(Outcomes(metrics, np.zeros(3, bool), ""), ["final_error"])
+    assert found.metrics["final_error"].tolist() == [0.4, 0.1, 0.5]
+    assert list(found.metrics) == ["final_error"]

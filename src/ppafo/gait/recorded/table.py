@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.documents.regular_file import decoded
 from ppafo.errors import DataError, first_twice, one_line
 from ppafo.signals.recording import Floats
 from ppafo.storage.comma_separated import read_csv
@@ -423,7 +424,11 @@ def _header(path: str | Path) -> str:
 
 
 def _text(path: str | Path) -> str:
-    return read_bytes(path).decode("utf-8-sig", errors="replace")
+    content = read_bytes(path)
+    try:
+        return decoded(content)
+    except UnicodeDecodeError:
+        return content.decode("utf-8", errors="replace")
 
 
 LONGEST_FILLED = 0.25

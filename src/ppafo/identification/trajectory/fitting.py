@@ -15,6 +15,7 @@ from ppafo.identification.trajectory.problem import (
     TrajectoryProblem,
     broken_rule,
     full_path,
+    impossible_start,
     ranges_of,
     reach_of,
     with_numbers,
@@ -149,7 +150,8 @@ class TrajectoryFit:
 
     Matrices are in the order of ``estimates``; those of the coordinates are in ``uncertainty``. ``models`` are the
     fitted runs at the times of the samples, ``measurements`` the samples, both by experiment over the time of the run.
-    ``remarks`` are sentences about the fit as a whole.
+    ``remarks`` are sentences about the fit as a whole. ``misfit`` says why the model does not explain the recordings,
+    so that what they fix holds for it only; empty if it does.
     """
 
     problem: TrajectoryProblem
@@ -165,6 +167,7 @@ class TrajectoryFit:
     scenarios: tuple[Scenario, ...]
     remarks: tuple[str, ...]
     optimum: Optimum
+    misfit: str
 
     def estimate(self, name: str) -> Estimate:
         """Return the estimate of a parameter by its path; ``valve.area`` means the valve of the first experiment.
@@ -177,11 +180,6 @@ class TrajectoryFit:
                 return estimate
         hint = nearest_name(full, [item.path for item in self.estimates])
         raise IdentificationError(f"'{name}' was not fitted{hint}")
-
-    @property
-    def misfit(self) -> str:
-        """Why the model does not explain the recordings, so that what they fix holds for it only; empty if it does."""
-        return reason_of_misfit(self.uncertainty.misfit, self.channels)
 
     def posterior(self) -> "DataTree":
         """Return draws of the numbers and the recordings as a tree of datasets, laid out as ArviZ reads it; SI units.
@@ -279,6 +277,8 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     ]
     channels = channel_fits(problem.experiments, prepared, signals)
     low, high = coordinate_bounds(ranges)
+    highest = [item.number(float(end)) for item, end in zip(ranges, uncertainty.high, strict=True)]
+    atmosphere = prepared[0].scenario.device.supply.atmospheric_pressure
     evidence = Evidence(
         ranges=ranges,
         point=centre,
@@ -291,7 +291,7 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         prior_deviation=prior_coordinates(ranges)[1],
         inflation=uncertainty.inflation,
         residual_check=uncertainty.residual_check,
-        misfit=reason_of_misfit(uncertainty.misfit, channels),
+        misfit=reason_of_misfit(uncertainty.misfit, channels) or impossible_start(ranges, highest, atmosphere),
         alone=uncertainty.misfit.alone,
         sources=tuple(
             tuple(one.source or one.recording.label for one in problem.experiments if item.acts_in(one.label))
@@ -321,6 +321,7 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         remarks=_remarks(problem, found, evidence.misfit, uncertainty, channels, scenarios[0].device)
         + step_remarks(found.residuals, centre, signals),
         optimum=found,
+        misfit=evidence.misfit,
     )
 
 

@@ -229,6 +229,27 @@ def broken_rule(device: Device) -> str:
     return ""
 
 
+_STARTS = tuple(f"initial.{item.name}" for item in INITIAL)
+_BELOW_ATMOSPHERE = 0.02
+"""Fraction of the atmosphere by which a fitted start may lie below it: its sensor's zero, and no vacuum."""
+
+
+def impossible_start(ranges: "Sequence[Range]", highest: Sequence[float], atmosphere: float) -> str:
+    """Return why a fitted start cannot be, empty where it can; ``highest`` are the upper ends of intervals [SI].
+
+    A chamber that its valve vents into a room of ``atmosphere`` [Pa] never starts below it: only a vane that is drawn
+    makes a vacuum.
+    """
+    for item, most in zip(ranges, highest, strict=True):
+        if item.path in _STARTS and most < (1.0 - _BELOW_ATMOSPHERE) * atmosphere:
+            return (
+                f"{item.name} would be at most {most:.4g} Pa absolute, below the atmosphere of {atmosphere:.6g} Pa "
+                "into which the chamber is vented: no start, but the zero or the unit of its sensor, a gauge pressure "
+                "read as an absolute one, another atmosphere, or a run that starts too late"
+            )
+    return ""
+
+
 Scale = Literal["log", "linear"]
 
 LONGEST_TIME_OFFSET = 0.02

@@ -27,6 +27,7 @@ from ppafo.model.catalog import VALVES
 from ppafo.model.columns import at, over_runs
 from ppafo.model.plant import chamber_1_volume, chamber_2_volume, chamber_pressure
 from ppafo.parameters.plant import effect_rows, plant_parameters, switches_of
+from ppafo.signals.faults import is_at_limit, plateaus
 from ppafo.simulation.plan import (
     exact_orifice,
     initial_lines,
@@ -136,6 +137,13 @@ def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float =
     for name in experiment.channels:
         values = recording[name][inside]
         noise = experiment.noise[name] if name in experiment.noise else noise_of(values)
+        clipped = max(plateaus(values), key=lambda item: item.count)
+        if not noise > 0.0 and is_at_limit(values, clipped):
+            raise IdentificationError(
+                f"{said}: channel '{name}' is exactly its {clipped.word} value for {clipped.count} of {values.size} "
+                "samples: its sensor is at its limit, and shows no noise there; end the recording before it, or give "
+                "the standard deviation of the sensor in noise"
+            )
         if not noise > 0.0:
             raise IdentificationError(
                 f"{said}: channel '{name}' shows no noise from sample to sample, so its weight is "

@@ -26,7 +26,17 @@ from ppafo.loading import scenario_or_load
 from ppafo.progress import Report
 from ppafo.questions.question import Solved
 from ppafo.simulation.scenario import Scenario, plain
-from ppafo.studies.draws import Outcomes, Tally, Uncertainty, atmosphere_of, check_metrics, level_of, scenario_model
+from ppafo.studies.draws import (
+    Outcomes,
+    Tally,
+    Uncertainty,
+    atmosphere_of,
+    check_metrics,
+    level_of,
+    scenario_model,
+    settled,
+    with_companions,
+)
 from ppafo.studies.sampling import NOISE, with_noise
 from ppafo.studies.study import with_overrides
 from ppafo.studies.varying import VariedPath, varied_path
@@ -71,7 +81,8 @@ class Found(Solved):
     ``grid`` (runs,) is true for those of the first grid. ``changes`` counts how often neighbours among them differ in
     meeting the condition: more than once says that the condition is met in several stretches. Where sensors are noisy
     metrics are means over ``streams`` streams of noise, and ``spread`` (runs,) is the standard deviation from one to
-    another; else there are no streams and no spread.
+    another; else there are no streams and no spread. ``unsettled`` counts the runs whose loop oscillates at the instant
+    of the metric, so that their RMS error on the hold was taken in its place.
     """
 
     scenario: Scenario
@@ -87,6 +98,7 @@ class Found(Solved):
     reason: str
     streams: int
     spread: Floats
+    unsettled: int = 0
 
     @property
     def is_met(self) -> NDArray[np.bool_]:
@@ -146,7 +158,8 @@ def find(
     noise = Uncertainty(with_noise((), None, [base], [path.path])[0])
     seeds = noise.random_columns(0, STREAMS, _SEED)[NOISE] if noise.has_noise else np.zeros(0)
     tally = Tally(grid * max(1, seeds.size), progress)
-    search = _Search(path.path, condition, scenario_model(base, [condition.metric], threads, tally.add), seeds)
+    metrics = with_companions([condition.metric], base)
+    search = _Search(path.path, condition, scenario_model(base, metrics, threads, tally.add), seeds)
     search.run(np.linspace(low, high, grid))
     if not np.isfinite(search.metrics).any():
         raise StudyError(
@@ -173,6 +186,7 @@ def find(
         search.reason,
         seeds.size,
         search.spread[order],
+        search.unsettled,
     )
 
 
@@ -186,7 +200,7 @@ class _Search:
         self.values: Floats = np.empty(0)
         self.metrics: Floats = np.empty(0)
         self.spread: Floats = np.empty(0)
-        self.failures, self.reason = 0, ""
+        self.failures, self.unsettled, self.reason = 0, 0, ""
 
     def run(self, values: Floats) -> None:
         """Try values, each over all streams of noise."""
@@ -195,7 +209,9 @@ class _Search:
         if self._seeds.size:
             columns[NOISE] = np.repeat(self._seeds, values.size)
         outcomes = self._model(columns)
-        found = outcomes.metrics[self._condition.metric].reshape(streams, values.size)
+        judged = settled(outcomes, [self._condition.metric]).metrics[self._condition.metric]
+        self.unsettled += int(np.count_nonzero(judged > outcomes.metrics[self._condition.metric]))
+        found = judged.reshape(streams, values.size)
         self.values = np.concatenate([self.values, values])
         self.metrics = np.concatenate([self.metrics, found.mean(axis=0)])
         self.spread = np.concatenate([self.spread, found.std(axis=0, ddof=min(1, streams - 1))])
@@ -283,6 +299,11 @@ def remarks(found: Found) -> list[str]:
         )
     if found.streams:
         said.append(_noise(found))
+    if found.unsettled:
+        said.append(
+            f"in {found.unsettled} runs the loop oscillates on the hold, and {found.condition.metric} is one instant "
+            "of that: their rms_error_hold was taken in its place"
+        )
     if found.failures:
         runs = found.values.size * max(1, found.streams)
         said.append(f"{found.failures} of {runs} runs failed and count as not met; the first: {found.reason}")
@@ -347,6 +368,7 @@ def _data(found: Found) -> dict[str, Any]:
         "noise_streams": found.streams,
         "runs": found.values.size * max(1, found.streams),
         "failed": found.failures,
+        "unsettled": found.unsettled,
         "tried": [
             {"value": value, "metric": metric, "is_of_grid": bool(on_grid)}
             for value, metric, on_grid in zip(

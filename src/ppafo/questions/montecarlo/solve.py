@@ -1,7 +1,8 @@
 """A statistic over the distributions of a study, drawn until its interval is narrow enough, and the answer.
 
 A mean is estimated from randomised Sobol replicates, which know that of a smooth function far better than as many
-independent draws. The intervals of quantiles and probabilities are exact for independent draws, and get those.
+independent draws; its interval is never narrower than theirs, as nobody knows beforehand that no rare value decides.
+The intervals of quantiles and probabilities are exact for independent draws, and get those.
 
 Looking repeatedly and stopping at a favourable interval makes an ordinary interval too narrow. Here the number of
 looks is bounded before the first draw, and each look takes an equal part of the allowed error (Bonferroni's
@@ -38,11 +39,11 @@ from ppafo.studies.distributions import (
     Floats,
     Interval,
     effective_sample_size,
+    floored_interval,
     fraction_interval,
     fraction_text,
     noise_interval,
     quantile_interval,
-    replicates_interval,
 )
 from ppafo.studies.draws import (
     MAXIMUM_DRAWS,
@@ -105,7 +106,7 @@ class Statistic:
 
 def mean_of(unit: str) -> Statistic:
     """Return the mean of a metric in a unit."""
-    return Statistic("mean", unit, lambda values, level: replicates_interval(values, REPLICATES, level), True)
+    return Statistic("mean", unit, lambda values, level: floored_interval(values, REPLICATES, level), True)
 
 
 def quantile_of(unit: str, fraction: float) -> Statistic:
@@ -147,6 +148,8 @@ def parse_statistic(text: str, metric: str, atmosphere: float | None) -> Statist
 
 
 FEWEST_DRAWS = 32
+_RULE_OF_THREE = 3.0
+"""Over the draws: probability of an event that 95 of 100 such sets of draws show."""
 NOISE_DRAWS = 512
 """Draws that are run again with other noise, at most: its fraction of the variance is then known to some percent."""
 
@@ -448,6 +451,14 @@ def remarks(estimate: MonteCarlo) -> list[str]:
             f"do not trust this interval: the mean has an effective sample size of {last.effective_size:.3g} of "
             f"{last.draws - last.missing:,} draws, so that the true value lies outside more often than stated; request "
             "a quantile or a probability"
+        )
+    known = last.draws - last.missing
+    if estimate.statistic.is_of_replicates and known:
+        share, span = _RULE_OF_THREE / known, float(np.ptp(estimate.values))
+        said.append(
+            f"what happens in fewer than {100.0 * share:.2g} % of the runs may be missing among these draws (95 %): if "
+            f"it lay beyond the others by their range, {_difference(estimate, span)}, the mean would move by up to "
+            f"{_difference(estimate, share * span)}, and more the further it lies"
         )
     if estimate.noise is not None:
         said.append(f"sensor noise causes {fraction_text(estimate.noise)} of the variance over the draws")

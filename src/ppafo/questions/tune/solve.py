@@ -23,7 +23,7 @@ from ppafo.simulation.plan import profile_bounds
 from ppafo.simulation.scenario import Scenario, worn_kind
 from ppafo.simulation.simulate import OPEN_LOOP, simulate
 from ppafo.studies.distributions import Floats, Interval, noise_interval
-from ppafo.studies.draws import Model, Outcomes, Tally, scenario_model, with_new_noise
+from ppafo.studies.draws import Model, Outcomes, Tally, scenario_model, settled, with_companions, with_new_noise
 from ppafo.studies.study import with_overrides
 
 FAILED = 1.0e12
@@ -197,7 +197,12 @@ def tune(
     candidates = effort.candidates_per_gain * len(problem.searched) * (effort.generations + 1) * effort.starts
     noise = _NOISE_DRAWS if problem.spread is not None and problem.spread.uncertainty.has_noise else 0
     tally = Tally(draws * (candidates + 3) + (2 * (FRESH_DRAWS + noise) if problem.spread is not None else 0), progress)
-    model = scenario_model(problem.scenario, problem.metrics, threads, tally.add, problem.gauge)
+    metrics = with_companions(problem.metrics, problem.scenario)
+    whole = scenario_model(problem.scenario, metrics, threads, tally.add, problem.gauge)
+
+    def model(columns: Mapping[str, Floats]) -> Outcomes:
+        return settled(whole(columns), problem.metrics)
+
     fixed = _draws(problem, 0, 1 if problem.spread is None else problem.spread.draws)
     scales = _scales(problem, _runs(model, problem, [problem.before], fixed))
 

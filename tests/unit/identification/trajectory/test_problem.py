@@ -11,7 +11,9 @@ from ppafo.identification.trajectory.problem import (
     declaration_of,
     declared_numbers,
     full_path,
+    impossible_start,
     number_at,
+    range_of,
     ranges_of,
     with_numbers,
 )
@@ -181,3 +183,23 @@ def test_dynamic_friction_above_static_friction_is_named(step: Scenario) -> None
     assert broken_rule(step.device) == ""
     above = with_numbers(step, {"friction.dynamic_torque": 0.5})
     assert "friction.dynamic_torque" in broken_rule(above.device)
+
+
+def test_a_clipped_channel_is_called_so_and_not_without_noise(experiment: Experiment) -> None:
+    values = np.array(experiment.recording["pressure_1"])
+    random = np.random.default_rng(0)
+    level = float(np.quantile(values, 0.2))
+    clipped = np.minimum(values + 300.0 * random.standard_normal(values.size), level)
+    recording = experiment.recording.with_channel("pressure_1", clipped, "Pa")
+    without = dataclasses.replace(experiment, recording=recording, noise={"angle": 1e-3, "pressure_2": 500.0})
+    with pytest.raises(IdentificationError, match=r"exactly its largest value for .* its sensor is at its limit"):
+        prepare(without, {})
+
+
+def test_a_fitted_start_below_the_atmosphere_is_no_start(step: Scenario) -> None:
+    parameters = (FreeParameter("initial.pressure_1", recordings=("step",)), FreeParameter("friction.viscous_damping"))
+    ranges = tuple(range_of(one, (Experiment("step", step, simulate(step).recording),)) for one in parameters)
+    said = impossible_start(ranges, [8.3e4, 1.0], 101325.0)
+    assert "at most 8.3e+04 Pa absolute, below the atmosphere of 101325 Pa" in said
+    assert "gauge pressure" in said
+    assert impossible_start(ranges, [1.0e5, 1.0], 101325.0) == ""

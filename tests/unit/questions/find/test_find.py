@@ -185,3 +185,20 @@ def test_ideal_sensors_need_one_run_of_each_value(of_curve: Callable[..., Found]
     found = of_curve(lambda p: 6.3 - p)
     assert found.streams == 0
     assert not any("noise" in remark for remark in remarks(found))
+
+
+def test_one_instant_of_a_loop_that_oscillates_is_not_met_however_small_its_error_is_there() -> None:
+    found = find("torque-task-solenoid", "supply.pressure=62..90 psi_g", "final_error <= 0.5 N m", grid=15)
+    alone = ppafo.simulate("torque-task-solenoid", ["supply.pressure=74 psi_g"]).metrics
+    assert alone["final_error"].value < 0.5
+    assert alone["rms_error_hold"].value > 1.0
+    assert found.value is None
+    assert found.unsettled > 0
+    assert f"in {found.unsettled} runs the loop oscillates on the hold" in " ".join(remarks(found))
+
+
+def test_one_instant_of_a_loop_that_settles_is_its_error() -> None:
+    found = find(TASK, "supply.pressure=60..80 psi_g", "final_error <= 0.1 N m", grid=5)
+    alone = ppafo.simulate(TASK, ["supply.pressure=60 psi_g"]).metrics
+    assert found.unsettled == 0
+    assert found.metrics[0] == pytest.approx(alone["final_error"].value)
