@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, final
 
@@ -92,14 +91,6 @@ class LaneRows:
 def _row_numbers(groups: dict[str, type], first: int) -> dict[str, int]:
     paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
     return {path: first + number for number, path in enumerate(paths)}
-
-
-@dataclass(frozen=True, slots=True)
-class RarePhase:
-    """Lines of a phase that few lanes need at a time: those whose ``cell`` is above 0. It changes no other lane."""
-
-    lines: list[str]
-    cell: str
 
 
 def count_lanes(name: str, condition: str) -> list[str]:

@@ -12,23 +12,14 @@ end, and the state, unless its error refuses it.
 
 import re
 
-from ppafo.engine.lane_rows import HANDED, LaneRows, RarePhase, count_lanes, indent
+from ppafo.engine.lane_rows import HANDED, LaneRows, count_lanes, indent
 from ppafo.engine.lane_samples import present_pressures, pressures_of, sense_end
 from ppafo.engine.led_leg import torque_lines
+from ppafo.engine.pieces import Phases, RarePhase
 from ppafo.engine.rows import leaf_paths
-from ppafo.engine.scheme import actuators, motion, pneumatics, supply_lines, thermal_gas, walking
+from ppafo.engine.scheme import motion, pneumatics
 from ppafo.engine.source_text import woven
 from ppafo.model.effects.kind import Moment, State
-from ppafo.model.gait import (
-    GaitMeasured,
-    GaitNow,
-    gait_of,
-    gait_on_course,
-    measured_at,
-    place_at,
-    shown_toe_force,
-    stands_on_toes,
-)
 from ppafo.model.places import at_valve, way_across
 
 IMPOSSIBLE_RATE = 1.0e6
@@ -44,10 +35,7 @@ def find_begin(rows: LaneRows) -> list[str]:
         return []
     held = f"held = {rows.add(pneumatics.held_chambers)}(plant, state.angle)"
     lines = [rows.load("plant"), rows.load("state"), held, *rows.keep("held")]
-    if rows.program.walks:
-        carried = f"carried = {rows.add(walking.carried_foot)}(leg, share, walk.now, walk.foot)"
-        lines += [*[rows.load(name) for name in ("leg", "share", "walk")], carried, *rows.keep("carried")]
-    return rows.over_lanes(lines)
+    return rows.over_lanes([*lines, *([] if rows.program.leg is None else rows.program.leg.find(rows))])
 
 
 def plant_loop(rows: LaneRows) -> list[str]:
@@ -57,7 +45,7 @@ def plant_loop(rows: LaneRows) -> list[str]:
     return over_phases(rows, [*opening(rows), *command_at_valve(rows), "length = timing.step"], phases(rows))
 
 
-def over_phases(rows: LaneRows, prelude: list[str], all_phases: list[list[str] | RarePhase]) -> list[str]:
+def over_phases(rows: LaneRows, prelude: list[str], all_phases: Phases) -> list[str]:
     """Each phase in a loop of its own: loops this short let the processor work on several lanes at once.
 
     It looks some hundred instructions ahead, and one lane's division or root waits for the one before.
@@ -75,10 +63,8 @@ def over_phases(rows: LaneRows, prelude: list[str], all_phases: list[list[str] |
 def opening(rows: LaneRows) -> list[str]:
     """Lines that load what a step needs."""
     names = ["timing", "plant", "valve", "result", "state", "valve_state"]
-    names += ["thermal", "masses"] if rows.program.is_thermal else []
-    names += ["leg", "share", "gait_timing", "walk"] if rows.program.walks else []
-    names += ["lines", "line_state"] if rows.program.has_lines else []
-    names += ["load", "shank"] if rows.program.shank is not None else []
+    for piece in (rows.program.gas, rows.program.leg, rows.program.feed):
+        names += () if piece is None else piece.loads
     names += ["load", "shank"] if rows.program.shank is not None else []
     names += ["held"] if rows.program.hands_chambers_on else []
     names += ["start"] if rows.program.starts_apart else []
@@ -97,65 +83,30 @@ def time_of_step(rows: LaneRows) -> str:
     return f"time = {step} * timing.step"
 
 
-def phases(rows: LaneRows) -> list[list[str] | RarePhase]:
+def phases(rows: LaneRows) -> Phases:
     """Both stages of the gas over ``length`` [s] from ``time`` [s], what leads to them, and the state at the end."""
     program = rows.program
     is_free = program.angle is None
     kept = rows.keep("gas") if is_free else rows.keep("begun", "gas")
-    first = [rows.load("flowing"), *lead(rows), begin_gas(rows), *kept]
-    before = [*lead_walk(rows), open_valve(rows), first, pass_gas(rows)]
+    begin = program.gas.begin if program.feed is None else program.feed.begin
+    first = [rows.load("flowing"), *lead(rows), begin(rows), *kept]
+    before = [*([] if program.leg is None else program.leg.lead(rows)), open_valve(rows), first, pass_gas(rows)]
     if not is_free:
         return [*before, [*feed(rows), *finish(rows)]]
     error = [f"{rows.error} = gas_error"] if program.is_adaptive else []
     loaded = [rows.load("begun"), rows.load("change")]
     loaded += [f"gas_error = {rows.error}"] if program.is_adaptive else []
-    reached = reach_end(rows, with_gas(rows)) if program.walks else []
+    reached = [] if program.leg is None else program.leg.reach(rows, program.gas.add(rows))
     return [*before, [*feed(rows), *rows.keep("change"), *error], *reached, [*loaded, *finish(rows)]]
-
-
-def lead_walk(rows: LaneRows) -> list[list[str]]:
-    """Phases before the gas of a walking leg: the gait at the end of the step, and where the foot would be."""
-    if not rows.program.walks:
-        return []
-    foot = f"{rows.add(walking.begin_walk)}(plant, leg, gait_timing, state, held, walk, carried, next_gait, length)"
-    return [
-        *next_gait(rows),
-        [rows.load("next_gait"), rows.load("carried"), f"begun = {foot}", *rows.keep("begun")],
-    ]
-
-
-def next_gait(rows: LaneRows) -> list[list[str]]:
-    """Phases that make the gait at the end of the step: stride after stride, or on a course, with its marks."""
-    add = rows.add
-    if rows.program.takes_course:
-        given = "gait, walk_course, gait_timing, leg, time + length"
-        made = f"next_gait, marks = {add(gait_on_course)}({given})"
-        return [[rows.load("gait"), rows.load("walk_course"), made, *rows.keep("next_gait", "marks")]]
-    cells = {name: rows.cells[f"next_gait.{name}"] for name in GaitNow._fields}
-    measured = [cells[name] for name in GaitMeasured._fields]
-    rest = [name for name in GaitNow._fields if name not in GaitMeasured._fields]
-    return [
-        [f"place = {add(place_at)}(gait_timing, time + length)", *rows.keep("place")],
-        [
-            rows.load("gait"),
-            rows.load("place"),
-            f"measured = {add(measured_at)}(gait, gait_timing, leg, place)",
-            *[f"{cells[name]} = measured.{name}" for name in GaitMeasured._fields],
-        ],
-        [
-            f"next_gait = {add(gait_of)}(leg, {add(GaitMeasured)}({', '.join(measured)}))",
-            *[f"{cells[name]} = next_gait.{name}" for name in rest],
-        ],
-    ]
 
 
 def open_valve(rows: LaneRows) -> list[str]:
     """The valve, and the flows with which the step begins."""
-    valve, add = rows.program.valve, rows.add
+    valve, feed, add = rows.program.valve, rows.program.feed, rows.add
     after = "next_valve" if rows.program.is_parted else "valve_state"
     return [
         f"shown, {after} = {add(valve.advance)}(valve, valve_state, command, time, length)",
-        *connect(rows, "line_state"),
+        *connect(rows, *([] if feed is None else feed.states)),
         *present_pressures(rows),
         *leak_now(rows),
         f"flowing = {add(pneumatics.sloped_flows)}"
@@ -165,11 +116,10 @@ def open_valve(rows: LaneRows) -> list[str]:
     ]
 
 
-def connect(rows: LaneRows, line_state: str) -> list[str]:
-    """The ports of both chambers; where there are lines, at the pressures that they have in ``line_state``."""
-    source = "plant"
-    if rows.program.has_lines:
-        source = f"{rows.add(supply_lines.plant_at_line_pressures)}(plant, lines, {line_state})"
+def connect(rows: LaneRows, *fed_from: str) -> list[str]:
+    """The ports of both chambers; where lines feed them, at the pressures of a state of these."""
+    feed = rows.program.feed
+    source = "plant" if feed is None else feed.source(rows, *fed_from)
     return [f"port_1, port_2 = {rows.add(rows.program.valve.connect)}({source}, shown)"]
 
 
@@ -190,13 +140,8 @@ def leak_now(rows: LaneRows) -> list[str]:
 def lead(rows: LaneRows) -> list[str]:
     """Where the vane would be at the end of the step, ``next_angle``, and what else its motion needs then."""
     program, add = rows.program, rows.add
-    if program.walks:
-        return [
-            rows.load("begun"),
-            f"next_angle = {add(walking.next_angle)}(plant, leg, walk, begun)",
-            f"ahead = {add(pneumatics.held_chambers)}(plant, next_angle)",
-            *rows.keep("ahead"),
-        ]
+    if program.leg is not None:
+        return program.leg.assume(rows)
     if program.angle is None:
         return [rows.load("begun"), "next_angle = begun.next_angle"]
     if program.is_held:
@@ -208,32 +153,11 @@ def lead(rows: LaneRows) -> list[str]:
     ]
 
 
-def begin_gas(rows: LaneRows) -> str:
-    """The first stage of the gas."""
-    program, add = rows.program, rows.add
-    given = "flowing, length"
-    if program.has_lines:
-        begun = f"state, masses, next_angle, {given}" if program.is_thermal else f"state, next_angle, {given}"
-        if program.is_thermal:
-            return f"gas = {add(supply_lines.begin_fed_thermal_gas)}(plant, thermal, lines, line_state, {begun})"
-        return f"gas = {add(supply_lines.begin_fed_gas)}(plant, lines, line_state, {begun})"
-    if program.is_thermal:
-        return f"gas = {add(thermal_gas.begin_thermal_gas)}(plant, thermal, state, masses, next_angle, {given})"
-    if program.keeps_volumes:
-        return f"gas = {add(pneumatics.begin_still_gas)}(state, held, {given})"
-    if program.has_shape:
-        return f"gas = {add(actuators.begin_shaped_gas)}(plant, state, next_angle, {given})"
-    held = "held" if program.hands_chambers_on else f"{add(pneumatics.held_chambers)}(plant, state.angle)"
-    return f"gas = {add(pneumatics.begin_moving_gas)}(plant, state, {held}, next_angle, {given})"
-
-
 def pass_gas(rows: LaneRows) -> list[str]:
     """The flows of the second stage, at the pressures to which the first one leads."""
     program, add = rows.program, rows.add
-    gas = chambers_of(rows)
-    still = gas if program.keeps_volumes else f"{gas}.still"
-    ends = f"{add(thermal_gas.end_pressures)}(plant, {gas})" if program.is_thermal else f"{still}.end_1, {still}.end_2"
-    connected, leak = connect(rows, "gas.lines.after"), leak_now(rows)
+    ends = program.gas.ends(rows, program.chambers)
+    connected, leak = connect(rows, *([] if program.feed is None else [program.feed.after_first])), leak_now(rows)
     return [
         rows.load("gas"),
         rows.load("shown"),
@@ -267,69 +191,39 @@ def states_ahead(rows: LaneRows, lines: list[str]) -> list[str]:
 def feed(rows: LaneRows) -> list[str]:
     """The second stage: the gas of the step, and in parts that may be refused the error of the gas."""
     program, add = rows.program, rows.add
-    gas, is_still = chambers_of(rows), program.keeps_volumes
-    if program.is_thermal:
-        second = f"{add(thermal_gas.second_thermal_stage)}(thermal, {gas}, passing)"
-        change = f"{add(thermal_gas.thermal_change)}(plant, thermal, {gas}, second, length)"
-        error = f"{add(thermal_gas.thermal_error)}(plant, {gas}, second, length)"
-        shifted = f"{add(thermal_gas.thermal_opening_error)}(plant, {gas}, shift, length)"
-    else:
-        still = gas if is_still else f"{gas}.still"
-        next_angle = "state.angle" if program.is_held else "begun.next_angle"
-        stage = pneumatics.second_still_stage if is_still else pneumatics.second_moving_stage
-        second = f"{add(stage)}({gas}, passing)"
-        whole = pneumatics.still_change if is_still else pneumatics.moving_change
-        change = f"{add(whole)}(plant, {still}, second, length)"
-        error = f"{add(pneumatics.gas_error)}(plant, {still}, second, {next_angle}, length)"
-        shifted = f"{add(pneumatics.opening_error)}(plant, {still}, shift, {next_angle}, length)"
+    second = program.gas.second(rows, program.chambers)
+    error = second.error
     lines = [rows.load(name) for name in ("begun", "gas", "shown", "passing")]
-    lines += [f"second = {second}", f"change = {change}", *feed_lines(rows)]
+    lines += [f"second = {second.stage}", f"change = {second.change}", *feed_lines(rows)]
     if not program.is_adaptive:
         return lines
-    if program.has_lines:
-        error = f"max({error}, {add(supply_lines.line_error)}(plant, lines, gas.lines.after, next_lines))"
+    if program.feed is not None:
+        error = f"max({error}, {program.feed.error(rows)})"
     moves = program.valve.shift
     if moves is not None:
         lines += [rows.load("next_valve"), f"shift = {add(moves)}(valve_state, next_valve)"]
-    return [*lines, f"gas_error = {error}" + (f" + {shifted}" if moves else "")]
+    return [*lines, f"gas_error = {error}" + (f" + {second.shifted}" if moves else "")]
 
 
 def feed_lines(rows: LaneRows) -> list[str]:
-    """Lines that bring regulators and lines to the end of the step, kept apart where it may be refused."""
-    program, add = rows.program, rows.add
-    if not program.has_lines:
+    """Lines that bring what feeds the chambers to the end of the step, kept apart where it may be refused."""
+    feed = rows.program.feed
+    if feed is None:
         return []
-    end = supply_lines.end_thermal_lines if program.is_thermal else supply_lines.end_lines
-    before, moved = ("plant, thermal", "second") if program.is_thermal else ("plant", "change")
-    given = f"{before}, lines, line_state, gas, {moved}, passing.in_2.from_source, length"
-    if program.is_parted:
-        return [f"next_lines = {add(end)}({given})", *rows.keep("next_lines")]
-    return [f"line_state = {add(end)}({given})", *rows.store("line_state")]
-
-
-def reach_end(rows: LaneRows, fed: list[str]) -> list[list[str] | RarePhase]:
-    """Phases that find where the step ends, from the lines that add its gas; few feet depart from where they slide."""
-    add = rows.add
-    loads = [rows.load(name) for name in ("begun", "change", "ahead")]
-    given = "plant, leg, share, gait_timing, fed, walk, begun, next_gait, ahead, length"
-    reached = f"ended, carried = {add(walking.reach_end)}({given})"
-    departs = f"ended, ahead = {add(walking.depart_in_walk)}(plant, fed, begun, ended, ahead, length)"
-    return [
-        [*loads, rows.load("next_gait"), *fed, reached, *rows.keep("ended", "carried")],
-        RarePhase(
-            [*loads, rows.load("ended"), *fed, departs, *rows.keep("ended", "ahead")],
-            rows.cells["ended.motion.departs"],
-        ),
-    ]
+    ((state, after),) = feed.stored.items()
+    if rows.program.is_parted:
+        return [f"{after} = {feed.end(rows)}", *rows.keep(after)]
+    return [f"{state} = {feed.end(rows)}", *rows.store(state)]
 
 
 def finish(rows: LaneRows) -> list[str]:
     """The state at the end of a step or part, unless the part is refused; and the first time at which a run failed."""
     program, add = rows.program, rows.add
-    lines = [*with_gas(rows), *end_motion(rows), *with_work(rows), *advance_states(rows)]
+    fed = program.feed.stored.values() if program.feed is not None else ()
+    lines = [program.gas.add(rows), *end_motion(rows), *program.gas.work(rows), *advance_states(rows)]
     if not program.is_parted:
         return [*lines, *store_all(rows, ""), *judge(rows), *sense_end(rows)]
-    lines += [rows.load("next_valve"), *([rows.load("next_lines")] if program.has_lines else [])]
+    lines += [rows.load("next_valve"), *[rows.load(name) for name in fed]]
     if not program.is_adaptive:
         flag = "" if program.parts_are_rare else "taken"
         stored = [*store_all(rows, flag), *judge(rows, flag), *sense_end(rows)]
@@ -350,58 +244,19 @@ def finish(rows: LaneRows) -> list[str]:
     ]
 
 
-def with_gas(rows: LaneRows) -> list[str]:
-    """Lines that add the gas of the step: ``fed``, and ``warmed`` for the true masses."""
-    if rows.program.is_thermal:
-        return [f"fed, warmed = {rows.add(thermal_gas.with_thermal_gas)}(state, masses, change)"]
-    return [f"fed = {rows.add(motion.with_gas)}(state, change)"]
-
-
 def end_motion(rows: LaneRows) -> list[str]:
     """Lines that lead to the state ``after`` the step, and in parts to the ``error`` of the motion."""
     program, add = rows.program, rows.add
-    if program.walks:
-        follow = rows.cells["gait_sensors.follow_rate"]
-        given = f"plant, leg, share, gait_timing, {follow}, fed, walk, begun, ended, held, carried, next_gait, length"
-        lines = [
-            *[rows.load(name) for name in ("ended", "ahead", "carried", "next_gait")],
-            "held = ahead",
-            *rows.keep("held"),
-        ]
-        lines += [f"after, walk_after = {add(walking.end_walk)}({given})", *mark_stride(rows)]
-        if program.is_thermal:
-            assumed = f"{add(walking.next_angle)}(plant, leg, walk, begun)"
-            lines.append(f"after = {add(thermal_gas.after_motion)}(plant, thermal, after, {assumed}, after.angle)")
-        return lines
+    if program.leg is not None:
+        return program.leg.end(rows)
     if program.angle is None:
         lines = torque_lines(program, add, "time + length", "begun.next_angle")
         lines.append(f"angle, rate, error = {add(motion.end_part)}(plant, fed, begun, added, length)")
-        if program.is_thermal:
-            lines.append(f"fed = {add(thermal_gas.after_motion)}(plant, thermal, fed, begun.next_angle, angle)")
+        lines += program.gas.move(rows, "fed", "begun.next_angle", "angle")
         return [*lines, f"after = {add(motion.with_motion)}(fed, angle, rate)"]
     if program.is_held:
         return ["after = fed", "error = 0.0"]
     return [f"after = {add(motion.with_motion)}(fed, begun.next_angle, begun.next_rate)", "error = 0.0"]
-
-
-def mark_stride(rows: LaneRows) -> list[str]:
-    """Lines that add what marks a stride of a course: a scuff on the toe sensor, a forefoot on the edge of a stair."""
-    if not rows.program.takes_course:
-        return []
-    add, follow = rows.add, rows.cells["gait_sensors.follow_rate"]
-    marked = {
-        "toe_force": f"{add(shown_toe_force)}(walk_after.toe_force, marks, {follow}, length)",
-        "toes_first": f"{add(stands_on_toes)}(walk_after.toes_first, marks)",
-    }
-    fields = ", ".join(marked.get(name, f"walk_after.{name}") for name in walking.WalkState._fields)
-    return [rows.load("marks"), f"walk_after = {add(walking.WalkState)}({fields})"]
-
-
-def with_work(rows: LaneRows) -> list[str]:
-    """Lines that count the work of gas with an energy balance; a held vane takes none."""
-    if not rows.program.is_thermal or rows.program.is_held:
-        return []
-    return [f"warmed = {rows.add(thermal_gas.with_work)}(plant, warmed, state, after)"]
 
 
 def advance_states(rows: LaneRows) -> list[str]:
@@ -439,32 +294,35 @@ def state_errors(rows: LaneRows) -> list[str]:
 
 def positive(rows: LaneRows) -> str:
     """Condition that no mass is lost; false for what is no number."""
-    names = ["after.mass_1", "after.mass_2"]
-    names += ["warmed.mass_1", "warmed.mass_2"] if rows.program.is_thermal else []
-    names += ["next_lines.mass_1", "next_lines.mass_2"] if rows.program.has_lines else []
+    feed = rows.program.feed
+    names = masses_after(rows, *([] if feed is None else feed.stored.values()))
     return " and ".join(f"{name} > 0.0" for name in names)
+
+
+def masses_after(rows: LaneRows, *others: str) -> list[str]:
+    """Masses at the end of a step that must be above 0: of the gas, and of some other rows."""
+    groups = ("after", *rows.program.gas.stored.values(), *others)
+    return [f"{group}.mass_{number}" for group in groups for number in (1, 2)]
 
 
 def store_all(rows: LaneRows, flag: str) -> list[str]:
     """Lines that write the new state, where ``flag`` names a condition only under it."""
     lines = rows.store("state", "after", flag)
-    if rows.program.is_thermal:
-        lines += rows.store("masses", "warmed", flag)
-    if rows.program.walks:
-        lines += rows.store("walk", "walk_after", flag)
+    for piece in (rows.program.gas, rows.program.leg):
+        for group, name in ({} if piece is None else piece.stored).items():
+            lines += rows.store(group, name, flag)
     for state in rows.program.effect_states:
         lines += rows.store(state, f"{state}_after", flag)
     if rows.program.is_parted:
         lines += rows.store("valve_state", "next_valve", flag)
-        lines += rows.store("line_state", "next_lines", flag) if rows.program.has_lines else []
+        for group, name in ({} if rows.program.feed is None else rows.program.feed.stored).items():
+            lines += rows.store(group, name, flag)
     return lines
 
 
 def judge(rows: LaneRows, flag: str = "") -> list[str]:
     """The first time at which a run left what is possible."""
-    counted = ["after.mass_1", "after.mass_2"]
-    counted += ["warmed.mass_1", "warmed.mass_2"] if rows.program.is_thermal else []
-    gas = ", ".join(counted)
+    gas = ", ".join(masses_after(rows))
     waits = f"not {flag} or " if flag else ""
     return [
         f"possible = {waits}(abs(after.angular_velocity) < {IMPOSSIBLE_RATE} and min({gas}) > 0.0 "
@@ -482,8 +340,7 @@ def states_are_possible(rows: LaneRows) -> str:
 
 def begun_moment(rows: LaneRows) -> list[str]:
     """Lines that make the moment ``now`` at the begin of a step, with the flows of its first stage."""
-    gas = chambers_of(rows)
-    first = f"{gas}.first" if rows.program.is_thermal or rows.program.keeps_volumes else f"{gas}.still.first"
+    first = rows.program.gas.first(rows, rows.program.chambers)
     return [
         rows.load("gas"),
         f"supplied = {first}.supplied",
@@ -509,11 +366,6 @@ def _with_slopes(name: str, kind: State) -> list[tuple[str, str]]:
     """Each number of a state, and its rate."""
     paths = leaf_paths(kind.row, f"{name}_state")
     return [(path, path.replace(f"{name}_state", f"{name}_state_slopes", 1)) for path in paths]
-
-
-def chambers_of(rows: LaneRows) -> str:
-    """What the first stage of the chambers is called."""
-    return "gas.chambers" if rows.program.has_lines else "gas"
 
 
 def step_in_parts(rows: LaneRows) -> list[str]:

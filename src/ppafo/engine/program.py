@@ -10,23 +10,19 @@ from typing import Any, NamedTuple, get_type_hints
 from ppafo.control.controllers import switching as constant_controller
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.control.profiles import CONSTANT
+from ppafo.engine.pieces import Feed, GasScheme, LegScheme
 from ppafo.engine.scheme.actuators import links_of
+from ppafo.engine.scheme.isothermal_gas import ISOTHERMAL
 from ppafo.engine.scheme.motion import FreePart, Pace, PrescribedStep
-from ppafo.engine.scheme.pneumatics import GasChange, HeldChambers, MovingGas, SlopedFlows, StageFlows, StillGas
-from ppafo.engine.scheme.supply_lines import FedGas, FedThermalGas
-from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalGas
-from ppafo.engine.scheme.walking import CarriedFoot, DeviceShare, WalkEnd, WalkState, WalkStep
+from ppafo.engine.scheme.pneumatics import HeldChambers, SlopedFlows, StageFlows
 from ppafo.engine.source_text import Collector, SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.model.actuators.kind import ActuatorModel
 from ppafo.model.actuators.vane import MODEL as VANE
 from ppafo.model.effects.kind import Effect, State, effect_problem, laws_in_order
-from ppafo.model.gait import Course as WalkCourse
-from ppafo.model.gait import GaitNow, GaitPlace, GaitSeries, GaitTiming, Marks
-from ppafo.model.leg import FootLoad, LegParameters
-from ppafo.model.plant import PlantState, ThermalParameters, ThermalState
-from ppafo.model.regulator import LineState, SupplyLines
-from ppafo.model.sensors import GaitSeen, GaitSensors, SensorParameters
+from ppafo.model.leg import FootLoad
+from ppafo.model.plant import PlantState
+from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
 from ppafo.signals.meter import Course, MeterKind
 
@@ -71,18 +67,16 @@ class Program:
 
     ``angle`` None leaves the vane free, otherwise that profile prescribes it. ``controller`` None leaves the command
     to the caller, sample by sample. ``ideal_sensors`` False adds noise and quantisation of the signals,
-    ``late_signals`` True a delay. ``late_readings`` True lets sensors of a walk
-    be whole samples late. ``late_commands`` True adds a dead time before the valve. ``is_thermal`` True gives the gas
-    an energy balance instead of a constant temperature. ``walks`` True puts the device on a walking leg, whose foot is
-    free or where the ground and a gait lead it (``angle`` is None then;
-    its sensors are its own); ``takes_course`` True lets that leg stand, start, change its speed and stop instead of
-    walking stride after equal stride. ``has_lines`` True feeds the device from lines behind regulators instead of
-    constant pressures. ``is_adaptive`` True divides each step as its error asks, ``samples_inside`` True where recorded
-    samples lie between the steps. ``meters`` are updated at every sample that a recording would have, ``traced`` names
-    channels, or paths of the state, that are kept at some of them. ``starts_apart`` True lets the run of each lane
-    begin at a step of its own, while others of the block are under way. ``actuator`` is what stands between the
-    chambers and the joint. ``effects`` act in this order at the places of their laws. ``shank`` None leaves a free
-    vane to itself; otherwise it carries a foot on a shank that moves so (``engine/led_leg.py``).
+    ``late_signals`` True a delay. ``late_readings`` True lets sensors of a walk be whole samples late.
+    ``late_commands`` True adds a dead time before the valve. ``gas`` is what the gas keeps or exchanges, ``feed``
+    what feeds it, None for constant pressures. ``leg`` is a walking one that the device is on, whose foot is free or
+    where the ground and a gait lead it (``angle`` is None then; its sensors are its own). ``is_adaptive`` True
+    divides each step as its error asks, ``samples_inside`` True where recorded samples lie between the steps.
+    ``meters`` are updated at every sample that a recording would have, ``traced`` names channels, or paths of the
+    state, that are kept at some of them. ``starts_apart`` True lets the run of each lane begin at a step of its own,
+    while others of the block are under way. ``actuator`` is what stands between the chambers and the joint.
+    ``effects`` act in this order at the places of their laws. ``shank`` None leaves a free vane to itself; otherwise
+    it carries a foot on a shank that moves so (``engine/led_leg.py``).
     """
 
     valve: ValveModel
@@ -93,10 +87,9 @@ class Program:
     late_commands: bool
     late_signals: bool = False
     late_readings: bool = False
-    is_thermal: bool = False
-    walks: bool = False
-    takes_course: bool = False
-    has_lines: bool = False
+    gas: GasScheme = ISOTHERMAL
+    leg: LegScheme | None = None
+    feed: Feed | None = None
     is_adaptive: bool = False
     samples_inside: bool = False
     meters: tuple[MeterKind, ...] = ()
@@ -111,16 +104,14 @@ class Program:
         return {
             "timing": LaneTiming,
             "plant": self.actuator.plant,
-            "thermal": ThermalParameters if self.is_thermal else NoParameters,
+            **self.gas.parameters,
             "valve": self.valve.parameters,
             "controller": NoParameters if self.controller is None else self.controller.parameters,
             "reference": self.reference.parameters,
             "path": NoParameters if self.angle is None else self.angle.parameters,
             "sensors": SensorParameters,
-            **({"leg": LegParameters, "share": DeviceShare, "gait": GaitSeries} if self.walks else {}),
-            **({"gait_timing": GaitTiming, "gait_sensors": GaitSensors} if self.walks else {}),
-            **({"walk_course": WalkCourse} if self.takes_course else {}),
-            **({"lines": SupplyLines} if self.has_lines else {}),
+            **({} if self.leg is None else self.leg.parameters),
+            **({} if self.feed is None else self.feed.parameters),
             **({} if self.shank is None else {"load": FootLoad, "shank": self.shank.parameters}),
             **{effect.name: effect.parameters for effect in self.effects},
         }
@@ -146,16 +137,41 @@ class Program:
             "result": LaneResult,
             "pace": Pace,
             "state": PlantState,
-            "masses": ThermalState if self.is_thermal else NoParameters,
+            **self.gas.states,
             "valve_state": self.valve.state,
             "controller_state": NoParameters if self.controller is None else type(self.controller.initial),
-            **({"walk": WalkState, "gait_seen": GaitSeen} if self.walks else {}),
-            **({"line_state": LineState} if self.has_lines else {}),
+            **({} if self.leg is None else self.leg.states),
+            **({} if self.feed is None else self.feed.states),
             **self.effect_states,
             "course": Course if self.follows_reference else NoParameters,
             **{group: kind.state for group, kind in self.meter_groups.items()},
             **({"start": LaneStart} if self.starts_apart else {}),
         }
+
+    @property
+    def is_thermal(self) -> bool:
+        """True where the gas has an energy balance."""
+        return bool(self.gas.states)
+
+    @property
+    def walks(self) -> bool:
+        """True where the device is on a walking leg."""
+        return self.leg is not None
+
+    @property
+    def takes_course(self) -> bool:
+        """True where that leg stands, starts, changes its speed and stops."""
+        return self.leg is not None and self.leg.takes_course
+
+    @property
+    def has_lines(self) -> bool:
+        """True where lines behind regulators feed the chambers."""
+        return self.feed is not None
+
+    @property
+    def chambers(self) -> str:
+        """What the first stage of the chambers is called in a step."""
+        return "gas" if self.feed is None else self.feed.chambers
 
     @property
     def meter_groups(self) -> dict[str, MeterKind]:
@@ -210,27 +226,27 @@ class Program:
 
     def step_rows(self) -> dict[str, type]:
         """Groups of numbers that a phase of a step hands to the later ones, in order."""
-        free = WalkStep if self.walks else FreePart
+        free = FreePart if self.leg is None else self.leg.begun
         begun = free if self.angle is None else (NoParameters if self.is_held else PrescribedStep)
-        fed, free_gas = (FedThermalGas, ThermalGas) if self.is_thermal else (FedGas, MovingGas)
-        gas = fed if self.has_lines else (StillGas if self.keeps_volumes else free_gas)
-        change = ThermalFlows if self.is_thermal else GasChange
+        gas = self.gas.begun(self) if self.feed is None else self.feed.begun(self)
         shown = _shown_by(self.valve.connect)
         return {
-            **({"place": GaitPlace} if self.walks and not self.takes_course else {}),
-            **({"next_gait": GaitNow} if self.walks else {}),
-            **({"marks": Marks} if self.takes_course else {}),
+            **({} if self.leg is None else self.leg.led),
             **({"held": HeldChambers} if self.hands_chambers_on else {}),
-            **({"carried": CarriedFoot} if self.walks else {}),
+            **({} if self.leg is None else self.leg.handed),
             "begun": begun,
             "flowing": SlopedFlows,
             "gas": gas,
             "passing": StageFlows,
             "shown": shown,
-            **({"change": change} if self.angle is None else {}),
-            **({"ahead": HeldChambers, "ended": WalkEnd} if self.walks else {}),
+            **({"change": self.gas.change} if self.angle is None else {}),
+            **({} if self.leg is None else self.leg.ended),
             **({"next_valve": self.valve.state} if self.is_parted else {}),
-            **({"next_lines": LineState} if self.is_parted and self.has_lines else {}),
+            **(
+                {self.feed.stored[name]: row for name, row in self.feed.states.items()}
+                if self.is_parted and self.feed is not None
+                else {}
+            ),
         }
 
 

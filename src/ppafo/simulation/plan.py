@@ -20,8 +20,10 @@ from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.rows import leaves, rebuilt
 from ppafo.engine.run import Lines, Run, Walk
 from ppafo.engine.scheme.actuators import volumes_of
+from ppafo.engine.scheme.isothermal_gas import ISOTHERMAL
 from ppafo.engine.scheme.pneumatics import is_slow
 from ppafo.errors import ScenarioError
+from ppafo.kinds import kind_at
 from ppafo.model.actuators.vane import KIND as VANE
 from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.columns import (
@@ -161,6 +163,12 @@ def compose_run(pieces: Pieces, plant: PlantParameters, rule: StepRule, start: S
     )
 
 
+_ENERGY_BALANCE = "ppafo.engine.scheme.thermal_gas:ENERGY_BALANCE"
+_LINES = "ppafo.engine.scheme.supply_lines:LINES"
+_STRIDES, _COURSE = "ppafo.engine.scheme.walking:STRIDES", "ppafo.engine.scheme.walking:COURSE"
+"""Where pieces of programs are that most runs do not have."""
+
+
 def _program(pieces: Pieces, steps: Steps, walk: Walk | None, has_delay: bool) -> Program:
     """Return what the lanes are composed of."""
     is_late = first(pieces.signal_delay) > 0.0
@@ -174,10 +182,9 @@ def _program(pieces: Pieces, steps: Steps, walk: Walk | None, has_delay: bool) -
         late_commands=has_delay,
         late_signals=walk is None and is_late,
         late_readings=walk is not None and is_late,
-        is_thermal=pieces.thermal is not None,
-        walks=walk is not None,
-        takes_course=walk is not None and walk.course is not None,
-        has_lines=pieces.supply_lines is not None,
+        gas=ISOTHERMAL if pieces.thermal is None else kind_at(_ENERGY_BALANCE),
+        leg=None if walk is None else kind_at(_STRIDES if walk.course is None else _COURSE),
+        feed=None if pieces.supply_lines is None else kind_at(_LINES),
         is_adaptive=bool(first(steps.needs_parts)),
         samples_inside=bool(first(steps.record_every % 1.0)),
         effects=effects_of(pieces.device, pieces.sections),

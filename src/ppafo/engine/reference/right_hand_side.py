@@ -215,7 +215,7 @@ def parameter_groups(program: Program) -> dict[str, type]:
     """Groups of numbers that the right-hand side needs, in order."""
     return {
         "plant": program.actuator.plant,
-        "thermal": ThermalParameters if program.is_thermal else NoParameters,
+        **program.gas.parameters,
         "valve_orifice": ExactOrifice,
         "leak_orifice": ExactOrifice,
         "valve": program.valve.parameters,

@@ -8,8 +8,9 @@ which changes no faster than a chamber fills; the method keeps its order with an
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from ppafo.engine.pieces import GasScheme, Second
 from ppafo.engine.scheme.pneumatics import (
     ALLOWED_OF_PRESSURE,
     GAMMA,
@@ -508,3 +509,44 @@ def with_work(plant: PlantParameters, masses: ThermalState, before: PlantState, 
         heat_content=masses.heat_content,
         gas_work=masses.gas_work + difference * plant.volume_per_angle * (after.angle - before.angle),
     )
+
+
+def _begin(rows: Any) -> str:
+    given = "plant, thermal, state, masses, next_angle, flowing, length"
+    return f"gas = {rows.add(begin_thermal_gas)}({given})"
+
+
+def _second(rows: Any, gas: str) -> Second:
+    add = rows.add
+    return Second(
+        stage=f"{add(second_thermal_stage)}(thermal, {gas}, passing)",
+        change=f"{add(thermal_change)}(plant, thermal, {gas}, second, length)",
+        error=f"{add(thermal_error)}(plant, {gas}, second, length)",
+        shifted=f"{add(thermal_opening_error)}(plant, {gas}, shift, length)",
+    )
+
+
+def _move(rows: Any, state: str, assumed: str, reached: str) -> list[str]:
+    return [f"{state} = {rows.add(after_motion)}(plant, thermal, {state}, {assumed}, {reached})"]
+
+
+def _work(rows: Any) -> list[str]:
+    """A held vane takes none."""
+    return [] if rows.program.is_held else [f"warmed = {rows.add(with_work)}(plant, warmed, state, after)"]
+
+
+ENERGY_BALANCE = GasScheme(
+    parameters={"thermal": ThermalParameters},
+    states={"masses": ThermalState},
+    loads=("thermal", "masses"),
+    stored={"masses": "warmed"},
+    begun=lambda _program: ThermalGas,
+    change=ThermalFlows,
+    begin=_begin,
+    ends=lambda rows, gas: f"{rows.add(end_pressures)}(plant, {gas})",
+    first=lambda _rows, gas: f"{gas}.first",
+    second=_second,
+    add=lambda rows: f"fed, warmed = {rows.add(with_thermal_gas)}(state, masses, change)",
+    move=_move,
+    work=_work,
+)

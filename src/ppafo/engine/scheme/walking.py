@@ -3,8 +3,9 @@
 First the torques on the ankle beside actuator, friction and damping: wearer, ground, foot and foot plate.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from ppafo.engine.pieces import LegScheme, Phases, RarePhase
 from ppafo.engine.scheme.motion import (
     FreeEnd,
     FreeStep,
@@ -17,10 +18,25 @@ from ppafo.engine.scheme.motion import (
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers, held_pressures
 from ppafo.model import contact as ground
 from ppafo.model.elementary import TURNS_OF_RADIAN, sine_and_cosine_of_turns
-from ppafo.model.gait import GaitNow, GaitTiming
+from ppafo.model.gait import (
+    Course,
+    GaitMeasured,
+    GaitNow,
+    GaitPlace,
+    GaitSeries,
+    GaitTiming,
+    Marks,
+    gait_of,
+    gait_on_course,
+    measured_at,
+    place_at,
+    shown_toe_force,
+    stands_on_toes,
+)
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, passive_torque, torque_of_shank_on
 from ppafo.model.places import friction_in_motion
 from ppafo.model.plant import PlantParameters, PlantState, actuator_torque
+from ppafo.model.sensors import GaitSeen, GaitSensors
 
 
 class DeviceShare(NamedTuple):
@@ -358,3 +374,122 @@ def advance_walk(
         clearances=walk.clearances + counted_clearance,
         push_off_work=walk.push_off_work + work,
     )
+
+
+def find(rows: Any) -> list[str]:
+    """Lines that make what a step is handed by the one before, where there was none."""
+    carried = f"carried = {rows.add(carried_foot)}(leg, share, walk.now, walk.foot)"
+    return [*[rows.load(name) for name in ("leg", "share", "walk")], carried, *rows.keep("carried")]
+
+
+def lead(rows: Any) -> list[list[str]]:
+    """Phases before the gas: the gait at the end of the step, and where the foot would be."""
+    foot = f"{rows.add(begin_walk)}(plant, leg, gait_timing, state, held, walk, carried, next_gait, length)"
+    return [
+        *next_gait(rows),
+        [rows.load("next_gait"), rows.load("carried"), f"begun = {foot}", *rows.keep("begun")],
+    ]
+
+
+def next_gait(rows: Any) -> list[list[str]]:
+    """Phases that make the gait at the end of the step: stride after stride, or on a course, with its marks."""
+    add = rows.add
+    if rows.program.leg.takes_course:
+        given = "gait, walk_course, gait_timing, leg, time + length"
+        made = f"next_gait, marks = {add(gait_on_course)}({given})"
+        return [[rows.load("gait"), rows.load("walk_course"), made, *rows.keep("next_gait", "marks")]]
+    cells = {name: rows.cells[f"next_gait.{name}"] for name in GaitNow._fields}
+    measured = [cells[name] for name in GaitMeasured._fields]
+    rest = [name for name in GaitNow._fields if name not in GaitMeasured._fields]
+    return [
+        [f"place = {add(place_at)}(gait_timing, time + length)", *rows.keep("place")],
+        [
+            rows.load("gait"),
+            rows.load("place"),
+            f"measured = {add(measured_at)}(gait, gait_timing, leg, place)",
+            *[f"{cells[name]} = measured.{name}" for name in GaitMeasured._fields],
+        ],
+        [
+            f"next_gait = {add(gait_of)}(leg, {add(GaitMeasured)}({', '.join(measured)}))",
+            *[f"{cells[name]} = next_gait.{name}" for name in rest],
+        ],
+    ]
+
+
+def assume(rows: Any) -> list[str]:
+    """Lines that find where the gas takes the vane to be at the end of the step, and the chambers there."""
+    return [
+        rows.load("begun"),
+        f"next_angle = {rows.add(next_angle)}(plant, leg, walk, begun)",
+        f"ahead = {rows.add(held_chambers)}(plant, next_angle)",
+        *rows.keep("ahead"),
+    ]
+
+
+def reach(rows: Any, fed: str) -> Phases:
+    """Phases that find where the step ends, from the line that adds its gas; few feet depart from where they slide."""
+    loads = [rows.load(name) for name in ("begun", "change", "ahead")]
+    given = "plant, leg, share, gait_timing, fed, walk, begun, next_gait, ahead, length"
+    reached = f"ended, carried = {rows.add(reach_end)}({given})"
+    departs = f"ended, ahead = {rows.add(depart_in_walk)}(plant, fed, begun, ended, ahead, length)"
+    return [
+        [*loads, rows.load("next_gait"), fed, reached, *rows.keep("ended", "carried")],
+        RarePhase(
+            [*loads, rows.load("ended"), fed, departs, *rows.keep("ended", "ahead")],
+            rows.cells["ended.motion.departs"],
+        ),
+    ]
+
+
+def end(rows: Any) -> list[str]:
+    """Lines that lead to the state ``after`` the step."""
+    follow = rows.cells["gait_sensors.follow_rate"]
+    given = f"plant, leg, share, gait_timing, {follow}, fed, walk, begun, ended, held, carried, next_gait, length"
+    assumed = f"{rows.add(next_angle)}(plant, leg, walk, begun)"
+    return [
+        *[rows.load(name) for name in ("ended", "ahead", "carried", "next_gait")],
+        "held = ahead",
+        *rows.keep("held"),
+        f"after, walk_after = {rows.add(end_walk)}({given})",
+        *mark_stride(rows),
+        *rows.program.gas.move(rows, "after", assumed, "after.angle"),
+    ]
+
+
+def mark_stride(rows: Any) -> list[str]:
+    """Lines that add what marks a stride of a course: a scuff on the toe sensor, a forefoot on the edge of a stair."""
+    if not rows.program.leg.takes_course:
+        return []
+    add, follow = rows.add, rows.cells["gait_sensors.follow_rate"]
+    marked = {
+        "toe_force": f"{add(shown_toe_force)}(walk_after.toe_force, marks, {follow}, length)",
+        "toes_first": f"{add(stands_on_toes)}(walk_after.toes_first, marks)",
+    }
+    fields = ", ".join(marked.get(name, f"walk_after.{name}") for name in WalkState._fields)
+    return [rows.load("marks"), f"walk_after = {add(WalkState)}({fields})"]
+
+
+def _scheme(takes_course: bool) -> LegScheme:
+    gait = {"leg": LegParameters, "share": DeviceShare, "gait": GaitSeries}
+    timing = {"gait_timing": GaitTiming, "gait_sensors": GaitSensors}
+    place = {} if takes_course else {"place": GaitPlace}
+    return LegScheme(
+        takes_course=takes_course,
+        parameters={**gait, **timing, **({"walk_course": Course} if takes_course else {})},
+        states={"walk": WalkState, "gait_seen": GaitSeen},
+        loads=("leg", "share", "gait_timing", "walk"),
+        stored={"walk": "walk_after"},
+        begun=WalkStep,
+        led={**place, "next_gait": GaitNow, **({"marks": Marks} if takes_course else {})},
+        handed={"carried": CarriedFoot},
+        ended={"ahead": HeldChambers, "ended": WalkEnd},
+        find=find,
+        lead=lead,
+        assume=assume,
+        reach=reach,
+        end=end,
+    )
+
+
+STRIDES, COURSE = _scheme(takes_course=False), _scheme(takes_course=True)
+"""A leg that walks stride after equal stride, and one that stands, starts, changes its speed and stops."""

@@ -246,7 +246,7 @@ def metrics_entry(item: ExportedProgram, collector: Collector) -> str:
     kind, make = (ThermalTotals, thermal_totals) if program.is_thermal else (Totals, totals)
     further = ", plant, thermal" if program.is_thermal else ""
     parameters = program.parameter_rows()
-    given = ("plant", "thermal", *(effect.name for effect in program.effects))
+    given = ("plant", *program.gas.parameters, *(effect.name for effect in program.effects))
     lines = [f"{name} = {_loaded(name, parameters, 'parameters', collector)}" for name in given]
     lines += [f"{name} = {_loaded(name, groups, 'states', collector)}" for name in program.effect_states]
     add = collector.add
