@@ -27,7 +27,7 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate
 
-COMPLETIONS = 32_768
+COMPLETIONS = 40_960
 """Completions of the experiments in the report; ``ppafo unreported`` takes more."""
 EXPERIMENTS = (STEP, SOLENOID, PROPORTIONAL)
 """Shipped scenarios that stand for the paper's experiments."""

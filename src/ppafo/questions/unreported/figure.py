@@ -31,6 +31,7 @@ from ppafo.questions.unreported.settings import (
     Metrics,
     Setting,
     demand_over_ceiling,
+    effective,
     improvement,
     in_si,
     saving,
@@ -183,14 +184,19 @@ def _draw_number(axes: "Axes", setting: Setting, family: Weighed, shipped: float
 
 
 def smoothed_density(values: Floats, weights: Floats, grid: Floats) -> Floats:
-    """Return a density on a grid from weighted values, reflected at the ends of the grid, where the values end too."""
-    from scipy.stats import gaussian_kde
+    """Return a density on an even grid from weighted values, reflected at the ends of the grid, where the values end.
 
-    if np.ptp(values) == 0.0:
+    Bells of a width by Scott's rule, around the cells of the grid: no slower for many values.
+    """
+    share, places = weights / weights.sum(), np.rint((values - grid[0]) / (grid[1] - grid[0])).astype(np.intp)
+    width = effective(share) ** -0.2 * math.sqrt(float(share @ (values - share @ values) ** 2))
+    if width == 0.0:
         return np.zeros(grid.size)
-    low, high = grid[0], grid[-1]
-    found = gaussian_kde(values, weights=weights)
-    return np.asarray(found(grid) + found(2.0 * low - grid) + found(2.0 * high - grid))
+    width = max(width, grid[1] - grid[0])
+    cells = np.bincount(places, weights=share, minlength=grid.size)
+    mirrors = (grid, 2.0 * grid[0] - grid, 2.0 * grid[-1] - grid)
+    bells = sum(np.exp(-0.5 * ((grid[:, None] - centres) / width) ** 2) for centres in mirrors)
+    return np.asarray(bells @ cells / (width * math.sqrt(2.0 * math.pi)))
 
 
 def _short(words: str) -> str:
