@@ -17,7 +17,7 @@ from ppafo.parameters.publications.publication import paper_entries
 from ppafo.questions.league.bound import lower_bound
 from ppafo.questions.league.sampled_bound import sampled_bound
 from ppafo.questions.league.standing import ENTRANTS
-from ppafo.questions.reproduce.law_and_valve import FASTER
+from ppafo.questions.reproduce.torque_task import FASTER
 from ppafo.questions.unreported.answer import (
     Family,
     conclusion_rows,

@@ -66,8 +66,10 @@ def test_the_mark_of_a_number_whose_assumptions_were_chosen_is_computed(reproduc
     claim = next(item for item in reproduction.claims if item.id == "torque_rms_improvement")
     assert claim.left_open is not None
     assert claim.left_open[1] - claim.left_open[0] > 10.0
-    (far,) = with_open_ranges([dataclasses.replace(claim, value=-200.0)], reproduction.family)
-    (near,) = with_open_ranges([dataclasses.replace(claim, value=15.0000001)], reproduction.family)
+    (far,) = with_open_ranges([dataclasses.replace(claim, value=-200.0)], reproduction.family, reproduction.synthetic)
+    (near,) = with_open_ranges(
+        [dataclasses.replace(claim, value=15.0000001)], reproduction.family, reproduction.synthetic
+    )
     assert (far.is_chosen, near.is_chosen) == (False, True)
     assert near.open_range.endswith("% *")
 

@@ -484,7 +484,7 @@ def _left_open(reproduction: Reproduction) -> list[str]:
     """Return what the column of ranges is, where there are any by completions, and what nothing tests."""
     found = [
         "left open: by the printed digits, or by an interval of the identification;",
-        "of the torque task the 5 to 95 % of completions that agree with everything else that the paper says",
+        "of experiments the 5 to 95 % of completions that agree with everything else that the paper says",
         "*: ours is nearer to the published number than 95 % of that; the assumptions were chosen for this row",
     ]
     unread = [f"  {entry.id}: {entry.not_testable.rstrip('.')}" for entry in reproduction.unread]

@@ -12,6 +12,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 
+import numpy as np
+
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import DataError, ParameterError, SimulationError
 from ppafo.identification.bench import (
@@ -36,10 +38,12 @@ from ppafo.parameters.publications.publication import paper_entries
 from ppafo.questions.reproduce.claim import PRINTED_DIGITS, Claim, Printed, Verdict, stated_claim
 from ppafo.rig import record
 from ppafo.signals import Recording
+from ppafo.signals.recording import Floats
 from ppafo.simulation.building import apply_overrides
 from ppafo.simulation.declaration import quantities
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
 from ppafo.validation import RecordingAgreement, ReplaySettings, compare_recording
+from ppafo.validation.agreement import measured_values
 from ppafo.validation.measured import check_recording
 
 _NOT_OF_THE_PAPER = ("assumed", "derived")
@@ -403,6 +407,23 @@ def _step_error(item: _StepError, agreement: RecordingAgreement, rests_on: tuple
         ),
         is_synthetic=True,
     )
+
+
+def step_error_values(times: Floats, traces: Mapping[str, Floats], agreement: RecordingAgreement) -> dict[str, Floats]:
+    """Return the RMS errors of other simulated step responses (runs,) against the rig's, by claim, in its unit.
+
+    ``traces`` (times, runs) have the vane angle and both pressures [SI]; the rig's delay is that of the agreement.
+    """
+    measured = agreement.measured
+    at = measured.time - measured.time[0] - agreement.delay.correction
+    known = {**traces, "pressure_difference": traces["pressure_1"] - traces["pressure_2"]}
+    found = {}
+    for item in _STEP_ERRORS:
+        recorded = measured_values(measured, item.channel)
+        assert recorded is not None, "the rig records every channel of figure 7"
+        simulated = np.array([np.interp(at, times, course) for course in known[item.channel].T])
+        found[item.id] = np.sqrt(((simulated - recorded) ** 2).mean(axis=1)) / item.scale
+    return found
 
 
 def _step_percentages() -> list[Claim]:

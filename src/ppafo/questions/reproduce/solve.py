@@ -15,11 +15,10 @@ from ppafo.questions.reproduce.bench import (
     values_used_by,
 )
 from ppafo.questions.reproduce.claim import arithmetic_claims, load_printed
-from ppafo.questions.reproduce.law_and_valve import control_claims
 from ppafo.questions.reproduce.open_range import with_open_ranges
 from ppafo.questions.reproduce.publication import ALL, SEED, check_study, run_studies
 from ppafo.questions.reproduce.step_response import Levels, step_events, step_observations
-from ppafo.questions.reproduce.torque_task import torque_task_claims, torque_task_observations
+from ppafo.questions.reproduce.torque_task import control_claims, torque_task_claims, torque_task_observations
 from ppafo.questions.unreported.solve import infer_settings
 from ppafo.simulation.building import apply_overrides, is_of_device, scenario_paths, split_override, unknown_value
 from ppafo.simulation.declaration import value_at
@@ -130,7 +129,7 @@ def _reproduce_paper(overrides: Sequence[str], report: Report, completions: int 
         count = completions or COMPLETIONS
         report(Progress(f"drawing {count} completions of the experiments"))
         family = infer_settings(count)
-        claims = with_open_ranges(claims, family)
+        claims = with_open_ranges(claims, family, synthetic)
     return Reproduction(
         claims=tuple(sorted(claims, key=lambda claim: ORDER.index(claim.id))),
         step_observations=tuple(step_observations(step.recording, levels, events)),
