@@ -72,6 +72,22 @@ def test_the_torque_at_rest_is_the_measured_slope_times_the_pressure(tmp_path: P
     assert claim.verdict == "reproduced"
 
 
+@pytest.mark.parametrize("pressure", ["90 psi_g", "90psi_g", "620.5 kPa_g"])
+def test_the_printed_digits_of_a_pressure_leave_a_range(tmp_path: Path, pressure: str) -> None:
+    (claim,) = studied(tmp_path, TEXT.replace("90 psi_g", pressure)).studies[0].claims
+    assert claim.left_open is not None
+    half = 0.05 if pressure.startswith("620") else 0.5 * 6.894757
+    assert claim.left_open[1] - claim.left_open[0] == pytest.approx(2e3 * half * 1.451e-5, rel=1e-3)
+    assert claim.left_open[0] < claim.value < claim.left_open[1]
+
+
+def test_the_readings_of_the_chambers_leave_a_range(tmp_path: Path) -> None:
+    chambers = TEXT.replace("held_torque", "swept_volume").replace('pressure = "90 psi_g"', 'chambers = "ppafo2011"')
+    chambers = chambers.replace('"N m"', '"cm^3/rad"').replace("at_least = 8.5\nat_most = 9.5", "at_most = 60")
+    (claim,) = studied(tmp_path, chambers).studies[0].claims
+    assert (claim.value, claim.left_open) == (pytest.approx(51.0), pytest.approx((18.1, 51.0)))
+
+
 @pytest.mark.parametrize(
     ("change", "verdict"),
     [

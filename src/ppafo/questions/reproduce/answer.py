@@ -326,7 +326,8 @@ _STUDIES_HEAD = ("study", "claim", "published", "ours", "left open", "verdict")
 _RULE = (
     "'Ours' is computed anew whenever this is run. 'Reproduced' follows from printed numbers alone; 'with assumptions' "
     "rests on values and experiments that the publication does not print; 'contradicted' lies outside what is listed "
-    "as agreeing; 'not testable' has no number of ours, for the reason in its note. Nothing here was measured."
+    "as agreeing; 'not testable' has no number of ours, for the reason in its note. 'Left open' is what readings of "
+    "the chambers' volumes give, or the printed digits of a pressure. Nothing here was measured."
 )
 
 
@@ -346,7 +347,7 @@ def _studies_answer(solved: Studies) -> Answer:
                 item.claim.entry.id,
                 item.published or _own_sum(item.claim.entry.own),
                 item.ours,
-                None,
+                item.open_range or None,
                 VERDICTS[item.verdict],
             )
             for item in study.claims

@@ -77,11 +77,7 @@ class Claim:
     @property
     def open_range(self) -> str:
         """What is open about our number, as it is shown, with the mark of a number whose assumptions were chosen."""
-        if self.left_open is None:
-            return ""
-        low, high = (quantity(end, "-", 3) for end in self.left_open)
-        unit = "" if self.unit == "-" else f" {self.unit}"
-        return f"{low} to {high}{unit}{' *' if self.is_chosen else ''}"
+        return range_text(self.left_open, self.unit) + (" *" if self.left_open and self.is_chosen else "")
 
     @property
     def is_missed(self) -> bool:
@@ -109,6 +105,14 @@ class Claim:
             "source": self.source,
             "note": self.note,
         }
+
+
+def range_text(ends: tuple[float, float] | None, unit: str) -> str:
+    """Return a range as it is shown; empty where there is none."""
+    if ends is None:
+        return ""
+    low, high = (quantity(end, "-", 3) for end in ends)
+    return f"{low} to {high}{'' if unit == '-' else f' {unit}'}".rstrip()
 
 
 @dataclass(frozen=True, slots=True)
