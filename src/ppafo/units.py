@@ -65,6 +65,7 @@ _KIND_BELONGS = "_g, _a and _d belong to a unit of pressure that stands alone, s
 _LONGEST_UNIT = 60
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_NOT_ZERO = re.compile(r"[^eE]*[1-9]", re.ASCII)
 _PRESSURE_KIND = re.compile(r"([A-Za-z]+)_([gad])")
 _FACTOR = r"[A-Za-zµ]+(?:_[gad])?(?:\^-?[1-9])?"
 _PRODUCT = rf"{_FACTOR}(?: {_FACTOR})*"
@@ -91,7 +92,10 @@ def split_quantity(text: str) -> tuple[float, str]:
         raise UnitError(f"{_quote(text)} does not start with a number; write for example '12.6 mm^2' or '50 psi_g'")
     unit = stripped[match.end() :].strip()
     check_unit(unit)
-    return _finite(float(match.group()), text), unit
+    value = _finite(float(match.group()), text)
+    if value == 0.0 and _NOT_ZERO.match(match.group()):
+        raise UnitError(f"{_quote(text)} is too small for a number of 64 bits, and would be 0; write 0 or a larger one")
+    return value, unit
 
 
 def parse_quantity(text: str, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:

@@ -224,3 +224,13 @@ def test_any_text_is_a_quantity_or_refused_as_none(unit: str, number: str) -> No
             assert math.isfinite(parse_quantity(f"{number} {unit}", si_unit))
         except UnitError as error:
             assert len(str(error).splitlines()) == 1
+
+
+@pytest.mark.parametrize("text", ["1e-400 m^3", "-0.5e-330", "4.9e-999 Pa_a"])
+def test_a_number_that_would_become_0_is_refused(text: str) -> None:
+    with pytest.raises(UnitError, match=r"is too small for a number of 64 bits, and would be 0"):
+        split_quantity(text)
+
+
+def test_a_0_stays_one_however_it_is_written() -> None:
+    assert split_quantity("0e-400 m")[0] == split_quantity("-0.000 m")[0] == 0.0

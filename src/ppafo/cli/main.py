@@ -82,6 +82,19 @@ GROUPS: dict[str, tuple[str, ...]] = {
 }
 """The commands as the help shows them, by what somebody has come for."""
 
+FIRST_STEPS = """\
+Model-based design of pneumatic powered orthoses. Start with one of these:
+
+  ppafo simulate torque-task-proportional   the paper's torque task; add --out DIR for figures and a report
+  ppafo reproduce                           the paper's experiments against its printed numbers
+  ppafo walk solenoid                       a minute of walking with the device
+  ppafo workbench --out page.html           all of it with sliders, in a browser
+  ppafo new scenario mine                   a file of your own to start from; also for a device, a study, a walk
+  ppafo examples                            the examples of the how-to pages, ready to run
+
+All commands: ppafo --help"""
+"""What ``ppafo`` alone prints."""
+
 MOVED: dict[str, str] = {
     "bench": "'python -m benchmarks' or 'make bench'",
     "coverage": "'python scripts/interval_coverage.py'",
@@ -170,6 +183,16 @@ def check_options(words: Sequence[str], parser: CommandParser) -> None:
             )
 
 
+def check_overrides(overrides: Sequence[str]) -> None:
+    """Refuse a value that is set twice: nobody would know which one was meant."""
+    given: dict[str, str] = {}
+    for override in overrides:
+        path, _, value = (part.strip() for part in override.partition("="))
+        if path in given:
+            raise UsageError(f"--set {path}: is given twice, as '{given[path]}' and as '{value}'; leave one out")
+        given[path] = value
+
+
 def _nearest_option(name: str, known: Sequence[str]) -> str:
     """Return the hint; the dashes, which all have in common, would make strangers look alike."""
     hint = nearest_name(name.strip("-"), [option.removeprefix("--") for option in known if option.startswith("--")])
@@ -253,12 +276,13 @@ def _run(words: list[str]) -> int:
         check_options(words, parser)
         parsed = parser.parse_args(words)
         if parsed.command is None:
-            raise UsageError(
-                "no command was given; 'ppafo --help' lists them; try 'ppafo simulate torque-task-proportional' first"
-            )
+            print(FIRST_STEPS, file=sys.stderr)
+            return EXIT_BAD_INPUT
+        check_overrides(getattr(parsed, "overrides", ()))
         return int(parsed.run(parsed))
     except PpafoError as error:
-        print(f"ppafo: {_readable(one_line(error))}", file=sys.stderr)
+        lines = [f"{len(error.parts)} things are wrong:", *error.parts] if error.parts else [str(error)]
+        print("ppafo: " + "\n  ".join(_readable(one_line(line)) for line in lines), file=sys.stderr)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt as interrupt:
         print(f"ppafo: {str(interrupt) or 'interrupted; nothing is half written'}", file=sys.stderr)

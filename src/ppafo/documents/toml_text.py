@@ -77,7 +77,15 @@ class TomlKind:
 @lru_cache(maxsize=16)
 def _document(text: str) -> dict[str, Any]:
     """Return the document of a text, not to be changed: one run reads the same set several times."""
-    return tomllib.loads(text)
+    return tomllib.loads(text, parse_float=_float)
+
+
+def _float(text: str) -> float:
+    """Return the number of a text; one so small that it would be 0 is refused, as in quantities."""
+    value = float(text)
+    if value == 0.0 and text.lower().partition("e")[0].strip("+-0_."):
+        raise tomllib.TOMLDecodeError(f"{one_line(text)} is too small for a number of 64 bits, and would be 0")
+    return value
 
 
 def label(file: str) -> str:

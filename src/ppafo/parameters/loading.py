@@ -97,7 +97,13 @@ def _sections() -> dict[str, Any]:
 
 
 def parameter_file() -> type[BaseModel]:
-    """Return the model of a parameter set file, for the valves, actuators and effects that are loaded."""
+    """Return the model of a parameter set file, for the valves, actuators and effects that are loaded.
+
+    A file that names none of a kind is compared with all of this package.
+    """
+    for kinds in (VALVES, ACTUATORS):
+        if not kinds.loaded():
+            kinds.load_own()
     return _parameter_file(tuple(item for kinds in _KINDS for item in kinds.loaded().items()))
 
 

@@ -1,22 +1,34 @@
 """Words that the command line does not understand, and output that nobody can take."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from ppafo.cli.main import main
+from ppafo.cli.main import COMMANDS, main
 from ppafo.questions.question import whole_number
 
 FULL = Path("/dev/full")
 
 
+def test_without_a_command_it_says_where_to_start(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 2
+    said = capsys.readouterr().err
+    first = re.findall(r"^  ppafo (\w+) ", said, re.MULTILINE)
+    assert {"simulate", "reproduce", "walk", "workbench", "new", "examples"} == set(first) <= set(COMMANDS)
+    assert "All commands: ppafo --help" in said
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        ([], "no command was given; 'ppafo --help' lists them; try 'ppafo simulate torque-task-proportional'"),
+        (
+            ["simulate", "step-response", "--set", "run.duration=1 s", "--set", "run.duration = 2 s"],
+            "--set run.duration: is given twice, as '1 s' and as '2 s'; leave one out",
+        ),
         (["simulat"], "there is no command 'simulat', did you mean 'simulate'?"),
         (["--bogus"], "there is no option '--bogus'; available: --help, --version, -h"),
         (["--bogus", "simulate", "step-response"], "there is no option '--bogus'"),
@@ -71,7 +83,7 @@ def test_help_and_version_still_end_well(words: list[str], capsys: pytest.Captur
     "words", [["audit", "ppafo2011-printed"], ["sets", "--json"], ["--help"], ["--version"]], ids=" ".join
 )
 def test_output_that_cannot_be_written_is_one_line_and_exit_code_2(words: list[str]) -> None:
-    command = [sys.executable, "-c", "import sys; from ppafo.cli.main import main; sys.exit(main())", *words]
+    command = [sys.executable, "-c", "import sys; from ppafo.cli.main import COMMANDS, main; sys.exit(main())", *words]
     with FULL.open("w") as full:
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert done.stderr == "ppafo: standard output cannot be written: no space left on device\n"
@@ -79,7 +91,7 @@ def test_output_that_cannot_be_written_is_one_line_and_exit_code_2(words: list[s
 
 
 def test_a_reader_that_has_gone_is_no_mistake() -> None:
-    code = "import sys; from ppafo.cli.main import main; sys.exit(main(['sets']))"
+    code = "import sys; from ppafo.cli.main import COMMANDS, main; sys.exit(main(['sets']))"
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdout is not None
         assert process.stderr is not None

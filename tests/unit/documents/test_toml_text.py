@@ -94,3 +94,9 @@ def test_room_is_taken_for_what_is_there_and_not_for_the_most_that_may_be(tmp_pa
     tracemalloc.stop()
     assert content == b"x" * 1000
     assert most < 10_000_000
+
+
+def test_a_number_that_would_become_0_is_refused() -> None:
+    with pytest.raises(ScenarioError, match=r"mine.toml: is not valid TOML: 1e-400 is too small for a number"):
+        KIND.parse(b"value = 1e-400", "mine.toml")
+    assert KIND.parse(b"value = 0.0e-400", "mine.toml") == {"value": 0.0}
