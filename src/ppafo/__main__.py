@@ -2,13 +2,18 @@
 
 import sys
 
+from ppafo import interrupts
+
 
 def start() -> int:
-    """Run the command line and return its exit code."""
+    """Run the command line and return its exit code, 130 after a signal to end."""
     try:
+        interrupts.listen()
         from ppafo.cli.main import main
 
-        return main()
+        code = main()
+        interrupts.listen_no_more()
+        return 130 if interrupts.is_interrupted() else code
     except (KeyboardInterrupt, RuntimeError, ImportError) as error:
         if not _is_interrupt(error):
             raise

@@ -5,6 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TextIO, final
 
+from ppafo import interrupts
+
 _BETWEEN_LINES = 10.0
 """Seconds between two lines where the output is not a terminal."""
 
@@ -62,7 +64,8 @@ class ProgressLine:
         self._open = False
 
     def __call__(self, progress: Progress) -> None:
-        """Show the state."""
+        """Show the state; KeyboardInterrupt where a signal to end came meanwhile."""
+        interrupts.check()
         if self._stream.isatty():
             self._stream.write(f"\r\x1b[Kppafo: {progress.line()}")
             self._open = True

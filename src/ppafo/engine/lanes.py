@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo import interrupts
 from ppafo.control.kind import ProfileKind
 from ppafo.engine.cache import kept_bytes
 from ppafo.engine.lane_rows import VECTOR, lanes_of
@@ -178,6 +179,7 @@ def _run_block(module: ModuleType, batch: Batch, runs: slice, stop: threading.Ev
     for done in range(0, steps, STEPS_PER_CALL):
         if stop.is_set():
             break
+        interrupts.check()
         block.advance(min(STEPS_PER_CALL, steps - done))
     return block.result()
 

@@ -8,6 +8,7 @@ import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
+from ppafo import interrupts
 from ppafo.documents.regular_file import read_regular_file
 from ppafo.errors import DataError, reason
 
@@ -70,6 +71,7 @@ def replace_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
             for name, content in contents.items():
                 (aside / name).parent.mkdir(parents=True, exist_ok=True)
                 (aside / name).write_bytes(content)
+            interrupts.check()
             _swap(aside, target)
         finally:
             shutil.rmtree(aside, ignore_errors=True)

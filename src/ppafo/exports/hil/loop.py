@@ -18,6 +18,7 @@ from typing import NamedTuple, Protocol, final
 
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil import wire
+from ppafo.interrupts import SIGNALS
 from ppafo.model.valves.kind import VENT
 from ppafo.simulation.sampled import SampledRun
 
@@ -166,7 +167,7 @@ class LockStep:
 
 @contextmanager
 def stop_by_interrupt() -> Iterator[Callable[[], bool]]:
-    """Let Ctrl-C ask for an end in place of interrupting whatever is being done; a second one interrupts as ever."""
+    """Let a signal to end, such as Ctrl-C, ask for an end; a second one interrupts whatever is being done."""
     asked = threading.Event()
 
     def ask(_signal: int, _frame: object) -> None:
@@ -177,11 +178,13 @@ def stop_by_interrupt() -> Iterator[Callable[[], bool]]:
     if threading.current_thread() is not threading.main_thread():
         yield asked.is_set
         return
-    before = signal.signal(signal.SIGINT, ask)
+    known = [getattr(signal, name) for name in SIGNALS if hasattr(signal, name)]
+    before = {number: signal.signal(number, ask) for number in known if signal.getsignal(number) != signal.SIG_IGN}
     try:
         yield asked.is_set
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 @contextmanager

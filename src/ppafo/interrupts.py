@@ -1,0 +1,53 @@
+"""One way to end before the work is done: Ctrl-C, a request to end, a terminal that closes.
+
+Each raises KeyboardInterrupt where the main thread is, and is remembered: where it falls into a finaliser Python drops
+the exception, and a library may catch it. Work that goes in blocks reads the memory between two of them.
+"""
+
+import signal
+import sys
+from types import FrameType
+from typing import Any
+
+SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
+_received: list[int] = []
+"""Numbers of the signals that came; a list, since appending to it cannot be interrupted."""
+
+
+def listen() -> None:
+    """Let the signals end this process by KeyboardInterrupt; one that whoever started it lets be ignored stays so."""
+    for name in SIGNALS:
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+            signal.signal(number, _interrupt)
+    sys.unraisablehook = _without_interrupts
+
+
+def listen_no_more() -> None:
+    """Let the signals do nothing any more: what was to be done is done, and the process ends at once."""
+    for name in SIGNALS:
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) is _interrupt:
+            signal.signal(number, signal.SIG_IGN)
+
+
+def is_interrupted() -> bool:
+    """Tell whether a signal came, whatever became of its KeyboardInterrupt."""
+    return bool(_received)
+
+
+def check() -> None:
+    """Raise KeyboardInterrupt where a signal came; for every thread, between two blocks of work."""
+    if _received:
+        raise KeyboardInterrupt
+
+
+def _interrupt(number: int, _frame: FrameType | None) -> None:
+    _received.append(number)
+    raise KeyboardInterrupt
+
+
+def _without_interrupts(dropped: Any) -> None:
+    """Say nothing of an interrupt that fell into a finaliser: it is remembered."""
+    if not issubclass(dropped.exc_type, KeyboardInterrupt):
+        sys.__unraisablehook__(dropped)
