@@ -269,7 +269,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(words: list[str]) -> int:
     try:
-        _check_text(words)
+        # Refuse, before anything runs, a name that is not UTF-8: no result could say which file it is of.
+        for word in words:
+            if not word.isascii() and any("\ud800" <= character <= "\udfff" for character in word):
+                raise UsageError(f"'{one_line(word)}' is not text in UTF-8; give the file or folder another name")
         chosen = next((word for word in words if not word.startswith("-")), None)
         check_command(chosen, tuple(COMMANDS), MOVED)
         parser = build_parser(chosen)
@@ -294,10 +297,3 @@ def _readable(message: str) -> str:
     if len(message) <= _LONGEST_MESSAGE:
         return message
     return f"{message[: _LONGEST_MESSAGE // 2]} ... {message[-_LONGEST_MESSAGE // 2 :]}"
-
-
-def _check_text(words: list[str]) -> None:
-    """Refuse, before anything runs, a name that is not UTF-8: no result could say which file it is of."""
-    for word in words:
-        if not word.isascii() and any("\ud800" <= character <= "\udfff" for character in word):
-            raise UsageError(f"'{one_line(word)}' is not text in UTF-8; give the file or folder another name")

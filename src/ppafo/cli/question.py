@@ -44,7 +44,11 @@ def run(parsed: argparse.Namespace, question: Question) -> int:
             plural = f"{library.noun[:-1]}ies" if library.noun.endswith("y") else f"{library.noun}s"
             output.print_result("\n".join(align_columns(rows, len(rows[0]))), {plural: listed}, parsed.json)
             return output.EXIT_GOOD
-        _check_named(parsed, question, library)
+        # Refuse a command without its file, which only ``--list`` does without.
+        for argument in question.arguments:
+            if argument.nargs == "?" and getattr(parsed, argument.parameter) is None:
+                names = ", ".join(library.names())
+                raise library.error(f"no {library.noun} was given: name one ({names}) or give a .toml file")
     solve = question.solver()
     values = {argument.parameter: getattr(parsed, argument.parameter) for argument in question.arguments}
     if question.fills_folder:
@@ -78,14 +82,6 @@ def progress_line() -> Iterator[ProgressLine]:
     finally:
         logger.removeFilter(end_line)
         line.close()
-
-
-def _check_named(parsed: argparse.Namespace, question: Question, library: TomlKind) -> None:
-    """Refuse a command without its file, which only ``--list`` does without."""
-    for argument in question.arguments:
-        if argument.nargs == "?" and getattr(parsed, argument.parameter) is None:
-            names = ", ".join(library.names())
-            raise library.error(f"no {library.noun} was given: name one ({names}) or give a .toml file")
 
 
 def _words_of_files(library: TomlKind) -> list[dict[str, Any]]:

@@ -40,27 +40,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(parsed: argparse.Namespace) -> int:
     """List what there is, or record one experiment."""
     if parsed.action == "list":
-        return _list(parsed)
+        from ppafo.rig import list_presets, load_preset
+        from ppafo.rig.experiments import EXPERIMENTS
+
+        experiments = {item.name: item.summary for item in EXPERIMENTS.values()}
+        presets = {name: load_preset(name).title for name in list_presets()}
+        width = max(map(len, [*experiments, *presets]))
+        lines = ["experiments (recordings are synthetic):"]
+        lines += [f"  {name:<{width}}  {summary}" for name, summary in experiments.items()]
+        lines += ["presets:"]
+        lines += [f"  {name:<{width}}  {title}" for name, title in presets.items()]
+        document = {
+            "experiments": [{"name": name, "summary": summary} for name, summary in experiments.items()],
+            "presets": [{"name": name, "title": title} for name, title in presets.items()],
+        }
+        output.print_result("\n".join(lines), document, parsed.json)
+        return output.EXIT_GOOD
     return _record(parsed)
-
-
-def _list(parsed: argparse.Namespace) -> int:
-    from ppafo.rig import list_presets, load_preset
-    from ppafo.rig.experiments import EXPERIMENTS
-
-    experiments = {item.name: item.summary for item in EXPERIMENTS.values()}
-    presets = {name: load_preset(name).title for name in list_presets()}
-    width = max(map(len, [*experiments, *presets]))
-    lines = ["experiments (recordings are synthetic):"]
-    lines += [f"  {name:<{width}}  {summary}" for name, summary in experiments.items()]
-    lines += ["presets:"]
-    lines += [f"  {name:<{width}}  {title}" for name, title in presets.items()]
-    document = {
-        "experiments": [{"name": name, "summary": summary} for name, summary in experiments.items()],
-        "presets": [{"name": name, "title": title} for name, title in presets.items()],
-    }
-    output.print_result("\n".join(lines), document, parsed.json)
-    return output.EXIT_GOOD
 
 
 def _record(parsed: argparse.Namespace) -> int:

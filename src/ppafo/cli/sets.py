@@ -33,7 +33,10 @@ def run(parsed: argparse.Namespace) -> int:
     """List the sets, or show one."""
     output.check_output(parsed)
     if parsed.action == "show":
-        _show(parsed)
+        from ppafo.parameters import apply_overrides, load_parameter_set
+
+        parameter_set = apply_overrides(load_parameter_set(parsed.name), parsed.overrides)
+        output.deliver(parameter_set.name, _text(parameter_set), _document(parameter_set), parsed)
     else:
         _list(parsed)
     return output.EXIT_GOOD
@@ -47,13 +50,6 @@ def _list(parsed: argparse.Namespace) -> None:
     text = "\n".join(f"{item.name:<{width}}  {item.title}" for item in sets)
     document = {"sets": [{"name": item.name, "title": item.title, "valves": dict(item.valve_kinds)} for item in sets]}
     output.deliver("sets", text, document, parsed)
-
-
-def _show(parsed: argparse.Namespace) -> None:
-    from ppafo.parameters import apply_overrides, load_parameter_set
-
-    parameter_set = apply_overrides(load_parameter_set(parsed.name), parsed.overrides)
-    output.deliver(parameter_set.name, _text(parameter_set), _document(parameter_set), parsed)
 
 
 def _document(parameter_set: "ParameterSet") -> dict[str, Any]:

@@ -101,12 +101,18 @@ def _checked(
         raise ScenarioError(
             f"{said} does not start with a number; write for example '{setting['slider'][1]:g} {setting['shown']}'"
         )
-    scale = _scale(match[2] or setting["shown"], scales)
+    # The scale of a unit as it is listed, else in another spelling of it; None where it is not known here.
+    unit = match[2] or setting["shown"]
+    exact = (one for one in scales if unit in (one["unit"], _normal(one["unit"])))
+    other = (one for one in scales if _normal(unit) in (one["unit"], _normal(one["unit"])))
+    scale = next(exact, None) or next(other, None)
     if scale is None:
         known = ", ".join(one["unit"] or "a plain number" for one in scales)
         raise ScenarioError(f"{said} has a unit that does not fit here; allowed: {known}")
     value = _in_si(float(match[1]), scale, zero)
-    if not _is_inside(setting, value):
+    low, high = setting["low"], setting["high"]
+    is_below = low is not None and (value < low if setting["isLowAllowed"] else value <= low)
+    if not (math.isfinite(value) and not is_below and not (high is not None and value > high)):
         raise ScenarioError(f"{said} is outside of its range, {_range(setting, scales, zero)}")
     if setting["kept"] and (setting["kept"] == "zero") != (value == 0.0):
         need = "0" if setting["kept"] == "zero" else "above 0"
@@ -114,13 +120,6 @@ def _checked(
     if setting["key"].endswith(".seed") and not value.is_integer():
         raise ScenarioError(f"{said} must be a whole number")
     return value
-
-
-def _scale(unit: str, scales: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
-    """The scale of a unit as it is listed, else in another spelling of it; None where it is not known here."""
-    exact = (one for one in scales if unit in (one["unit"], _normal(one["unit"])))
-    other = (one for one in scales if _normal(unit) in (one["unit"], _normal(one["unit"])))
-    return next(exact, None) or next(other, None)
 
 
 def _normal(unit: str) -> str:
@@ -135,12 +134,6 @@ def _in_si(number: float, scale: Mapping[str, Any], zero: float) -> float:
         return number
     exact = Decimal(repr(number)) * Decimal(scale["scale"]) + Decimal(scale["offset"])
     return float(exact) + (zero if scale["isGauge"] else 0.0)
-
-
-def _is_inside(setting: Mapping[str, Any], value: float) -> bool:
-    low, high = setting["low"], setting["high"]
-    is_below = low is not None and (value < low if setting["isLowAllowed"] else value <= low)
-    return math.isfinite(value) and not is_below and not (high is not None and value > high)
 
 
 def _range(setting: Mapping[str, Any], scales: Sequence[Mapping[str, Any]], zero: float) -> str:

@@ -379,7 +379,15 @@ def _content(
     scenarios: "Sequence[str | Scenario]", overrides: Sequence[str], title: str, form: str
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Content of a page, and its modules by name; programs that are the same are there once."""
-    simulated = _simulated(scenarios, overrides)
+    if not 1 <= len(scenarios) <= MOST_SCENARIOS:
+        raise ScenarioError(f"a workbench has 1 to {MOST_SCENARIOS} scenarios, not {len(scenarios)}")
+    loaded = [load_scenario(item, overrides) if isinstance(item, str) else item for item in scenarios]
+    found: dict[str, Scenario] = {}
+    for scenario in loaded:
+        if scenario.name in found:
+            raise ScenarioError(f"two scenarios are called '{scenario.name}'; a workbench distinguishes them by name")
+        found[scenario.name] = scenario
+    simulated = [Simulated(scenario, module_of(scenario), _label(scenario)) for scenario in loaded]
     intervals = known_intervals()
     names: dict[str, str] = {}
     programs = []
@@ -398,18 +406,6 @@ def known_intervals() -> Mapping[str, Interval]:
     """
     told = json.loads(files("ppafo.live").joinpath("intervals.json").read_text(encoding="utf-8"))
     return {path: (low, high) for path, (low, high) in told.items()}
-
-
-def _simulated(given: "Sequence[str | Scenario]", overrides: Sequence[str]) -> list[Simulated]:
-    if not 1 <= len(given) <= MOST_SCENARIOS:
-        raise ScenarioError(f"a workbench has 1 to {MOST_SCENARIOS} scenarios, not {len(given)}")
-    loaded = [load_scenario(item, overrides) if isinstance(item, str) else item for item in given]
-    found: dict[str, Scenario] = {}
-    for scenario in loaded:
-        if scenario.name in found:
-            raise ScenarioError(f"two scenarios are called '{scenario.name}'; a workbench distinguishes them by name")
-        found[scenario.name] = scenario
-    return [Simulated(scenario, module_of(scenario), _label(scenario)) for scenario in loaded]
 
 
 def _label(scenario: Scenario) -> str:

@@ -51,7 +51,9 @@ def record(
     time) or ``rig.pressure_sensor.noise=0 Pa_d`` (preset). SimulationError where the extra ``reference`` is missing.
     """
     chosen = find_experiment(experiment)
-    check_seed(seed)
+    # Raise ParameterError for a seed that is not a whole number from 0 to 4294967295.
+    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed <= LARGEST_SEED:
+        raise ParameterError(f"seed = {seed} must be a whole number from 0 to {LARGEST_SEED}")
     words = tuple(overrides)
     of_preset = tuple(item for item in words if item.strip().startswith(PREFIX))
     others = tuple(item for item in words if item not in of_preset)
@@ -69,12 +71,6 @@ def find_experiment(name: str) -> Experiment:
         hint = nearest_name(name, EXPERIMENTS)
         raise ParameterError(f"there is no experiment '{one_line(name)}'{hint}; available: {', '.join(EXPERIMENTS)}")
     return EXPERIMENTS[name]
-
-
-def check_seed(seed: int) -> None:
-    """Raise ParameterError for a seed that is not a whole number from 0 to 4294967295."""
-    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed <= LARGEST_SEED:
-        raise ParameterError(f"seed = {seed} must be a whole number from 0 to {LARGEST_SEED}")
 
 
 def _refuse_overrides(preset: Preset, overrides: tuple[str, ...]) -> Preset:

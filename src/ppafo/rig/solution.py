@@ -112,12 +112,6 @@ class RigProgram(NamedTuple):
     show: Callable[..., None]
 
 
-def load_rig_program() -> RigProgram:
-    """Return the compiled right-hand side and observables of the rig."""
-    module = load_source(rig_source())
-    return RigProgram(module.fill, module.show)
-
-
 @functools.cache
 def rig_source() -> str:
     """Source of the module."""
@@ -199,7 +193,9 @@ class _Rig:
         self.y = np.array([*rig_run.initial, *numbers(run.program.valve.initial())], dtype=np.float64)
         self.outputs, self.inputs = np.empty(OUTPUTS), np.zeros(INPUTS)
         self.present, self.rates = np.empty(UNKNOWNS), np.empty(UNKNOWNS)
-        functions = load_rig_program()
+        # The compiled right-hand side and observables of the rig.
+        module = load_source(rig_source())
+        functions = RigProgram(module.fill, module.show)
         self.fill = with_arrays(functions.fill, self.present, self.rates, parameters, self.inputs)
         self.show = with_arrays(functions.show, self.present, self.outputs, parameters, self.inputs)
         self.valve_moves = True

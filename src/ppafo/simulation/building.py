@@ -258,12 +258,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         supply_lines=read_supply_lines(reading, device),
         links=_links_at_start(reading),
     )
-    _check_actuator(reading, scenario)
-    return scenario
-
-
-def _check_actuator(reading: Reading, scenario: Scenario) -> None:
-    """Refuse what only a vane has."""
+    # Refuse what only a vane has.
     try:
         if scenario.thermal is not None:
             scenario.device.check_vane("gas with an energy balance")
@@ -271,6 +266,7 @@ def _check_actuator(reading: Reading, scenario: Scenario) -> None:
             scenario.device.check_vane("a controller on whole numbers")
     except ParameterError as error:
         raise _of_device(reading, error) from error
+    return scenario
 
 
 def read_hardware(reading: Reading, request: ScenarioRequest, overrides: tuple[str, ...]) -> Hardware:

@@ -162,11 +162,6 @@ def gas_settings(kind: str) -> tuple[Quantity, ...]:
     return THERMAL_GAS if kind == THERMAL else ()
 
 
-def motion_settings(kind: str) -> tuple[Quantity, ...]:
-    """Return the settings of a kind of motion; a prescribed one has a profile instead."""
-    return {"free": FREE, "held": (ANGLE,), "leg": LEG}.get(kind, ())
-
-
 def shank_settings(kind: str) -> tuple[Quantity, ...]:
     """Return the settings of the shank of a leg: those of a profile, or where in its stride a gait begins."""
     return (GAIT_START,) if kind == GAIT_SHANK else profile_settings(kind, SHANK_LEVEL)
@@ -175,9 +170,10 @@ def shank_settings(kind: str) -> tuple[Quantity, ...]:
 def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
     """Return the declaration of every number that a document with its kinds can hold, by path."""
     motion = kind_at(document, "motion")
+    # The settings of a kind of motion; a prescribed one has a profile instead.
     sections = {
         "run": RUN,
-        "motion": motion_settings(motion),
+        "motion": {"free": FREE, "held": (ANGLE,), "leg": LEG}.get(motion, ()),
         "motion.profile": profile_settings(kind_at(document, "motion.profile"), ANGLE_LEVEL)
         if motion == "prescribed"
         else (),

@@ -44,7 +44,7 @@ def read_motion(
             raise ScenarioError(f"{reading.file}: {problem}")
         return PrescribedMotion(profile)
     angle = reading.number(_ANGLE_PATH, ANGLE)
-    if not _is_between_stops(device, angle):
+    if not (device.actuator.angle_min - TOLERANCE <= angle <= device.actuator.angle_max + TOLERANCE):
         raise reading.refusal(_ANGLE_PATH, f"must be between the stops of {device.name}, {_range_text(_stops(device))}")
     if kind == "held":
         return PrescribedMotion(ProfileChoice("constant", {"level": angle}))
@@ -119,10 +119,6 @@ def _angles(profile: ProfileChoice, duration: float, step: float) -> Iterator[tu
         away = -rate / acceleration if acceleration else 0.0
         if 0.0 < away < min(duration / count, duration - time):
             yield time + away, angle + 0.5 * rate * away
-
-
-def _is_between_stops(device: Device, angle: float) -> bool:
-    return device.actuator.angle_min - TOLERANCE <= angle <= device.actuator.angle_max + TOLERANCE
 
 
 def _stops(device: Device) -> tuple[float, float]:

@@ -328,7 +328,7 @@ def clock_with(name: str, given: TimeTexts, times: Mapping[str, float]) -> Clock
 
 def time_texts(base: Scenario) -> TimeTexts:
     """Return the times as the scenario's file gives them, or the numbers where the scenario was changed since."""
-    document = _document(base)
+    document = apply_overrides(base.origin.content, base.origin.overrides, base.name).document
     texts = {
         section: {name: value for name, value in document[section].items() if f"{section}.{name}" in TIMES}
         for section in ("run", "controller")
@@ -345,7 +345,3 @@ def time_texts(base: Scenario) -> TimeTexts:
 def clock_of(base: Scenario) -> Clock:
     """Return the clock that a scenario has."""
     return Clock(base.duration, base.time_step, base.output_interval, base.control.period)
-
-
-def _document(base: Scenario) -> dict[str, Any]:
-    return apply_overrides(base.origin.content, base.origin.overrides, base.name).document

@@ -43,7 +43,9 @@ class Reading:
         """
         value = value_at(self.document, path)
         if value is None:
-            return self._default(path, quantity)
+            if quantity.default is None:
+                raise ScenarioError(f"{self.file}: '{path}' is missing: {quantity.summary or quantity.name}")
+            return quantity.default
         result = self._in_si(path, value, quantity, atmosphere)
         if not is_within(result, quantity):
             raise self.refusal(path, f"{quantity.summary or quantity.name} must be {limits(quantity, atmosphere)}")
@@ -52,11 +54,6 @@ class Reading:
     def section(self, section: str, quantities: tuple[Quantity, ...]) -> dict[str, float]:
         """Return all values of a section by name, in SI."""
         return {item.name: self.number(f"{section}.{item.name}", item) for item in quantities}
-
-    def _default(self, path: str, quantity: Quantity) -> float:
-        if quantity.default is None:
-            raise ScenarioError(f"{self.file}: '{path}' is missing: {quantity.summary or quantity.name}")
-        return quantity.default
 
     def _in_si(self, path: str, value: object, quantity: Quantity, atmosphere: float) -> float:
         if isinstance(value, bool) or not isinstance(value, str | int | float):

@@ -106,7 +106,15 @@ def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
     """
     command = _input_values(inputs, COMMAND, run) if inputs.has(COMMAND) else None
     path = _path(inputs, device, run) if inputs.has(ANGLE) else {}
-    return StepInputs(command, {**recorded_parameters(inputs, device, run), **path})
+    # The parameters that follow a recording [SI], for every step.
+    followed: dict[str, Floats] = {}
+    if inputs.has(SUPPLY):
+        followed |= dict.fromkeys(supply_paths(device), _input_values(inputs, SUPPLY, run))
+    if inputs.has(DORSIFLEXION_SUPPLY):
+        followed["plant.dorsiflexion_pressure"] = _input_values(inputs, DORSIFLEXION_SUPPLY, run)
+    if inputs.has(EXTERNAL_TORQUE):
+        followed["plant.external_torque"] = _input_values(inputs, EXTERNAL_TORQUE, run)
+    return StepInputs(command, {**followed, **path})
 
 
 def with_prescribed_angle(run: Run, angle: float) -> Run:
@@ -134,18 +142,6 @@ def between_stops(angles: Floats, device: Device, file: str) -> Floats:
             f"{file}: 'angle' is {shown:.4g} deg, beyond the stops of {device.name}, {low:g} to {high:g} deg"
         )
     return np.clip(angles, lowest, highest)
-
-
-def recorded_parameters(inputs: RecordedInputs, device: Device, run: Run) -> dict[str, Floats]:
-    """Return the parameters that follow a recording [SI], for every step."""
-    followed: dict[str, Floats] = {}
-    if inputs.has(SUPPLY):
-        followed |= dict.fromkeys(supply_paths(device), _input_values(inputs, SUPPLY, run))
-    if inputs.has(DORSIFLEXION_SUPPLY):
-        followed["plant.dorsiflexion_pressure"] = _input_values(inputs, DORSIFLEXION_SUPPLY, run)
-    if inputs.has(EXTERNAL_TORQUE):
-        followed["plant.external_torque"] = _input_values(inputs, EXTERNAL_TORQUE, run)
-    return followed
 
 
 def _input_values(inputs: RecordedInputs, name: str, run: Run) -> Floats:

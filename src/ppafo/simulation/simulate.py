@@ -110,7 +110,29 @@ class Result:
 
         SimulationError for a run that diverged, and for a Python controller that gives a different run each time.
         """
-        return check_result(self)
+        # What a completed run determines; SimulationError for one that diverged, or that is never the same.
+        scenario = self.scenario
+        if not self.status.is_completed:
+            raise SimulationError(f"{scenario.name}: the run diverged, so there is nothing to check")
+        run = plan_run(scenario)
+        _check_repeatable(self, run)
+        # Highest less lowest pressure [Pa] that the chambers had or are connected to; the atmosphere's if there is one.
+        supply, recording = self.scenario.device.supply, self.recording
+        outside = [supply.pressure, supply.dorsiflexion_pressure, supply.atmospheric_pressure]
+        values = np.concatenate([recording["pressure_1"], recording["pressure_2"], outside])
+        pressures = float(np.ptp(values)) or supply.atmospheric_pressure
+        repeats = _repeats(run, pressures)
+        results = results_of(scenario, [repeat for _, repeat in repeats])
+        found = [(name, repeated) for (name, _), repeated in zip(repeats, results, strict=True)]
+        courses = tuple(_course(name, found, self, pressures) for name in _COURSES)
+        return Check(
+            scenario=scenario.name,
+            metrics=_metrics(self, found, pressures),
+            courses=courses,
+            parts_at=_time_of_parting([repeated for _, repeated in found], self, courses),
+            failed=tuple(dict.fromkeys(name for name, repeated in found if not repeated.status.is_completed)),
+            atmosphere=scenario.device.supply.atmospheric_pressure,
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return what ``run.json`` says of a result, beside what storage adds to it, as plain data in SI units."""
@@ -218,7 +240,11 @@ def _recording(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, F
         "mass_2": (rows["state.mass_2"], "kg"),
     }
     if scenario.control.kind != OPEN_LOOP:
-        channels["reference"] = (profile_values(scenario.reference, _moments(run, times.size))[0], "N m")
+        # Times of the first samples [s], shape (count,), rounded as the engine does, so that a reference has its bits.
+        steps = np.arange(times.size, dtype=np.float64) * run.record_every
+        whole = np.round(steps)
+        moments: Floats = np.where(np.abs(steps - whole) <= SAME_MOMENT, whole, steps) * run.step
+        channels["reference"] = (profile_values(scenario.reference, moments)[0], "N m")
     channels |= gas_channels(scenario.device.gas, run, rows)
     channels |= _leg_channels(run, times, angle)
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
@@ -241,14 +267,6 @@ def _leg_channels(run: Run, times: Floats, angle: Floats) -> dict[str, tuple[Flo
         "measured_foot_angle": (measured, "rad"),
         "toe_difference": (higher, "m"),
     }
-
-
-def _moments(run: Run, count: int) -> Floats:
-    """Times of the first samples [s], shape (count,), rounded as the engine does, so that a reference has its bits."""
-    steps = np.arange(count, dtype=np.float64) * run.record_every
-    whole = np.round(steps)
-    moments: Floats = np.where(np.abs(steps - whole) <= SAME_MOMENT, whole, steps) * run.step
-    return moments
 
 
 def gas_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tuple[Floats, str]]:
@@ -335,28 +353,6 @@ def compile_models(scenarios: Iterable[Scenario]) -> None:
         load_program(program)
 
 
-def check_result(result: Result) -> Check:
-    """Return what a completed run determines; SimulationError for one that diverged, or that is never the same."""
-    scenario = result.scenario
-    if not result.status.is_completed:
-        raise SimulationError(f"{scenario.name}: the run diverged, so there is nothing to check")
-    run = plan_run(scenario)
-    _check_repeatable(result, run)
-    pressures = _pressure_range(result)
-    repeats = _repeats(run, pressures)
-    results = results_of(scenario, [repeat for _, repeat in repeats])
-    found = [(name, repeated) for (name, _), repeated in zip(repeats, results, strict=True)]
-    courses = tuple(_course(name, found, result, pressures) for name in _COURSES)
-    return Check(
-        scenario=scenario.name,
-        metrics=_metrics(result, found, pressures),
-        courses=courses,
-        parts_at=_time_of_parting([repeated for _, repeated in found], result, courses),
-        failed=tuple(dict.fromkeys(name for name, repeated in found if not repeated.status.is_completed)),
-        atmosphere=scenario.device.supply.atmospheric_pressure,
-    )
-
-
 def _check_repeatable(result: Result, run: Run) -> None:
     """Refuse a Python controller that gives a different run each time: every change would be its own."""
     controller = result.scenario.control.custom
@@ -422,14 +418,6 @@ def _measurements_moved(run: Run, pressures: float) -> list[Run]:
         for draw in range(draws)
         for move in (MOVE, -MOVE)
     ]
-
-
-def _pressure_range(result: Result) -> float:
-    """Highest less lowest pressure [Pa] that the chambers had or are connected to; the atmosphere's if there is one."""
-    supply, recording = result.scenario.device.supply, result.recording
-    outside = [supply.pressure, supply.dorsiflexion_pressure, supply.atmospheric_pressure]
-    values = np.concatenate([recording["pressure_1"], recording["pressure_2"], outside])
-    return float(np.ptp(values)) or supply.atmospheric_pressure
 
 
 def _metrics(result: Result, repeats: list[tuple[str, Result]], pressures: float) -> tuple[NumberCheck, ...]:

@@ -317,20 +317,9 @@ def _with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
         window = parse_quantity(wanted.window, TIME_UNIT)
     except UnitError as error:
         raise DataError(f"direction of '{wanted.of}': {error}") from error
-    rate = wanted.sign * _smooth_rate(recording.time, recording[wanted.of], window)
-    direction = np.where(rate > threshold, 1.0, np.where(rate < -threshold, -1.0, 0.0))
-    moving = np.flatnonzero(direction)
-    if moving.size == 0:
-        raise DataError(f"direction: '{wanted.of}' never moves faster than {wanted.threshold}")
-    sweeps = np.zeros(direction.size)
-    sweeps[moving] = np.concatenate(([1], 1 + np.cumsum(np.diff(direction[moving]) != 0.0)))
-    found = recording.with_channel("direction", direction, PLAIN_NUMBER)
-    return found if "repetition" in recording else found.with_channel("repetition", sweeps, PLAIN_NUMBER)
-
-
-def _smooth_rate(time: Floats, values: Floats, window: float) -> Floats:
-    """Return the slope between the means of the half windows [s] before and after each sample."""
-    sums = np.concatenate(([0.0], np.cumsum(values)))
+    # The slope between the means of the half windows [s] before and after each sample.
+    time = recording.time
+    sums = np.concatenate(([0.0], np.cumsum(recording[wanted.of])))
     times = np.concatenate(([0.0], np.cumsum(time)))
     here = np.arange(time.size)
     first = np.minimum(np.searchsorted(time, time - 0.5 * window), here)
@@ -339,4 +328,12 @@ def _smooth_rate(time: Floats, values: Floats, window: float) -> Floats:
     means = (sums[here + 1] - sums[first]) / before, (sums[last] - sums[here]) / after
     centres = (times[here + 1] - times[first]) / before, (times[last] - times[here]) / after
     gap = np.maximum(centres[1] - centres[0], 1e-12)
-    return np.asarray((means[1] - means[0]) / gap)
+    rate = wanted.sign * np.asarray((means[1] - means[0]) / gap)
+    direction = np.where(rate > threshold, 1.0, np.where(rate < -threshold, -1.0, 0.0))
+    moving = np.flatnonzero(direction)
+    if moving.size == 0:
+        raise DataError(f"direction: '{wanted.of}' never moves faster than {wanted.threshold}")
+    sweeps = np.zeros(direction.size)
+    sweeps[moving] = np.concatenate(([1], 1 + np.cumsum(np.diff(direction[moving]) != 0.0)))
+    found = recording.with_channel("direction", direction, PLAIN_NUMBER)
+    return found if "repetition" in recording else found.with_channel("repetition", sweeps, PLAIN_NUMBER)

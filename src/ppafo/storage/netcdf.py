@@ -56,11 +56,6 @@ def channel_attributes(recording: Recording, name: str) -> dict[str, str]:
     return {"units": _PLAIN_NUMBER_IN_NETCDF if unit == PLAIN_NUMBER else unit, "long_name": summary, **declared}
 
 
-def unit_of_attribute(text: str) -> str:
-    """Return the unit that ``channel_attributes`` wrote as this text."""
-    return PLAIN_NUMBER if text == _PLAIN_NUMBER_IN_NETCDF else text
-
-
 _DAMAGED = (OSError, KeyError, RuntimeError, TypeError, ValueError, OverflowError, MemoryError)
 """What h5py raises where a file is cut off or damaged."""
 
@@ -119,7 +114,23 @@ def _recording(content: bytes, path: str | Path) -> Recording:
 
     with h5py.File(io.BytesIO(content), "r") as file:
         variables = _own_variables(file)
-        _check_sizes(variables, len(content))
+        # Refuse, before memory is taken, numbers that the file does not hold or that grow out of all proportion.
+        file_bytes = len(content)
+        wanted = 0
+        for name, variable in variables.items():
+            if variable.size != variables[TIME].size:
+                raise DataError(f"'{name}' has {variable.size} values for {variables[TIME].size} times")
+            _check_filters(name, variable)
+            wanted += variable.size * _BYTES_OF_A_NUMBER
+            if variable.chunks is not None:
+                wanted += math.prod(variable.chunks) * variable.dtype.itemsize
+        if wanted > max(_ALWAYS_ALLOWED, _MOST_GROWTH * file_bytes):
+            raise DataError(
+                f"requires {wanted / 1e6:,.0f} MB of memory, the file has {file_bytes / 1e6:.2g} MB; "
+                f"a recording requires at most {_MOST_GROWTH} times its file"
+            )
+        for name, variable in variables.items():
+            _check_chunks(name, variable)
         time = _channel(TIME, variables.pop(TIME))
         if time.unit != TIME_UNIT:
             raise DataError(f"'{TIME}' is in '{time.unit}', it must be in '{TIME_UNIT}'")
@@ -146,25 +157,6 @@ def _own_variables(file: Any) -> dict[str, Any]:
         if variable.is_virtual or variable.external:
             raise DataError(f"the numbers of '{name}' are in another file; a recording must contain its numbers itself")
     return variables
-
-
-def _check_sizes(variables: Mapping[str, Any], file_bytes: int) -> None:
-    """Refuse, before memory is taken, numbers that the file does not hold or that grow out of all proportion."""
-    wanted = 0
-    for name, variable in variables.items():
-        if variable.size != variables[TIME].size:
-            raise DataError(f"'{name}' has {variable.size} values for {variables[TIME].size} times")
-        _check_filters(name, variable)
-        wanted += variable.size * _BYTES_OF_A_NUMBER
-        if variable.chunks is not None:
-            wanted += math.prod(variable.chunks) * variable.dtype.itemsize
-    if wanted > max(_ALWAYS_ALLOWED, _MOST_GROWTH * file_bytes):
-        raise DataError(
-            f"requires {wanted / 1e6:,.0f} MB of memory, the file has {file_bytes / 1e6:.2g} MB; "
-            f"a recording requires at most {_MOST_GROWTH} times its file"
-        )
-    for name, variable in variables.items():
-        _check_chunks(name, variable)
 
 
 def _check_filters(name: str, variable: Any) -> None:
@@ -209,7 +201,9 @@ def _channel(name: str, variable: Any) -> Channel:
             raise DataError(f"'{name}' has gaps ('{key}'); fill them or cut the file there")
     # The channel itself refuses a word that is none.
     between: Any = _attribute(variable, _BETWEEN) or None
-    return Channel(values, unit_of_attribute(_attribute(variable, "units")), between)
+    # The unit that ``channel_attributes`` wrote as this text.
+    text = _attribute(variable, "units")
+    return Channel(values, PLAIN_NUMBER if text == _PLAIN_NUMBER_IN_NETCDF else text, between)
 
 
 def _attribute(place: Any, name: str) -> str:

@@ -83,7 +83,28 @@ def _read(path: str | Path, cell: Cell) -> OpenSimTable:
         lines = text_lines(read_bytes(path))
         header = _header(lines)
         number, labels = _labels(lines, header)
-        values, remarks = _without_repeats(_rows(lines, number + 1, labels, header, cell))
+        # The numbers, row by row; blank lines may only follow the last row.
+        first = number + 1
+        last = len(lines)
+        while last >= first and not lines[last - 1].strip():
+            last -= 1
+        count = last - first + 1
+        if count <= 0:
+            raise DataError("has labels but no rows")
+        if header.rows is not None and header.rows != count:
+            raise DataError(
+                f"has {count} rows, its header states {header.rows}: the file is cut off or was edited; "
+                "get it again, or correct the header"
+            )
+        table = np.empty((count, len(labels)))
+        for index in range(count):
+            cells = lines[first - 1 + index].split()
+            if len(cells) != len(labels):
+                raise DataError(f"line {first + index} has {len(cells)} values for {len(labels)} columns")
+            table[index, 0] = _number(cells[0], first + index, labels[0])
+            pairs = zip(cells[1:], labels[1:], strict=True)
+            table[index, 1:] = [cell(text, first + index, label) for text, label in pairs]
+        values, remarks = _without_repeats(table)
         time = values[:, 0]
         _check_clock(time, number + 1)
         if header.width is not None and header.width != len(labels):
@@ -131,7 +152,10 @@ def _header(lines: list[str]) -> _Header:
     for number, line in enumerate(lines[:end], start=1):
         match = _COUNT.match(line.strip())
         if match is not None:
-            counts[match[1].lower()] = _whole(match[2], match[1], number)
+            text = match[2]
+            if not (text.isascii() and text.isdigit() and len(text) < 12):
+                raise DataError(f"line {number}: {match[1]} is {one_line(text)[:_LONGEST_SHOWN]!r}, not a whole number")
+            counts[match[1].lower()] = int(text)
         said = _states_degrees(line, number)
         if said is not None and in_degrees is not None and said != in_degrees:
             raise DataError(f"line {number}: the header states degrees and radians; correct the one that is wrong")
@@ -145,12 +169,6 @@ def _header(lines: list[str]) -> _Header:
     return _Header(
         one_line(name), rows, width, in_degrees, end, kinds[0] if kinds else "measured", "datacolumns" in counts
     )
-
-
-def _whole(text: str, key: str, number: int) -> int:
-    if not (text.isascii() and text.isdigit() and len(text) < 12):
-        raise DataError(f"line {number}: {key} is {one_line(text)[:_LONGEST_SHOWN]!r}, not a whole number")
-    return int(text)
 
 
 def _states_degrees(line: str, number: int) -> bool | None:
@@ -186,30 +204,6 @@ def _cells(line: str) -> list[str]:
     if "\t" in line:
         return [cell.strip() for cell in line.strip().split("\t")]
     return line.split()
-
-
-def _rows(lines: list[str], first: int, labels: list[str], header: _Header, cell: Cell) -> Floats:
-    """Return the numbers, row by row; blank lines may only follow the last row."""
-    last = len(lines)
-    while last >= first and not lines[last - 1].strip():
-        last -= 1
-    count = last - first + 1
-    if count <= 0:
-        raise DataError("has labels but no rows")
-    if header.rows is not None and header.rows != count:
-        raise DataError(
-            f"has {count} rows, its header states {header.rows}: the file is cut off or was edited; "
-            "get it again, or correct the header"
-        )
-    table = np.empty((count, len(labels)))
-    for index in range(count):
-        cells = lines[first - 1 + index].split()
-        if len(cells) != len(labels):
-            raise DataError(f"line {first + index} has {len(cells)} values for {len(labels)} columns")
-        table[index, 0] = _number(cells[0], first + index, labels[0])
-        pairs = zip(cells[1:], labels[1:], strict=True)
-        table[index, 1:] = [cell(text, first + index, label) for text, label in pairs]
-    return table
 
 
 def _number(cell: str, line: int, label: str) -> float:

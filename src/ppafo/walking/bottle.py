@@ -196,11 +196,17 @@ def read_bottle(reading: Reading, device: Device, folder: Path) -> BottleSupply 
             f"set that"
         )
     try:
-        bottle = load_bottle(_place(section["name"], folder), own)
+        name = section["name"]
+        path = Path(name)
+        bottle = load_bottle(folder / path if path.suffix == ".toml" and not path.is_absolute() else name, own)
     except ParameterError as error:
         raise ParameterError(f"{reading.file}: [{BOTTLE}]: {error}") from error
     _check_set_pressure(reading, bottle, device, section["name"])
-    bottle = _set_to_supply(bottle, device)
+    # The bottle with its regulator set to the supply pressure of the device, in its entries too.
+    pressure = device.supply.pressure
+    entry = Entry(value=pressure, unit="Pa_a", origin="derived", source="supply.pressure of the walk")
+    regulator = bottle.regulator._replace(set_pressure=pressure)
+    bottle = replace(bottle, regulator=regulator, entries={**bottle.entries, _SET_PRESSURE: entry})
     numbers = _numbers(reading, section, bottle)
     line = isobar(bottle.fluid.table, bottle.regulator.set_pressure)
     supply = BottleSupply(
@@ -223,19 +229,6 @@ def _check_set_pressure(reading: Reading, bottle: Bottle, device: Device, name: 
         f"{reading.file}: {BOTTLE_NAME}: {name} sets {_SET_PRESSURE} to {quantity_text(own, 'Pa_a', atmosphere)}, and "
         f"supply.pressure is {quantity_text(given, 'Pa_a', atmosphere)}: give both the same"
     )
-
-
-def _set_to_supply(bottle: Bottle, device: Device) -> Bottle:
-    """Return the bottle with its regulator set to the supply pressure of the device, in its entries too."""
-    pressure = device.supply.pressure
-    entry = Entry(value=pressure, unit="Pa_a", origin="derived", source="supply.pressure of the walk")
-    regulator = bottle.regulator._replace(set_pressure=pressure)
-    return replace(bottle, regulator=regulator, entries={**bottle.entries, _SET_PRESSURE: entry})
-
-
-def _place(name: str, folder: Path) -> str | Path:
-    path = Path(name)
-    return folder / path if path.suffix == ".toml" and not path.is_absolute() else name
 
 
 def _numbers(reading: Reading, section: Mapping[str, Any], bottle: Bottle) -> dict[str, float]:
@@ -272,18 +265,7 @@ def _check(reading: Reading, device: Device, supply: BottleSupply) -> None:
     for path in _OWN:
         if value_at(reading.document, path) is not None:
             raise reading.refusal(path, f"the bottle's regulator has its own: set {BOTTLE}.regulator.droop or .area")
-    _check_rates(reading, supply)
-    pressure = supply.offers_first().content.pressure
-    if pressure < regulator.set_pressure + regulator.pressure_margin:
-        has = quantity_text(pressure, "Pa_a", device.supply.atmospheric_pressure)
-        needs = quantity_text(
-            regulator.set_pressure + regulator.pressure_margin, "Pa_a", device.supply.atmospheric_pressure
-        )
-        raise reading.refusal(BOTTLE_NAME, f"has {has} at the start, and its regulator needs {needs}")
-
-
-def _check_rates(reading: Reading, supply: BottleSupply) -> None:
-    """Refuse a bottle of so little gas, or parts of so little heat capacity, that they follow within no time."""
+    # Refuse a bottle of so little gas, or parts of so little heat capacity, that they follow within no time.
     flow = supply.offers_first().largest_flow
     rates = following_rates(supply.bottle.fluid.table, supply.line, supply.bottle.supply, supply.mass, flow)
     fastest = max(rates, key=rates.__getitem__)
@@ -293,6 +275,13 @@ def _check_rates(reading: Reading, supply: BottleSupply) -> None:
             f"the temperature of its {fastest} follows within {1.0e3 / rates[fastest]:.3g} ms, and a walk follows what "
             f"takes {1.0e3 / _FASTEST:g} ms or more: {_FOLLOWS[fastest]}",
         )
+    pressure = supply.offers_first().content.pressure
+    if pressure < regulator.set_pressure + regulator.pressure_margin:
+        has = quantity_text(pressure, "Pa_a", device.supply.atmospheric_pressure)
+        needs = quantity_text(
+            regulator.set_pressure + regulator.pressure_margin, "Pa_a", device.supply.atmospheric_pressure
+        )
+        raise reading.refusal(BOTTLE_NAME, f"has {has} at the start, and its regulator needs {needs}")
 
 
 class SupplyEnding(NamedTuple):
@@ -383,7 +372,18 @@ def run_on_bottle(
     every = max(1, round(supply.coupling / run.step))
     state, table = supply.start(), supply.bottle.fluid.table
     met = [(0.0, state, supply.offers_first())]
-    lanes = _lanes_of(run, device, met[0][2])
+    assert run.lines is not None, "a bottle feeds lines"
+    names = row_numbers(run.program.parameter_rows())
+    effects = tuple(effect for effect in run.program.effects if effect.is_of_device)
+    rows = [path for effect in effects for path in leaf_paths(effect.parameters, effect.name)]
+    lanes = _Lanes(
+        rows=[names[path] for path in (*_PARAMETERS, *rows)],
+        plant=run.plant,
+        volume=run.lines.parameters.volume_1,
+        start=met[0][2].gas_temperature,
+        device=device,
+        effects=effects,
+    )
     window = max(2, math.ceil(_STRIDES * stride_time / (every * run.step))) * every
     gauges = [(0, 1.0)]
     ending, done, before = None, 0, float(batch.states[regulated, 0])
@@ -459,21 +459,6 @@ class _Lanes:
         plant = self.plant
         pressure = mass * plant.gas_product * now.gas_temperature / (self.start * self.volume)
         return (pressure - plant.atmospheric_pressure) / (plant.supply_pressure - plant.atmospheric_pressure)
-
-
-def _lanes_of(run: Run, device: Device, first: SupplyNow) -> _Lanes:
-    assert run.lines is not None, "a bottle feeds lines"
-    names = row_numbers(run.program.parameter_rows())
-    effects = tuple(effect for effect in run.program.effects if effect.is_of_device)
-    rows = [path for effect in effects for path in leaf_paths(effect.parameters, effect.name)]
-    return _Lanes(
-        rows=[names[path] for path in (*_PARAMETERS, *rows)],
-        plant=run.plant,
-        volume=run.lines.parameters.volume_1,
-        start=first.gas_temperature,
-        device=device,
-        effects=effects,
-    )
 
 
 def _ending(

@@ -190,7 +190,17 @@ def ankle_path(gait: Gait, timing: GaitTiming, wearer: Wearer) -> AnklePath:
     swing = np.clip((_GRID - timing.toe_off) / (1.0 - timing.toe_off), 0.0, 1.0)
     up = _above(toes_down, heel_down, swing) + MID_SWING_CLEARANCE * np.sin(np.pi * swing) ** 2
     length = (gait.walking_speed or DEFAULT_SPEED) * gait.stride_time
-    forward = _forward(foot, wearer, height, timing.toe_off, length)
+    # Rolling over heel and toes in stance; in the swing a smooth way to the next foothold with equal speeds.
+    on_heel = wearer.heel_lever * (np.cos(foot) - 1.0) - height * np.sin(foot)
+    on_toes = wearer.toe_lever * (1.0 - np.cos(foot)) - height * np.sin(foot)
+    rolled = np.where(foot > 0.0, on_heel, on_toes)
+    last = int(np.searchsorted(_GRID, timing.toe_off)) - 1
+    speed = (rolled[last] - rolled[last - 10]) / (_GRID[last] - _GRID[last - 10])
+    way, span = rolled[0] + length - rolled[last], 1.0 - _GRID[last]
+    fraction = np.clip((_GRID - _GRID[last]) / span, 0.0, 1.0)
+    start = speed * span
+    cubic = start * fraction + (3.0 * way - 2.0 * start) * fraction**2 + (start - 2.0 * way) * fraction**3
+    forward = np.asarray(np.where(np.arange(_GRID.size) <= last, rolled, rolled[last] + cubic))
     levers = wearer.heel_lever, wearer.toe_lever
     return AnklePath(forward, up, length, timing.ground_angle, wearer.shank_length, *levers, height)
 
@@ -202,20 +212,6 @@ def _above(toes_down: Floats, heel_down: Floats, swing: Floats) -> Floats:
     """
     width = HAND_OVER * swing**4 * (1.0 - swing) / (0.8**4 * 0.2)
     return np.asarray(0.5 * (toes_down + heel_down + np.hypot(toes_down - heel_down, width)))
-
-
-def _forward(foot: Floats, wearer: Wearer, height: float, toe_off: float, length: float) -> Floats:
-    """Rolling over heel and toes in stance; in the swing a smooth way to the next foothold with equal speeds."""
-    on_heel = wearer.heel_lever * (np.cos(foot) - 1.0) - height * np.sin(foot)
-    on_toes = wearer.toe_lever * (1.0 - np.cos(foot)) - height * np.sin(foot)
-    rolled = np.where(foot > 0.0, on_heel, on_toes)
-    last = int(np.searchsorted(_GRID, toe_off)) - 1
-    speed = (rolled[last] - rolled[last - 10]) / (_GRID[last] - _GRID[last - 10])
-    way, span = rolled[0] + length - rolled[last], 1.0 - _GRID[last]
-    fraction = np.clip((_GRID - _GRID[last]) / span, 0.0, 1.0)
-    start = speed * span
-    cubic = start * fraction + (3.0 * way - 2.0 * start) * fraction**2 + (start - 2.0 * way) * fraction**3
-    return np.asarray(np.where(np.arange(_GRID.size) <= last, rolled, rolled[last] + cubic))
 
 
 class RockerFit(NamedTuple):

@@ -101,7 +101,15 @@ def load_walk(
     file, given = label(str(name_or_path)), tuple(overrides)
     named = {"gait": gait, "course": course, BOTTLE_NAME: bottle}
     instead = {path: str(item) for path, item in named.items() if item is not None}
-    _check_given_once(given, instead, file)
+    # Refuse an override beside another word for the same value, by path in ``others``.
+    for override in given:
+        path, text = split_override(override)
+        other = instead.get(OF_A_WALK.same.get(path, path))
+        if other is not None:
+            raise ScenarioError(
+                f"{file}: override '{path}={text}': the {path.partition('.')[0]} is given as '{one_line(other)}' "
+                "already; give it once"
+            )
     content = FILE.parse(FILE.read(name_or_path), file)
     folder = Path(name_or_path).parent
     return scenario_of(
@@ -127,7 +135,10 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     carried = read_bottle(reading, device, Path() if BOTTLE_NAME in instead else request.folder)
     lines = _lines(reading, document, device, carried)
     settings = _sensor_settings(reading)
-    links = _links(reading, law, device)
+    # Which settings of controller and timing follow others because the file does not give them.
+    timing = timing_settings(timing_of(reading.document))
+    found = links_of_defaults({"controller": law.quantities, "timing": timing}, device)
+    links = {path: links for path, links in found.items() if value_at(reading.document, path) is None}
     _check_timing(law, reading)
     motion = WalkMotion(
         kind=WALK,
@@ -215,31 +226,12 @@ def _assumed(reading: Reading, carried: BottleSupply | None) -> tuple[Assumption
     return tuple({**found, **lines}.values())
 
 
-def _check_given_once(overrides: tuple[str, ...], others: Mapping[str, str], file: str) -> None:
-    """Refuse an override beside another word for the same value, by path in ``others``."""
-    for override in overrides:
-        path, text = split_override(override)
-        other = others.get(OF_A_WALK.same.get(path, path))
-        if other is not None:
-            raise ScenarioError(
-                f"{file}: override '{path}={text}': the {path.partition('.')[0]} is given as '{one_line(other)}' "
-                "already; give it once"
-            )
-
-
 def _check_timing(law: ControllerKind, reading: Reading) -> None:
     """Raise ScenarioError for a timing of a controller that goes by no time in the stride."""
     try:
         with_timing(law, TIMINGS[timing_of(reading.document)])
     except ScenarioError as error:
         raise ScenarioError(f"{reading.file}: {error}") from error
-
-
-def _links(reading: Reading, law: ControllerKind, device: Device) -> Graph:
-    """Return which settings of controller and timing follow others because the file does not give them."""
-    timing = timing_settings(timing_of(reading.document))
-    found = links_of_defaults({"controller": law.quantities, "timing": timing}, device)
-    return {path: links for path, links in found.items() if value_at(reading.document, path) is None}
 
 
 def _settings(

@@ -142,9 +142,11 @@ def walk_population(
     rows = {path: states[row] for path, row in row_numbers(batch.program.state_rows()).items()}
     good = (rows["result.failure_time"] >= NEVER_FAILED) & np.isfinite(states).all(axis=0)
     walked = run.step * run.step_count
-    outcomes = _outcomes(
-        rows, walked * gaits.timing["frequency"] if planned is None else turns_walked(planned.course, walked)
-    )
+    # Numbers of each wearer from the totals; ``strides`` walked, parts of one included.
+    strides = walked * gaits.timing["frequency"] if planned is None else turns_walked(planned.course, walked)
+    strikes, landings = np.maximum(rows["walk.strides"], 1.0), np.maximum(rows["walk.landings"], 1.0)
+    over = {"slap_rate": landings, "toe_clearance": strikes, "toe_landing": strikes}
+    outcomes = {name: rows[item.total] / over.get(name, strides) for name, item in PER_STRIDE.items()}
     traits = {
         "body_mass": walk_of(configuration).wearer.body_mass * build.mass,
         "shank_length": walk_of(configuration).wearer.shank_length * build.stature,
@@ -178,13 +180,6 @@ def _run_in_groups(batch: Batch, progress: Progress) -> Floats:
     return np.concatenate(found, axis=1)
 
 
-def _outcomes(rows: Mapping[str, Floats], strides: Floats) -> dict[str, Floats]:
-    """Numbers of each wearer from the totals; ``strides`` walked, parts of one included."""
-    strikes, landings = np.maximum(rows["walk.strides"], 1.0), np.maximum(rows["walk.landings"], 1.0)
-    over = {"slap_rate": landings, "toe_clearance": strikes, "toe_landing": strikes}
-    return {name: rows[item.total] / over.get(name, strides) for name, item in PER_STRIDE.items()}
-
-
 def population_figure(population: Population) -> "Figure":
     """Return four histograms with quantiles, and two pictures of outcome over trait."""
     from matplotlib.figure import Figure
@@ -196,7 +191,15 @@ def population_figure(population: Population) -> "Figure":
         for axes, name in zip((grid[0], grid[1], grid[3], grid[4]), _HISTOGRAMS, strict=True):
             _histogram(axes, population, name)
         for axes, (trait, outcome) in zip((grid[2], grid[5]), _PAIRS, strict=True):
-            _scatter(axes, population, trait, outcome)
+            (across, across_quantity, _), (up, up_quantity, _) = SHOWN[trait], SHOWN[outcome]
+            x = display_values(population.traits[trait], across_quantity)
+            y = display_values(population.outcomes[outcome], up_quantity)
+            thin = slice(None, None, max(1, x.size // _MAXIMUM_POINTS))
+            axes.plot(x[thin], y[thin], ".", color=BLUE, markersize=2.5, alpha=0.35, markeredgewidth=0.0)
+            axes.plot(x[0], y[0], "o", color=VERMILION, markersize=6)
+            axes.set_ylabel(title_with_unit(up, up_quantity), fontsize=9)
+            axes.set_xlabel(title_with_unit(across, across_quantity), fontsize=9)
+            axes.locator_params(nbins=5)
         width, height = _SIZE
         title = f"{population.scenario.name}: {population.count} wearers, {population.minutes:.3g} min each"
         figure.text(0.12 / width, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
@@ -215,16 +218,4 @@ def _histogram(axes: "Axes", population: Population, name: str) -> None:
     axes.plot(values[0], 0.0, "o", color=VERMILION, markersize=6, clip_on=False, zorder=5)
     axes.set_xlabel(title_with_unit(title, quantity), fontsize=9)
     axes.set_ylabel("Wearers", fontsize=9)
-    axes.locator_params(nbins=5)
-
-
-def _scatter(axes: "Axes", population: Population, trait: str, outcome: str) -> None:
-    (across, across_quantity, _), (up, up_quantity, _) = SHOWN[trait], SHOWN[outcome]
-    x = display_values(population.traits[trait], across_quantity)
-    y = display_values(population.outcomes[outcome], up_quantity)
-    thin = slice(None, None, max(1, x.size // _MAXIMUM_POINTS))
-    axes.plot(x[thin], y[thin], ".", color=BLUE, markersize=2.5, alpha=0.35, markeredgewidth=0.0)
-    axes.plot(x[0], y[0], "o", color=VERMILION, markersize=6)
-    axes.set_ylabel(title_with_unit(up, up_quantity), fontsize=9)
-    axes.set_xlabel(title_with_unit(across, across_quantity), fontsize=9)
     axes.locator_params(nbins=5)

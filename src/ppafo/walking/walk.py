@@ -111,15 +111,7 @@ def compare_walks(configuration: Scenario, minutes: float | None = None, progres
     ScenarioError for bad input, SimulationError where its bottle ends the walk before there is anything to compare.
     """
     worn = walk(configuration, minutes, progress=progress)
-    _check_ending(worn)
-    # As long as the bottle lasted, where there is one.
-    as_long = minutes if worn.supply is None else float(worn.recording.time[-1]) / 60.0
-    bare = walk(with_device_off(configuration), as_long, progress=progress)
-    return Comparison(worn, bare, healthy_metrics(configuration))
-
-
-def _check_ending(worn: WalkResult) -> None:
-    """Refuse a walk that its bottle ended within the first strides."""
+    # Refuse a walk that its bottle ended within the first strides.
     shortest = SHORTEST_STRIDES * walk_of(worn.scenario).gait.stride_time
     if worn.supply is not None and worn.supply.ending.time < shortest:
         ending = worn.supply.ending
@@ -127,6 +119,10 @@ def _check_ending(worn: WalkResult) -> None:
             f"{worn.scenario.name} on its bottle: {ending.message}, after {ending.time:.3g} s: fewer than "
             f"{SHORTEST_STRIDES} strides; take a fuller, larger or warmer bottle"
         )
+    # As long as the bottle lasted, where there is one.
+    as_long = minutes if worn.supply is None else float(worn.recording.time[-1]) / 60.0
+    bare = walk(with_device_off(configuration), as_long, progress=progress)
+    return Comparison(worn, bare, healthy_metrics(configuration))
 
 
 def with_device_off(configuration: Scenario) -> Scenario:

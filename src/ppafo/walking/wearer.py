@@ -166,20 +166,16 @@ def segment_values(wearer: Wearer, build: Build) -> dict[str, Floats]:
     return {"body_mass": wearer.body_mass * build.mass, **found}
 
 
-def gait_subject(gait: Gait) -> Wearer:
-    """Return the wearer with body mass, and lengths where the stature is known, of the subject of a gait."""
-    paper = paper_subject()
-    stature = 1.0 if gait.stature is None else SHANK_SHARE * gait.stature / paper.shank_length
-    build = Build(np.array([gait.body_mass / paper.body_mass]), np.array([stature]))
-    segments = {name: float(values[0]) for name, values in segment_values(paper, build).items()}
-    return replace(paper, **segments)
-
-
 def read_wearer(reading: Reading, gait: Gait, is_named: bool) -> Wearer:
     """Return the wearer of a walk file; what it leaves out is of the gait's subject, or of the paper's by default."""
     if not is_named:
         return Wearer(**reading.section("wearer", WEARER))
-    subject = gait_subject(gait)
+    # The wearer with body mass, and lengths where the stature is known, of the subject of a gait.
+    paper = paper_subject()
+    stature = 1.0 if gait.stature is None else SHANK_SHARE * gait.stature / paper.shank_length
+    build = Build(np.array([gait.body_mass / paper.body_mass]), np.array([stature]))
+    segments = {name: float(values[0]) for name, values in segment_values(paper, build).items()}
+    subject = replace(paper, **segments)
     quantities = tuple(replace(item, default=getattr(subject, item.name)) for item in WEARER)
     for item in quantities:
         value = getattr(subject, item.name)

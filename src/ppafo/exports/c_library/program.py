@@ -26,11 +26,6 @@ from ppafo.model.columns import over_runs
 from ppafo.simulation.ensemble.running import ThermalTotals, Totals, has_channels, thermal_totals, totals
 
 
-def one_run_collector(decorator: str) -> SourceCollector:
-    """A collector that also takes functions that Python applies to columns."""
-    return SourceCollector(decorator, for_one_run)
-
-
 def for_one_run(function: FunctionType, tree: ast.FunctionDef) -> ast.FunctionDef:
     """The definition of a function for one run."""
     tree = _ForOneRun(function.__globals__).visit(tree)
@@ -171,7 +166,8 @@ def c_text(
     from ppafo.translation.c99 import c_source, documents_of
     from ppafo.translation.walk import walk_module
 
-    collector = one_run_collector(INLINE)
+    # A collector that also takes functions that Python applies to columns.
+    collector = SourceCollector(INLINE, for_one_run)
     composed = _composed_text(item, collector, further, together)
     state, parameter = list(item.state_places.values()), list(item.parameter_places.values())
     alone = [name.replace("AT_", "PARAMETER_", 1) for name in parameter]

@@ -136,15 +136,6 @@ def missing_tools(target: Target) -> tuple[str, ...]:
     return tuple(tool for tool in target.tools if which(tool) is None)
 
 
-def check_tools(target: Target) -> None:
-    """SimulationError where this computer lacks a tool of a target."""
-    absent = missing_tools(target)
-    if absent:
-        raise SimulationError(
-            f"the simulator of {target.name} needs {', '.join(absent)}; {target.packages} are packages of Debian"
-        )
-
-
 def built(contents: Mapping[str, bytes], folder: Path, goals: Sequence[str] = ("all",)) -> None:
     """Write the files of a firmware into a folder and make what is asked for; SimulationError where that fails."""
     for name, content in contents.items():
@@ -175,7 +166,12 @@ def chip_simulator(contents: Mapping[str, bytes], target: Target) -> Iterator[tu
 @contextmanager
 def built_image(contents: Mapping[str, bytes], target: Target) -> Iterator[Image]:
     """The image for the simulator that is built of these files, in a folder that goes with the ``with``."""
-    check_tools(target)
+    # SimulationError where this computer lacks a tool of a target.
+    absent = missing_tools(target)
+    if absent:
+        raise SimulationError(
+            f"the simulator of {target.name} needs {', '.join(absent)}; {target.packages} are packages of Debian"
+        )
     with tempfile.TemporaryDirectory(prefix="ppafo-chip-", ignore_cleanup_errors=True) as folder:
         built(contents, Path(folder))
         yield read_image(Path(folder), target)

@@ -307,7 +307,20 @@ def plant_alone(item: Scenario) -> Interface:
 
 def _walking_plant(configuration: Scenario) -> Interface:
     check_can_leave(configuration)
-    chosen = _walk_of_plant(configuration)
+    # The walk with a command that is handed in at every step, and sensors that nobody looks at.
+    step = step_counts(1.0, configuration.time_step, 1.0, configuration.control.period).step
+    motion = walk_of(configuration)
+    # The forces under the foot are among the outputs.
+    forces = dict.fromkeys(FORCES, 0.0) | {"force_bandwidth": motion.forces["force_bandwidth"]}
+    chosen = replace(
+        configuration,
+        name=f"{configuration.name}-plant",
+        description=f"The plant alone of this walk, on its leg: {configuration.description}",
+        control=Control(switching.CONSTANT.name, {"command": 0.0}, step),
+        time_step=step,
+        sensors=Sensors(),
+        motion=replace(motion, forces=forces, faults={sensor: FaultSettings() for sensor in motion.faults}),
+    )
     library = walk_library(chosen)
     return Interface(
         name=chosen.name,
@@ -368,23 +381,6 @@ def _plant_of_scenario(scenario: Scenario) -> Interface:
             "follow": _FOLLOW_ANGLE if is_led else f"    settings->{_outside(chosen)};",
             "lead": _LEAD_ANGLE if is_led else "    rows[PARAMETER_PLANT_EXTERNAL_TORQUE] = inputs[1];",
         },
-    )
-
-
-def _walk_of_plant(configuration: Scenario) -> Scenario:
-    """The walk with a command that is handed in at every step, and sensors that nobody looks at."""
-    step = step_counts(1.0, configuration.time_step, 1.0, configuration.control.period).step
-    motion = walk_of(configuration)
-    # The forces under the foot are among the outputs.
-    forces = dict.fromkeys(FORCES, 0.0) | {"force_bandwidth": motion.forces["force_bandwidth"]}
-    return replace(
-        configuration,
-        name=f"{configuration.name}-plant",
-        description=f"The plant alone of this walk, on its leg: {configuration.description}",
-        control=Control(switching.CONSTANT.name, {"command": 0.0}, step),
-        time_step=step,
-        sensors=Sensors(),
-        motion=replace(motion, forces=forces, faults={sensor: FaultSettings() for sensor in motion.faults}),
     )
 
 

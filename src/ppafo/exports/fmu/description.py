@@ -87,8 +87,17 @@ def variables_of(interface: Interface) -> tuple[Variable, ...]:
     library = interface.library
     first_metric = len(library.settings) + len(library.program.outputs)
     first_input = first_metric + len(library.program.metrics)
+    found = []
+    for number, item in enumerate(interface.library.settings):
+        change, quantity = change_of(interface, item), item.quantity
+        if change == "h":
+            continue
+        low, high = (limit if abs(limit) < 1e308 else None for limit in (quantity.minimum, quantity.maximum))
+        said = quantity.summary or quantity.name
+        kind = "tunable" if change == "t" else "fixed"
+        found.append(Variable(item.path, number, quantity.unit, said, "parameter", kind, item.value, low, high))
     return (
-        *_parameters(interface),
+        *found,
         *(
             Variable(name, len(library.settings) + place, *OUTPUTS[name], "output", variability_of(name))
             for place, name in enumerate(library.program.outputs)
@@ -108,19 +117,6 @@ def variables_of(interface: Interface) -> tuple[Variable, ...]:
 def variability_of(name: str) -> str:
     """Whether an output jumps, ``discrete``, or goes on, ``continuous``."""
     return "discrete" if name in STEPPED else "continuous"
-
-
-def _parameters(interface: Interface) -> list[Variable]:
-    found = []
-    for number, item in enumerate(interface.library.settings):
-        change, quantity = change_of(interface, item), item.quantity
-        if change == "h":
-            continue
-        low, high = (limit if abs(limit) < 1e308 else None for limit in (quantity.minimum, quantity.maximum))
-        said = quantity.summary or quantity.name
-        kind = "tunable" if change == "t" else "fixed"
-        found.append(Variable(item.path, number, quantity.unit, said, "parameter", kind, item.value, low, high))
-    return found
 
 
 BASE_UNITS = {

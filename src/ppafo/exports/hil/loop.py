@@ -327,7 +327,16 @@ class Bench:
 
         ScenarioError where nobody answers.
         """
-        if not self._call(patience, is_stopped):
+        # Send the first sample until it is answered; false where it was not.
+        self.judge.sent = 0
+        self._show(wire.BEGIN)
+        first = wire.sample_bytes(self._shown)
+        for _ in range(max(1, math.ceil(patience / _CALL_INTERVAL))):
+            self.port.send(first)
+            self.pace.call(_CALL_INTERVAL, self.port, self._take)
+            if self.judge.is_answered or is_stopped():
+                break
+        if not self.judge.is_answered:
             if is_stopped():
                 raise KeyboardInterrupt("interrupted before a controller answered; nothing is written")
             heard = wire.described_refusals(self.reader.refused, self.judge.ignored.items())
@@ -361,18 +370,6 @@ class Bench:
             is_real_time=self.pace.is_real,
             failure=self.port.failure,
         )
-
-    def _call(self, patience: float, is_stopped: Callable[[], bool]) -> bool:
-        """Send the first sample until it is answered; false where it was not."""
-        self.judge.sent = 0
-        self._show(wire.BEGIN)
-        first = wire.sample_bytes(self._shown)
-        for _ in range(max(1, math.ceil(patience / _CALL_INTERVAL))):
-            self.port.send(first)
-            self.pace.call(_CALL_INTERVAL, self.port, self._take)
-            if self.judge.is_answered or is_stopped():
-                break
-        return self.judge.is_answered
 
     def _exchange(self, sent: float, late: float) -> None:
         """Wait for the answer to the sample that was sent [s], go on under it, and wait until the next one is due."""

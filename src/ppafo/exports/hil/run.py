@@ -217,8 +217,16 @@ class HardwareRun:
 
     def files(self) -> dict[str, bytes]:
         """The files beside those of a result, by name."""
+        # The log as a table; an empty cell is something that was not there.
+        buffer = io.StringIO()
+        writer = csv.writer(buffer, lineterminator="\n")
+        writer.writerow(LOG_COLUMNS)
+        for row in self.exchange.rows:
+            stamp = "" if row.controller_time is None else repr(row.controller_time / wire.MICROSECONDS)
+            times = ("" if value is None else repr(value) for value in (row.sent_late, row.answered_after))
+            writer.writerow([row.sequence, repr(row.due), *times, repr(row.command), stamp, int(row.is_vented)])
         found = {
-            "log.csv": log_bytes(self.exchange.rows),
+            "log.csv": buffer.getvalue().encode(),
             "link.json": f"{json_text(self.document())}\n".encode(),
         }
         if self.exchange.is_real_time:
@@ -326,18 +334,6 @@ def longest_silence(rows: Sequence[Row]) -> int:
         current = current + 1 if row.answered_after is None and row.sent_late is not None else 0
         longest = max(longest, current)
     return longest
-
-
-def log_bytes(rows: Sequence[Row]) -> bytes:
-    """The log as a table; an empty cell is something that was not there."""
-    buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(LOG_COLUMNS)
-    for row in rows:
-        stamp = "" if row.controller_time is None else repr(row.controller_time / wire.MICROSECONDS)
-        times = ("" if value is None else repr(value) for value in (row.sent_late, row.answered_after))
-        writer.writerow([row.sequence, repr(row.due), *times, repr(row.command), stamp, int(row.is_vented)])
-    return buffer.getvalue().encode()
 
 
 def _histogram(axes: "Axes", values: Sequence[float], title: str) -> None:

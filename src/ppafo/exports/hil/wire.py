@@ -375,7 +375,16 @@ def open_port(text: str, baud: int = DEFAULT_BAUD, listens: bool = False) -> Por
     if kind == "udp":
         return _open_udp(text, place, listens)
     if kind == "serial" and place:
-        return _open_serial(text, place, baud)
+        try:
+            import serial
+        except ImportError as error:
+            raise ScenarioError(f"--port {text}: a serial port needs pyserial: pip install 'ppafo[hil]'") from error
+        try:
+            device = serial.Serial(place, baud, timeout=0.0, write_timeout=_WRITE_TIMEOUT, exclusive=True)
+            device.reset_input_buffer()
+        except (OSError, ValueError) as error:
+            raise ScenarioError(f"--port {one_line(text)}: cannot be opened: {one_line(error)}") from error
+        return SerialPort(device)
     raise ScenarioError(f"--port {one_line(text)}: must be {FORMS}")
 
 
@@ -395,16 +404,3 @@ def _open_udp(text: str, place: str, listens: bool) -> UdpPort:
         if own is not None:
             own.close()
         raise ScenarioError(f"--port {one_line(text)}: cannot be used: {reason(error)}") from error
-
-
-def _open_serial(text: str, place: str, baud: int) -> SerialPort:
-    try:
-        import serial
-    except ImportError as error:
-        raise ScenarioError(f"--port {text}: a serial port needs pyserial: pip install 'ppafo[hil]'") from error
-    try:
-        device = serial.Serial(place, baud, timeout=0.0, write_timeout=_WRITE_TIMEOUT, exclusive=True)
-        device.reset_input_buffer()
-    except (OSError, ValueError) as error:
-        raise ScenarioError(f"--port {one_line(text)}: cannot be opened: {one_line(error)}") from error
-    return SerialPort(device)

@@ -84,9 +84,39 @@ def plugin_files(scenario: Scenario, platforms: Sequence[str], mujoco: Headers) 
         raise ScenarioError(f"no plugin is built on this computer for itself; --platforms {' or '.join(BUILT_FOR)}")
     library = plugin_library(scenario)
     sources, identity = _sources(library, mujoco)
-    binaries = {name: _library_name(library, name) for name in platforms}
+    # The file of the plugin on a platform.
+    binaries = {name: f"{'' if name == 'win64' else 'lib'}{library.name}{PLATFORMS[name].suffix}" for name in platforms}
     numbers = {"identity": identity, **_numbers(scenario, library, mujoco, binaries)}
-    words = _page_words(scenario, library, mujoco, numbers)
+    # What fills the example and the page.
+    device = scenario.device
+    low, high = (angle - _NEUTRAL_ANGLE for angle in (device.actuator.angle_min, device.actuator.angle_max))
+    rows = "".join(
+        f"| `{item.path}` | {item.value!r} | {item.quantity.unit} | {item.quantity.summary or item.quantity.name} |\n"
+        for item in attributes_of(library)
+    )
+    outputs = "".join(
+        f"| {place} | `{name}` | {OUTPUTS[name][0]} | {OUTPUTS[name][1]} |\n"
+        for place, name in enumerate(library.program.outputs)
+    )
+    libraries = numbers["libraries"]
+    assert isinstance(libraries, dict)
+    words = {
+        "title": scenario.name,
+        "plugin": plugin_name(library),
+        "version": __version__,
+        "mujoco": mujoco.version,
+        "library": next(iter(libraries.values())),
+        "libraries": ", ".join(f"`{file}` ({name})" for name, file in libraries.items()),
+        "pressure": repr(device.supply.pressure),
+        "low": repr(low),
+        "high": repr(high),
+        "armature": repr(device.foot_plate.inertia),
+        "damping": repr(device.friction.viscous_damping),
+        "frictionloss": repr(device.friction.dynamic_torque),
+        "valve": _VALVES.get(device.valve.kind, _PROPORTIONAL),
+        "attributes": rows,
+        "outputs": outputs,
+    }
     include = ("-I", str(mujoco.include))
     return {
         **{
@@ -136,11 +166,6 @@ def _angle_at_start(scenario: Scenario) -> float:
         return motion.angle
     assert isinstance(motion, PrescribedMotion)
     return min(max(_NEUTRAL_ANGLE, scenario.device.actuator.angle_min), scenario.device.actuator.angle_max)
-
-
-def _library_name(library: Library, platform: str) -> str:
-    """The file of the plugin on a platform."""
-    return f"{'' if platform == 'win64' else 'lib'}{library.name}{PLATFORMS[platform].suffix}"
 
 
 def _sources(library: Library, mujoco: Headers) -> tuple[dict[str, bytes], str]:
@@ -205,37 +230,4 @@ def _numbers(scenario: Scenario, library: Library, mujoco: Headers, binaries: Ma
             "damping": device.friction.viscous_damping,
             "frictionloss": device.friction.dynamic_torque,
         },
-    }
-
-
-def _page_words(scenario: Scenario, library: Library, mujoco: Headers, numbers: Mapping[str, object]) -> dict[str, str]:
-    """What fills the example and the page."""
-    device = scenario.device
-    low, high = (angle - _NEUTRAL_ANGLE for angle in (device.actuator.angle_min, device.actuator.angle_max))
-    rows = "".join(
-        f"| `{item.path}` | {item.value!r} | {item.quantity.unit} | {item.quantity.summary or item.quantity.name} |\n"
-        for item in attributes_of(library)
-    )
-    outputs = "".join(
-        f"| {place} | `{name}` | {OUTPUTS[name][0]} | {OUTPUTS[name][1]} |\n"
-        for place, name in enumerate(library.program.outputs)
-    )
-    libraries = numbers["libraries"]
-    assert isinstance(libraries, dict)
-    return {
-        "title": scenario.name,
-        "plugin": plugin_name(library),
-        "version": __version__,
-        "mujoco": mujoco.version,
-        "library": next(iter(libraries.values())),
-        "libraries": ", ".join(f"`{file}` ({name})" for name, file in libraries.items()),
-        "pressure": repr(device.supply.pressure),
-        "low": repr(low),
-        "high": repr(high),
-        "armature": repr(device.foot_plate.inertia),
-        "damping": repr(device.friction.viscous_damping),
-        "frictionloss": repr(device.friction.dynamic_torque),
-        "valve": _VALVES.get(device.valve.kind, _PROPORTIONAL),
-        "attributes": rows,
-        "outputs": outputs,
     }

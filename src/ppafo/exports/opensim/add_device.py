@@ -116,7 +116,16 @@ def add_load(model: Any, coordinate: str, times: Sequence[float], torques: Seque
     """
     import opensim
 
-    axes = _axes(model, coordinate)
+    # The joint's axis in its two bodies, by their names, in the second one reversed; each over its length.
+    state = model.initSystem()
+    joint = model.getCoordinateSet().get(coordinate).getJoint()
+    child, parent = (frame.findBaseFrame() for frame in (joint.getChildFrame(), joint.getParentFrame()))
+    found = [_axes_at(model, state, coordinate, (child, parent), angle) for angle in (0.0, 0.2)]
+    same = all(abs(a - b) < 1.0e-6 for one, two in zip(*found, strict=True) for a, b in zip(one, two, strict=True))
+    if not same or sum(component * component for component in found[0][0]) < 1.0e-12:
+        raise ValueError(f"{model.getName()}: '{coordinate}' turns about no axis that is fixed in both bodies")
+    (of_child, of_parent) = found[0]
+    axes = {child.getName(): of_child, parent.getName(): [-component for component in of_parent]}
     for body, axis in axes.items():
         load = opensim.PrescribedForce(f"{coordinate}{SUFFIX}_{body}", model.getBodySet().get(body))
         load.set_forceIsGlobal(False)
@@ -139,19 +148,6 @@ def line(times: Sequence[float], values: Sequence[float]) -> Any:
     return function
 
 
-def _axes(model: Any, coordinate: str) -> dict[str, list[float]]:
-    """Return the joint's axis in its two bodies, by their names, in the second one reversed; each over its length."""
-    state = model.initSystem()
-    joint = model.getCoordinateSet().get(coordinate).getJoint()
-    child, parent = (frame.findBaseFrame() for frame in (joint.getChildFrame(), joint.getParentFrame()))
-    found = [_axes_at(model, state, coordinate, (child, parent), angle) for angle in (0.0, 0.2)]
-    same = all(abs(a - b) < 1.0e-6 for one, two in zip(*found, strict=True) for a, b in zip(one, two, strict=True))
-    if not same or sum(component * component for component in found[0][0]) < 1.0e-12:
-        raise ValueError(f"{model.getName()}: '{coordinate}' turns about no axis that is fixed in both bodies")
-    (of_child, of_parent) = found[0]
-    return {child.getName(): of_child, parent.getName(): [-component for component in of_parent]}
-
-
 def _axes_at(model: Any, state: Any, coordinate: str, frames: Sequence[Any], angle: float) -> list[list[float]]:
     """Return the axis in each frame, with the coordinate at an angle [rad] and nothing else in motion."""
     coordinates = model.getCoordinateSet()
@@ -170,14 +166,6 @@ def _axes_at(model: Any, state: Any, coordinate: str, frames: Sequence[Any], ang
     ]
 
 
-def _quiet() -> None:
-    """Else OpenSim leaves a file opensim.log, and lines about every component on the screen."""
-    import opensim
-
-    opensim.Logger.removeFileSink()
-    opensim.Logger.setLevelString("Error")
-
-
 def main(words: Sequence[str] | None = None) -> int:
     """Read model and torque, and write the model with the device; returns the exit code."""
     parser = argparse.ArgumentParser(description="Put the torque of a device into a model of OpenSim.")
@@ -189,7 +177,11 @@ def main(words: Sequence[str] | None = None) -> int:
     parsed = parser.parse_args(words)
     try:
         name, times, torques = read_torque(parsed.torque)
-        _quiet()
+        # Else OpenSim leaves a file opensim.log, and lines about every component on the screen.
+        import opensim
+
+        opensim.Logger.removeFileSink()
+        opensim.Logger.setLevelString("Error")
         model = read_model(parsed.model)
         coordinate = parsed.coordinate or name.removesuffix(SUFFIX)
         check_coordinate(model, coordinate)

@@ -259,7 +259,9 @@ def _axes(
         return "x", "z", ()
     apart = at_knee - at_ankle
     up = int(np.argmax(np.abs(np.nanmean(apart, axis=1)) - 2.0 * np.nanstd(apart, axis=1)))
-    way = _way(at_ankle)
+    # How far a point went, (3,), from where it is first seen to where it is last seen.
+    seen = np.flatnonzero(np.isfinite(at_ankle).all(axis=0))
+    way = at_ankle[:, seen[-1]] - at_ankle[:, seen[0]] if seen.size else np.zeros(3)
     pointing = _pointing(table, foot, labels)
     if np.hypot(*np.delete(way, up)) < _LEAST_WAY * _per_metre(table, ankle):
         if pointing is None:
@@ -294,12 +296,6 @@ def _pointing(table: MotionTable, foot: str, labels: Sequence[str]) -> Floats | 
     apart = at_toe - at_heel
     seen = np.isfinite(apart).all(axis=0)
     return np.asarray(apart[:, seen].mean(axis=1)) if seen.any() else None
-
-
-def _way(point: Floats) -> Floats:
-    """Return how far a point went, (3,), from where it is first seen to where it is last seen."""
-    seen = np.flatnonzero(np.isfinite(point).all(axis=0))
-    return point[:, seen[-1]] - point[:, seen[0]] if seen.size else np.zeros(3)
 
 
 def _per_metre(table: MotionTable, label: str) -> float:

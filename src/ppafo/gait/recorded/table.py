@@ -83,7 +83,12 @@ def read_c3d(path: str | Path) -> C3dFile:
     Analog channels are faster; the samples at the times of the points are taken. Where a point was not seen it is NaN,
     for whoever uses the column to fill or refuse. The clock is that of the trial, which may begin before the file.
     """
-    _check_is_c3d(path)
+    try:
+        import ezc3d  # noqa: F401  # its absence is reported before the file is looked at
+    except ImportError as error:
+        raise DataError(f"{path}: C3D files need ezc3d; install it with 'pip install ppafo[c3d]'") from error
+    if read_bytes(path)[1:2] != _MARK:
+        raise DataError(f"{path}: is not a C3D file")
     check_can_be_read(Path(path), __name__, "open_c3d", "ezc3d")
     content = open_c3d(path)
     parameters: Any = content["parameters"]
@@ -105,15 +110,6 @@ def read_c3d(path: str | Path) -> C3dFile:
         columns[name], units[name] = values, "N"
     first = max(0, int(content["header"]["points"].get("first_frame", 0)))
     return C3dFile((first + np.arange(frames)) / rate, columns, units, _trial(parameters))
-
-
-def _check_is_c3d(path: str | Path) -> None:
-    try:
-        import ezc3d  # noqa: F401  # its absence is reported before the file is looked at
-    except ImportError as error:
-        raise DataError(f"{path}: C3D files need ezc3d; install it with 'pip install ppafo[c3d]'") from error
-    if read_bytes(path)[1:2] != _MARK:
-        raise DataError(f"{path}: is not a C3D file")
 
 
 def open_c3d(path: str | Path) -> Any:
@@ -307,7 +303,20 @@ def read_table(
         raise DataError(f"{table.file}: has {table.time.size} rows; a stride needs several tens")
     low = float(table.time[0] if start is None else start)
     high = float(table.time[-1] if end is None else end)
-    table = _bridge_gaps(table, longest_gap, low, high)
+    # The table with a remark on rows missing between two times [s]; DataError where for too long.
+    steps = np.diff(table.time)
+    median = float(np.median(steps))
+    seen = (table.time[:-1] >= low) & (table.time[1:] <= high)
+    jumps = np.flatnonzero(seen & (steps > _LARGEST_JUMP * median)).tolist()
+    for index in jumps:
+        if steps[index] > longest_gap + 1.5 * median:
+            raise DataError(
+                f"{table.file}: the time jumps in row {index + 2} from {table.time[index]:g} s to "
+                f"{table.time[index + 1]:g} s, the usual interval is {median:.3g} s; cut the file there or fill the gap"
+                " (--start, --end, --fill-gaps)"
+            )
+    said = [f"rows from {table.time[i]:g} to {table.time[i + 1]:g} s are missing and were bridged" for i in jumps]
+    table = replace(table, remarks=(*table.remarks, *said))
     inside = (table.time >= low) & (table.time <= high)
     if not inside.any():
         raise DataError(
@@ -358,23 +367,6 @@ def _of_csv(path: str | Path) -> MotionTable:
     columns = {name: recording[name] for name in recording.names}
     units = {name: recording.unit(name) for name in recording.names}
     return MotionTable(str(path), CSV, recording.time, columns, units, recording.kind)
-
-
-def _bridge_gaps(table: MotionTable, longest: float, low: float, high: float) -> MotionTable:
-    """Return the table with a remark on rows missing between two times [s]; DataError where for too long."""
-    steps = np.diff(table.time)
-    median = float(np.median(steps))
-    seen = (table.time[:-1] >= low) & (table.time[1:] <= high)
-    jumps = np.flatnonzero(seen & (steps > _LARGEST_JUMP * median)).tolist()
-    for index in jumps:
-        if steps[index] > longest + 1.5 * median:
-            raise DataError(
-                f"{table.file}: the time jumps in row {index + 2} from {table.time[index]:g} s to "
-                f"{table.time[index + 1]:g} s, the usual interval is {median:.3g} s; cut the file there or fill the gap"
-                " (--start, --end, --fill-gaps)"
-            )
-    said = [f"rows from {table.time[i]:g} to {table.time[i + 1]:g} s are missing and were bridged" for i in jumps]
-    return replace(table, remarks=(*table.remarks, *said))
 
 
 _DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab"}

@@ -121,11 +121,6 @@ def digest(result: BatchResult) -> str:
     return _hash((result.states, result.record))
 
 
-def rows_digest(batch: Batch) -> str:
-    """Return the hash of the rows that a plan made."""
-    return _hash((batch.parameters, batch.states))
-
-
 def _hash(arrays: tuple[NDArray[np.float64], ...]) -> str:
     found = hashlib.sha256()
     for values in arrays:
@@ -146,8 +141,9 @@ def hashes_of(name: str, run: Callable[[Batch], Runner], draws: int = DRAWS) -> 
     batch = plain_batch(name)
     runner = run(batch)
     drawn = runner(drawn_batch(batch, draws))
+    # The hash of the rows that a plan made.
     return {
-        "rows": rows_digest(batch),
+        "rows": _hash((batch.parameters, batch.states)),
         "run": digest(runner(batch)),
         "draws": digest(drawn),
         "failed": failures(drawn),

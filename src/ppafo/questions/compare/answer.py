@@ -245,11 +245,6 @@ def has_errors(comparison: Comparison) -> bool:
     return _ERROR in comparison.metrics
 
 
-def has_changes(comparison: Comparison) -> bool:
-    """Tell whether there are draws whose changes can be drawn."""
-    return comparison.draws > 0 and has_errors(comparison)
-
-
 def pareto_figure(comparison: Comparison) -> "matplotlib.figure.Figure":
     """Return error against gas, a panel for each task."""
     tasks = list(comparison.tasks)
@@ -366,7 +361,8 @@ def answer_of(comparison: Comparison) -> Answer:
     if has_errors(comparison):
         drawn = Figure("pareto", pareto, lambda: pareto_figure(comparison))
         sections.append(Section("Error against gas", figure=drawn, is_detail=True))
-    if has_changes(comparison):
+    # Whether there are draws whose changes can be drawn.
+    if comparison.draws > 0 and has_errors(comparison):
         drawn = Figure("change", change, lambda: change_figure(comparison))
         sections.append(Section("Spread of the change", figure=drawn, is_detail=True))
     return Answer(
@@ -402,7 +398,8 @@ def _task_sections(comparison: Comparison, task: str) -> list[Section]:
         (case.configuration, *(_value(case, name) for name in comparison.metrics), case.status.kind)
         for case in comparison.of_task(task)
     )
-    head = tuple(map(Column, paired_head(comparison)))
+    # The head of the table of pairs: with the fraction of noise where a controller receives any.
+    head = tuple(map(Column, (*_PAIRED_HEAD, "spread due to noise") if _has_noise(comparison) else _PAIRED_HEAD))
     where = "" if len(comparison.tasks) == 1 else f", {task}"
     paired = {name: paired_rows(comparison, task, name) for name in _others(comparison)}
     best = tuple(f"best: {text}" for text in best_sentences(comparison, task))
@@ -448,11 +445,6 @@ def lead(comparison: Comparison) -> str:
         f"{words}; {comparison.draws:,} draws of {values}{noise}, the same for all; "
         f"each interval with {100.0 * comparison.confidence:g} % confidence"
     )
-
-
-def paired_head(comparison: Comparison) -> Sequence[str]:
-    """Return the head of the table of pairs: with the fraction of noise where a controller receives any."""
-    return (*_PAIRED_HEAD, "spread due to noise") if _has_noise(comparison) else _PAIRED_HEAD
 
 
 def paired_rows(comparison: Comparison, task: str, configuration: str) -> list[list[str]]:

@@ -83,7 +83,9 @@ def compare(
         for task, texts in wanted.items()
         for item in chosen
     ]
-    metrics = common_metrics([place.scenario for place in placed])
+    # Those metrics of the table that all scenarios can have: without a reference there is no error.
+    scenarios = [place.scenario for place in placed]
+    metrics = tuple(name for name in COMPARED if not any(lacking(scenario, METRICS[name]) for scenario in scenarios))
     drawing = _drawing(known, placed, draws, seed, check_fraction(maximum_failed, "maximum_failed"))
     outcomes = (
         _outcomes(placed, metrics, drawing, threads, progress) if drawing is not None else [_UNDRAWN] * len(placed)
@@ -113,11 +115,6 @@ def _tasks(tasks: Mapping[str, Sequence[str]] | Sequence[tuple[str, Sequence[str
     if repeated is not None:
         raise StudyError(f"there are two tasks named '{repeated}'; give each its own name")
     return {name: tuple(texts) for name, texts in pairs}
-
-
-def common_metrics(scenarios: list[Scenario]) -> tuple[str, ...]:
-    """Return those metrics of the table that all scenarios can have: without a reference there is no error."""
-    return tuple(name for name in COMPARED if not any(lacking(scenario, METRICS[name]) for scenario in scenarios))
 
 
 _SAME = 1.0e-9
@@ -152,20 +149,6 @@ def _drawing(
     return _Drawing(study, uncertainty, draws, usual if seed is None else seed, maximum_failed)
 
 
-def _check_set_or_drawn(placed: Sequence[ConfiguredTask], study: Study) -> None:
-    """Refuse cases that differ in a value that the study draws for all of them: the difference would not count."""
-    shared = [path for path in study.paths if not path.startswith("valve.") and path != NOISE]
-    for path in shared:
-        places = [place for place in placed if study.varies(path, place.configuration)]
-        values = [value for place in places if (value := _value_at(path, place.scenario)) is not None]
-        lowest, highest = min(values, default=0.0), max(values, default=0.0)
-        if highest - lowest > _SAME * max(abs(lowest), abs(highest)):
-            raise StudyError(
-                f"the study draws '{path}' for every configuration, so the different values of the configurations "
-                f"({lowest:.6g} and {highest:.6g} in SI units) would be ignored; use a study that does not draw it"
-            )
-
-
 def _value_at(path: str, scenario: Scenario) -> float | None:
     try:
         return number_at(scenario, path)
@@ -182,7 +165,17 @@ def _outcomes(
 ) -> list[tuple[Outcomes, Outcomes | None]]:
     """Return the runs of every case, all over the same draws, and the first of them again with other noise."""
     if drawing.study is not None:
-        _check_set_or_drawn(placed, drawing.study)
+        # Refuse cases that differ in a value that the study draws for all of them: the difference would not count.
+        shared = [path for path in drawing.study.paths if not path.startswith("valve.") and path != NOISE]
+        for path in shared:
+            places = [place for place in placed if drawing.study.varies(path, place.configuration)]
+            values = [value for place in places if (value := _value_at(path, place.scenario)) is not None]
+            lowest, highest = min(values, default=0.0), max(values, default=0.0)
+            if highest - lowest > _SAME * max(abs(lowest), abs(highest)):
+                raise StudyError(
+                    f"the study draws '{path}' for every configuration, so the different values of the configurations "
+                    f"({lowest:.6g} and {highest:.6g} in SI units) would be ignored; use a study that does not draw it"
+                )
     columns = drawing.uncertainty.replicated_columns(0, drawing.draws, drawing.seed)
     again = with_new_noise(columns, NOISE_DRAWS) if drawing.uncertainty.has_noise else {}
     tally = Tally((drawing.draws + (min(NOISE_DRAWS, drawing.draws) if again else 0)) * len(placed), progress)

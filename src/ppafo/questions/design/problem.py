@@ -108,18 +108,14 @@ def read_variables(
     for path, table in tables.items():
         place = f"{file}: variables.'{path}'"
         _check_path(path, known, valves, place)
-        kinds = _kinds(path, scenarios)
+        # The kinds of valve whose scenarios have a number, none where all of them do.
+        having = {
+            kind: path in OWN or any(path in declared_numbers(scenario) for scenario in of_kind)
+            for kind, of_kind in scenarios.items()
+        }
+        kinds = () if all(having.values()) else tuple(kind for kind, has in having.items() if has)
         found.append(replace(_variable(path, table, known[path], atmosphere, place), kinds=kinds))
     return tuple(found)
-
-
-def _kinds(path: str, scenarios: Mapping[str, Sequence[Scenario]]) -> tuple[str, ...]:
-    """Return the kinds of valve whose scenarios have a number, none where all of them do."""
-    having = {
-        kind: path in OWN or any(path in declared_numbers(scenario) for scenario in of_kind)
-        for kind, of_kind in scenarios.items()
-    }
-    return () if all(having.values()) else tuple(kind for kind, has in having.items() if has)
 
 
 def _check_path(path: str, known: Mapping[str, Quantity], valves: Sequence[Part], place: str) -> None:
@@ -292,7 +288,8 @@ class DesignProblem:
     def parts(self) -> tuple[Part, ...]:
         """All parts that any design may have, each once."""
         chosen = [part for item in self.combinations for part in (item.valve, item.actuator)]
-        return _each_once([*chosen, *self.carried])
+        parts = [*chosen, *self.carried]
+        return tuple({(part.group, part.name): part for part in parts}.values())
 
 
 def load_design(name_or_path: str | Path, seed: int | None = None) -> DesignProblem:
@@ -349,10 +346,6 @@ def with_seed(problem: DesignProblem, seed: int) -> DesignProblem:
     if not 0 <= seed <= LARGEST_SEED:
         raise StudyError(f"seed = {seed}: must be a whole number from 0 to {LARGEST_SEED}")
     return replace(problem, search=problem.search.model_copy(update={"seed": seed}))
-
-
-def _each_once(parts: Sequence[Part]) -> tuple[Part, ...]:
-    return tuple({(part.group, part.name): part for part in parts}.values())
 
 
 def _combinations(parts: PartsTable, catalogue: Catalogue) -> tuple[Combination, ...]:

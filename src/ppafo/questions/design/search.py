@@ -291,14 +291,11 @@ def search_front(
         if box is None:
             box = _box(worth)
         growth.append((growth[-1][0] + len(children), _dominated_fraction(worth, box)))
-        progress(_progress(growth, settings, time.monotonic() - begun))
+        elapsed = time.monotonic() - begun
+        designs, fraction = growth[-1]
+        most = settings.screening + settings.generations * settings.population
+        progress(Progress(f"hypervolume {fraction:.2f}", designs, most, elapsed=elapsed, noun="designs"))
     return Front(found, worth, tuple(growth), _has_settled(growth, settings.tolerance))
-
-
-def _progress(growth: list[tuple[int, float]], settings: SearchTable, elapsed: float) -> Progress:
-    designs, fraction = growth[-1]
-    most = settings.screening + settings.generations * settings.population
-    return Progress(f"hypervolume {fraction:.2f}", designs, most, elapsed=elapsed, noun="designs")
 
 
 def survivors_of_many(worth: Worth, count: int) -> NDArray[np.intp]:

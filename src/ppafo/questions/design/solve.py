@@ -157,11 +157,7 @@ class Evaluation:
             for values in series:
                 beyond = _excess(values, item.most, 1.0) + _excess(values, item.least, -1.0)
                 total += beyond.max(axis=0)
-        total += self._over_rating(candidates)
-        return np.where(np.isfinite(objectives).all(axis=1) & np.isfinite(total), total, np.inf)
-
-    def _over_rating(self, candidates: Candidates) -> Floats:
-        """Return by what fraction (candidates,) the highest supply pressure is above what the parts are made for."""
+        # By what fraction (candidates,) the highest supply pressure is above what the parts are made for.
         problem = self.problem
         ratings = np.array(
             [
@@ -179,7 +175,8 @@ class Evaluation:
                 found = moving_together(scenario, {path: chosen[path] for path in SUPPLIES if path in chosen})
                 for path in SUPPLIES[:2]:
                     highest = np.maximum(highest, found.get(path, number_at(scenario, path)))
-        return np.asarray(np.maximum(0.0, highest / ratings - 1.0))
+        total += np.asarray(np.maximum(0.0, highest / ratings - 1.0))
+        return np.where(np.isfinite(objectives).all(axis=1) & np.isfinite(total), total, np.inf)
 
 
 def _excess(values: Floats, limit: float | None, sign: float) -> Floats:

@@ -165,14 +165,6 @@ class Steps:
         return np.asarray(np.max(np.abs(self.lanes), axis=1))
 
 
-def can_be_stepped(model: LinearModel) -> bool:
-    """True for a steady state of a held ankle whose valve follows at once and is open: the lanes can begin there."""
-    motion = model.scenario.motion
-    is_held = isinstance(motion, PrescribedMotion) and motion.profile.kind == "constant"
-    is_gas_alone = all(item.name.startswith("pressure") for item in model.states)
-    return model.is_steady and is_held and is_gas_alone and 0.0 < abs(_value(model, "command")) < 0.7
-
-
 def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> Steps:
     """Steps of the command by some shares of the command of the steady state."""
     command = _value(model, "command")
@@ -315,7 +307,11 @@ def answer_of(model: LinearModel) -> Answer:
             )
         ],
     ]
-    if can_be_stepped(model):
+    # True for a steady state of a held ankle whose valve follows at once and is open: the lanes can begin there.
+    motion = model.scenario.motion
+    is_held = isinstance(motion, PrescribedMotion) and motion.profile.kind == "constant"
+    is_gas_alone = all(item.name.startswith("pressure") for item in model.states)
+    if model.is_steady and is_held and is_gas_alone and 0.0 < abs(_value(model, "command")) < 0.7:
         drawn = Figure("steps", _STEPS_CAPTION, lambda: steps_figure(model))
         sections.append(Section("How far it holds", figure=drawn))
     size = f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"

@@ -177,17 +177,6 @@ def without_slew_limit(run: Run) -> Run:
     return replace(run, valve=run.valve._replace(slew_limit=NO_SLEW_LIMIT)) if is_limited else run
 
 
-def answers_to_command(run: Run) -> bool:
-    """False for a valve that is on or off: no small change of the command changes its openings or its movement."""
-    import casadi
-
-    command = casadi.SX.sym("command")
-    start = leaves(run.program.valve.initial())
-    openings, moves = _valve(without_slew_limit(run), start, command, both_sides)
-    slopes = casadi.Function("slopes", [command], [casadi.jacobian(casadi.vertcat(*openings, *moves), command)])
-    return any(abs(slope) > 0.0 for value in (-0.5, 0.5) for slope in slopes(value).nonzeros())
-
-
 STEADY = 1.0e-9
 """Largest rate of a state [1/s], over the size of the state, that counts as none."""
 FIRST_COMMANDS = (0.01, 0.1, 0.003, 0.03, 0.3, 1.0)
@@ -347,7 +336,15 @@ class _Search:
             step = np.linalg.lstsq(slopes * self._sizes, -residual, rcond=None)[0] * self._sizes
             share = 1.0
             while share > 1.0e-6:
-                tried = self._moved(values, share * step)
+                # Values after a step, pressures at least half of what they were, the command within -1 to 1.
+                moved = dict(values)
+                for name, change in zip(self._names, (share * step).tolist(), strict=True):
+                    moved[name] = values[name] + change
+                    if name.startswith(("pressure", "temperature")):
+                        moved[name] = max(moved[name], 0.5 * values[name])
+                    if name == "command":
+                        moved[name] = min(max(moved[name], -1.0), 1.0)
+                tried = moved
                 residual, slopes = self._at(tried)
                 if np.isfinite(residual).all() and float(np.max(np.abs(residual))) < largest:
                     break
@@ -356,17 +353,6 @@ class _Search:
                 return None
             values = tried
         return None
-
-    def _moved(self, values: Mapping[str, float], step: Floats) -> dict[str, float]:
-        """Values after a step, pressures at least half of what they were, the command within -1 to 1."""
-        moved = dict(values)
-        for name, change in zip(self._names, step.tolist(), strict=True):
-            moved[name] = values[name] + change
-            if name.startswith(("pressure", "temperature")):
-                moved[name] = max(moved[name], 0.5 * values[name])
-            if name == "command":
-                moved[name] = min(max(moved[name], -1.0), 1.0)
-        return moved
 
     def _at(self, values: Mapping[str, float]) -> tuple[Floats, Floats]:
         residual, slopes = (np.array(item) for item in self._residual(values))
@@ -381,12 +367,6 @@ def _settled(run: Run, values: Mapping[str, float]) -> Any:
     """State of the valve after the changes that it makes at once."""
     state: Any = rebuilt(run.program.valve.state, [values[name] for name in valve_states(run.program)])
     return run.program.valve.settle(run.valve, state, values["command"], 0.0)
-
-
-def openings_at(run: Run, values: Mapping[str, float]) -> Openings:
-    """Openings of the valve [-] at a point."""
-    found: Openings = run.program.valve.instant(run.valve, _settled(run, values), values["command"])
-    return found
 
 
 def _no_equilibrium(
@@ -429,7 +409,14 @@ def linearise(
     if chosen.supply_lines is not None:
         raise ScenarioError(f"{chosen.name}: linear models are for constant supplies; omit [supply_line]")
     chosen.device.check_vane("a linear model")
-    if not answers_to_command(run):
+    # False for a valve that is on or off: no small change of the command changes its openings or its movement.
+    import casadi
+
+    command = casadi.SX.sym("command")
+    start = leaves(run.program.valve.initial())
+    openings, moves = _valve(without_slew_limit(run), start, command, both_sides)
+    slopes = casadi.Function("slopes", [command], [casadi.jacobian(casadi.vertcat(*openings, *moves), command)])
+    if not any(abs(slope) > 0.0 for value in (-0.5, 0.5) for slope in slopes(value).nonzeros()):
         raise ScenarioError(
             f"{chosen.name}: valve '{chosen.device.valve_name}' is on or off: its flow has no derivative by the "
             "command; set device.valve to one that opens in proportion"
@@ -539,7 +526,9 @@ def _differs(one: Floats, other: Floats) -> bool:
 
 def sides_of(run: Run, point: Point) -> dict[str, str]:
     """Which side of each limit the point lies on, in words by place."""
-    at, plant, openings = point.values, run.plant, openings_at(run, point.values)
+    # Openings of the valve [-] at a point.
+    found: Openings = run.program.valve.instant(run.valve, _settled(run, point.values), point.values["command"])
+    at, plant, openings = point.values, run.plant, found
     room, first, second = plant.atmospheric_pressure, at["pressure_1"], at["pressure_2"]
     paths = {
         "source to chamber 1": (at["supply_pressure"], first, openings.source_1),

@@ -264,37 +264,33 @@ def sensitivity_figure(found: Sensitivity) -> "matplotlib.figure.Figure":
     with house_style():
         figure, grid = figure_of_free_panels((_WIDTH, height), margins, rows, 2)
         for metric, (bars, course) in zip(found.metrics, grid, strict=True):
-            _draw_indices(bars, found, metric)
+            shown = found.method.shown
+            order = np.argsort(metric.indices.values[shown[0]])
+            places = np.arange(order.size)
+            for name, colour, shift in zip(shown, (BLUE, ORANGE), (0.14, -0.14), strict=False):
+                values = _in_display_unit(found, metric, metric.indices.values[name])[order]
+                band = metric.indices.bands.get(name)
+                reach = None if band is None else _in_display_unit(found, metric, band)[order]
+                bars.errorbar(
+                    values,
+                    places + shift,
+                    xerr=reach,
+                    fmt="o",
+                    color=colour,
+                    markersize=5,
+                    elinewidth=1.4,
+                    label=_TITLES[name].removesuffix(" of effect"),
+                )
+            bars.set_yticks(places, [found.paths[row] for row in order])
+            for label, colour in zip(reversed(bars.get_yticklabels()), COLOURS[:_MAXIMUM_LINES], strict=False):
+                label.set_color(colour)
+            bars.axvline(0.0, color="#9a9a9a", linewidth=0.8)
+            bars.set_xlabel(_unit(found, metric))
+            bars.set_title(metric.metric)
+            bars.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1, handlelength=1.0)
             _draw_settling(course, found, metric)
         mark_kind(figure, "simulated")
         return figure
-
-
-def _draw_indices(axes: "Axes", found: Sensitivity, metric: OfMetric) -> None:
-    shown = found.method.shown
-    order = np.argsort(metric.indices.values[shown[0]])
-    places = np.arange(order.size)
-    for name, colour, shift in zip(shown, (BLUE, ORANGE), (0.14, -0.14), strict=False):
-        values = _in_display_unit(found, metric, metric.indices.values[name])[order]
-        band = metric.indices.bands.get(name)
-        reach = None if band is None else _in_display_unit(found, metric, band)[order]
-        axes.errorbar(
-            values,
-            places + shift,
-            xerr=reach,
-            fmt="o",
-            color=colour,
-            markersize=5,
-            elinewidth=1.4,
-            label=_TITLES[name].removesuffix(" of effect"),
-        )
-    axes.set_yticks(places, [found.paths[row] for row in order])
-    for label, colour in zip(reversed(axes.get_yticklabels()), COLOURS[:_MAXIMUM_LINES], strict=False):
-        label.set_color(colour)
-    axes.axvline(0.0, color="#9a9a9a", linewidth=0.8)
-    axes.set_xlabel(_unit(found, metric))
-    axes.set_title(metric.metric)
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1, handlelength=1.0)
 
 
 def _draw_settling(axes: "Axes", found: Sensitivity, metric: OfMetric) -> None:
@@ -340,12 +336,44 @@ def answer_of(found: Sensitivity) -> Answer:
             *(_metric_section(found, metric) for metric in found.metrics),
             Section("Indices and their convergence", figure=figure, is_detail=True),
         ),
-        data=_data(found),
+        data={
+            "study": found.name,
+            "method": found.method.name,
+            "settings": plain(found.settings),
+            "paths": list(found.paths),
+            "runs": found.runs,
+            "failed": found.failures,
+            "policy": "above the maximum fraction refused; below, every block with a failed run is left out",
+            "metrics": [
+                {
+                    "metric": metric.metric,
+                    "mean": metric.mean,
+                    "standard_deviation": metric.sd,
+                    "runs_without_value": metric.dropped_runs,
+                    "settling": [
+                        {
+                            "blocks": each.blocks,
+                            "used": each.used,
+                            "indices": {name: plain(values.tolist()) for name, values in each.indices.values.items()},
+                            "bands": {name: plain(values.tolist()) for name, values in each.indices.bands.items()},
+                        }
+                        for each in metric.settling
+                    ],
+                }
+                for metric in found.metrics
+            ],
+        },
     )
 
 
 def _metric_section(found: Sensitivity, metric: OfMetric) -> Section:
-    head = tuple(map(Column, table_head(found, metric)))
+    # The head of the table of a metric.
+    unit = display_unit(metric_quantity(metric.metric)) if found.method.name == "morris" else ""
+    names = []
+    for name in metric.indices.values:
+        names.append(f"{_TITLES[name]} ({unit})" if unit else _TITLES[name])
+        names += ["band"] if name in metric.indices.bands else []
+    head = tuple(map(Column, ["value", *names]))
     rows = tuple(map(tuple, table_rows(found, metric)))
     return Section(heading(found, metric), table=Table(head, rows), remarks=tuple(remarks(found, metric)))
 
@@ -366,16 +394,6 @@ def heading(found: Sensitivity, metric: OfMetric) -> str:
     spread = f"sd {change_text(metric.sd, metric_quantity(metric.metric))}"
     dropped = f"; {metric.dropped_blocks:,} of {found.settings.samples:,} {found.method.sizes_label} left out"
     return f"{metric.metric}: {spread}{dropped if metric.dropped_blocks else ''}"
-
-
-def table_head(found: Sensitivity, metric: OfMetric) -> list[str]:
-    """Return the head of the table of a metric."""
-    unit = display_unit(metric_quantity(metric.metric)) if found.method.name == "morris" else ""
-    names = []
-    for name in metric.indices.values:
-        names.append(f"{_TITLES[name]} ({unit})" if unit else _TITLES[name])
-        names += ["band"] if name in metric.indices.bands else []
-    return ["value", *names]
 
 
 def table_rows(found: Sensitivity, metric: OfMetric) -> list[list[str]]:
@@ -403,36 +421,6 @@ def _interactions(indices: Indices) -> str:
     if alone + error < 1.0:
         return f"first-order indices sum to {alone:.3f} ± {error:.2g}; the rest comes from interactions"
     return f"first-order indices sum to {alone:.3f} ± {error:.2g}: interactions, if any, are within this error"
-
-
-def _data(found: Sensitivity) -> dict[str, Any]:
-    return {
-        "study": found.name,
-        "method": found.method.name,
-        "settings": plain(found.settings),
-        "paths": list(found.paths),
-        "runs": found.runs,
-        "failed": found.failures,
-        "policy": "above the maximum fraction refused; below, every block with a failed run is left out",
-        "metrics": [
-            {
-                "metric": metric.metric,
-                "mean": metric.mean,
-                "standard_deviation": metric.sd,
-                "runs_without_value": metric.dropped_runs,
-                "settling": [
-                    {
-                        "blocks": each.blocks,
-                        "used": each.used,
-                        "indices": {name: plain(values.tolist()) for name, values in each.indices.values.items()},
-                        "bands": {name: plain(values.tolist()) for name, values in each.indices.bands.items()},
-                    }
-                    for each in metric.settling
-                ],
-            }
-            for metric in found.metrics
-        ],
-    }
 
 
 def _cells(found: Sensitivity, metric: OfMetric, row: int) -> list[str]:

@@ -156,35 +156,32 @@ def sizing_figure(sizing: Sizing) -> "matplotlib.figure.Figure":
         figure = matplotlib.figure.Figure(figsize=_SIZE)
         figure.subplots_adjust(left=0.08, right=0.98, bottom=0.085, top=0.92, wspace=0.22, hspace=0.52)
         grid = figure.add_gridspec(2, 2)
-        _torque(figure.add_subplot(grid[0, :]), sizing)
+        axes = figure.add_subplot(grid[0, :])
+        problem = sizing.problem
+        time = np.linspace(0.0, problem.scenario.duration, 3001)
+        axes.plot(
+            time,
+            problem.profile.at(time),
+            color=REFERENCE.colour,
+            linestyle=REFERENCE.line,
+            linewidth=1.2,
+            label="prescribed",
+        )
+        title = "Torque (N m)"
+        if sizing.recording is not None and sizing.choice is not None:
+            axes.plot(
+                sizing.recording.time, sizing.recording["torque"], color=ACTUAL.colour, label=sizing.choice.valve.name
+            )
+            pressure = display_value(sizing.choice.pressure, "pressure")
+            title += f", {sizing.choice.valve.name} at {pressure:.1f} {axis_unit('pressure')}"
+        axes.set_title(f"$\\bf{{A}}$   {title}", pad=18)
+        axes.set_xlabel("Time (s)")
+        axes.margins(x=0.0)
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1, handlelength=1.6)
         _errors(figure.add_subplot(grid[1, 0]), sizing)
         _gas(figure.add_subplot(grid[1, 1]), sizing)
         mark_kind(figure, "simulated")
     return figure
-
-
-def _torque(axes: "Axes", sizing: Sizing) -> None:
-    problem = sizing.problem
-    time = np.linspace(0.0, problem.scenario.duration, 3001)
-    axes.plot(
-        time,
-        problem.profile.at(time),
-        color=REFERENCE.colour,
-        linestyle=REFERENCE.line,
-        linewidth=1.2,
-        label="prescribed",
-    )
-    title = "Torque (N m)"
-    if sizing.recording is not None and sizing.choice is not None:
-        axes.plot(
-            sizing.recording.time, sizing.recording["torque"], color=ACTUAL.colour, label=sizing.choice.valve.name
-        )
-        pressure = display_value(sizing.choice.pressure, "pressure")
-        title += f", {sizing.choice.valve.name} at {pressure:.1f} {axis_unit('pressure')}"
-    axes.set_title(f"$\\bf{{A}}$   {title}", pad=18)
-    axes.set_xlabel("Time (s)")
-    axes.margins(x=0.0)
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1, handlelength=1.6)
 
 
 def _errors(axes: "Axes", sizing: Sizing) -> None:

@@ -83,7 +83,27 @@ def compute_chunk(task: Task, number: int) -> tuple[Finished, Files]:
     study, part = task.study, chunk(task.study, number)
     values = drawn_values(study, np.arange(part.first, part.first + part.runs))
     result = _result(study, part, values, task.threads)
-    tables = {RUNS_FOLDER: runs_table(study, part, values, result)}
+    # A row for every run: number, configuration, varied values, status, metrics; SI units, nan where none.
+    configuration = study.configurations[part.configuration]
+    name = configuration.name
+    own = absolute(configuration.scenario, varied_columns(study, configuration, dict(values)), study.gauge)
+    names = [item.name for item in study.configurations]
+    columns = {
+        "run": TableColumn(_numbers(study, part), _PLAIN, "number of the run in the study"),
+        "configuration": TableColumn(
+            encode_texts(np.full(part.runs, part.configuration), names), _PLAIN, "name of the base scenario"
+        ),
+    }
+    for path, column in values.items():
+        given = own.get(path, column) if study.varies(path, name) else np.full(part.runs, np.nan)
+        columns[path] = TableColumn(given, study.units[path], "varied value")
+    columns["status"] = TableColumn(encode_texts(result.status, STATUSES), _PLAIN, "how the run ended")
+    columns["failure_time"] = TableColumn(result.failure_time, "s", "time at which the run diverged")
+    columns["reason"] = TableColumn(texts_of_some(result.reasons, part.runs), _PLAIN, "why the run has no metrics")
+    for metric in study.outputs.metrics:
+        computed = result.metrics.get(metric, np.full(part.runs, np.nan))
+        columns[metric] = TableColumn(computed, stored_unit(METRICS[metric].unit), METRICS[metric].summary)
+    tables = {RUNS_FOLDER: table_of(columns, chunk_facts(study, part))}
     if study.outputs.trajectories:
         tables[TRAJECTORIES_FOLDER] = trajectories_table(study, part, result)
     if study.outputs.bands:
@@ -175,30 +195,6 @@ def stored_unit(unit: str) -> str:
     What metrics and channels call Pa is absolute.
     """
     return "Pa_a" if unit == "Pa" else unit
-
-
-def runs_table(study: Study, chunk: Chunk, values: Mapping[str, Floats], result: EnsembleResult) -> "pa.Table":
-    """Return a row for every run: number, configuration, varied values, status, metrics; SI units, nan where none."""
-    configuration = study.configurations[chunk.configuration]
-    name = configuration.name
-    own = absolute(configuration.scenario, varied_columns(study, configuration, dict(values)), study.gauge)
-    names = [item.name for item in study.configurations]
-    columns = {
-        "run": TableColumn(_numbers(study, chunk), _PLAIN, "number of the run in the study"),
-        "configuration": TableColumn(
-            encode_texts(np.full(chunk.runs, chunk.configuration), names), _PLAIN, "name of the base scenario"
-        ),
-    }
-    for path, column in values.items():
-        given = own.get(path, column) if study.varies(path, name) else np.full(chunk.runs, np.nan)
-        columns[path] = TableColumn(given, study.units[path], "varied value")
-    columns["status"] = TableColumn(encode_texts(result.status, STATUSES), _PLAIN, "how the run ended")
-    columns["failure_time"] = TableColumn(result.failure_time, "s", "time at which the run diverged")
-    columns["reason"] = TableColumn(texts_of_some(result.reasons, chunk.runs), _PLAIN, "why the run has no metrics")
-    for metric in study.outputs.metrics:
-        computed = result.metrics.get(metric, np.full(chunk.runs, np.nan))
-        columns[metric] = TableColumn(computed, stored_unit(METRICS[metric].unit), METRICS[metric].summary)
-    return table_of(columns, chunk_facts(study, chunk))
 
 
 def trajectories_table(study: Study, chunk: Chunk, result: EnsembleResult) -> "pa.Table":

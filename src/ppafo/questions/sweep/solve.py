@@ -77,27 +77,6 @@ Parts = Callable[[], Iterator[Floats]]
 """Gives the finite values of a column anew each time, in parts whose order is always the same."""
 
 
-def summary_of(study: Study, results: StudyResults) -> dict[str, Any]:
-    """Return the content of ``summary.json``."""
-    completed = {item.name: _completed_runs(results, item.name) for item in study.configurations}
-    failed = study.runs - sum(completed.values())
-    diverged = sum(part.size for item in study.configurations for part in results.parts(item.name, "failure_time"))
-    return {
-        "study": study.name,
-        "runs": study.runs,
-        "completed": study.runs - failed,
-        "diverged": diverged,
-        "refused": failed - diverged,
-        "completed_by_configuration": completed,
-        "failures": _failures(results) if failed else [],
-        "quantile_definition": QUANTILE_DEFINITION,
-        "configurations": {
-            item.name: {metric: _metric(study, results, item.name, metric) for metric in study.outputs.metrics}
-            for item in study.configurations
-        },
-    }
-
-
 def _completed_runs(results: StudyResults, configuration: str) -> int:
     parts = results.chunks(RUNS_FOLDER, ["status"], configuration)
     return sum(int(np.count_nonzero(completed_rows(part))) for part in parts)
@@ -227,17 +206,13 @@ def _digit_counts(parts: Parts, digit: int, prefixes: set[int]) -> dict[int, NDA
     size = 1 << _DIGIT_BITS
     counts = {prefix: np.zeros(size, dtype=np.int64) for prefix in prefixes}
     for part in parts():
-        keys = _keys(part) >> shift
+        # Whole numbers in the same order as the values.
+        bits = np.ascontiguousarray(part).view(np.uint64)
+        keys = np.where(bits & _SIGN != 0, ~bits, bits | _SIGN) >> shift
         for prefix in prefixes:
             own = keys if digit == 0 else keys[(keys >> np.uint64(_DIGIT_BITS)) == np.uint64(prefix)]
             counts[prefix] += np.bincount((own & np.uint64(size - 1)).astype(np.int64), minlength=size)
     return counts
-
-
-def _keys(values: Floats) -> NDArray[np.uint64]:
-    """Return whole numbers in the same order as the values."""
-    bits = np.ascontiguousarray(values).view(np.uint64)
-    return np.where(bits & _SIGN != 0, ~bits, bits | _SIGN)
 
 
 def _number(key: int) -> float:
@@ -290,7 +265,35 @@ def sweep(
     place = place_at(kept.name if kept is not None else str(out))
     bins = _claim(chosen, place, means)
     _work(Task(chosen, bins, place.address, means.threads), place, means)
-    return replace(finish_results(chosen, place, bins), kept=kept)
+    # Write summary and bands of a study all of whose chunks are there, and return its results.
+    results = StudyResults(place, read_manifest(place), {})
+    # The content of ``summary.json``.
+    completed = {item.name: _completed_runs(results, item.name) for item in chosen.configurations}
+    failed = chosen.runs - sum(completed.values())
+    diverged = sum(part.size for item in chosen.configurations for part in results.parts(item.name, "failure_time"))
+    summary = {
+        "study": chosen.name,
+        "runs": chosen.runs,
+        "completed": chosen.runs - failed,
+        "diverged": diverged,
+        "refused": failed - diverged,
+        "completed_by_configuration": completed,
+        "failures": _failures(results) if failed else [],
+        "quantile_definition": QUANTILE_DEFINITION,
+        "configurations": {
+            item.name: {metric: _metric(chosen, results, item.name, metric) for metric in chosen.outputs.metrics}
+            for item in chosen.configurations
+        },
+    }
+    if chosen.outputs.bands:
+        content, beyond = bands_file(chosen, results, bins)
+        place.write(BANDS, content)
+        summary["bands"] = {
+            "share_beyond_bins": beyond,
+            "definition": "uniformly distributed inside each of the equal bins",
+        }
+    place.write(SUMMARY, f"{json_text(summary)}\n".encode())
+    return replace(replace(results, summary=summary), kept=kept)
 
 
 def sweep_into_folder(
@@ -332,21 +335,6 @@ def studies_of_the_package() -> list[dict[str, Any]]:
     """Return name, number of runs and description of each study that comes with the package."""
     studies = [load_study(name) for name in list_studies()]
     return [{"name": study.name, "runs": study.runs, "description": study.description} for study in studies]
-
-
-def finish_results(study: Study, place: Place, bins: BinsOf) -> StudyResults:
-    """Write summary and bands of a study all of whose chunks are there, and return its results."""
-    results = StudyResults(place, read_manifest(place), {})
-    summary = summary_of(study, results)
-    if study.outputs.bands:
-        content, beyond = bands_file(study, results, bins)
-        place.write(BANDS, content)
-        summary["bands"] = {
-            "share_beyond_bins": beyond,
-            "definition": "uniformly distributed inside each of the equal bins",
-        }
-    place.write(SUMMARY, f"{json_text(summary)}\n".encode())
-    return replace(results, summary=summary)
 
 
 def _claim(study: Study, place: Place, means: Means) -> BinsOf:
@@ -399,7 +387,25 @@ def _work(task: Task, place: Place, means: Means) -> None:
             )
     else:
         _compute_here(task, place, missing, tally.add)
-    _log(place, means, tally, time.monotonic() - started)
+    # Add a line on this session to the log.
+    elapsed = time.monotonic() - started
+    line = {
+        "ended": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+        "machine": platform.platform(),
+        "processors": os.cpu_count(),
+        "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
+        "scheduler": means.scheduler,
+        "threads": means.threads,
+        "runs": tally.done - tally.earlier,
+        "failed": tally.failed,
+        "seconds": round(elapsed, 3),
+    }
+    try:
+        with place.open(LOG) as file:
+            before = file.read()
+    except OSError:
+        before = b""
+    place.write(LOG, before + f"{json.dumps(line)}\n".encode())
 
 
 def _compute_here(task: Task, place: Place, numbers: Iterable[int], finish: Callable[[Finished], None]) -> None:
@@ -432,24 +438,3 @@ class _Tally:
         if self._report is not None:
             elapsed = time.monotonic() - self._started
             self._report(Progress("", self.done, self._runs, self.failed, self.earlier, elapsed))
-
-
-def _log(place: Place, means: Means, tally: _Tally, elapsed: float) -> None:
-    """Add a line on this session to the log."""
-    line = {
-        "ended": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
-        "machine": platform.platform(),
-        "processors": os.cpu_count(),
-        "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
-        "scheduler": means.scheduler,
-        "threads": means.threads,
-        "runs": tally.done - tally.earlier,
-        "failed": tally.failed,
-        "seconds": round(elapsed, 3),
-    }
-    try:
-        with place.open(LOG) as file:
-            before = file.read()
-    except OSError:
-        before = b""
-    place.write(LOG, before + f"{json.dumps(line)}\n".encode())

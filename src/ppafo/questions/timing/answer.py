@@ -140,7 +140,27 @@ def answer_of(timing: Timing) -> Answer:
             ),
             *_slap_sections(timing.slap),
         ),
-        data=_data(timing),
+        data={
+            "format": "ppafo timing",
+            "schema_version": 1,
+            "walk": timing.file,
+            "overrides": list(timing.overrides),
+            "minutes": timing.minutes,
+            "published": PUBLISHED,
+            "reductions": {
+                wearer: {
+                    name: {
+                        "steady": timing.reduction(wearer, name, [STEADY]),
+                        "courses": timing.reduction(wearer, name, _courses(timing)),
+                    }
+                    for name in TIMINGS
+                }
+                for wearer in WEARERS
+            },
+            "ways": [_way_data(item) for item in timing.ways],
+            "slap": None if timing.slap is None else _slap_data(timing.slap),
+            "versions": {"ppafo": __version__},
+        },
     )
 
 
@@ -245,30 +265,6 @@ def _row(item: TimedWay) -> tuple[str | float | None, ...]:
         float(sum(found.missed for found in item.events.values())),
         float(sum(found.false for found in item.events.values())),
     )
-
-
-def _data(timing: Timing) -> dict[str, Any]:
-    return {
-        "format": "ppafo timing",
-        "schema_version": 1,
-        "walk": timing.file,
-        "overrides": list(timing.overrides),
-        "minutes": timing.minutes,
-        "published": PUBLISHED,
-        "reductions": {
-            wearer: {
-                name: {
-                    "steady": timing.reduction(wearer, name, [STEADY]),
-                    "courses": timing.reduction(wearer, name, _courses(timing)),
-                }
-                for name in TIMINGS
-            }
-            for wearer in WEARERS
-        },
-        "ways": [_way_data(item) for item in timing.ways],
-        "slap": None if timing.slap is None else _slap_data(timing.slap),
-        "versions": {"ppafo": __version__},
-    }
 
 
 def _slap_data(slap: SlapStudy) -> dict[str, Any]:

@@ -111,6 +111,7 @@ def _cells(values: Floats, quantity: str, digits: int) -> list[str | None]:
 
 def _wearers_data(population: Population) -> dict[str, Any]:
     configuration = population.scenario
+    # The quantiles of outcomes and traits.
     return {
         "format": WEARERS_FORMAT,
         "schema_version": WEARERS_SCHEMA_VERSION,
@@ -131,7 +132,10 @@ def _wearers_data(population: Population) -> dict[str, Any]:
             "gait": "stride time, stance share and series coefficients by the deviations of the gait",
             "most_deviations": MAXIMUM_DEVIATIONS,
         },
-        **all_quantiles(population),
+        **{
+            "outcomes": quantiles(population.outcomes, OUTCOMES),
+            "traits": quantiles(population.traits, TRAITS),
+        },
         "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
         "configuration": walk_document(configuration),
     }
@@ -156,14 +160,6 @@ def quantiles(table: Mapping[str, Floats], numbers: Mapping[str, Number]) -> dic
             "quantiles": dict(zip(map(str, QUANTILES), _values(table[name]).tolist(), strict=False)),
         }
         for name, item in numbers.items()
-    }
-
-
-def all_quantiles(population: Population) -> dict[str, dict[str, dict[str, object]]]:
-    """Return the quantiles of outcomes and traits."""
-    return {
-        "outcomes": quantiles(population.outcomes, OUTCOMES),
-        "traits": quantiles(population.traits, TRAITS),
     }
 
 

@@ -277,7 +277,15 @@ def _band(axes: "Axes", label: str, fractions: Floats, states: tuple[State, ...]
     below = np.zeros(PHASES.size)
     for state, fraction in zip(states, fractions, strict=True):
         axes.fill_between(_PERCENT, below, below + fraction, color=state.colour, linewidth=0.0, step="mid")
-        _name_blocks(axes, state, fraction, below + 0.5 * fraction)
+        # Write the name into every block that is wide enough and holds for most strides.
+        middle = below + 0.5 * fraction
+        inside = np.flatnonzero(np.diff(np.concatenate([[0], (fraction > 0.5).astype(int), [0]])))
+        for first, last in zip(inside[::2], inside[1::2], strict=True):
+            left, right = _PERCENT[first], _PERCENT[last - 1]
+            if right - left >= _NARROWEST:
+                text, turn = (state.name, 0) if right - left >= _NARROW else (state.short, 90)
+                place = 0.5 * (left + right), float(np.mean(middle[first:last]))
+                axes.text(*place, text, ha="center", va="center", fontsize=9.0 if turn == 0 else 8.0, rotation=turn)
         below = below + fraction
     if not below.any():
         axes.text(50.0, 0.5, "no gait phases in this controller", ha="center", va="center", fontsize=9.0, color=GREY)
@@ -288,17 +296,6 @@ def _band(axes: "Axes", label: str, fractions: Floats, states: tuple[State, ...]
     axes.tick_params(axis="x", length=0.0)
     axes.set_ylabel(label, rotation=0, ha="right", va="center")
     axes.yaxis.set_label_coords(-0.012, 0.5)
-
-
-def _name_blocks(axes: "Axes", state: State, fraction: Floats, middle: Floats) -> None:
-    """Write the name into every block that is wide enough and holds for most strides."""
-    inside = np.flatnonzero(np.diff(np.concatenate([[0], (fraction > 0.5).astype(int), [0]])))
-    for first, last in zip(inside[::2], inside[1::2], strict=True):
-        left, right = _PERCENT[first], _PERCENT[last - 1]
-        if right - left >= _NARROWEST:
-            text, turn = (state.name, 0) if right - left >= _NARROW else (state.short, 90)
-            place = 0.5 * (left + right), float(np.mean(middle[first:last]))
-            axes.text(*place, text, ha="center", va="center", fontsize=9.0 if turn == 0 else 8.0, rotation=turn)
 
 
 def _legs(axes: "Axes", result: WalkResult) -> None:
@@ -379,12 +376,15 @@ def animation(comparison: Comparison) -> bytes:
                 for artist in scene.show(index):
                     scene.axes.draw_artist(artist)
             cursor.set_xdata([index / _PER_STRIDE] * 2)
-            name, colour = _valve_state(commands[index])
+            command = commands[index]
+            name, colour = _VENTED if command > VENTS_ABOVE else _VALVE[int(np.sign(command))]
             lamp.set_text(f"valve: {name}")
             lamp.get_bbox_patch().set_facecolor(colour)
             cursor.axes.draw_artist(cursor)
             cursor.axes.draw_artist(lamp)
-            images.append(_image(canvas))
+            from PIL import Image
+
+            images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").copy())
         return _gif(images, walk_of(comparison.with_device.scenario).gait.stride_time)
 
 
@@ -456,16 +456,6 @@ def _traces(axes: "Axes", result: WalkResult, turns: np.ndarray) -> None:
 def _commands(result: WalkResult, turns: np.ndarray) -> np.ndarray:
     times = turns * walk_of(result.scenario).gait.stride_time
     return result.recording["command"][np.searchsorted(result.recording.time, times, side="right") - 1]
-
-
-def _valve_state(command: float) -> tuple[str, str]:
-    return _VENTED if command > VENTS_ABOVE else _VALVE[int(np.sign(command))]
-
-
-def _image(canvas: Any) -> "Image":
-    from PIL import Image
-
-    return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").copy()
 
 
 def _together(images: "list[Image]") -> "Image":

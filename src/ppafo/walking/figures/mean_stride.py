@@ -74,24 +74,27 @@ def walk_figure(walks: Mapping[str, Strides]) -> "Figure":
     with house_style():
         figure, grid = figure_of_panels((_WIDTH, height), _MARGINS, len(_PANELS))
         for panel, (axes,) in zip(_PANELS, grid, strict=True):
-            _background(axes, first, panel)
+            fraction = 100.0 * walk_of(first.scenario).gait.stance_share
+            axes.axvspan(0.0, fraction, color=STANCE, zorder=0, linewidth=0.0)
+            if panel.level is not None:
+                axes.axhline(panel.level, color=GREY, linewidth=0.8)
+            axes.set_title(panel.title)
+            axes.locator_params(axis="y", nbins=5)
             for (name, result), colour in zip(walks.items(), (WITH, WITHOUT), strict=False):
                 _draw(axes, panel, result, name, colour)
-        _healthy(grid[0][0], grid[-1][0], first)
+        angle = grid[0][0]
+        gait = walk_of(first.scenario).gait
+        look: dict[str, Any] = {"color": HEALTHY, "linewidth": 1.2, "linestyle": (0, (1, 1.2)), "label": "healthy gait"}
+        curve = _DEGREES * clinical_angle(gait.ankle_angle.values_at(PHASES))
+        angle.plot(_PERCENT, curve, **look)
+        band = _DEGREES * gait.ankle_angle.deviation
+        angle.fill_between(_PERCENT, curve - band, curve + band, color=GREY, alpha=0.15, linewidth=0.0)
+        grid[-1][0].plot(_PERCENT, 100.0 * healthy_toe_height(first.scenario), **look)
         grid[-1][0].set_xlabel("Stride (%)")
         grid[-1][0].set_xlim(0.0, 100.0)
         _head(figure, grid[0][0], first, height)
         mark_kind(figure, first.recording.kind)
         return figure
-
-
-def _background(axes: "Axes", result: Strides, panel: _Panel) -> None:
-    fraction = 100.0 * walk_of(result.scenario).gait.stance_share
-    axes.axvspan(0.0, fraction, color=STANCE, zorder=0, linewidth=0.0)
-    if panel.level is not None:
-        axes.axhline(panel.level, color=GREY, linewidth=0.8)
-    axes.set_title(panel.title)
-    axes.locator_params(axis="y", nbins=5)
 
 
 def _draw(axes: "Axes", panel: _Panel, result: Strides, name: str, colour: str) -> None:
@@ -107,16 +110,6 @@ def _draw(axes: "Axes", panel: _Panel, result: Strides, name: str, colour: str) 
         mean, band = factor * values, factor * curves.deviation
         axes.fill_between(_PERCENT, mean - band, mean + band, color=colour, alpha=0.2, linewidth=0.0)
         axes.plot(_PERCENT, mean, color=colour, linestyle=style, label=name)
-
-
-def _healthy(angle: "Axes", toes: "Axes", result: Strides) -> None:
-    gait = walk_of(result.scenario).gait
-    look: dict[str, Any] = {"color": HEALTHY, "linewidth": 1.2, "linestyle": (0, (1, 1.2)), "label": "healthy gait"}
-    curve = _DEGREES * clinical_angle(gait.ankle_angle.values_at(PHASES))
-    angle.plot(_PERCENT, curve, **look)
-    band = _DEGREES * gait.ankle_angle.deviation
-    angle.fill_between(_PERCENT, curve - band, curve + band, color=GREY, alpha=0.15, linewidth=0.0)
-    toes.plot(_PERCENT, 100.0 * healthy_toe_height(result.scenario), **look)
 
 
 def _head(figure: "Figure", axes: "Axes", result: Strides, height: float) -> None:

@@ -98,7 +98,11 @@ def over_time_figure(result: WalkResult) -> "Figure":
         toes.plot(time, 100.0 * recording["toe_height"], color=BLUE, linewidth=0.9)
         toes.axhline(0.0, color=GREY, linewidth=0.8)
         toes.set_ylabel("Toes over\nthe ground (cm)")
-        _phases(phases, result, time)
+        phases.set_ylabel("Controller")
+        phases.set_yticks(range(len(_PHASES)), _PHASES)
+        phases.set_ylim(-0.3, len(_PHASES) - 0.7)
+        if "controller_phase" in result.recording:
+            phases.step(time, result.recording["controller_phase"], where="post", color=BLACK, linewidth=0.9)
         _levels(level, result, time)
         level.set_xlabel(f"Time ({unit})")
         level.set_xlim(0.0, float(time[-1]))
@@ -108,14 +112,6 @@ def over_time_figure(result: WalkResult) -> "Figure":
         figure.text(0.12 / width, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
         mark_kind(figure, recording.kind)
         return figure
-
-
-def _phases(axes: "Axes", result: WalkResult, time: Floats) -> None:
-    axes.set_ylabel("Controller")
-    axes.set_yticks(range(len(_PHASES)), _PHASES)
-    axes.set_ylim(-0.3, len(_PHASES) - 0.7)
-    if "controller_phase" in result.recording:
-        axes.step(time, result.recording["controller_phase"], where="post", color=BLACK, linewidth=0.9)
 
 
 def _levels(axes: "Axes", result: WalkResult, time: Floats) -> None:
@@ -168,7 +164,12 @@ def course_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
         for axes, title in zip(panels, _TITLES, strict=True):
             axes.set_title(title)
             axes.locator_params(axis="y", nbins=4)
-            _background(axes, worn)
+            # Every other segment on grey, and a line where the controller helps less.
+            for segment in worn.segments[1::2]:
+                axes.axvspan(segment.start, segment.end, color=_SHADED, zorder=0, linewidth=0.0)
+            for segment in worn.segments:
+                if segment.safe_time is not None:
+                    axes.axvline(segment.safe_time, color=_SAFE, linewidth=1.2)
         _speed(panels[0], worn)
         _both(panels[1], worn, bare)
         _forces(panels[2], worn)
@@ -182,15 +183,6 @@ def course_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
         _head(figure, worn, height)
         mark_kind(figure, worn.recording.kind)
         return figure
-
-
-def _background(axes: "Axes", worn: WalkResult) -> None:
-    """Every other segment on grey, and a line where the controller helps less."""
-    for segment in worn.segments[1::2]:
-        axes.axvspan(segment.start, segment.end, color=_SHADED, zorder=0, linewidth=0.0)
-    for segment in worn.segments:
-        if segment.safe_time is not None:
-            axes.axvline(segment.safe_time, color=_SAFE, linewidth=1.2)
 
 
 def _speed(axes: "Axes", worn: WalkResult) -> None:

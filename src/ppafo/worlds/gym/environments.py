@@ -319,7 +319,12 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
             self._ended = self._ended & ~reset
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
             reset = self._ended
-            infos |= self._final(seen, reset)
+            # What environments that begin again at once showed at their end.
+            last = np.full(self.num_envs, None, dtype=object)
+            for place in np.flatnonzero(reset):
+                last[place] = seen.observations[place].copy()
+            info = _masked({"error": seen.errors, "supplied_mass": seen.supplied}, reset)
+            infos |= {"final_obs": last, "_final_obs": reset.copy(), "final_info": info, "_final_info": reset.copy()}
         if reset.any():
             begun = self._begin(np.flatnonzero(reset))
             seen.observations[reset] = begun.observations[reset]
@@ -335,14 +340,6 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         drawn = [self._generators[place] for place in places]
         columns, _ = self.world.episodes.draw([generator for generator in drawn if generator is not None])
         return self._lanes.begin(places, columns)
-
-    def _final(self, seen: Seen, ended: Flags) -> dict[str, Any]:
-        """What environments that begin again at once showed at their end."""
-        last = np.full(self.num_envs, None, dtype=object)
-        for place in np.flatnonzero(ended):
-            last[place] = seen.observations[place].copy()
-        info = _masked({"error": seen.errors, "supplied_mass": seen.supplied}, ended)
-        return {"final_obs": last, "_final_obs": ended.copy(), "final_info": info, "_final_info": ended.copy()}
 
 
 def _masked(values: Mapping[str, Floats], there: Flags) -> dict[str, Any]:

@@ -497,21 +497,18 @@ class WalkEpisodes:
         """Return an episode for each generator; a wearer is no list of numbers, so that nothing more is told."""
         columns = _repeated(self.plain, len(generators))
         for place, generator in enumerate(generators if self.randomise else ()):
-            batch = self._wearer(generator)
+            # Two wearers: that of the configuration, and one who is drawn, with noise of his or her own.
+            seed = float(generator.integers(0, LARGEST_SEED))
+            drawn = replace(self.commanded, sensors=replace(self.commanded.sensors, seed=int(seed)))
+            build = draw_builds(2, generator)
+            gaits = draw_gaits(walk_of(self.configuration).gait, build.stature, generator)
+            batch = batch_of_many(drawn, build, gaits, generator)
             columns.parameters[:, place], columns.states[:, place] = batch.parameters[:, 1], batch.states[:, 1]
         return columns, np.zeros((0, len(generators)))
 
     def shown(self, drawn: Floats) -> Scenario:  # noqa: ARG002 - a wearer is no list of numbers
         """Return the walk before anything is drawn."""
         return self.configuration
-
-    def _wearer(self, generator: np.random.Generator) -> Batch:
-        """Two wearers: that of the configuration, and one who is drawn, with noise of his or her own."""
-        seed = float(generator.integers(0, LARGEST_SEED))
-        drawn = replace(self.commanded, sensors=replace(self.commanded.sensors, seed=int(seed)))
-        build = draw_builds(2, generator)
-        gaits = draw_gaits(walk_of(self.configuration).gait, build.stature, generator)
-        return batch_of_many(drawn, build, gaits, generator)
 
 
 def walk_episodes(configuration: Scenario, randomise: bool, seconds: float) -> WalkEpisodes:

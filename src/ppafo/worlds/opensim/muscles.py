@@ -72,34 +72,30 @@ class AnkleMuscles:
 
     def plot(self) -> "Figure":
         """Return a figure of moments and muscles; ``.savefig(...)`` writes it."""
-        return _figure(self)
+        # The figure: the moment above, the muscles that give most force below it.
+        from matplotlib.figure import Figure
 
-
-def _figure(found: AnkleMuscles) -> "Figure":
-    """Return the figure: the moment above, the muscles that give most force below it."""
-    from matplotlib.figure import Figure
-
-    before, after = found.forces[_WITHOUT], found.forces[_WITH]
-    names = sorted(before, key=lambda name: -before[name].max())[:_MUSCLES_SHOWN]
-    with house_style():
-        figure = Figure(figsize=(8.4, 2.0 + 1.7 * len(names)))
-        top, *panels = figure.subplots(1 + len(names), 1, sharex=True)
-        top.plot(found.time, found.moment[_WITHOUT], color=GREY, label="without the device")
-        top.plot(found.time, found.moment[_WITH], color=BLUE, label="with it")
-        top.plot(found.time, found.device, color=VERMILION, label="the device")
-        top.axhline(0.0, color=BLACK, linewidth=0.6)
-        top.set_ylabel("ankle moment (N m)\ndorsiflexion above 0")
-        label_lines(top)
-        for axes, name in zip(panels, names, strict=True):
-            axes.plot(found.time, before[name], color=GREY)
-            axes.plot(found.time, after[name], color=BLUE)
-            axes.set_ylim(bottom=0.0)
-            axes.set_ylabel(f"{name} (N)")
-        panels[-1].set_xlabel("time (s)")
-        figure.suptitle(f"{found.coordinate} of {found.model}, static optimisation", x=0.02, ha="left", fontsize=10)
-        mark_kind(figure, "simulated")
-        figure.tight_layout()
-        return figure
+        before, after = self.forces[_WITHOUT], self.forces[_WITH]
+        names = sorted(before, key=lambda name: -before[name].max())[:_MUSCLES_SHOWN]
+        with house_style():
+            figure = Figure(figsize=(8.4, 2.0 + 1.7 * len(names)))
+            top, *panels = figure.subplots(1 + len(names), 1, sharex=True)
+            top.plot(self.time, self.moment[_WITHOUT], color=GREY, label="without the device")
+            top.plot(self.time, self.moment[_WITH], color=BLUE, label="with it")
+            top.plot(self.time, self.device, color=VERMILION, label="the device")
+            top.axhline(0.0, color=BLACK, linewidth=0.6)
+            top.set_ylabel("ankle moment (N m)\ndorsiflexion above 0")
+            label_lines(top)
+            for axes, name in zip(panels, names, strict=True):
+                axes.plot(self.time, before[name], color=GREY)
+                axes.plot(self.time, after[name], color=BLUE)
+                axes.set_ylim(bottom=0.0)
+                axes.set_ylabel(f"{name} (N)")
+            panels[-1].set_xlabel("time (s)")
+            figure.suptitle(f"{self.coordinate} of {self.model}, static optimisation", x=0.02, ha="left", fontsize=10)
+            mark_kind(figure, "simulated")
+            figure.tight_layout()
+            return figure
 
 
 def ankle_muscles(
@@ -180,17 +176,8 @@ class _Solved:
 def _check_fit(model: Any, task: "_Task", coordinate: str, motion: str | Path) -> None:
     """Refuse a motion and loads that do not fit the model, and a motion that does not last as long as the torque."""
     check_place(model, coordinate)
-    _check_loads(task.loads, model)
-    time = read_motion(motion, model, coordinate).time
-    if not time[0] <= task.start < task.end <= time[-1]:
-        raise DataError(
-            f"{motion}: goes from {time[0]:g} to {time[-1]:g} s, and the torque from {task.start:g} to "
-            f"{task.end:g} s; lay the torque on heel strikes of the motion"
-        )
-
-
-def _check_loads(path: Path, model: Any) -> None:
-    """Refuse loads without their table, and those on bodies that the model does not have."""
+    # Refuse loads without their table, and those on bodies that the model does not have.
+    path = task.loads
     try:
         loads = opensim.ExternalLoads(str(path), True)
     except RuntimeError as error:
@@ -208,6 +195,12 @@ def _check_loads(path: Path, model: Any) -> None:
                 f"{path}: model {model.getName()} has no body '{body}'{nearest_name(body, bodies)}; "
                 f"there are: {', '.join(bodies)}"
             )
+    time = read_motion(motion, model, coordinate).time
+    if not time[0] <= task.start < task.end <= time[-1]:
+        raise DataError(
+            f"{motion}: goes from {time[0]:g} to {time[-1]:g} s, and the torque from {task.start:g} to "
+            f"{task.end:g} s; lay the torque on heel strikes of the motion"
+        )
 
 
 def _solve(model: Any, task: _Task, coordinate: str, names: tuple[str, ...], folder: Path) -> _Solved:
@@ -215,10 +208,32 @@ def _solve(model: Any, task: _Task, coordinate: str, names: tuple[str, ...], fol
     plain, reserved = folder / "plain.osim", folder / "reserved.osim"
     model.finalizeConnections()
     model.printToXML(str(plain))
-    _add_reserves(model)
+    # Give every coordinate an actuator that costs much: OpenSim needs one where muscles cannot give a moment.
+    for name in coordinate_names(model):
+        reserve = opensim.CoordinateActuator(name)
+        reserve.setName(f"{name}_reserve")
+        joint = model.getCoordinateSet().get(name).getJoint()
+        on_ground = joint.getParentFrame().findBaseFrame().getName() == model.getGround().getName()
+        reserve.setOptimalForce(RESIDUAL if on_ground else RESERVE)
+        reserve.setMinControl(-_UNBOUNDED)
+        reserve.setMaxControl(_UNBOUNDED)
+        model.addForce(reserve)
+    model.finalizeConnections()
     model.printToXML(str(reserved))
     try:
-        good = _inverse_dynamics(plain, task, folder) and _static_optimisation(reserved, task, folder)
+        tool = opensim.InverseDynamicsTool()
+        tool.setModelFileName(str(plain))
+        tool.setCoordinatesFileName(str(task.motion))
+        tool.setLowpassCutoffFrequency(_NO_FILTER if task.low_pass is None else task.low_pass)
+        tool.setExternalLoadsFileName(str(task.loads))
+        tool.setStartTime(task.start)
+        tool.setEndTime(task.end)
+        tool.setResultsDir(str(folder))
+        tool.setOutputGenForceFileName("moments.sto")
+        left_out = opensim.ArrayStr()
+        left_out.append("Muscles")
+        tool.setExcludedForces(left_out)
+        good = bool(tool.run()) and _static_optimisation(reserved, task, folder)
     except RuntimeError as error:
         raise SimulationError(f"{model.getName()}: OpenSim stopped: {one_line(error)}") from error
     if not good:
@@ -240,36 +255,6 @@ def _column(table: Any, name: str) -> Floats:
     """Return a column of a table that OpenSim wrote: it has some columns twice, which our reader refuses."""
     values: Floats = np.array(table.getDependentColumn(name).to_numpy())
     return values
-
-
-def _add_reserves(model: Any) -> None:
-    """Give every coordinate an actuator that costs much: OpenSim needs one where muscles cannot give a moment."""
-    for name in coordinate_names(model):
-        reserve = opensim.CoordinateActuator(name)
-        reserve.setName(f"{name}_reserve")
-        joint = model.getCoordinateSet().get(name).getJoint()
-        on_ground = joint.getParentFrame().findBaseFrame().getName() == model.getGround().getName()
-        reserve.setOptimalForce(RESIDUAL if on_ground else RESERVE)
-        reserve.setMinControl(-_UNBOUNDED)
-        reserve.setMaxControl(_UNBOUNDED)
-        model.addForce(reserve)
-    model.finalizeConnections()
-
-
-def _inverse_dynamics(model: Path, task: _Task, folder: Path) -> bool:
-    tool = opensim.InverseDynamicsTool()
-    tool.setModelFileName(str(model))
-    tool.setCoordinatesFileName(str(task.motion))
-    tool.setLowpassCutoffFrequency(_NO_FILTER if task.low_pass is None else task.low_pass)
-    tool.setExternalLoadsFileName(str(task.loads))
-    tool.setStartTime(task.start)
-    tool.setEndTime(task.end)
-    tool.setResultsDir(str(folder))
-    tool.setOutputGenForceFileName("moments.sto")
-    left_out = opensim.ArrayStr()
-    left_out.append("Muscles")
-    tool.setExcludedForces(left_out)
-    return bool(tool.run())
 
 
 def _static_optimisation(model: Path, task: _Task, folder: Path) -> bool:

@@ -333,8 +333,9 @@ class DrawnGait:
         self._sample += 1
         return GaitReadings._make(self._shown), begins
 
-    def _forces(self, part: float) -> tuple[float, float]:
-        """Forces under heel and toes [N] at a part of the stride."""
+    def _measured(self, command: int) -> GaitMeasurement:
+        part = self._at / self._length
+        # Forces under heel and toes [N] at a part of the stride.
         rocking = 250.0 + 240.0 * math.sin(2.0 * math.pi * self._at / 90.0)
         odd = {
             "stands": (300.0, 300.0),
@@ -346,11 +347,7 @@ class DrawnGait:
             "late toes": (500.0 * _bump(part, 0.0, 0.45), 700.0 * _bump(part, 0.3, 0.62)),
             "short swing": (500.0 * (_bump(part, 0.0, 0.45) + _bump(part, 0.75, 1.0)), 700.0 * _bump(part, 0.12, 0.62)),
         }
-        return odd.get(self._odd, (500.0 * _bump(part, 0.0, 0.45), 700.0 * _bump(part, 0.12, 0.62)))
-
-    def _measured(self, command: int) -> GaitMeasurement:
-        part = self._at / self._length
-        heel, toe = self._forces(part)
+        heel, toe = odd.get(self._odd, (500.0 * _bump(part, 0.0, 0.45), 700.0 * _bump(part, 0.12, 0.62)))
         moves = 0.0 if self._odd == "stands" else self._draw.uniform(-5.0, 5.0)
         # Up in the swing, down after the strike, up over the foot that stands, down in the push-off.
         turned = -0.1 * math.sin(2.0 * math.pi * part / 0.14) if part < 0.14 else -0.2 * math.sin(5.0 * (part - 0.14))
