@@ -15,7 +15,7 @@ from pathlib import Path
 
 from ppafo.walking.course import list_courses
 from ppafo.walking.loading import load_walk
-from ppafo.walking.population import walk_population
+from ppafo.walking.walk import walk_population
 
 CONFIGURATIONS = ("solenoid", "proportional")
 SENSORS = {

@@ -7,7 +7,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.answers.answer import Column
+from ppafo.answers import Column
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.metrics import METRICS, Metric
 from ppafo.units import from_si

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ppafo.answers.answer import Answer, Cell, Column, Figure, Section, Table
+from ppafo.answers import Answer, Cell, Column, Figure, Section, Table
 from ppafo.answers.display_units import display_difference, display_unit, display_value, title_with_unit
 from ppafo.answers.style import render_figure
 from ppafo.documents.json_text import json_text

@@ -2,9 +2,8 @@
 
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.loading import list_walks, load_walk
-from ppafo.walking.population import Population, walk_population
 from ppafo.walking.result import WalkResult
-from ppafo.walking.walk import Comparison, compare_walks, walk
+from ppafo.walking.walk import Comparison, Population, compare_walks, walk, walk_population
 
 __all__ = [
     "Comparison",

@@ -1,29 +1,45 @@
-"""Runs a walk, and compares it with the device switched off and with a healthy ankle."""
+"""Runs a walk, or one of many wearers; compares it with the device switched off and with a healthy ankle."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ppafo.answers.display_units import display_values, title_with_unit
+from ppafo.answers.style import BLUE, GREY, VERMILION, house_style, mark_kind
 from ppafo.control.walking import event_on_off
-from ppafo.engine.lanes import STEPS_PER_CALL, Batch, BatchResult, begin_block
-from ppafo.engine.run import batch_of
+from ppafo.control.walking.signs import SIGNS, STOPPED
+from ppafo.engine.lane_rows import LANES
+from ppafo.engine.lanes import STEPS_PER_CALL, Batch, BatchResult, Floats, begin_block, run_batch
+from ppafo.engine.rows import row_numbers
+from ppafo.engine.run import NEVER_FAILED, batch_of
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.metrics import Metric
+from ppafo.metrics.strides import PER_STRIDE
 from ppafo.model.leg import passive_torque
 from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
 from ppafo.walking.bottle import run_on_bottle
 from ppafo.walking.contradictions import check_no_bottle
+from ppafo.walking.course import turns_walked
 from ppafo.walking.declaration import THRESHOLDS
+from ppafo.walking.events import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
 from ppafo.walking.gait_series import landing_phase
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import SHORTEST_STRIDES, duration_problems, walk_of, with_duration
-from ppafo.walking.planning import fed_device, plan_walk
-from ppafo.walking.result import WalkResult, result_of_walk
+from ppafo.walking.person import crowd_of, draw_gaits
+from ppafo.walking.planning import course_of_walk, fed_device, plan_walk, plan_walks, unrecorded
+from ppafo.walking.result import REMEDY, WalkResult, result_of_walk
 from ppafo.walking.strides import PHASES, healthy_positive_work, healthy_toe_height, lowest_toes
+from ppafo.walking.wearer import draw_builds
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Progress = Callable[[float, float], None]
 
@@ -165,3 +181,193 @@ def _landing_rate(configuration: Scenario) -> float:
     gait = walk_of(configuration).gait
     phase = landing_phase(gait)
     return gait.shank_angle.rate(phase, gait.stride_time) - gait.ankle_angle.rate(phase, gait.stride_time)
+
+
+MAXIMUM_WEARERS = 1_000_000
+
+STEPS_AT_ONCE = 1.0e8
+"""Steps of all wearers of one group together, a few seconds."""
+
+SHOWN = {
+    "gas": ("Gas per stride", "gas mass", 3),
+    "push_off_work": ("Work on the wearer in push-off", "energy", 2),
+    "slap_rate": ("Rate of the foot as it comes down", "angular velocity", 0),
+    "toe_clearance": ("Lowest toe height in mid-swing, relative to healthy", "body length", 1),
+    "toe_landing": ("Strides that begin on the toes", "fraction", 0),
+    "body_mass": ("Body mass", "mass", 1),
+    "shank_length": ("Shank", "body length", 1),
+    "stride_time": ("Stride time", "time", 3),
+    "stance_share": ("Stance", "fraction", 1),
+}
+"""Title, kind of quantity, and digits behind the point of what is known of every wearer."""
+
+_SIZE = (9.4, 5.6)
+_DRAWN_QUANTILES = (0.05, 0.5, 0.95)
+_HISTOGRAMS = ("gas", "push_off_work", "slap_rate", "toe_clearance")
+_PAIRS = (("stride_time", "gas"), ("body_mass", "push_off_work"))
+_BINS = 40
+_MAXIMUM_POINTS = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A quantity of every wearer: unit and meaning."""
+
+    unit: str
+    summary: str
+
+
+OUTCOMES: dict[str, Number] = {
+    name: Number(item.unit, f"{item.summary}, mean over all strides of a wearer") for name, item in PER_STRIDE.items()
+}
+TRAITS: dict[str, Number] = {
+    "body_mass": Number("kg", "mass of the body"),
+    "shank_length": Number("m", "knee to ankle"),
+    "stride_time": Number("s", "from one heel strike to the next"),
+    "stance_share": Number("-", "fraction of the stride until toe-off"),
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Population:
+    """Wearers and the outcomes of their walks, each an array (wearers,) by name, in SI units.
+
+    ``diverged`` counts the wearers whose walk left what is possible; they are not in ``outcomes`` nor in ``traits``.
+    ``vented`` counts those whose controller stopped for good, ``paused`` the others who had less help for a while.
+    ``signs`` counts both by the last sign that was seen, with the most frequent first.
+    """
+
+    scenario: Scenario
+    minutes: float
+    seed: int
+    traits: Mapping[str, Floats]
+    outcomes: Mapping[str, Floats]
+    diverged: int
+    vented: int
+    paused: int
+    signs: Mapping[str, int]
+
+    @property
+    def count(self) -> int:
+        """Number of wearers that walked to the end."""
+        return int(self.outcomes["gas"].size)
+
+    @property
+    def message(self) -> str:
+        """How the walks ended."""
+        if not self.diverged:
+            return "completed"
+        return f"{self.diverged} of {self.diverged + self.count} wearers diverged and are left out; {REMEDY}"
+
+    def __repr__(self) -> str:
+        return f"Population of {self.count} wearers, {self.scenario.name}, {self.minutes:g} min: {self.message}"
+
+
+def walk_population(
+    configuration: Scenario,
+    minutes: float | None,
+    wearers: int,
+    seed: int = 1,
+    progress: Progress = silent,
+) -> Population:
+    """Let many wearers walk for ``minutes`` [min], or all of a course; the first is that of the configuration.
+
+    ``progress`` gets the number of wearers that have walked and the number of all. ScenarioError for bad input.
+    """
+    if not 1 <= wearers <= MAXIMUM_WEARERS:
+        raise ScenarioError(f"the number of wearers must be from 1 to {MAXIMUM_WEARERS}, not {wearers}")
+    if walk_of(configuration).bottle is not None:
+        raise ScenarioError("many wearers walk at a constant supply: leave out the bottle, or the number of wearers")
+    if walk_of(configuration).person:
+        raise ScenarioError("many wearers are drawn about the wearer: leave out wearer.person, or their number")
+    generator = np.random.default_rng(seed)
+    build = draw_builds(wearers, generator)
+    gaits = draw_gaits(walk_of(configuration).gait, build.stature, generator)
+    crowd = crowd_of(configuration, build, gaits, generator)
+    planned = course_of_walk(crowd)
+    if minutes is None and planned is not None:
+        minutes = float(np.max(planned.duration)) / 60.0
+    seconds = lasting(configuration, minutes).duration
+    run, _ = plan_walks(with_duration(crowd, seconds))
+    batch = unrecorded(run, wearers)
+    states = _run_in_groups(batch, progress)
+    rows = {path: states[row] for path, row in row_numbers(batch.program.state_rows()).items()}
+    good = (rows["result.failure_time"] >= NEVER_FAILED) & np.isfinite(states).all(axis=0)
+    walked = run.step * run.step_count
+    # Numbers of each wearer from the totals; ``strides`` walked, parts of one included.
+    strides = walked * gaits.timing["frequency"] if planned is None else turns_walked(planned.course, walked)
+    strikes, landings = np.maximum(rows["walk.strides"], 1.0), np.maximum(rows["walk.landings"], 1.0)
+    over = {"slap_rate": landings, "toe_clearance": strikes, "toe_landing": strikes}
+    outcomes = {name: rows[item.total] / over.get(name, strides) for name, item in PER_STRIDE.items()}
+    traits = {
+        "body_mass": walk_of(configuration).wearer.body_mass * build.mass,
+        "shank_length": walk_of(configuration).wearer.shank_length * build.stature,
+        "stride_time": gaits.stride_time,
+        "stance_share": gaits.timing["toe_off"],
+    }
+    kept = [{name: values[good] for name, values in table.items()} for table in (traits, outcomes)]
+    vented, paused, found = _less_help(rows, good)
+    return Population(configuration, seconds / 60.0, seed, kept[0], kept[1], int((~good).sum()), vented, paused, found)
+
+
+def _less_help(rows: Mapping[str, Floats], good: NDArray[np.bool_]) -> tuple[int, int, dict[str, int]]:
+    """Return how many of the good walks ended stopped, how many others had less help, and the last signs of both."""
+    if SAFE_ROW not in rows:
+        return 0, 0, {}
+    stopped, less = rows[SAFE_ROW][good] == STOPPED, rows[VENTINGS_ROW][good] > 0.0
+    last = Counter(SIGNS[sign].name for sign in rows[f"{FINDING_ROW}.sign"][good][less].tolist())
+    return int(stopped.sum()), int((~stopped & less).sum()), dict(last.most_common())
+
+
+def _run_in_groups(batch: Batch, progress: Progress) -> Floats:
+    """Final states, in groups small enough for an interrupt to be seen and for progress to be reported."""
+    count = batch.states.shape[1]
+    group = max(1, int(STEPS_AT_ONCE / batch.clock.step_count / LANES)) * LANES
+    found = []
+    for first in range(0, count, group):
+        part = slice(first, first + group)
+        one = Batch(batch.program, batch.clock, batch.parameters[:, part], batch.states[:, part])
+        found.append(run_batch(one).states)
+        progress(float(min(first + group, count)), float(count))
+    return np.concatenate(found, axis=1)
+
+
+def population_figure(population: Population) -> "Figure":
+    """Return four histograms with quantiles, and two pictures of outcome over trait."""
+    from matplotlib.figure import Figure
+
+    with house_style():
+        figure = Figure(figsize=_SIZE)
+        figure.subplots_adjust(left=0.06, right=0.985, top=0.885, bottom=0.095, hspace=0.36, wspace=0.27)
+        grid = figure.subplots(2, 3).ravel().tolist()
+        for axes, name in zip((grid[0], grid[1], grid[3], grid[4]), _HISTOGRAMS, strict=True):
+            _histogram(axes, population, name)
+        for axes, (trait, outcome) in zip((grid[2], grid[5]), _PAIRS, strict=True):
+            (across, across_quantity, _), (up, up_quantity, _) = SHOWN[trait], SHOWN[outcome]
+            x = display_values(population.traits[trait], across_quantity)
+            y = display_values(population.outcomes[outcome], up_quantity)
+            thin = slice(None, None, max(1, x.size // _MAXIMUM_POINTS))
+            axes.plot(x[thin], y[thin], ".", color=BLUE, markersize=2.5, alpha=0.35, markeredgewidth=0.0)
+            axes.plot(x[0], y[0], "o", color=VERMILION, markersize=6)
+            axes.set_ylabel(title_with_unit(up, up_quantity), fontsize=9)
+            axes.set_xlabel(title_with_unit(across, across_quantity), fontsize=9)
+            axes.locator_params(nbins=5)
+        width, height = _SIZE
+        title = f"{population.scenario.name}: {population.count} wearers, {population.minutes:.3g} min each"
+        figure.text(0.12 / width, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
+        remark = "lines: 5th, 50th and 95th percentiles; dot: the wearer of the configuration"
+        figure.text(0.12 / width, 1.0 - 0.36 / height, remark, ha="left", va="top", fontsize=9, color=GREY)
+        mark_kind(figure, "simulated")
+        return figure
+
+
+def _histogram(axes: "Axes", population: Population, name: str) -> None:
+    title, quantity, _ = SHOWN[name]
+    values = display_values(population.outcomes[name], quantity)
+    axes.hist(values, bins=_BINS, color=BLUE, alpha=0.55)
+    for fraction in _DRAWN_QUANTILES:
+        axes.axvline(float(np.quantile(values, fraction)), color=GREY, linewidth=1.4 if fraction == 0.5 else 0.9)
+    axes.plot(values[0], 0.0, "o", color=VERMILION, markersize=6, clip_on=False, zorder=5)
+    axes.set_xlabel(title_with_unit(title, quantity), fontsize=9)
+    axes.set_ylabel("Wearers", fontsize=9)
+    axes.locator_params(nbins=5)

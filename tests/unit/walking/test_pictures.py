@@ -14,7 +14,7 @@ from ppafo.walking.figures.legs import animation, drags, frames_figure, last_pha
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.over_time import over_time_figure
 from ppafo.walking.motion import walk_of
-from ppafo.walking.population import population_figure
+from ppafo.walking.walk import population_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -163,7 +163,7 @@ def test_wearers_that_diverge_are_counted_and_left_out() -> None:
 
 
 def test_progress_of_many_wearers_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ppafo.walking.population.STEPS_AT_ONCE", 1.0)
+    monkeypatch.setattr("ppafo.walking.walk.STEPS_AT_ONCE", 1.0)
     told: list[tuple[float, float]] = []
     configuration = load_walk("off")
     grouped = walk_population(configuration, MINUTES, 70, 1, lambda done, total: told.append((done, total)))

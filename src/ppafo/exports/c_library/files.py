@@ -13,8 +13,8 @@ from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import SIGNAL_ROWS
 from ppafo.engine.run import NEVER_FAILED
 from ppafo.engine.source_text import Collector
+from ppafo.exports import filled, licence, template
 from ppafo.exports.c_library.program import COUNTS, IN_PARTS, WHOLE, ExportedProgram, Further, c_text
-from ppafo.exports.templates import filled, licence, template
 from ppafo.metrics.catalog import METRICS
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity

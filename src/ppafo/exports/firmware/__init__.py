@@ -9,8 +9,8 @@ from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, LARGEST_READING, SE
 from ppafo.engine.rows import is_number, leaf_paths, members, rebuilt
 from ppafo.engine.source_text import SourceCollector, is_row
 from ppafo.errors import ProgramError, ScenarioError
+from ppafo.exports import filled, licence, template
 from ppafo.exports.firmware.catalog import target_of
-from ppafo.exports.templates import filled, licence, template
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.plan import fixed_controller, plan_run, profile_bounds

@@ -21,6 +21,7 @@ from pathlib import Path
 from ppafo.control.catalog import PROFILES
 from ppafo.control.controllers import switching
 from ppafo.errors import ProgramError, ScenarioError, nearest_name
+from ppafo.exports import filled, licence, template
 from ppafo.exports.c_library import commanded, library_of, scenario_library, walk_library
 from ppafo.exports.c_library.files import Library, library_files, steps_source
 from ppafo.exports.c_library.walk_preparation import check_can_leave
@@ -33,7 +34,6 @@ from ppafo.exports.fmu.description import (
     description_of_fmi3,
     variability_of,
 )
-from ppafo.exports.templates import filled, licence, template
 from ppafo.model.valves.kind import VENT
 from ppafo.simulation.plan import outside_torque, step_counts
 from ppafo.simulation.scenario import (

@@ -25,11 +25,11 @@ from ppafo.engine.lanes import load_program
 from ppafo.engine.loading import chosen_compiler
 from ppafo.engine.run import Run, batch_of
 from ppafo.errors import ScenarioError
+from ppafo.exports import filled, template
 from ppafo.exports.firmware import chip_controller, firmware
 from ppafo.exports.hil import wire
 from ppafo.exports.hil.loop import Bench, Exchange, Pace, Row, without_collections
 from ppafo.exports.hil.wire import MICROSECONDS
-from ppafo.exports.templates import filled, template
 from ppafo.model.valves import dump
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.sampled import SampledRun

@@ -11,12 +11,12 @@ from pathlib import Path
 
 from ppafo.engine.lanes import prescribe_recorded_angle
 from ppafo.errors import ScenarioError, nearest_name
+from ppafo.exports import filled, template
 from ppafo.exports.c_library import commanded, scenario_library
 from ppafo.exports.c_library.files import OUTPUTS, Library, Setting, library_files, steps_source
 from ppafo.exports.c_library.preparation import preparation_of
 from ppafo.exports.c_library.program import ExportedProgram
 from ppafo.exports.fmu import HIDDEN, PLATFORMS, build_library
-from ppafo.exports.templates import filled, template
 from ppafo.simulation.recorded import held_vane
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
 from ppafo.version import __version__

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from ppafo.errors import ScenarioError
-from ppafo.exports.templates import filled, template
+from ppafo.exports import filled, template
 from ppafo.gait.opensim_names import opensim_recording
 from ppafo.signals import Channel, Recording
 from ppafo.storage.opensim import opensim_bytes

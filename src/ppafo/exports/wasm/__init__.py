@@ -80,10 +80,10 @@ from ppafo.answers.display_units import display_unit, quantity_of_unit
 from ppafo.engine.cache import kept_bytes
 from ppafo.engine.outline import file_hash
 from ppafo.errors import PpafoError, ProgramError
+from ppafo.exports import filled, template
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.files import OUTPUTS, Library, Setting, c_identifier, conditions_of, run_words
 from ppafo.exports.c_library.program import IN_PARTS, TOGETHER, WHOLE, ExportedProgram, c_text, outline_of
-from ppafo.exports.templates import filled, template
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, Term, itself

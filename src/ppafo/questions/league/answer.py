@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.answer import Cell
+from ppafo.answers import Answer, Cell, Column, Figure, Section, Table
 from ppafo.answers.display_units import display_value
 from ppafo.answers.style import house_style, look_of_valve, mark_kind
 from ppafo.progress import Report

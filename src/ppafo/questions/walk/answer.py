@@ -52,10 +52,9 @@ from ppafo.walking.loading import FILE, load_walk
 from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
 from ppafo.walking.planning import law_of, sensor_settings
-from ppafo.walking.population import OUTCOMES, SHOWN, TRAITS, Number, Population, population_figure
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES
-from ppafo.walking.walk import Comparison, compare_walks
+from ppafo.walking.walk import OUTCOMES, SHOWN, TRAITS, Comparison, Number, Population, compare_walks, population_figure
 from ppafo.walking.wearer import CORRELATION, MASS_VARIATION, MAXIMUM_DEVIATIONS, STATURE_VARIATION
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)

@@ -16,9 +16,8 @@ from ppafo.questions.endurance.solve import WITHOUT_REST, endurance_of_walk, fol
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.bottle import DIVERGED, WALKED
 from ppafo.walking.motion import walk_of
-from ppafo.walking.population import Population, walk_population
 from ppafo.walking.result import WalkResult, integral_of_a_stride
-from ppafo.walking.walk import Progress, walk
+from ppafo.walking.walk import Population, Progress, walk, walk_population
 
 LONGEST = 1.0
 """Minutes that are walked at most with other chambers: a walk repeats itself, but for a course and on a bottle."""

@@ -26,11 +26,11 @@ from ppafo.engine.lanes import run_batch
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
+from ppafo.exports import filled, licence, template
 from ppafo.exports.firmware import TICK, ChipController, law_source, parameters_header, ticks_of
 from ppafo.exports.firmware.catalog import MSP430G2553
 from ppafo.exports.firmware.lock_step import Comparison, Cost, PythonChip, compare_with, cost_of
 from ppafo.exports.firmware.simulators import ChipSimulator, Decision, chip_simulator
-from ppafo.exports.templates import filled, licence, template
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
 from ppafo.simulation.reading import quantity_text
