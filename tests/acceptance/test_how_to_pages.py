@@ -29,9 +29,10 @@ from ppafo.parameters.building import build_device
 from ppafo.parameters.device import Valve
 from ppafo.parameters.loading import parse_parameter_set
 from ppafo.parameters.plant import plant_parameters
-from ppafo.simulation.loading import parse_scenario, scenario_from_dict
+from ppafo.simulation.loading import scenario_from_dict
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PrescribedMotion
+from tests.scenario_text import parse_scenario
 
 PAGES = Path(__file__).parents[2] / "docs" / "how-to"
 

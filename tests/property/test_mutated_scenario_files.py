@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from ppafo.control.catalog import PROFILES
 from ppafo.errors import PpafoError
-from ppafo.simulation.loading import list_scenarios, parse_scenario
+from ppafo.simulation.loading import list_scenarios
 from ppafo.simulation.plan import profile_parameters
 from ppafo.simulation.scenario import FreeMotion, Scenario
+from tests.scenario_text import parse_scenario
 
 FILE = "damaged.toml"
 ORIGINALS = [

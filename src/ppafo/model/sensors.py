@@ -198,15 +198,6 @@ NOTHING_SEEN = GaitSeen(
 )
 
 
-def lagged_reading(shown: float, true: float, follow_rate: float, step: float) -> float:
-    """What a first-order sensor shows after a step [s]; ``follow_rate`` [1/s] is the inverse of its time constant.
-
-    Both readings are in the sensor's unit.
-    """
-    fraction = follow_rate * step
-    return shown + (true - shown) * fraction / (1.0 + fraction)
-
-
 def is_active(fault: Fault, time: float) -> bool:
     """True where a fault acts at a time [s]; one that comes and goes does so in the first half of each period."""
     length = fault.period if fault.period > 0.0 else 1.0

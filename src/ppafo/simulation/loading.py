@@ -72,15 +72,6 @@ def scenario_or_load(
     return scenario
 
 
-def parse_scenario(content: bytes, file: str, overrides: Iterable[str] = (), folder: Path | None = None) -> Scenario:
-    """Return the scenario in the bytes of a TOML file; relative paths in it begin in ``folder``.
-
-    ScenarioError or ParameterError for anything that cannot be used.
-    """
-    document = FILE.parse(content, label(file))
-    return scenario_of(ScenarioRequest(label(file), file, folder or Path(), document, tuple(overrides)), VANE)
-
-
 def scenario_from_dict(content: Mapping[str, Any], overrides: Iterable[str] = ()) -> Scenario:
     """Return a scenario from nested dictionaries that are laid out as a scenario file is.
 

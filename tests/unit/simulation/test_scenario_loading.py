@@ -11,8 +11,9 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import ScenarioError
 from ppafo.model.sensors import Measurement
 from ppafo.parameters import load_device
-from ppafo.simulation.loading import list_scenarios, load_scenario, parse_scenario, scenario_from_dict
+from ppafo.simulation.loading import list_scenarios, load_scenario, scenario_from_dict
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, ProfileChoice, Scenario, Sensors
+from tests.scenario_text import parse_scenario
 
 PSI = 6894.757293168361
 SMALL: dict[str, Any] = {

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from ppafo.errors import ParameterError, PpafoError, ScenarioError
-from ppafo.simulation.loading import load_scenario, parse_scenario, scenario_from_dict
+from ppafo.simulation.loading import load_scenario, scenario_from_dict
+from tests.scenario_text import parse_scenario
 
 TEXT = """
 schema_version = 1

@@ -270,23 +270,6 @@ class HardwareRun:
         self.result.save(folder, {**self.files(), **further})
 
 
-def run_hardware(
-    scenario: Scenario,
-    port: wire.Port,
-    pace: Callable[[float], Pace],
-    rate: int = wire.RATE,
-    patience: float = 10.0,
-    is_stopped: Callable[[], bool] = lambda: False,
-    run: int | None = None,
-) -> HardwareRun:
-    """Run the plant of a scenario against the controller at a port; ``pace`` makes the pace for a period [s].
-
-    ``patience`` [s] is how long the controller is called; ``run`` its number, drawn where none is given.
-    ScenarioError where nobody answers.
-    """
-    return run_plant(plant_of(scenario, rate), port, pace, patience, is_stopped, run)
-
-
 def run_plant(
     plant: Plant,
     port: wire.Port,
@@ -295,7 +278,11 @@ def run_plant(
     is_stopped: Callable[[], bool] = lambda: False,
     run: int | None = None,
 ) -> HardwareRun:
-    """The same of a plant that is made."""
+    """Run a plant against the controller at a port; ``pace`` makes the pace for a period [s].
+
+    ``patience`` [s] is how long the controller is called; ``run`` its number, drawn where none is given.
+    ScenarioError where nobody answers.
+    """
     number = random.SystemRandom().randint(0, _LARGEST_RUN) if run is None else run
     before = load_now()
     begun = plant.begin()

@@ -253,7 +253,6 @@ _LARGEST_JUMP = 3.0
 """Times the median interval; a longer one is a gap, not jitter of the clock."""
 
 OPENSIM, CSV, C3D, TRC = "opensim", "csv", "c3d", "trc"
-MARKERS = (C3D, TRC)
 FILES = ".mot, .sto, .csv, .c3d or .trc"
 
 _STATE = re.compile(r".*/([^/]+)/value")

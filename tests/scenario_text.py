@@ -1,0 +1,13 @@
+"""Scenarios in the text of a file that lies nowhere."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from ppafo.simulation.building import ScenarioRequest
+from ppafo.simulation.loading import FILE, VANE, scenario_of
+from ppafo.simulation.scenario import Scenario
+
+
+def parse_scenario(content: bytes, file: str, overrides: Iterable[str] = ()) -> Scenario:
+    """Return the scenario in the bytes of a TOML file; ScenarioError or ParameterError for what cannot be used."""
+    return scenario_of(ScenarioRequest(file, file, Path(), FILE.parse(content, file), tuple(overrides)), VANE)
