@@ -1,7 +1,7 @@
 """The answer about a bottle: how long it lasts and why it ends, its values with their sources; several side by side."""
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,6 @@ from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import axis_unit, display_value, display_values, quantity_text
 from ppafo.answers.style import (
     BLUE,
-    GREEN,
     GREY,
     ORANGE,
     VERMILION,
@@ -32,6 +31,7 @@ from ppafo.signals.recording import Floats
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.units import format_quantity
 from ppafo.version import __version__
+from ppafo.walking.figures.over_time import draw_bottle_pressure, draw_gas_left
 
 if TYPE_CHECKING:
     import matplotlib.figure
@@ -100,8 +100,8 @@ def endurance_figure(found: Endurance) -> "matplotlib.figure.Figure":
         figure, rows = figure_of_panels((_WIDTH, height), Margins(_LEFT, _RIGHT, _TOP, bottom, _GAP), _PANELS)
         grid = [axes for (axes,) in rows]
         _draw_temperature(grid[0], found, minutes)
-        _draw_bottle_pressure(grid[1], found, minutes)
-        _draw_mass(grid[2], found, minutes)
+        draw_bottle_pressure(grid[1], minutes, recording["bottle_pressure"], found.bottle.regulator)
+        draw_gas_left(grid[2], minutes, recording, found.bottle.mass)
         for axes in grid:
             axes.locator_params(axis="y", nbins=5)
         grid[-1].set_xlabel(f"Time ({axis_unit('duration')})")
@@ -129,31 +129,6 @@ def _draw_temperature(axes: "Axes", found: Endurance, minutes: Floats) -> None:
     axes.plot(minutes, display_values(recording["wall_temperature"], "temperature"), color=ORANGE, label="wall")
     axes.plot(minutes, display_values(recording["bottle_temperature"], "temperature"), color=BLUE, label="content")
     axes.set_title(f"Temperature of the bottle ({axis_unit('temperature')})")
-    label_lines(axes)
-
-
-def _draw_bottle_pressure(axes: "Axes", found: Endurance, minutes: Floats) -> None:
-    regulator = found.bottle.regulator
-    pressure = found.discharge.recording["bottle_pressure"]
-    needed = regulator.set_pressure + regulator.pressure_margin
-    axes.axhline(display_value(needed, "pressure"), color=VERMILION, linestyle="--", linewidth=1.2, label="needed")
-    axes.plot(minutes, display_values(pressure, "pressure"), color=BLUE, label="bottle")
-    axes.set_ylim(0.0, 1.06 * display_value(float(np.max(pressure)), "pressure"))
-    axes.set_title(f"Pressure in the bottle ({axis_unit('pressure')})")
-    label_lines(axes)
-
-
-def _draw_mass(axes: "Axes", found: Endurance, minutes: Floats) -> None:
-    recording = found.discharge.recording
-    names: Sequence[tuple[str, str, str]] = (
-        ("bottle_mass", "total gas", BLUE),
-        ("liquid_mass", "liquid", GREEN),
-    )
-    for name, label, colour in names:
-        if name in recording:
-            axes.plot(minutes, display_values(recording[name], "gas mass"), color=colour, label=label)
-    axes.set_ylim(0.0, 1.06 * display_value(found.bottle.mass, "gas mass"))
-    axes.set_title(f"Left in the bottle ({axis_unit('gas mass')})")
     label_lines(axes)
 
 

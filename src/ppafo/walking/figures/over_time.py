@@ -1,6 +1,8 @@
 """A whole walk over time: gas, toes and phases with the safe state; a course with its segments; the bottle."""
 
 import textwrap
+from collections.abc import Mapping
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -23,7 +25,8 @@ from ppafo.answers.style import (
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.control.walking.signs import HELPS, LIFTS, PAUSED, STOPPED
 from ppafo.gait.gait import clinical_angle
-from ppafo.signals.recording import Floats
+from ppafo.model.source import Regulator
+from ppafo.signals.recording import Floats, Recording
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.figures.mean_stride import WITH, WITHOUT
 from ppafo.walking.motion import walk_of
@@ -276,18 +279,12 @@ def peak_torques(result: WalkResult) -> Floats:
 
 def bottle_figure(result: WalkResult) -> "Figure":
     """Return the figure of a walk on its bottle; below it stands what ended it."""
-    assert result.supply is not None, "drawn for a walk on a bottle"
-    ending = result.supply.ending
+    supply = result.supply
+    assert supply is not None, "drawn for a walk on a bottle"
+    ending, bottle = supply.ending, supply.supply.bottle
     remarks = textwrap.wrap(f"End: {ending.message}.", _REMARK_WIDTH)
     bottom = _BOTTLE_MARGINS.bottom + _REMARK_LINE * len(remarks)
-    margins = Margins(
-        _BOTTLE_MARGINS.left,
-        _BOTTLE_MARGINS.right,
-        _BOTTLE_MARGINS.top,
-        bottom,
-        _BOTTLE_MARGINS.row_gap,
-        label=_BOTTLE_MARGINS.label,
-    )
+    margins = replace(_BOTTLE_MARGINS, bottom=bottom)
     height = _BOTTLE_MARGINS.top + _PANELS * _BOTTLE_PANEL + (_PANELS - 1) * _BOTTLE_MARGINS.row_gap + bottom
     end = float(result.recording.time[-1])
     scale, unit = (60.0, "min") if end > _BOTTLE_LONG else (1.0, "s")
@@ -295,16 +292,17 @@ def bottle_figure(result: WalkResult) -> "Figure":
         figure, rows = figure_of_panels((_BOTTLE_WIDTH, height), margins, _PANELS)
         grid = [axes for (axes,) in rows]
         _draw_supply(grid[0], result, scale)
-        _draw_bottle_pressure(grid[1], result, scale)
+        times = supply.times / scale
+        draw_bottle_pressure(grid[1], times, supply.values["bottle_pressure"], bottle.regulator)
         _draw_temperatures(grid[2], result, scale)
         _draw_torque(grid[3], result, scale)
-        _draw_gas(grid[4], result, scale)
+        draw_gas_left(grid[4], times, supply.values, supply.supply.mass)
         for axes in grid:
             axes.locator_params(axis="y", nbins=5)
             axes.axvline(ending.time / scale, color=VERMILION, linewidth=1.0)
         grid[-1].set_xlabel(f"Time ({unit})")
         grid[-1].set_xlim(0.0, 1.005 * end / scale)
-        title = f"{result.scenario.name} on {result.supply.supply.bottle.name}"
+        title = f"{result.scenario.name} on {bottle.name}"
         figure.text(0.12 / _BOTTLE_WIDTH, 1.0 - 0.12 / height, title, va="top", fontsize=13, fontweight="bold")
         figure.text(0.12 / _BOTTLE_WIDTH, 0.1 / height, "\n".join(remarks), va="bottom", fontsize=9, color=VERMILION)
         mark_kind(figure, result.recording.kind)
@@ -326,15 +324,12 @@ def _draw_supply(axes: "Axes", result: WalkResult, scale: float) -> None:
     label_lines(axes)
 
 
-def _draw_bottle_pressure(axes: "Axes", result: WalkResult, scale: float) -> None:
-    supply = result.supply
-    assert supply is not None, "drawn for a walk on a bottle"
-    regulator = supply.supply.bottle.regulator
-    needed = display_value(regulator.set_pressure + regulator.pressure_margin, "pressure")
-    pressure = display_values(supply.values["bottle_pressure"], "pressure")
-    axes.axhline(needed, color=VERMILION, linestyle="--", linewidth=1.2, label="needed")
-    axes.plot(supply.times / scale, pressure, color=BLUE, label="bottle")
-    axes.set_ylim(0.0, 1.06 * float(pressure.max()))
+def draw_bottle_pressure(axes: "Axes", time: Floats, pressure: Floats, regulator: Regulator) -> None:
+    """Draw the pressure [Pa] of a bottle over time, in the unit of the axis, and what its regulator needs."""
+    needed = regulator.set_pressure + regulator.pressure_margin
+    axes.axhline(display_value(needed, "pressure"), color=VERMILION, linestyle="--", linewidth=1.2, label="needed")
+    axes.plot(time, display_values(pressure, "pressure"), color=BLUE, label="bottle")
+    axes.set_ylim(0.0, 1.06 * display_value(float(np.max(pressure)), "pressure"))
     axes.set_title(f"Pressure in the bottle ({axis_unit('pressure')})")
     label_lines(axes)
 
@@ -366,13 +361,11 @@ def _draw_torque(axes: "Axes", result: WalkResult, scale: float) -> None:
     axes.set_title("Peak torque of each stride (N m)")
 
 
-def _draw_gas(axes: "Axes", result: WalkResult, scale: float) -> None:
-    supply = result.supply
-    assert supply is not None, "drawn for a walk on a bottle"
+def draw_gas_left(axes: "Axes", time: Floats, gas: Recording | Mapping[str, Floats], full: float) -> None:
+    """Draw what is left in a bottle over time, in the unit of the axis, of the mass of a full one [kg]."""
     for name, label, colour in (("bottle_mass", "total gas", BLUE), ("liquid_mass", "liquid", GREEN)):
-        if name in supply.values:
-            values = display_values(supply.values[name], "gas mass")
-            axes.plot(supply.times / scale, values, color=colour, label=label)
-    axes.set_ylim(0.0, 1.06 * display_value(supply.supply.mass, "gas mass"))
+        if name in gas:
+            axes.plot(time, display_values(gas[name], "gas mass"), color=colour, label=label)
+    axes.set_ylim(0.0, 1.06 * display_value(full, "gas mass"))
     axes.set_title(f"Left in the bottle ({axis_unit('gas mass')})")
     label_lines(axes)
