@@ -22,8 +22,8 @@ from ppafo.control.catalog import PROFILES
 from ppafo.control.controllers import switching
 from ppafo.errors import ProgramError, ScenarioError, nearest_name
 from ppafo.exports import filled, licence, template
-from ppafo.exports.c_library import commanded, library_of, scenario_library, walk_library
-from ppafo.exports.c_library.files import Library, library_files, steps_source
+from ppafo.exports.c_library import commanded, library_of
+from ppafo.exports.c_library.files import library_files, steps_source
 from ppafo.exports.c_library.walk_preparation import check_can_leave
 from ppafo.exports.fmu.description import (
     Input,
@@ -35,7 +35,7 @@ from ppafo.exports.fmu.description import (
     variability_of,
 )
 from ppafo.model.valves.kind import VENT
-from ppafo.simulation.plan import outside_torque, step_counts
+from ppafo.simulation.plan import outside_torque, profile_parameters, step_counts
 from ppafo.simulation.scenario import (
     Control,
     FreeMotion,
@@ -43,7 +43,6 @@ from ppafo.simulation.scenario import (
     ProfileChoice,
     Scenario,
     Sensors,
-    vane_motion,
     worn_kind,
 )
 from ppafo.translation.native import asked, complaint
@@ -302,104 +301,72 @@ def plant_alone(item: Scenario) -> Interface:
 
     That of a walk is the device on its walking leg, which takes the command alone.
     """
-    return _plant_of_scenario(item) if worn_kind(item) is None else _walking_plant(item)
-
-
-def _walking_plant(configuration: Scenario) -> Interface:
-    check_can_leave(configuration)
-    # The walk with a command that is handed in at every step, and sensors that nobody looks at.
-    step = step_counts(1.0, configuration.time_step, 1.0, configuration.control.period).step
-    motion = walk_of(configuration)
-    # The forces under the foot are among the outputs.
-    forces = dict.fromkeys(FORCES, 0.0) | {"force_bandwidth": motion.forces["force_bandwidth"]}
-    chosen = replace(
-        configuration,
-        name=f"{configuration.name}-plant",
-        description=f"The plant alone of this walk, on its leg: {configuration.description}",
-        control=Control(switching.CONSTANT.name, {"command": 0.0}, step),
-        time_step=step,
-        sensors=Sensors(),
-        motion=replace(motion, forces=forces, faults={sensor: FaultSettings() for sensor in motion.faults}),
-    )
-    library = walk_library(chosen)
-    return Interface(
-        name=chosen.name,
-        library=library,
-        template="plant.c",
-        time=PLANT_TIME.format(motion=ON_LEG),
-        tuning=PLANT_TUNING,
-        step=chosen.time_step,
-        duration=configuration.duration,
-        outputs=tuple(name for name in library.program.outputs if name not in ("command", "reference")),
-        shows_metrics=False,
-        is_step_fixed=True,
-        clock=None,
-        hidden=_hidden(library),
-        inputs=(WALKING_COMMAND,),
-        words={"steps": steps_source(library), "highest": repr(VENT), "follow": "", "lead": ""},
-    )
-
-
-def _hidden(library: Library) -> frozenset[str]:
-    """Settings that are none of the unit's variables."""
+    chosen = _led_vane(item) if worn_kind(item) is None else _commanded_walk(item)
+    library, motion = library_of(chosen), chosen.motion
+    command, unseen, highest = COMMAND, {"command", "reference"}, 1.0
+    further: tuple[Input, ...] = ()
+    if isinstance(motion, PrescribedMotion):
+        said, follow, lead = LED, _FOLLOW_ANGLE, _LEAD_ANGLE
+        angle = motion.profile.settings["start_level"]
+        further = (
+            Input("angle", "rad", "angle of the ankle, 90 deg neutral, growing in plantarflexion", angle),
+            Input("angular_velocity", "rad/s", "its rate", 0.0),
+        )
+        unseen |= {"angle", "angular_velocity"}
+    elif isinstance(motion, FreeMotion):
+        # T_ex of a vane alone, or T_2 of the ankle of a leg, which is opposed.
+        torque = "motion_external_torque = inputs[1]" if motion.leg is None else "motion_ankle_torque = -inputs[1]"
+        said, follow = FREE, f"    settings->{torque};"
+        lead = "    rows[PARAMETER_PLANT_EXTERNAL_TORQUE] = inputs[1];"
+        joint = "T_ex on the joint" if motion.leg is None else "on the ankle of the leg, -T_2"
+        words = f"torque {joint}, above 0 works against plantarflexion"
+        further = (Input("external_torque", "N m", words, outside_torque(motion)),)
+    else:
+        command, highest = WALKING_COMMAND, VENT
+        said, follow, lead = ON_LEG, "", ""
     hidden = {"run.duration", "run.output_interval", "controller.period", "controller.command"}
     unused = ("sensors.", "motion.profile.", "motion.external_torque", "motion.ankle_torque")
-    return frozenset(hidden | {item.path for item in library.settings if item.path.startswith(unused)})
-
-
-def _plant_of_scenario(scenario: Scenario) -> Interface:
-    # The ankle is led from outside, from where the scenario has it at the start.
-    motion = scenario.motion
-    if isinstance(motion, PrescribedMotion):
-        from ppafo.simulation.plan import profile_parameters
-
-        found: tuple[float, float, float] = PROFILES[motion.profile.kind].value(profile_parameters(motion.profile), 0.0)
-        angle, _, _ = found
-        settings = {"start_level": angle, "level": angle, "ramp_start": 0.0, "ramp_time": 2.0}
-        motion = PrescribedMotion(ProfileChoice("ramp_hold", settings))
-    chosen = replace(commanded(scenario), motion=motion)
-    library = scenario_library(chosen)
-    is_led = isinstance(chosen.motion, PrescribedMotion)
-    unseen = {"command", *(("angle", "angular_velocity") if is_led else ())}
     return Interface(
         name=chosen.name,
         library=library,
         template="plant.c",
-        time=PLANT_TIME.format(motion=LED if is_led else FREE),
+        time=PLANT_TIME.format(motion=said),
         tuning=PLANT_TUNING,
         step=chosen.time_step,
-        duration=scenario.duration,
+        duration=item.duration,
         outputs=tuple(name for name in library.program.outputs if name not in unseen),
         shows_metrics=False,
         is_step_fixed=True,
         clock=None,
-        hidden=_hidden(library),
-        inputs=_inputs(chosen),
-        words={
-            "steps": steps_source(library),
-            "highest": "1.0",
-            "follow": _FOLLOW_ANGLE if is_led else f"    settings->{_outside(chosen)};",
-            "lead": _LEAD_ANGLE if is_led else "    rows[PARAMETER_PLANT_EXTERNAL_TORQUE] = inputs[1];",
-        },
+        hidden=frozenset(hidden | {item.path for item in library.settings if item.path.startswith(unused)}),
+        inputs=(command, *further),
+        words={"steps": steps_source(library), "highest": repr(highest), "follow": follow, "lead": lead},
     )
 
 
-def _outside(scenario: Scenario) -> str:
-    """How the torque that is handed in is set: T_ex of a vane alone, or T_2 of the ankle of a leg, which is opposed."""
-    motion = vane_motion(scenario)
-    has_leg = isinstance(motion, FreeMotion) and motion.leg is not None
-    return "motion_ankle_torque = -inputs[1]" if has_leg else "motion_external_torque = inputs[1]"
+def _led_vane(scenario: Scenario) -> Scenario:
+    """The scenario under a command; an ankle is led from outside, from where the scenario has it at the start."""
+    motion = scenario.motion
+    if isinstance(motion, PrescribedMotion):
+        found: tuple[float, float, float] = PROFILES[motion.profile.kind].value(profile_parameters(motion.profile), 0.0)
+        settings = {"start_level": found[0], "level": found[0], "ramp_start": 0.0, "ramp_time": 2.0}
+        motion = PrescribedMotion(ProfileChoice("ramp_hold", settings))
+    return replace(commanded(scenario), motion=motion)
 
 
-def _inputs(scenario: Scenario) -> tuple[Input, ...]:
-    motion = vane_motion(scenario)
-    if isinstance(motion, FreeMotion):
-        joint = "T_ex on the joint" if motion.leg is None else "on the ankle of the leg, -T_2"
-        said = f"torque {joint}, above 0 works against plantarflexion"
-        return (COMMAND, Input("external_torque", "N m", said, outside_torque(motion)))
-    angle = motion.profile.settings["start_level"]
-    return (
-        COMMAND,
-        Input("angle", "rad", "angle of the ankle, 90 deg neutral, growing in plantarflexion", angle),
-        Input("angular_velocity", "rad/s", "its rate", 0.0),
+def _commanded_walk(walk: Scenario) -> Scenario:
+    """The walk with a command that is handed in at every step, and sensors that nobody looks at."""
+    check_can_leave(walk)
+    step = step_counts(1.0, walk.time_step, 1.0, walk.control.period).step
+    motion = walk_of(walk)
+    # The forces under the foot are among the outputs.
+    forces = dict.fromkeys(FORCES, 0.0) | {"force_bandwidth": motion.forces["force_bandwidth"]}
+    return replace(
+        walk,
+        name=f"{walk.name}-plant",
+        description=f"The plant alone of this walk, on its leg: {walk.description}",
+        control=Control(switching.CONSTANT.name, {"command": 0.0}, step),
+        time_step=step,
+        sensors=Sensors(),
+        motion=replace(motion, forces=forces, faults={sensor: FaultSettings() for sensor in motion.faults}),
     )
