@@ -1,5 +1,6 @@
 """Many wearers in one batch: the first is the wearer of the configuration, the others differ as is stated."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -163,7 +164,7 @@ def test_wearers_that_diverge_are_counted_and_left_out() -> None:
 
 
 def test_progress_of_many_wearers_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ppafo.walking.walk.STEPS_AT_ONCE", 1.0)
+    monkeypatch.setattr(sys.modules[walk_population.__module__], "STEPS_AT_ONCE", 1.0)
     told: list[tuple[float, float]] = []
     configuration = load_walk("off")
     grouped = walk_population(configuration, MINUTES, 70, 1, lambda done, total: told.append((done, total)))
