@@ -14,6 +14,7 @@ from ppafo.parameters.device import Supply
 Document = dict[str, Any]
 Chance = random.Random
 
+GAIT = "falisse2019-subject1"
 GASES = (("CO2", 44.0, 1.3), ("air", 28.965, 1.4), ("N2", 28.013, 1.401), ("He", 4.0026, 1.667))
 SUPPLY_LINES = ("supply.pressure", "supply.dorsiflexion_pressure")
 MAY_RELIEVE = "relieving" in Supply.__dataclass_fields__
@@ -297,6 +298,13 @@ def legs(chance: Chance) -> Document:
     return document(lines, leg(chance, 100.0, 3.0), law, initial=start(chance), reference=ramp(chance))
 
 
+def legs_in_a_gait(chance: Chance) -> Document:
+    """The same with the shank of the built-in gait, without its ground, from anywhere in the stride."""
+    drawn = legs(chance)
+    drawn["motion"]["shank"] = {"kind": "gait", "gait": GAIT, "start": f"{chance.random()}"}
+    return drawn
+
+
 def solenoid_loops(chance: Chance) -> Document:
     """A pair of solenoid valves with all their delays, switched from 1 Hz to 10 kHz by late and coarse sensors."""
     return loop(chance, (1.0, 15.0), "solenoid")
@@ -375,6 +383,7 @@ FAMILIES: Mapping[str, Callable[[Chance], Document]] = {
     "loops without friction": loops_without_friction,
     "prescribed": prescribed,
     "legs": legs,
+    "legs in a gait": legs_in_a_gait,
     "mixed": mixed,
 }
 

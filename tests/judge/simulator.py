@@ -97,13 +97,20 @@ class Law(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """A foot on a prescribed shank (is_worn = 1): its m c [kg m], its inertia about the ankle, length of the shank."""
+    """A foot on a prescribed shank (is_worn = 1): its m c [kg m], its inertia about the ankle, length of the shank.
+
+    The shank follows a profile, or a gait of that many strides a second (0: none) from a phase in turns: ``curves``
+    has the angle and the accelerations of the knee forward and up, each by its mean, its cosines and its sines.
+    """
 
     is_worn: float
     moment: float
     inertia: float
     shank_length: float
     shank: Path
+    frequency: float
+    start: float
+    curves: Any
 
 
 class Rig(NamedTuple):
@@ -262,19 +269,39 @@ def turning_inertia(rig: Rig) -> float:
 
 
 @njit(cache=True)
+def stride(leg: Leg, curve: int, time: float) -> tuple[float, float, float]:
+    """Value, rate and second derivative of a curve of the gait."""
+    turn, terms = 2.0 * math.pi, leg.curves.shape[1] // 2
+    value, rate, second = leg.curves[curve, 0], 0.0, 0.0
+    for number in range(1, terms + 1):
+        pace = turn * number * leg.frequency
+        place = turn * number * (leg.start + leg.frequency * time)
+        along, across = leg.curves[curve, number], leg.curves[curve, terms + number]
+        value += along * math.cos(place) + across * math.sin(place)
+        rate += pace * (across * math.cos(place) - along * math.sin(place))
+        second -= pace * pace * (along * math.cos(place) + across * math.sin(place))
+    return value, rate, second
+
+
+@njit(cache=True)
 def torque_on_foot(rig: Rig, time: float, angle: float) -> float:
     """What shank and weight do to the body that turns about the ankle [N m], plantarflexion positive.
 
     Newton's law of that body in the frame of the room: its angle over the horizontal is alpha, its weight acts at S
-    over the mass, and the ankle carries it along a circle about the knee.
+    over the mass, and the ankle carries it along a circle about the knee, which has accelerations of its own.
     """
-    shank, shank_rate = follow(rig.leg.shank, time)
-    shank_bend = bend(rig.leg.shank, time)
+    knee_forward, knee_up = 0.0, 0.0
+    if rig.leg.frequency > 0.0:
+        shank, shank_rate, shank_bend = stride(rig.leg, 0, time)
+        knee_forward, knee_up = stride(rig.leg, 1, time)[0], stride(rig.leg, 2, time)[0]
+    else:
+        shank, shank_rate = follow(rig.leg.shank, time)
+        shank_bend = bend(rig.leg.shank, time)
     alpha = shank - angle + 0.5 * math.pi
     s = rig.leg.moment + rig.gravity / STANDARD_GRAVITY
     length = rig.leg.shank_length
-    forward = length * (math.cos(shank) * shank_bend - math.sin(shank) * shank_rate * shank_rate)
-    up = length * (math.sin(shank) * shank_bend + math.cos(shank) * shank_rate * shank_rate)
+    forward = knee_forward + length * (math.cos(shank) * shank_bend - math.sin(shank) * shank_rate * shank_rate)
+    up = knee_up + length * (math.sin(shank) * shank_bend + math.cos(shank) * shank_rate * shank_rate)
     falls = s * (math.cos(alpha) * (STANDARD_GRAVITY + up) - math.sin(alpha) * forward)
     return turning_inertia(rig) * shank_bend + falls
 
@@ -628,14 +655,19 @@ def path_of(choice: Any) -> Path:
 
 
 def leg_of(leg: Any) -> Leg:
-    """The leg as numbers; its knee must rest."""
+    """The leg as numbers."""
+    still = Path(CONSTANT, 0.0, 0.0, 0.0, 0.0)
     if leg is None:
-        return Leg(0.0, 0.0, 0.0, 0.0, Path(CONSTANT, 0.0, 0.0, 0.0, 0.0))
-    if leg.curves is not None:
-        raise ValueError("the judge knows no gait")
+        return Leg(0.0, 0.0, 0.0, 0.0, still, 0.0, 0.0, np.zeros((3, 1)))
     moment = leg.foot_mass * leg.foot_mass_centre
-    inertia = leg.foot_inertia + moment * leg.foot_mass_centre
-    return Leg(1.0, moment, inertia, leg.shank_length, path_of(leg.shank))
+    body = (1.0, moment, leg.foot_inertia + moment * leg.foot_mass_centre, leg.shank_length)
+    if leg.curves is None:
+        return Leg(*body, path_of(leg.shank), 0.0, 0.0, np.zeros((3, 1)))
+    curves = [
+        [series.mean, *(item.cosine for item in series.harmonics), *(item.sine for item in series.harmonics)]
+        for series in (leg.curves.shank, leg.curves.knee_forward, leg.curves.knee_up)
+    ]
+    return Leg(*body, still, leg.curves.frequency, leg.curves.start, np.array(curves))
 
 
 def valve_of(scenario: Scenario) -> Valve:

@@ -54,7 +54,16 @@ def reference_gap(scenario: Scenario) -> float:
 
 @pytest.mark.parametrize(
     "family",
-    ["gases", "slow valves", "thermal rebounds", "late coarse sensors", "solenoid loops", "prescribed", "legs"],
+    [
+        "gases",
+        "slow valves",
+        "thermal rebounds",
+        "late coarse sensors",
+        "solenoid loops",
+        "prescribed",
+        "legs",
+        "legs in a gait",
+    ],
 )
 def test_judge_and_reference_solver_agree(family: str) -> None:
     assert {n: gap for n in range(3) if (gap := reference_gap(scenario_from_dict(draw(family, SEED, n)))) > 1e-2} == {}
