@@ -9,12 +9,11 @@ import argparse
 from importlib import resources
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
 from ppafo import load_device, simulate
-from ppafo.answers.style import house_style
+from ppafo.answers.style import COLOURS, Margins, figure_of_free_panels, house_style, mark_kind
 from ppafo.engine.scheme.actuators import torque_of, volumes_of
 from ppafo.model.catalog import ACTUATORS
 from ppafo.parameters.plant import plant_parameters
@@ -27,6 +26,7 @@ SHOWN = {
     "measured-bladder": (str(EXAMPLE / "measured-bladder.toml"), "measured (synthetic)"),
 }
 """Set and label of each by the ending of its scenarios."""
+MARGINS = Margins(left=0.65, right=0.2, top=0.75, bottom=0.55, row_gap=0.95, column_gap=0.85)
 
 
 def draw_relation(torques: Axes, volumes: Axes, name: str, label: str, colour: str) -> None:
@@ -54,20 +54,22 @@ def main() -> None:
 
 def draw(out: Path) -> None:
     """Draw all kinds into one picture."""
-    figure, ((torques, volumes), (angles, pressures)) = plt.subplots(2, 2, figsize=(9.0, 6.2), layout="constrained")
-    for number, (ending, (name, label)) in enumerate(SHOWN.items()):
-        draw_relation(torques, volumes, name, label, f"C{number}")
+    figure, ((torques, volumes), (angles, pressures)) = figure_of_free_panels((9.0, 6.6), MARGINS, 2, 2)
+    for (ending, (name, label)), colour in zip(SHOWN.items(), COLOURS, strict=False):
+        draw_relation(torques, volumes, name, label, colour)
         recording = simulate(EXAMPLE / f"step-response-{ending}.toml").recording
         room = plant_parameters(load_device(name)).atmospheric_pressure
-        angles.plot(recording.time, np.degrees(recording["angle"]), color=f"C{number}")
-        pressures.plot(recording.time, 1e-3 * (recording["pressure_1"] - room), color=f"C{number}")
-    torques.set(
-        xlabel="angle [deg]", ylabel="torque [N m]", title="chamber 1 at supply pressure (dashed: at half of it)"
-    )
-    volumes.set(xlabel="angle [deg]", ylabel="volume of chamber 1 [mL]", yscale="log", title="the same")
-    angles.set(xlabel="time [s]", ylabel="angle [deg]", title="step response of the example")
-    pressures.set(xlabel="time [s]", ylabel="gauge pressure 1 [kPa]", title="the same")
-    torques.legend()
+        angles.plot(recording.time, np.degrees(recording["angle"]), color=colour)
+        pressures.plot(recording.time, 1e-3 * (recording["pressure_1"] - room), color=colour)
+    torques.set(xlabel="Angle (deg)", ylabel="Torque (N m)", ylim=(0.0, None))
+    torques.set_title("Torque with chamber 1 at supply; dashed: at half of it")
+    volumes.set(xlabel="Angle (deg)", ylabel="Volume of chamber 1 (mL)", yscale="log")
+    volumes.set_title("Volume of chamber 1")
+    volumes.yaxis.set_major_formatter("{x:g}")
+    angles.set(xlabel="Time (s)", ylabel="Angle (deg)", title="Step response: angle")
+    pressures.set(xlabel="Time (s)", ylabel="Gauge pressure 1 (kPa)", title="Step response: pressure in chamber 1")
+    figure.legend(*torques.get_legend_handles_labels(), loc="upper left", ncols=4, bbox_to_anchor=(0.06, 0.995))
+    mark_kind(figure, "simulated")
     figure.savefig(out, dpi=110)
 
 
