@@ -321,6 +321,8 @@ def _entry(entry: Entry | TextEntry | FlagEntry) -> Iterator[str]:
         yield f"note = {_text(entry.note)}"
     if isinstance(entry, Entry) and entry.uncertainty is not None:
         yield f"uncertainty = {float(entry.uncertainty)!r}"
+    if isinstance(entry, Entry) and entry.key:
+        yield f"key = {_text(entry.key)}"
 
 
 def _citation(citation: Citation) -> Iterator[str]:

@@ -43,6 +43,9 @@ class Entry(BaseModel):
     source: Annotated[Text, Field(description="where to look it up: page, equation, data sheet, recording")]
     note: Annotated[str, Field(description="reason, conflict or remark")] = ""
     uncertainty: Annotated[float | None, Field(ge=0.0, description="half width of the 95 % interval, same unit")] = None
+    key: Annotated[
+        str, Field(description="statement that gives the number: 'PUBLICATION/ID', with which it is audited")
+    ] = ""
 
 
 class TextEntry(BaseModel):

@@ -10,11 +10,18 @@ from ppafo.parameters.audit.chambers import check_filling, check_rotation, check
 from ppafo.parameters.audit.evidence import Evidence, Finding
 from ppafo.parameters.audit.flow import check_bores, check_choked_flow, check_flow, check_orifices, check_sonic_flow
 from ppafo.parameters.audit.torque import check_inertia, check_published_torque, check_torque_ceiling
-from ppafo.parameters.audit.values import check_dimensions, check_gas_data, check_ideal_gas, check_ranges
+from ppafo.parameters.audit.values import (
+    check_dimensions,
+    check_gas_data,
+    check_ideal_gas,
+    check_ranges,
+    check_statements,
+)
 from ppafo.parameters.overrides import overridden_paths
 from ppafo.parameters.parameter_set import ParameterSet
 
 CHECKS: dict[str, Callable[[Evidence], Iterator[Finding]]] = {
+    "statements": check_statements,
     "dimensions": check_dimensions,
     "ranges": check_ranges,
     "gas data": check_gas_data,

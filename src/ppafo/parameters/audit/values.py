@@ -1,5 +1,6 @@
 """Are the values of a set possible: dimensions, ranges, the gas that is named, and what the ideal gas law miscounts?"""
 
+import math
 from collections.abc import Iterator
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
@@ -9,7 +10,38 @@ from ppafo.model.gas import SPECIES
 from ppafo.parameters.audit.evidence import Evidence, Finding, Side
 from ppafo.parameters.declaration import is_within
 from ppafo.parameters.parameter_set import entry_in_si, number_in_si, number_text
+from ppafo.parameters.publications.publication import FILE, read_publication
 from ppafo.units import to_si
+
+# Is every value that has the key of a published statement the number that this states?
+
+
+def check_statements(evidence: Evidence) -> Iterator[Finding]:
+    """Yield an error for each value whose key names no published number, or one of another size."""
+    for path, entry in evidence.parameter_set.numbers.items():
+        name, _, identifier = entry.key.partition("/")
+        if not entry.key:
+            continue
+        stated = {}
+        if name in FILE.names():
+            claims = read_publication(name)[0].claims
+            stated = {claim.id: (claim.published, claim.unit) for claim in claims if claim.published is not None}
+        number, unit = stated.get(identifier, (math.nan, ""))
+        if number == entry.value and unit == entry.unit:
+            continue
+        found = f"{number:g} {unit}".rstrip() if identifier in stated else "no number of that name"
+        yield Finding(
+            id=f"{path.replace('.', '-').replace('_', '-')}-against-statement",
+            severity="error",
+            title=f"{path} is not what '{entry.key}' states",
+            values=evidence.values_of(path),
+            sides=(),
+            paragraph=(
+                f"{path} is {number_text(entry)} and names '{entry.key}', which has {found}. Reconciled by that "
+                "number, or by the key of the statement that is meant (ppafo reproduce --list)."
+            ),
+        )
+
 
 # Does every value have the dimension that its equation needs?
 

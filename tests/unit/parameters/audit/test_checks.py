@@ -211,3 +211,22 @@ def test_an_area_that_is_the_bore_of_a_tube_is_noted() -> None:
 
 def test_a_torque_of_another_actuator_says_so() -> None:
     assert "Of another actuator: the original one was a Parker" in findings()["rated-torque"].paragraph
+
+
+def with_key(path: str, key: str) -> list[Finding]:
+    numbers = {**BASE.numbers, path: BASE.numbers[path].model_copy(update={"key": key})}
+    return [item for item in audit(replace(BASE, numbers=numbers)) if item.id.endswith("-against-statement")]
+
+
+def test_a_value_with_the_key_of_a_statement_is_the_number_that_this_states() -> None:
+    assert BASE.numbers["reported.walking_torque"].key == "jrrd-2011/peak_torque_printed_volume"
+    assert with_key("reported.walking_torque", "jrrd-2011/torque_at_rest") == []
+
+
+@pytest.mark.parametrize(
+    "key", ["jmd-2016/rated_torque", "jrrd-2011/torque_at_reste", "jrrd-2012/torque_at_rest", "jrrd"]
+)
+def test_a_key_of_another_number_or_of_none_is_an_error(key: str) -> None:
+    (found,) = with_key("reported.walking_torque", key)
+    assert (found.severity, found.id) == ("error", "reported-walking-torque-against-statement")
+    assert f"'{key}'" in found.title
