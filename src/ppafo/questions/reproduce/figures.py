@@ -46,14 +46,21 @@ _BIN = 3.0
 """Milliseconds over which the band of a measurement reaches from its least to its largest reading."""
 
 
-class _Curve(NamedTuple):
-    """What one panel of figure 7 shows, and its room for the first milliseconds: left, bottom, width, height."""
+class _Panel(NamedTuple):
+    """One panel of figure 7: its name, unit and look, and its room for the first milliseconds (x, y, width, height)."""
 
     name: str
     unit: str
-    values: Floats
     look: Look
     inset: tuple[float, float, float, float] | None
+
+
+_PANELS = (
+    _Panel("Vane angle", "deg", ACTUAL, None),
+    _Panel("Pressure difference, $P_1 - P_2$", "psi", ACTUAL, (0.69, 0.14, 0.29, 0.34)),
+    _Panel("Chamber 1 (plantarflexion), $P_1$", "psig", CHAMBER_1, (0.3, 0.12, 0.34, 0.34)),
+    _Panel("Chamber 2 (dorsiflexion), $P_2$", "psig", CHAMBER_2, (0.69, 0.3, 0.29, 0.4)),
+)
 
 
 def step_response_figure(
@@ -71,10 +78,10 @@ def step_response_figure(
         each = rows // 2
         panels = [grid[each * row][column] for row in (0, 1) for column in (0, 1)]
         last = _MILLISECONDS * _last_time(recording, events)
-        for letter, axes, curve in zip("ABCD", panels, _curves(recording, levels), strict=True):
-            axes.plot(_MILLISECONDS * recording.time, curve.values, color=curve.look.colour, label="model", zorder=3)
-            axes.set_title(f"$\\bf{{{letter}}}$   {curve.name}", fontsize=10.5)
-            axes.set_ylabel(curve.unit)
+        for letter, axes, panel, values in zip("ABCD", panels, _PANELS, _curves(recording, levels), strict=True):
+            axes.plot(_MILLISECONDS * recording.time, values, color=panel.look.colour, label="model", zorder=3)
+            axes.set_title(f"$\\bf{{{letter}}}$   {panel.name}", fontsize=10.5)
+            axes.set_ylabel(panel.unit)
             axes.margins(y=0.06)
         for axes in grid[-1]:
             axes.set_xlabel("Time after the step (ms)")
@@ -82,9 +89,9 @@ def step_response_figure(
         if synthetic is not None:
             differences = [grid[each * row + 1][column] for row in (0, 1) for column in (0, 1)]
             _add_measurement(panels, differences, recording, synthetic, levels)
-        for axes, curve in zip(panels, _curves(recording, levels), strict=True):
-            if curve.inset is not None:
-                _enlarge(axes, curve.inset)
+        for axes, panel in zip(panels, _PANELS, strict=True):
+            if panel.inset is not None:
+                _enlarge(axes, panel.inset)
         if events is not None:
             _mark([axes for row in grid for axes in row], panels[0], events)
         handles, names = panels[0].get_legend_handles_labels()
@@ -93,35 +100,11 @@ def step_response_figure(
         return figure
 
 
-def _curves(recording: Recording, levels: Levels) -> tuple[_Curve, ...]:
-    difference = (recording["pressure_1"] - recording["pressure_2"]) / PASCALS_PER_PSI
-    pressure_1, pressure_2 = (
-        ((recording[name] - levels.atmosphere) / PASCALS_PER_PSI) for name in ("pressure_1", "pressure_2")
-    )
-    return (
-        _Curve(name="Vane angle", unit="deg", values=np.degrees(recording["angle"]), look=ACTUAL, inset=None),
-        _Curve(
-            name="Pressure difference, $P_1 - P_2$",
-            unit="psi",
-            values=difference,
-            look=ACTUAL,
-            inset=(0.69, 0.14, 0.29, 0.34),
-        ),
-        _Curve(
-            name="Chamber 1 (plantarflexion), $P_1$",
-            unit="psig",
-            values=pressure_1,
-            look=CHAMBER_1,
-            inset=(0.3, 0.12, 0.34, 0.34),
-        ),
-        _Curve(
-            name="Chamber 2 (dorsiflexion), $P_2$",
-            unit="psig",
-            values=pressure_2,
-            look=CHAMBER_2,
-            inset=(0.69, 0.3, 0.29, 0.4),
-        ),
-    )
+def _curves(recording: Recording, levels: Levels) -> tuple[Floats, ...]:
+    """Return what the panels show, in their order and units."""
+    first, second = recording["pressure_1"], recording["pressure_2"]
+    gauge = ((pressure - levels.atmosphere) / PASCALS_PER_PSI for pressure in (first, second))
+    return (np.degrees(recording["angle"]), (first - second) / PASCALS_PER_PSI, *gauge)
 
 
 def _last_time(recording: Recording, events: StepEvents | None) -> float:
@@ -135,18 +118,17 @@ def _add_measurement(
     """Draw a measurement as a line with the band of its readings, and below it what it differs from the model."""
     times = _MILLISECONDS * synthetic.time
     first = np.flatnonzero(np.diff(np.floor(times / _BIN), prepend=-np.inf) > 0.0)
-    for axes, below, curve, expected in zip(
-        panels, differences, _curves(synthetic, levels), _curves(model, levels), strict=True
-    ):
-        low, high = np.minimum.reduceat(curve.values, first), np.maximum.reduceat(curve.values, first)
+    curves = zip(_PANELS, _curves(synthetic, levels), _curves(model, levels), strict=True)
+    for axes, below, (panel, values, expected) in zip(panels, differences, curves, strict=True):
+        low, high = np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
         axes.fill_between(
             times[first] + 0.5 * _BIN, low, high, color=EXPERIMENT.colour, alpha=0.3, linewidth=0.0, zorder=1
         )
-        axes.plot(times, curve.values, color=EXPERIMENT.colour, linewidth=0.8, zorder=2, label="synthetic measurement")
-        apart = curve.values - np.interp(synthetic.time, model.time, expected.values)
+        axes.plot(times, values, color=EXPERIMENT.colour, linewidth=0.8, zorder=2, label="synthetic measurement")
+        apart = values - np.interp(synthetic.time, model.time, expected)
         below.plot(times, apart, color=EXPERIMENT.colour, linewidth=0.9)
-        below.axhline(0.0, color=expected.look.colour, linewidth=1.0)
-        below.set_ylabel(f"Δ {curve.unit.replace('psig', 'psi')}")
+        below.axhline(0.0, color=panel.look.colour, linewidth=1.0)
+        below.set_ylabel(f"Δ {panel.unit.replace('psig', 'psi')}")
         below.locator_params(axis="y", nbins=4)
 
 
