@@ -1,9 +1,9 @@
-"""What was made before and takes long to make: compiled programs in a folder that nobody else can write, and texts.
+"""The cache of this computer: compiled programs, and texts that are expensive to compose.
 
-Loading compiled code runs it, so a folder is used only where it belongs to this user, and a program only where it is
-whole to the last bit. Whatever is wrong with the folder, a model is compiled and runs; only the next start waits again.
-Beside the programs lies what else was made, such as their texts, each in a file that begins with the hash of the rest
-and is found by what it was made from (``kept_bytes``).
+Loading compiled code runs it, so the folder is used only where no other user can write to it, and a program only where
+every byte has its recorded hash. If anything is wrong with the folder, the model is compiled in memory and runs; only
+the next start has to compile again. Texts are stored by a key of what they were composed from, in files that begin with
+the hash of their content (``kept_bytes``).
 """
 
 import contextlib
