@@ -183,16 +183,6 @@ def check_options(words: Sequence[str], parser: CommandParser) -> None:
             )
 
 
-def check_overrides(overrides: Sequence[str]) -> None:
-    """Refuse a value that is set twice: nobody would know which one was meant."""
-    given: dict[str, str] = {}
-    for override in overrides:
-        path, _, value = (part.strip() for part in override.partition("="))
-        if path in given:
-            raise UsageError(f"--set {path}: is given twice, as '{given[path]}' and as '{value}'; leave one out")
-        given[path] = value
-
-
 def _nearest_option(name: str, known: Sequence[str]) -> str:
     """Return the hint; the dashes, which all have in common, would make strangers look alike."""
     hint = nearest_name(name.strip("-"), [option.removeprefix("--") for option in known if option.startswith("--")])
@@ -281,7 +271,14 @@ def _run(words: list[str]) -> int:
         if parsed.command is None:
             print(FIRST_STEPS, file=sys.stderr)
             return EXIT_BAD_INPUT
-        check_overrides(getattr(parsed, "overrides", ()))
+        # Refuse a value that is set twice: nobody would know which one was meant.
+        overrides = getattr(parsed, "overrides", ())
+        given: dict[str, str] = {}
+        for override in overrides:
+            path, _, value = (part.strip() for part in override.partition("="))
+            if path in given:
+                raise UsageError(f"--set {path}: is given twice, as '{given[path]}' and as '{value}'; leave one out")
+            given[path] = value
         return int(parsed.run(parsed))
     except PpafoError as error:
         lines = [f"{len(error.parts)} things are wrong:", *error.parts] if error.parts else [str(error)]

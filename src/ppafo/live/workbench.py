@@ -73,7 +73,16 @@ def program_content(item: Simulated, module: str, intervals: Mapping[str, Interv
     """Return what the page knows of a scenario; ``module`` is the element that holds its program."""
     told = item.module.description
     gauge = _gauge_texts(item.scenario, told["settings"])
-    document = _document(told)
+    # The file of a scenario or walk with the overrides in it; those of the device stay overrides.
+    declared = OF_A_VANE
+    if told["kind"] == "walk":
+        from ppafo.walking.declaration import OF_A_WALK
+
+        declared = OF_A_WALK
+    changed = apply_overrides(told["document"], told["overrides"], told["name"], declared)
+    document, own = changed.document, changed.device
+    overrides = [*document.get("device", {}).get("overrides", ()), *own]
+    document["device"] = {**document.get("device", {}), **({"overrides": overrides} if overrides else {})}
     return {
         "name": told["name"],
         "kind": told["kind"],
@@ -147,20 +156,6 @@ def _as_in_files(entry: Mapping[str, Any], item: Scenario) -> dict[str, Any]:
     if entry["group"] == "controller" and entry["display"]["unit"] == "psi_g":
         return {**entry, "display": {**entry["display"], "unit": "psi_a", "zero": 0.0}}
     return dict(entry)
-
-
-def _document(told: Mapping[str, Any]) -> dict[str, Any]:
-    """The file of a scenario or walk with the overrides in it; those of the device stay overrides."""
-    declared = OF_A_VANE
-    if told["kind"] == "walk":
-        from ppafo.walking.declaration import OF_A_WALK
-
-        declared = OF_A_WALK
-    changed = apply_overrides(told["document"], told["overrides"], told["name"], declared)
-    document, own = changed.document, changed.device
-    overrides = [*document.get("device", {}).get("overrides", ()), *own]
-    document["device"] = {**document.get("device", {}), **({"overrides": overrides} if overrides else {})}
-    return document
 
 
 def page_content(

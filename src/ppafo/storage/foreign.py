@@ -135,7 +135,21 @@ def read_foreign(
         lines = _lines(path, columns.encoding)
         if TIME not in columns.channels:
             raise DataError(f"the column map has no channel '{TIME}'")
-        table = _read_table(lines, columns)
+        names, width, rows = _rows(lines, columns)
+        places = {
+            name: place for name, item in columns.channels.items() if (place := _place(name, item, names, width)) >= 0
+        }
+        titles = {name: names[place] if names else str(place + 1) for name, place in places.items()}
+        table = _Table(array("q"), {name: array("d") for name in places})
+        for line, row in rows:
+            if len(row) != width:
+                is_split = columns.decimal == "point" and columns.delimiter == "comma" and len(row) == 2 * width
+                remedy = f"; {DECIMAL_COMMAS}" if is_split else ""
+                raise DataError(f"line {line} has {len(row)} values for {width} columns{remedy}")
+            table.lines.append(line)
+            for name, place in places.items():
+                thousands = columns.channels[name].thousands
+                table.numbers[name].append(_number(row[place], thousands, columns.decimal, titles[name], line))
         channels = {
             name: _constant(name, item, len(table.lines), atmosphere)
             if item.constant is not None
@@ -161,25 +175,6 @@ class _Table:
 
     lines: "array[int]"
     numbers: dict[str, "array[float]"]
-
-
-def _read_table(lines: list[str], columns: ColumnMap) -> _Table:
-    names, width, rows = _rows(lines, columns)
-    places = {
-        name: place for name, item in columns.channels.items() if (place := _place(name, item, names, width)) >= 0
-    }
-    titles = {name: names[place] if names else str(place + 1) for name, place in places.items()}
-    table = _Table(array("q"), {name: array("d") for name in places})
-    for line, row in rows:
-        if len(row) != width:
-            is_split = columns.decimal == "point" and columns.delimiter == "comma" and len(row) == 2 * width
-            remedy = f"; {DECIMAL_COMMAS}" if is_split else ""
-            raise DataError(f"line {line} has {len(row)} values for {width} columns{remedy}")
-        table.lines.append(line)
-        for name, place in places.items():
-            thousands = columns.channels[name].thousands
-            table.numbers[name].append(_number(row[place], thousands, columns.decimal, titles[name], line))
-    return table
 
 
 def _rows(lines: list[str], columns: ColumnMap) -> tuple[list[str], int, Rows]:

@@ -281,7 +281,16 @@ def read_trc(path: str | Path) -> MarkerTable:
         if unit not in _UNITS:
             shown = one_line(unit)[:_LONGEST_SHOWN]
             raise DataError(f"line 3: Units is {shown!r}; allowed are {', '.join(_UNITS)}")
-        names = _names(lines[3])
+        # The names of the markers; the two names before them are those of frame and time.
+        line = lines[3]
+        cells = [cell.strip() for cell in line.split("\t")]
+        if len(cells) < 3 or cells[1].lower() != "time":
+            raise DataError("line 4: must begin with 'Frame#', 'Time' and the names of markers, parted by tabs")
+        names = [name for name in cells[2:] if name]
+        twice = first_twice(names)
+        if twice is not None or not names:
+            what = "no marker" if twice is None else f"two markers {one_line(twice)[:_LONGEST_SHOWN]!r}"
+            raise DataError(f"line 4: names {what}; every marker needs a name of its own")
         rows = [(number, line) for number, line in enumerate(lines[_HEAD_LINES:], _HEAD_LINES + 1) if line.strip()]
         values = np.array([_marker_row(line, number, len(names)) for number, line in rows]).reshape(
             -1, 1 + 3 * len(names)
@@ -291,19 +300,6 @@ def read_trc(path: str | Path) -> MarkerTable:
         raise DataError(f"{path}: {error}".replace(f"{path}: {path}:", f"{path}:")) from error
     markers = {name: values[:, 1 + 3 * place : 4 + 3 * place].T for place, name in enumerate(names)}
     return MarkerTable(values[:, 0], markers, unit)
-
-
-def _names(line: str) -> list[str]:
-    """Return the names of the markers; the two names before them are those of frame and time."""
-    cells = [cell.strip() for cell in line.split("\t")]
-    if len(cells) < 3 or cells[1].lower() != "time":
-        raise DataError("line 4: must begin with 'Frame#', 'Time' and the names of markers, parted by tabs")
-    names = [name for name in cells[2:] if name]
-    twice = first_twice(names)
-    if twice is not None or not names:
-        what = "no marker" if twice is None else f"two markers {one_line(twice)[:_LONGEST_SHOWN]!r}"
-        raise DataError(f"line 4: names {what}; every marker needs a name of its own")
-    return names
 
 
 def _marker_row(line: str, number: int, markers: int) -> list[float]:

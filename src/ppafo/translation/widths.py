@@ -281,7 +281,7 @@ class _Narrowing:
         if term.kind in ("field", "item"):
             owner = parts[0].type
             kind = dict(owner.fields)[term.detail] if isinstance(owner, Row) else None
-            return replace(term, type=kind or _item_type(owner, term.detail), parts=parts)
+            return replace(term, type=kind or _types(owner)[term.detail], parts=parts)
         if term.kind == "build":
             whole = self.type_of(term.type, self.ranges.parts[term.type])
             inner = [own for _, own in whole.fields] if isinstance(whole, Row) else _types(whole)
@@ -314,10 +314,6 @@ class _Narrowing:
 def _types(kind: Type) -> tuple[Type, ...]:
     assert isinstance(kind, Items)
     return kind.types
-
-
-def _item_type(kind: Type, place: int) -> Type:
-    return _types(kind)[place]
 
 
 def converted(term: Term, kind: Type) -> Term:

@@ -272,15 +272,6 @@ def check_scatter(
             )
 
 
-def scatter_remarks(curves: Mapping[str, CurveStatistics], errors: Mapping[str, FitError]) -> list[str]:
-    """Return a line on each curve that scatters more than a steady walk does."""
-    return [
-        f"{_statement(item)}: that is noise, or the walk is not steady; {_REMEDY}"
-        for item in _scatters(curves, errors)
-        if item.spread > REMARKED_SPREAD or item.misfit > REMARKED_MISFIT
-    ]
-
-
 def _statement(item: _Scatter) -> str:
     return (
         f"{item.name} differs between strides by {100.0 * item.spread:.0f} % of its range and its series misses "
@@ -477,7 +468,12 @@ def _finish(
     # The reading of the file that would be neutral.
     neutral = f"{float(np.degrees(taken_off)) + sign * tilt:.1f} deg"
     said += zero_remarks(tilt, f"--ankle-neutral '{neutral}', or ankle_angle.neutral in a gait map, corrects it")
-    said += scatter_remarks(curves, errors)
+    # A line on each curve that scatters more than a steady walk does.
+    said += [
+        f"{_statement(item)}: that is noise, or the walk is not steady; {_REMEDY}"
+        for item in _scatters(curves, errors)
+        if item.spread > REMARKED_SPREAD or item.misfit > REMARKED_MISFIT
+    ]
     names = tuple(table.file for table in source.tables)
     return ImportedGait(
         gait,

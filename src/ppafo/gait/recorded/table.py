@@ -94,7 +94,14 @@ def read_c3d(path: str | Path) -> C3dFile:
     parameters: Any = content["parameters"]
     rate = _rate(parameters, path)
     points: Floats = content["data"]["points"]
-    labels = _labels(parameters["POINT"], points.shape[1], path)
+    # The labels, without the subject's name before a colon.
+    group = parameters["POINT"]
+    number = points.shape[1]
+    labels = [_bare(label) for label in _texts(group, "LABELS")][:number]
+    twice = first_twice(labels)
+    if twice is not None or len(labels) != number:
+        what = f"two of {twice!r}" if twice is not None else f"{len(labels)} labels for {number} columns"
+        raise DataError(f"{path}: there are {what}; every point and channel needs a label of its own")
     frames = points.shape[2]
     columns = {
         f"{label}.{axis}": points[row, number, :]
@@ -131,16 +138,6 @@ def _rate(parameters: Any, path: str | Path) -> float:
     if not 0.0 < rate < np.inf:
         raise DataError(f"{path}: POINT:RATE is {rate:g}; points need a rate above 0 Hz")
     return rate
-
-
-def _labels(group: Any, number: int, path: str | Path) -> list[str]:
-    """Return the labels, without the subject's name before a colon."""
-    labels = [_bare(label) for label in _texts(group, "LABELS")][:number]
-    twice = first_twice(labels)
-    if twice is not None or len(labels) != number:
-        what = f"two of {twice!r}" if twice is not None else f"{len(labels)} labels for {number} columns"
-        raise DataError(f"{path}: there are {what}; every point and channel needs a label of its own")
-    return labels
 
 
 def _bare(label: str) -> str:

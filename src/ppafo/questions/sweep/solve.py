@@ -101,7 +101,17 @@ def _failures(results: StudyResults) -> list[dict[str, Any]]:
 
 def bands_file(study: Study, results: StudyResults, bins: BinsOf) -> tuple[bytes, float]:
     """Return the content of ``bands.parquet``, and the fraction of values that lay beyond the bins."""
-    merged = _merged_counts(study, results)
+    # The counts over all chunks by configuration and channel, shape (times, BINS + 2).
+    merged: dict[str, dict[str, Counts]] = {}
+    for item in study.configurations:
+        samples = int(item.scenario.duration / study.outputs.every + 1.0e-9) + 1
+        merged[item.name] = {name: np.zeros((samples, BINS + 2), dtype=np.int64) for name in study.outputs.bands}
+        for part in results.chunks(COUNTS_FOLDER, configuration=item.name):
+            channels = part.column("channel").cast("string").to_numpy()
+            sample, place, count = (part.column(key).to_numpy() for key in ("sample", "bin", "count"))
+            for channel, total in merged[item.name].items():
+                own = channels == channel
+                total[sample[own], place[own]] += count[own]
     parts = [
         _band(study, number, channel, bins[item.name][channel], merged[item.name][channel])
         for number, item in enumerate(study.configurations)
@@ -137,21 +147,6 @@ def _band(study: Study, configuration: int, channel: str, bins: Bins, counts: Co
         "runs": counts.sum(axis=1),
         **{f"q{fraction:g}": values for fraction, values in quantiles.items()},
     }
-
-
-def _merged_counts(study: Study, results: StudyResults) -> Mapping[str, Mapping[str, Counts]]:
-    """Return the counts over all chunks by configuration and channel, shape (times, BINS + 2)."""
-    merged: dict[str, dict[str, Counts]] = {}
-    for item in study.configurations:
-        samples = int(item.scenario.duration / study.outputs.every + 1.0e-9) + 1
-        merged[item.name] = {name: np.zeros((samples, BINS + 2), dtype=np.int64) for name in study.outputs.bands}
-        for part in results.chunks(COUNTS_FOLDER, configuration=item.name):
-            channels = part.column("channel").cast("string").to_numpy()
-            sample, place, count = (part.column(key).to_numpy() for key in ("sample", "bin", "count"))
-            for channel, total in merged[item.name].items():
-                own = channels == channel
-                total[sample[own], place[own]] += count[own]
-    return merged
 
 
 def describe(parts: Parts, fractions: Sequence[float]) -> dict[str, Any]:
