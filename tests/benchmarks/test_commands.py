@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks import __main__ as speed
 from ppafo.cli.main import main as package
-from ppafo.storage.owned_folder import MARK, write_marked_folder
+from ppafo.storage.result_folder import MARK, write_marked_folder
 from scripts import interval_coverage as coverage
 
 Command = Callable[[Sequence[str]], int]

@@ -23,8 +23,8 @@ from ppafo.questions.reproduce.publication import load_publication
 from ppafo.questions.size.problem import read_sizing_file
 from ppafo.questions.sweep.results import load_study_results
 from ppafo.questions.tune.problem import load_tuning
+from ppafo.rig.experiments import check_rig_folder
 from ppafo.rig.preset import load_preset
-from ppafo.rig.record import check_rig_folder
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.storage.foreign import load_column_map
 from ppafo.storage.result_folder import read_document, read_recording

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import COMMANDS, main
-from ppafo.storage.owned_folder import MARK
+from ppafo.storage.result_folder import MARK
 from tests.virtual_wire import free_port, sending_bench
 
 FOLDERS: dict[str, list[str]] = {

@@ -7,7 +7,7 @@ import pytest
 
 from ppafo.identification.trajectory import TrajectoryFit
 from ppafo.questions.identify.solve import identify
-from ppafo.rig.record import record
+from ppafo.rig.experiments import record
 from ppafo.storage import write_csv
 
 DROOPING = (

@@ -10,7 +10,7 @@ from ppafo.answers import Answer, Cell, Column, Figure, Section, Table
 from ppafo.answers.display_units import display_difference, display_unit, display_value, title_with_unit
 from ppafo.answers.style import render_figure
 from ppafo.documents.json_text import json_text
-from ppafo.storage.owned_folder import write_marked_folder
+from ppafo.storage.result_folder import write_marked_folder
 from ppafo.version import __version__
 
 if TYPE_CHECKING:

@@ -53,7 +53,7 @@ def add_override_argument(parser: argparse.ArgumentParser) -> None:
 def check_output(parsed: argparse.Namespace) -> None:
     """Refuse, before anything runs, a folder of ``--out`` that is not absent, empty or this command's own result."""
     if parsed.out is not None:
-        from ppafo.storage.owned_folder import check_owned_folder, marked_folder
+        from ppafo.storage.result_folder import check_owned_folder, marked_folder
 
         with blame_out_option():
             check_owned_folder(parsed.out, marked_folder(_command(parsed)))
@@ -160,7 +160,7 @@ def _drop_output() -> None:
 
 def write_files(parsed: argparse.Namespace, contents: Mapping[str, bytes]) -> None:
     """Make the folder of ``--out`` hold exactly these files, and the mark by which it is known: all of them or none."""
-    from ppafo.storage.owned_folder import write_marked_folder
+    from ppafo.storage.result_folder import write_marked_folder
 
     with blame_out_option():
         write_marked_folder(parsed.out, contents, _command(parsed))

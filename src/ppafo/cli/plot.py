@@ -32,7 +32,7 @@ def run(parsed: argparse.Namespace) -> int:
     from ppafo.answers.recording_figure import FIGURE_FORMATS
     from ppafo.answers.style import render_figure
     from ppafo.storage.files import write_file
-    from ppafo.storage.owned_folder import add_to_marked_folder
+    from ppafo.storage.result_folder import add_to_marked_folder
 
     if parsed.out is not None and parsed.out.suffix.removeprefix(".") not in FIGURE_FORMATS:
         allowed = ", ".join(f".{name}" for name in FIGURE_FORMATS)
@@ -79,10 +79,9 @@ def _draw_folder(folder: Path, names: list[str]) -> "dict[str, Figure]":
     from ppafo.answers.recording_figure import draw_stored_result
     from ppafo.questions.sweep.manifest import MANIFEST
     from ppafo.questions.sweep.results import load_study_results
-    from ppafo.rig.record import RIG_FILE
+    from ppafo.rig.experiments import RIG_FILE
     from ppafo.storage import read_result
-    from ppafo.storage.owned_folder import MARK
-    from ppafo.storage.result_folder import NETCDF_FILE, RUN_FILE
+    from ppafo.storage.result_folder import MARK, NETCDF_FILE, RUN_FILE
 
     if RUN_FILE in names:
         return {_FIGURE: draw_stored_result(read_result(folder))}
@@ -98,7 +97,7 @@ def _draw_folder(folder: Path, names: list[str]) -> "dict[str, Figure]":
 def _draw_rig(folder: Path, names: list[str]) -> "dict[str, Figure]":
     """Return a figure of each recording of the rig; gauge pressure counts from the atmosphere of its device."""
     from ppafo.answers.recording_figure import recording_figure, stated_atmosphere
-    from ppafo.rig.record import RIG_FILE
+    from ppafo.rig.experiments import RIG_FILE
     from ppafo.storage import read_recording
 
     file = folder / RIG_FILE
@@ -129,7 +128,7 @@ def _draw_end(folder: Path, names: list[str]) -> "Figure":
 
 def _document(file: Path) -> dict[str, Any]:
     """Return the names and values of a JSON file."""
-    from ppafo.storage.owned_folder import read_json
+    from ppafo.storage.result_folder import read_json
 
     document = read_json(file)
     if not isinstance(document, dict):
@@ -139,7 +138,7 @@ def _document(file: Path) -> dict[str, Any]:
 
 def _say_what_is_there(parsed: argparse.Namespace, names: list[str]) -> int:
     """Say which figures a folder of ppafo has and which file to open; DataError where the folder is another."""
-    from ppafo.storage.owned_folder import MARK, marking_command
+    from ppafo.storage.result_folder import MARK, marking_command
 
     if MARK not in names:
         raise DataError(f"{parsed.folder}: is not a result folder of ppafo")

@@ -60,7 +60,7 @@ def run(parsed: argparse.Namespace) -> int:
 
 
 def _record(parsed: argparse.Namespace) -> int:
-    from ppafo.rig.record import NOTICE, check_rig_folder, find_experiment, record, write_rig_recording
+    from ppafo.rig.experiments import NOTICE, check_rig_folder, find_experiment, record, write_rig_recording
 
     find_experiment(parsed.experiment)
     seed = _whole_number(parsed.seed)

@@ -10,7 +10,7 @@ from ppafo.questions.league.solve import DRAWS
 from ppafo.questions.league.standing import ENTRANTS, SEED, WALKING_ENTRANTS
 from ppafo.questions.league.walking import bound, contest
 from ppafo.questions.league.walking.task import CONFIGURATION
-from ppafo.storage.owned_folder import MARK
+from ppafo.storage.result_folder import MARK
 
 pytestmark = pytest.mark.thorough
 

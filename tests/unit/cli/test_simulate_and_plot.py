@@ -23,7 +23,7 @@ from ppafo.simulation.simulate import Result, Status, compile_models
 from ppafo.storage import read_result
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
-from ppafo.storage.owned_folder import check_owned_folder, marked_folder, write_marked_folder
+from ppafo.storage.result_folder import check_owned_folder, marked_folder, write_marked_folder
 
 FILES = ["figure.png", "figure.svg", "recording.csv", "recording.nc", "report.html", "run.json"]
 

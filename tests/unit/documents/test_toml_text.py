@@ -13,7 +13,7 @@ from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError
 from ppafo.parameters import load_parameter_set
 from ppafo.simulation.loading import load_scenario
 from ppafo.storage import read_csv, read_netcdf, read_recording, read_result
-from ppafo.storage.owned_folder import read_json
+from ppafo.storage.result_folder import read_json
 
 KIND = TomlKind("scenario", "scenario", resources.files("ppafo") / "scenarios", ScenarioError)
 

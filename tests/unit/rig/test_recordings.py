@@ -9,9 +9,8 @@ import pytest
 
 from ppafo.errors import DataError, ParameterError, PpafoError, SimulationError
 from ppafo.rig import list_presets, load_preset, record
-from ppafo.rig.experiments import EXPERIMENTS, on_scale
+from ppafo.rig.experiments import EXPERIMENTS, on_scale, write_rig_recording
 from ppafo.rig.preset import PATHS, SECTIONS, Preset, json_schema
-from ppafo.rig.record import write_rig_recording
 from ppafo.rig.solution import make_solver
 from ppafo.signals.channels import CHANNELS
 from ppafo.storage import read_csv

@@ -20,8 +20,7 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.loading import scenario_from_dict
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario, scenario_document
 from ppafo.simulation.simulate import simulate
-from ppafo.storage.owned_folder import read_json
-from ppafo.storage.result_folder import RUN_FILE, read_document, read_recording
+from ppafo.storage.result_folder import RUN_FILE, read_document, read_json, read_recording
 from ppafo.walking import WalkResult
 from ppafo.walking.motion import walk_of
 from ppafo.walking.strides import is_whole_course
