@@ -98,6 +98,7 @@ def test_a_run_loads_the_valves_of_its_set_and_the_controller_and_actuator_that_
     assert "ppafo.model.valves.proportional" in before
     assert not {f"ppafo.model.{name}" for name in others} & own(before)
     assert "ppafo.control.controllers.model_based" not in before
+    assert not {f"ppafo.engine.scheme.{name}" for name in ("thermal_gas", "supply_lines")} & own(before)
 
 
 def test_the_number_of_modules_of_a_run_does_not_grow_unnoticed(simulated: tuple[list[str], list[str]]) -> None:
