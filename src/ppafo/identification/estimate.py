@@ -48,7 +48,8 @@ class Estimate:
     ``explanation`` is one or two sentences: residual check, what the value trades against, what is assumed.
     ``recordings`` names each source with its hash: ``static.csv sha256:0123abcd...``.
     ``widened`` is how many times as wide the interval is as the scatter alone would have it; 1 where the law describes
-    the recordings to within their scatter. ``condition`` says where the value holds, ``at 430 kPa``, if not everywhere.
+    the recordings to within their scatter. ``condition`` says where the value holds, ``at 430 kPa``, if not everywhere;
+    where it says what must not be, ``beside`` is the interval [unit] without that.
     """
 
     path: str
@@ -62,6 +63,7 @@ class Estimate:
     confidence: float = 0.95
     widened: float = 1.0
     condition: str = ""
+    beside: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if self.verdict not in _VERDICTS:
@@ -88,6 +90,9 @@ class Estimate:
     def verdict_in_words(self) -> str:
         """The verdict, where it holds, and how much wider the interval is where the law misses the recordings."""
         description = f"{self.verdict}, {self.condition}" if self.condition else self.verdict
+        if self.beside is not None:
+            other = f"{self.beside[0]:.6g} to {self.beside[1]:.6g} {self.unit}".removesuffix(" -").rstrip()
+            description = f"{description} (else {other})"
         if self.is_usable and self.widened >= WORTH_TELLING:
             return f"{description}, widened {self.widened:.3g} times (lack of fit)"
         return description

@@ -9,6 +9,7 @@ import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.estimate import Estimate
+from ppafo.identification.trajectory.directions import Doubt, doubt_of
 from ppafo.identification.trajectory.information import autocorrelation, correlation
 from ppafo.identification.trajectory.problem import (
     Experiment,
@@ -151,7 +152,8 @@ class TrajectoryFit:
     Matrices are in the order of ``estimates``; those of the coordinates are in ``uncertainty``. ``models`` are the
     fitted runs at the times of the samples, ``measurements`` the samples, both by experiment over the time of the run.
     ``remarks`` are sentences about the fit as a whole. ``misfit`` says why the model does not explain the recordings,
-    so that what they fix holds for it only; empty if it does.
+    so that what they fix holds for it only; empty if it does. ``doubt`` has what they say of effects that the model
+    lacks, None where that was not searched.
     """
 
     problem: TrajectoryProblem
@@ -168,6 +170,7 @@ class TrajectoryFit:
     remarks: tuple[str, ...]
     optimum: Optimum
     misfit: str
+    doubt: Doubt | None
 
     def estimate(self, name: str) -> Estimate:
         """Return the estimate of a parameter by its path; ``valve.area`` means the valve of the first experiment.
@@ -279,6 +282,15 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     low, high = coordinate_bounds(ranges)
     highest = [item.number(float(end)) for item, end in zip(ranges, uncertainty.high, strict=True)]
     atmosphere = prepared[0].scenario.device.supply.atmospheric_pressure
+    doubt = None
+    if problem.search.directions:
+        report(Progress("trajectory fit: what the model may lack"))
+        doubt = doubt_of(whole, uncertainty.low, uncertainty.high)
+    reasons = (
+        "" if doubt is None else doubt.misfit,
+        reason_of_misfit(uncertainty.misfit, channels),
+        impossible_start(ranges, highest, atmosphere),
+    )
     evidence = Evidence(
         ranges=ranges,
         point=centre,
@@ -291,13 +303,15 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         prior_deviation=prior_coordinates(ranges)[1],
         inflation=uncertainty.inflation,
         residual_check=uncertainty.residual_check,
-        misfit=reason_of_misfit(uncertainty.misfit, channels) or impossible_start(ranges, highest, atmosphere),
+        misfit="; ".join(reason for reason in reasons if reason),
         alone=uncertainty.misfit.alone,
         sources=tuple(
             tuple(one.source or one.recording.label for one in problem.experiments if item.acts_in(one.label))
             for item in ranges
         ),
         search=problem.search,
+        conditions=() if doubt is None else doubt.conditions,
+        beside=None if doubt is None else (doubt.low, doubt.high),
     )
     slopes = np.array([item.slope(float(z)) for item, z in zip(ranges, centre, strict=True)])
     scenarios = tuple(with_numbers(item.scenario, numbers_in(item.label, ranges, centre)) for item in prepared)
@@ -322,6 +336,7 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         + step_remarks(found.residuals, centre, signals),
         optimum=found,
         misfit=evidence.misfit,
+        doubt=doubt,
     )
 
 

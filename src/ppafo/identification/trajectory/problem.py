@@ -426,7 +426,8 @@ Loss = Literal["linear", "soft_l1", "huber"]
 class Search:
     """How to look for the optimum: loss, number of starts besides the first, seed of their draws, and limits.
 
-    A robust loss counts residuals beyond 1.345 standard deviations less. ``identified`` and ``weak`` are the half
+    With ``directions`` what is left is searched for what a bench may have and the model not. A robust loss counts
+    residuals beyond 1.345 standard deviations less. ``identified`` and ``weak`` are the half
     widths of an interval, relative to the number, up to which it is called so.
     """
 
@@ -437,6 +438,7 @@ class Search:
     confidence: float = 0.95
     identified: float = 0.2
     weak: float = 1.0
+    directions: bool = False
 
 
 @dataclass(frozen=True, slots=True)

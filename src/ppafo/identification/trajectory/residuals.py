@@ -242,7 +242,7 @@ def trajectories(
     """
 
     def one(prepared: PreparedExperiment) -> dict[str, Floats]:
-        return _trajectories(prepared, _columns_in(prepared.label, ranges, points), len(points))
+        return signals_at(prepared, _columns_in(prepared.label, ranges, points), len(points))
 
     workers = min(len(experiments), os.cpu_count() or 1)
     if workers == 1:
@@ -305,7 +305,8 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
     )
 
 
-def _trajectories(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
+def signals_at(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
+    """Return the channels [SI] (samples, runs) of one experiment with other numbers [SI] in each of ``count`` runs."""
     run = run_with(prepared, columns)
     kept, failure = _rows_of(run.program)
     records: Floats | None = None

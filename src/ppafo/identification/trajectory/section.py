@@ -175,6 +175,9 @@ class TrajectorySection(BaseModel):
     other_starts: Annotated[int, Field(ge=0, le=100, description="number of starts besides the first")] = 0
     seed: Annotated[int, Field(ge=0, description="random seed of the draws of starts")] = 1
     confidence: Annotated[float, Field(gt=0.5, lt=1.0, description="confidence of the intervals")] = 0.95
+    directions: Annotated[
+        bool, Field(description="search what is left for effects that the model does not have, and say what is hidden")
+    ] = True
     profiles: Annotated[Texts, Field(description="parameters whose profile likelihood is wanted, by path")] = ()
     candidates: Annotated[
         tuple[CandidateSection, ...],
@@ -267,7 +270,11 @@ def trajectory_problem(section: TrajectorySection, setting: Setting) -> Trajecto
     parameters = [_parameter(item, scenarios, setting) for item in section.parameters]
     nuisances = [one for item in section.experiments for one in _nuisances(item, setting)]
     search = Search(
-        loss=section.loss, other_starts=section.other_starts, seed=section.seed, confidence=section.confidence
+        loss=section.loss,
+        other_starts=section.other_starts,
+        seed=section.seed,
+        confidence=section.confidence,
+        directions=section.directions,
     )
     return TrajectoryProblem((*parameters, *nuisances), experiments, search)
 

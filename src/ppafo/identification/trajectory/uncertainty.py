@@ -29,7 +29,7 @@ from ppafo.identification.trajectory.posterior import (
     draw_posterior,
     whiten,
 )
-from ppafo.identification.trajectory.problem import Range, Search
+from ppafo.identification.trajectory.problem import Range, Search, is_nuisance
 from ppafo.identification.trajectory.residuals import Floats
 from ppafo.identification.trajectory.search import Sensor, WhitenedFit, is_at_bound
 from ppafo.identification.trajectory.sensor_noise import Drift, SensorNoise, sensor_noise
@@ -252,6 +252,7 @@ def _quadratic(information: Floats, pull: Floats, prior: Floats) -> tuple[Floats
 STRONG = 0.8
 """Correlation from which two numbers are reported as trading off against each other."""
 
+_CONDITIONAL: tuple[Verdict, ...] = ("identified", "weak")
 _MAXIMUM_PARTNERS = 3
 _LARGEST_LOGARITHM = 300.0
 _FREED = 0.5
@@ -264,8 +265,9 @@ FROM_PRIOR = 0.8
 class Evidence:
     """What a verdict is made of, in coordinates: point, information of data and priors, covariance, bounds, sources.
 
-    ``interval`` has the ends of the intervals. ``misfit`` says why the model is wrong, empty where it is not; ``alone``
-    names for each parameter the only channel that speaks of it, empty where several do.
+    ``interval`` has the ends of the intervals, ``beside`` those with effects that nothing shows, and ``conditions``
+    says for each parameter which of these must not be, empty for none. ``misfit`` says why the model is wrong, empty
+    where it is not; ``alone`` names for each parameter the only channel that speaks of it, empty where several do.
     """
 
     ranges: tuple[Range, ...]
@@ -283,6 +285,8 @@ class Evidence:
     alone: tuple[str, ...]
     sources: tuple[tuple[str, ...], ...]
     search: Search
+    conditions: tuple[str, ...] = ()
+    beside: tuple[Floats, Floats] | None = None
 
 
 def estimate_of(evidence: Evidence, index: int) -> Estimate:
@@ -290,19 +294,33 @@ def estimate_of(evidence: Evidence, index: int) -> Estimate:
     item, at = evidence.ranges[index], float(evidence.point[index])
     half = 0.5 * float(evidence.interval[1][index] - evidence.interval[0][index])
     furthest = _LARGEST_LOGARITHM if item.scale == "log" else math.inf
-    low, high = (item.number(float(np.clip(end[index], -furthest, furthest))) for end in evidence.interval)
+
+    def ends(pair: tuple[Floats, Floats]) -> tuple[float, float]:
+        one, other = (item.number(float(np.clip(end[index], -furthest, furthest))) for end in pair)
+        return max(min(one, other), item.low), min(max(one, other), item.high)
+
+    low, high = ends(evidence.interval)
     fraction = relative_half_width(evidence, index, half)
     verdict = _verdict(evidence, index, fraction)
+    explanation = _explanation(evidence, index, verdict, fraction)
+    condition, beside = "", None
+    is_asked = verdict in _CONDITIONAL and not is_nuisance(item)
+    if evidence.beside is not None and is_asked and evidence.conditions[index]:
+        condition, beside = f"if {evidence.conditions[index]}", ends(evidence.beside)
+        interval = f"{beside[0]:.4g} to {beside[1]:.4g} {item.unit}".removesuffix(" -")
+        explanation += f" These recordings cannot show whether that is so; if not, the interval is {interval}."
     return Estimate(
         path=item.name,
         value=item.number(at),
         unit=item.unit,
-        low=max(min(low, high), item.low),
-        high=min(max(low, high), item.high),
+        low=low,
+        high=high,
         verdict=verdict,
-        explanation=_explanation(evidence, index, verdict, fraction),
+        explanation=explanation,
         recordings=evidence.sources[index],
         confidence=evidence.search.confidence,
+        condition=condition,
+        beside=beside,
     )
 
 

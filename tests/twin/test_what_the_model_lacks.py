@@ -1,0 +1,86 @@
+"""Physics that a fitted model lacks, planted by a simulator of another author: it is named, or the verdict says so."""
+
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks.intervals import NOISE, planted_problem, two_step_responses
+from ppafo.identification.trajectory import FreeParameter, Search, TrajectoryFit, fit
+from ppafo.signals.recording import Channel, Recording
+from tests.judge.bench import Extra, bench
+
+PLANTED = two_step_responses(0.4)
+TIMES = np.arange(401, dtype=np.float64) * 1e-3
+UNITS = {"angle": "rad", "pressure_1": "Pa", "pressure_2": "Pa"}
+INERTIA, STATIC, FLOW = "foot_plate.inertia", "friction.static_torque", "valve.discharge_coefficient"
+PATHS = (FLOW, "actuator.leak.area", STATIC, "friction.viscous_damping", INERTIA)
+
+
+def fitted(extra: Extra, directions: bool = True) -> TrajectoryFit:
+    """A fit of two step responses of a device with something more, under white noise."""
+    random = np.random.default_rng(4)
+    recordings = []
+    for scenario in PLANTED.scenarios:
+        columns = bench(scenario, [(0.0, scenario.control.settings["command"])], TIMES, extra)
+        channels = {
+            name: Channel(values + NOISE[name] * random.standard_normal(TIMES.size), unit)
+            for values, (name, unit) in zip(columns, UNITS.items(), strict=True)
+        }
+        recordings.append(Recording("planted", TIMES, channels, kind="synthetic"))
+    starts = [PLANTED.truth(path) * math.exp(random.uniform(-0.1, 0.1)) for path in PATHS]
+    begin = [FreeParameter(path, start=start) for path, start in zip(PATHS, starts, strict=True)]
+    return fit(planted_problem(PLANTED, begin, recordings, Search(directions=directions)))
+
+
+@pytest.mark.parametrize(
+    ("extra", "words"),
+    [
+        (Extra(leak_opens=1.0e4), "the leak seems to open at"),
+        (Extra(heat=6000.0), "the gas seems to warm and cool"),
+        (Extra(stribeck=0.3), "friction near standstill seems to be higher"),
+    ],
+)
+def test_an_effect_that_the_model_lacks_is_named(extra: Extra, words: str) -> None:
+    found = fitted(extra)
+    assert found.misfit.startswith(words)
+    assert {estimate.verdict for estimate in found.estimates} == {"holds for this model only"}
+
+
+def test_friction_that_grows_unseen_is_in_the_condition_and_the_truth_in_the_interval_beside() -> None:
+    found, without = fitted(Extra(pressed=3.0e-7)), fitted(Extra(pressed=3.0e-7), directions=False)
+    truth = PLANTED.truth(INERTIA)
+    wrong = without.estimate(INERTIA)
+    assert wrong.verdict == "identified"
+    assert not wrong.low <= truth <= wrong.high
+    said = found.estimate(INERTIA)
+    assert (said.low, said.high) == (wrong.low, wrong.high)
+    assert "if friction does not grow with the pressure between the chambers by more than" in said.verdict_in_words
+    assert said.beside is not None
+    assert said.beside[0] <= truth <= said.beside[1]
+    assert "if not, the interval is" in said.explanation
+
+
+def test_nothing_is_named_where_the_model_lacks_nothing() -> None:
+    found = fitted(Extra())
+    assert found.misfit == ""
+    assert {estimate.verdict for estimate in found.estimates} == {"identified"}
+    assert found.doubt is not None
+    assert max(abs(one.score) for one in found.doubt.findings) < 4.0
+    assert found.estimate("actuator.leak.area").condition == ""
+
+
+def test_a_zero_that_is_off_by_more_than_a_bench_has_is_named() -> None:
+    random = np.random.default_rng(4)
+    recordings = []
+    for scenario in PLANTED.scenarios:
+        columns = bench(scenario, [(0.0, scenario.control.settings["command"])], TIMES)
+        columns[2] += 1500.0
+        channels = {
+            name: Channel(values + NOISE[name] * random.standard_normal(TIMES.size), unit)
+            for values, (name, unit) in zip(columns, UNITS.items(), strict=True)
+        }
+        recordings.append(Recording("planted", TIMES, channels, kind="synthetic"))
+    begin = [FreeParameter(path, start=PLANTED.truth(path)) for path in PATHS]
+    found = fit(planted_problem(PLANTED, begin, recordings, Search(directions=True)))
+    assert "the zero of pressure_2 seems to be off by 1.5 kPa" in found.misfit
