@@ -25,7 +25,13 @@ from ppafo.identification.trajectory.residuals import (
     trajectories,
 )
 from ppafo.identification.trajectory.search import WhitenedFit
-from ppafo.identification.trajectory.sensor_noise import SensorNoise, from_reflections, reflections_of
+from ppafo.identification.trajectory.sensor_noise import (
+    Drift,
+    SensorNoise,
+    from_reflections,
+    reflections_of,
+    sensor_noise,
+)
 from ppafo.model.catalog import find_effects
 from ppafo.parameters.plant import effects_of
 from ppafo.simulation.numbers import number_at, with_numbers
@@ -463,9 +469,15 @@ def _findings(found: WhitenedFit, columns: Sequence[Column], others: Sequence[Co
     for _ in range(_ROUNDS):
         explained = np.linalg.lstsq(rows[:, :used], rows[:, -1], rcond=1.0e-9)[0]
         left = whole.columns[:, -1] - whole.columns[:, :used] @ explained
-        rows = whiten(
-            whole, [_short_noise(whole.segments(left, place)) for place in range(len(model.sensors))], weights
-        )
+        noises = [_short_noise(whole.segments(left, place)) for place in range(len(model.sensors))]
+        rows = whiten(whole, noises, weights)
+    # A slow drift is more than a short autoregression can hold, and would look like a gain that drifts.
+    explained = np.linalg.lstsq(rows[:, :used], rows[:, -1], rcond=1.0e-9)[0]
+    left = whole.columns[:, -1] - whole.columns[:, :used] @ explained
+    parts = [whole.segments(left, place) for place in range(len(model.sensors))]
+    drifts = [sensor_noise(own, sensor.is_given) for own, sensor in zip(parts, found.sensors, strict=True)]
+    noises = [one if isinstance(one.shape, Drift) else short for one, short in zip(drifts, noises, strict=True)]
+    rows = whiten(whole, noises, weights)
     slopes, d, r = rows[:, :first], rows[:, first:-1], rows[:, -1]
     # Priors hold the numbers as samples do.
     information = slopes.T @ slopes
