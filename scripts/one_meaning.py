@@ -35,6 +35,7 @@ from ppafo.exports.c_library.program import COUNTS
 from ppafo.exports.wasm import description_of
 from ppafo.live.workbench import page_content, program_content
 from ppafo.loading import load_scenario
+from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.parameters.graph import ATMOSPHERE_PATH, counts_from
 from ppafo.questions.sweep.manifest import drawn_values, varied_columns
 from ppafo.simulation.ensemble.planning import plan_ensemble
@@ -61,6 +62,10 @@ from scripts.typed_words import (
     single,
     words_of,
 )
+
+# What is drawn must not depend on the kinds that were used before: a scenario has the numbers of those that are loaded.
+for kinds in (VALVES, ACTUATORS, EFFECTS):
+    kinds.load_own()
 
 
 def at_study(name: str, count: int, seed: int) -> Judged:

@@ -90,7 +90,8 @@ ANKLE_RANGE = (5.0, 80.0)
 ANKLE_LIMITS = (40.0, 150.0)
 MIDSTANCE = slice(15, 41)
 """Percent of the stride in which the foot stands: the ankle then turns as the shank does."""
-_MINIMUM_SHANK_TRAVEL = 8.0
+_TURNS = 2.0
+"""Degrees, RMS, by which a standing foot has to turn for a sign to show; recorded feet turn by 0.5 to 1.5."""
 _TURNED_BACK = 0.1
 """Of its range, by which a shank has to rotate backwards over the standing foot for its sign to be reversed.
 
@@ -134,7 +135,7 @@ def check_shank(walk: MeanStride) -> None:
 
 def check_ankle(walk: MeanStride) -> None:
     """Raise DataError for an ankle angle that no leg has, or not with this shank."""
-    theta, phi = (np.degrees(walk.curves[name]) for name in ("ankle_angle", "shank_angle"))
+    theta = np.degrees(walk.curves["ankle_angle"])
     place = f"{walk.file['ankle_angle']}: ankle_angle"
     travel = float(np.ptp(theta))
     low, high = ANKLE_RANGE
@@ -144,7 +145,7 @@ def check_ankle(walk: MeanStride) -> None:
             f"{_unit_hint(travel, low, high)}"
         )
     turned, reversed_turned = standing_turns(walk.curves["shank_angle"], walk.curves["ankle_angle"])
-    if np.ptp(phi[MIDSTANCE]) > _MINIMUM_SHANK_TRAVEL and turned > _CLEARLY_BETTER * reversed_turned:
+    if turned > _CLEARLY_BETTER * reversed_turned and turned > _TURNS:
         raise DataError(
             f"{place} goes into plantarflexion while the shank rotates forward over the standing foot, which would "
             f"turn by {turned:.2g} deg (RMS), and by {reversed_turned:.2g} deg with the other sign: its sign is "
@@ -179,7 +180,7 @@ def standing_turns(shank: Floats, ankle: Floats) -> tuple[float, float]:
 def sign_remarks(shank: Floats, ankle: Floats) -> list[str]:
     """Return what there is to say of an ankle whose sign the standing foot does not show."""
     turned, reversed_turned = standing_turns(shank, ankle)
-    if turned <= reversed_turned:
+    if _CLEARLY_BETTER * turned <= reversed_turned:
         return []
     return [
         f"mid-stance does not show the sign of ankle_angle: the standing foot turns by {turned:.2g} deg (RMS), and by "

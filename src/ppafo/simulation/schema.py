@@ -196,7 +196,12 @@ def file_model(name: str, own: dict[str, Any]) -> type[BaseModel]:
 
 
 def scenario_file() -> type[BaseModel]:
-    """Return the model of a scenario file, for the controllers and profiles that are loaded."""
+    """Return the model of a scenario file, for the controllers and profiles that are loaded.
+
+    A file that names no controller is compared with all of this package.
+    """
+    if not CONTROLLERS.loaded():
+        CONTROLLERS.load_own()
     return _scenario_file(*(tuple(kinds.loaded().items()) for kinds in (CONTROLLERS, PROFILES)))
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.errors import ScenarioError, UnitError, nearest_name
+from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters import apply_overrides, load_parameter_set
 from ppafo.parameters.declaration import alternatives, is_within
@@ -104,6 +105,7 @@ def _parse(text: str, quantity: Quantity, atmosphere: float) -> float:
 
 def varied_path(path: str, scenario: Scenario) -> VariedPath:
     """Return a path of a scenario; ScenarioError with the nearest one where there is none."""
+    find_effects([path])
     known = declared_numbers(scenario)
     if path not in known:
         section = path.partition(".")[0]

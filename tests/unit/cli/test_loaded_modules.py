@@ -118,3 +118,37 @@ def test_a_walk_reads_units_without_their_library(tmp_path: Path) -> None:
     command = COMMAND.format(words=["walk", "off", "--minutes", "0.2", "--out", str(tmp_path / "walk")])
     _, after = loaded_by(command)
     assert heavy(after) <= READING | DRAWING | WRITING | {"scipy"}
+
+
+def said_by(*words: str) -> tuple[int, str]:
+    """Exit code and all words of a command in a process of its own, which has loaded no kinds before."""
+    done = subprocess.run([sys.executable, "-m", "ppafo", *words], capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        'schema_version = 1\nname = "x"\n',
+        'schema_version = 1\nname = "x"\n[controler]\nkind = "pid"\n',
+        'schema_version = 1\nname = "x"\n[controller]\nproportional_gain = "1 1/(N m)"\n',
+        'schema_version = 2\nname = "x"\n',
+    ],
+)
+def test_a_file_that_names_no_kind_is_refused_in_one_line_by_a_process_that_has_loaded_none(
+    content: str, tmp_path: Path
+) -> None:
+    (tmp_path / "x.toml").write_text(content)
+    code, said = said_by("simulate", str(tmp_path / "x.toml"))
+    assert code == 2
+    assert said.count("\n") == 1
+    assert "x.toml: " in said
+
+
+@pytest.mark.long
+def test_an_effect_that_nothing_has_named_before_can_be_varied() -> None:
+    condition = ("--such-that", "rms_error <= 0.9 N m")
+    code, said = said_by(
+        "find", "torque-task-proportional", "--vary", "effects.ice.blockage_per_gas=1..2000 1/kg", *condition
+    )
+    assert code == 0, said

@@ -179,7 +179,9 @@ def stop_by_interrupt() -> Iterator[Callable[[], bool]]:
         yield asked.is_set
         return
     known = [getattr(signal, name) for name in SIGNALS if hasattr(signal, name)]
-    before = {number: signal.signal(number, ask) for number in known if signal.getsignal(number) != signal.SIG_IGN}
+    # A job in the background has Ctrl-C ignored by its shell, and ends all the same by whoever sends it the signal.
+    heard = [number for number in known if number == signal.SIGINT or signal.getsignal(number) != signal.SIG_IGN]
+    before = {number: signal.signal(number, ask) for number in heard}
     try:
         yield asked.is_set
     finally:

@@ -209,10 +209,11 @@ def constant_stretches(time: Floats, values: Floats, spans: Sequence[tuple[float
     return found
 
 
-ODD_SHAPE, ODD_AGAINST_OTHERS = 0.25, 4.0
-"""A stride is odd whose curve is off the median one by this fraction of its range, RMS, and by as many times the
-median distance of all strides. Impaired walking varies more, but then in every stride."""
-_FEWEST_TO_COMPARE = 4
+ODD_SHAPE, ODD_PHASE, ODD_AGAINST_OTHERS = 0.25, 0.4, 4.0
+"""A stride is odd whose curve is off the median one by these fractions of its range, RMS over the stride or at any one
+phase, and by as many times the median distance of all strides. Impaired walking varies more, but then in every stride.
+"""
+_FEWEST_TO_COMPARE = 3
 _MOST_ODD = 0.4
 """Fraction of the strides; where more are odd, none is the exception."""
 
@@ -223,9 +224,11 @@ def without_odd_shapes(curves: Mapping[str, CurveStatistics], strides: Strides) 
         if len(item.strides) < _FEWEST_TO_COMPARE or name == "centre_of_pressure":
             continue
         middle = np.median(item.curves, axis=0)
-        distances = np.sqrt(np.mean((item.curves - middle) ** 2, axis=1))
-        limit = max(ODD_SHAPE * float(np.ptp(middle)), ODD_AGAINST_OTHERS * float(np.median(distances)))
-        odd = [stride for stride, far in zip(item.strides, distances, strict=True) if far > limit]
+        away = np.abs(item.curves - middle)
+        is_odd = np.zeros(len(item.strides), dtype=bool)
+        for share, distances in ((ODD_SHAPE, np.sqrt(np.mean(away**2, axis=1))), (ODD_PHASE, np.max(away, axis=1))):
+            is_odd |= distances > max(share * np.ptp(middle), ODD_AGAINST_OTHERS * np.median(distances))
+        odd = [stride for stride, is_it in zip(item.strides, is_odd.tolist(), strict=True) if is_it]
         if len(odd) <= _MOST_ODD * len(item.strides):
             strides = strides.without(
                 [stride for stride in odd if stride in strides.taken], f"{name} is unlike all others"

@@ -15,6 +15,7 @@ from ppafo.documents.toml_text import TomlKind, beside
 from ppafo.errors import StudyError, UnitError, first_twice, nearest_name
 from ppafo.loading import load_scenario, placed
 from ppafo.metrics.catalog import METRICS
+from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, is_within
 from ppafo.parameters.graph import ATMOSPHERE_PATH
@@ -101,6 +102,7 @@ def read_variables(
     ``scenarios`` are those of all tasks by kind of valve.
     """
     everything = [scenario for of_kind in scenarios.values() for scenario in of_kind]
+    find_effects(tables)
     known = {path: quantity for scenario in everything for path, quantity in declared_numbers(scenario).items()}
     known = {path: quantity for path, quantity in known.items() if path not in _BY_PARTS} | OWN
     atmosphere = everything[0].device.supply.atmospheric_pressure
