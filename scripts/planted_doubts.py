@@ -1,6 +1,7 @@
 """Plants physics and faults of a record that the fitted model lacks, and counts what a trajectory fit says of them.
 
     python scripts/planted_doubts.py --draws 20 --seed 31
+    python scripts/planted_doubts.py --clean --draws 20 --seed 31
 
 The recordings are those of an integration with scipy that shares no code with the package (tests/judge/bench.py): two
 step responses of 0.4 s at 1 kHz, white noise of sensors, five numbers fitted. Each row plants one thing at four sizes.
@@ -23,6 +24,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks.intervals import Planted, planted_problem, two_step_responses
+from benchmarks.intervals.noise_kinds import NOISE_KINDS
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory import FreeParameter, Search, TrajectoryFit, fit
 from ppafo.signals.recording import Channel, Recording
@@ -134,15 +136,17 @@ def truth_of(planted: Planted, extra: Extra) -> list[Any]:
     return [bench(one, [(0.0, one.control.settings["command"])], times, extra) for one in planted.scenarios]
 
 
-def fitted(planted: Planted, signals: Sequence[Any], random: np.random.Generator) -> TrajectoryFit:
-    """The fit of five numbers that begin up to 15 % off."""
-    recordings = []
+def fitted(
+    planted: Planted, signals: Sequence[Any], random: np.random.Generator, noise: str = "white"
+) -> TrajectoryFit:
+    """The fit of five numbers that begin up to 15 % off, to signals with noise of a kind."""
+    recordings, kind = [], NOISE_KINDS[noise]
     times = np.arange(round(DURATION / INTERVAL) + 1, dtype=np.float64) * INTERVAL
-    for values in signals:
-        channels = {
-            name: Channel(one + planted.noise[name] * random.standard_normal(one.size), unit)
-            for one, (name, unit) in zip(values, UNITS.items(), strict=True)
-        }
+    for number, values in enumerate(signals):
+        channels = {}
+        for one, (name, unit) in zip(values, UNITS.items(), strict=True):
+            errors = (kind if name in kind.channels else NOISE_KINDS["white"]).draw(one.size, number, random)
+            channels[name] = Channel(one + planted.noise[name] * errors, unit)
         recordings.append(Recording("planted", times, channels, kind="synthetic"))
     starts = [planted.truth(path) * math.exp(random.uniform(-0.15, 0.15)) for path in PARAMETERS]
     begin = [FreeParameter(path, start=start) for path, start in zip(PARAMETERS, starts, strict=True)]
@@ -189,15 +193,39 @@ def count_row(row: Row, planted: Planted, draws: int, seed: int) -> Count:
     return found
 
 
+def print_false_alarms(planted: Planted, draws: int, seed: int, wanted: Sequence[str]) -> None:
+    """Print what fits of the right model say under each kind of noise, a row when it is done."""
+    print("| noise | fits | model called wrong | a direction named | largest score of one not named | CPU s a fit |")
+    print("|---|---|---|---|---|---|")
+    signals = [one[:, :: round(INTERVAL / FINE)] for one in truth_of(planted, Extra())]
+    for number, noise in enumerate(NOISE_KINDS):
+        if wanted and not any(noise.startswith(one) for one in wanted):
+            continue
+        begun, wrong, named, largest = time.process_time(), 0, 0, 0.0
+        for draw in range(draws):
+            outcome = fitted(planted, signals, np.random.default_rng([seed, 100 + number, draw]), noise)
+            assert outcome.doubt is not None
+            wrong += bool(outcome.misfit)
+            named += bool(outcome.doubt.shown)
+            if not outcome.doubt.shown:
+                largest = max(largest, *(abs(one.score) for one in outcome.doubt.findings))
+        seconds = (time.process_time() - begun) / draws
+        print(f"| {noise} | {draws} | {wrong} | {named} | {largest:.1f} | {seconds:.1f} |", flush=True)
+
+
 def main() -> None:
     """Print the table, a row when it is done."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--draws", type=int, default=20)
     parser.add_argument("--seed", type=int, default=31)
+    parser.add_argument("--clean", action="store_true", help="nothing planted, under ten kinds of noise")
     parser.add_argument("--rows", default="", help="begin of the names of the rows that are wanted, by commas")
     words = parser.parse_args()
     planted = two_step_responses(DURATION)
     wanted = [one for one in words.rows.split(",") if one]
+    if words.clean:
+        print_false_alarms(planted, words.draws, words.seed, wanted)
+        return
     print(f"| {' | '.join(HEAD)} |")
     print(f"|{'---|' * len(HEAD)}")
     for row in ROWS:

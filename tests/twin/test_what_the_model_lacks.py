@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.intervals import NOISE, planted_problem, two_step_responses
+from benchmarks.intervals.noise_kinds import NOISE_KINDS
 from ppafo.identification.trajectory import FreeParameter, Search, TrajectoryFit, fit
 from ppafo.signals.recording import Channel, Recording
 from tests.judge.bench import Extra, bench
@@ -17,14 +18,14 @@ INERTIA, STATIC, FLOW = "foot_plate.inertia", "friction.static_torque", "valve.d
 PATHS = (FLOW, "actuator.leak.area", STATIC, "friction.viscous_damping", INERTIA)
 
 
-def fitted(extra: Extra, directions: bool = True) -> TrajectoryFit:
-    """A fit of two step responses of a device with something more, under white noise."""
-    random = np.random.default_rng(4)
+def fitted(extra: Extra, directions: bool = True, noise: str = "white", seed: int = 4) -> TrajectoryFit:
+    """A fit of two step responses of a device with something more, under noise of a kind."""
+    random = np.random.default_rng(seed)
     recordings = []
     for scenario in PLANTED.scenarios:
         columns = bench(scenario, [(0.0, scenario.control.settings["command"])], TIMES, extra)
         channels = {
-            name: Channel(values + NOISE[name] * random.standard_normal(TIMES.size), unit)
+            name: Channel(values + NOISE[name] * NOISE_KINDS[noise].draw(TIMES.size, 0, random), unit)
             for values, (name, unit) in zip(columns, UNITS.items(), strict=True)
         }
         recordings.append(Recording("planted", TIMES, channels, kind="synthetic"))
@@ -58,7 +59,7 @@ def test_friction_that_grows_unseen_is_in_the_condition_and_the_truth_in_the_int
     assert "if friction does not grow with the pressure between the chambers by more than" in said.verdict_in_words
     assert said.beside is not None
     assert said.beside[0] <= truth <= said.beside[1]
-    assert "if not, the interval is" in said.explanation
+    assert "if not, the interval is the one behind 'else'" in said.explanation
 
 
 def test_nothing_is_named_where_the_model_lacks_nothing() -> None:
@@ -68,6 +69,18 @@ def test_nothing_is_named_where_the_model_lacks_nothing() -> None:
     assert found.doubt is not None
     assert max(abs(one.score) for one in found.doubt.findings) < 4.0
     assert found.estimate("actuator.leak.area").condition == ""
+
+
+@pytest.mark.long
+def test_a_gain_that_drifts_is_not_named_where_a_slow_drift_of_the_sensor_explains_as_much() -> None:
+    found = fitted(Extra(), noise="heavy-drift", seed=7)
+    assert found.doubt is not None
+    highest = max(found.doubt.findings, key=lambda one: abs(one.score))
+    assert highest.column.name == "gain of pressure_1"
+    assert abs(highest.score) > 5.0
+    assert abs(highest.size) > highest.column.tolerance
+    assert found.doubt.shown == ()
+    assert found.misfit == ""
 
 
 def test_a_zero_that_is_off_by_more_than_a_bench_has_is_named() -> None:

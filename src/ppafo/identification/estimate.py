@@ -88,11 +88,18 @@ class Estimate:
 
     @property
     def verdict_in_words(self) -> str:
-        """The verdict, where it holds, and how much wider the interval is where the law misses the recordings."""
+        """What ``verdict_with`` returns with the interval beside in ``unit``."""
+        low, high = self.beside or (math.nan, math.nan)
+        return self.verdict_with(f"{low:.6g} to {high:.6g} {self.unit}".removesuffix(" -").rstrip())
+
+    def verdict_with(self, beside: str) -> str:
+        """Return the verdict, where it holds, and how much wider the interval is where the law misses the recordings.
+
+        ``beside`` is the interval that stands beside, as it shall be written; it is left out where there is none.
+        """
         description = f"{self.verdict}, {self.condition}" if self.condition else self.verdict
         if self.beside is not None:
-            other = f"{self.beside[0]:.6g} to {self.beside[1]:.6g} {self.unit}".removesuffix(" -").rstrip()
-            description = f"{description} (else {other})"
+            description = f"{description} (else {beside})"
         if self.is_usable and self.widened >= WORTH_TELLING:
             return f"{description}, widened {self.widened:.3g} times (lack of fit)"
         return description

@@ -16,7 +16,7 @@ from ppafo.identification.new_set import with_estimates
 from ppafo.identification.problem import json_schema, parse_problem
 from ppafo.parameters import apply_overrides, build_device
 from ppafo.parameters.loading import load_device, load_parameter_set, parameter_set_toml, parse_parameter_set
-from ppafo.questions.identify.answer import Identification
+from ppafo.questions.identify.answer import Identification, estimate_row
 from ppafo.questions.identify.solve import identify
 from ppafo.storage import write_csv
 from ppafo.units import to_si
@@ -348,3 +348,23 @@ def test_a_set_states_the_half_width_for_its_own_confidence() -> None:
     entry = with_estimates(load_parameter_set("ppafo2011"), [wide]).parameter_set.numbers["foot_plate.inertia"]
     assert entry.uncertainty == pytest.approx(0.1 * entry.value * 1.959964 / 2.575829, rel=1e-6)
     assert "99% interval" in entry.note
+
+
+def test_the_interval_beside_is_written_in_the_unit_of_the_set() -> None:
+    beside = (0.008, 0.012)
+    found = Estimate(
+        "foot_plate.inertia",
+        0.01,
+        "kg m^2",
+        0.0099,
+        0.0101,
+        "identified",
+        "Why.",
+        ("a.csv",),
+        condition="if",
+        beside=beside,
+    )
+    before = apply_overrides(load_parameter_set("ppafo2011"), ["foot_plate.inertia=10 g m^2"])
+    entry = with_estimates(before, [found]).parameter_set.numbers["foot_plate.inertia"]
+    assert "(else 8 to 12 g m^2), 95% interval 9.9 to 10.1 g m^2" in entry.note
+    assert estimate_row(found, before)[3] == "identified, if (else 8.000 to 12.00 g m^2)"

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ppafo.identification.trajectory.information import inverse_with_root
+from ppafo.identification.trajectory.information import inverse_with_root, solution
 from ppafo.identification.trajectory.posterior import whiten
 from ppafo.identification.trajectory.problem import TIME_OFFSET
 from ppafo.identification.trajectory.residuals import (
@@ -30,6 +30,7 @@ from ppafo.identification.trajectory.sensor_noise import (
     SensorNoise,
     from_reflections,
     reflections_of,
+    sample_weights,
     sensor_noise,
 )
 from ppafo.model.catalog import find_effects
@@ -233,8 +234,7 @@ def doubt_of(found: WhitenedFit, low: Floats, high: Floats) -> Doubt:
     """
     of_model = _of_model(found)
     columns = [*(sizes[0] for sizes in of_model), *_of_record(found)]
-    others = [column for sizes in of_model for column in sizes[1:]]
-    every = _findings(found, columns, others)
+    every = _findings(found, columns, [column for sizes in of_model for column in sizes[1:]])
     findings, at_other_sizes = every[: len(columns)], every[len(columns) :]
     limit = _quantile(ALARM / max(1, len(findings)))
     shown = []
@@ -243,8 +243,28 @@ def doubt_of(found: WhitenedFit, low: Floats, high: Floats) -> Doubt:
             alike = [other for other in at_other_sizes if other.column.name == one.column.name and other.score > 0.0]
             shown.append(max((one, *alike), key=lambda item: item.score))
     shown.sort(key=lambda one: -abs(one.score))
-    clear = tuple(one for one in shown if one.column.low <= one.size) or tuple(shown)
+    # What cannot be, an effect that is negative, counts only where nothing else shows.
+    possible = [one for one in shown if one.column.low <= one.size]
+    others = [one for one in shown if one.column.low > one.size]
+    clear = _not_noise(found, possible, limit) or _not_noise(found, others, limit)
     return Doubt(findings, clear, *_with_open_sizes(findings, found.optimum.point, low, high))
+
+
+def _not_noise(found: WhitenedFit, shown: Sequence[Finding], limit: float) -> tuple[Finding, ...]:
+    """Return the findings from the first on that explains more than any noise of the sensors could.
+
+    A score takes the noise as known, and that which is left when all directions are taken out is too little where it is
+    slow. So noise of any kind is estimated without the effect and with it, and the likelihoods are compared.
+    """
+    if not shown:
+        return ()
+    starts = _slopes_of_starts(found.optimum.residuals, found.optimum.point)
+    without = _likelihood(found, starts)
+    for place, one in enumerate(shown):
+        with_it = _likelihood(found, np.column_stack([starts, one.column.change]))
+        if with_it - without > limit**2:
+            return tuple(shown[place:])
+    return ()
 
 
 def _quantile(chance: float) -> float:
@@ -495,6 +515,32 @@ def _findings(found: WhitenedFit, columns: Sequence[Column], others: Sequence[Co
         ends = [min(max(size + side * _SPAN * error, column.low), column.high) for side in (-1.0, 1.0)]
         made.append(Finding(column, score, size, error, ends[0], ends[1], responses[:kept, place] / largest))
     return tuple(made)
+
+
+def _likelihood(found: WhitenedFit, more: Floats) -> float:
+    """Return twice the log likelihood [-] at the best numbers and noise, less what Akaike's criterion takes for noise.
+
+    ``more`` are columns of residuals (samples, columns) of unknown sizes. The noise of each sensor may be of any kind.
+    """
+    model, pulled = found.model, len(found.model.pull)
+    more = more / np.maximum(np.max(np.abs(more), axis=0, initial=0.0), _INVISIBLE)
+    whole = replace(model, columns=np.hstack([model.slopes, more, model.residuals[:, None]]))
+    columns, residuals = whole.slopes, whole.residuals
+    precision = np.zeros((columns.shape[1], columns.shape[1]))
+    precision[:pulled, :pulled] = model.precision
+    noises, weights, best = list(found.noises), [sensor.weights for sensor in found.sensors], -math.inf
+    for _ in range(_ROUNDS):
+        rows = whiten(whole, noises, weights)
+        product = rows[:, :-1].T @ rows[:, -1]
+        product[:pulled] += model.pull
+        move = -solution(rows[:, :-1].T @ rows[:, :-1] + precision, product)
+        left = residuals + columns @ move
+        parts = [whole.segments(left, place) for place in range(len(model.sensors))]
+        noises = [sensor_noise(own, sensor.is_given) for own, sensor in zip(parts, found.sensors, strict=True)]
+        weights = [tuple(sample_weights(noise, own)) for noise, own in zip(noises, parts, strict=True)]
+        of_priors = float(move[:pulled] @ (2.0 * model.pull + model.precision @ move[:pulled]))
+        best = max(best, 2.0 * sum(one.likelihood - one.numbers for one in noises) - of_priors)
+    return best
 
 
 def _short_noise(segments: Sequence[Floats]) -> SensorNoise:

@@ -191,7 +191,7 @@ class SensorNoise:
     """Noise of a sensor: its shape, the level of each recording, degrees of freedom (infinite for normal tails).
 
     ``levels`` are in units of the given or first estimated noise; all equal where ``is_shared``. ``is_fixed`` is noise
-    that was given and is not exceeded. ``likelihood`` and ``numbers`` are what the criterion is made of.
+    that was given and is not exceeded. The log ``likelihood`` and ``numbers`` are what the criterion is made of.
     """
 
     shape: Shape
@@ -223,7 +223,9 @@ def sensor_noise(segments: Sequence[Floats], is_given: bool = False) -> SensorNo
     whole = np.concatenate(segments)
     white = from_reflections(np.zeros(0))
     if float(np.mean(whole * whole)) < max(_LEAST, 1.0 if is_given else 0.0):
-        return SensorNoise(white, np.full(len(segments), 1.0 if is_given else math.sqrt(_LEAST)), is_fixed=True)
+        level, count = 1.0 if is_given else math.sqrt(_LEAST), len(whole)
+        likelihood = -0.5 * float(whole @ whole) / level**2 - count * (math.log(level) + 0.5 * math.log(2.0 * math.pi))
+        return SensorNoise(white, np.full(len(segments), level), is_fixed=True, likelihood=likelihood)
     levels = _relative_levels(segments)
     scaled = [one / level for one, level in zip(segments, levels, strict=True)]
     is_shared = bool(np.all(levels == 1.0))
@@ -240,7 +242,8 @@ def sensor_noise(segments: Sequence[Floats], is_given: bool = False) -> SensorNo
         return _criterion(one.likelihood, one.numbers, count) + (math.log(count) - 2.0) * more
 
     best = min(candidates, key=criterion_beside_drifts)
-    return SensorNoise(best.shape, best.levels * levels, best.freedom, is_shared, False, best.likelihood, best.numbers)
+    likelihood = best.likelihood - sum(len(one) * math.log(level) for one, level in zip(segments, levels, strict=True))
+    return SensorNoise(best.shape, best.levels * levels, best.freedom, is_shared, False, likelihood, best.numbers)
 
 
 def sample_weights(noise: SensorNoise, segments: Sequence[Floats]) -> list[Floats]:

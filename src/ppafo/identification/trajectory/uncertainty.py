@@ -307,8 +307,9 @@ def estimate_of(evidence: Evidence, index: int) -> Estimate:
     is_asked = verdict in _CONDITIONAL and not is_nuisance(item)
     if evidence.beside is not None and is_asked and evidence.conditions[index]:
         condition, beside = f"if {evidence.conditions[index]}", ends(evidence.beside)
-        interval = f"{beside[0]:.4g} to {beside[1]:.4g} {item.unit}".removesuffix(" -")
-        explanation += f" These recordings cannot show whether that is so; if not, the interval is {interval}."
+        explanation += (
+            " These recordings cannot show whether that is so; if not, the interval is the one behind 'else'."
+        )
     return Estimate(
         path=item.name,
         value=item.number(at),

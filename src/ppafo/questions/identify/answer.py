@@ -333,7 +333,7 @@ def _procedure_section(result: BenchResult, before: ParameterSet) -> Section:
     kind = "" if result.kind == "measured" else f" ({result.kind})"
     return Section(
         f"{result.procedure}{kind}: {result.summary}",
-        table=Table((), tuple(_estimate_row(item, before) for item in result.estimates)),
+        table=Table((), tuple(estimate_row(item, before) for item in result.estimates)),
         remarks=(*_checks(result.checks), *(f"remark: {remark}" for remark in result.remarks)),
     )
 
@@ -349,7 +349,7 @@ def _trajectory_section(outcome: TrajectoryOutcome, before: ParameterSet) -> Sec
         f"trajectory{origin}: {count_of(len(fit.estimates), 'number')} fitted to "
         f"{count_of(len(fit.measurements), 'recording')}",
         paragraphs=tuple(f"beforehand: INSUFFICIENT: {one.name}: {one.statement}" for one in missing),
-        table=Table((), tuple(_estimate_row(item, before) for item in fit.estimates)),
+        table=Table((), tuple(estimate_row(item, before) for item in fit.estimates)),
         remarks=(
             *(f"{item.path}: {item.explanation}" for item in doubtful),
             *_checks(outcome.checks),
@@ -364,9 +364,11 @@ def _checks(checks: Iterable[Check]) -> list[str]:
     return [f"{'holds' if check.holds else 'FAILS'}: {check.name}: {check.statement}" for check in checks]
 
 
-def _estimate_row(item: Estimate, before: ParameterSet) -> tuple[str, ...]:
+def estimate_row(item: Estimate, before: ParameterSet) -> tuple[str, ...]:
+    """Return path, value, interval and verdict of an estimate of a trajectory fit, in the unit of the set."""
     path, value, unit, interval = _row(item, before)
-    return path, f"{value} {unit}".rstrip(), interval, item.verdict_in_words
+    beside = "" if item.beside is None else f"{_in_set_unit(item, item.beside, before)[2]} {unit}".rstrip()
+    return path, f"{value} {unit}".rstrip(), interval, item.verdict_with(beside)
 
 
 def _profile(one: Profile, before: ParameterSet) -> str:
@@ -391,11 +393,15 @@ def _row(estimate: Estimate, before: ParameterSet) -> tuple[str, str, str, str]:
     """Return path, value, unit and interval."""
     if math.isnan(estimate.value):
         return estimate.path, _NO_VALUE, "", ""
-    numbers = (estimate.value, estimate.low, estimate.high)
-    shown = [in_set_unit(one, estimate.path, estimate.unit, before) for one in numbers]
+    return estimate.path, *_in_set_unit(estimate, (estimate.low, estimate.high), before)
+
+
+def _in_set_unit(estimate: Estimate, ends: tuple[float, float], before: ParameterSet) -> tuple[str, str, str]:
+    """Return value, unit and interval of an estimate as the set would write them, with digits that tell its ends."""
+    shown = [in_set_unit(one, estimate.path, estimate.unit, before) for one in (estimate.value, *ends)]
     value, low, high = (number for number, _ in shown)
     digits = _digits(value, 0.5 * abs(high - low))
-    return estimate.path, f"{value:#.{digits}g}", shown[0][1], f"{low:#.{digits}g} to {high:#.{digits}g}"
+    return f"{value:#.{digits}g}", shown[0][1], f"{low:#.{digits}g} to {high:#.{digits}g}"
 
 
 def _digits(value: float, half_width: float) -> int:

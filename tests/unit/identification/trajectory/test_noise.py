@@ -183,6 +183,16 @@ def test_levels_of_recordings_that_differ_are_told_apart() -> None:
     assert sensor_noise(drawn("white", 10)).is_shared
 
 
+def test_the_likelihood_of_noise_is_that_of_its_samples_whatever_the_levels() -> None:
+    for segments, is_given in ((drawn("unequal", 10), False), ([0.5 * one for one in drawn("white", 13)], True)):
+        noise = sensor_noise(segments, is_given)
+        expected = 0.0
+        for one, level in zip(segments, noise.levels, strict=True):
+            square, spread = noise.shape.square(one / level, np.ones(len(one)))
+            expected -= 0.5 * square + spread + len(one) * math.log(level * math.sqrt(2.0 * math.pi))
+        assert noise.likelihood == pytest.approx(expected, abs=1e-6)
+
+
 def test_hum_is_found_at_its_frequency_and_noise_of_other_kinds_is_not_hum() -> None:
     (line,) = hum_of(drawn("hum", 11))
     assert line == pytest.approx(0.05, rel=2e-3)
