@@ -22,7 +22,7 @@ from ppafo.exports.c_library.files import c_identifier
 from ppafo.metrics.catalog import METRICS
 from ppafo.metrics.metric import Readings
 from ppafo.running import simulate
-from ppafo.signals.meter import SAME_LEVEL, Course, Sample, advance_course
+from ppafo.signals.meter import SAME_LEVEL, Course, FootSample, Sample, StrideSample, advance_course
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import TIMES, with_numbers
 from ppafo.simulation.plan import plan_run, plan_runs
@@ -48,6 +48,7 @@ EVERYTHING = (
 )
 """What makes a program of every feature of a scenario."""
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
+NO_FOOT, NO_STRIDE = FootSample(0.0, 0.0, 0.0), StrideSample(*[0.0] * len(StrideSample._fields))
 
 
 def written(folder: Path, name: str, *overrides: str) -> str:
@@ -72,8 +73,9 @@ def metrics_of(result: Result) -> dict[str, float]:
     meters = {meter.name: meter for kind in kinds for meter in kind.meters}
     states: dict[str, Any] = {}
     for number in range(len(recording)):
-        given = {name: float(recording[name][number]) for name in Sample._fields[1:-2]}
-        sample = Sample(number=float(number), temperature_1=0.0, temperature_2=0.0, **given)
+        given = {name: float(recording[name][number]) for name in Sample._fields if name in recording.names}
+        nothing = {"temperature_1": 0.0, "temperature_2": 0.0, "foot": NO_FOOT, "stride": NO_STRIDE}
+        sample = Sample(number=float(number), **given, **nothing)
         course = advance_course(course, sample)
         for name, meter in meters.items():
             states[name] = meter.update(states[name], course, sample) if number else meter.start(course, sample)

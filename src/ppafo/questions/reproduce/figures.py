@@ -56,10 +56,10 @@ class _Panel(NamedTuple):
 
 
 _PANELS = (
-    _Panel("Vane angle", "deg", ACTUAL, None),
-    _Panel("Pressure difference, $P_1 - P_2$", "psi", ACTUAL, (0.69, 0.14, 0.29, 0.34)),
-    _Panel("Chamber 1 (plantarflexion), $P_1$", "psig", CHAMBER_1, (0.3, 0.12, 0.34, 0.34)),
-    _Panel("Chamber 2 (dorsiflexion), $P_2$", "psig", CHAMBER_2, (0.69, 0.3, 0.29, 0.4)),
+    _Panel(name="Vane angle", unit="deg", look=ACTUAL, inset=None),
+    _Panel(name="Pressure difference, $P_1 - P_2$", unit="psi", look=ACTUAL, inset=(0.69, 0.14, 0.29, 0.34)),
+    _Panel(name="Chamber 1 (plantarflexion), $P_1$", unit="psig", look=CHAMBER_1, inset=(0.3, 0.12, 0.34, 0.34)),
+    _Panel(name="Chamber 2 (dorsiflexion), $P_2$", unit="psig", look=CHAMBER_2, inset=(0.69, 0.3, 0.29, 0.4)),
 )
 
 
