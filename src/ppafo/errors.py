@@ -1,7 +1,8 @@
 """Every error that ppafo raises on purpose: one tree, one clear line each."""
 
+import contextlib
 import difflib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 
 class PpafoError(Exception):
@@ -47,6 +48,15 @@ class StudyError(PpafoError):
 
 class IdentificationError(PpafoError):
     """A recording does not allow the requested estimate."""
+
+
+@contextlib.contextmanager
+def refused_as(kind: Callable[[str], PpafoError], place: object, *caught: type[Exception]) -> Iterator[None]:
+    """Raise what is caught inside as another error, after the place that it is about: a file, a key, an option."""
+    try:
+        yield
+    except caught as error:
+        raise kind(f"{place}: {error}") from error
 
 
 def check_all(chains: Iterable[Sequence[Callable[[], None]]]) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ppafo.cli import output
-from ppafo.errors import DataError, UnitError
+from ppafo.errors import DataError, UnitError, refused_as
 
 if TYPE_CHECKING:
     from ppafo.gait import Gait
@@ -144,10 +144,8 @@ def _whole(option: str, text: str) -> int:
 def _quantity(option: str, text: str, si_unit: str) -> float:
     from ppafo.units import parse_quantity
 
-    try:
+    with refused_as(DataError, f"{option} {text!r}", UnitError):
         return parse_quantity(text, si_unit)
-    except UnitError as error:
-        raise DataError(f"{option} {text!r}: {error}") from error
 
 
 def _optional(option: str, text: str | None, si_unit: str) -> float | None:

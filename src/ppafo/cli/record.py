@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ppafo.cli import output
 from ppafo.cli.hil import EXIT_INTERRUPTED, PORT_HELP, add_baud_argument, check_patience
-from ppafo.errors import DataError, UnitError
+from ppafo.errors import DataError, UnitError, refused_as
 
 if TYPE_CHECKING:
     from ppafo.exports.hil.recording import Recorded
@@ -84,10 +84,8 @@ def _seconds(text: str | None) -> float | None:
         return None
     from ppafo.units import parse_quantity
 
-    try:
+    with refused_as(UnitError, f"--duration {text}", UnitError):
         seconds = parse_quantity(text, "s")
-    except UnitError as error:
-        raise UnitError(f"--duration {text}: {error}") from error
     if not (seconds > 0.0 and math.isfinite(seconds)):
         raise UnitError(f"--duration {text}: must be above 0 s")
     return seconds

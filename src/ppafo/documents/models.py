@@ -157,8 +157,12 @@ Model = TypeVar("Model", bound=BaseModel)
 NAME = r"^[a-z0-9][a-z0-9_-]*$"
 """What the name of a set or scenario looks like."""
 
-STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
-"""What is true of every table of a file: no other keys, no other types, finite numbers; made ready when it is read."""
+
+class StrictTable(BaseModel):
+    """A table of a file: no other keys, no other types, finite numbers; made ready when it is read."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
+
 
 Text = Annotated[str, Field(min_length=1)]
 Texts = Annotated[tuple[Text, ...], Field(strict=False)]

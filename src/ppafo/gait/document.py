@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field
 
 from ppafo.documents.models import NAME, make_schema, optional, table, validate
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import DataError, UnitError
+from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.gait.gait import CURVES, REQUIRED, Curve, Gait, plain_unit
 from ppafo.gait.plausible import check_gait
 from ppafo.units import from_si, parse_quantity, to_si
@@ -139,10 +139,8 @@ def _number(document: dict[str, Any], path: str, file: str) -> float | None:
     if text is None:
         return None
     unit, low, high = _LIMITS[path]
-    try:
+    with refused_as(DataError, f"{file}: {path} = {text!r}", UnitError):
         value = parse_quantity(text, unit)
-    except UnitError as error:
-        raise DataError(f"{file}: {path} = {text!r}: {error}") from error
     if not low <= value <= high:
         raise DataError(
             f"{file}: {path} = {text!r} is not allowed; it lies between {low:g} and {high:g} {unit}".strip()

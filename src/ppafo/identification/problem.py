@@ -12,12 +12,12 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from ppafo.documents.models import NAME, STRICT, Text, make_schema, validate
+from ppafo.documents.models import NAME, StrictTable, Text, make_schema, validate
 from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, read_regular_file
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import IdentificationError, UnitError, nearest_name, reason
+from ppafo.errors import IdentificationError, UnitError, nearest_name, reason, refused_as
 from ppafo.identification.bench.flow_laws import GasAt
 from ppafo.identification.bench.free_decay import FreeDecaySettings, decay_prospects, free_decay
 from ppafo.identification.bench.open_valve_flow import OpenValveFlowSettings, flow_prospects, open_valve_flow
@@ -79,10 +79,8 @@ class Setting:
         """
         if text is None:
             return None
-        try:
+        with refused_as(IdentificationError, f"{self.place}: {name} = {text!r}", UnitError):
             return parse_quantity(text, unit)
-        except UnitError as error:
-            raise IdentificationError(f"{self.place}: {name} = {text!r}: {error}") from error
 
     def gas(self, species: str | None, text: str | None, confidence: float) -> GasAt:
         """Return the gas of the bench; species and temperature are the set's where none is named.
@@ -120,10 +118,8 @@ class Setting:
         return f"valves.{chosen_valve(self.parameter_set, name or self.valve)}"
 
 
-class StaticTorqueProblem(BaseModel):
+class StaticTorqueProblem(StrictTable):
     """Static torque over rising and falling pressure: torque constant and static friction."""
-
-    model_config = STRICT
 
     kind: Literal["static-torque"]
     recordings: _Recordings
@@ -136,10 +132,8 @@ class StaticTorqueProblem(BaseModel):
         return StaticTorqueSettings(self.confidence, self.calibration)
 
 
-class FreeDecayProblem(BaseModel):
+class FreeDecayProblem(StrictTable):
     """Free decay after an impulse: viscous damping and Coulomb friction."""
-
-    model_config = STRICT
 
     kind: Literal["free-decay"]
     recordings: _Recordings
@@ -167,10 +161,8 @@ class FreeDecayProblem(BaseModel):
         return FreeDecaySettings(start, end, inertia, half_width, source, self.confidence, self.calibration)
 
 
-class OpenValveFlowProblem(BaseModel):
+class OpenValveFlowProblem(StrictTable):
     """Flow through the fully open valve: Cd, or C and b of ISO 6358."""
-
-    model_config = STRICT
 
     kind: Literal["open-valve-flow"]
     recordings: _Recordings
@@ -192,10 +184,8 @@ class OpenValveFlowProblem(BaseModel):
         return OpenValveFlowSettings(gas, self.law, area, path, self.confidence, self.calibration)
 
 
-class VaneLeakProblem(BaseModel):
+class VaneLeakProblem(StrictTable):
     """Closed chambers losing pressure: the law of the leak, and its area where it is an orifice."""
-
-    model_config = STRICT
 
     kind: Literal["vane-leak"]
     recordings: _Recordings
@@ -244,10 +234,8 @@ class VaneLeakProblem(BaseModel):
         )
 
 
-class ValveMapProblem(BaseModel):
+class ValveMapProblem(StrictTable):
     """Command against flow: dead band, gain, saturation, hysteresis."""
-
-    model_config = STRICT
 
     kind: Literal["valve-map"]
     recordings: _Recordings
@@ -264,10 +252,8 @@ class ValveMapProblem(BaseModel):
         return ValveMapSettings(gas, setting.valve_path(self.valve), self.confidence, self.calibration)
 
 
-class DeviceProblem(BaseModel):
+class DeviceProblem(StrictTable):
     """The set to start from, its valve, and changes to it."""
-
-    model_config = STRICT
 
     set: Annotated[Text, Field(description="name of a parameter set, or a path relative to this file")]
     valve: _Valve = None
@@ -316,16 +302,16 @@ def window_of(problem: ProcedureProblem, setting: Setting) -> tuple[float, float
     return -math.inf if first is None else first, math.inf if last is None else last
 
 
-class ProblemFile(BaseModel):
+class ProblemFile(StrictTable):
     """A problem file, as it is written."""
-
-    model_config = STRICT
 
     schema_version: Annotated[Literal[1], Field(description="version of this layout")]
     name: Annotated[str, Field(pattern=NAME, max_length=100, description="name of the new parameter set")]
     title: Annotated[str, Field(description="title of the new parameter set")] = ""
     device: Annotated[DeviceProblem, Field(description="the set to start from")]
-    columns: Annotated[dict[str, ColumnMap], Field(description="column maps by name, for files from elsewhere")] = {}
+    columns: Annotated[dict[str, ColumnMap], Field(description="column maps by name, for files from elsewhere")] = (
+        Field(default={})
+    )
     procedure: Annotated[
         tuple[Annotated[ProcedureProblem, Field(discriminator="kind")], ...],
         Field(strict=False, min_length=1, description="bench procedures to apply"),

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, decoded, read_regular_file
 from ppafo.documents.toml_text import label
-from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, reason
+from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, reason, refused_as
 from ppafo.model.actuators.table import (
     BENDS,
     MOST_ANGLES,
@@ -132,10 +132,8 @@ def _header(cells: Sequence[str], file: str) -> tuple[list[str], list[str]]:
             raise ParameterError(
                 f"{file}: column 'pressure' is in '{one_line(unit)[:_SHOWN]}'; give gauge, as in kPa_g"
             )
-        try:
+        with refused_as(ParameterError, f"{file}: column '{name}'", UnitError):
             to_si(1.0, unit, COLUMNS[name], 0.0)
-        except UnitError as error:
-            raise ParameterError(f"{file}: column '{name}': {error}") from error
         names.append(name)
         units.append(unit)
     missing = [name for name in ("angle", "pressure", "volume_1") if name not in names]

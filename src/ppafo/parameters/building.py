@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.errors import ParameterError, UnitError, nearest_name
+from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as
 from ppafo.model.actuators.kind import Range
 from ppafo.model.actuators.table import Table
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
@@ -167,10 +167,8 @@ def _reader(parameter_set: ParameterSet) -> Callable[[str], float]:
     def read(path: str) -> float:
         entry = parameter_set.numbers[path]
         given = f"{parameter_set.file}: {path} = {number_text(entry)}"
-        try:
+        with refused_as(ParameterError, given, UnitError):
             value = entry_in_si(entry, declared[path], atmosphere)
-        except UnitError as error:
-            raise ParameterError(f"{given}: {error}") from error
         _check_range(given, value, declared[path])
         return value
 

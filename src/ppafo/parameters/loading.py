@@ -13,7 +13,7 @@ from pydantic import BaseModel, Field
 
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table, validate
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ParameterError, UnitError, nearest_name
+from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as
 from ppafo.kinds import Kinds
 from ppafo.model.actuators.table import Table
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES, device_effects, find_effects
@@ -248,10 +248,8 @@ def _check(parameter_set: ParameterSet) -> None:
             valve = path.split(".")[2]
             hint = nearest_name(valve, parameter_set.valve_kinds)
             raise ParameterError(f"{parameter_set.file}: {path}: there is no valve '{valve}'{hint}")
-        try:
+        with refused_as(ParameterError, f"{parameter_set.file}: {path}.unit", UnitError):
             check_unit(entry.unit)
-        except UnitError as error:
-            raise ParameterError(f"{parameter_set.file}: {path}.unit: {error}") from error
 
 
 def parameter_set_toml(parameter_set: ParameterSet) -> str:

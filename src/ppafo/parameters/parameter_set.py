@@ -5,10 +5,10 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.models import STRICT, Text, Texts
+from ppafo.documents.models import StrictTable, Text, Texts
 from ppafo.errors import ParameterError, UnitError, nearest_name
 from ppafo.model.actuators.table import Table
 from ppafo.model.declaration import Quantity
@@ -32,10 +32,8 @@ CONFIDENCE = 0.95
 """Of the interval whose half width an entry states."""
 
 
-class Entry(BaseModel):
+class Entry(StrictTable):
     """A number as it was given, in its own unit."""
-
-    model_config = STRICT
 
     value: Annotated[float, Field(description="the number, in the unit beside it")]
     unit: Annotated[str, Field(description="such as 'mm^2', 'psi_g' (gauge), 'psi_a' (absolute); '' for a number")]
@@ -48,10 +46,8 @@ class Entry(BaseModel):
     ] = ""
 
 
-class TextEntry(BaseModel):
+class TextEntry(StrictTable):
     """A name or formula as it was given."""
-
-    model_config = STRICT
 
     value: Text
     origin: Annotated[Origin, Field(description="how the value came to be known")]
@@ -59,10 +55,8 @@ class TextEntry(BaseModel):
     note: Annotated[str, Field(description="reason, conflict or remark")] = ""
 
 
-class FlagEntry(BaseModel):
+class FlagEntry(StrictTable):
     """A yes or no as it was given."""
-
-    model_config = STRICT
 
     value: Annotated[bool, Field(description="true or false")]
     origin: Annotated[Origin, Field(description="how the value came to be known")]
@@ -70,10 +64,8 @@ class FlagEntry(BaseModel):
     note: Annotated[str, Field(description="reason, conflict or remark")] = ""
 
 
-class Citation(BaseModel):
+class Citation(StrictTable):
     """The publication or report that the set comes from; what is not known is left out."""
-
-    model_config = STRICT
 
     title: Text
     authors: Texts = ()
@@ -82,10 +74,8 @@ class Citation(BaseModel):
     note: str = ""
 
 
-class Accepted(BaseModel):
+class Accepted(StrictTable):
     """A contradiction that the author of the set knows of and keeps, with the reason."""
-
-    model_config = STRICT
 
     finding: Annotated[Text, Field(description="identifier of the finding, as 'ppafo audit' prints it")]
     reason: Text

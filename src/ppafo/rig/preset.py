@@ -16,11 +16,11 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from ppafo.documents.models import STRICT, make_schema, quote, table
+from ppafo.documents.models import StrictTable, make_schema, quote, table
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
+from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, refused_as
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
 from ppafo.model.gas import heat_capacity_at_constant_volume
@@ -136,10 +136,8 @@ PATHS: dict[str, Quantity] = {
 }
 
 
-class PresetValue(BaseModel):
+class PresetValue(StrictTable):
     """A value of the rig, with its reason."""
-
-    model_config = STRICT
 
     value: float = Field(description="the number, in the unit beside it")
     unit: str = Field(description="unit of the number, such as 'mm^2'; empty for a plain number")
@@ -216,10 +214,8 @@ def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Pres
         said = f"override '{PREFIX}{path}={text}'"
         if path not in PATHS:
             raise ParameterError(f"{said}: the rig has no value '{path}'{nearest_name(path, PATHS)}")
-        try:
+        with refused_as(ParameterError, said, UnitError):
             value = parse_quantity(text, PATHS[path].unit)
-        except UnitError as error:
-            raise ParameterError(f"{said}: {error}") from error
         preset = preset.with_value(path, value, "override")
     return preset
 
@@ -250,14 +246,10 @@ def _with_entry(preset: Preset, path: str, entry: dict[str, Any], file: str) -> 
         raise ParameterError(f"{file}: {path}.value = {quote(value)} must be a number")
     if not isinstance(unit, str) or not isinstance(reason, str) or not reason:
         raise ParameterError(f"{file}: {path} needs a unit and a reason, both texts")
-    try:
+    with refused_as(ParameterError, f"{file}: {path}", UnitError):
         in_si = to_si(float(value), unit, PATHS[path].unit)
-    except UnitError as error:
-        raise ParameterError(f"{file}: {path}: {error}") from error
-    try:
+    with refused_as(ParameterError, file, ParameterError):
         return preset.with_value(path, in_si, reason)
-    except ParameterError as error:
-        raise ParameterError(f"{file}: {error}") from error
 
 
 def _table(parent: Mapping[str, Any], key: str, file: str, before: str = "") -> dict[str, Any]:

@@ -15,7 +15,7 @@ from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.fixed.torque_laws import FIXED, FIXED_LAWS
 from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
 from ppafo.documents.models import quote
-from ppafo.errors import KindError, ScenarioError, nearest_name
+from ppafo.errors import KindError, ScenarioError, nearest_name, refused_as
 from ppafo.kinds import Kinds
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.bandwidth import EFFECT as BANDWIDTH
@@ -216,10 +216,8 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
         hint = nearest_name(motion, known)
         raise ScenarioError(f"{file}: motion.kind = {quote(motion)} is not known{hint}; allowed: {', '.join(known)}")
     for section, kinds in sections:
-        try:
+        with refused_as(ScenarioError, f"{file}: {section}.kind", KindError):
             kinds.get(kind_at(document, section))
-        except KindError as error:
-            raise ScenarioError(f"{file}: {section}.kind: {error}") from error
 
 
 def check_motion_kind(kind: object, place: str) -> None:

@@ -21,7 +21,7 @@ import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.regular_file import decoded
-from ppafo.errors import DataError, UnitError, first_twice, nearest_name, one_line
+from ppafo.errors import DataError, UnitError, first_twice, nearest_name, one_line, refused_as
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.signals.channels import BETWEEN, PLAIN_NUMBER, TIME, TIME_UNIT, Between
 from ppafo.signals.recording import Floats
@@ -106,14 +106,12 @@ def in_si(column: Column, values: Floats, atmosphere: float) -> Floats:
     """
     from ppafo.units import check_unit, to_si
 
-    try:
+    with refused_as(DataError, f"column '{column.name} [{column.unit}]'", UnitError):
         if column.unit != column.si_unit:
             given, wanted = (_for_conversion(unit) for unit in (column.unit, column.si_unit))
             return np.array([to_si(value, given, wanted, atmosphere) for value in values.tolist()])
         if column.name not in CHANNELS:
             check_unit(_for_conversion(column.unit))
-    except UnitError as error:
-        raise DataError(f"column '{column.name} [{column.unit}]': {error}") from error
     return values
 
 

@@ -18,10 +18,10 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.models import STRICT, Text, make_schema, read_model
+from ppafo.documents.models import StrictTable, Text, make_schema, read_model
 from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import TomlKind
-from ppafo.errors import DataError, UnitError, nearest_name, one_line
+from ppafo.errors import DataError, UnitError, nearest_name, one_line, refused_as
 from ppafo.signals import Channel, Recording
 from ppafo.signals.channels import PLAIN_NUMBER, TIME, TIME_UNIT, Between
 from ppafo.signals.recording import Floats
@@ -31,10 +31,8 @@ from ppafo.storage.files import read_bytes
 Thousands = Literal["point", "comma", "apostrophe", "blank"]
 
 
-class MappedChannel(BaseModel):
+class MappedChannel(StrictTable):
     """Where one channel comes from: a column, or a constant. The value is sign * (factor * number + offset) in unit."""
-
-    model_config = STRICT
 
     column: Annotated[
         Annotated[int, Field(ge=1)] | Text | None, Field(description="number of the column from 1, or its name")
@@ -52,10 +50,8 @@ class MappedChannel(BaseModel):
     ] = None
 
 
-class MappedDirection(BaseModel):
+class MappedDirection(StrictTable):
     """Direction (1 or -1, 0 for neither) from how fast a channel moves; sweeps one way are counted as repetitions."""
-
-    model_config = STRICT
 
     of: Annotated[Text, Field(description="channel whose rate decides")]
     threshold: Annotated[Text, Field(description="slowest rate that counts, such as '2 mm/s'")]
@@ -63,10 +59,8 @@ class MappedDirection(BaseModel):
     sign: Annotated[Literal[1, -1], Field(description="-1 where a growing channel means falling pressure")] = 1
 
 
-class ColumnMap(BaseModel):
+class ColumnMap(StrictTable):
     """How a file is written and what its columns are."""
-
-    model_config = STRICT
 
     delimiter: Annotated[
         Literal["comma", "semicolon", "tab", "whitespace"], Field(description="what separates columns")
@@ -131,7 +125,7 @@ def read_foreign(
 
     DataError names the file and the column.
     """
-    try:
+    with refused_as(DataError, path, DataError):
         lines = _lines(path, columns.encoding)
         if TIME not in columns.channels:
             raise DataError(f"the column map has no channel '{TIME}'")
@@ -162,8 +156,6 @@ def read_foreign(
         kind = kind_of_comments(line for line in lines if line.startswith(_COMMENT))
         recording = Recording(label or one_line(Path(path).stem), time, channels, kind)
         return recording if columns.direction is None else _with_direction(recording, columns.direction)
-    except DataError as error:
-        raise DataError(f"{path}: {error}") from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,10 +240,8 @@ def _constant(name: str, item: MappedChannel, count: int, atmosphere: float) -> 
     from ppafo.units import split_quantity
 
     text = str(item.constant)
-    try:
+    with refused_as(DataError, f"channel '{name}', constant = {text!r}", UnitError):
         value, unit = split_quantity(text)
-    except UnitError as error:
-        raise DataError(f"channel '{name}', constant = {text!r}: {error}") from error
     column = Column(name, unit or PLAIN_NUMBER)
     return Channel(in_si(column, np.full(count, value), atmosphere), column.si_unit, item.between)
 
@@ -292,10 +282,8 @@ def _convert(name: str, item: MappedChannel, numbers: Floats, atmosphere: float)
 
     values, unit = item.sign * (item.factor * numbers + item.offset), item.unit
     if item.times is not None:
-        try:
+        with refused_as(DataError, f"channel '{name}', times = {item.times!r}", UnitError):
             multiple, times_unit = split_quantity(item.times)
-        except UnitError as error:
-            raise DataError(f"channel '{name}', times = {item.times!r}: {error}") from error
         values, unit = values * multiple, f"{unit} {times_unit}".removeprefix(f"{PLAIN_NUMBER} ").strip()
     column = Column(name, unit)
     return Channel(in_si(column, values, atmosphere), TIME_UNIT if name == TIME else column.si_unit, item.between)
@@ -307,11 +295,9 @@ def _with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
 
     unit = recording.unit(wanted.of)
     rate_unit = f"{'1' if unit == PLAIN_NUMBER else unit.removesuffix('_d')}/s"
-    try:
+    with refused_as(DataError, f"direction of '{wanted.of}'", UnitError):
         threshold = parse_quantity(wanted.threshold, rate_unit)
         window = parse_quantity(wanted.window, TIME_UNIT)
-    except UnitError as error:
-        raise DataError(f"direction of '{wanted.of}': {error}") from error
     # The slope between the means of the half windows [s] before and after each sample.
     time = recording.time
     sums = np.concatenate(([0.0], np.cumsum(recording[wanted.of])))

@@ -16,7 +16,7 @@ from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.json_text import json_document, json_text
-from ppafo.errors import DataError, one_line, reason
+from ppafo.errors import DataError, one_line, reason, refused_as
 from ppafo.signals import Recording, recording_kind
 from ppafo.storage.comma_separated import csv_bytes, read_csv
 from ppafo.storage.files import add_files, check_folder_can_be_replaced, read_bytes, replace_folder
@@ -293,10 +293,8 @@ def read_recording(path: str | Path, atmosphere: float = STANDARD_ATMOSPHERE) ->
             return found
         # The recording of a result folder is what ``run.json`` beside it says of it.
         described = read_document(place.parent)["recording"]
-        try:
+        with refused_as(DataError, run_file, DataError):
             kind = recording_kind(str(described.get("kind", found.kind)))
-        except DataError as error:
-            raise DataError(f"{run_file}: {error}") from error
         return replace(found, label=str(described.get("label", found.label)), kind=kind)
     raise DataError(f"{path}: is neither a .nc or .csv file nor a result folder")
 

@@ -6,9 +6,9 @@ says which unit it needs.
 
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from ppafo.documents.models import NAME, STRICT, Text, Texts, make_schema
+from ppafo.documents.models import NAME, StrictTable, Text, Texts, make_schema
 
 MAXIMUM_RUNS = 2**32
 MAXIMUM_RUNS_OF_CHUNK = 1_000_000
@@ -21,20 +21,16 @@ _Path = Annotated[Text, Field(description="what is varied: a path as for --set, 
 _Only = Annotated[Texts, Field(description="names of the configurations in which it varies; default: all")]
 
 
-class Configuration(BaseModel):
+class Configuration(StrictTable):
     """One base scenario; several of them get the same draws."""
-
-    model_config = STRICT
 
     name: Annotated[str, Field(pattern=NAME, max_length=100, description="label in tables and figures")]
     scenario: Annotated[Text, Field(description="name of a scenario, or a path relative to this file")]
     overrides: Annotated[Texts, Field(description="such as 'valve.area=12.6mm^2'")] = ()
 
 
-class Grid(BaseModel):
+class Grid(StrictTable):
     """Values at equal distances, both ends among them."""
-
-    model_config = STRICT
 
     path: _Path
     kind: Literal["grid"]
@@ -45,10 +41,8 @@ class Grid(BaseModel):
     only: _Only = ()
 
 
-class Listed(BaseModel):
+class Listed(StrictTable):
     """Values one by one; crossed with every other list and grid."""
-
-    model_config = STRICT
 
     path: _Path
     kind: Literal["list"]
@@ -56,10 +50,8 @@ class Listed(BaseModel):
     only: _Only = ()
 
 
-class Uniform(BaseModel):
+class Uniform(StrictTable):
     """Every value between two bounds equally likely."""
-
-    model_config = STRICT
 
     path: _Path
     kind: Literal["uniform"]
@@ -68,10 +60,8 @@ class Uniform(BaseModel):
     only: _Only = ()
 
 
-class LogUniform(BaseModel):
+class LogUniform(StrictTable):
     """The logarithm equally likely between two bounds above 0."""
-
-    model_config = STRICT
 
     path: _Path
     kind: Literal["log_uniform"]
@@ -80,10 +70,8 @@ class LogUniform(BaseModel):
     only: _Only = ()
 
 
-class Normal(BaseModel):
+class Normal(StrictTable):
     """A normal distribution."""
-
-    model_config = STRICT
 
     path: _Path
     kind: Literal["normal"]
@@ -92,10 +80,8 @@ class Normal(BaseModel):
     only: _Only = ()
 
 
-class TruncatedNormal(BaseModel):
+class TruncatedNormal(StrictTable):
     """A normal distribution of which only the part between two bounds is drawn; mean and deviation are of the whole."""
-
-    model_config = STRICT
 
     path: _Path
     kind: Literal["truncated_normal"]
@@ -106,10 +92,8 @@ class TruncatedNormal(BaseModel):
     only: _Only = ()
 
 
-class LogNormal(BaseModel):
+class LogNormal(StrictTable):
     """A distribution whose logarithm is normal: median, and the factor that one standard deviation is."""
-
-    model_config = STRICT
 
     path: _Path
     kind: Literal["log_normal"]
@@ -118,10 +102,8 @@ class LogNormal(BaseModel):
     only: _Only = ()
 
 
-class Triangular(BaseModel):
+class Triangular(StrictTable):
     """A density that rises in a line to the mode and falls in a line from it."""
-
-    model_config = STRICT
 
     path: _Path
     kind: Literal["triangular"]
@@ -131,10 +113,8 @@ class Triangular(BaseModel):
     only: _Only = ()
 
 
-class Choice(BaseModel):
+class Choice(StrictTable):
     """One of some values, each with its weight; equal weights by default."""
-
-    model_config = STRICT
 
     path: _Path
     kind: Literal["choice"]
@@ -143,10 +123,8 @@ class Choice(BaseModel):
     only: _Only = ()
 
 
-class WholeNumbers(BaseModel):
+class WholeNumbers(StrictTable):
     """Equally likely whole numbers, both bounds among them; for the seed of the noise."""
-
-    model_config = STRICT
 
     path: _Path
     kind: Literal["whole_numbers"]
@@ -155,39 +133,31 @@ class WholeNumbers(BaseModel):
     only: _Only = ()
 
 
-class Stated(BaseModel):
+class Stated(StrictTable):
     """Normal, with value and uncertainty as the parameter set states them; a half width of 95 % is 1.96 deviations."""
-
-    model_config = STRICT
 
     path: _Path
     kind: Literal["stated"]
     only: _Only = ()
 
 
-class Correlation(BaseModel):
+class Correlation(StrictTable):
     """Correlation of two distributions, as that of the normal scores behind them (a Gaussian copula)."""
-
-    model_config = STRICT
 
     between: Annotated[tuple[Text, Text], Field(strict=False, description="two paths that have distributions")]
     coefficient: Annotated[float, Field(gt=-1.0, lt=1.0)]
 
 
-class Sample(BaseModel):
+class Sample(StrictTable):
     """How often and how the distributions are drawn; the whole sample is taken at every point of the grid."""
-
-    model_config = STRICT
 
     method: Literal["random", "latin_hypercube", "sobol"]
     runs: Annotated[int, Field(ge=1, le=MAXIMUM_RUNS, description="draws; each is run in every configuration")]
     seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 1
 
 
-class Outputs(BaseModel):
+class Outputs(StrictTable):
     """What is kept of every run."""
-
-    model_config = STRICT
 
     metrics: Annotated[Texts | Literal["all"], Field(description="names of metrics, or 'all'")] = ()
     trajectories: Annotated[Texts, Field(description="channels kept for every run")] = ()
@@ -198,10 +168,8 @@ class Outputs(BaseModel):
     )
 
 
-class SameAs(BaseModel):
+class SameAs(StrictTable):
     """The value that another varied path has in the same run."""
-
-    model_config = STRICT
 
     path: _Path
     kind: Annotated[Literal["same_as"], Field(description="optional")] = "same_as"
@@ -226,10 +194,8 @@ Varied = (
 VARIED = get_args(Varied)
 
 
-class StudyFile(BaseModel):
+class StudyFile(StrictTable):
     """A study file, as it is written."""
-
-    model_config = STRICT
 
     schema_version: Annotated[Literal[1], Field(description="version of this layout")]
     name: Annotated[str, Field(pattern=NAME, max_length=100)]

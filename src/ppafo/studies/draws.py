@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import ScenarioError, StudyError, UnitError, first_twice, nearest_name
+from ppafo.errors import ScenarioError, StudyError, UnitError, first_twice, nearest_name, refused_as
 from ppafo.metrics import METRICS
 from ppafo.metrics.tracking import ONE_INSTANT, settled_error
 from ppafo.parameters.graph import ATMOSPHERE_PATH
@@ -322,10 +322,8 @@ def _piece(
     threads: int | None,
     gauge: Collection[str],
 ) -> Outcomes:
-    try:
+    with refused_as(StudyError, f"scenario '{scenario.name}'", ScenarioError):
         result = run_ensemble(scenario, columns, metrics, threads=threads, gauge=gauge)
-    except ScenarioError as error:
-        raise StudyError(f"scenario '{scenario.name}': {error}") from error
     runs = result.status.size
     values = {name: result.metrics.get(name, np.full(runs, np.nan)) for name in metrics}
     reason = result.reasons[min(result.reasons)] if result.reasons else ""
@@ -369,7 +367,5 @@ def difference_of(text: str, metric: str, what: str) -> float:
 
 
 def _number(text: str, unit: str, what: str, atmosphere: float) -> float:
-    try:
+    with refused_as(StudyError, what, UnitError):
         return parse_quantity(text, unit, atmosphere)
-    except UnitError as error:
-        raise StudyError(f"{what}: {error}") from error

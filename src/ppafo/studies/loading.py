@@ -9,7 +9,16 @@ from typing import Any
 
 from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import DataError, ParameterError, ScenarioError, StudyError, UnitError, first_twice, nearest_name
+from ppafo.errors import (
+    DataError,
+    ParameterError,
+    ScenarioError,
+    StudyError,
+    UnitError,
+    first_twice,
+    nearest_name,
+    refused_as,
+)
 from ppafo.loading import load_scenario, placed
 from ppafo.metrics import METRICS
 from ppafo.parameters.graph import ATMOSPHERE_PATH
@@ -138,10 +147,8 @@ def _check_set_or_varied(parsed: declared.StudyFile, source: _Source) -> None:
 
 
 def _scenario(item: declared.Configuration, source: _Source) -> Any:
-    try:
+    with refused_as(source.refusal, f"configuration '{item.name}'", ScenarioError, ParameterError, DataError):
         return load_scenario(placed(item.scenario, source.folder), item.overrides)
-    except (ScenarioError, ParameterError, DataError) as error:
-        raise source.refusal(f"configuration '{item.name}': {error}") from error
 
 
 def _check_requests(parsed: declared.StudyFile, source: _Source) -> None:
@@ -176,34 +183,28 @@ def _place(
         if name not in names:
             hint = nearest_name(name, names)
             raise source.refusal(f"vary '{item.path}': only: there is no configuration '{name}'{hint}")
-    try:
+    with refused_as(source.refusal, f"vary '{item.path}'", ScenarioError):
         places = [varied_path(item.path, each.scenario) for each in _varying(item, configurations)]
-    except ScenarioError as error:
-        raise source.refusal(f"vary '{item.path}': {error}") from error
     if any(place != places[0] for place in places):
         raise source.refusal(
             f"vary '{item.path}': has different units, limits or atmospheres in different configurations"
         )
     if isinstance(item, declared.SameAs) or ATMOSPHERE_PATH not in {other.path for other in parsed.vary}:
         return places[0]
-    try:
+    with refused_as(source.refusal, f"vary '{item.path}'", UnitError):
         first = _varying(item, configurations)[0].scenario
         is_stated = isinstance(item, declared.Stated)
         texts = [f"0 {stated_normal(places[0], first)[1]}"] if is_stated else texts_of(item)
         return in_its_unit(places[0], texts)
-    except UnitError as error:
-        raise source.refusal(f"vary '{item.path}': {error}") from error
 
 
 def _axis_or_drawn(
     item: declared.Varied, place: VariedPath, configurations: Iterable[Configuration], source: _Source
 ) -> Axis | Drawn:
-    try:
+    with refused_as(source.refusal, f"vary '{item.path}'", UnitError):
         if isinstance(item, declared.Stated):
             return _stated_distribution(item, place, _varying(item, configurations))
         return axis_or_distribution(item, place)
-    except UnitError as error:
-        raise source.refusal(f"vary '{item.path}': {error}") from error
 
 
 def _stated_distribution(item: declared.Stated, place: VariedPath, configurations: Iterable[Configuration]) -> Drawn:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ppafo.engine.lane_samples import TRACED
-from ppafo.errors import StudyError, UnitError, first_twice, nearest_name
+from ppafo.errors import StudyError, UnitError, first_twice, nearest_name, refused_as
 from ppafo.loading import reloaded, scenario_or_load
 from ppafo.metrics import METRICS
 from ppafo.simulation.ensemble.running import lacking, offered
@@ -76,10 +76,8 @@ def _check_names(
 
 
 def _interval(outputs: declared.Outputs, scenarios: Sequence[Scenario], refusal: Refusal) -> float:
-    try:
+    with refused_as(refusal, f"outputs.every = {outputs.every!r}", UnitError):
         every = parse_quantity(outputs.every, "s")
-    except UnitError as error:
-        raise refusal(f"outputs.every = {outputs.every!r}: {error}") from error
     if not (outputs.trajectories or outputs.bands):
         return every
     shortest = min(scenario.duration for scenario in scenarios)

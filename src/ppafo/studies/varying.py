@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.errors import ScenarioError, UnitError, nearest_name
+from ppafo.errors import ScenarioError, UnitError, nearest_name, refused_as
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters import apply_overrides, load_parameter_set
@@ -249,10 +249,8 @@ def _bounds(item: Any, place: VariedPath) -> tuple[float, float]:
 
 
 def _deviation(item: Any, place: VariedPath) -> float:
-    try:
+    with refused_as(UnitError, f"standard_deviation = {item.standard_deviation!r}", UnitError):
         deviation = place.distance(item.standard_deviation)
-    except UnitError as error:
-        raise UnitError(f"standard_deviation = {item.standard_deviation!r}: {error}") from error
     if deviation <= 0.0:
         raise UnitError(f"standard_deviation = {item.standard_deviation!r} must be more than 0")
     return deviation
@@ -263,10 +261,8 @@ def _key(item: Any, key: str, place: VariedPath) -> float:
 
 
 def _level(key: str, value: str | float, place: VariedPath) -> float:
-    try:
+    with refused_as(UnitError, f"{key} = {value!r}", UnitError):
         return place.level(value)
-    except UnitError as error:
-        raise UnitError(f"{key} = {value!r}: {error}") from error
 
 
 def stated_normal(place: VariedPath, scenario: Scenario) -> tuple[NormalAround, str]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ppafo.engine.lanes import Floats, replay
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of
-from ppafo.errors import DataError, SimulationError, UnitError, nearest_name, one_line
+from ppafo.errors import DataError, SimulationError, UnitError, nearest_name, one_line, refused_as
 from ppafo.model.plant import chamber_pressures
 from ppafo.parameters.device import Device
 from ppafo.signals import Channel, Recording
@@ -150,10 +150,8 @@ def parse_initial(texts: Sequence[str], atmosphere: float) -> dict[str, float]:
                 f"initial value '{one_line(text)}': there is no channel '{one_line(name)}'{hint}; "
                 f"available: {', '.join(_UNITS)}"
             )
-        try:
+        with refused_as(DataError, f"initial value '{one_line(text)}'", UnitError):
             values[name] = parse_quantity(value, _UNITS[name], atmosphere)
-        except UnitError as error:
-            raise DataError(f"initial value '{one_line(text)}': {error}") from error
     return values
 
 

@@ -18,7 +18,7 @@ from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.engine.lanes import BatchResult, Floats, begin_block
 from ppafo.engine.rows import leaf_paths, leaves, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
-from ppafo.errors import ParameterError, ScenarioError
+from ppafo.errors import ParameterError, ScenarioError, refused_as
 from ppafo.model.cold_gas import (
     DRY_ICE,
     Isobar,
@@ -195,12 +195,10 @@ def read_bottle(reading: Reading, device: Device, folder: Path) -> BottleSupply 
             f"{reading.file}: {BOTTLE}.{_SET_PRESSURE}: in a walk the bottle's regulator is set to supply.pressure; "
             f"set that"
         )
-    try:
+    with refused_as(ParameterError, f"{reading.file}: [{BOTTLE}]", ParameterError):
         name = section["name"]
         path = Path(name)
         bottle = load_bottle(folder / path if path.suffix == ".toml" and not path.is_absolute() else name, own)
-    except ParameterError as error:
-        raise ParameterError(f"{reading.file}: [{BOTTLE}]: {error}") from error
     _check_set_pressure(reading, bottle, device, section["name"])
     # The bottle with its regulator set to the supply pressure of the device, in its entries too.
     pressure = device.supply.pressure

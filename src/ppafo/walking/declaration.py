@@ -16,7 +16,7 @@ from ppafo.control.walking.catalog import (
     walking_controllers,
 )
 from ppafo.documents.models import make_schema, one_of, optional, table
-from ppafo.errors import KindError, ScenarioError
+from ppafo.errors import KindError, ScenarioError, refused_as
 from ppafo.model.declaration import Quantity
 from ppafo.simulation.declaration import (
     PERIOD,
@@ -169,10 +169,8 @@ def timing_of(document: Mapping[str, Any]) -> str:
 
 def find_kinds(document: Mapping[str, Any], file: str) -> None:
     """Load the controller that a document names, where another package has it; ScenarioError where that fails."""
-    try:
+    with refused_as(ScenarioError, f"{file}: controller.kind", KindError):
         load_walking_controller(kind_at(document, "controller"))
-    except KindError as error:
-        raise ScenarioError(f"{file}: controller.kind: {error}") from error
 
 
 def _texts(document: Mapping[str, Any]) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from ppafo.control.fixed.torque_laws import FIXED, FLOAT
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ParameterError, ScenarioError, one_line
+from ppafo.errors import ParameterError, ScenarioError, one_line, refused_as
 from ppafo.gait import NORMATIVE, load_gait
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG, Quantity
@@ -228,10 +228,8 @@ def _assumed(reading: Reading, carried: BottleSupply | None) -> tuple[Assumption
 
 def _check_timing(law: ControllerKind, reading: Reading) -> None:
     """Raise ScenarioError for a timing of a controller that goes by no time in the stride."""
-    try:
+    with refused_as(ScenarioError, f"{reading.file}", ScenarioError):
         with_timing(law, TIMINGS[timing_of(reading.document)])
-    except ScenarioError as error:
-        raise ScenarioError(f"{reading.file}: {error}") from error
 
 
 def _settings(

@@ -3,12 +3,14 @@
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ppafo.errors import DataError
 from ppafo.gait.recorded.mapping import (
     AngleMap,
+    Axis,
     ForceMap,
     GaitMap,
     KneeMap,
@@ -16,12 +18,15 @@ from ppafo.gait.recorded.mapping import (
     PressureMap,
     ShankMap,
     Side,
+    Vertical,
     opensim_map,
     package_map,
 )
 from ppafo.gait.recorded.table import CSV, OPENSIM, PLATE, MotionTable
 from ppafo.signals.recording import Floats
 
+_FORWARDS: tuple[Axis, ...] = ("x", "y", "z", "-x", "-y", "-z")
+_UPWARDS: tuple[Vertical, ...] = ("x", "y", "z")
 _WORD = re.compile(r"[a-z]+|\d+")
 _SIDES = {"right": {"r", "right"}, "left": {"l", "left"}}
 _ANGLES = "ankleangles?v?"
@@ -206,7 +211,7 @@ def _first(labels: Sequence[str], foot: str, names: Sequence[str]) -> str | None
     return next(filter(None, (_label(labels, foot + name) for name in names)), None)
 
 
-def _ankle_map(labels: Sequence[str], foot: str, axes: tuple[str, str]) -> tuple[AngleMap, tuple[str, ...]]:
+def _ankle_map(labels: Sequence[str], foot: str, axes: tuple[Axis, Vertical]) -> tuple[AngleMap, tuple[str, ...]]:
     """Return the ankle angle of the model, or from heel and toe where the file has only markers."""
     angles = _label(labels, foot + _ANGLES)
     heel, toe = (_first(labels, foot, names) for names in (_HEELS, _TOES))
@@ -221,9 +226,9 @@ def _ankle_map(labels: Sequence[str], foot: str, axes: tuple[str, str]) -> tuple
 
 def _load_maps(
     table: MotionTable, labels: Sequence[str], foot: str, vertical: str, body_mass: float
-) -> tuple[dict[str, MomentMap | ForceMap], tuple[str, ...]]:
+) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Return the maps of the loads that were measured, each with the unit that its size shows, and remarks."""
-    found: dict[str, MomentMap | ForceMap] = {}
+    found: dict[str, Any] = {}
     remarks: list[str] = []
     moment = _label(labels, foot + _MOMENTS)
     if moment is not None and _is_measured(table, f"{moment}.x"):
@@ -248,7 +253,7 @@ def _is_measured(table: MotionTable, name: str) -> bool:
 
 def _axes(
     table: MotionTable, knee: str, ankle: str, foot: str, labels: Sequence[str]
-) -> tuple[str, str, tuple[str, ...]]:
+) -> tuple[Axis, Vertical, tuple[str, ...]]:
     """Return the axes along the walk and upwards, and a remark where they are not x and z.
 
     Upwards is from ankle to knee; the walk follows the ankle's travel, or the foot where the ankle hardly travels. The
@@ -265,7 +270,7 @@ def _axes(
     pointing = _pointing(table, foot, labels)
     if np.hypot(*np.delete(way, up)) < _LEAST_WAY * _per_metre(table, ankle):
         if pointing is None:
-            return "x" if up else "y", "xyz"[up], ()
+            return "x" if up else "y", _UPWARDS[up], ()
         way = pointing
     elif pointing is not None and np.delete(pointing, up) @ np.delete(way, up) < 0.0:
         way = -way
@@ -278,9 +283,9 @@ def _axes(
             f"the lean of the shank is seen along an axis, to {_MOST_OBLIQUE:g} deg; rotate "
             "the coordinates so that one axis points along the walk"
         )
-    forward = f"{'-' if way[along] < 0.0 else ''}{'xyz'[along]}"
+    forward = _FORWARDS[along + 3 * bool(way[along] < 0.0)]
     said = () if (forward, up) == ("x", 2) else (f"the walk goes along {forward}, upwards is {'xyz'[up]}",)
-    return forward, "xyz"[up], said
+    return forward, _UPWARDS[up], said
 
 
 def _point(table: MotionTable, label: str) -> Floats | None:

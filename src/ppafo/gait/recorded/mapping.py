@@ -11,12 +11,12 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, model_validator
+from pydantic import Field, model_validator
 
-from ppafo.documents.models import NAME, STRICT, Text, make_schema, validate
+from ppafo.documents.models import NAME, StrictTable, Text, make_schema, validate
 from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, read_regular_file
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import DataError, UnitError, reason
+from ppafo.errors import DataError, UnitError, reason, refused_as
 from ppafo.gait.recorded.table import LONGEST_FILLED
 from ppafo.units import parse_quantity
 
@@ -25,14 +25,13 @@ _Terms = Annotated[
     tuple[Text, ...], Field(strict=False, min_length=1, description="columns to add; '-' before one subtracts it")
 ]
 _Unit = Annotated[Text | None, Field(description="unit of the columns, where the file does not state it")]
-_Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
+Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
+Vertical = Literal["x", "y", "z"]
 _Flexion = Literal["plantarflexion", "dorsiflexion"]
 
 
-class ShankMap(BaseModel):
+class ShankMap(StrictTable):
     """Shank angle: a sum of columns, or two markers and the axes of the laboratory."""
-
-    model_config = STRICT
 
     terms: _Terms | None = None
     unit: _Unit = None
@@ -41,8 +40,8 @@ class ShankMap(BaseModel):
     )
     knee: Annotated[Text | None, Field(description="marker at the knee, instead of terms")] = None
     ankle: Annotated[Text | None, Field(description="marker at the ankle")] = None
-    forward: Annotated[_Axis, Field(description="axis along the walk")] = "x"
-    vertical: Annotated[Literal["x", "y", "z"], Field(description="axis upwards")] = "z"
+    forward: Annotated[Axis, Field(description="axis along the walk")] = "x"
+    vertical: Annotated[Vertical, Field(description="axis upwards")] = "z"
 
     @model_validator(mode="after")
     def _one_way(self) -> "ShankMap":
@@ -51,19 +50,17 @@ class ShankMap(BaseModel):
         return self
 
 
-class AngleMap(BaseModel):
+class AngleMap(StrictTable):
     """Ankle angle: a sum of columns, or two markers of the foot, whose line turns against the shank.
 
     With markers the zero is the foot that stands flat, and ``neutral`` is taken off as it is from columns.
     """
 
-    model_config = STRICT
-
     terms: _Terms | None = None
     heel: Annotated[Text | None, Field(description="marker at the heel, instead of terms")] = None
     toe: Annotated[Text | None, Field(description="marker at the toes")] = None
-    forward: Annotated[_Axis, Field(description="axis along the walk, with markers")] = "x"
-    vertical: Annotated[Literal["x", "y", "z"], Field(description="axis upwards, with markers")] = "z"
+    forward: Annotated[Axis, Field(description="axis along the walk, with markers")] = "x"
+    vertical: Annotated[Vertical, Field(description="axis upwards, with markers")] = "z"
     unit: _Unit = None
     positive: Annotated[_Flexion, Field(description="which motion is positive")]
     neutral: Annotated[
@@ -78,47 +75,37 @@ class AngleMap(BaseModel):
 
     def sign_and_neutral(self) -> tuple[float, float]:
         """Return 1 where plantarflexion is positive, else -1, and ``neutral`` [rad]; DataError for its unit."""
-        try:
+        with refused_as(DataError, f"ankle_angle.neutral = {self.neutral!r}", UnitError):
             neutral = parse_quantity(self.neutral, "rad")
-        except UnitError as error:
-            raise DataError(f"ankle_angle.neutral = {self.neutral!r}: {error}") from error
         return 1.0 if self.positive == "plantarflexion" else -1.0, neutral
 
 
-class MomentMap(BaseModel):
+class MomentMap(StrictTable):
     """Ankle moment, in N m or N m/kg."""
-
-    model_config = STRICT
 
     terms: _Terms
     unit: _Unit = None
     positive: Annotated[_Flexion, Field(description="which internal moment is positive")]
 
 
-class ForceMap(BaseModel):
+class ForceMap(StrictTable):
     """Vertical ground reaction on this foot, in N or, as a plain number '-', in body weights."""
-
-    model_config = STRICT
 
     terms: _Terms
     unit: _Unit = None
     positive: Annotated[Literal["up", "down"], Field(description="which force is positive")] = "up"
 
 
-class PressureMap(BaseModel):
+class PressureMap(StrictTable):
     """Centre of pressure along the foot, from the ankle."""
-
-    model_config = STRICT
 
     terms: _Terms
     unit: _Unit = None
     positive: Annotated[Literal["forward", "backward"], Field(description="which direction is positive")] = "forward"
 
 
-class KneeMap(BaseModel):
+class KneeMap(StrictTable):
     """Knee in the sagittal plane: its position in m or its acceleration in m/s^2, or hip and thigh instead."""
-
-    model_config = STRICT
 
     forward: _Terms
     up: _Terms
@@ -139,10 +126,8 @@ class KneeMap(BaseModel):
         return self
 
 
-class GaitMap(BaseModel):
+class GaitMap(StrictTable):
     """What the columns of recorded files mean; a curve that is not named is not imported."""
-
-    model_config = STRICT
 
     schema_version: Annotated[Literal[1], Field(description="version of this layout")] = 1
     shank_angle: ShankMap

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import count, pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -365,7 +365,7 @@ def _of_csv(path: str | Path) -> MotionTable:
     return MotionTable(str(path), CSV, recording.time, columns, units, recording.kind)
 
 
-_DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab"}
+_DELIMITERS: dict[str, Literal["comma", "semicolon", "tab"]] = {",": "comma", ";": "semicolon", "\t": "tab"}
 _NAME = re.compile(r"(.*?)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?")
 _TIMES = {"time": "s", "t": "s", "time_s": "s", "time_ms": "ms"}
 _LONGEST_SHOWN = 40

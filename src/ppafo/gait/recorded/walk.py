@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.errors import DataError, UnitError, check_all, nearest_name, one_line
+from ppafo.errors import DataError, UnitError, check_all, nearest_name, one_line, refused_as
 from ppafo.gait.gait import HARMONICS, REQUIRED, fit_curve
 from ppafo.gait.plausible import SignSource, other_sign
 from ppafo.gait.recorded.conventions import column_names
@@ -327,10 +327,8 @@ def _thigh_length(mapped: KneeMap, stature: float | None) -> float:
     if mapped.thigh_length is None:
         return THIGH_FRACTION * (stature or 0.0)
     place, (low, high) = f"knee.thigh_length = {mapped.thigh_length!r}", _LENGTHS
-    try:
+    with refused_as(DataError, place, UnitError):
         length = parse_quantity(mapped.thigh_length, "m")
-    except UnitError as error:
-        raise DataError(f"{place}: {error}") from error
     if not low <= length <= high:
         raise DataError(f"{place} is not plausible; a thigh is {low:g} to {high:g} m long")
     return length

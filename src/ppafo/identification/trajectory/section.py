@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.models import NAME, STRICT, Text, Texts, validate
-from ppafo.errors import DataError, IdentificationError, UnitError, nearest_name
+from ppafo.documents.models import NAME, StrictTable, Text, Texts, validate
+from ppafo.errors import DataError, IdentificationError, UnitError, nearest_name, refused_as
 from ppafo.identification.bench.result import count_of
 from ppafo.identification.estimate import Check, Estimate, Prospect, interval_factor
 from ppafo.identification.source import Source, Use, common_use, source_of
@@ -69,19 +69,15 @@ _Label = Annotated[str, Field(pattern=NAME, max_length=60, description="its name
 _Noise = dict[str, Text]
 
 
-class PriorSection(BaseModel):
+class PriorSection(StrictTable):
     """What is known beforehand: a normal distribution."""
-
-    model_config = STRICT
 
     mean: Annotated[Text, Field(description="most likely value, with its unit")]
     relative: Annotated[float, Field(gt=0.0, description="standard deviation over the mean")]
 
 
-class ParameterSection(BaseModel):
+class ParameterSection(StrictTable):
     """A number to be fitted."""
-
-    model_config = STRICT
 
     path: Annotated[Text, Field(description="dotted path, such as friction.viscous_damping or initial.pressure_1")]
     start: Annotated[
@@ -100,10 +96,8 @@ class ParameterSection(BaseModel):
     recordings: Annotated[Texts, Field(description="experiments in which it acts, by label; default: all")] = ()
 
 
-class ExperimentSection(BaseModel):
+class ExperimentSection(StrictTable):
     """A recording and the scenario that is to explain it."""
-
-    model_config = STRICT
 
     label: _Label
     recording: Annotated[Text, Field(description="file, relative to this one")]
@@ -126,7 +120,9 @@ class ExperimentSection(BaseModel):
         Texts | None,
         Field(description="channels to compare; default: angle and both pressures, without what is held or followed"),
     ] = None
-    noise: Annotated[_Noise, Field(description="standard deviation by channel, '0.1 deg', '500 Pa_d'")] = {}
+    noise: Annotated[_Noise, Field(description="standard deviation by channel, '0.1 deg', '500 Pa_d'")] = Field(
+        default={}
+    )
     inputs: Annotated[
         Texts | None, Field(description=f"what the run follows in the recording: {', '.join(ALL_INPUTS)}")
     ] = None
@@ -148,22 +144,18 @@ class ExperimentSection(BaseModel):
     ] = None
 
 
-class CandidateSection(BaseModel):
+class CandidateSection(StrictTable):
     """An experiment that could be done next."""
-
-    model_config = STRICT
 
     label: _Label
     scenario: Annotated[Text, Field(description="name of a scenario, or a file relative to this one")]
     overrides: Annotated[Texts, Field(description="changes to the scenario")] = ()
-    noise: Annotated[_Noise, Field(description="by channel; default: that of the first recording")] = {}
+    noise: Annotated[_Noise, Field(description="by channel; default: that of the first recording")] = Field(default={})
     interval: Annotated[Text, Field(description="time between two samples")] = "1 ms"
 
 
-class TrajectorySection(BaseModel):
+class TrajectorySection(StrictTable):
     """A trajectory fit, as it is written."""
-
-    model_config = STRICT
 
     parameters: Annotated[
         tuple[ParameterSection, ...], Field(strict=False, min_length=1, description="free parameters")
@@ -222,10 +214,8 @@ def name_in_refusals(file: str) -> Iterator[None]:
 
 def quantity_of(said: str, text: str, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
     """Return the number in a text in ``unit``; IdentificationError where it is none. ``said`` is file and key."""
-    try:
+    with refused_as(IdentificationError, f"{said} = '{text}'", UnitError):
         return parse_quantity(text, unit, atmosphere)
-    except UnitError as error:
-        raise IdentificationError(f"{said} = '{text}': {error}") from error
 
 
 def noise_of_channels(given: Mapping[str, str], said: str) -> dict[str, float]:

@@ -18,7 +18,7 @@ from pydantic import BaseModel, Field
 
 from ppafo.documents.models import NAME, make_schema, optional, read_model, table
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
+from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, refused_as
 from ppafo.model.cold_gas import ColdSupply, Passage
 from ppafo.model.declaration import Quantity
 from ppafo.model.gas import SPECIES
@@ -308,10 +308,8 @@ def _override(entries: Mapping[str, Entry], override: str) -> dict[str, Entry]:
         raise ParameterError(f"override '{one_line(override)}' is not of the form PATH=VALUE")
     if path not in PATHS:
         raise ParameterError(f"override '{path}={text}': a bottle has no value '{path}'{nearest_name(path, PATHS)}")
-    try:
+    with refused_as(ParameterError, f"override '{path}={text}'", UnitError):
         value, unit = split_quantity(text)
-    except UnitError as error:
-        raise ParameterError(f"override '{path}={text}': {error}") from error
     entry = Entry(value=value, unit=unit, origin="assumed", source="override")
     return {name: kept for name, kept in entries.items() if name not in _other_fill(path)} | {path: entry}
 
@@ -354,19 +352,15 @@ def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
 
 
 def _fluid(name: str, file: str) -> Fluid:
-    try:
+    with refused_as(ParameterError, f"{file}: gas = '{name}'", ParameterError):
         return load_fluid(name)
-    except ParameterError as error:
-        raise ParameterError(f"{file}: gas = '{name}': {error}") from error
 
 
 def _in_si(path: str, entry: Entry, file: str) -> float:
     quantity = PATHS[path]
     given = f"{file}: {path} = {format_quantity(entry.value, entry.unit)}"
-    try:
+    with refused_as(ParameterError, given, UnitError):
         value = to_si(entry.value, entry.unit, quantity.unit)
-    except UnitError as error:
-        raise ParameterError(f"{given}: {error}") from error
     if not (math.isfinite(value) and is_within(value, quantity)):
         lower = f"{'at least' if quantity.minimum_allowed else 'more than'} {quantity.minimum:g}"
         upper = f" and at most {quantity.maximum:g}" if math.isfinite(quantity.maximum) else ""

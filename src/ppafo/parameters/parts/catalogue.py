@@ -11,9 +11,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.models import NAME, STRICT, make_schema, one_of, optional, table, validate
+from ppafo.documents.models import NAME, StrictTable, make_schema, one_of, optional, table, validate
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ParameterError, UnitError, nearest_name
+from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import ACTUATOR, AREA_FORM, ORIFICE, SONIC_FORM, is_within
@@ -60,10 +60,8 @@ DOUBTFUL: tuple[Origin, ...] = ("quoted", "assumed")
 """Origins that a reader has to look at before buying: from memory of a document, or a guess."""
 
 
-class Figure(BaseModel):
+class Figure(StrictTable):
     """A figure of a part as it was given, in its own unit."""
-
-    model_config = STRICT
 
     value: Annotated[float, Field(description="the number, in the unit beside it")]
     unit: Annotated[str, Field(description="such as 'mm^2', 'g', 'bar_g'; '' for a number")]
@@ -264,10 +262,8 @@ def _check_orifice(place: str, figures: Mapping[str, Figure]) -> None:
 def _in_si(place: str, figure: Figure, quantity: Quantity) -> float:
     if figure.origin in _NEEDS_A_REASON and not figure.note.strip():
         raise ParameterError(f"{place}.note is missing: a figure that is {figure.origin} needs its reason")
-    try:
+    with refused_as(ParameterError, f"{place} = {figure.value:g} {figure.unit}", UnitError):
         value = to_si(figure.value, figure.unit, quantity.unit, STANDARD_ATMOSPHERE)
-    except UnitError as error:
-        raise ParameterError(f"{place} = {figure.value:g} {figure.unit}: {error}") from error
     if not is_within(value, quantity):
         limits = [f"{'at least' if quantity.minimum_allowed else 'more than'} {quantity.minimum:g}"]
         limits += [f"at most {quantity.maximum:g}"] if math.isfinite(quantity.maximum) else []

@@ -12,9 +12,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from ppafo.documents.models import NAME, STRICT, Text, Texts, make_schema, read_model
+from ppafo.documents.models import NAME, StrictTable, Text, Texts, make_schema, read_model
 from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import ScenarioError, first_twice
 
@@ -24,10 +24,8 @@ FILE = TomlKind("publication", "publication", resources.files("ppafo.parameters.
 _IDENTIFIER = r"^[a-z][a-z0-9_]*$"
 
 
-class ClaimEntry(BaseModel):
+class ClaimEntry(StrictTable):
     """One statement in the file of a publication."""
-
-    model_config = STRICT
 
     id: str = Field(pattern=_IDENTIFIER, description="name of the statement, unique in the file")
     statement: Text = Field(description="what is stated, one sentence")
@@ -61,10 +59,8 @@ class ClaimEntry(BaseModel):
     not_testable: str = Field("", description="why nothing is computed, in place of a computation")
 
 
-class PublicationFile(BaseModel):
+class PublicationFile(StrictTable):
     """The file of a publication."""
-
-    model_config = STRICT
 
     schema_version: Literal[1] = Field(description="version of this layout")
     name: str = Field(pattern=NAME)

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from ppafo.documents.models import NAME, STRICT, Text, Texts, make_schema, read_model
+from ppafo.documents.models import NAME, StrictTable, Text, Texts, make_schema, read_model
 from ppafo.documents.toml_text import TomlKind, beside
-from ppafo.errors import StudyError, UnitError, first_twice, nearest_name
+from ppafo.errors import StudyError, UnitError, first_twice, nearest_name, refused_as
 from ppafo.loading import load_scenario, placed
 from ppafo.metrics.catalog import METRICS
 from ppafo.model.catalog import find_effects
@@ -54,10 +54,8 @@ _AREA = {f"valve.{item.name}" for item in AREA_FORM}
 _SONIC = {f"valve.{item.name}" for item in SONIC_FORM}
 
 
-class VariableTable(BaseModel):
+class VariableTable(StrictTable):
     """A number that may be chosen: between two limits, or one of some values."""
-
-    model_config = STRICT
 
     lowest: Annotated[str | None, Field(description="smallest value with its unit")] = None
     highest: Annotated[str | None, Field(description="largest value with its unit")] = None
@@ -158,10 +156,8 @@ def _variable(path: str, table: VariableTable, quantity: Quantity, atmosphere: f
 
 
 def _number(text: str, quantity: Quantity, atmosphere: float, place: str) -> float:
-    try:
+    with refused_as(StudyError, f"{place}: '{text}'", UnitError):
         value = parse_quantity(text, "" if quantity.unit == "1" else quantity.unit, atmosphere)
-    except UnitError as error:
-        raise StudyError(f"{place}: '{text}': {error}") from error
     if not is_within(value, quantity):
         lower = f"{'at least' if quantity.minimum_allowed else 'more than'} {quantity.minimum:g}"
         unit = quantity.unit if quantity.unit != "1" else ""
@@ -177,10 +173,8 @@ _OWN_NAMES = {"gas": GAS}
 _Names = Annotated[tuple[Text, ...], Field(strict=False, min_length=1)]
 
 
-class TaskTable(BaseModel):
+class TaskTable(StrictTable):
     """A task that the device has to do, as a scenario for each kind of valve that may do it."""
-
-    model_config = STRICT
 
     name: Annotated[Text, Field(description="label in reports")]
     scenarios: Annotated[
@@ -191,10 +185,8 @@ class TaskTable(BaseModel):
     weight: Annotated[float, Field(gt=0.0, description="weight of the task in use, relative to the others")] = 1.0
 
 
-class PartsTable(BaseModel):
+class PartsTable(StrictTable):
     """Names of parts in the catalogue; every valve is tried with every actuator."""
-
-    model_config = STRICT
 
     valves: Annotated[_Names, Field(description="valves to choose from")]
     actuators: Annotated[_Names, Field(description="actuators to choose from")]
@@ -203,19 +195,15 @@ class PartsTable(BaseModel):
     other_mass: Annotated[str, Field(description="other mass that is carried: shell, straps, electronics")] = "0 kg"
 
 
-class ConstraintTable(BaseModel):
+class ConstraintTable(StrictTable):
     """What a design has to keep, in each task."""
-
-    model_config = STRICT
 
     least: Annotated[str | None, Field(description="smallest value allowed, with its unit")] = None
     most: Annotated[str | None, Field(description="largest value allowed, with its unit")] = None
 
 
-class DesignFile(BaseModel):
+class DesignFile(StrictTable):
     """A design file, as it is written."""
-
-    model_config = STRICT
 
     schema_version: Annotated[Literal[1], Field(description="version of this layout")]
     name: Annotated[str, Field(pattern=NAME, max_length=100)]
@@ -226,10 +214,10 @@ class DesignFile(BaseModel):
     error: Annotated[str, Field(description="metric used as the error: any metric in N m")] = "rms_error"
     task: Annotated[tuple[TaskTable, ...], Field(strict=False, min_length=1)]
     parts: PartsTable
-    variables: Annotated[dict[str, VariableTable], Field(description="numbers to choose, by path")] = {}
+    variables: Annotated[dict[str, VariableTable], Field(description="numbers to choose, by path")] = Field(default={})
     constraints: Annotated[
         dict[str, ConstraintTable], Field(description="limits by metric, or on error, gas or mass")
-    ] = {}
+    ] = Field(default={})
     search: SearchTable = SearchTable()
 
 
@@ -321,10 +309,8 @@ def load_design(name_or_path: str | Path, seed: int | None = None) -> DesignProb
     valves = [item.valve for item in combinations]
     bottles = [] if document.parts.bottle is None else [catalogue.part("bottles", document.parts.bottle)]
     place = f"{file}: parts.other_mass"
-    try:
+    with refused_as(StudyError, f"{place} = '{document.parts.other_mass}'", UnitError):
         other_mass = parse_quantity(document.parts.other_mass, "kg")
-    except UnitError as error:
-        raise StudyError(f"{place} = '{document.parts.other_mass}': {error}") from error
     if other_mass < 0.0:
         raise StudyError(f"{place} = '{document.parts.other_mass}': must be at least 0 kg")
     problem = DesignProblem(

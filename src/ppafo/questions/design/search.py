@@ -15,9 +15,9 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from ppafo.documents.models import STRICT
+from ppafo.documents.models import StrictTable
 from ppafo.progress import Progress, Report, report_nothing
 
 Floats = NDArray[np.float64]
@@ -228,10 +228,8 @@ PATIENCE = 10
 LARGEST_SEED = 2**32 - 1
 
 
-class SearchTable(BaseModel):
+class SearchTable(StrictTable):
     """How long to search."""
-
-    model_config = STRICT
 
     screening: Annotated[
         int, Field(ge=16, le=100_000, description="number of evenly spread designs in the first generation")

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ppafo.constants import GRAMS_PER_KILOGRAM, STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, ParameterError, UnitError, nearest_name, one_line
+from ppafo.errors import DataError, ParameterError, UnitError, nearest_name, one_line, refused_as
 from ppafo.model.declaration import Quantity
 from ppafo.model.exhaust_reuse import ReuseCycle
 from ppafo.model.plant import chamber_1_volume, chamber_2_volume
@@ -104,10 +104,8 @@ def parse_reuse(
 
 
 def _value(quantity: Quantity, text: str, atmosphere: float) -> float:
-    try:
+    with refused_as(ParameterError, f"--reuse {quantity.name}={text}", UnitError):
         value = parse_quantity(text, quantity.unit, atmosphere)
-    except UnitError as error:
-        raise ParameterError(f"--reuse {quantity.name}={text}: {error}") from error
     if not is_within(value, quantity):
         raise ParameterError(
             f"--reuse {quantity.name}={text}: {quantity.summary} must be from {quantity.minimum:g} to "

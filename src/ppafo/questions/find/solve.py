@@ -21,7 +21,7 @@ from ppafo.answers.display_units import (
     quantity_text,
 )
 from ppafo.answers.style import BLACK, BLUE, GREEN, VERMILION, Margins, figure_of_panels, house_style, mark_kind
-from ppafo.errors import ScenarioError, StudyError, UnitError, one_line
+from ppafo.errors import ScenarioError, StudyError, UnitError, one_line, refused_as
 from ppafo.loading import scenario_or_load
 from ppafo.progress import Report
 from ppafo.questions.question import Solved
@@ -234,13 +234,11 @@ def _range(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
         raise StudyError(
             f"'{one_line(text)}' is not of the form PATH=LOW..HIGH, for example 'supply.pressure=20..90 psi_g'"
         )
-    try:
+    with refused_as(StudyError, f"'{one_line(text)}'", ScenarioError, UnitError):
         path = varied_path(parts[1], base)
         unit = split_quantity(parts[3])[1]
         lower = parts[2] if split_quantity(parts[2])[1] else f"{parts[2]} {unit}".rstrip()
         low, high = path.level(lower), path.level(parts[3])
-    except (ScenarioError, UnitError) as error:
-        raise StudyError(f"'{one_line(text)}': {error}") from error
     if not low < high:
         raise StudyError(f"'{one_line(text)}': the low end must be below the high end")
     return path, low, high

@@ -29,7 +29,7 @@ from ppafo.answers.display_units import (
     metric_title,
 )
 from ppafo.answers.style import BLUE, GREY, VERMILION, Margins, figure_of_free_panels, house_style, mark_kind
-from ppafo.errors import StudyError, UnitError
+from ppafo.errors import StudyError, UnitError, refused_as
 from ppafo.metrics import METRICS
 from ppafo.progress import Report
 from ppafo.questions.question import Solved
@@ -349,10 +349,8 @@ def stopping_rule(statistic: Statistic, metric: str, width: str, like: StoppingR
 
 def parse_fraction(text: str) -> float:
     """Return a fraction from a text in percent, such as '1 %'."""
-    try:
+    with refused_as(StudyError, f"width = '{text}'", UnitError):
         return parse_quantity(text, "")
-    except UnitError as error:
-        raise StudyError(f"width = '{text}': {error}") from error
 
 
 def _plain(text: str) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from ppafo.answers.writing import format_printed_quantity, quantity
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.toml_text import label
-from ppafo.errors import ScenarioError, SimulationError, UnitError, nearest_name
+from ppafo.errors import ScenarioError, SimulationError, UnitError, nearest_name, refused_as
 from ppafo.parameters import load_device
 from ppafo.parameters.audit.evidence import digits
 from ppafo.parameters.chamber_volumes import PRINTED_VOLUMES, ChamberVolumes, readings
@@ -255,10 +255,8 @@ def _checked(entry: ClaimEntry, citation: str, file: str) -> PublishedClaim:
             f"{place}: published = {entry.published:g} does not agree with itself, {name} = {limit:g}; widen the range"
         )
     computation = COMPUTATIONS[entry.computation]
-    try:
+    with refused_as(ScenarioError, f"{place}.unit", UnitError):
         from_si(1.0, entry.unit, computation.unit)
-    except UnitError as error:
-        raise ScenarioError(f"{place}.unit: {error}") from error
     return PublishedClaim(entry, computation, _arguments(entry, computation, place), source)
 
 
@@ -283,10 +281,8 @@ def _argument(text: str, unit: str, place: str) -> str | float:
             known = "; ".join(chamber_names())
             raise ScenarioError(f"{place}: there are no chambers '{text}'{hint}; available: {known}")
         return text
-    try:
+    with refused_as(ScenarioError, place, UnitError):
         value = parse_quantity(text, unit)
-    except UnitError as error:
-        raise ScenarioError(f"{place}: {error}") from error
     # An absolute pressure and a time: neither lies below 0.
     if not 0.0 <= value < math.inf:
         raise ScenarioError(f"{place} = '{text}': must be at least 0 {unit} and finite")

@@ -9,13 +9,13 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.profiles import KNOTS
-from ppafo.documents.models import NAME, STRICT, Text, Texts, make_schema, read_model
+from ppafo.documents.models import NAME, StrictTable, Text, Texts, make_schema, read_model
 from ppafo.documents.toml_text import TomlKind, beside
-from ppafo.errors import DataError, StudyError, UnitError
+from ppafo.errors import DataError, StudyError, UnitError, refused_as
 from ppafo.parameters.parts import Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
 from ppafo.simulation.loading import load_scenario
@@ -32,10 +32,8 @@ _MOMENT = 1.0e-5
 """Time [s] in which a table goes from the end of a repetition to the beginning of the next where these differ."""
 
 
-class ProfileTable(BaseModel):
+class ProfileTable(StrictTable):
     """The prescribed torque over one repetition: a recording, or times and torques."""
-
-    model_config = STRICT
 
     recording: Annotated[
         str | None, Field(description="a .csv or .nc file or a result folder, relative to this file")
@@ -144,12 +142,10 @@ def _profile_of_table(table: ProfileTable, place: str) -> tuple[Floats, Floats, 
 
 
 def _profile_of_recording(table: ProfileTable, folder: Path, place: str) -> tuple[Floats, Floats, str]:
-    try:
+    with refused_as(StudyError, f"{place}.recording", DataError):
         recording = read_recording(folder / str(table.recording))
         torque: Any = recording[table.channel]
         unit = recording.unit(table.channel)
-    except DataError as error:
-        raise StudyError(f"{place}.recording: {error}") from error
     if unit != _TORQUE:
         raise StudyError(f"{place}.channel = '{table.channel}' is in '{unit}'; a torque in {_TORQUE} is needed")
     if len(recording) < 2:
@@ -158,10 +154,8 @@ def _profile_of_recording(table: ProfileTable, folder: Path, place: str) -> tupl
 
 
 def _number(text: str, unit: str, place: str) -> float:
-    try:
+    with refused_as(StudyError, f"{place}: '{text}'", UnitError):
         return parse_quantity(text, unit)
-    except UnitError as error:
-        raise StudyError(f"{place}: '{text}': {error}") from error
 
 
 FILE = TomlKind("sizing", "size", resources.files("ppafo.questions.size") / "library", StudyError)
@@ -171,10 +165,8 @@ _SECONDS_PER_HOUR = 3600.0
 _LARGEST_DENOMINATOR = 10**6
 
 
-class UseTable(BaseModel):
+class UseTable(StrictTable):
     """How much is done with one bottle."""
-
-    model_config = STRICT
 
     repetitions: Annotated[
         int | None, Field(gt=0, description="number of repetitions of the profile, such as steps")
@@ -185,18 +177,14 @@ class UseTable(BaseModel):
     ] = 0.1
 
 
-class LimitsTable(BaseModel):
+class LimitsTable(StrictTable):
     """What must be kept."""
-
-    model_config = STRICT
 
     rms_error: Annotated[Text, Field(description="largest RMS torque error: '0.5 N m', or '5 %' of the largest torque")]
 
 
-class SizingPartsTable(BaseModel):
+class SizingPartsTable(StrictTable):
     """Names of parts in the catalogue."""
-
-    model_config = STRICT
 
     valves: Annotated[_Names, Field(description="valves to choose from, of the kind that the scenario has")]
     bottles: Annotated[_Names, Field(description="bottles to choose from")]
@@ -204,19 +192,15 @@ class SizingPartsTable(BaseModel):
     regulators: Annotated[Texts, Field(description="regulators that are carried (all of those listed)")] = ()
 
 
-class PressureTable(BaseModel):
+class PressureTable(StrictTable):
     """Supply pressures to choose from; both regulators have the same."""
-
-    model_config = STRICT
 
     lowest: Annotated[Text, Field(description="lowest supply pressure")] = "10 psi_g"
     highest: Annotated[Text, Field(description="highest supply pressure")] = "120 psi_g"
 
 
-class SizingFile(BaseModel):
+class SizingFile(StrictTable):
     """A sizing file, as it is written."""
-
-    model_config = STRICT
 
     schema_version: Annotated[Literal[1], Field(description="version of this layout")]
     name: Annotated[str, Field(pattern=NAME, max_length=100)]
@@ -358,10 +342,8 @@ def _pressures(document: SizingFile, scenario: Scenario, file: str) -> tuple[flo
     values = []
     for key in ("lowest", "highest"):
         text = getattr(document.pressure, key)
-        try:
+        with refused_as(StudyError, f"{file}: pressure.{key} = '{text}'", UnitError):
             values.append(parse_quantity(text, "Pa_a", atmosphere))
-        except UnitError as error:
-            raise StudyError(f"{file}: pressure.{key} = '{text}': {error}") from error
     lowest, highest = values
     if not atmosphere < lowest < highest:
         raise StudyError(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from ppafo.documents.json_text import json_text
-from ppafo.errors import DataError, PpafoError, ScenarioError, StudyError, one_line
+from ppafo.errors import DataError, PpafoError, ScenarioError, StudyError, one_line, refused_as
 from ppafo.metrics import METRICS
 from ppafo.questions.sweep.answer import SUMMARY, StudyResults
 from ppafo.questions.sweep.manifest import (
@@ -181,12 +181,10 @@ def _result(study: Study, part: Chunk, values: dict[str, Floats], threads: int |
         "supply.pressure": np.full(part.runs, configuration.scenario.device.supply.pressure)
     }
     every = outputs.every if outputs.traces else 0.0
-    try:
+    with refused_as(StudyError, f"configuration '{configuration.name}'", ScenarioError):
         return run_ensemble(
             configuration.scenario, columns, outputs.metrics, outputs.traces, every, threads, study.gauge
         )
-    except ScenarioError as error:
-        raise StudyError(f"configuration '{configuration.name}': {error}") from error
 
 
 def stored_unit(unit: str) -> str:

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from ppafo.documents.models import NAME, STRICT, Text, Texts, make_schema, validate
+from ppafo.documents.models import NAME, StrictTable, Text, Texts, make_schema, validate
 from ppafo.documents.toml_text import TomlKind, beside, label
-from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice
+from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice, refused_as
 from ppafo.loading import load_scenario, placed
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.simulation.numbers import number_at
@@ -30,10 +30,8 @@ _Value = Annotated[str | float | int, Field(description="text with unit; a plain
 _Metric = Annotated[Text, Field(description="name of a metric, such as 'rms_error'")]
 
 
-class SearchRange(BaseModel):
+class SearchRange(StrictTable):
     """A number that is searched, with the bounds between which it may lie."""
-
-    model_config = STRICT
 
     path: Annotated[Text, Field(description="as for --set, such as 'controller.proportional_gain'")]
     minimum: _Value
@@ -41,10 +39,8 @@ class SearchRange(BaseModel):
     spacing: Annotated[Literal["linear", "logarithmic"], Field(description="default: linear")] = "linear"
 
 
-class Goal(BaseModel):
+class Goal(StrictTable):
     """A term of the objective: weight times metric over scale; less is better, with a weight below 0 more is."""
-
-    model_config = STRICT
 
     metric: _Metric
     weight: float = 1.0
@@ -53,20 +49,16 @@ class Goal(BaseModel):
     )
 
 
-class Constraint(BaseModel):
+class Constraint(StrictTable):
     """A metric that must not be above, or below, a value."""
-
-    model_config = STRICT
 
     metric: _Metric
     at_most: Annotated[Text | None, Field(description="largest value with its unit")] = None
     at_least: Annotated[Text | None, Field(description="smallest value with its unit")] = None
 
 
-class Robust(BaseModel):
+class Robust(StrictTable):
     """Every candidate is run over the same draws from a study, and judged by the bad end of what comes from it."""
-
-    model_config = STRICT
 
     study: Annotated[Text, Field(description="name of a study, or a path relative to this file")]
     measure: Annotated[
@@ -78,10 +70,8 @@ class Robust(BaseModel):
     draws: Annotated[int, Field(ge=8, le=MAXIMUM_DRAWS)] = 64
 
 
-class Effort(BaseModel):
+class Effort(StrictTable):
     """How long is searched: independent starts, generations of each at most, candidates of a generation per gain."""
-
-    model_config = STRICT
 
     starts: Annotated[int, Field(ge=1, le=100)] = 3
     generations: Annotated[int, Field(ge=1, le=100_000)] = 100
@@ -89,10 +79,8 @@ class Effort(BaseModel):
     seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 1
 
 
-class TuningFile(BaseModel):
+class TuningFile(StrictTable):
     """A tuning file, as it is written."""
-
-    model_config = STRICT
 
     schema_version: Annotated[Literal[1], Field(description="version of this layout")]
     name: Annotated[str, Field(pattern=NAME, max_length=100)]
@@ -311,13 +299,11 @@ def _once(items: Sequence[Goal | Constraint]) -> list[str]:
 
 
 def _search_variable(item: SearchRange, scenario: Scenario, atmosphere_varies: bool, refusal: Refusal) -> Searched:
-    try:
+    with refused_as(refusal, f"search '{item.path}'", UnitError, ScenarioError):
         place = varied_path(item.path, scenario)
         place = in_its_unit(place, (item.minimum, item.maximum)) if atmosphere_varies else place
         minimum, maximum = place.level(item.minimum), place.level(item.maximum)
         before = present_value(item.path, scenario) - (place.atmosphere if place.is_gauge else 0.0)
-    except (UnitError, ScenarioError) as error:
-        raise refusal(f"search '{item.path}': {error}") from error
     if item.path == NOISE:
         raise refusal(f"search '{item.path}': all candidates get the same noise, so it cannot be searched")
     if minimum >= maximum:
@@ -363,11 +349,9 @@ def _spread(
     if robust is None:
         noise = Uncertainty(()).with_noise_of([scenario])
         return Spread(noise, "", NOISE_DRAWS, parsed.effort.seed, 0.0, None) if noise.drawn else None
-    try:
+    with refused_as(refusal, "robust", StudyError):
         study = load_study(beside(robust.study, folder, list_studies()))
         uncertainty = _without_restriction(uncertainty_of(study), study.only).with_noise_of([scenario])
-    except StudyError as error:
-        raise refusal(f"robust: {error}") from error
     both = next((path for path in uncertainty.paths if path in searched), None)
     if both is not None:
         raise refusal(f"robust: study '{study.name}' draws '{both}', which is searched here; it cannot be both")
