@@ -16,156 +16,92 @@ from ppafo.engine.compilers import Compiler, offer
 from ppafo.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from ppafo.errors import (
-        DataError,
-        IdentificationError,
-        KindError,
-        ParameterError,
-        PpafoError,
-        ProgramError,
-        ScenarioError,
-        SimulationError,
-        StudyError,
-        UnitError,
-    )
-    from ppafo.gait import Gait, list_gaits, load_gait
-    from ppafo.live.workbench import workbench
-    from ppafo.loading import load_scenario, scenario_from_dict
-    from ppafo.metrics import Metric, evaluate
-    from ppafo.model.sensors import Measurement
-    from ppafo.parameters import ParameterSet, apply_overrides, list_sets, load_device, load_parameter_set
-    from ppafo.parameters.audit import audit
-    from ppafo.parameters.device import Device
-    from ppafo.parameters.parts import Catalogue, Part, load_catalogue
-    from ppafo.questions.bits.solve import bits
-    from ppafo.questions.compare.answer import Comparison
-    from ppafo.questions.compare.solve import compare
-    from ppafo.questions.design.answer import Design
-    from ppafo.questions.design.problem import load_design
-    from ppafo.questions.design.solve import design
-    from ppafo.questions.endurance.answer import Endurance
-    from ppafo.questions.endurance.solve import endurance, endurance_of_walk
-    from ppafo.questions.find.solve import Found, find
-    from ppafo.questions.identify.answer import Identification
-    from ppafo.questions.identify.solve import identify
-    from ppafo.questions.league.answer import League
-    from ppafo.questions.league.solve import league
-    from ppafo.questions.linearise.answer import LinearModel
-    from ppafo.questions.linearise.solve import linearise
-    from ppafo.questions.montecarlo.solve import MonteCarlo, monte_carlo
-    from ppafo.questions.parts.solve import Parts, parts
-    from ppafo.questions.reproduce.answer import Reproduction
-    from ppafo.questions.reproduce.solve import reproduce
-    from ppafo.questions.sensitivity.solve import Sensitivity, sensitivity
-    from ppafo.questions.size.answer import Sizing, size
-    from ppafo.questions.size.problem import load_sizing
-    from ppafo.questions.sweep.answer import StudyResults
-    from ppafo.questions.sweep.results import load_study_results
-    from ppafo.questions.sweep.solve import sweep
-    from ppafo.questions.timing.answer import Timing, event_timing
-    from ppafo.questions.tune.answer import Tuning
-    from ppafo.questions.tune.problem import list_tunings, load_tuning
-    from ppafo.questions.tune.solve import tune
-    from ppafo.questions.unreported.solve import infer_settings
-    from ppafo.questions.validate.solve import Validation, validate
-    from ppafo.running import simulate
-    from ppafo.signals import Channel, Recording
-    from ppafo.simulation.loading import list_scenarios
-    from ppafo.simulation.scenario import Scenario
-    from ppafo.simulation.simulate import Result, Status, simulate_many
-    from ppafo.storage import read_recording, read_result
-    from ppafo.studies.loading import list_studies, load_study
-    from ppafo.walking import compare_walks, list_walks, load_walk, walk_population
-    from ppafo.walking.walk import walk
-
-__all__ = [
-    "Catalogue",
-    "Channel",
-    "Comparison",
-    "DataError",
-    "Design",
-    "Device",
-    "Endurance",
-    "Found",
-    "Gait",
-    "Identification",
-    "IdentificationError",
-    "KindError",
-    "League",
-    "LinearModel",
-    "Measurement",
-    "Metric",
-    "MonteCarlo",
-    "ParameterError",
-    "ParameterSet",
-    "Part",
-    "Parts",
-    "PpafoError",
-    "ProgramError",
-    "Recording",
-    "Reproduction",
-    "Result",
-    "Scenario",
-    "ScenarioError",
-    "Sensitivity",
-    "SimulationError",
-    "Sizing",
-    "Status",
-    "StudyError",
-    "StudyResults",
-    "Timing",
-    "Tuning",
-    "UnitError",
-    "Validation",
-    "apply_overrides",
-    "audit",
-    "bits",
-    "compare",
-    "compare_walks",
-    "design",
-    "endurance",
-    "endurance_of_walk",
-    "evaluate",
-    "event_timing",
-    "find",
-    "identify",
-    "infer_settings",
-    "league",
-    "linearise",
-    "list_gaits",
-    "list_scenarios",
-    "list_sets",
-    "list_studies",
-    "list_tunings",
-    "list_walks",
-    "load_catalogue",
-    "load_design",
-    "load_device",
-    "load_gait",
-    "load_parameter_set",
-    "load_scenario",
-    "load_sizing",
-    "load_study",
-    "load_study_results",
-    "load_tuning",
-    "load_walk",
-    "monte_carlo",
-    "parts",
-    "read_recording",
-    "read_result",
-    "reproduce",
-    "scenario_from_dict",
-    "sensitivity",
-    "simulate",
-    "simulate_many",
-    "size",
-    "sweep",
-    "tune",
-    "validate",
-    "walk",
-    "walk_population",
-    "workbench",
-]
+    from ppafo.errors import DataError as DataError
+    from ppafo.errors import IdentificationError as IdentificationError
+    from ppafo.errors import KindError as KindError
+    from ppafo.errors import ParameterError as ParameterError
+    from ppafo.errors import PpafoError as PpafoError
+    from ppafo.errors import ProgramError as ProgramError
+    from ppafo.errors import ScenarioError as ScenarioError
+    from ppafo.errors import SimulationError as SimulationError
+    from ppafo.errors import StudyError as StudyError
+    from ppafo.errors import UnitError as UnitError
+    from ppafo.gait import Gait as Gait
+    from ppafo.gait import list_gaits as list_gaits
+    from ppafo.gait import load_gait as load_gait
+    from ppafo.live.workbench import workbench as workbench
+    from ppafo.loading import load_scenario as load_scenario
+    from ppafo.loading import scenario_from_dict as scenario_from_dict
+    from ppafo.metrics import Metric as Metric
+    from ppafo.metrics import evaluate as evaluate
+    from ppafo.model.sensors import Measurement as Measurement
+    from ppafo.parameters import ParameterSet as ParameterSet
+    from ppafo.parameters import apply_overrides as apply_overrides
+    from ppafo.parameters import list_sets as list_sets
+    from ppafo.parameters import load_device as load_device
+    from ppafo.parameters import load_parameter_set as load_parameter_set
+    from ppafo.parameters.audit import audit as audit
+    from ppafo.parameters.device import Device as Device
+    from ppafo.parameters.parts import Catalogue as Catalogue
+    from ppafo.parameters.parts import Part as Part
+    from ppafo.parameters.parts import load_catalogue as load_catalogue
+    from ppafo.questions.bits.solve import bits as bits
+    from ppafo.questions.compare.answer import Comparison as Comparison
+    from ppafo.questions.compare.solve import compare as compare
+    from ppafo.questions.design.answer import Design as Design
+    from ppafo.questions.design.problem import load_design as load_design
+    from ppafo.questions.design.solve import design as design
+    from ppafo.questions.endurance.answer import Endurance as Endurance
+    from ppafo.questions.endurance.solve import endurance as endurance
+    from ppafo.questions.endurance.solve import endurance_of_walk as endurance_of_walk
+    from ppafo.questions.find.solve import Found as Found
+    from ppafo.questions.find.solve import find as find
+    from ppafo.questions.identify.answer import Identification as Identification
+    from ppafo.questions.identify.solve import identify as identify
+    from ppafo.questions.league.answer import League as League
+    from ppafo.questions.league.solve import league as league
+    from ppafo.questions.linearise.answer import LinearModel as LinearModel
+    from ppafo.questions.linearise.solve import linearise as linearise
+    from ppafo.questions.montecarlo.solve import MonteCarlo as MonteCarlo
+    from ppafo.questions.montecarlo.solve import monte_carlo as monte_carlo
+    from ppafo.questions.parts.solve import Parts as Parts
+    from ppafo.questions.parts.solve import parts as parts
+    from ppafo.questions.reproduce.answer import Reproduction as Reproduction
+    from ppafo.questions.reproduce.solve import reproduce as reproduce
+    from ppafo.questions.sensitivity.solve import Sensitivity as Sensitivity
+    from ppafo.questions.sensitivity.solve import sensitivity as sensitivity
+    from ppafo.questions.size.answer import Sizing as Sizing
+    from ppafo.questions.size.answer import size as size
+    from ppafo.questions.size.problem import load_sizing as load_sizing
+    from ppafo.questions.sweep.answer import StudyResults as StudyResults
+    from ppafo.questions.sweep.results import load_study_results as load_study_results
+    from ppafo.questions.sweep.solve import sweep as sweep
+    from ppafo.questions.timing.answer import Timing as Timing
+    from ppafo.questions.timing.answer import event_timing as event_timing
+    from ppafo.questions.tune.answer import Tuning as Tuning
+    from ppafo.questions.tune.problem import list_tunings as list_tunings
+    from ppafo.questions.tune.problem import load_tuning as load_tuning
+    from ppafo.questions.tune.solve import tune as tune
+    from ppafo.questions.unreported.solve import infer_settings as infer_settings
+    from ppafo.questions.validate.solve import Validation as Validation
+    from ppafo.questions.validate.solve import validate as validate
+    from ppafo.running import simulate as simulate
+    from ppafo.signals import Channel as Channel
+    from ppafo.signals import Recording as Recording
+    from ppafo.simulation.loading import list_scenarios as list_scenarios
+    from ppafo.simulation.scenario import Scenario as Scenario
+    from ppafo.simulation.simulate import Result as Result
+    from ppafo.simulation.simulate import Status as Status
+    from ppafo.simulation.simulate import simulate_many as simulate_many
+    from ppafo.storage import read_recording as read_recording
+    from ppafo.storage import read_result as read_result
+    from ppafo.studies.loading import list_studies as list_studies
+    from ppafo.studies.loading import load_study as load_study
+    from ppafo.walking import compare_walks as compare_walks
+    from ppafo.walking import list_walks as list_walks
+    from ppafo.walking import load_walk as load_walk
+    from ppafo.walking import walk_population as walk_population
+    from ppafo.walking.walk import walk as walk
 
 _HOMES = {
     "ppafo.errors": (
@@ -182,45 +118,58 @@ _HOMES = {
     ),
     "ppafo.gait": ("Gait", "list_gaits", "load_gait"),
     "ppafo.live.workbench": ("workbench",),
+    "ppafo.loading": ("load_scenario", "scenario_from_dict"),
     "ppafo.metrics": ("Metric", "evaluate"),
     "ppafo.model.sensors": ("Measurement",),
     "ppafo.parameters": ("ParameterSet", "apply_overrides", "list_sets", "load_device", "load_parameter_set"),
     "ppafo.parameters.audit": ("audit",),
     "ppafo.parameters.device": ("Device",),
     "ppafo.parameters.parts": ("Catalogue", "Part", "load_catalogue"),
-    "ppafo.signals": ("Channel", "Recording"),
-    "ppafo.loading": ("load_scenario", "scenario_from_dict"),
+    "ppafo.questions.bits.solve": ("bits",),
+    "ppafo.questions.compare.answer": ("Comparison",),
+    "ppafo.questions.compare.solve": ("compare",),
+    "ppafo.questions.design.answer": ("Design",),
+    "ppafo.questions.design.problem": ("load_design",),
+    "ppafo.questions.design.solve": ("design",),
+    "ppafo.questions.endurance.answer": ("Endurance",),
+    "ppafo.questions.endurance.solve": ("endurance", "endurance_of_walk"),
+    "ppafo.questions.find.solve": ("Found", "find"),
+    "ppafo.questions.identify.answer": ("Identification",),
+    "ppafo.questions.identify.solve": ("identify",),
+    "ppafo.questions.league.answer": ("League",),
+    "ppafo.questions.league.solve": ("league",),
+    "ppafo.questions.linearise.answer": ("LinearModel",),
+    "ppafo.questions.linearise.solve": ("linearise",),
+    "ppafo.questions.montecarlo.solve": ("MonteCarlo", "monte_carlo"),
+    "ppafo.questions.parts.solve": ("Parts", "parts"),
+    "ppafo.questions.reproduce.answer": ("Reproduction",),
+    "ppafo.questions.reproduce.solve": ("reproduce",),
+    "ppafo.questions.sensitivity.solve": ("Sensitivity", "sensitivity"),
+    "ppafo.questions.size.answer": ("Sizing", "size"),
+    "ppafo.questions.size.problem": ("load_sizing",),
+    "ppafo.questions.sweep.answer": ("StudyResults",),
+    "ppafo.questions.sweep.results": ("load_study_results",),
+    "ppafo.questions.sweep.solve": ("sweep",),
+    "ppafo.questions.timing.answer": ("Timing", "event_timing"),
+    "ppafo.questions.tune.answer": ("Tuning",),
+    "ppafo.questions.tune.problem": ("list_tunings", "load_tuning"),
+    "ppafo.questions.tune.solve": ("tune",),
+    "ppafo.questions.unreported.solve": ("infer_settings",),
+    "ppafo.questions.validate.solve": ("Validation", "validate"),
     "ppafo.running": ("simulate",),
+    "ppafo.signals": ("Channel", "Recording"),
     "ppafo.simulation.loading": ("list_scenarios",),
     "ppafo.simulation.scenario": ("Scenario",),
     "ppafo.simulation.simulate": ("Result", "Status", "simulate_many"),
     "ppafo.storage": ("read_recording", "read_result"),
     "ppafo.studies.loading": ("list_studies", "load_study"),
-    "ppafo.questions.sweep.results": ("StudyResults", "load_study_results"),
-    "ppafo.questions.sweep.solve": ("sweep",),
-    "ppafo.questions.identify.solve": ("Identification", "identify"),
-    "ppafo.questions.reproduce.solve": ("Reproduction", "reproduce"),
-    "ppafo.questions.bits.solve": ("bits",),
-    "ppafo.questions.compare.solve": ("Comparison", "compare"),
-    "ppafo.questions.design.problem": ("load_design",),
-    "ppafo.questions.design.solve": ("Design", "design"),
-    "ppafo.questions.endurance.solve": ("Endurance", "endurance", "endurance_of_walk"),
-    "ppafo.questions.league.solve": ("League", "league"),
-    "ppafo.questions.find.solve": ("Found", "find"),
-    "ppafo.questions.linearise.solve": ("LinearModel", "linearise"),
-    "ppafo.questions.montecarlo.solve": ("MonteCarlo", "monte_carlo"),
-    "ppafo.questions.parts.solve": ("Parts", "parts"),
-    "ppafo.questions.size.problem": ("load_sizing",),
-    "ppafo.questions.size.answer": ("Sizing", "size"),
-    "ppafo.questions.sensitivity.solve": ("Sensitivity", "sensitivity"),
-    "ppafo.questions.unreported.solve": ("infer_settings",),
-    "ppafo.questions.validate.solve": ("Validation", "validate"),
-    "ppafo.questions.timing.answer": ("Timing", "event_timing"),
-    "ppafo.questions.tune.problem": ("list_tunings", "load_tuning"),
-    "ppafo.questions.tune.solve": ("Tuning", "tune"),
-    "ppafo.walking": ("compare_walks", "list_walks", "load_walk", "walk", "walk_population"),
+    "ppafo.walking": ("compare_walks", "list_walks", "load_walk", "walk_population"),
+    "ppafo.walking.walk": ("walk",),
 }
-_HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+"""Where each public name is: the imports above once more, as they are not made before a name is used."""
+
+_HOME_OF = dict(sorted((name, module) for module, names in _HOMES.items() for name in names))
+__all__ = list(_HOME_OF)
 
 _RENAMED = {"run_design": "design", "run_sizing": "size", "run_study": "sweep"}
 """Names of version 0.1 and what they are called now."""

@@ -134,7 +134,10 @@ def test_the_make_targets_of_the_readme_exist() -> None:
 
 def test_every_command_is_once_in_the_table_of_questions() -> None:
     rows = re.findall(r"^\| [^|]+ \| ((?:`\w+`(?:, )?)+) \| .+ \|$", ASKED.partition("## ")[0], re.MULTILINE)
-    assert sorted(name for row in rows for name in re.findall(r"\w+", row)) == sorted(COMMANDS)
+    listed = [name for row in rows for name in re.findall(r"\w+", row)]
+    missing = [f"| what somebody wants to know | `{name}` | a page |" for name in COMMANDS if name not in listed]
+    assert missing == [], "add to the table of docs/what-you-can-ask.md, in words of a user:\n" + "\n".join(missing)
+    assert sorted(listed) == sorted(COMMANDS)
 
 
 def test_the_table_of_bits_has_every_golden_hash_and_the_rows_that_the_script_prints() -> None:

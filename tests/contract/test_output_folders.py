@@ -75,7 +75,12 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def test_every_command_is_here() -> None:
-    assert {name.partition(" ")[0] for name in (*FOLDERS, *FILES)} == set(COMMANDS) - {"examples"}
+    tried = {name.partition(" ")[0] for name in (*FOLDERS, *FILES)}
+    missing = [
+        f'    "{name}": ["the words", "that it needs"],' for name in COMMANDS if name not in {*tried, "examples"}
+    ]
+    assert missing == [], "paste into FOLDERS of tests/contract/test_output_folders.py:\n" + "\n".join(missing)
+    assert tried == set(COMMANDS) - {"examples"}
 
 
 def test_an_example_takes_only_a_folder_that_is_absent(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,14 +1,25 @@
-"""Every question of the catalogue: its arguments are those of its function, it is a verb, its answer can be written."""
+"""Every question of the catalogue: its arguments are those of its function, it is a verb, its answer can be written.
+
+That of the how-to page is installed as a package of its own would be, and is a command by that.
+"""
 
 import inspect
+import json
+import re
+import shutil
+import sys
+import textwrap
 import typing
+from collections.abc import Iterator
+from importlib.resources import files
+from pathlib import Path
 
 import pytest
 
 import ppafo
-from ppafo.cli.main import build_parser
+from ppafo.cli.main import build_parser, main
 from ppafo.documents.toml_text import TomlKind
-from ppafo.questions.catalogue import QUESTIONS, question
+from ppafo.questions.catalogue import QUESTIONS
 from ppafo.questions.question import Solved, load_name
 
 NAMES = list(QUESTIONS)
@@ -20,13 +31,13 @@ NO_VERB_OF_ITS_OWN = {
 
 def solved_types(name: str) -> list[type]:
     """The classes that solving a question may return."""
-    returned = typing.get_type_hints(question(name).solver())["return"]
+    returned = typing.get_type_hints(QUESTIONS[name].solver())["return"]
     return list(typing.get_args(returned)) or [returned]
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_argument_is_a_parameter_of_what_solves_the_question(name: str) -> None:
-    declared = question(name)
+    declared = QUESTIONS[name]
     signature = inspect.signature(declared.solver())
     given = {argument.parameter: None for argument in declared.arguments}
     assert all(sum(other.parameter == one for other in declared.arguments) == 1 for one in given if one != "highest")
@@ -37,7 +48,7 @@ def test_every_argument_is_a_parameter_of_what_solves_the_question(name: str) ->
 
 @pytest.mark.parametrize("name", NAMES)
 def test_defaults_of_the_command_are_those_of_the_verb(name: str) -> None:
-    declared = question(name)
+    declared = QUESTIONS[name]
     parameters = inspect.signature(declared.solver()).parameters
     for argument in declared.arguments:
         default = parameters[argument.parameter].default
@@ -54,16 +65,80 @@ def test_what_a_question_comes_to_answers_draws_saves_and_becomes_data(name: str
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in NO_VERB_OF_ITS_OWN])
 def test_every_question_is_a_verb_with_its_errors_documented(name: str) -> None:
-    solver = question(name).solver()
-    assert getattr(ppafo, solver.__name__) is solver
+    solver, (home, _, verb) = QUESTIONS[name].solver(), QUESTIONS[name].solve.partition(":")
+    result = solved_types(name)[0]
+    assert getattr(ppafo, verb, None) is solver, (
+        "paste into src/ppafo/__init__.py, the imports below TYPE_CHECKING, the rest into _HOMES:\n"
+        f"    from {result.__module__} import {result.__name__} as {result.__name__}\n"
+        f"    from {home} import {verb} as {verb}\n"
+        f'    "{result.__module__}": ("{result.__name__}",),\n'
+        f'    "{home}": ("{verb}",),\n'
+        "then: python scripts/public_api.py"
+    )
     assert solver.__doc__ is not None
     assert "Error" in solver.__doc__
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_parser_of_the_command_is_made_without_loading_what_solves_it(name: str) -> None:
-    declared = question(name)
+    declared = QUESTIONS[name]
     help_text = build_parser(name).format_help()
     assert name in help_text
     if declared.library:
         assert isinstance(load_name(declared.library), TomlKind)
+
+
+EXAMPLE = files("ppafo.examples") / "add-a-question"
+PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "add-a-question.md").read_text(encoding="utf-8")
+WORDS = ("torque-task-proportional", "--pressure", "30 psi_g", "--pressure", "60 psi_g")
+
+
+@pytest.fixture
+def _installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """The package of the example, as an installer leaves it."""
+    folder = tmp_path / "site"
+    shutil.copytree(Path(str(EXAMPLE)) / "my_questions", folder / "my_questions")
+    about = folder / "my_questions-0.1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: my-questions\nVersion: 0.1.0\n")
+    entries = "[ppafo.questions]\npressures = my_questions.pressures:QUESTION\nbroken = my_questions.nothing:QUESTION\n"
+    (about / "entry_points.txt").write_text(entries)
+    monkeypatch.syspath_prepend(folder)
+    monkeypatch.chdir(tmp_path)
+    yield
+    for name in set(QUESTIONS) - set(NAMES):
+        del QUESTIONS[name]
+    for name in [name for name in sys.modules if name.split(".")[0] == "my_questions"]:
+        del sys.modules[name]
+
+
+@pytest.mark.usefixtures("_installed")
+def test_a_question_of_another_package_is_a_command_that_answers_what_its_page_shows(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (shown,) = re.findall(r"```text\n(.*?)```", PAGE, re.DOTALL)
+    assert main(["pressures", *WORDS]) == 0
+    assert capsys.readouterr().out == textwrap.dedent(shown)
+    assert main(["my_questions.pressures:QUESTION", *WORDS, "--json", "--out", str(tmp_path / "out")]) == 0
+    runs = json.loads(capsys.readouterr().out)["runs"]
+    assert [run["supply"] for run in runs] == ["30 psi_g", "60 psi_g"]
+    assert {"pressures.png", "pressures.json", "report.html"} <= {path.name for path in (tmp_path / "out").iterdir()}
+
+
+@pytest.mark.usefixtures("_installed")
+def test_a_question_of_another_package_is_in_the_help_and_in_hints_and_is_refused_in_one_line(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["pressure", *WORDS]) == 2
+    assert "there is no command 'pressure', did you mean 'pressures'?" in capsys.readouterr().err
+    assert "  pressures    show what a lower supply pressure costs" in build_parser(None).format_help()
+    for words, said in (
+        (["pressures", "torque-task"], "the following arguments are required: --pressure"),
+        (["pressures", "torque-task", "--pressure", "40"], "there is no scenario or walk 'torque-task'"),
+        (["pressures", "torque-task-solenoid", "--presure", "40"], "no option '--presure', did you mean '--pressure'"),
+        (["broken"], "question 'broken' of package 'my-questions' cannot be loaded: ModuleNotFoundError"),
+    ):
+        assert main(words) == 2
+        printed = capsys.readouterr().err
+        assert said in printed
+        assert printed.count("\n") == 1

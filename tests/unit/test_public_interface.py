@@ -1,5 +1,6 @@
 """``import ppafo``: small, quick, and everything in it works."""
 
+import ast
 import importlib
 import runpy
 import subprocess
@@ -18,6 +19,20 @@ def test_every_public_name_can_be_had_and_is_listed() -> None:
         assert getattr(ppafo, name) is not None
     assert set(ppafo.__all__) <= set(dir(ppafo))
     assert sorted(ppafo.__all__) == ppafo.__all__
+
+
+def test_the_names_for_type_checkers_and_their_homes_at_run_time_are_the_same() -> None:
+    tree = ast.parse(Path(str(ppafo.__file__)).read_text(encoding="utf-8"))
+    (block,) = (node for node in tree.body if isinstance(node, ast.If))
+    imports = [node for node in block.body if isinstance(node, ast.ImportFrom)]
+    checked = {(alias.name, node.module) for node in imports for alias in node.names}
+    found = set(ppafo._HOME_OF.items())
+    paste = [f"    from {home} import {name} as {name}" for name, home in sorted(found - checked, key=str)]
+    paste += [f'    "{home}": ("{name}",),' for name, home in sorted(checked - found, key=str)]
+    assert paste == [], "paste into src/ppafo/__init__.py, imports below TYPE_CHECKING, the rest into _HOMES:\n" + (
+        "\n".join(paste)
+    )
+    assert all(alias.asname == alias.name for node in imports for alias in node.names), "a type checker needs 'as'"
 
 
 def test_a_name_that_does_not_exist_is_an_attribute_error() -> None:

@@ -8,79 +8,55 @@ import gc
 import importlib
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import takewhile
 from typing import TYPE_CHECKING, NoReturn, final
 
 from ppafo.cli.output import flush_output, printing
 from ppafo.errors import PpafoError, nearest_name, one_line
-from ppafo.questions.catalogue import QUESTIONS, question
+from ppafo.questions.catalogue import QUESTIONS
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
 
-COMMANDS: dict[str, str] = {
-    "reproduce": QUESTIONS["reproduce"],
-    "simulate": "run a scenario and write its recording, metrics and figure",
-    "workbench": "write scenarios as one page that simulates them while sliders are dragged",
-    "unreported": QUESTIONS["unreported"],
-    "sweep": QUESTIONS["sweep"],
-    "compare": QUESTIONS["compare"],
-    "sensitivity": QUESTIONS["sensitivity"],
-    "montecarlo": QUESTIONS["montecarlo"],
-    "find": QUESTIONS["find"],
-    "tune": QUESTIONS["tune"],
-    "linearise": QUESTIONS["linearise"],
-    "walk": QUESTIONS["walk"],
-    "league": QUESTIONS["league"],
-    "timing": QUESTIONS["timing"],
-    "validate": QUESTIONS["validate"],
-    "record": "record a bench that speaks the protocol of 'ppafo hil'",
-    "rig": "record synthetic bench data on the virtual test rig",
-    "identify": QUESTIONS["identify"],
-    "gait": "list, show and import gaits; export recordings for OpenSim",
-    "endurance": QUESTIONS["endurance"],
-    "design": QUESTIONS["design"],
-    "size": QUESTIONS["size"],
-    "new": "write an input file to start from: a template, or a copy of a shipped one",
-    "examples": "list the examples of the how-to pages, or write one into a folder, ready to run",
-    "plot": "redraw the figures of a result folder",
-    "sets": "list parameter sets, or show one with the source of every value",
-    "parts": QUESTIONS["parts"],
-    "audit": "check a parameter set for contradictions",
-    "export": "write a scenario or a walk for other tools: a library in C, an FMU, a controller for 'ppafo hil'",
-    "firmware": "write the controller of a scenario or a walk as firmware for a small processor",
-    "chip": "run a scenario or a walk with its controller on the simulator of a small processor",
-    "hil": "run a scenario's plant in real time against a controller at a serial port or over UDP",
-    "bits": QUESTIONS["bits"],
-    "cache": "show, compile or remove the compiled models of this computer",
-    "schema": "print the JSON Schema of a file format",
+SUBCOMMANDS: dict[str, dict[str, str]] = {
+    "the paper": {},
+    "your device": {
+        "new": "write an input file to start from: a template, or a copy of a shipped one",
+        "examples": "list the examples of the how-to pages, or write one into a folder, ready to run",
+        "simulate": "run a scenario and write its recording, metrics and figure",
+        "workbench": "write scenarios as one page that simulates them while sliders are dragged",
+        "plot": "redraw the figures of a result folder",
+        "sets": "list parameter sets, or show one with the source of every value",
+        "audit": "check a parameter set for contradictions",
+    },
+    "from bench to model": {
+        "record": "record a bench that speaks the protocol of 'ppafo hil'",
+        "rig": "record synthetic bench data on the virtual test rig",
+    },
+    "decide": {},
+    "walk": {
+        "gait": "list, show and import gaits; export recordings for OpenSim",
+    },
+    "tools": {
+        "export": "write a scenario or a walk for other tools: a library in C, an FMU, a controller for 'ppafo hil'",
+        "firmware": "write the controller of a scenario or a walk as firmware for a small processor",
+        "chip": "run a scenario or a walk with its controller on the simulator of a small processor",
+        "hil": "run a scenario's plant in real time against a controller at a serial port or over UDP",
+        "cache": "show, compile or remove the compiled models of this computer",
+        "schema": "print the JSON Schema of a file format",
+    },
 }
+"""Headings of the help, by what somebody has come for, and under each the subcommands that are no questions.
 
-GROUPS: dict[str, tuple[str, ...]] = {
-    "the paper": ("reproduce", "unreported"),
-    "your device": ("new", "examples", "simulate", "workbench", "plot", "sets", "parts", "audit"),
-    "from bench to model": ("record", "rig", "identify", "validate"),
-    "decide": (
-        "sweep",
-        "compare",
-        "sensitivity",
-        "montecarlo",
-        "find",
-        "tune",
-        "linearise",
-        "design",
-        "size",
-        "endurance",
-        "league",
-    ),
-    "walk": ("walk", "gait", "timing"),
-    "tools": ("export", "firmware", "chip", "hil", "bits", "cache", "schema"),
-}
-"""The commands as the help shows them, by what somebody has come for."""
+A subcommand is a module of ``cli`` with ``add_arguments`` and ``run``. Questions say their heading themselves.
+"""
+
+COMMANDS = (*(name for group in SUBCOMMANDS.values() for name in group), *QUESTIONS)
+"""The commands of this package; questions of other packages are commands too."""
 
 FIRST_STEPS = """\
 Model-based design of pneumatic powered orthoses. Start with one of these:
@@ -130,6 +106,15 @@ class UsageError(PpafoError):
 class CommandParser(argparse.ArgumentParser):
     """A parser that raises ``UsageError`` where argparse would print its usage and end the process."""
 
+    list_commands: Callable[[], str] | None = None
+    """What follows the description in the help; made only there, as it loads every question."""
+
+    def format_help(self) -> str:
+        """Return the help, with the commands where there are some."""
+        if self.list_commands is not None:
+            self.description, self.list_commands = f"{self.description}\n\n{self.list_commands()}", None
+        return super().format_help()
+
     def error(self, message: str) -> NoReturn:
         """Raise the message of argparse as an error of one line that names the help to look at."""
         bad_value = _BAD_VALUE.fullmatch(message)
@@ -156,14 +141,17 @@ class CommandParser(argparse.ArgumentParser):
         return found
 
 
-def check_command(word: str | None, known: Sequence[str], moved: Mapping[str, str]) -> None:
+def check_command(word: str | None) -> None:
     """Refuse a word in the place of the command that names none; argparse would list them without the nearest.
 
-    ``moved`` has, for each command of earlier versions, what does the same in a checkout of the repository.
+    KindError for a question of another package that is there and cannot be used.
     """
-    if word is not None and word in moved:
-        raise UsageError(f"'{word}' is no longer a command of the package: run {moved[word]} in a checkout of ppafo")
-    if word is not None and word not in known:
+    if word is None or word in COMMANDS:
+        return
+    if word in MOVED:
+        raise UsageError(f"'{word}' is no longer a command of the package: run {MOVED[word]} in a checkout of ppafo")
+    if word not in QUESTIONS:
+        known = tuple(dict.fromkeys((*COMMANDS, *QUESTIONS)))
         hint = nearest_name(word, known)
         raise UsageError(f"there is no command '{word}'{hint}; available: {', '.join(known)}")
 
@@ -215,35 +203,43 @@ def build_parser(chosen: str | None) -> CommandParser:
     parser = CommandParser(
         prog="ppafo",
         usage="ppafo [-h] [--version] COMMAND ...",
-        description=f"Model-based design of pneumatic powered orthoses.\n\n{_list_commands()}",
+        description="Model-based design of pneumatic powered orthoses.",
         epilog="'ppafo COMMAND --help' shows what a command takes.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.list_commands = _list_commands
     parser.add_argument("--version", action="version", version=f"ppafo {__version__}")
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", prog="ppafo", help=argparse.SUPPRESS)
-    for name, summary in COMMANDS.items():
-        subparser = subparsers.add_parser(name, description=summary)
-        if name == chosen and name in QUESTIONS:
-            from ppafo.cli import question as runner
-
-            declared = question(name)
-            runner.add_arguments(subparser, declared)
-            subparser.set_defaults(run=partial(runner.run, question=declared))
-        elif name == chosen:
+    plain = {name: summary for group in SUBCOMMANDS.values() for name, summary in group.items()}
+    for name in dict.fromkeys((*COMMANDS, *QUESTIONS)):
+        if name != chosen:
+            subparsers.add_parser(name)
+        elif name in plain:
+            subparser = subparsers.add_parser(name, description=plain[name])
             module = importlib.import_module(f"ppafo.cli.{name}")
             module.add_arguments(subparser)
             subparser.set_defaults(run=module.run)
+        else:
+            from ppafo.cli import question as runner
+
+            declared = QUESTIONS[name]
+            subparser = subparsers.add_parser(name, description=declared.summary)
+            runner.add_arguments(subparser, declared)
+            subparser.set_defaults(run=partial(runner.run, question=declared))
     return parser
 
 
 def _list_commands() -> str:
-    """Return the commands with what each does, group by group."""
-    width = max(map(len, COMMANDS))
-    groups = [
-        "\n".join([f"{title}:", *(f"  {name:<{width}}  {COMMANDS[name]}" for name in names)])
-        for title, names in GROUPS.items()
-    ]
-    return "\n\n".join(groups)
+    """Return the commands with what each does, group by group, with the questions of other packages."""
+    QUESTIONS.load_all()
+    groups = {heading: dict(group) for heading, group in SUBCOMMANDS.items()}
+    for name, declared in QUESTIONS.loaded().items():
+        groups.setdefault(declared.group, {})[name] = declared.summary
+    width = max(len(name) for group in groups.values() for name in group)
+    return "\n\n".join(
+        "\n".join([f"{heading}:", *(f"  {name:<{width}}  {summary}" for name, summary in group.items())])
+        for heading, group in groups.items()
+    )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -264,14 +260,14 @@ def _run(words: list[str]) -> int:
             if not word.isascii() and any("\ud800" <= character <= "\udfff" for character in word):
                 raise UsageError(f"'{one_line(word)}' is not text in UTF-8; give the file or folder another name")
         chosen = next((word for word in words if not word.startswith("-")), None)
-        check_command(chosen, tuple(COMMANDS), MOVED)
+        check_command(chosen)
         parser = build_parser(chosen)
         check_options(words, parser)
         parsed = parser.parse_args(words)
         if parsed.command is None:
             print(FIRST_STEPS, file=sys.stderr)
             return EXIT_BAD_INPUT
-        # Refuse a value that is set twice: nobody would know which one was meant.
+        # Refuse a value that is set twice: which one was meant is ambiguous.
         overrides = getattr(parsed, "overrides", ())
         given: dict[str, str] = {}
         for override in overrides:

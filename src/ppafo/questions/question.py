@@ -88,16 +88,20 @@ class Solved:
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """A question: what solves it (``module:function``), and what its command takes.
+    """A question: its command, what the help says of it, what solves it (``module:function``), and what it takes.
 
-    ``solve`` takes the parameters of the arguments, and ``progress`` where it is long work, and returns a ``Solved``.
-    ``library`` is the ``TomlKind`` of the files that come with the package (``module:NAME``), for ``--list``, and
-    ``listing`` returns the entries of that list where these are more than the words of the files. ``default_folder``
-    (``module:function``) takes the values of the arguments by name and returns where the answer is written unless
-    ``--out`` says so; without it nothing is. ``fills_folder`` is true where solving itself fills the folder, an
-    argument ``out`` of its own, so that a later call resumes; the data of its answer name it as ``folder``.
+    ``group`` is the heading of ``ppafo --help`` under which it stands, such as ``decide``. ``solve`` takes the
+    parameters of the arguments, and ``progress`` where it is long work, and returns a ``Solved``. ``library`` is the
+    ``TomlKind`` of the files that come with the package (``module:NAME``), for ``--list``, and ``listing`` returns the
+    entries of that list where these are more than the words of the files. ``default_folder`` (``module:function``)
+    takes the values of the arguments by name and returns where the answer is written unless ``--out`` says so; without
+    it nothing is. ``fills_folder`` is true where solving itself fills the folder, an argument ``out`` of its own, so
+    that a later call resumes; the data of its answer name it as ``folder``.
     """
 
+    name: str
+    summary: str
+    group: str
     solve: str
     arguments: tuple[Argument, ...]
     library: str = ""

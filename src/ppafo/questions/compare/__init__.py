@@ -15,6 +15,9 @@ def _task(text: str) -> tuple[str, list[str]]:
 
 
 QUESTION = Question(
+    name="compare",
+    summary="compare configurations, also over an uncertain device",
+    group="decide",
     solve="ppafo.questions.compare.solve:compare",
     arguments=(
         Argument(

@@ -5,6 +5,9 @@ from pathlib import Path
 from ppafo.questions.question import SET, Argument, Question, quantity
 
 QUESTION = Question(
+    name="endurance",
+    summary="compute how long a bottle of gas lasts, and why it ends",
+    group="decide",
     solve="ppafo.questions.endurance.solve:endurance",
     arguments=(
         Argument(

@@ -3,6 +3,9 @@
 from ppafo.questions.question import SET, THREADS, Argument, Question, counting_number
 
 QUESTION = Question(
+    name="find",
+    summary="find the lowest or highest value that meets a condition on a metric",
+    group="decide",
     solve="ppafo.questions.find.solve:find",
     arguments=(
         Argument(("SCENARIO",), "scenario", "name of a scenario, or a .toml file", "SCENARIO"),

@@ -3,6 +3,9 @@
 from ppafo.questions.question import SET, Argument, Question, minutes, whole_number
 
 QUESTION = Question(
+    name="league",
+    summary="rank every controller on a task against what is possible at best",
+    group="decide",
     solve="ppafo.questions.league.solve:league",
     arguments=(
         Argument(

@@ -16,6 +16,9 @@ def point(text: str) -> float | str:
 
 
 QUESTION = Question(
+    name="linearise",
+    summary="make a linear model of the plant near one point, for control design",
+    group="decide",
     solve="ppafo.questions.linearise.solve:linearise",
     arguments=(
         Argument(("SCENARIO",), "scenario", "name of a scenario, or a .toml file", "SCENARIO"),

@@ -3,6 +3,9 @@
 from ppafo.questions.question import CONFIDENCE, SEED, SET, THREADS, Argument, Question, maximum_failed, whole_number
 
 QUESTION = Question(
+    name="montecarlo",
+    summary="draw until the interval of a statistic is narrow enough",
+    group="decide",
     solve="ppafo.questions.montecarlo.solve:monte_carlo",
     arguments=(
         Argument(("STUDY",), "study", "a study with distributions: a name, or a .toml file", "STUDY"),

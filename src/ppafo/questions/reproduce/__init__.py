@@ -3,6 +3,9 @@
 from ppafo.questions.question import SET, Argument, Question
 
 QUESTION = Question(
+    name="reproduce",
+    summary="reproduce the paper's experiments and check its claims",
+    group="the paper",
     solve="ppafo.questions.reproduce.solve:reproduce",
     arguments=(
         Argument(

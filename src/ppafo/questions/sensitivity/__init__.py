@@ -3,6 +3,9 @@
 from ppafo.questions.question import CONFIDENCE, SEED, SET, THREADS, Argument, Question, maximum_failed, whole_number
 
 QUESTION = Question(
+    name="sensitivity",
+    summary="rank uncertain values by their influence: Sobol, Shapley or Morris indices",
+    group="decide",
     solve="ppafo.questions.sensitivity.solve:sensitivity",
     arguments=(
         Argument(("STUDY",), "study", "a study with distributions: a name, or a .toml file", "STUDY"),

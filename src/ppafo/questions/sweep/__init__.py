@@ -3,6 +3,9 @@
 from ppafo.questions.question import SEED, SET, THREADS, Argument, Question, counting_number
 
 QUESTION = Question(
+    name="sweep",
+    summary="run a study: many runs, one row each, resumable",
+    group="decide",
     solve="ppafo.questions.sweep.solve:sweep_into_folder",
     arguments=(
         Argument(("STUDY",), "study", "name of a study, or a .toml file", "STUDY", nargs="?"),

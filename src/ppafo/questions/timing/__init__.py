@@ -3,6 +3,9 @@
 from ppafo.questions.question import SET, Argument, Question, minutes
 
 QUESTION = Question(
+    name="timing",
+    summary="find how far a controller is off in time, and what the slap of the foot comes from",
+    group="walk",
     solve="ppafo.questions.timing.answer:event_timing",
     arguments=(
         Argument(

@@ -5,6 +5,9 @@ from dataclasses import replace
 from ppafo.questions.question import SEED, Argument, Question, whole_number
 
 QUESTION = Question(
+    name="unreported",
+    summary="find what the paper's results imply about settings that it does not report",
+    group="the paper",
     solve="ppafo.questions.unreported.solve:infer_settings",
     arguments=(
         Argument(

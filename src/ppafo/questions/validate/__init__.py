@@ -3,6 +3,9 @@
 from ppafo.questions.question import SET, Argument, Question, quantity
 
 QUESTION = Question(
+    name="validate",
+    summary="compare a parameter set with recordings, channel by channel",
+    group="from bench to model",
     solve="ppafo.questions.validate.solve:validate",
     arguments=(
         Argument(("PARAMETERS",), "parameter_set", "name of a parameter set, or a .toml file", "PARAMETERS"),

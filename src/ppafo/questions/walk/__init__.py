@@ -3,6 +3,9 @@
 from ppafo.questions.question import SET, Argument, Question, counting_number, minutes, whole_number
 
 QUESTION = Question(
+    name="walk",
+    summary="simulate walking with the device, without it, and healthy",
+    group="walk",
     solve="ppafo.questions.walk.answer:walk_with_and_without",
     arguments=(
         Argument(
