@@ -234,7 +234,8 @@ def doubt_of(found: WhitenedFit, low: Floats, high: Floats) -> Doubt:
     """
     of_model = _of_model(found)
     columns = [*(sizes[0] for sizes in of_model), *_of_record(found)]
-    every = _findings(found, columns, [column for sizes in of_model for column in sizes[1:]])
+    starts = _slopes_of_starts(found.optimum.residuals, found.optimum.point)
+    every = _findings(found, starts, columns, [column for sizes in of_model for column in sizes[1:]])
     findings, at_other_sizes = every[: len(columns)], every[len(columns) :]
     limit = _quantile(ALARM / max(1, len(findings)))
     shown = []
@@ -246,11 +247,11 @@ def doubt_of(found: WhitenedFit, low: Floats, high: Floats) -> Doubt:
     # What cannot be, an effect that is negative, counts only where nothing else shows.
     possible = [one for one in shown if one.column.low <= one.size]
     others = [one for one in shown if one.column.low > one.size]
-    clear = _not_noise(found, possible, limit) or _not_noise(found, others, limit)
+    clear = _not_noise(found, starts, possible, limit) or _not_noise(found, starts, others, limit)
     return Doubt(findings, clear, *_with_open_sizes(findings, found.optimum.point, low, high))
 
 
-def _not_noise(found: WhitenedFit, shown: Sequence[Finding], limit: float) -> tuple[Finding, ...]:
+def _not_noise(found: WhitenedFit, starts: Floats, shown: Sequence[Finding], limit: float) -> tuple[Finding, ...]:
     """Return the findings from the first on that explains more than any noise of the sensors could.
 
     A score takes the noise as known, and that which is left when all directions are taken out is too little where it is
@@ -258,7 +259,6 @@ def _not_noise(found: WhitenedFit, shown: Sequence[Finding], limit: float) -> tu
     """
     if not shown:
         return ()
-    starts = _slopes_of_starts(found.optimum.residuals, found.optimum.point)
     without = _likelihood(found, starts)
     for place, one in enumerate(shown):
         with_it = _likelihood(found, np.column_stack([starts, one.column.change]))
@@ -319,13 +319,18 @@ def _slopes_of_starts(residuals: Residuals, point: Floats) -> Floats:
             for path, step in steps.items():
                 at = number_at(fitted.scenario, path)
                 values = signals_at(fitted, {path: np.array([at + step, at])}, 2)
-                parts = [(values[channel.name] / channel.noise) for channel in one.channels]
+                stacked = _stacked(one, values)
                 column = np.zeros(total)
-                column[first : first + count] = np.concatenate([part[:, 0] - part[:, 1] for part in parts])
+                column[first : first + count] = stacked[:, 0] - stacked[:, 1]
                 columns.append(column)
         first += count
     finite = [column for column in columns if np.isfinite(column).all() and column.any()]
     return np.column_stack(finite) if finite else np.zeros((total, 0))
+
+
+def _stacked(prepared: PreparedExperiment, signals: Mapping[str, Floats]) -> Floats:
+    """Return the channels over their noise, one below the other (samples, runs)."""
+    return np.concatenate([signals[channel.name] / channel.noise for channel in prepared.channels])
 
 
 def _column(direction: Direction, change: Floats) -> Column:
@@ -376,7 +381,7 @@ def _changes(
             columns[path][run] = number
     made = prepare_samples(prepared.label, with_numbers(scenario, neutral), prepared.samples, {}, prepared.recorded)
     signals = signals_at(replace(made, time_offset=prepared.time_offset), columns, len(used) + 1)
-    values = np.concatenate([signals[channel.name] / channel.noise for channel in prepared.channels])
+    values = _stacked(prepared, signals)
     found[:, used] = values[:, :-1] - values[:, -1:]
     return found
 
@@ -462,14 +467,16 @@ def _late(prepared: PreparedExperiment, residuals: Residuals, point: Floats) -> 
     finer = prepare_samples(prepared.label, prepared.scenario, samples, numbers, prepared.recorded)
     step = 0.1 * float(np.median(np.diff(prepared.time)))
     ends = [
-        np.concatenate([values[channel.name][:, 0] / channel.noise for channel in prepared.channels])
+        _stacked(prepared, values)[:, 0]
         for offset in (step, -step)
         for (values,) in (trajectories([replace(finer, time_offset=offset)], residuals.ranges, point[None, :]),)
     ]
     return np.asarray((ends[0] - ends[1]) / (2.0 * step))
 
 
-def _findings(found: WhitenedFit, columns: Sequence[Column], others: Sequence[Column]) -> tuple[Finding, ...]:
+def _findings(
+    found: WhitenedFit, starts: Floats, columns: Sequence[Column], others: Sequence[Column]
+) -> tuple[Finding, ...]:
     """Return score, size and shifts of each direction, one by one, on residuals that a short autoregression whitens.
 
     It is fitted to what is left with all of ``columns`` and all slopes projected out, so that no misfit is noise; those
@@ -480,23 +487,26 @@ def _findings(found: WhitenedFit, columns: Sequence[Column], others: Sequence[Co
         return ()
     every = (*columns, *others)
     changes = np.column_stack([one.change * max(abs(one.low), one.high) for one in every])
-    starts = _slopes_of_starts(found.optimum.residuals, found.optimum.point)
     whole = replace(model, columns=np.hstack([model.slopes, starts, changes, model.residuals[:, None]]))
     first = model.slopes.shape[1] + starts.shape[1]
     used = first + len(columns)
     weights = [sensor.weights for sensor in found.sensors]
     rows = whiten(whole, found.noises, weights)
-    for _ in range(_ROUNDS):
+
+    def left_of_sensors() -> list[list[Floats]]:
         explained = np.linalg.lstsq(rows[:, :used], rows[:, -1], rcond=1.0e-9)[0]
         left = whole.columns[:, -1] - whole.columns[:, :used] @ explained
-        noises = [_short_noise(whole.segments(left, place)) for place in range(len(model.sensors))]
+        return [whole.segments(left, place) for place in range(len(model.sensors))]
+
+    for _ in range(_ROUNDS):
+        noises = [_short_noise(parts) for parts in left_of_sensors()]
         rows = whiten(whole, noises, weights)
-    # A slow drift is more than a short autoregression can hold, and would look like a gain that drifts.
-    explained = np.linalg.lstsq(rows[:, :used], rows[:, -1], rcond=1.0e-9)[0]
-    left = whole.columns[:, -1] - whole.columns[:, :used] @ explained
-    parts = [whole.segments(left, place) for place in range(len(model.sensors))]
-    drifts = [sensor_noise(own, sensor.is_given) for own, sensor in zip(parts, found.sensors, strict=True)]
-    noises = [one if isinstance(one.shape, Drift) else short for one, short in zip(drifts, noises, strict=True)]
+    # A slow drift is more than a short autoregression can hold, and would look like a gain that drifts; so would time
+    # stamps that are off, where the slope is large, like a late clock.
+    pairs = list(zip(left_of_sensors(), found.sensors, strict=True))
+    likely = [sensor_noise(parts, sensor.is_given, sensor.courses) for parts, sensor in pairs]
+    is_long = [isinstance(one.shape, Drift) or one.grows for one in likely]
+    noises = [one if is_it else short for one, short, is_it in zip(likely, noises, is_long, strict=True)]
     rows = whiten(whole, noises, weights)
     slopes, d, r = rows[:, :first], rows[:, first:-1], rows[:, -1]
     # Priors hold the numbers as samples do.
@@ -536,7 +546,7 @@ def _likelihood(found: WhitenedFit, more: Floats) -> float:
         move = -solution(rows[:, :-1].T @ rows[:, :-1] + precision, product)
         left = residuals + columns @ move
         parts = [whole.segments(left, place) for place in range(len(model.sensors))]
-        noises = [sensor_noise(own, sensor.is_given) for own, sensor in zip(parts, found.sensors, strict=True)]
+        noises = [sensor_noise(own, one.is_given, one.courses) for own, one in zip(parts, found.sensors, strict=True)]
         weights = [tuple(sample_weights(noise, own)) for noise, own in zip(noises, parts, strict=True)]
         of_priors = float(move[:pulled] @ (2.0 * model.pull + model.precision @ move[:pulled]))
         best = max(best, 2.0 * sum(one.likelihood - one.numbers for one in noises) - of_priors)

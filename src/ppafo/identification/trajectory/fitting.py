@@ -9,7 +9,7 @@ import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.estimate import Estimate
-from ppafo.identification.trajectory.directions import Doubt, doubt_of
+from ppafo.identification.trajectory.directions import LARGEST_DRIFT, Doubt, doubt_of
 from ppafo.identification.trajectory.information import autocorrelation, correlation
 from ppafo.identification.trajectory.problem import (
     Experiment,
@@ -32,7 +32,7 @@ from ppafo.identification.trajectory.residuals import (
     trajectories,
     with_half_steps,
 )
-from ppafo.identification.trajectory.search import Optimum, optimum, weigh
+from ppafo.identification.trajectory.search import Optimum, Sensor, optimum, weigh
 from ppafo.identification.trajectory.uncertainty import Evidence, Misfit, Uncertainty, estimate_of, uncertainty_of
 from ppafo.parameters.device import Device
 from ppafo.progress import Progress, Report, report_nothing
@@ -114,16 +114,17 @@ def channel_fits(
     return tuple(found)
 
 
-def reason_of_misfit(misfit: Misfit, channels: Sequence[ChannelFit]) -> str:
+def reason_of_misfit(misfit: Misfit, channels: Sequence[ChannelFit], sensors: Sequence[Sensor]) -> str:
     """Return why the model does not explain the recordings, empty where it does.
 
     Parts want different numbers, or a channel leaves more than its sensor can be blamed for.
     """
     if misfit.is_found:
         return misfit.in_words
+    of_gain = {one.channel: LARGEST_DRIFT * one.noise.size_of_level for one in sensors if one.noise.has_gain}
     for channel in channels:
         size = float(np.sqrt(channel.chi_square))
-        if size > (_MUCH if channel.is_given else _OF_NO_SENSOR):
+        if size > (_MUCH if channel.is_given else max(_OF_NO_SENSOR, of_gain.get(channel.channel, 0.0))):
             noise = "the noise that was given for it" if channel.is_given else "its noise from sample to sample"
             return f"{channel.channel} of {channel.experiment} leaves {size:.2g} times {noise}"
     return ""
@@ -288,7 +289,7 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         doubt = doubt_of(whole, uncertainty.low, uncertainty.high)
     reasons = (
         "" if doubt is None else doubt.misfit,
-        reason_of_misfit(uncertainty.misfit, channels),
+        reason_of_misfit(uncertainty.misfit, channels, uncertainty.sensors),
         impossible_start(ranges, highest, atmosphere),
     )
     evidence = Evidence(

@@ -20,20 +20,22 @@ from ppafo.identification.trajectory.information import (
 from ppafo.identification.trajectory.residuals import Floats
 from ppafo.identification.trajectory.sensor_noise import (
     FREEDOMS,
+    LOG_JITTER,
     LOG_RATIO,
     AutoRegression,
     Drift,
     SensorNoise,
-    Shape,
-    drift_of,
     errors_of,
     from_coefficients,
     from_reflections,
     longest_memory,
+    numbers_of,
     profile_likelihood,
     regression_of,
     sample_weights,
     t_likelihood,
+    with_numbers,
+    without_common_stamps,
 )
 
 CHAINS, DRAWS, HEAVY_DRAWS, SETTLING = 2, 100, 300, 20
@@ -164,8 +166,9 @@ def whiten(model: LinearModel, noises: Sequence[SensorNoise], weights: Sequence[
     """Return the columns whitened by the noise of the sensors, of variance 1 [-] each."""
     found = np.zeros_like(model.columns)
     for places, noise, parts in zip(model.sensors, noises, weights, strict=True):
-        for place, level, weight in zip(places, noise.levels, parts, strict=True):
-            found[place] = noise.shape.rows(model.columns[place], weight)[0] / level
+        for number, (place, level, weight) in enumerate(zip(places, noise.levels, parts, strict=True)):
+            found[place] = noise.rows(model.columns[place], weight, number)[0] / level
+    without_common_stamps(found, model.sensors, noises)
     return found
 
 
@@ -191,50 +194,57 @@ class _State:
         segments = model.segments(model.residuals, sensor)
         weights = tuple(sample_weights(noise, segments))
         products = _products(model, noise, weights, sensor)
-        numbers = np.zeros(0) if noise.is_fixed else _numbers_of(noise.shape)
+        numbers = np.zeros(0) if noise.is_fixed else _numbers_of(noise)
         if not numbers.size:
             return cls(noise, weights, *products, numbers, np.zeros((0, 0)))
         scaled = [one / level for one, level in zip(segments, noise.levels, strict=True)]
         step = (
-            _proposal(numbers, noise.shape.is_zeroed, scaled, weights)
-            if isinstance(noise.shape, Drift)
+            _proposal(numbers, noise, scaled, weights)
+            if isinstance(noise.shape, Drift) or noise.grows
             else np.diag(_SHARE_OF_ERROR * np.cosh(numbers) / math.sqrt(sum(len(one) for one in scaled)))
         )
         return cls(noise, weights, *products, numbers, step)
 
 
-def _numbers_of(shape: Shape) -> Floats:
-    """Return the numbers in which a shape is drawn with the columns left out; none for a long autoregression."""
-    if isinstance(shape, Drift):
-        return np.array([math.log(shape.ratio), -math.log(-math.log(shape.memory))])
+def _numbers_of(noise: SensorNoise) -> Floats:
+    """Return the numbers in which noise is drawn with the columns left out; none for a long autoregression."""
+    shape = noise.shape
+    if isinstance(shape, Drift) or noise.grows:
+        return numbers_of(noise)
     last = [float(shape.predictors[stage, stage - 1]) for stage in range(1, shape.order + 1)]
     return np.arctanh(last) if 0 < shape.order <= _FEW else np.zeros(0)
 
 
-def _shape_of(numbers: Floats, noise: SensorNoise, longest: float) -> tuple[Shape, float] | None:
-    """Return the shape with these numbers and the logarithm of its prior, None where the prior is 0.
+def _noise_of(numbers: Floats, noise: SensorNoise, longest: float) -> tuple[SensorNoise, float] | None:
+    """Return the noise with these numbers and the logarithm of its prior, None where the prior is 0.
 
     The prior is even in the reflection coefficients of an autoregression, and in the logarithm of the memory of a
-    drift; then in the standard deviation of its steps or, where heavy tails hide more of it, in its whole variance.
-    Priors that favour smaller drifts make intervals too narrow.
+    drift; then in the standard deviation of its steps or, where heavy tails hide more of it, in its whole variance. It
+    is even in the jitter. Priors that favour smaller drifts make intervals too narrow.
     """
-    if isinstance(noise.shape, Drift):
-        if not (LOG_RATIO[0] <= numbers[0] <= LOG_RATIO[1] and 0.0 <= numbers[1] <= longest):
-            return None
-        drift = drift_of(numbers, noise.shape.is_zeroed)
-        return drift, math.log(drift.stationary) if noise.is_heavy else 0.5 * float(numbers[0])
+    if isinstance(noise.shape, Drift) or noise.grows:
+        changed, prior = with_numbers(noise, numbers), 0.0
+        if noise.jitter > 0.0:
+            if not LOG_JITTER[0] <= numbers[-1] <= LOG_JITTER[1]:
+                return None
+            prior += float(numbers[-1])
+        if isinstance(changed.shape, Drift):
+            if not (LOG_RATIO[0] <= numbers[0] <= LOG_RATIO[1] and 0.0 <= numbers[1] <= longest):
+                return None
+            prior += math.log(changed.shape.stationary) if noise.is_heavy else 0.5 * float(numbers[0])
+        return changed, prior
     reflections = np.tanh(numbers)
     if np.abs(reflections).max() > _LARGEST:
         return None
-    return from_reflections(reflections), float(np.sum(np.log1p(-np.square(reflections))))
+    return replace(noise, shape=from_reflections(reflections)), float(np.sum(np.log1p(-np.square(reflections))))
 
 
 def _products(model: LinearModel, noise: SensorNoise, weights: Sequence[Floats], sensor: int) -> tuple[Floats, float]:
     """Return the products of the whitened columns of a sensor, and the logarithm of what they were divided by."""
     width = model.columns.shape[1]
     products, spread = np.zeros((width, width)), 0.0
-    for place, level, weight in zip(model.sensors[sensor], noise.levels, weights, strict=True):
-        rows, logarithm = noise.shape.rows(model.columns[place], weight)
+    for number, (place, level, weight) in enumerate(zip(model.sensors[sensor], noise.levels, weights, strict=True)):
+        rows, logarithm = noise.rows(model.columns[place], weight, number)
         products += rows.T @ rows / level**2
         spread += logarithm
     return products, spread
@@ -272,7 +282,12 @@ def _with_level(state: _State, draw: Floats, count: int, random: np.random.Gener
 
 def _distribution_given_noise(model: LinearModel, states: Sequence[_State]) -> tuple[Floats, Floats, Floats]:
     """Return mean, covariance and a root of it of the columns given the noise."""
-    products = np.sum([state.products for state in states], axis=0)
+    if sum(state.noise.jitter > 0.0 for state in states) > 1:
+        # Channels share their time stamps, and are no longer a sum.
+        rows = whiten(model, [state.noise for state in states], [state.weights for state in states])
+        products = rows.T @ rows
+    else:
+        products = np.sum([state.products for state in states], axis=0)
     mean, root = solution_with_root(products[:-1, :-1] + model.precision, products[:-1, -1] + model.pull)
     return -mean, root @ root.T, root
 
@@ -288,14 +303,14 @@ def _with_memory(model: LinearModel, states: Sequence[_State], random: np.random
             continue
         others = np.sum([one.products for place, one in enumerate(found) if place != sensor], axis=0)
         longest = longest_memory(model.segments(model.residuals, sensor), state.noise.is_heavy)
-        here = _shape_of(state.numbers, state.noise, longest)
+        here = _noise_of(state.numbers, state.noise, longest)
         likelihood = _without_columns(model, others + state.products) - state.spread + (here[1] if here else 0.0)
         for _ in range(_PROPOSALS):
             numbers = state.numbers + state.step @ random.standard_normal(len(state.numbers))
-            tried = _shape_of(numbers, state.noise, longest)
+            tried = _noise_of(numbers, state.noise, longest)
             if tried is None:
                 continue
-            noise = replace(state.noise, shape=tried[0])
+            noise = tried[0]
             products, spread = _products(model, noise, state.weights, sensor)
             other = _without_columns(model, others + products) - spread + tried[1]
             if math.log(random.random()) < other - likelihood:
@@ -347,17 +362,21 @@ def _regression(
     return found if math.log(random.random()) < gain else shape
 
 
-def _proposal(numbers: Floats, is_zeroed: bool, scaled: Sequence[Floats], weights: Sequence[Floats]) -> Floats:
-    """Return a root of the covariance of proposals, from the curvature of the likelihood of a drift."""
+def _proposal(numbers: Floats, noise: SensorNoise, scaled: Sequence[Floats], weights: Sequence[Floats]) -> Floats:
+    """Return a root of the covariance of proposals, from the curvature of the likelihood of drift and jitter."""
 
-    def at(first: float, second: float) -> float:
-        moved = numbers + _STEP * np.array([first, second])
-        return profile_likelihood(drift_of(moved, is_zeroed), scaled, weights)[0]
+    def at(move: Floats) -> float:
+        return profile_likelihood(with_numbers(noise, numbers + _STEP * move), scaled, weights)[0]
 
-    middle = at(0.0, 0.0)
-    cross = 0.25 * (at(1.0, 1.0) + at(-1.0, -1.0) - at(1.0, -1.0) - at(-1.0, 1.0))
-    along = [at(1.0, 0.0) + at(-1.0, 0.0) - 2.0 * middle, at(0.0, 1.0) + at(0.0, -1.0) - 2.0 * middle]
-    values, vectors = np.linalg.eigh(-np.array([[along[0], cross], [cross, along[1]]]) / _STEP**2)
+    count = len(numbers)
+    ways, middle = np.eye(count), at(np.zeros(count))
+    curvature = np.diag([at(way) + at(-way) - 2.0 * middle for way in ways])
+    for first in range(count):
+        for second in range(first):
+            both, apart = ways[first] + ways[second], ways[first] - ways[second]
+            cross = 0.25 * (at(both) + at(-both) - at(apart) - at(-apart))
+            curvature[first, second] = curvature[second, first] = cross
+    values, vectors = np.linalg.eigh(-curvature / _STEP**2)
     return np.asarray(1.7 * vectors / np.sqrt(np.clip(values, 0.3, 1.0e4)))
 
 
@@ -365,7 +384,8 @@ def _with_levels(
     noise: SensorNoise, segments: Sequence[Floats], weights: Sequence[Floats], random: np.random.Generator
 ) -> SensorNoise:
     """Return the noise with its levels drawn, one for all recordings or one for each."""
-    sums = np.array([noise.shape.square(one, weight)[0] for one, weight in zip(segments, weights, strict=True)])
+    pairs = zip(segments, weights, strict=True)
+    sums = np.array([noise.square(one, weight, number)[0] for number, (one, weight) in enumerate(pairs)])
     counts = np.array([float(len(one)) for one in segments])
     if noise.is_shared:
         level = math.sqrt(0.5 * sums.sum() / random.gamma(0.5 * counts.sum()))

@@ -35,12 +35,15 @@ from ppafo.identification.trajectory.residuals import (
     prior_coordinates,
 )
 from ppafo.identification.trajectory.sensor_noise import (
+    Course,
     SensorNoise,
+    course_of,
     errors_of,
     from_reflections,
     reflections_of,
     sample_weights,
     sensor_noise,
+    without_common_stamps,
 )
 from ppafo.progress import Progress, Report, report_nothing
 
@@ -323,8 +326,8 @@ _ALIKE = 0.01
 class Sensor:
     """One sensor: channel, time between samples [s], the places of its recordings, its noise and its hum [Hz].
 
-    ``weights`` are those of the samples, by recording. A recording with a gap counts as two; one sample between two is
-    left out.
+    ``weights`` are those of the samples and ``courses`` what it should show, by recording. A recording with a gap
+    counts as two; one sample between two is left out.
     """
 
     channel: str
@@ -334,6 +337,7 @@ class Sensor:
     noise: SensorNoise
     weights: tuple[Floats, ...] = ()
     hum: tuple[float, ...] = ()
+    courses: tuple[Course, ...] = ()
 
     @property
     def in_words(self) -> str:
@@ -352,13 +356,15 @@ class Whitening:
         """Return columns (samples, columns) whitened [-]."""
         found = np.zeros_like(values)
         for sensor in self.sensors:
-            for place, level, weight in zip(sensor.places, sensor.noise.levels, sensor.weights, strict=True):
-                rows = sensor.noise.shape.rows(values[place], weight)[0] / level
+            parts = zip(sensor.places, sensor.noise.levels, sensor.weights, strict=True)
+            for number, (place, level, weight) in enumerate(parts):
+                rows = sensor.noise.rows(values[place], weight, number)[0] / level
                 if sensor.hum:
                     columns = hum_columns(len(weight), [one * sensor.interval for one in sensor.hum])
-                    basis = np.linalg.qr(sensor.noise.shape.rows(columns, weight)[0])[0]
+                    basis = np.linalg.qr(sensor.noise.rows(columns, weight, number)[0])[0]
                     rows = rows - basis @ (basis.T @ rows)
                 found[place] = rows
+        without_common_stamps(found, [one.places for one in self.sensors], [one.noise for one in self.sensors])
         return found
 
 
@@ -387,6 +393,8 @@ def weigh(found: Optimum, given: Sequence[frozenset[str]]) -> WhitenedFit:
     near = residuals.around(point, directions_for(found.information, fixed))
     sensors = _sensors(residuals.experiments, given)
     for number in range(1, MAXIMUM_ROUNDS + 1):
+        if number <= ESTIMATED_ROUNDS:
+            sensors = _with_courses(sensors, residuals.experiments, near.of_data)
         sensors = tuple(_estimate_noise(one, near.of_data, number <= ESTIMATED_ROUNDS) for one in sensors)
         model = _linear_model(near, sensors)
         step, information = _step(near, model, sensors)
@@ -435,12 +443,35 @@ def _sensors(experiments: Sequence[PreparedExperiment], given: Sequence[frozense
     )
 
 
+def _with_courses(
+    sensors: Sequence[Sensor], experiments: Sequence[PreparedExperiment], residuals: Floats
+) -> tuple[Sensor, ...]:
+    """Return the sensors with what the model says that they show; places of channels in one experiment are alike."""
+    found: list[dict[int, Course]] = [{} for _ in sensors]
+    start = stamps = 0
+    for prepared in experiments:
+        for channel in prepared.channels:
+            stop = start + len(prepared.time)
+            level = residuals[start:stop] + channel.values / channel.noise
+            for sensor, courses in zip(sensors, found, strict=True):
+                for place in sensor.places:
+                    if start <= place.start < stop:
+                        part = slice(place.start - start, place.stop - start)
+                        courses[place.start] = course_of(prepared.time[part], level[part], stamps + part.start)
+            start = stop
+        stamps += len(prepared.time)
+    return tuple(
+        replace(sensor, courses=tuple(courses[place.start] for place in sensor.places))
+        for sensor, courses in zip(sensors, found, strict=True)
+    )
+
+
 def _estimate_noise(sensor: Sensor, residuals: Floats, is_estimated: bool) -> Sensor:
     """Return the sensor with its noise and hum estimated from residuals, or with its weights alone."""
     segments = [residuals[place] for place in sensor.places]
     hum = tuple(one / sensor.interval for one in hum_of(segments)) if is_estimated else sensor.hum
     quiet = [without_hum(one, [frequency * sensor.interval for frequency in hum]) for one in segments]
-    noise = sensor_noise(quiet, sensor.is_given) if is_estimated else sensor.noise
+    noise = sensor_noise(quiet, sensor.is_given, sensor.courses) if is_estimated else sensor.noise
     return replace(sensor, noise=noise, hum=hum, weights=tuple(sample_weights(noise, quiet)))
 
 

@@ -1,7 +1,8 @@
 """The noise of one sensor, from what its recordings leave unexplained: level, memory, drift, heavy tails.
 
 Autoregressions of up to 30 samples, their order by the corrected criterion of Akaike, and white noise upon an
-Ornstein-Uhlenbeck drift compete; each may have innovations with a t distribution. The least criterion wins.
+Ornstein-Uhlenbeck drift compete; each may have innovations with a t distribution. White noise and drifts may grow with
+the slope, as where time stamps are off, and the drift with the level, as that of a gain. The least criterion wins.
 
 A shape is that of noise whose innovations have variance 1; samples may weigh differently (``weights``, 1 for plain
 normal noise), which is how heavy tails enter: a t distribution is a normal one whose variance is itself drawn.
@@ -9,7 +10,7 @@ normal noise), which is how heavy tails enter: a t distribution is a normal one 
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -184,6 +185,30 @@ _ROUNDS_OF_T = 12
 _LARGE_PRODUCT = 1.0e100
 _LEAST = 1.0e-30
 LOG_RATIO = (-20.0, 12.0)
+LOG_JITTER = (math.log(1.0e-9), math.log(0.1))
+_JITTER = 2.0
+"""Standard errors of the score of jitter from which it is tried."""
+_SMALLEST_LEVEL = 1.0e-6
+"""Level over its root mean square below which a gain changes nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """What a sensor should show in one recording, over its noise: level [-] and slope [1/s] at each sample.
+
+    ``first`` is the place of its first sample among those of all experiments: channels of one experiment share them.
+    """
+
+    level: Floats
+    slope: Floats
+    first: int = 0
+
+
+def course_of(time: Floats, level: Floats, first: int = 0) -> Course:
+    """Return the course of a level [-] over time [s]; a slope is the mean square of those before and after a sample."""
+    slopes = np.diff(level) / np.diff(time)
+    before, after = np.concatenate([slopes[:1], slopes]), np.concatenate([slopes, slopes[-1:]])
+    return Course(level, np.copysign(np.sqrt(0.5 * (before**2 + after**2)), before + after), first)
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,6 +217,8 @@ class SensorNoise:
 
     ``levels`` are in units of the given or first estimated noise; all equal where ``is_shared``. ``is_fixed`` is noise
     that was given and is not exceeded. The log ``likelihood`` and ``numbers`` are what the criterion is made of.
+    ``jitter`` [s] is by how much time stamps are off for a level of 1, ``has_gain`` that the drift is one of the gain,
+    in units of the root mean square of the level; ``courses`` is what both grow with, by recording.
     """
 
     shape: Shape
@@ -201,6 +228,59 @@ class SensorNoise:
     is_fixed: bool = False
     likelihood: float = 0.0
     numbers: int = 1
+    jitter: float = 0.0
+    has_gain: bool = False
+    courses: tuple[Course, ...] = ()
+
+    @property
+    def grows(self) -> bool:
+        """Whether it grows with the slope or with the level."""
+        return self.jitter > 0.0 or self.has_gain
+
+    @property
+    def size_of_level(self) -> float:
+        """Root mean square of the level [-] over all recordings."""
+        total = sum(float(one.level @ one.level) for one in self.courses)
+        return math.sqrt(total / sum(len(one.level) for one in self.courses))
+
+    def rows(self, values: Floats, weights: Floats, recording: int) -> tuple[Floats, float]:
+        """Return columns of a recording whitened for a level of 1, and the logarithm of the product of the spreads."""
+        if not self.grows:
+            return self.shape.rows(values, weights)
+        divisors, precisions, logs = self._growth(recording)
+        rows, spread = self.shape.rows(values / divisors[:, None], weights * precisions)
+        return rows, spread + logs
+
+    def square(self, segment: Floats, weights: Floats, recording: int) -> tuple[float, float]:
+        """Return the sum of the squares of the whitened samples, and what ``rows`` returns of the spreads."""
+        if not self.grows:
+            return self.shape.square(segment, weights)
+        divisors, precisions, logs = self._growth(recording)
+        square, spread = self.shape.square(segment / divisors, weights * precisions)
+        return square, spread + logs
+
+    def _growth(self, recording: int) -> tuple[Floats, Floats, float]:
+        """Return what samples are divided by, the precision of their white part then, and the logarithms of the former.
+
+        The drift of a gain is one of the samples over the level.
+        """
+        course = self.courses[recording]
+        precisions = 1.0 / (1.0 + np.square(self.jitter * course.slope))
+        if not self.has_gain:
+            return np.ones(len(precisions)), precisions, 0.0
+        divisors = np.maximum(np.abs(course.level) / self.size_of_level, _SMALLEST_LEVEL)
+        return divisors, precisions * divisors**2, float(np.sum(np.log(divisors)))
+
+    def common_part(self, recording: int) -> Floats:
+        """Return the part [-] of each whitened sample that is the time stamp's, with the sign of the slope."""
+        course = self.courses[recording]
+        of_stamps, unknown = self.jitter * course.slope, 0.0
+        if isinstance(self.shape, Drift):
+            memory, change, _ = self.shape.numbers
+            rest = memory**2 + change - 1.0
+            unknown = 0.5 * (rest + math.sqrt(rest * rest + 4.0 * change))
+        of_drift = unknown * np.square(course.level / self.size_of_level) if self.has_gain else unknown
+        return np.asarray(of_stamps / np.sqrt(1.0 + of_stamps**2 + of_drift))
 
     @property
     def is_heavy(self) -> bool:
@@ -211,15 +291,46 @@ class SensorNoise:
         """Return what the noise is like; ``interval`` [s] is the time between two samples."""
         tails = f", heavy tails (t with {self.freedom:.2g} degrees of freedom)" if self.is_heavy else ""
         unequal = "" if self.is_shared else ", a level for each recording"
+        stamps = f", time stamps off by {1e3 * self.jitter * float(np.mean(self.levels)):.2g} ms"
+        rest = f"{tails}{unequal}{stamps if self.jitter > 0.0 else ''}"
         if isinstance(self.shape, Drift):
             size, memory = math.sqrt(self.shape.stationary), -interval / math.log(self.shape.memory)
-            return f"white and a drift of {size:.2g} times its size over {memory:.2g} s{tails}{unequal}"
+            if self.has_gain:
+                longest = interval * max(len(one.level) for one in self.courses)
+                over = math.sqrt(min(1.0, longest / memory)) * size * float(np.mean(self.levels)) / self.size_of_level
+                return f"white and a gain that drifts by {100.0 * over:.2g} % over {min(memory, longest):.2g} s{rest}"
+            return f"white and a drift of {size:.2g} times its size over {memory:.2g} s{rest}"
         description = "white" if self.shape.order == 0 else f"autoregression of {self.shape.order}"
-        return f"{description}{tails}{unequal}"
+        return f"{description}{rest}"
 
 
-def sensor_noise(segments: Sequence[Floats], is_given: bool = False) -> SensorNoise:
-    """Return the noise [-] that explains a sensor's residuals best; ``is_given`` says that its size is at least 1."""
+def without_common_stamps(rows: Floats, places: Sequence[Sequence[slice]], noises: Sequence[SensorNoise]) -> None:
+    """Take from whitened columns (samples, columns) what channels share because a sample of all was early or late.
+
+    Each channel in turn tells how late a sample was, in standard deviations, and the next is freed of it.
+    """
+    late = [(parts, noise) for parts, noise in zip(places, noises, strict=True) if noise.jitter > 0.0]
+    if len(late) < 2:
+        return
+    count = max(one.first + len(one.slope) for _, noise in late for one in noise.courses)
+    expected, unknown = np.zeros((count, rows.shape[1])), np.ones(count)
+    for parts, noise in late:
+        for number, place in enumerate(parts):
+            course, share = noise.courses[number], noise.common_part(number)
+            at = slice(course.first, course.first + len(share))
+            left = rows[place] - share[:, None] * expected[at]
+            variance = 1.0 - share**2 * (1.0 - unknown[at])
+            rows[place] = left / np.sqrt(variance)[:, None]
+            gain = unknown[at] * share / variance
+            expected[at] += gain[:, None] * left
+            unknown[at] -= gain * share * unknown[at]
+
+
+def sensor_noise(segments: Sequence[Floats], is_given: bool = False, courses: Sequence[Course] = ()) -> SensorNoise:
+    """Return the noise [-] that explains a sensor's residuals best; ``is_given`` says that its size is at least 1.
+
+    With the ``courses`` of its recordings it may grow with slope and level.
+    """
     whole = np.concatenate(segments)
     white = from_reflections(np.zeros(0))
     if float(np.mean(whole * whole)) < max(_LEAST, 1.0 if is_given else 0.0):
@@ -230,9 +341,12 @@ def sensor_noise(segments: Sequence[Floats], is_given: bool = False) -> SensorNo
     scaled = [one / level for one, level in zip(segments, levels, strict=True)]
     is_shared = bool(np.all(levels == 1.0))
     drift = max((_drift(scaled, is_zeroed) for is_zeroed in (False, True)), key=lambda one: one.likelihood)
-    candidates = [_autoregression(scaled), drift]
-    if any(_gain_of_tails(one, scaled) > _HEAVY for one in candidates):
-        candidates += [_heavy_autoregression(scaled, candidates[0]), _heavy_drift(scaled, drift)]
+    plain = [_autoregression(scaled), drift]
+    growing = _growing(scaled, courses, levels, plain)
+    best = min((*plain, *growing), key=lambda one: _criterion(one.likelihood, one.numbers, len(whole)))
+    candidates = [*plain, *growing]
+    if any(_gain_of_tails(one, scaled) > _HEAVY for one in ([best] if best.grows else plain)):
+        candidates += [_heavy_autoregression(scaled, plain[0]), _heavy_drift(scaled, drift)]
     count = len(whole)
 
     def criterion_beside_drifts(one: SensorNoise) -> float:
@@ -243,7 +357,7 @@ def sensor_noise(segments: Sequence[Floats], is_given: bool = False) -> SensorNo
 
     best = min(candidates, key=criterion_beside_drifts)
     likelihood = best.likelihood - sum(len(one) * math.log(level) for one, level in zip(segments, levels, strict=True))
-    return SensorNoise(best.shape, best.levels * levels, best.freedom, is_shared, False, likelihood, best.numbers)
+    return replace(best, levels=best.levels * levels, is_shared=is_shared, likelihood=likelihood)
 
 
 def sample_weights(noise: SensorNoise, segments: Sequence[Floats]) -> list[Floats]:
@@ -276,11 +390,13 @@ def previous_samples(segment: Floats, order: int) -> Floats:
     return windows[:, ::-1]
 
 
-def profile_likelihood(shape: Shape, segments: Sequence[Floats], weights: Sequence[Floats]) -> tuple[float, float]:
+def profile_likelihood(
+    noise: SensorNoise, segments: Sequence[Floats], weights: Sequence[Floats]
+) -> tuple[float, float]:
     """Return the log likelihood [-] at the best common level, and that level."""
     squares, logs, count = 0.0, 0.0, 0
-    for one, weight in zip(segments, weights, strict=True):
-        square, spread = shape.square(one, weight)
+    for number, (one, weight) in enumerate(zip(segments, weights, strict=True)):
+        square, spread = noise.square(one, weight, number)
         squares, logs, count = squares + square, logs + spread, count + len(one)
     variance = max(squares / count, _LEAST)
     return -0.5 * count * (math.log(2.0 * math.pi * variance) + 1.0) - logs, math.sqrt(variance)
@@ -324,27 +440,105 @@ def _autoregression(segments: list[Floats]) -> SensorNoise:
     most = max(0, min(MAXIMUM_ORDER, count // _SAMPLES_FOR_EACH, shortest - 2))
     reflections, left = reflections_of(segments, most)
     scores = [_criterion(-0.5 * count * math.log(left[order]), order + 1, count) for order in range(most + 1)]
-    shape = from_reflections(reflections[: int(np.argmin(scores))])
-    likelihood, level = profile_likelihood(shape, segments, [np.ones(len(one)) for one in segments])
-    return _of(shape, level, len(segments), likelihood)
+    return _at_best_level(_unscaled(from_reflections(reflections[: int(np.argmin(scores))]), segments), segments)
+
+
+def _unscaled(shape: Shape, segments: Sequence[Floats]) -> SensorNoise:
+    return SensorNoise(shape, np.ones(len(segments)))
+
+
+def _at_best_level(noise: SensorNoise, segments: Sequence[Floats]) -> SensorNoise:
+    """Return normal noise of a shape at its best common level, with what the criterion needs."""
+    likelihood, level = profile_likelihood(noise, segments, [np.ones(len(one)) for one in segments])
+    numbers = noise.shape.order + 1 + (noise.jitter > 0.0)
+    return replace(noise, levels=np.full(len(segments), level), likelihood=likelihood, numbers=numbers)
 
 
 def _drift(segments: list[Floats], is_zeroed: bool) -> SensorNoise:
     """Return the drift of greatest likelihood, with white normal noise upon it."""
+    grid = [np.array([ratio, memory]) for ratio in (-9.0, -6.0, -3.0, 0.0) for memory in (1.5, 3.5, 5.5)]
+    return _best_from(grid, _unscaled(Drift(1.0, 0.5, is_zeroed), segments), segments)
+
+
+def numbers_of(noise: SensorNoise) -> Floats:
+    """Return the logarithms of ratio and memory of a drift, then that of the jitter where there is one."""
+    shape = noise.shape
+    numbers = [math.log(shape.ratio), -math.log(-math.log(shape.memory))] if isinstance(shape, Drift) else []
+    return np.array([*numbers, math.log(noise.jitter)] if noise.jitter > 0.0 else numbers)
+
+
+def with_numbers(noise: SensorNoise, numbers: Floats) -> SensorNoise:
+    """Return noise of white samples or a drift with the numbers that ``numbers_of`` returns."""
+    shape = noise.shape
+    if isinstance(shape, Drift):
+        shape = drift_of((float(numbers[0]), float(numbers[1])), shape.is_zeroed)
+    return replace(noise, shape=shape, jitter=math.exp(float(numbers[-1])) if noise.jitter > 0.0 else 0.0)
+
+
+def _best_from(grid: Sequence[Floats], noise: SensorNoise, segments: Sequence[Floats]) -> SensorNoise:
+    """Return the noise of greatest likelihood whose numbers are searched from the best of a grid."""
     from scipy.optimize import minimize
 
     ones, longest = [np.ones(len(one)) for one in segments], longest_memory(segments, is_heavy=False)
 
-    def cost(numbers: Floats) -> float:
-        inside, away = _within(numbers, longest)
-        return away - profile_likelihood(drift_of(inside, is_zeroed), segments, ones)[0]
+    def inside(numbers: Floats) -> tuple[Floats, float]:
+        within = numbers.copy()
+        if isinstance(noise.shape, Drift):
+            within[:2] = _within(numbers, longest)[0]
+        if noise.jitter > 0.0:
+            within[-1] = min(max(float(numbers[-1]), LOG_JITTER[0]), LOG_JITTER[1])
+        return within, float(np.sum(np.square(numbers - within)))
 
-    grid = [np.array([ratio, memory]) for ratio in (-9.0, -6.0, -3.0, 0.0) for memory in (1.5, 3.5, 5.5)]
+    def cost(numbers: Floats) -> float:
+        within, away = inside(numbers)
+        return away - profile_likelihood(with_numbers(noise, within), segments, ones)[0]
+
     start = min(grid, key=cost)
-    found = minimize(cost, start, method="Nelder-Mead", options={"xatol": 0.05, "fatol": 0.02, "maxfev": 120})
-    shape = drift_of(_within(found.x, longest)[0], is_zeroed)
-    likelihood, level = profile_likelihood(shape, segments, ones)
-    return _of(shape, level, len(segments), likelihood)
+    options = {"xatol": 0.05, "fatol": 0.02, "maxfev": 60 * len(start)}
+    found = minimize(cost, start, method="Nelder-Mead", options=options)
+    return _at_best_level(with_numbers(noise, inside(found.x)[0]), segments)
+
+
+def _growing(
+    segments: Sequence[Floats], courses: Sequence[Course], levels: Floats, plain: Sequence[SensorNoise]
+) -> list[SensorNoise]:
+    """Return white noise and drifts that grow with slope or level, where what ``plain`` noise leaves says so.
+
+    ``plain`` is an autoregression and a drift. A drift of the gain is tried where noise is not white, jitter where the
+    squares of what is left are larger where the slope is (the score of a little jitter).
+    """
+    if not courses:
+        return []
+    count = sum(len(one) for one in segments)
+    scaled = tuple(
+        Course(one.level / level, one.slope / level, one.first) for one, level in zip(courses, levels, strict=True)
+    )
+    best = min(plain, key=lambda one: _criterion(one.likelihood, one.numbers, count))
+    drift = next(one for one in plain if isinstance(one.shape, Drift))
+    found = []
+    if best.shape.order > 0 and any(one.level.any() for one in scaled):
+        grid = [numbers_of(drift), *(np.array([ratio, 5.5]) for ratio in (-9.0, -6.0, -3.0))]
+        for is_zeroed in (False, True):
+            gain = replace(_unscaled(Drift(1.0, 0.5, is_zeroed), segments), has_gain=True, courses=scaled)
+            found.append(_best_from(grid, gain, segments))
+        found = [max(found, key=lambda one: one.likelihood)]
+    errors = np.concatenate([errors_of(best.shape, one) for one in segments]) / best.levels[0]
+    uneven = np.concatenate([np.square(one.slope) for one in scaled])
+    uneven -= uneven.mean()
+    spread = math.sqrt(2.0 * float(uneven @ uneven))
+    if spread > 0.0 and float(uneven @ np.square(errors)) > _JITTER * spread:
+        white = replace(_unscaled(from_reflections(np.zeros(0)), segments), courses=scaled)
+        steepest = math.sqrt(max(float(np.max(np.square(one.slope))) for one in scaled))
+        sizes = [math.log(size / steepest) for size in (0.5, 2.0, 8.0, 30.0)]
+        found += [
+            _best_from(
+                [np.append(numbers_of(one), size) for size in sizes],
+                replace(one, jitter=1.0, courses=scaled),
+                segments,
+            )
+            for one in (white, drift, *found)
+        ]
+    return found
 
 
 def _within(numbers: Floats, longest: float) -> tuple[tuple[float, float], float]:
@@ -356,7 +550,8 @@ def _within(numbers: Floats, longest: float) -> tuple[tuple[float, float], float
 
 def _gain_of_tails(noise: SensorNoise, segments: Sequence[Floats]) -> float:
     """Return the log likelihood that the best t distribution of the innovations gains over a normal one."""
-    errors = np.concatenate([errors_of(noise.shape, one) for one in segments]) / noise.levels[0]
+    rows = [noise.rows(one[:, None], np.ones(len(one)), number)[0] for number, one in enumerate(segments)]
+    errors = np.concatenate(rows)[:, 0] / noise.levels[0]
     likelihoods, _ = _fit_scaled_t(errors)
     normal = -0.5 * len(errors) * (math.log(2.0 * math.pi * float(np.mean(errors * errors))) + 1.0)
     return float(likelihoods.max() - normal)

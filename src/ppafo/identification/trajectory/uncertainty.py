@@ -163,7 +163,7 @@ def _fit_apart(
     noises = [
         sensor.noise
         if isinstance(sensor.noise.shape, Drift)
-        else sensor_noise(apart.segments(apart.residuals, place), sensor.is_given)
+        else sensor_noise(apart.segments(apart.residuals, place), sensor.is_given, sensor.courses)
         for place, sensor in enumerate(found.sensors)
     ]
     return apart, tuple(noises)

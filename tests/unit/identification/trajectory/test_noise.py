@@ -16,13 +16,16 @@ from ppafo.identification.trajectory.residuals import Floats
 from ppafo.identification.trajectory.search import hum_of
 from ppafo.identification.trajectory.sensor_noise import (
     AutoRegression,
+    Course,
     Drift,
     SensorNoise,
+    course_of,
     from_coefficients,
     reflections_of,
     sensor_noise,
     t_likelihood,
     t_nodes,
+    without_common_stamps,
 )
 from ppafo.signals.recording import Channel, Recording
 
@@ -347,3 +350,69 @@ def test_gaps_and_a_lone_sample_between_two_do_no_harm(experiment: Experiment) -
 def test_slow_noise_of_a_sensor_alone_is_no_reason_to_doubt_the_model() -> None:
     lines = [repetition(Task("slow", number, 18, False)) for number in range(2)]
     assert not any(line.alarm for line in lines)
+
+
+def course_of_a_rise(count: int = 200) -> Course:
+    """What a sensor shows of something that rises from 100 to 900 times its noise, over one sample a millisecond."""
+    time = 1.0e-3 * np.arange(count)
+    return course_of(time, 100.0 + 800.0 / (1.0 + np.exp(-(time - 0.08) / 0.008)))
+
+
+def whitened_by(noise: SensorNoise, count: int) -> Floats:
+    return noise.rows(np.eye(count), np.ones(count), 0)[0] / noise.levels[0]
+
+
+@pytest.mark.parametrize("is_zeroed", [False, True])
+def test_a_gain_that_drifts_and_late_stamps_whiten_like_the_root_of_their_covariance(is_zeroed: bool) -> None:
+    course, count = course_of_a_rise(40), 40
+    drift = Drift(0.3, 0.9, is_zeroed)
+    noise = SensorNoise(drift, np.ones(1), jitter=2.0e-4, has_gain=True, courses=(course,))
+    lags, steps = np.abs(np.subtract.outer(np.arange(count), np.arange(count))), np.arange(count)
+    of_gain = drift.stationary * 0.9**lags
+    if is_zeroed:
+        of_gain -= drift.stationary * 0.9 ** np.add.outer(steps + 2, steps)
+    level = course.level / noise.size_of_level
+    covariance = np.diag(1.0 + (2.0e-4 * course.slope) ** 2) + np.outer(level, level) * of_gain
+    rows, spreads = noise.rows(np.eye(count), np.ones(count), 0)
+    assert rows @ covariance @ rows.T == pytest.approx(np.eye(count), abs=1e-9)
+    assert 2.0 * spreads == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-9)
+
+
+def test_channels_whose_samples_are_late_together_are_whitened_together() -> None:
+    first, count = course_of_a_rise(120), 120
+    second = Course(-2.0 * first.level, -2.0 * first.slope)
+    white = from_coefficients(np.zeros(0))
+    assert white is not None
+    noises = [SensorNoise(white, np.ones(1), jitter=3.0e-5, courses=(one,)) for one in (first, second)]
+    late = 3.0e-5 * np.concatenate([first.slope, second.slope])
+    together = np.outer(late, late) * np.kron(np.ones((2, 2)), np.eye(count))
+    covariance = np.eye(2 * count) + together
+    rows = np.zeros((2 * count, 2 * count))
+    places = [[slice(0, count)], [slice(count, 2 * count)]]
+    for noise, (place,) in zip(noises, places, strict=True):
+        rows[place] = noise.rows(np.eye(2 * count)[place], np.ones(count), 0)[0]
+    assert np.abs(rows @ covariance @ rows.T - np.eye(2 * count)).max() > 0.3
+    without_common_stamps(rows, places, noises)
+    assert rows @ covariance @ rows.T == pytest.approx(np.eye(2 * count), abs=1e-9)
+
+
+def test_late_stamps_and_a_gain_that_drifts_are_recognised_with_their_sizes() -> None:
+    random = np.random.default_rng(6)
+    courses = [course_of_a_rise(), course_of_a_rise()]
+    late = [random.standard_normal(200) + one.slope * 1.0e-4 * random.standard_normal(200) for one in courses]
+    noise = sensor_noise(late, courses=courses)
+    assert not noise.has_gain
+    assert 1.0e3 * noise.jitter * noise.levels[0] == pytest.approx(0.1, rel=0.25)
+    assert "time stamps off by 0." in noise.in_words(1.0e-3)
+    walks = [np.cumsum(random.standard_normal(200)) / math.sqrt(200.0) for _ in courses]
+    drifting = [random.standard_normal(200) + 0.02 * one.level * walk for one, walk in zip(courses, walks, strict=True)]
+    gain = sensor_noise(drifting, courses=courses)
+    assert gain.has_gain
+    assert "a gain that drifts by" in gain.in_words(1.0e-3)
+    assert 0.5e-2 < float(gain.in_words(1.0e-3).split(" drifts by ")[1].split(" %")[0]) * 1.0e-2 < 5.0e-2
+
+
+def test_noise_that_does_not_grow_is_not_said_to() -> None:
+    courses = [course_of_a_rise(COUNT), course_of_a_rise(COUNT)]
+    assert not any(sensor_noise(drawn("white", seed), courses=courses).grows for seed in range(30, 36))
+    assert not any(sensor_noise(drawn("drift", seed), courses=courses).has_gain for seed in range(30, 36))
