@@ -15,12 +15,17 @@ Verdict = Literal[
     "not identifiable",
     "at its bound",
     "law does not describe the data",
+    "within its tolerance",
+    "beyond its tolerance",
 ]
 """What the recordings say about a value.
 
 Only the first is given where the model explains the recordings. The first three are fit to be used in a parameter set,
 the second and the third as fitted values that nobody should take for the device's own.
 """
+
+BENCH_VERDICTS: tuple[Verdict, ...] = ("within its tolerance", "beyond its tolerance")
+"""Of what a bench knows up to a tolerance, which is no value of a device."""
 
 _VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 _USABLE: tuple[Verdict, ...] = ("identified", "holds for this model only", "weak")

@@ -28,6 +28,7 @@ from ppafo.identification.bench.vane_leak import VaneLeakSettings, leak_prospect
 from ppafo.identification.estimate import Prospect, half_width_for
 from ppafo.identification.source import Source, data_prospects
 from ppafo.identification.trajectory.section import TrajectorySection
+from ppafo.identification.trajectory.tolerances import BenchSection
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.parameter_set import CONFIDENCE, ParameterSet, chosen_valve, number_in_si
 from ppafo.storage.foreign import ColumnMap
@@ -312,6 +313,9 @@ class ProblemFile(StrictTable):
     columns: Annotated[dict[str, ColumnMap], Field(description="column maps by name, for files from elsewhere")] = (
         Field(default={})
     )
+    bench: Annotated[
+        BenchSection | None, Field(description="what the bench does not know exactly, and what it can do")
+    ] = None
     procedure: Annotated[
         tuple[Annotated[ProcedureProblem, Field(discriminator="kind")], ...],
         Field(strict=False, min_length=1, description="bench procedures to apply"),

@@ -14,7 +14,7 @@ import numpy as np
 
 from ppafo.identification.trajectory.information import inverse_with_root, solution
 from ppafo.identification.trajectory.posterior import whiten
-from ppafo.identification.trajectory.problem import TIME_OFFSET
+from ppafo.identification.trajectory.problem import TIME_OFFSET, ZERO_OF
 from ppafo.identification.trajectory.residuals import (
     Floats,
     PreparedExperiment,
@@ -418,6 +418,7 @@ def _of_record(found: WhitenedFit) -> list[Column]:
                 np.concatenate(late),
             )
         )
+    fitted = {item.path for item in residuals.ranges}
     for sensor in dict.fromkeys(sensor.channel for sensor in found.sensors):
         drift, zero = [], []
         for one in experiments:
@@ -437,6 +438,8 @@ def _of_record(found: WhitenedFit) -> list[Column]:
                 np.concatenate(drift),
             )
         )
+        if f"{ZERO_OF}{sensor}" in fitted:
+            continue
         is_angle = sensor == "angle"
         made.append(
             Column(
@@ -514,13 +517,16 @@ def _findings(
     information[: len(model.pull), : len(model.pull)] += model.precision
     inverse, _ = inverse_with_root(information)
     responses = inverse @ (slopes.T @ d)
-    remaining = r - slopes @ (inverse @ (slopes.T @ r))
+    # At the best numbers the priors pull as the samples do, the other way.
+    product = slopes.T @ r
+    product[: len(model.pull)] += model.pull
+    remaining = r - slopes @ (inverse @ product)
     away = d - slopes @ responses
     made = []
     for place, column in enumerate(every):
         largest = max(abs(column.low), column.high)
         known = max(float(away[:, place] @ d[:, place]), _INVISIBLE)
-        score = -float(away[:, place] @ remaining) / math.sqrt(known)
+        score = -float(d[:, place] @ remaining) / math.sqrt(known)
         size, error = largest * score / math.sqrt(known), largest / math.sqrt(known)
         ends = [min(max(size + side * _SPAN * error, column.low), column.high) for side in (-1.0, 1.0)]
         made.append(Finding(column, score, size, error, ends[0], ends[1], responses[:kept, place] / largest))

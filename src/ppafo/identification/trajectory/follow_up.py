@@ -21,7 +21,7 @@ from ppafo.identification.trajectory.residuals import (
     prepare_samples,
     trajectories,
 )
-from ppafo.identification.trajectory.search import descend, is_at_bound
+from ppafo.identification.trajectory.search import descend, moved_alone
 from ppafo.simulation.scenario import Scenario
 
 POINTS_PER_SIDE = 4
@@ -101,7 +101,7 @@ def _side(fit: TrajectoryFit, index: int, coordinates: Floats) -> dict[float, fl
         if held.ranges:
             low, high = coordinate_bounds(held.ranges)
             start = np.clip(point[others], low, high)
-            done = descend(held, start, directions_for(part, is_at_bound(start, held.ranges)), search)
+            done = descend(held, start, directions_for(part, moved_alone(start, held.ranges)), search)
             cost, point[others] = done.cost + prior, done.point
         else:
             cost = _half_square(residuals.of_data(point[None, :])[:, 0]) + prior
@@ -169,7 +169,7 @@ def expected_information(fit: TrajectoryFit, candidates: Sequence[Candidate]) ->
     low, high = coordinate_bounds(ranges)
     of_bounds = np.diag(12.0 / np.square(np.minimum(high - low, 2.0 * _WIDEST)))
     known = covariance(fit.uncertainty.covariance) + of_bounds
-    directions = directions_for(known, is_at_bound(point, ranges))
+    directions = directions_for(known, moved_alone(point, ranges))
     brought = [_expect(fit, known, candidate, directions) for candidate in candidates]
     return tuple(sorted(brought, key=lambda one: -one.gain))
 

@@ -169,9 +169,21 @@ _DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow
 TIME_OFFSET = "recording.time_offset"
 """Path of a number that no scenario has: the time by which the samples of a recording are later than the run."""
 
+ZERO_OF, GAIN_OF = "recording.zero_of_", "recording.gain_of_"
+"""Paths, with a channel behind them, of what a sensor adds to its samples and of its gain less 1."""
+
 RECORDING = (
     Quantity("time_offset", "s", "time by which the samples are later than the run, a late trigger", 0.0, -1.0, 1.0),
+    *(
+        Quantity(f"zero_of_{name}", unit, f"what the sensor of {name} adds to its samples", 0.0, -size, size)
+        for name, unit, size in (("angle", "rad", 1.0), ("pressure_1", "Pa_d", 1.0e6), ("pressure_2", "Pa_d", 1.0e6))
+    ),
+    *(
+        Quantity(f"gain_of_{name}", "1", f"gain of the sensor of {name} less 1", 0.0, -0.5, 0.5)
+        for name in FITTED_CHANNELS
+    ),
 )
+_OF_RECORDING = frozenset(f"recording.{item.name}" for item in RECORDING)
 
 
 def full_path(path: str, scenario: Scenario) -> str:
@@ -210,14 +222,14 @@ def declaration_of(path: str, scenario: Scenario) -> Quantity:
 
 
 def number_at(scenario: Scenario, path: str) -> float:
-    """Return the number at a path in SI units; the time offset of a recording is 0 before it is fitted."""
+    """Return the number at a path in SI units; those of a recording are 0 before they are fitted."""
     declaration_of(path, scenario)
-    return 0.0 if path == TIME_OFFSET else numbers.number_at(scenario, path)
+    return 0.0 if path in _OF_RECORDING else numbers.number_at(scenario, path)
 
 
 def with_numbers(scenario: Scenario, changed: Mapping[str, float]) -> Scenario:
-    """Return the scenario with numbers [SI] replaced, by paths of ``declared_numbers``; a time offset is none of it."""
-    return numbers.with_numbers(scenario, {path: number for path, number in changed.items() if path != TIME_OFFSET})
+    """Return the scenario with numbers [SI] replaced, by paths of ``declared_numbers``, but those of recordings."""
+    return numbers.with_numbers(scenario, {path: one for path, one in changed.items() if path not in _OF_RECORDING})
 
 
 def broken_rule(device: Device) -> str:
@@ -281,7 +293,8 @@ class FreeParameter:
     are ratios; ``scale`` None takes it for volumes, conductances, areas and the inertia, and ``linear`` for friction,
     pressures and motion. Bounds left out are the declared ones, at most a factor of 100 from the start. ``recordings``
     limits the number to some experiments, by label: an initial pressure belongs to one, and so does
-    ``recording.time_offset`` [s], by which its samples are later than the run.
+    ``recording.time_offset`` [s], by which its samples are later than the run. One that ``is_tolerance`` is a tolerance
+    of the bench: fitted because nobody knows it better, and never a value of the device.
     """
 
     path: str
@@ -291,6 +304,7 @@ class FreeParameter:
     scale: Scale | None = None
     prior: Prior | None = None
     recordings: tuple[str, ...] = ()
+    is_tolerance: bool = False
 
     @property
     def name(self) -> str:
@@ -315,6 +329,7 @@ class Range:
     size: float
     prior: Prior | None
     recordings: tuple[str, ...]
+    is_tolerance: bool = False
 
     def acts_in(self, label: str) -> bool:
         """Return whether the number acts in the experiment with this label."""
@@ -371,12 +386,20 @@ def range_of(parameter: FreeParameter, experiments: Sequence[Experiment]) -> Ran
     unit = quantity.unit.removesuffix("_a") or "-"
     size = 0.5 * (high - low) if start == 0.0 or path == TIME_OFFSET else abs(start)
     name = full_path(parameter.name, scenarios[0])
-    return Range(path, name, unit, scale, start, low, high, size, parameter.prior, parameter.recordings)
+    return Range(
+        path, name, unit, scale, start, low, high, size, parameter.prior, parameter.recordings, parameter.is_tolerance
+    )
 
 
 def is_nuisance(item: Range) -> bool:
-    """Return whether a number belongs to one recording's beginning and is fitted only because nobody knows it."""
-    return bool(item.recordings) and (item.path == TIME_OFFSET or item.path.startswith("initial."))
+    """Return whether a number is fitted only because nobody knows it: one recording's beginning, or the bench's."""
+    is_beginning = bool(item.recordings) and (item.path == TIME_OFFSET or item.path.startswith("initial."))
+    return item.is_tolerance or is_beginning
+
+
+def is_of_sensor(item: Range) -> bool:
+    """Return whether a number changes what a sensor says, in a straight line, and nothing that runs."""
+    return item.path.startswith((ZERO_OF, GAIN_OF))
 
 
 def reach_of(ranges: Sequence[Range]) -> float:

@@ -9,7 +9,7 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any, Protocol
 
@@ -22,7 +22,15 @@ from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batches_of
 from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import IdentificationError
-from ppafo.identification.trajectory.problem import TIME_OFFSET, Experiment, Range, scenario_of, with_numbers
+from ppafo.identification.trajectory.problem import (
+    GAIN_OF,
+    TIME_OFFSET,
+    ZERO_OF,
+    Experiment,
+    Range,
+    scenario_of,
+    with_numbers,
+)
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import at, over_runs
 from ppafo.model.plant import chamber_1_volume, chamber_2_volume, chamber_pressure
@@ -90,7 +98,8 @@ class PreparedExperiment:
 
     ``run`` has the step and the clock of all columns; a sample is ``fraction`` [-] of the way from record ``place`` to
     the next. ``inputs`` are what the run follows at each step, made of what ``recorded`` has; None where it follows
-    nothing. ``time_offset`` [s] is how much later the samples are than the run, where it is not fitted.
+    nothing. ``time_offset`` [s] is how much later the samples are than the run, where it is not fitted; ``of_sensors``
+    has zeros and gains by path, where they are not.
     """
 
     label: str
@@ -102,6 +111,7 @@ class PreparedExperiment:
     recorded: RecordedInputs | None = None
     inputs: StepInputs | None = None
     time_offset: float = 0.0
+    of_sensors: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def time(self) -> Floats:
@@ -306,7 +316,29 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
 
 
 def signals_at(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
-    """Return the channels [SI] (samples, runs) of one experiment with other numbers [SI] in each of ``count`` runs."""
+    """Return the channels [SI] (samples, runs) of one experiment with other numbers [SI] in each of ``count`` runs.
+
+    What differs only in zeros and gains of sensors is run once. A pressure sensor reads gauge pressure.
+    """
+    of_sensors = {path: column for path, column in columns.items() if path.startswith((ZERO_OF, GAIN_OF))}
+    running = {path: column for path, column in columns.items() if path not in of_sensors}
+    errors = {**prepared.of_sensors, **of_sensors}
+    if not errors:
+        return _run_signals(prepared, running, count)
+    together = np.array([np.broadcast_to(column, (count,)) for column in running.values()]).reshape(-1, count)
+    _, first, place = np.unique(together, axis=1, return_index=True, return_inverse=True)
+    fewer = {path: np.broadcast_to(column, (count,))[first] for path, column in running.items()}
+    found = _run_signals(prepared, fewer, len(first))
+    atmosphere = prepared.scenario.device.supply.atmospheric_pressure
+    for name, values in found.items():
+        rest = 0.0 if name == ANGLE else atmosphere
+        gain, zero = (np.asarray(errors.get(f"{path}{name}", 0.0)) for path in (GAIN_OF, ZERO_OF))
+        found[name] = rest + (1.0 + gain) * (values[:, place.ravel()] - rest) + zero
+    return found
+
+
+def _run_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], count: int) -> dict[str, Floats]:
+    """Return what ideal sensors would say."""
     run = run_with(prepared, columns)
     kept, failure = _rows_of(run.program)
     records: Floats | None = None
@@ -427,7 +459,13 @@ class Residuals:
         def hold_in(prepared: PreparedExperiment) -> PreparedExperiment:
             acting = {item.path: number for item, number in names.items() if item.acts_in(prepared.label)}
             offset = acting.pop(TIME_OFFSET, prepared.time_offset)
-            return replace(prepared, scenario=with_numbers(prepared.scenario, acting), time_offset=offset)
+            errors = {path: number for path, number in acting.items() if path.startswith((ZERO_OF, GAIN_OF))}
+            return replace(
+                prepared,
+                scenario=with_numbers(prepared.scenario, acting),
+                time_offset=offset,
+                of_sensors={**prepared.of_sensors, **errors},
+            )
 
         ranges = tuple(item for place, item in enumerate(self.ranges) if place not in held)
         return replace(self, experiments=tuple(hold_in(one) for one in self.experiments), ranges=ranges)

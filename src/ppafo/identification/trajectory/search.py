@@ -23,7 +23,7 @@ from ppafo.identification.trajectory.information import (
     standard_errors,
 )
 from ppafo.identification.trajectory.posterior import LinearModel, whiten
-from ppafo.identification.trajectory.problem import Range, Search, is_nuisance
+from ppafo.identification.trajectory.problem import Range, Search, is_nuisance, is_of_sensor
 from ppafo.identification.trajectory.residuals import (
     FIRST_STEP,
     Floats,
@@ -115,7 +115,8 @@ def _without_one(residuals: Residuals, best: Optimum, search: Search, report: Re
     if count < 2 or 2.0 * best.cost <= _EXPLAINED * residuals.channel_slices()[-1].stop:
         return ()
     report(Progress("trajectory fit: with one number at a time held at its start"))
-    found = (_descend_holding(residuals, np.arange(count) == index, search) for index in range(count))
+    wanted = [index for index, item in enumerate(residuals.ranges) if not item.is_tolerance]
+    found = (_descend_holding(residuals, np.arange(count) == index, search) for index in wanted)
     return tuple(one for one in found if one is not None)
 
 
@@ -170,9 +171,9 @@ def _without_nuisances(residuals: Residuals, search: Search, report: Report) -> 
     """Return where the search ends with all nuisances held at their start, as a start with them free.
 
     A fit with more numbers that ends above one with fewer has not found its least. None where no nuisance is fitted, or
-    nothing else.
+    nothing else. Tolerances start where the bench states them, and stay free.
     """
-    is_held = np.array([is_nuisance(item) for item in residuals.ranges])
+    is_held = np.array([is_nuisance(item) and not item.is_tolerance for item in residuals.ranges])
     if not is_held.any() or is_held.all():
         return None
     report(Progress("trajectory fit: with initial states and time offsets held"))
@@ -199,6 +200,14 @@ def is_at_bound(point: Floats, ranges: Sequence[Range]) -> Mask:
     return np.asarray(np.minimum(point - low, high - point) <= AT_BOUND * np.minimum(high - low, 1.0))
 
 
+def moved_alone(point: Floats, ranges: Sequence[Range]) -> Mask:
+    """Return which coordinates, in their units, get a step of their own: those at a bound, and those of sensors.
+
+    The latter change no run, so that one run serves all of them.
+    """
+    return is_at_bound(point, ranges) | np.array([is_of_sensor(item) for item in ranges], dtype=np.bool_)
+
+
 def _refine(residuals: Residuals, start: Floats, search: Search) -> Optimum:
     """Return the optimum from one start; steps of differences follow the numbers, in stages."""
     directions = np.diag(np.full(len(start), FIRST_STEP))
@@ -208,7 +217,7 @@ def _refine(residuals: Residuals, start: Floats, search: Search) -> Optimum:
         found = descend(used, start, directions, search, tolerance)
         evaluations += found.evaluations
         # Information and the steps that suit it: two passes, since each needs the other.
-        fixed, quick = is_at_bound(found.point, residuals.ranges), residuals.quick()
+        fixed, quick = moved_alone(found.point, residuals.ranges), residuals.quick()
         for _ in range(PASSES):
             directions = directions_for(precision(quick.around(found.point, directions), search.loss), fixed)
         information = precision(residuals.around(found.point, directions), search.loss)
@@ -389,7 +398,7 @@ def weigh(found: Optimum, given: Sequence[frozenset[str]]) -> WhitenedFit:
     ``given`` has, for each experiment, the channels whose noise was given: it is not taken to be less.
     """
     residuals, point = found.residuals, found.point
-    fixed = is_at_bound(point, residuals.ranges)
+    fixed = moved_alone(point, residuals.ranges)
     near = residuals.around(point, directions_for(found.information, fixed))
     sensors = _sensors(residuals.experiments, given)
     for number in range(1, MAXIMUM_ROUNDS + 1):
@@ -402,7 +411,7 @@ def weigh(found: Optimum, given: Sequence[frozenset[str]]) -> WhitenedFit:
         has_settled = bool(np.all(np.abs(step) <= SETTLED * errors))
         if has_settled or number == MAXIMUM_ROUNDS:
             break
-        directions = directions_for(information, is_at_bound(near.point + step, residuals.ranges))
+        directions = directions_for(information, moved_alone(near.point + step, residuals.ranges))
         further = _damp_step(near, step, directions, Whitening(sensors))
         if further is None:
             # Where the runs are rough no step lowers the cost any more: this is as near as one comes.

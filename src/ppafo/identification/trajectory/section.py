@@ -17,7 +17,7 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.models import NAME, StrictTable, Text, Texts, validate
 from ppafo.errors import DataError, IdentificationError, UnitError, nearest_name, refused_as
 from ppafo.identification.bench.result import count_of
-from ppafo.identification.estimate import Check, Estimate, Prospect, interval_factor
+from ppafo.identification.estimate import BENCH_VERDICTS, Check, Estimate, Prospect, interval_factor
 from ppafo.identification.source import Source, Use, common_use, source_of
 from ppafo.identification.trajectory.fitting import TrajectoryFit, fit, noise_in, residuals_of
 from ppafo.identification.trajectory.follow_up import Candidate, Expected, Profile, expected_information, profile
@@ -41,7 +41,8 @@ from ppafo.identification.trajectory.problem import (
     use_of,
 )
 from ppafo.identification.trajectory.residuals import FIRST_STEP, Floats, Residuals, prior_coordinates
-from ppafo.identification.trajectory.search import is_at_bound
+from ppafo.identification.trajectory.search import moved_alone
+from ppafo.identification.trajectory.tolerances import Tolerances, tolerance_parameters
 from ppafo.identification.trajectory.uncertainty import FROM_PRIOR, STRONG, relative_to_number
 from ppafo.parameters import apply_overrides, build_device
 from ppafo.parameters.device import Device
@@ -186,7 +187,8 @@ class Setting:
 
     ``read`` gives the recording of an experiment, ``folder`` is where paths of scenarios begin, ``file`` what messages
     call the section. ``parameter_set`` takes the place of the sets that scenarios name, ``valve`` that of their valves.
-    ``bench`` are estimates that came before, by path; ``used`` are the recordings from which they came.
+    ``bench`` are estimates that came before, by path; ``used`` are the recordings from which they came. ``tolerances``
+    are those of the bench.
     """
 
     read: Callable[[ExperimentSection], Source]
@@ -196,6 +198,7 @@ class Setting:
     valve: str | None = None
     bench: Mapping[str, Estimate] = field(default_factory=dict)
     used: tuple[Use, ...] = ()
+    tolerances: Tolerances = field(default_factory=Tolerances)
 
 
 @contextmanager
@@ -266,7 +269,10 @@ def trajectory_problem(section: TrajectorySection, setting: Setting) -> Trajecto
         confidence=section.confidence,
         directions=section.directions,
     )
-    return TrajectoryProblem((*parameters, *nuisances), experiments, search)
+    fitted = (*parameters, *nuisances)
+    return TrajectoryProblem(
+        (*fitted, *tolerance_parameters(setting.tolerances, experiments, fitted)), experiments, search
+    )
 
 
 def candidates_of(section: TrajectorySection, setting: Setting, noise: Mapping[str, float]) -> tuple[Candidate, ...]:
@@ -488,11 +494,13 @@ def _numbers(residuals: Residuals, search: Search) -> list[Prospect]:
     if not np.isfinite(residuals.of_data(point[None, :])).all():
         return [Prospect("numbers", False, "the model diverges at the start values, so nothing can be predicted")]
     known = precision(residuals.around(point, np.diag(np.full(len(point), FIRST_STEP))), "linear")
-    known = precision(residuals.around(point, directions_for(known, is_at_bound(point, ranges))), "linear")
+    known = precision(residuals.around(point, directions_for(known, moved_alone(point, ranges))), "linear")
     errors, together = np.sqrt(np.diag(covariance(known))), correlation(covariance(known))
     _, priors, _ = prior_coordinates(ranges)
     found = []
     for index, item in enumerate(ranges):
+        if item.is_tolerance:
+            continue
         error, row = float(errors[index]), together[index]
         fraction = relative_to_number(item, item.coordinate(item.start), interval_factor(search.confidence) * error)
         is_prior = error > FROM_PRIOR * priors[index]
@@ -596,5 +604,16 @@ def _checks(found: TrajectoryFit) -> tuple[Check, ...]:
         ),
         Check("what is left", worst.fraction <= ACCEPTABLE_FRACTION, description),
         Check("one model for all", not wrong, wrong or found.uncertainty.misfit.in_words),
+        *_bench_check(found),
         Check("numbers agree", not broken, broken or "no rule of a device is broken"),
     )
+
+
+def _bench_check(found: TrajectoryFit) -> tuple[Check, ...]:
+    """Return whether all tolerances of the bench are kept, nothing where it states none."""
+    stated = [item for item in found.estimates if item.verdict in BENCH_VERDICTS]
+    if not stated:
+        return ()
+    broken = [item for item in stated if item.verdict == "beyond its tolerance"]
+    text = "; ".join(f"{item.path}: {item.explanation}" for item in broken)
+    return (Check("bench", not broken, text or f"{count_of(len(stated), 'number')} within the stated tolerances"),)

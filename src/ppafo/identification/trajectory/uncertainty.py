@@ -301,8 +301,11 @@ def estimate_of(evidence: Evidence, index: int) -> Estimate:
 
     low, high = ends(evidence.interval)
     fraction = relative_half_width(evidence, index, half)
-    verdict = _verdict(evidence, index, fraction)
-    explanation = _explanation(evidence, index, verdict, fraction)
+    if item.is_tolerance:
+        verdict, explanation = _of_bench(item, item.number(at), low, high)
+    else:
+        verdict = _verdict(evidence, index, fraction)
+        explanation = _explanation(evidence, index, verdict, fraction)
     condition, beside = "", None
     is_asked = verdict in _CONDITIONAL and not is_nuisance(item)
     if evidence.beside is not None and is_asked and evidence.conditions[index]:
@@ -355,6 +358,16 @@ def _verdict(evidence: Evidence, index: int, fraction: float) -> Verdict:
     if evidence.misfit:
         return "holds for this model only"
     return "identified" if fraction <= evidence.search.identified else "weak"
+
+
+def _of_bench(item: Range, value: float, low: float, high: float) -> tuple[Verdict, str]:
+    """Return whether the interval of a tolerance meets what the bench states, and both in words."""
+    assert item.prior is not None
+    stated, limit = item.prior.mean, item.prior.standard_deviation * math.sqrt(3.0)
+    found, unit = f"the recordings want {value - stated:+.3g}", item.unit.removesuffix("_d")
+    text = f"the bench states {stated:.6g} within {limit:.3g} {unit}, {found}".replace(" -,", ",")
+    is_beyond = low > stated + limit or high < stated - limit
+    return ("beyond its tolerance" if is_beyond else "within its tolerance"), f"{text}."
 
 
 def _is_prior_alone(evidence: Evidence, index: int) -> bool:

@@ -27,7 +27,7 @@ from ppafo.answers.style import (
 from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.errors import DataError
 from ppafo.identification.bench.result import BenchResult, count_of, figure_3, procedure_figure
-from ppafo.identification.estimate import Check, Estimate, Prospect
+from ppafo.identification.estimate import BENCH_VERDICTS, Check, Estimate, Prospect
 from ppafo.identification.new_set import NewSet, in_set_unit
 from ppafo.identification.trajectory.fitting import TrajectoryFit
 from ppafo.identification.trajectory.follow_up import Expected, Profile
@@ -343,15 +343,18 @@ def _trajectory_section(outcome: TrajectoryOutcome, before: ParameterSet) -> Sec
     kind, fit = kind_of_fit(outcome.fit), outcome.fit
     origin = "" if kind == "measured" else f" ({kind})"
     missing = [one for one in outcome.beforehand if not one.can_be_had]
-    doubtful = [item for item in fit.estimates if item.verdict != "identified"]
+    values = [item for item in fit.estimates if item.verdict not in BENCH_VERDICTS]
+    doubtful = [item for item in values if item.verdict != "identified"]
+    of_bench = [item for item in fit.estimates if item.verdict in BENCH_VERDICTS]
     candidates = enumerate(outcome.expected, start=1)
     return Section(
-        f"trajectory{origin}: {count_of(len(fit.estimates), 'number')} fitted to "
+        f"trajectory{origin}: {count_of(len(values), 'number')} fitted to "
         f"{count_of(len(fit.measurements), 'recording')}",
         paragraphs=tuple(f"beforehand: INSUFFICIENT: {one.name}: {one.statement}" for one in missing),
-        table=Table((), tuple(estimate_row(item, before) for item in fit.estimates)),
+        table=Table((), tuple(estimate_row(item, before) for item in values)),
         remarks=(
             *(f"{item.path}: {item.explanation}" for item in doubtful),
+            *(f"bench: {item.path}: {item.explanation}" for item in of_bench),
             *_checks(outcome.checks),
             *(f"remark: {remark}" for remark in outcome.remarks),
             *(f"profile: {_profile(curve, before)}" for curve in outcome.profiles),

@@ -19,6 +19,7 @@ from ppafo.identification.problem import (
 from ppafo.identification.source import Source, Use, double_use, source_of
 from ppafo.identification.trajectory.section import Setting as FitSetting
 from ppafo.identification.trajectory.section import solve_section
+from ppafo.identification.trajectory.tolerances import Tolerances, tolerances_of
 from ppafo.parameters.device import VANE
 from ppafo.parameters.loading import load_parameter_set
 from ppafo.parameters.overrides import apply_overrides
@@ -90,6 +91,7 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
         problem.device.valve,
         bench,
         used,
+        Tolerances() if problem.bench is None else tolerances_of(problem.bench, file),
     )
     fitted = None if problem.trajectory is None else solve_section(problem.trajectory, setting, progress)
     estimates = (*_bench_estimates(results), *(() if fitted is None else fitted.fit.estimates))
