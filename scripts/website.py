@@ -207,7 +207,7 @@ def kinds() -> str:
     from ppafo.control.walking.catalog import WALKING_CONTROLLERS
     from ppafo.metrics import METRICS
     from ppafo.model.catalog import VALVES
-    from ppafo.signals.channels import CHANNELS
+    from ppafo.signals.recording import CHANNELS
 
     text = _titled("Kinds and their settings", "What a file can name, as this package has it; numbers are in SI units.")
     catalogues: dict[str, Mapping[str, Any]] = {

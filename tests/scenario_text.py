@@ -3,8 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from ppafo.simulation.building import ScenarioRequest
-from ppafo.simulation.loading import FILE, VANE, scenario_of
+from ppafo.simulation.loading import FILE, VANE, ScenarioRequest, scenario_of
 from ppafo.simulation.scenario import Scenario
 
 

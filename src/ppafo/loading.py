@@ -13,8 +13,8 @@ from ppafo.errors import ScenarioError, nearest_name
 from ppafo.parameters import ParameterSet
 from ppafo.simulation import loading as of_vanes
 from ppafo.simulation import schema
-from ppafo.simulation.building import ScenarioRequest
 from ppafo.simulation.declaration import WALK, kind_at
+from ppafo.simulation.loading import ScenarioRequest
 from ppafo.simulation.scenario import Scenario
 
 _OF_A_VANE = ("motion", "initial", "reference")

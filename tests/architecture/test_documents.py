@@ -18,7 +18,7 @@ from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect, equation_lines, nomenclature_lines
 from ppafo.parameters import declaration, device
-from ppafo.signals.channels import CHANNELS
+from ppafo.signals.recording import CHANNELS
 
 ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "src" / "ppafo"

@@ -18,7 +18,7 @@ from ppafo.model.catalog import VALVES
 from ppafo.model.plant import Openings
 from ppafo.model.sensors import Measurement
 from ppafo.model.valves.kind import ValveKind, ValveModel
-from ppafo.signals.channels import CHANNELS
+from ppafo.signals.recording import CHANNELS
 
 CATALOGS = [*CONTROLLERS.items(), *WALKING_CONTROLLERS.items(), *PROFILES.items(), *VALVES.items()]
 

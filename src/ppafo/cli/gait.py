@@ -173,9 +173,8 @@ def _record(parsed: argparse.Namespace) -> int:
 
 
 def _export(parsed: argparse.Namespace) -> int:
-    from ppafo.gait.opensim_names import opensim_recording
     from ppafo.storage import read_recording
-    from ppafo.storage.opensim import write_opensim
+    from ppafo.storage.opensim import opensim_recording, write_opensim
 
     _check_side(parsed.side)
     mass = _optional("--body-mass", parsed.body_mass, "kg")

@@ -16,8 +16,8 @@ from ppafo.exports.wasm import WasmModule, module_of
 from ppafo.live.page import block_of, check_start, packed_once, page_of, policy_of_block
 from ppafo.loading import load_scenario
 from ppafo.parameters.graph import ATMOSPHERE_PATH
-from ppafo.simulation.building import apply_overrides, is_of_device
 from ppafo.simulation.declaration import OF_A_VANE, PRESSURE_WORDS
+from ppafo.simulation.loading import apply_overrides, is_of_device
 from ppafo.simulation.scenario import FreeMotion, Scenario, vane_motion, worn_kind
 from ppafo.units import conversion, from_si, to_si
 from ppafo.version import __version__

@@ -1,6 +1,34 @@
-"""What a recording says in numbers: named values with units, the same for measured and simulated data."""
+"""What a recording says in numbers: named values with units, the same for measured and simulated data.
 
-from ppafo.metrics.catalog import METRICS, evaluate
+To add a metric: a function and its MetricKind in a module of this folder, listed in its METRICS.
+"""
+
+from ppafo.kinds import Kinds
+from ppafo.metrics import gas, motion, strides, switching, tracking
 from ppafo.metrics.metric import Metric, MetricKind
+from ppafo.signals import Recording
 
 __all__ = ["METRICS", "Metric", "MetricKind", "evaluate"]
+
+
+METRICS: Kinds[MetricKind] = Kinds(
+    "ppafo.metrics",
+    "metric",
+    MetricKind,
+    {
+        kind.name: kind
+        for kind in (*tracking.METRICS, *gas.METRICS, *switching.METRICS, *motion.METRICS, *strides.METRICS)
+    },
+)
+
+
+def evaluate(recording: Recording) -> dict[str, Metric]:
+    """Return every metric that the channels of the recording allow; one sample alone allows none."""
+    found: dict[str, Metric] = {}
+    for kind in METRICS.values():
+        if kind.compute is None or len(recording) < 2 or not set(kind.channels) <= set(recording.names):
+            continue
+        value = kind.compute(recording)
+        if value is not None:
+            found[kind.name] = Metric(value, kind.unit, kind.summary)
+    return found

@@ -23,8 +23,16 @@ from ppafo.parameters import declaration
 from ppafo.parameters.actuator_table import read_actuator_table
 from ppafo.parameters.building import build_device
 from ppafo.parameters.device import VANE, Device
-from ppafo.parameters.overrides import apply_overrides
-from ppafo.parameters.parameter_set import Accepted, Citation, Entry, FlagEntry, ParameterSet, TextEntry, chosen_valve
+from ppafo.parameters.parameter_set import (
+    Accepted,
+    Citation,
+    Entry,
+    FlagEntry,
+    ParameterSet,
+    TextEntry,
+    apply_overrides,
+    chosen_valve,
+)
 from ppafo.units import check_unit
 
 # A dotted path names a valve: a dot or a blank in its name would make it another path.

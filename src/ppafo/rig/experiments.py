@@ -45,8 +45,7 @@ from ppafo.rig.preset import (
     sensor,
 )
 from ppafo.rig.solution import RigRun, RigSolution, sensor_signals, solve_rig, spool_position
-from ppafo.signals.channels import CHANNELS
-from ppafo.signals.recording import Channel, Recording
+from ppafo.signals.recording import CHANNELS, Channel, Recording
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.plan import exact_orifice, plan_run, profile_values
 from ppafo.simulation.scenario import UNITS, Scenario, plain

@@ -7,8 +7,7 @@ from typing import Any
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Number, choose, larger, rounded_up, smaller, truncated
 from ppafo.parameters.graph import Follows, Graph, Term
-from ppafo.simulation.declaration import PERIOD, RATE, RUN, value_at
-from ppafo.simulation.reading import Reading, quantity_text
+from ppafo.simulation.declaration import PERIOD, RATE, RUN, Reading, quantity_text, value_at
 
 MAXIMUM_STEPS = 1.0e8
 MAXIMUM_OUTPUTS = 5.0e6

@@ -1,8 +1,12 @@
-"""From a name, a file or plain Python values to a scenario; every mistake is one clear line."""
+"""From a name, a file or plain Python values to a scenario in SI units; every mistake is one clear line.
+
+First what makes a Scenario of a document with overrides, and says what no source gives in it; then names and files.
+"""
 
 import copy
+import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -10,14 +14,475 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from ppafo.control.fixed.torque_laws import FIXED, FLOAT
+from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
 from ppafo.documents.models import first_problem, is_gap
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ScenarioError, one_line
-from ppafo.parameters import ParameterSet
-from ppafo.simulation.building import OverriddenDocument, ScenarioRequest, apply_overrides, build_scenario
-from ppafo.simulation.declaration import OF_A_VANE, Declared
-from ppafo.simulation.scenario import Scenario
+from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
+from ppafo.model.catalog import EFFECTS, VALVES
+from ppafo.model.declaration import Quantity
+from ppafo.model.effects.kind import SECTION as EFFECTS_SECTION
+from ppafo.model.regulator import SupplyLines
+from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set
+from ppafo.parameters import apply_overrides as apply_device_overrides
+from ppafo.parameters.declaration import ORIFICE, RELIEVING_PATH, SECTIONS, SPECIES_PATH
+from ppafo.parameters.declaration import quantities as device_quantities
+from ppafo.parameters.device import Device, Supply
+from ppafo.parameters.graph import Follows, Graph, follows, gauge_link
+from ppafo.parameters.parameter_set import atmospheric_pressure, chosen_valve, entry_text, links_of_set
+from ppafo.simulation import declaration
+from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock, read_clock
+from ppafo.simulation.declaration import (
+    ARITHMETIC,
+    AT_REST,
+    INITIAL,
+    OF_A_VANE,
+    PRESSURE_WORDS,
+    SEED,
+    SENSORS,
+    SUPPLY_LINE,
+    SUPPLY_LINES,
+    THERMAL,
+    THERMAL_GAS,
+    TORQUE_LEVEL,
+    Declared,
+    Reading,
+    controller_settings,
+    kind_at,
+    line_entries,
+    line_quantities,
+    quantities,
+    quantity_text,
+    value_at,
+)
+from ppafo.simulation.motion import read_motion, read_profile
+from ppafo.simulation.scenario import (
+    Assumption,
+    Control,
+    Origin,
+    ProfileChoice,
+    Scenario,
+    Sensors,
+    Thermal,
+)
 from ppafo.simulation.schema import scenario_file, whole_scenario_file
+from ppafo.units import format_quantity, split_quantity
+
+_SECTION = "assumed"
+_NOTHING_TO_FOLLOW = ProfileChoice("constant", {"level": 0.0})
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_SEED = "sensors.seed"
+_ONE_OR_OTHER = {"controller.rate": "period", "controller.period": "rate"}
+_OWN_KEYS = {"controller": frozenset({"kind", "rate", "period"})}
+
+
+@dataclass(frozen=True, slots=True)
+class OverriddenDocument:
+    """A document with overrides in it: paths that were set, and the overrides that belong to the device."""
+
+    document: dict[str, Any]
+    paths: frozenset[str]
+    device: tuple[str, ...]
+
+
+def apply_overrides(
+    document: Mapping[str, Any], overrides: Iterable[str], file: str, declared: Declared = OF_A_VANE
+) -> OverriddenDocument:
+    """Return a changed copy of a document; ``file`` is what messages call it.
+
+    Naming another kind of motion, controller, timing or profile drops the settings that only the old kind has; giving a
+    rate drops the period, and the reverse. A gain on the torque may leave out its unit. ScenarioError for a path that
+    is neither ``declared`` nor of the device.
+    """
+    changed = _with_one_path_each(document, file, declared)
+    paths: set[str] = set()
+    device: list[str] = []
+    for override in overrides:
+        given, text = split_override(override)
+        path = declared.same.get(given, given)
+        if path in declared.appended:
+            section, own = declared.appended[path]
+            changed.setdefault(section, {}).setdefault("overrides", []).append(f"{own}={text}")
+        elif is_of_device(path):
+            device.append(override)
+            continue
+        else:
+            known = declared.paths(changed)
+            if path not in known:
+                raise unknown_value(override, known, f"{file} has")
+            if path == "motion.kind":
+                declaration.check_motion_kind(text, f"override '{override}'")
+            _set(changed, path, text, file, declared)
+        paths.add(path)
+    return OverriddenDocument(changed, frozenset(paths), tuple(device))
+
+
+def _with_one_path_each(document: Mapping[str, Any], file: str, declared: Declared) -> dict[str, Any]:
+    """Return a copy of a document where each value stands at the one path that the document keeps."""
+    changed = copy.deepcopy(dict(document))
+    for path, kept in declared.same.items():
+        section, _, name = path.rpartition(".")
+        table = value_at(changed, section)
+        if not isinstance(table, dict) or name not in table:
+            continue
+        if kept in changed:
+            raise ScenarioError(f"{file}: give either {path} or {kept}, not both")
+        changed[kept] = table.pop(name)
+    return changed
+
+
+def split_override(override: str) -> tuple[str, str]:
+    """Return path and value of a text such as ``run.duration=1 s``. ScenarioError for any other text."""
+    on_one_line = one_line(override)
+    path, separator, text = (part.strip() for part in on_one_line.partition("="))
+    if not separator or not path or not text:
+        raise ScenarioError(f"override '{on_one_line}' is not of the form PATH=VALUE, as valve.area=12.6mm^2 is")
+    return path, text
+
+
+def scenario_paths(document: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return every path of the scenario that an override can set, for the kinds that the document names."""
+    return OF_A_VANE.paths(document)
+
+
+def device_paths() -> tuple[str, ...]:
+    """Return every path of the device that an override can set, with ``valve`` for the one that is chosen."""
+    sections = [path for path in device_quantities({}) if not path.startswith("reported.")]
+    valve = [*ORIFICE, *(item for kind in VALVES.values() for item in kind.quantities)]
+    return (*sections, SPECIES_PATH, RELIEVING_PATH, *(f"valve.{item.name}" for item in valve))
+
+
+def is_of_device(path: str) -> bool:
+    """Tell whether a path begins in the device, which then has the say about the rest of it."""
+    return path.partition(".")[0] in {*SECTIONS, EFFECTS_SECTION, "valve", "valves"}
+
+
+def unknown_value(override: str, known: tuple[str, ...], who_has: str) -> ScenarioError:
+    """Return the error for a path that is neither known nor of the device; ``who_has`` begins as ``task.toml has``."""
+    path, _ = split_override(override)
+    EFFECTS.load_own()
+    allowed = [*known, *device_paths()]
+    section = path.partition(".")[0]
+    near = [name for name in known if name.startswith(f"{section}.")]
+    hint = nearest_name(path, allowed) or f"; for example {', '.join(near[:6] or known[:6])}"
+    return ScenarioError(f"override '{one_line(override)}': {who_has} no value '{path}'{hint}")
+
+
+def _set(document: dict[str, Any], path: str, text: str, file: str, declared: Declared) -> None:
+    section, _, name = path.rpartition(".")
+    table = document
+    for part in section.split(".") if section else ():
+        table = table.setdefault(part, {})
+        if not isinstance(table, dict):
+            raise ScenarioError(f"override '{path}={text}': {file} has no table [{section}]")
+    if name == "kind" and table.get("kind") != text:
+        _drop_settings_of_old_kind(document, section, text, declared)
+    table.pop(_ONE_OR_OTHER.get(path, ""), None)
+    table[name] = _seed(path, text) if path == _SEED else _with_unit_of_gain(document, path, text, declared)
+
+
+def _drop_settings_of_old_kind(document: dict[str, Any], section: str, kind: str, declared: Declared) -> None:
+    table = declaration.value_at(document, section)
+    before = _setting_names(document, section, declared)
+    table["kind"] = kind
+    after = _setting_names(document, section, declared)
+    for name in before - after - _OWN_KEYS.get(section, frozenset()):
+        table.pop(name, None)
+
+
+def _setting_names(document: dict[str, Any], section: str, declared: Declared) -> frozenset[str]:
+    """Return the keys that a section can have beside its kind."""
+    prefix = f"{section}."
+    paths = [path.removeprefix(prefix) for path in declared.paths(document) if path.startswith(prefix)]
+    return frozenset(path.partition(".")[0] for path in paths) - {"kind"}
+
+
+def _with_unit_of_gain(document: dict[str, Any], path: str, text: str, declared: Declared) -> str:
+    """Return the text with the SI unit of a gain on the torque where it has none: papers print gains without units."""
+    quantity = declared.quantities(document).get(path)
+    is_gain = quantity is not None and path.startswith("controller.") and "(N m" in quantity.unit
+    return f"{text} {quantity.unit}" if quantity is not None and is_gain and _NUMBER.fullmatch(text) else text
+
+
+def _seed(path: str, text: str) -> int:
+    try:
+        return int(text)
+    except ValueError as error:
+        raise ScenarioError(f"override '{path}={text}': must be a whole number") from error
+
+
+@dataclass(frozen=True, slots=True)
+class ScenarioRequest:
+    """A scenario that is to be built.
+
+    ``file`` is what messages call it, ``path`` the file itself if there is one, ``folder`` where relative paths begin,
+    ``content`` the document as it was given. ``parameter_set`` takes the place of the set that the document names, and
+    ``instead`` has names of other files, by path in the document, whose relative paths begin in the working folder.
+    """
+
+    file: str
+    path: str | None
+    folder: Path
+    content: dict[str, Any]
+    overrides: tuple[str, ...]
+    parameter_set: ParameterSet | None = None
+    instead: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Hardware:
+    """The parameter set with all overrides in it, the name of its valve that is used, and what follows what in it."""
+
+    parameter_set: ParameterSet
+    valve: str
+    links: Graph
+
+
+def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Scenario:
+    """Return the scenario of a document that has the right keys.
+
+    ScenarioError or ParameterError for the first value that cannot be used.
+    """
+    document = changed.document
+    reading = Reading(request.file, document, changed.paths)
+    hardware = read_hardware(reading, request, changed.device)
+    device = read_device(reading, hardware)
+    clock = read_clock(reading)
+    before = Reading(request.file, request.content)
+    scenario = Scenario(
+        name=document["name"],
+        description=document.get("description", ""),
+        device=device,
+        duration=clock.duration,
+        time_step=clock.step,
+        output_interval=clock.output_interval,
+        motion=read_motion(reading, device, clock.duration, clock.step, request.folder),
+        initial_pressure_1=_initial_pressure(reading, 0, device.supply),
+        initial_pressure_2=_initial_pressure(reading, 1, device.supply),
+        control=_control(reading, clock.period),
+        reference=read_profile(reading, "reference", TORQUE_LEVEL) if "reference" in document else _NOTHING_TO_FOLLOW,
+        sensors=_sensors(reading, clock),
+        assumptions=(*read_assumptions(before, reading, hardware, request.overrides), *assumed_lines(reading)),
+        origin=Origin(request.path, document["device"]["set"], hardware.valve, request.overrides, request.content),
+        thermal=read_thermal(reading),
+        supply_lines=read_supply_lines(reading, device),
+        links=_links_at_start(reading),
+    )
+    # Refuse what only a vane has.
+    try:
+        if scenario.thermal is not None:
+            scenario.device.check_vane("gas with an energy balance")
+        if scenario.control.is_fixed:
+            scenario.device.check_vane("a controller on whole numbers")
+    except ParameterError as error:
+        raise _of_device(reading, error) from error
+    return scenario
+
+
+def read_hardware(reading: Reading, request: ScenarioRequest, overrides: tuple[str, ...]) -> Hardware:
+    """Return the parameter set with the overrides of the file and then those of the caller."""
+    section = reading.document["device"]
+    valve = section.get("valve")
+    try:
+        parameter_set = request.parameter_set or load_parameter_set(set_name(section["set"], request.folder))
+        name = chosen_valve(parameter_set, valve)
+        parameter_set = apply_device_overrides(parameter_set, section.get("overrides", ()), valve)
+    except ParameterError as error:
+        raise _of_device(reading, error) from error
+    before = atmospheric_pressure(parameter_set) if overrides else None
+    changed = apply_device_overrides(parameter_set, overrides, valve)
+    given = {split_override(text)[0] for text in overrides}
+    return Hardware(changed, name, links_of_set(changed, given, before))
+
+
+def set_name(name: str, folder: Path) -> str:
+    """Return the name of a set of the package, or the path of a set file, which may be relative to the scenario."""
+    is_path = Path(name).suffix == ".toml" or "/" in name
+    return str(folder / name) if is_path and name not in list_sets() else name
+
+
+def read_device(reading: Reading, hardware: Hardware) -> Device:
+    """Return the device of a parameter set with its overrides; ParameterError for what is missing or contradicts."""
+    try:
+        return build_device(hardware.parameter_set, hardware.valve, hardware.links)
+    except ParameterError as error:
+        raise _of_device(reading, error) from error
+
+
+def _of_device(reading: Reading, error: ParameterError) -> ParameterError:
+    """Return the error with the scenario it happened in, on one line whatever the names are."""
+    return ParameterError(f"{reading.file}: [device]: {one_line(error)}")
+
+
+def _initial_pressure(reading: Reading, chamber: int, supply: Supply) -> float:
+    """Return the pressure [Pa absolute] of a chamber at the start, from a number or a word."""
+    quantity = INITIAL[chamber]
+    path = f"initial.{quantity.name}"
+    value = value_at(reading.document, path)
+    word = AT_REST if value is None else value
+    if isinstance(word, str) and word.strip() in PRESSURE_WORDS:
+        return float(_link_of_word(word).number(lambda source: getattr(supply, source.removeprefix("supply."))))
+    if isinstance(word, str) and not any(character.isdigit() for character in word):
+        words = ", ".join(PRESSURE_WORDS)
+        hint = nearest_name(word, PRESSURE_WORDS)
+        raise reading.refusal(path, f"is neither a pressure such as '50 psi_g' nor one of {words}{hint}")
+    return reading.number(path, quantity, supply.atmospheric_pressure)
+
+
+def _link_of_word(word: str) -> Follows:
+    """Return which pressure of the supply a word such as ``atmosphere`` stands for."""
+    return follows(f"supply.{PRESSURE_WORDS[word.strip()]}")
+
+
+def _links_at_start(reading: Reading) -> Graph:
+    """Return which pressures of the supply those at the start follow: those of a word, or in gauge."""
+    found = {}
+    for item in INITIAL:
+        path = f"initial.{item.name}"
+        value = value_at(reading.document, path)
+        word = AT_REST if value is None else str(value)
+        is_word = word.strip() in PRESSURE_WORDS
+        found[path] = (_link_of_word(word),) if is_word else gauge_link(path, *split_quantity(word))
+    return {path: links for path, links in found.items() if links}
+
+
+def _control(reading: Reading, period: float) -> Control:
+    kind = kind_at(reading.document, "controller")
+    arithmetic = value_at(reading.document, ARITHMETIC) or FLOAT
+    settings = reading.section("controller", controller_settings(kind, arithmetic))
+    for item in () if arithmetic == FIXED else CONVERTER:
+        if value_at(reading.document, f"controller.{item.name}") is not None:
+            raise reading.refusal(f"controller.{item.name}", f'needs {ARITHMETIC} = "{FIXED}"')
+    return Control(kind, settings, period, arithmetic=arithmetic)
+
+
+def _sensors(reading: Reading, clock: Clock) -> Sensors:
+    values = reading.section("sensors", SENSORS)
+    if values["delay"] > clock.duration:
+        raise reading.refusal("sensors.delay", "must not be longer than run.duration: nothing would ever be measured")
+    if values["delay"] / clock.step > MAXIMUM_STEPS_OF_DELAY:
+        longest = quantity_text(MAXIMUM_STEPS_OF_DELAY * clock.step, "s")
+        raise reading.refusal("sensors.delay", f"must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps")
+    return Sensors(
+        delay=values["delay"],
+        angle_noise=values["angle_noise"],
+        pressure_noise=values["pressure_noise"],
+        angle_quantum=values["angle_resolution"],
+        pressure_quantum=values["pressure_resolution"],
+        seed=int(reading.number("sensors.seed", SEED)),
+        angle_bandwidth=values["angle_bandwidth"],
+        pressure_bandwidth=values["pressure_bandwidth"],
+    )
+
+
+def read_assumptions(
+    before: Reading, reading: Reading, hardware: Hardware, overrides: Iterable[str]
+) -> tuple[Assumption, ...]:
+    """Return every assumption that still has a value; one that an override replaced says what it was ``before``.
+
+    ScenarioError for a path that has no value.
+    """
+    replaced = frozenset(split_override(text)[0] for text in overrides)
+    notes: Mapping[str, str] = reading.document.get(_SECTION, {})
+    assumptions = []
+    for path, note in notes.items():
+        value, earlier = _value(reading, hardware, path), _value(before, hardware, path)
+        if value is None and earlier is None:
+            raise _unknown(reading, path)
+        if value is not None:
+            assumptions.append(
+                Assumption(path, value, _note(before, path, note, earlier) if path in replaced else note)
+            )
+    return tuple(assumptions)
+
+
+def _note(before: Reading, path: str, note: str, earlier: str | None) -> str:
+    """Return the note of a value that an override has replaced."""
+    was = earlier if value_at(before.document, path) is not None else "another value"
+    return f"set by an override; the scenario has {was}: {note}"
+
+
+def _value(reading: Reading, hardware: Hardware, path: str) -> str | None:
+    """Return the value at a path as written in the file or, where it has none, the default; None without either."""
+    given = value_at(reading.document, path)
+    if path in scenario_paths(reading.document) and given is not None:
+        return str(given)
+    quantity = quantities(reading.document).get(path)
+    return _device_value(hardware, path) if quantity is None else _default(quantity)
+
+
+def _device_value(hardware: Hardware, path: str) -> str | None:
+    full = f"valves.{hardware.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
+    entry = hardware.parameter_set.entries().get(full)
+    quantity = hardware.parameter_set.declarations().get(full)
+    if entry is not None:
+        return entry_text(entry)
+    if path == RELIEVING_PATH:
+        return "false"
+    return None if quantity is None else _default(quantity)
+
+
+def _default(quantity: Quantity) -> str | None:
+    return None if quantity.default is None else quantity_text(quantity.default, quantity.unit)
+
+
+def _unknown(reading: Reading, path: str) -> ScenarioError:
+    hint = nearest_name(path, [*scenario_paths(reading.document), *device_paths()])
+    return ScenarioError(
+        f"{reading.file}: [{_SECTION}] names '{one_line(path)}', which has no value in this scenario{hint}"
+    )
+
+
+def read_thermal(reading: Reading) -> Thermal | None:
+    """Return how the gas takes up heat in SI, None where it keeps its temperature."""
+    if kind_at(reading.document, "gas_model") != THERMAL:
+        return None
+    values = reading.section("gas_model", THERMAL_GAS)
+    return Thermal(
+        heat_transfer_coefficient=values["heat_transfer_coefficient"], area_per_volume=values["wall_area_per_volume"]
+    )
+
+
+def read_supply_lines(reading: Reading, device: Device) -> SupplyLines | None:
+    """Return the lines of a file in SI, None where it has no such section: then supply pressures are constant.
+
+    ScenarioError where dorsiflexion is set to more than the line has that feeds its regulator.
+    """
+    if value_at(reading.document, SUPPLY_LINE) is None:
+        return None
+    supply = device.supply
+    if supply.dorsiflexion_pressure > supply.pressure:
+        first, second = (
+            quantity_text(pressure, "Pa_a", supply.atmospheric_pressure)
+            for pressure in (supply.pressure, supply.dorsiflexion_pressure)
+        )
+        raise ScenarioError(
+            f"{reading.file}: [{SUPPLY_LINE}]: its second regulator is fed by the first, so "
+            f"supply.dorsiflexion_pressure, {second}, cannot be above supply.pressure, {first}"
+        )
+    first_line, second_line = (reading.section(f"{SUPPLY_LINE}.{line}", line_quantities(line)) for line in SUPPLY_LINES)
+    return SupplyLines(
+        droop_1=first_line["droop"],
+        largest_flow_1=first_line["largest_flow"],
+        volume_1=first_line["volume"],
+        droop_2=second_line["droop"],
+        largest_flow_2=second_line["largest_flow"],
+        volume_2=second_line["volume"],
+        relieving=float(supply.relieving),
+    )
+
+
+def assumed_lines(reading: Reading) -> tuple[Assumption, ...]:
+    """Return the values of the lines that the file leaves to their defaults, with the reason for each."""
+    if value_at(reading.document, SUPPLY_LINE) is None:
+        return ()
+    return tuple(
+        Assumption(f"{SUPPLY_LINE}.{path}", format_quantity(entry.value, entry.unit), f"{entry.origin}: {entry.source}")
+        for path, entry in line_entries().items()
+        if value_at(reading.document, f"{SUPPLY_LINE}.{path}") is None
+    )
+
 
 FILE = TomlKind("scenario", "scenario", resources.files("ppafo") / "scenarios", ScenarioError)
 

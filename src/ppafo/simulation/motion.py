@@ -16,12 +16,13 @@ from ppafo.simulation.declaration import (
     FREE,
     GAIT_SHANK,
     LEG,
+    Reading,
     kind_at,
     profile_settings,
+    quantity_text,
     shank_settings,
     value_at,
 )
-from ppafo.simulation.reading import Reading, quantity_text
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, ProfileChoice
 
 MAXIMUM_CHECKED_TIMES = 20_000

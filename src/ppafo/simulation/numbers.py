@@ -18,10 +18,9 @@ from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, holding, left, resolved
 from ppafo.parameters.plant import all_settings
 from ppafo.simulation import declaration
-from ppafo.simulation.building import apply_overrides
 from ppafo.simulation.clock import Clock, read_clock
-from ppafo.simulation.declaration import SUPPLY_LINE, SUPPLY_LINES
-from ppafo.simulation.reading import Reading
+from ppafo.simulation.declaration import SUPPLY_LINE, SUPPLY_LINES, Reading
+from ppafo.simulation.loading import apply_overrides
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, PrescribedMotion, Scenario, worn_kind
 
 HELD_ANGLE = "motion.angle"

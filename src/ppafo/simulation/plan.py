@@ -48,7 +48,7 @@ from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice
 from ppafo.parameters.plant import effect_rows, effects_of, orifice_conductance, plant_parameters
-from ppafo.simulation.reading import short_quantity_text
+from ppafo.simulation.declaration import short_quantity_text
 from ppafo.simulation.scenario import (
     PYTHON_CONTROLLER,
     FreeMotion,

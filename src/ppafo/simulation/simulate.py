@@ -18,7 +18,7 @@ from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together
 from ppafo.engine.scheme.actuators import pressures_of, torque_of, volumes_of
 from ppafo.errors import SimulationError
-from ppafo.metrics.catalog import evaluate
+from ppafo.metrics import evaluate
 from ppafo.metrics.metric import Metric
 from ppafo.model.gait import foot_in_gait
 from ppafo.model.gas import energy_per_content

@@ -23,8 +23,7 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.regular_file import decoded
 from ppafo.errors import DataError, UnitError, first_twice, nearest_name, one_line, refused_as
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
-from ppafo.signals.channels import BETWEEN, PLAIN_NUMBER, TIME, TIME_UNIT, Between
-from ppafo.signals.recording import Floats
+from ppafo.signals.recording import BETWEEN, PLAIN_NUMBER, TIME, TIME_UNIT, Between, Floats
 from ppafo.storage.files import read_bytes, write_file
 
 _HEADER = re.compile(r"\s*(\w+)\s*\[\s*([^\[\]]+?)\s*\]\s*(\w*)\s*", re.ASCII)

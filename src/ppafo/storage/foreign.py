@@ -23,8 +23,7 @@ from ppafo.documents.regular_file import decoded
 from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import DataError, UnitError, nearest_name, one_line, refused_as
 from ppafo.signals import Channel, Recording
-from ppafo.signals.channels import PLAIN_NUMBER, TIME, TIME_UNIT, Between
-from ppafo.signals.recording import Floats
+from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT, Between, Floats
 from ppafo.storage.comma_separated import DECIMAL_COMMAS, Column, check_clock, in_si, kind_of_comments
 from ppafo.storage.files import read_bytes
 

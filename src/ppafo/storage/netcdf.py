@@ -15,7 +15,7 @@ import numpy as np
 
 from ppafo.errors import DataError, one_line
 from ppafo.signals import CHANNELS, Channel, Recording, recording_kind
-from ppafo.signals.channels import PLAIN_NUMBER, TIME, TIME_UNIT
+from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT
 from ppafo.storage.files import read_bytes, write_file
 
 if TYPE_CHECKING:

@@ -40,8 +40,7 @@ from ppafo.parameters.device import Device
 from ppafo.parameters.parameter_set import Entry
 from ppafo.parameters.plant import effect_row
 from ppafo.signals import Channel, Recording
-from ppafo.simulation.declaration import SUPPLY_LINE, THERMAL, kind_at, value_at
-from ppafo.simulation.reading import Reading, quantity_text
+from ppafo.simulation.declaration import SUPPLY_LINE, THERMAL, Reading, kind_at, quantity_text, value_at
 from ppafo.units import format_quantity
 
 BOTTLE = "bottle"

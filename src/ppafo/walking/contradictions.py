@@ -12,7 +12,7 @@ from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at, larger, smaller
-from ppafo.simulation.reading import Reading, short_quantity_text
+from ppafo.simulation.declaration import Reading, short_quantity_text
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import controller_of, law_of, walking_valve

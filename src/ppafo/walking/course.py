@@ -21,7 +21,7 @@ from ppafo.model.elementary import sine_and_cosine
 from ppafo.model.gait import NEVER, PARTS, STANDS_AT, Course, CoursePart, GaitNow, GaitTiming
 from ppafo.model.leg import LegParameters
 from ppafo.signals.recording import Floats
-from ppafo.simulation.reading import Reading
+from ppafo.simulation.declaration import Reading
 from ppafo.simulation.schema import kind_field, model_name, number_type, quantity_fields
 from ppafo.walking.preparation import standing_on
 

@@ -15,8 +15,7 @@ from ppafo.control.walking import phases
 from ppafo.control.walking.signs import HELPS, LIFTS, PAUSED, SIGNS, STOPPED, Sign
 from ppafo.engine.lanes import Floats
 from ppafo.model import contact as ground
-from ppafo.simulation.declaration import PLAIN
-from ppafo.simulation.reading import WRITTEN_UNITS
+from ppafo.simulation.declaration import PLAIN, WRITTEN_UNITS
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import from_si
 from ppafo.walking.planning import law_of

@@ -19,8 +19,10 @@ from ppafo.model.regulator import SupplyLines
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.graph import Follows, Graph, Term
-from ppafo.simulation.building import (
+from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE, Reading, kind_at, value_at
+from ppafo.simulation.loading import (
     Hardware,
+    Layout,
     OverriddenDocument,
     ScenarioRequest,
     assumed_lines,
@@ -28,11 +30,9 @@ from ppafo.simulation.building import (
     read_hardware,
     read_supply_lines,
     read_thermal,
+    scenario_of,
     split_override,
 )
-from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE, kind_at, value_at
-from ppafo.simulation.loading import Layout, scenario_of
-from ppafo.simulation.reading import Reading
 from ppafo.simulation.scenario import Assumption, Control, MotionKind, Origin, Scenario, Sensors
 from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk, rules

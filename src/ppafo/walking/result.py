@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from ppafo.engine.lanes import BatchResult, Floats
 from ppafo.engine.program import LaneResult
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run
-from ppafo.gait.opensim_names import opensim_recording
 from ppafo.metrics import METRICS, Metric, evaluate
 from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, MetricKind
 from ppafo.model.contact import SWING
@@ -21,7 +20,7 @@ from ppafo.signals import Channel, Recording
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 from ppafo.simulation.simulate import Status, gas_channels
-from ppafo.storage.opensim import write_opensim
+from ppafo.storage.opensim import opensim_recording, write_opensim
 from ppafo.walking.bottle import UNITS, SupplyCourse
 from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.course import PlannedCourse, pace_in_time

@@ -18,8 +18,7 @@ from ppafo.gait import Gait
 from ppafo.model.declaration import Quantity
 from ppafo.model.leg import LegParameters
 from ppafo.signals.recording import Floats
-from ppafo.simulation.declaration import FOOT, value_at
-from ppafo.simulation.reading import Reading
+from ppafo.simulation.declaration import FOOT, Reading, value_at
 
 WEARER = (
     Quantity("body_mass", "kg", "mass of the body", 72.5, 10.0, 300.0),

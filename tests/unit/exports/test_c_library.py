@@ -19,7 +19,7 @@ from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of, batches_of
 from ppafo.exports.c_library import c_library, scenario_library
 from ppafo.exports.c_library.files import c_identifier
-from ppafo.metrics.catalog import METRICS
+from ppafo.metrics import METRICS
 from ppafo.metrics.metric import Readings
 from ppafo.running import simulate
 from ppafo.signals.meter import SAME_LEVEL, Course, FootSample, Sample, StrideSample, advance_course

@@ -7,7 +7,6 @@ import pytest
 
 from ppafo.errors import DataError
 from ppafo.gait import Gait, load_gait, walk_recording
-from ppafo.gait.opensim_names import opensim_recording
 from ppafo.gait.plausible import check_force_scale
 from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.gait.recorded.conventions import find_convention
@@ -17,7 +16,7 @@ from ppafo.gait.recorded.table import read_table
 from ppafo.gait.recorded.walk import Signal
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
-from ppafo.storage.opensim import write_opensim
+from ppafo.storage.opensim import opensim_recording, write_opensim
 from tests.unit.gait.laboratory import GAIT, MASS, SPEED, STRIDE, UNLOADED, angles, curve, force, markers, opensim, trc
 
 PHASES = np.linspace(0.0, 1.0, 101)

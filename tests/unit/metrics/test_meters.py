@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from ppafo.metrics.catalog import METRICS, evaluate
+from ppafo.metrics import METRICS, evaluate
 from ppafo.metrics.gas import ENERGIES
 from ppafo.metrics.metric import Readings
 from ppafo.metrics.switching import UNDECIDED, Swing, count_of, next_swing, reversals

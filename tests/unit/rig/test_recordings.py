@@ -12,7 +12,7 @@ from ppafo.rig import list_presets, load_preset, record
 from ppafo.rig.experiments import EXPERIMENTS, on_scale, write_rig_recording
 from ppafo.rig.preset import PATHS, SECTIONS, Preset, json_schema
 from ppafo.rig.solution import make_solver
-from ppafo.signals.channels import CHANNELS
+from ppafo.signals.recording import CHANNELS
 from ppafo.storage import read_csv
 from ppafo.storage.comma_separated import marked_csv_bytes
 

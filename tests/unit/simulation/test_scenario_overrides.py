@@ -7,8 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ppafo.errors import ParameterError, PpafoError, ScenarioError
-from ppafo.simulation.building import device_paths, scenario_paths, split_override
-from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.loading import device_paths, load_scenario, scenario_paths, split_override
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, ProfileChoice
 
 TASK = "torque-task-proportional"

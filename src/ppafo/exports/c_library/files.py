@@ -15,7 +15,7 @@ from ppafo.engine.run import NEVER_FAILED
 from ppafo.engine.source_text import Collector
 from ppafo.exports import filled, licence, template
 from ppafo.exports.c_library.program import COUNTS, IN_PARTS, WHOLE, ExportedProgram, Further, c_text
-from ppafo.metrics.catalog import METRICS
+from ppafo.metrics import METRICS
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device, Orifice, SonicOrifice

@@ -20,7 +20,7 @@ from ppafo.engine.outline import Outline
 from ppafo.engine.program import Program, link_program
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import Collector, SourceCollector, woven
-from ppafo.metrics.catalog import METRICS
+from ppafo.metrics import METRICS
 from ppafo.metrics.metric import WALK, MetricKind, Readings
 from ppafo.model.columns import over_runs
 from ppafo.simulation.ensemble.running import ThermalTotals, Totals, has_channels, thermal_totals, totals

@@ -13,8 +13,8 @@ from ppafo.exports import filled, licence, template
 from ppafo.exports.firmware.catalog import target_of
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.plant import plant_parameters
+from ppafo.simulation.declaration import quantity_text
 from ppafo.simulation.plan import fixed_controller, plan_run, profile_bounds
-from ppafo.simulation.reading import quantity_text
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.c99 import c_source, documents_of
 from ppafo.translation.typed import INT, Row

@@ -12,9 +12,8 @@ import numpy as np
 
 from ppafo.errors import ScenarioError
 from ppafo.exports import filled, template
-from ppafo.gait.opensim_names import opensim_recording
 from ppafo.signals import Channel, Recording
-from ppafo.storage.opensim import opensim_bytes
+from ppafo.storage.opensim import opensim_bytes, opensim_recording
 from ppafo.version import __version__
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult

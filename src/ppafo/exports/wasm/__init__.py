@@ -87,10 +87,9 @@ from ppafo.exports.c_library.program import IN_PARTS, TOGETHER, WHOLE, ExportedP
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, Term, itself
-from ppafo.parameters.overrides import SOURCE
-from ppafo.parameters.parameter_set import Entry, atmospheric_pressure, entry_in_si
-from ppafo.simulation.building import is_of_device, set_name, split_override
+from ppafo.parameters.parameter_set import SOURCE, Entry, atmospheric_pressure, entry_in_si
 from ppafo.simulation.declaration import SEED, value_at
+from ppafo.simulation.loading import is_of_device, set_name, split_override
 from ppafo.simulation.numbers import HELD_ANGLE, TIMES
 from ppafo.simulation.scenario import Scenario, worn_kind
 from ppafo.translation.native import asked, complaint

@@ -147,7 +147,7 @@ def turned_forward(table: MotionTable) -> MotionTable:
 
 
 def _own_columns(table: MotionTable, foot: str) -> dict[str, object]:
-    """Return the maps of what this package writes for OpenSim beside its coordinates (``gait/opensim_names.py``)."""
+    """Return the maps of what this package writes for OpenSim beside its coordinates (``storage/opensim.py``)."""
     found: dict[str, object] = {}
     if f"shank_angle_{foot}" in table.columns:
         found["shank_angle"] = ShankMap(terms=(f"shank_angle_{foot}",))

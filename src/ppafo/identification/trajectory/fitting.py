@@ -36,8 +36,7 @@ from ppafo.identification.trajectory.search import Optimum, Sensor, optimum, wei
 from ppafo.identification.trajectory.uncertainty import Evidence, Misfit, Uncertainty, estimate_of, uncertainty_of
 from ppafo.parameters.device import Device
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.signals.channels import CHANNELS
-from ppafo.signals.recording import Channel, Recording, RecordingKind
+from ppafo.signals.recording import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.simulation.scenario import Scenario
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from ppafo.documents.models import NAME, StrictTable, Text, Texts, make_schema, 
 from ppafo.documents.toml_text import TomlKind, beside
 from ppafo.errors import StudyError, UnitError, first_twice, nearest_name, refused_as
 from ppafo.loading import load_scenario, placed
-from ppafo.metrics.catalog import METRICS
+from ppafo.metrics import METRICS
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, is_within

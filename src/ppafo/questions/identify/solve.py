@@ -22,8 +22,7 @@ from ppafo.identification.trajectory.section import solve_section
 from ppafo.identification.trajectory.tolerances import Tolerances, tolerances_of
 from ppafo.parameters.device import VANE
 from ppafo.parameters.loading import load_parameter_set
-from ppafo.parameters.overrides import apply_overrides
-from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, chosen_valve
+from ppafo.parameters.parameter_set import ParameterSet, apply_overrides, atmospheric_pressure, chosen_valve
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.identify.answer import Beforehand, Identification, _bench_estimates
 from ppafo.storage.foreign import read_foreign

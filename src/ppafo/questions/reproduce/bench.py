@@ -32,15 +32,15 @@ from ppafo.identification.source import Source
 from ppafo.parameters import ParameterSet, load_device, load_parameter_set
 from ppafo.parameters import apply_overrides as apply_to_set
 from ppafo.parameters.audit.evidence import Interval, digits
-from ppafo.parameters.overrides import SOURCE as OVERRIDE
+from ppafo.parameters.parameter_set import SOURCE as OVERRIDE
 from ppafo.parameters.parameter_set import Entry, number_in_si, number_text
 from ppafo.parameters.publications.publication import paper_entries
 from ppafo.questions.reproduce.claim import PRINTED_DIGITS, Claim, Printed, Verdict, stated_claim
 from ppafo.rig import record
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
-from ppafo.simulation.building import apply_overrides
 from ppafo.simulation.declaration import quantities
+from ppafo.simulation.loading import apply_overrides
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
 from ppafo.validation import RecordingAgreement, ReplaySettings, compare_recording
 from ppafo.validation.agreement import measured_values

@@ -20,9 +20,15 @@ from ppafo.questions.reproduce.publication import ALL, SEED, check_study, run_st
 from ppafo.questions.reproduce.step_response import Levels, step_events, step_observations
 from ppafo.questions.reproduce.torque_task import control_claims, torque_task_claims, torque_task_observations
 from ppafo.questions.unreported.solve import infer_settings
-from ppafo.simulation.building import apply_overrides, is_of_device, scenario_paths, split_override, unknown_value
 from ppafo.simulation.declaration import value_at
-from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.loading import (
+    apply_overrides,
+    is_of_device,
+    load_scenario,
+    scenario_paths,
+    split_override,
+    unknown_value,
+)
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate
 

@@ -24,7 +24,7 @@ from ppafo.answers.writing import files_of
 from ppafo.errors import DataError, StudyError, nearest_name
 from ppafo.questions.question import Solved
 from ppafo.questions.sweep.manifest import RUNS_FOLDER, TRAJECTORIES_FOLDER, chunk_file
-from ppafo.signals.channels import CHANNELS
+from ppafo.signals.recording import CHANNELS
 from ppafo.storage.parquet import as_numpy, read_parquet
 from ppafo.storage.places import Place
 from ppafo.studies.distributions import Floats

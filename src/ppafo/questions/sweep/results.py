@@ -33,7 +33,7 @@ from ppafo.questions.sweep.manifest import (
     read_manifest,
     varied_columns,
 )
-from ppafo.signals.channels import CHANNELS
+from ppafo.signals.recording import CHANNELS
 from ppafo.simulation.ensemble import EnsembleResult, run_ensemble
 from ppafo.simulation.numbers import absolute
 from ppafo.storage.parquet import TableColumn, encode_texts, lists_of, parquet_bytes, table_of, texts_of_some

@@ -57,7 +57,7 @@ from ppafo.questions.sweep.results import (
     stored_unit,
     write_chunk,
 )
-from ppafo.signals.channels import CHANNELS
+from ppafo.signals.recording import CHANNELS
 from ppafo.storage.parquet import TableColumn, encode_texts, parquet_bytes, table_of
 from ppafo.storage.places import Place, place_at
 from ppafo.studies.distributions import Floats

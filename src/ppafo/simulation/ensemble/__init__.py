@@ -10,7 +10,7 @@ from ppafo.engine.lane_samples import TRACED
 from ppafo.engine.lanes import Floats, load_programs
 from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError, nearest_name
-from ppafo.metrics.catalog import METRICS
+from ppafo.metrics import METRICS
 from ppafo.metrics.metric import MetricKind
 from ppafo.simulation.ensemble.planning import EnsemblePlan, plan_ensemble
 from ppafo.simulation.ensemble.running import REFERENCE, Outcome, Request, intervals, offered, samples_of

@@ -18,6 +18,7 @@ from ppafo.parameters.building import actuator_problem, beyond_pressures, consis
 from ppafo.parameters.device import VANE
 from ppafo.parameters.plant import switches_of
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock
+from ppafo.simulation.declaration import limits, quantity_text
 from ppafo.simulation.motion import TOLERANCE, profile_problem
 from ppafo.simulation.numbers import (
     HELD_ANGLE,
@@ -30,7 +31,6 @@ from ppafo.simulation.numbers import (
     varied_scenario,
 )
 from ppafo.simulation.plan import plan_runs, profile_bounds
-from ppafo.simulation.reading import limits, quantity_text
 from ppafo.simulation.scenario import FreeMotion, MotionKind, ProfileChoice, Scenario, vane_motion, worn_kind
 
 _WHOLE = ("sensors.seed", "wearer.person")

@@ -15,7 +15,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.errors import ScenarioError
-from ppafo.metrics.catalog import METRICS
+from ppafo.metrics import METRICS
 from ppafo.metrics.gas import ENERGIES
 from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, WALK, MetricKind, Readings
 from ppafo.model.gas import energy_per_content

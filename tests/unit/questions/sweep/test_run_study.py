@@ -19,7 +19,7 @@ from ppafo.questions.sweep.answer import StudyResults
 from ppafo.questions.sweep.manifest import estimate_bytes, stored_bins
 from ppafo.questions.sweep.results import Task, compute_chunk, load_study_results, stored_unit
 from ppafo.questions.sweep.solve import LOG, sweep
-from ppafo.signals.channels import CHANNELS
+from ppafo.signals.recording import CHANNELS
 from ppafo.storage.places import DiskFolder
 from ppafo.studies.loading import load_study
 

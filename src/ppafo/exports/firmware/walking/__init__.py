@@ -33,7 +33,7 @@ from ppafo.exports.firmware.lock_step import Comparison, Cost, PythonChip, compa
 from ppafo.exports.firmware.simulators import ChipSimulator, Decision, chip_simulator
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
-from ppafo.simulation.reading import quantity_text
+from ppafo.simulation.declaration import quantity_text
 from ppafo.simulation.sampled import run_sampled, state_row_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.version import __version__

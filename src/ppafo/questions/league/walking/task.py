@@ -9,8 +9,8 @@ from ppafo.control.walking.catalog import WALKING_CONTROLLERS, keeps_time
 from ppafo.control.walking.phases import PHASE_QUANTITIES
 from ppafo.control.walking.signs import SAFETY_QUANTITIES
 from ppafo.errors import ScenarioError, nearest_name, one_line
-from ppafo.simulation.building import split_override
 from ppafo.simulation.declaration import PERIOD, RATE
+from ppafo.simulation.loading import split_override
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
