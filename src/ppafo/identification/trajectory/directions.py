@@ -14,7 +14,7 @@ import numpy as np
 
 from ppafo.identification.trajectory.information import inverse_with_root, solution
 from ppafo.identification.trajectory.posterior import whiten
-from ppafo.identification.trajectory.problem import TIME_OFFSET, ZERO_OF
+from ppafo.identification.trajectory.problem import TIME_OFFSET, ZERO_OF, with_numbers
 from ppafo.identification.trajectory.residuals import (
     Floats,
     PreparedExperiment,
@@ -35,7 +35,7 @@ from ppafo.identification.trajectory.sensor_noise import (
 )
 from ppafo.model.catalog import find_effects
 from ppafo.parameters.plant import effects_of
-from ppafo.simulation.numbers import number_at, with_numbers
+from ppafo.simulation.numbers import number_at
 from ppafo.simulation.recorded import COMMAND
 from ppafo.simulation.scenario import FreeMotion, Scenario, Thermal
 
@@ -283,10 +283,10 @@ def _of_model(found: WhitenedFit) -> list[list[Column]]:
     find_effects(path for direction in EFFECT_DIRECTIONS for path in direction.neutral)
     fitted = [_fitted(one, residuals, point) for one in residuals.experiments]
     made = []
-    effects = [one for one in EFFECT_DIRECTIONS if any(_can_have(item.scenario, one) for item in fitted)]
-    for together, prepare in ((effects, _as_it_is), ((HEAT,), _with_heat)):
+    effects = [one for one in EFFECT_DIRECTIONS if any(can_have(item.scenario, one) for item in fitted)]
+    for together, prepare in ((effects, as_it_is), ((HEAT,), with_heat)):
         sizes = [(direction, size) for direction in together for size in direction.sizes]
-        parts = [_changes(one, sizes, prepare) for one in fitted]
+        parts = [changes_with(one, sizes, prepare) for one in fitted]
         changes = list(np.concatenate(parts).T)
         for direction in together:
             found_at = [(size, change) for (one, size), change in zip(sizes, changes, strict=True) if one is direction]
@@ -345,23 +345,24 @@ def _fitted(prepared: PreparedExperiment, residuals: Residuals, point: Floats) -
     return replace(prepared, scenario=with_numbers(prepared.scenario, numbers), time_offset=offset)
 
 
-def _can_have(scenario: Scenario, direction: Direction) -> bool:
+def can_have(scenario: Scenario, direction: Direction) -> bool:
     """Return whether an effect can be tried: a free vane, the valve that it needs, and it is not on already."""
     is_on = any(effect.name == direction.name for effect in effects_of(scenario.device))
     fits = not direction.valve or scenario.device.valve.kind == direction.valve
     return isinstance(scenario.motion, FreeMotion) and fits and not is_on
 
 
-def _as_it_is(scenario: Scenario) -> Scenario | None:
+def as_it_is(scenario: Scenario) -> Scenario | None:
+    """Return the scenario itself."""
     return scenario
 
 
-def _with_heat(scenario: Scenario) -> Scenario | None:
+def with_heat(scenario: Scenario) -> Scenario | None:
     """Return the scenario with gas whose temperature follows from its energy, None where it has it already."""
     return None if scenario.thermal is not None else replace(scenario, thermal=Thermal(1.0, WALLS))
 
 
-def _changes(
+def changes_with(
     prepared: PreparedExperiment,
     sizes: Sequence[tuple[Direction, float]],
     prepare: Callable[[Scenario], Scenario | None],
@@ -369,7 +370,7 @@ def _changes(
     """Return the changes of the channels over their noise (samples, sizes), 0 where an effect cannot be."""
     count = sum(len(channel.values) for channel in prepared.channels)
     scenario = prepare(prepared.scenario)
-    used = [place for place, (one, _) in enumerate(sizes) if one is HEAT or _can_have(prepared.scenario, one)]
+    used = [place for place, (one, _) in enumerate(sizes) if one is HEAT or can_have(prepared.scenario, one)]
     found = np.zeros((count, len(sizes)))
     if scenario is None or not used:
         return found

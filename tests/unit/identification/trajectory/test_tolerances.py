@@ -9,7 +9,7 @@ import pytest
 
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import IdentificationError
-from ppafo.identification.trajectory import Experiment, FreeParameter, TrajectoryProblem, fit
+from ppafo.identification.trajectory import Experiment, FreeParameter, Search, TrajectoryProblem, fit
 from ppafo.identification.trajectory import residuals as trajectory_residuals
 from ppafo.identification.trajectory.fitting import residuals_of
 from ppafo.identification.trajectory.problem import number_at, with_numbers
@@ -143,7 +143,8 @@ def test_errors_of_the_bench_are_taken_for_those_only_where_they_are_stated(
     experiments = (on_bench(planned["there"], 5000.0, 1), on_bench(planned["low"], -5500.0, 2))
     free = (FreeParameter("foot_plate.inertia", start=0.009), FreeParameter("friction.viscous_damping"))
     plain = fit(TrajectoryProblem(free, experiments))
-    stated = fit(TrajectoryProblem((*free, *tolerance_parameters(STATED, experiments, free)), experiments))
+    added = tolerance_parameters(STATED, experiments, free)
+    stated = fit(TrajectoryProblem((*free, *added), experiments, Search(directions=True)))
     inertia = number_at(planned["there"], "foot_plate.inertia")
     without, with_them = plain.estimate("foot_plate.inertia"), stated.estimate("foot_plate.inertia")
     assert not without.low <= inertia <= without.high
