@@ -45,7 +45,11 @@ class Entry(StrictTable):
     note: Annotated[str, Field(description="reason, conflict or remark")] = ""
     uncertainty: Annotated[float | None, Field(ge=0.0, description="half width of the 95 % interval, same unit")] = None
     key: Annotated[
-        str, Field(description="statement that gives the number: 'PUBLICATION/ID', with which it is audited")
+        str,
+        Field(
+            description="statement that gives the number, with which it is audited: 'PUBLICATION/ID' or "
+            "'PUBLICATION/ID.ARGUMENT'"
+        ),
     ] = ""
 
 

@@ -22,10 +22,7 @@ def check_statements(evidence: Evidence) -> Iterator[Finding]:
         name, _, identifier = entry.key.partition("/")
         if not entry.key:
             continue
-        stated = {}
-        if name in FILE.names():
-            claims = read_publication(name)[0].claims
-            stated = {claim.id: (claim.published, claim.unit) for claim in claims if claim.published is not None}
+        stated = _stated_numbers(name) if name in FILE.names() else {}
         number, unit = stated.get(identifier, (math.nan, ""))
         if number == entry.value and unit == entry.unit:
             continue
@@ -41,6 +38,21 @@ def check_statements(evidence: Evidence) -> Iterator[Finding]:
                 "number, or by the key of the statement that is meant (ppafo reproduce --list)."
             ),
         )
+
+
+def _stated_numbers(name: str) -> dict[str, tuple[float, str]]:
+    """Return number and unit of each statement of a publication by its id, and of its arguments by ``ID.ARGUMENT``."""
+    found = {}
+    for claim in read_publication(name)[0].claims:
+        if claim.published is not None:
+            found[claim.id] = (claim.published, claim.unit)
+        for argument, text in claim.arguments.items():
+            number, _, unit = text.partition(" ")
+            try:
+                found[f"{claim.id}.{argument}"] = (float(number), unit)
+            except ValueError:
+                continue  # The name of chambers.
+    return found
 
 
 # Does every value have the dimension that its equation needs?

@@ -7,7 +7,7 @@ import numpy as np
 
 from ppafo.parameters.publications.publication import ClaimEntry, paper_entries
 from ppafo.questions.reproduce.bench import NoEvidence, SyntheticEvidence, step_error_values
-from ppafo.questions.reproduce.claim import Claim
+from ppafo.questions.reproduce.claim import Claim, load_printed
 from ppafo.questions.reproduce.torque_task import control_values
 from ppafo.questions.unreported.answer import Family, weighted_quantiles
 from ppafo.questions.unreported.settings import EVIDENCE, OBSERVABLES, STEP_RUN, Floats, effective, step_columns
@@ -50,8 +50,9 @@ def _of_likeliest(draws: Mapping[str, Floats], synthetic: SyntheticEvidence | No
 
 
 def unread(claims: Sequence[str]) -> list[ClaimEntry]:
-    """Return the statements of the paper that neither the claims and observations of these ids nor completions test."""
-    read = {*claims, *(entry.id for entry in EVIDENCE)}
+    """Return the statements of the paper that nothing reads: none of these claims, no completion and no set."""
+    of_sets = {entry.key.partition("/")[2] for entry in load_printed().parameter_set.numbers.values()}
+    read = {*claims, *(entry.id for entry in EVIDENCE), *of_sets}
     return [entry for entry in paper_entries().values() if entry.id not in read]
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from ppafo.parameters import apply_overrides, load_parameter_set
+from ppafo.parameters import apply_overrides, list_sets, load_parameter_set
 from ppafo.parameters.audit import Finding, audit
 
 BASE = load_parameter_set("ppafo2011")
@@ -221,6 +221,25 @@ def with_key(path: str, key: str) -> list[Finding]:
 def test_a_value_with_the_key_of_a_statement_is_the_number_that_this_states() -> None:
     assert BASE.numbers["reported.walking_torque"].key == "jrrd-2011/peak_torque_printed_volume"
     assert with_key("reported.walking_torque", "jrrd-2011/torque_at_rest") == []
+    assert with_key("reported.walking_torque_pressure", "jrrd-2011/torque_at_rest.pressure") == []
+    (found,) = with_key("reported.walking_torque_pressure", "jmd-2016/rated_torque.pressure")
+    assert "which has 120 psi_g" in found.paragraph
+
+
+WITHOUT_A_FILE = ("Zillen 2021", "Nesler, Swift and Rouse")
+"""Publications of which no statement is tested."""
+
+
+@pytest.mark.parametrize("name", list_sets())
+def test_every_published_number_of_a_shipped_set_names_its_statement(name: str) -> None:
+    numbers = load_parameter_set(name).numbers
+    unnamed = [
+        path
+        for path, entry in numbers.items()
+        if entry.origin == "published" and not entry.key and not entry.source.startswith(WITHOUT_A_FILE)
+    ]
+    assert unnamed == []
+    assert not [found for found in audit(load_parameter_set(name)) if found.id.endswith("-against-statement")]
 
 
 @pytest.mark.parametrize(
