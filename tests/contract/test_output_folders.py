@@ -137,10 +137,13 @@ def test_own_earlier_result_is_replaced_whole_and_holds_nothing_else(
     assert main(words_of(name, out)) == 0
     first = contents(out)
     (stray,) = [path for path in sorted(out.iterdir()) if path.name != MARK][:1]
-    stray.write_text("an earlier one")
+    stray.write_text("mine now")
+    assert main(words_of(name, out)) == 2
+    assert f"({stray.name})" in capsys.readouterr().err
+    assert stray.read_text() == "mine now"
+    stray.unlink()
     assert main(words_of(name, out)) == 0
     assert set(contents(out)) == set(first)
-    assert stray.read_text() != "an earlier one"
     (out / "notes.txt").write_text("mine")
     before = contents(out)
     assert main(words_of(name, out)) == 2
@@ -163,7 +166,7 @@ def test_mark_that_names_no_files_lets_nothing_be_replaced(tmp_path: Path, capsy
     out = tmp_path / "out"
     assert main(["parts", "--out", str(out)]) == 0
     document = json.loads((out / MARK).read_text())
-    (out / MARK).write_text(json.dumps(document | {"files": 3}))
+    (out / MARK).write_text(json.dumps(document | {"sha256": 3}))
     assert main(["parts", "--out", str(out)]) == 2
 
 

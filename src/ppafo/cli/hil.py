@@ -1,12 +1,13 @@
 """``ppafo hil SCENARIO --port PORT``: a scenario's plant in real time against a controller at a wire."""
 
 import argparse
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ppafo.cli import output
-from ppafo.errors import ScenarioError
+from ppafo.errors import ScenarioError, UnitError
 from ppafo.exports.hil.wire import DEFAULT_BAUD, FORMS, HIGHEST_RATE, LOWEST_RATE, RATE
 
 if TYPE_CHECKING:
@@ -14,8 +15,8 @@ if TYPE_CHECKING:
     from ppafo.simulation.scenario import Scenario
 
 EXIT_INTERRUPTED = 130
-_LONGEST_PATIENCE = 3600.0
-_DEFAULT_PATIENCE = 10.0
+LONGEST_PATIENCE = 3600.0
+_DEFAULT_PATIENCE = "10 s"
 _PER_THOUSAND = 1.0e3
 _SAME = 1.0e-9
 PORT_HELP = f"{FORMS} (extra 'hil')"
@@ -40,10 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--patience",
-        metavar="S",
-        type=float,
+        metavar="TIME",
         default=_DEFAULT_PATIENCE,
-        help=f"how long the controller is called, in seconds (default: {_DEFAULT_PATIENCE:g})",
+        help=f"how long the controller is called (default: '{_DEFAULT_PATIENCE}')",
     )
     output.add_override_argument(parser)
     output.add_json_argument(parser)
@@ -61,15 +61,23 @@ def add_baud_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def check_patience(patience: float) -> None:
-    """Refuse a patience that is none."""
-    if not 0.0 < patience <= _LONGEST_PATIENCE:
-        raise ScenarioError(f"--patience {patience:g}: must be above 0, at most {_LONGEST_PATIENCE:g} s")
+def seconds_of(option: str, text: str, longest: float = math.inf) -> float:
+    """Return the time that an option gives, such as ``10 s``, in seconds. UnitError where it is none."""
+    from ppafo.units import parse_quantity
+
+    try:
+        seconds = parse_quantity(text, "s")
+    except UnitError as error:
+        raise UnitError(f"{option} {text}: {error}") from error
+    if not 0.0 < seconds <= longest:
+        limit = "" if math.isinf(longest) else f", at most {longest:g} s"
+        raise UnitError(f"{option} {text}: must be above 0 s{limit}")
+    return seconds
 
 
 def run(parsed: argparse.Namespace) -> int:
     """Run the plant to its end; 1 where it was vented or diverged, 130 where Ctrl-C stopped it."""
-    check_patience(parsed.patience)
+    parsed.patience = seconds_of("--patience", parsed.patience, LONGEST_PATIENCE)
     from ppafo.exports.hil.loop import stop_by_interrupt
     from ppafo.loading import load_scenario
     from ppafo.simulation.scenario import worn_kind

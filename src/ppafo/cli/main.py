@@ -193,6 +193,8 @@ def _stands_for(name: str, option: str) -> bool:
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 _LONGEST_MESSAGE = 1000
+_SAME_VALUE = {"controller.period": "controller.rate"}
+"""Values that are given by either of two names."""
 
 OBJECTS_BETWEEN_COLLECTIONS = 1_000_000
 """The usual 700 make Python look for garbage hundreds of times while it imports, which is a tenth of a start."""
@@ -267,14 +269,7 @@ def _run(words: list[str]) -> int:
         if parsed.command is None:
             print(FIRST_STEPS, file=sys.stderr)
             return EXIT_BAD_INPUT
-        # Refuse a value that is set twice: which one was meant is ambiguous.
-        overrides = getattr(parsed, "overrides", ())
-        given: dict[str, str] = {}
-        for override in overrides:
-            path, _, value = (part.strip() for part in override.partition("="))
-            if path in given:
-                raise UsageError(f"--set {path}: is given twice, as '{given[path]}' and as '{value}'; leave one out")
-            given[path] = value
+        _check_each_set_once(getattr(parsed, "overrides", ()))
         return int(parsed.run(parsed))
     except PpafoError as error:
         lines = [f"{len(error.parts)} things are wrong:", *error.parts] if error.parts else [str(error)]
@@ -283,6 +278,19 @@ def _run(words: list[str]) -> int:
     except KeyboardInterrupt as interrupt:
         print(f"ppafo: {str(interrupt) or 'interrupted; nothing is half written'}", file=sys.stderr)
         return EXIT_INTERRUPTED
+
+
+def _check_each_set_once(overrides: Sequence[str]) -> None:
+    """Refuse a value that is set twice, by its own name or by that of the value it is the inverse of."""
+    given: dict[str, tuple[str, str]] = {}
+    for override in overrides:
+        path, _, value = (part.strip() for part in override.partition("="))
+        before, other = given.get(_SAME_VALUE.get(path, path), ("", ""))
+        if before == path:
+            raise UsageError(f"--set {path}: is given twice, as '{other}' and as '{value}'; leave one out")
+        if before:
+            raise UsageError(f"--set {path}: the same as {before}, which is set to '{other}'; leave one out")
+        given[_SAME_VALUE.get(path, path)] = (path, value)
 
 
 def _readable(message: str) -> str:

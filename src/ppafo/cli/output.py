@@ -14,7 +14,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from ppafo.documents.json_text import json_text
-from ppafo.errors import DataError, reason
+from ppafo.errors import DataError, one_line, reason
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -178,14 +178,19 @@ def load_drawing() -> None:
     """Import matplotlib without what it does at import for others.
 
     It writes tables of settings into its documentation, and loads axes in three dimensions and the names of glyphs of
-    TeX; the latter are loaded when they are first used, the others never are here.
+    TeX; the latter are loaded when they are first used, the others never are here. DataError where a setting of the
+    user's own stops it.
     """
     if "matplotlib.artist" in sys.modules:
         return
     _load_late("fontTools.agl")
     # Its two lines about a folder that cannot be written say nothing of the result.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
-    import matplotlib.artist
+    try:
+        import matplotlib.artist
+    except ValueError as error:
+        settings = "its settings: MPLBACKEND in the environment, or a file matplotlibrc"
+        raise DataError(f"Matplotlib refuses {settings}: {one_line(error)}") from error
 
     flat = ModuleType(_AXES_IN_SPACE)
     flat.__dict__["Axes3D"] = None

@@ -32,7 +32,7 @@ def run(parsed: argparse.Namespace) -> int:
     from ppafo.answers.recording_figure import FIGURE_FORMATS
     from ppafo.answers.style import render_figure
     from ppafo.storage.files import write_file
-    from ppafo.storage.result_folder import add_to_marked_folder
+    from ppafo.storage.result_folder import add_to_folder
 
     if parsed.out is not None and parsed.out.suffix.removeprefix(".") not in FIGURE_FORMATS:
         allowed = ", ".join(f".{name}" for name in FIGURE_FORMATS)
@@ -58,7 +58,7 @@ def run(parsed: argparse.Namespace) -> int:
             for stem, figure in drawn.items()
             for form, content in render_figure(figure, _FORMATS).items()
         }
-        add_to_marked_folder(parsed.folder, files)
+        add_to_folder(parsed.folder, files)
         written = [str(parsed.folder / name) for name in files]
     output.print_result(f"written: {', '.join(written)}", {"files": written}, parsed.json)
     return output.EXIT_GOOD

@@ -1,19 +1,18 @@
 """``ppafo record --port PORT --out FILE.csv``: a recording from a bench that speaks the protocol."""
 
 import argparse
-import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ppafo.cli import output
-from ppafo.cli.hil import EXIT_INTERRUPTED, PORT_HELP, add_baud_argument, check_patience
-from ppafo.errors import DataError, UnitError, refused_as
+from ppafo.cli.hil import EXIT_INTERRUPTED, LONGEST_PATIENCE, PORT_HELP, add_baud_argument, seconds_of
+from ppafo.errors import DataError
 
 if TYPE_CHECKING:
     from ppafo.exports.hil.recording import Recorded
 
-_DEFAULT_PATIENCE = 5.0
+_DEFAULT_PATIENCE = "5 s"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,10 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--duration", metavar="TIME", help="end after this time of the bench, for example '10 s'")
     parser.add_argument(
         "--patience",
-        metavar="S",
-        type=float,
+        metavar="TIME",
         default=_DEFAULT_PATIENCE,
-        help=f"end, or give up, after so many seconds without a sample (default: {_DEFAULT_PATIENCE:g})",
+        help=f"end, or give up, after this time without a sample (default: '{_DEFAULT_PATIENCE}')",
     )
     output.add_json_argument(parser)
     parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="the .csv file to write")
@@ -36,8 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(parsed: argparse.Namespace) -> int:
     """Record until the bench or a person ends it; 1 where the port broke, 130 where Ctrl-C stopped it."""
-    check_patience(parsed.patience)
-    duration = _seconds(parsed.duration)
+    patience = seconds_of("--patience", parsed.patience, LONGEST_PATIENCE)
+    duration = None if parsed.duration is None else seconds_of("--duration", parsed.duration)
     output.check_new_file(parsed.out)
     if parsed.out.suffix != ".csv":
         raise DataError(f"--out {parsed.out}: must end in .csv")
@@ -46,15 +44,15 @@ def run(parsed: argparse.Namespace) -> int:
     with output.blame_out_option():
         check_files_can_be_added(parsed.out.parent, [parsed.out.name])
     from ppafo.exports.hil.loop import stop_by_interrupt
-    from ppafo.exports.hil.recording import record
+    from ppafo.exports.hil.recording import kept_aside, record
     from ppafo.exports.hil.wire import open_port
     from ppafo.storage.comma_separated import write_csv
 
     port = open_port(parsed.port, parsed.baud, listens=True)
     try:
         output.tell(f"listening at {parsed.port}")
-        with stop_by_interrupt() as is_stopped:
-            found = record(port, parsed.out.stem, duration, parsed.patience, is_stopped)
+        with stop_by_interrupt() as is_stopped, kept_aside(parsed.out) as keep:
+            found = record(port, parsed.out.stem, duration, patience, is_stopped, keep=keep)
             write_csv(parsed.out, found.recording)
         is_broken = bool(port.failure)
     finally:
@@ -77,18 +75,6 @@ def run(parsed: argparse.Namespace) -> int:
         print(f"ppafo: stopped; {parsed.out} is whole", file=sys.stderr)
         return EXIT_INTERRUPTED
     return output.EXIT_CHECK_FAILED if is_broken else output.EXIT_GOOD
-
-
-def _seconds(text: str | None) -> float | None:
-    if text is None:
-        return None
-    from ppafo.units import parse_quantity
-
-    with refused_as(UnitError, f"--duration {text}", UnitError):
-        seconds = parse_quantity(text, "s")
-    if not (seconds > 0.0 and math.isfinite(seconds)):
-        raise UnitError(f"--duration {text}: must be above 0 s")
-    return seconds
 
 
 def _document(found: "Recorded", path: Path) -> dict[str, Any]:

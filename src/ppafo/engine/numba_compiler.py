@@ -21,7 +21,7 @@ from typing import Any
 
 from ppafo.engine.plain_python import mistake, parse_module
 from ppafo.engine.source_text import without_origins
-from ppafo.errors import SimulationError
+from ppafo.errors import SimulationError, one_line
 
 _LENGTH = 24
 _SHARED: dict[str, Any] = {}
@@ -48,8 +48,8 @@ class NumbaCompiler:
 
     def described(self) -> str:
         """Its version, and that of LLVM."""
+        numba = _imported()
         import llvmlite.binding
-        import numba
 
         version = ".".join(map(str, llvmlite.binding.llvm_version_info))
         return f"Numba {numba.__version__} with LLVM {version}"
@@ -71,10 +71,29 @@ def numba_compiler() -> NumbaCompiler:
     return NumbaCompiler()
 
 
+def _imported() -> ModuleType:
+    """Import Numba; SimulationError where a setting of the user's own, in the environment or a file, stops it."""
+    settings = "its settings: NUMBA_... in the environment, or .numba_config.yaml in the working folder"
+    try:
+        import numba
+        from numba.core import config
+    except _errors_of_settings() as error:
+        raise SimulationError(f"Numba refuses {settings}: {one_line(error)}") from error
+    if getattr(config, "DISABLE_JIT", 0):
+        raise SimulationError(f"Numba compiles nothing, as DISABLE_JIT is set in {settings}")
+    return numba
+
+
+def _errors_of_settings() -> tuple[type[Exception], ...]:
+    """What Numba raises at its import: its own error, and that of PyYAML, with which it reads its file if it can."""
+    yaml = sys.modules.get("yaml")
+    return (ValueError,) if yaml is None else (ValueError, yaml.YAMLError)
+
+
 @cache
 def _identity() -> str:
     # Programs of another processor or version must not be taken for damaged ones.
-    import numba
+    numba = _imported()
     from numba.core.registry import cpu_target
 
     processor = cpu_target.target_context.codegen().magic_tuple()

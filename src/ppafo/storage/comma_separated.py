@@ -142,8 +142,12 @@ def write_csv(path: str | Path, recording: Recording) -> Path:
 
 def marked_csv_bytes(recording: Recording) -> bytes:
     """Return the table of a recording for a file that stands alone; it begins with its kind unless it was measured."""
-    mark = f"{_MARKS[recording.kind]}\n" if recording.kind in _MARKS else ""
-    return mark.encode() + csv_bytes(recording)
+    return mark_of(recording.kind).encode() + csv_bytes(recording)
+
+
+def mark_of(kind: RecordingKind) -> str:
+    """Return the line of comment with which a file begins whose recording was not measured; empty for the others."""
+    return f"{_MARKS[kind]}\n" if kind in _MARKS else ""
 
 
 def csv_bytes(recording: Recording) -> bytes:

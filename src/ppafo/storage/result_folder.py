@@ -1,21 +1,21 @@
 """Recordings from wherever they are, and result folders: NetCDF, CSV, and ``run.json`` with all that led to them.
 
-A folder is complete or not there. Only an empty folder or an earlier result is ever replaced.
-
-Folders that a command makes whole: it takes one that is absent, empty or its own from earlier, and no other. One that
-is taken ends up with exactly the new files; until they are all written it stays as it was.
+A folder is complete or not there: a command takes one that is absent, empty or its own from earlier, and no other. It
+ends up with exactly the new files; until they are all written it stays as it was. Its mark states the hash of each
+file, and only files that still have theirs are replaced: neither what somebody changed nor what a mark from elsewhere
+lists is ever removed.
 """
 
 import hashlib
 import os
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.json_text import json_document, json_text
+from ppafo.documents.regular_file import read_regular_file
 from ppafo.errors import DataError, one_line, reason, refused_as
 from ppafo.signals import Recording, recording_kind
 from ppafo.storage.comma_separated import csv_bytes, read_csv
@@ -30,54 +30,46 @@ _NAMED = 3
 
 @dataclass(frozen=True, slots=True)
 class FolderKind:
-    """What a command writes: what messages call it, the file by which it is recognised, the names of all its files.
+    """What a command writes: what messages call it, the file by which it is recognised, the hashes of all others.
 
-    ``files_of(folder)`` gives the names that an earlier run may have left; DataError where the mark is somebody else's.
-    ``earlier_files_of`` gives those of an earlier version that had another mark, none where there is no such result.
+    ``hashes_of(folder)`` gives the hashes that the mark states, by name; DataError where the mark is somebody else's.
     """
 
     noun: str
     mark: str
-    files_of: Callable[[Path], Collection[str]]
-    earlier_files_of: Callable[[Path], Collection[str]] = lambda _folder: ()
+    hashes_of: Callable[[Path], Mapping[str, str]]
 
 
 MARK = "ppafo.json"
 """The file by which the folder of a command is recognised that has no document of its own kind."""
 
 _FORMAT = "ppafo files"
-
-
-_FIGURES = ("figure-3-identification", "figure-7-step-response", "figure-8-torque-task", "unreported-settings")
-_EXPERIMENTS = ("step-response", "torque-task-solenoid", "torque-task-proportional")
-_UNMARKED: dict[str, dict[str, tuple[str, ...]]] = {
-    "reproduce": {
-        "claims.json": (
-            "report.html",
-            *(f"{name}.csv" for name in _EXPERIMENTS),
-            *(f"{name}.{ending}" for name in _FIGURES for ending in ("png", "svg")),
-        )
-    },
-    "endurance": {"endurance.json": ("endurance.md", "bottle.csv", "endurance.png", "endurance.svg")},
-    "walk": {"walk.json": (), "wearers.json": ()},
-}
-"""Commands whose folders of version 0.1 have another mark: its name, and the files beside it that it does not list."""
+_HASHES = "sha256"
 
 
 def marked_folder(command: str) -> FolderKind:
     """Return the kind of folder that a command writes which marks it by ``MARK``.
 
-    Its list of files is a DataError where another command wrote the folder.
+    Its hashes are a DataError where another command wrote the folder.
     """
 
-    def files_of(folder: Path) -> set[str]:
+    def hashes_of(folder: Path) -> Mapping[str, str]:
         if marking_command(folder) != command:
             raise DataError(f"{folder}: is not a result of 'ppafo {command}' (see {MARK}); choose another folder")
-        document = read_json(folder / MARK)
-        files = document.get("files")
-        return {MARK, *map(str, files if isinstance(files, list) else ())}
+        return _stated(folder / MARK, read_json(folder / MARK))
 
-    return FolderKind(f"result of 'ppafo {command}'", MARK, files_of, partial(_unmarked_files, command=command))
+    return FolderKind(f"result of 'ppafo {command}'", MARK, hashes_of)
+
+
+def _stated(mark: Path, document: Mapping[str, Any]) -> Mapping[str, str]:
+    """Return the hashes of files that a mark states; DataError for one of a version that stated none."""
+    hashes = document.get(_HASHES)
+    if not isinstance(hashes, dict):
+        raise DataError(
+            f"{mark}: states no hashes of its files, as earlier versions of ppafo did not; remove the folder yourself, "
+            "or choose another one"
+        )
+    return hashes
 
 
 def marking_command(folder: Path) -> str:
@@ -87,36 +79,32 @@ def marking_command(folder: Path) -> str:
     return str(document.get("command", "")) if is_own else ""
 
 
-def add_to_marked_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
-    """Write files into a folder, replacing those of the same names; where it has ``MARK``, they are listed in it."""
-    command = marking_command(folder) if (folder / MARK).is_file() else ""
-    mark = {}
-    if command:
-        files = sorted({*contents, *marked_folder(command).files_of(folder)} - {MARK})
-        mark = {MARK: f"{json_text(_mark(command, files))}\n".encode()}
-    add_files(folder, {**contents, **mark})
+def add_to_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
+    """Write files into a folder, replacing those of the same names; the mark of a command states them from then on."""
+    marks = {}
+    for name in (MARK, RUN_FILE):
+        document = read_json(folder / name) if (folder / name).is_file() else None
+        if isinstance(document, dict) and document.get("format") in (_FORMAT, FORMAT) and _HASHES in document:
+            document[_HASHES] = dict(sorted({**document[_HASHES], **_hashes(contents)}.items()))
+            document["files"] = sorted({*document["files"], *contents})
+            marks[name] = f"{json_text(document)}\n".encode()
+    add_files(folder, {**contents, **marks})
 
 
-def _mark(command: str, files: Collection[str]) -> dict[str, Any]:
-    return {"format": _FORMAT, "schema_version": 1, "command": command, "files": sorted(files)}
-
-
-def _unmarked_files(folder: Path, command: str) -> set[str]:
-    """Return the names in a folder that version 0.1 of a command wrote; none where it did not."""
-    for mark, beside in _UNMARKED.get(command, {}).items():
-        document = read_json(folder / mark) if (folder / mark).is_file() else None
-        is_own = isinstance(document, dict) and (
-            document.get("format") == f"ppafo {mark.removesuffix('.json')}" or isinstance(document.get("claims"), list)
-        )
-        if isinstance(document, dict) and is_own:
-            listed = document.get("files")
-            return {mark, *beside, *map(str, listed if isinstance(listed, list) else ())}
-    return set()
+def _hashes(contents: Mapping[str, bytes]) -> dict[str, str]:
+    return {name: _checksum(content) for name, content in sorted(contents.items())}
 
 
 def write_marked_folder(folder: Path, contents: Mapping[str, bytes], command: str) -> None:
     """Make a folder hold exactly these files and ``MARK``, where it is absent, empty or that command's own."""
-    marked = {**contents, MARK: f"{json_text(_mark(command, contents))}\n".encode()}
+    mark = {
+        "format": _FORMAT,
+        "schema_version": 1,
+        "command": command,
+        "files": sorted(contents),
+        _HASHES: _hashes(contents),
+    }
+    marked = {**contents, MARK: f"{json_text(mark)}\n".encode()}
     write_owned_folder(folder, marked, marked_folder(command))
 
 
@@ -147,15 +135,35 @@ def _check_own(folder: Path, kind: FolderKind) -> None:
     present = {entry.name for entry in _listed(folder)}
     if not present:
         return
-    own = kind.files_of(folder) if kind.mark in present else kind.earlier_files_of(folder)
-    if not own:
+    if kind.mark not in present:
         raise DataError(f"{folder}: is not empty and not a {kind.noun} (it has no {kind.mark}); choose another folder")
-    foreign = sorted(_foreign(folder, own))
+    hashes = kind.hashes_of(folder)
+    foreign = sorted(_foreign(folder, {*hashes, kind.mark}))
     if foreign:
-        shown = ", ".join(foreign[:_NAMED]) + (", ..." if len(foreign) > _NAMED else "")
         raise DataError(
-            f"{folder}: contains files that are not part of its {kind.noun} ({shown}); move them or use another folder"
+            f"{folder}: contains files that are not part of its {kind.noun} ({_some(foreign)}); move them or use "
+            "another folder"
         )
+    changed = sorted(name for name, stated in hashes.items() if _is_changed(folder / name, stated))
+    if changed:
+        raise DataError(
+            f"{folder}: contains files that were changed since its {kind.noun} was written ({_some(changed)}); move "
+            "them or use another folder"
+        )
+
+
+def _some(names: Sequence[str]) -> str:
+    return ", ".join(names[:_NAMED]) + (", ..." if len(names) > _NAMED else "")
+
+
+def _is_changed(path: Path, stated: str) -> bool:
+    """Tell whether a file is there and has another hash than the one that was stated."""
+    if not os.path.lexists(path):
+        return False
+    try:
+        return _checksum(read_regular_file(path)) != stated
+    except OSError:
+        return True  # a link to nowhere, a pipe: not what was written
 
 
 def _listed(folder: Path) -> list[Path]:
@@ -181,8 +189,6 @@ CSV_FILE = "recording.csv"
 FORMAT = "ppafo result"
 SCHEMA_VERSION = 1
 
-_KNOWN_FILES = (RUN_FILE, NETCDF_FILE, CSV_FILE, "figure.png", "figure.svg")
-
 
 @dataclass(frozen=True, slots=True, repr=False)
 class StoredResult:
@@ -207,6 +213,7 @@ def write_result(
         "format": FORMAT,
         "schema_version": SCHEMA_VERSION,
         "files": sorted([*contents, RUN_FILE]),
+        _HASHES: _hashes(contents),
         "recording": {
             "label": recording.label,
             "samples": len(recording),
@@ -257,12 +264,11 @@ def read_document(folder: str | Path) -> dict[str, Any]:
     return document
 
 
-def _files_of(folder: Path) -> set[str]:
-    """Return the names that an earlier result may have: its own list, and figures drawn since."""
-    return {*_KNOWN_FILES, *map(str, read_document(folder)["files"])}
+def _hashes_of(folder: Path) -> Mapping[str, str]:
+    return _stated(folder / RUN_FILE, read_document(folder))
 
 
-_RESULT = FolderKind("ppafo result", RUN_FILE, _files_of)
+_RESULT = FolderKind("ppafo result", RUN_FILE, _hashes_of)
 
 
 WALK_RECORDING = "recording.nc"

@@ -36,10 +36,18 @@ from ppafo.translation.typed import FLOAT, INT, LIBRARY, Array, Scalar, Type
 from ppafo.translation.walk import entries_of, walk_module
 
 
-def asked(line: Sequence[str], remedy: str = "", folder: str | None = None) -> "subprocess.CompletedProcess[str]":
-    """What a compiler says and how it ends, run in ``folder``; CompilerError, with a remedy, if it cannot be run."""
+def asked(
+    line: Sequence[str], remedy: str = "", folder: str | None = None, scratch: Path | None = None
+) -> "subprocess.CompletedProcess[str]":
+    """What a compiler says and how it ends, run in ``folder``; CompilerError, with a remedy, if it cannot be run.
+
+    ``scratch`` is where it has its temporary files, which it leaves there when it is killed.
+    """
+    kept = None if scratch is None else {**os.environ, **dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(scratch))}
     try:
-        return subprocess.run(line, cwd=folder, capture_output=True, encoding="utf-8", errors="replace", check=False)
+        return subprocess.run(
+            line, cwd=folder, env=kept, capture_output=True, encoding="utf-8", errors="replace", check=False
+        )
     except OSError as error:
         raise CompilerError(f"{line[0]} cannot be run: {reason(error)}{remedy and '; '}{remedy}") from error
 
@@ -314,7 +322,7 @@ def _compiled(source: str, folder: Path, command: Sequence[str], flags: Sequence
     written.write_text(source, encoding="utf-8")
     position = () if sys.platform == "win32" else ("-fPIC",)
     line = [*command, *flags, "-shared", *position, str(written), "-o", str(library), "-lm"]
-    done, name = asked(line), Path(command[0]).name
+    done, name = asked(line, scratch=folder), Path(command[0]).name
     if done.returncode in _INTERRUPTED:
         raise SimulationError(f"{name} was interrupted")  # by the same key as this process: it works all the same
     if done.returncode != 0:

@@ -29,6 +29,10 @@ def test_without_a_command_it_says_where_to_start(capsys: pytest.CaptureFixture[
             ["simulate", "step-response", "--set", "run.duration=1 s", "--set", "run.duration = 2 s"],
             "--set run.duration: is given twice, as '1 s' and as '2 s'; leave one out",
         ),
+        (
+            ["simulate", "step-response", "--set", "controller.rate=1 kHz", "--set", "controller.period=1 ms"],
+            "--set controller.period: the same as controller.rate, which is set to '1 kHz'; leave one out",
+        ),
         (["simulat"], "there is no command 'simulat', did you mean 'simulate'?"),
         (["--bogus"], "there is no option '--bogus'; available: --help, --version, -h"),
         (["--bogus", "simulate", "step-response"], "there is no option '--bogus'"),

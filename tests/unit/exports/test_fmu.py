@@ -153,7 +153,9 @@ def test_a_state_that_is_restored_goes_on_with_the_same_bits(instance: Instance,
 def test_a_state_of_something_else_is_refused_and_changes_nothing(instance: Instance, unit: str) -> None:
     instance.go_to(0.1)
     given = instance.kept()
-    for wrong in (given[:100], given[:-8], bytes(len(given)), given[:40] + b"\xff" * 8 + given[48:]):
+    damaged = bytearray(given)
+    damaged[-20] ^= 1  # a number of the run, which is still one
+    for wrong in (given[:100], given[:-8], bytes(len(given)), given[:40] + b"\xff" * 8 + given[48:], bytes(damaged)):
         with pytest.raises(Exception, match=r"De[sS]erializeFMU[sS]tate"):
             instance.restored(wrong)
     other = Instance(unit)
@@ -167,15 +169,24 @@ STEPS_DONE, STEPS_PER_SAMPLE, SAMPLE_COUNT, TAKEN, SHOWN = range(2, 7)
 
 
 def changed(kept: bytes, word: int, value: bytes) -> bytes:
-    """A state with another value in a word of its run."""
+    """A state with another value in a word of its run, and a hash that fits."""
     size = kept[40:48]
-    at = kept.index(size, len(kept) - int.from_bytes(size, "little")) + 8 * word
-    return kept[:at] + value + kept[at + 8 :]
+    at = kept.index(size, len(kept) - 8 - int.from_bytes(size, "little")) + 8 * word
+    return sealed(kept[:at] + value + kept[at + 8 :])
+
+
+def sealed(kept: bytes) -> bytes:
+    """A state with the FNV-1a hash of its bytes in place of its own."""
+    found = 14695981039346656037
+    for byte in kept[:-8]:
+        found = (found ^ byte) * 1099511628211 % 2**64
+    return kept[:-8] + found.to_bytes(8, "little")
 
 
 def test_a_state_whose_counts_cannot_be_is_refused(instance: Instance, unit: str) -> None:
     instance.go_to(0.1)
     given = instance.kept()
+    assert sealed(given) == given
     assert int.from_bytes(changed(given, SHOWN, given[:8])[48:56], "little") == 2  # the phase: it runs
     whole = {
         STEPS_DONE: (-1,),
@@ -187,12 +198,12 @@ def test_a_state_whose_counts_cannot_be_is_refused(instance: Instance, unit: str
     }
     bad = [changed(given, word, struct.pack("<q", value)) for word, values in whole.items() for value in values]
     bad += [changed(given, -1, struct.pack("<d", value)) for value in (0.0, -1.0, math.nan, math.inf)]
-    bad += [given[:48] + struct.pack("<q", phase) + given[56:] for phase in (-1, 4)]
+    bad += [sealed(given[:48] + struct.pack("<q", phase) + given[56:]) for phase in (-1, 4)]
     begun = Instance(unit)
     early = begun.slave
     early.reset()
     fresh = begun.kept()
-    bad.append(fresh[:56] + bytes(8) + fresh[64:])  # nothing is stale, and there is no run
+    bad.append(sealed(fresh[:56] + bytes(8) + fresh[64:]))  # nothing is stale, and there is no run
     for wrong in bad:
         with pytest.raises(Exception, match=r"De[sS]erializeFMU[sS]tate"):
             instance.restored(wrong)

@@ -238,7 +238,7 @@ def test_ctrl_c_vents_writes_the_log_whole_and_ends_with_130(
 
 
 def test_where_nobody_answers_nothing_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["hil", TASK, "--port", f"udp:127.0.0.1:{free_port()}", "--patience", "0.05", "--set", SHORT]
+    words = ["hil", TASK, "--port", f"udp:127.0.0.1:{free_port()}", "--patience", "0.05 s", "--set", SHORT]
     assert main([*words, "--out", str(tmp_path / "out")]) == 2
     last = capsys.readouterr().err.splitlines()[-1]
     assert last == "ppafo: no controller answers within 0.05 s; came in: nothing"

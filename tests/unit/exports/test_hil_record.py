@@ -2,8 +2,12 @@
 
 import random
 import socket
+import subprocess
+import sys
 import threading
 import time
+import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +17,8 @@ from hypothesis import strategies as st
 
 from ppafo.cli.main import main
 from ppafo.errors import DataError
-from ppafo.exports.hil.recording import Recorded, record
-from ppafo.exports.hil.wire import COMPUTED, OVER, WRAP, Answer, Sample, answer_bytes, count_of, sample_bytes
+from ppafo.exports.hil.recording import Collector, Recorded, kept_aside, record
+from ppafo.exports.hil.wire import COMPUTED, OVER, WRAP, Answer, Reader, Sample, answer_bytes, count_of, sample_bytes
 from ppafo.storage import read_recording
 from ppafo.storage.comma_separated import write_csv
 from tests.virtual_wire import free_port, sending_bench
@@ -217,7 +221,7 @@ def test_whoever_sends_first_is_not_the_bench_unless_it_sends_a_packet(
     stranger = threading.Thread(target=send_garbage)
     stranger.start()
     time.sleep(0.05)
-    words = ["record", "--port", f"udp:127.0.0.1:{port}", "--patience", "20", "--out", str(tmp_path / "bench.csv")]
+    words = ["record", "--port", f"udp:127.0.0.1:{port}", "--patience", "20 s", "--out", str(tmp_path / "bench.csv")]
     try:
         with sending_bench(port, 0.5):
             assert main(words) == 0
@@ -255,12 +259,82 @@ def test_a_file_that_is_there_is_not_replaced(tmp_path: Path, capsys: pytest.Cap
     assert path.read_bytes() == before
 
 
+@pytest.mark.parametrize("order", ["as sent", "shuffled"])
+def test_what_came_is_kept_aside_while_it_is_recorded(order: str, tmp_path: Path) -> None:
+    packets = [packet(number) for number in range(3000)]
+    if order == "shuffled":
+        packets = [packet(number + (1 if number % 2 == 0 else -1)) for number in range(3000)]
+    tape, aside = Tape(packets), tmp_path / "aside.csv"
+    with aside.open("w", encoding="utf-8") as file:
+        whole = record(tape, "aside", None, 1.0, clock=tape.clock, keep=file.write).recording
+    kept, whole = (
+        {(time, *values) for time, *values in zip(one.time, *(one[name] for name in one.names), strict=True)}
+        for one in (read_recording(aside), whole)
+    )
+    assert kept <= whole
+    assert len(kept) > 2490  # all but the last half second, and the few that were overtaken as it was written
+
+
+def _fail(keep: Callable[[str], None]) -> None:
+    keep("time [s],angle [rad]\n0.0,1.0\n")
+    raise DataError("no room")
+
+
+def test_a_recording_whose_file_cannot_be_written_stays_aside(tmp_path: Path) -> None:
+    target = tmp_path / "bench.csv"
+    with (
+        pytest.raises(DataError, match=r"no room; what came is in .*bench\.recording\.csv$"),
+        kept_aside(target) as keep,
+    ):
+        _fail(keep)
+    assert len(read_recording(tmp_path / "bench.recording.csv")) == 1
+    with (
+        pytest.raises(DataError, match=r"bench\.recording\.csv: is there; .* rename it to keep it"),
+        kept_aside(target),
+    ):
+        pass
+    with pytest.raises(KeyboardInterrupt), kept_aside(tmp_path / "other.csv"):
+        raise KeyboardInterrupt
+    assert {path.name for path in tmp_path.iterdir()} == {"bench.recording.csv"}
+
+
+@pytest.mark.long
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL here")
+def test_a_recording_that_is_killed_loses_a_second(tmp_path: Path) -> None:
+    port = free_port()
+    words = ["record", "--port", f"udp:127.0.0.1:{port}", "--out", "bench.csv"]
+    with subprocess.Popen([sys.executable, "-m", "ppafo", *words], cwd=tmp_path, stderr=subprocess.PIPE) as process:
+        assert process.stderr is not None
+        assert b"listening" in process.stderr.readline()
+        aside = tmp_path / "bench.recording.csv"
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bench:
+            for number in range(10_000):
+                bench.sendto(packet(number), ("127.0.0.1", port))
+                time.sleep(0.001)
+                if number % 100 == 0 and aside.read_bytes().count(b"\n") > 1000:
+                    break
+        process.kill()
+    assert len(read_recording(aside)) >= 1000
+    assert not (tmp_path / "bench.csv").exists()
+
+
+def test_an_hour_of_samples_needs_little_memory() -> None:
+    collector, first = Collector(), packet(0)
+    collector.take(*Reader(is_stream=False).take(first))
+    tracemalloc.start()
+    for number in range(1, 20_001):
+        collector.take(*Reader(is_stream=False).take(packet(number)))
+    grown = tracemalloc.get_traced_memory()[0]
+    tracemalloc.stop()
+    assert grown / 20_000 < 200.0
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         (["--duration", "10"], "--duration 10: "),
         (["--duration", "-1 s"], "--duration -1 s: must be above 0 s"),
-        (["--patience", "0"], "--patience 0: must be above 0"),
+        (["--patience", "0 s"], "--patience 0 s: must be above 0 s"),
         (["--out", "bench.txt"], "--out bench.txt: must end in .csv"),
     ],
 )

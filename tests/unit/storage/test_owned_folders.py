@@ -1,6 +1,7 @@
 """Folders that a command makes whole: one policy for results and reproductions."""
 
 import errno
+import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -46,29 +47,31 @@ def test_an_earlier_reproduction_is_replaced_whole(tmp_path: Path) -> None:
     assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
 
 
-@pytest.mark.parametrize(
-    ("command", "left"),
-    [
-        ("reproduce", {CLAIMS: b'{"claims": [1]}', "report.html": b"", "figure-7-step-response.png": b""}),
-        ("endurance", {"endurance.json": b'{"format": "ppafo endurance"}', "bottle.csv": b""}),
-        ("walk", {"walk.json": b'{"format": "ppafo walk", "files": ["walk.json", "legs.gif"]}', "legs.gif": b""}),
-        ("walk", {"wearers.json": b'{"format": "ppafo wearers", "files": ["wearers.csv"]}', "wearers.csv": b""}),
-    ],
-)
-def test_a_result_of_version_0_1_is_replaced_but_not_with_files_of_others(
-    command: str, left: dict[str, bytes], tmp_path: Path
-) -> None:
+def test_only_files_whose_hash_the_mark_states_are_removed(tmp_path: Path) -> None:
+    # A folder from elsewhere, whose mark lists the name of a file of the user's.
     out = tmp_path / "out"
+    write_reproduction(tmp_path / "theirs", {"thesis.txt": b"theirs"})
     out.mkdir()
-    for name, content in left.items():
-        (out / name).write_bytes(content)
-    check_owned_folder(out, marked_folder(command))
-    (out / "notes.txt").write_text("mine")
-    with pytest.raises(DataError, match=r"contains files that are not part of its .* \(notes\.txt\)"):
-        check_owned_folder(out, marked_folder(command))
-    (out / "notes.txt").unlink()
-    write_marked_folder(out, WHOLE, command)
+    (out / MARK).write_bytes((tmp_path / "theirs" / MARK).read_bytes())
+    (out / "thesis.txt").write_text("years of work")
+    changed = r"files that were changed since its result of 'ppafo reproduce' was written \(thesis\.txt\)"
+    with pytest.raises(DataError, match=changed):
+        write_reproduction(out, WHOLE)
+    (out / "thesis.txt").unlink()
+    (out / "thesis.txt").symlink_to("nowhere")
+    with pytest.raises(DataError, match=changed):
+        write_reproduction(out, WHOLE)
+    (out / "thesis.txt").unlink()
+    write_reproduction(out, WHOLE)
     assert contents(out) == WHOLE
+
+
+def test_a_mark_without_hashes_removes_nothing(tmp_path: Path) -> None:
+    mark = {"format": "ppafo files", "schema_version": 1, "command": "reproduce", "files": ["thesis.txt"]}
+    (tmp_path / MARK).write_text(json.dumps(mark))
+    (tmp_path / "thesis.txt").write_text("years of work")
+    with pytest.raises(DataError, match=r"states no hashes of its files, .* remove the folder yourself"):
+        write_reproduction(tmp_path, WHOLE)
 
 
 def test_folders_inside_a_result_are_its_own_and_what_others_put_into_them_is_not(tmp_path: Path) -> None:
@@ -97,7 +100,7 @@ def claims_of_somebody_else(folder: Path) -> str:
 
 def claims_that_are_no_json(folder: Path) -> str:
     (folder / CLAIMS).write_text("mine")
-    return r"claims\.json: is not JSON"
+    return r"is not empty and not a result of 'ppafo reproduce'"
 
 
 def a_reproduction_and_notes(folder: Path) -> str:
@@ -168,8 +171,8 @@ def test_folder_that_cannot_be_renamed_is_refused_before_anything_runs(
 ) -> None:
     out = tmp_path / "out"
     out.mkdir()
-    for name, content in there.items():
-        (out / name).write_bytes(content)
+    if there:
+        write_reproduction(out, there)
     rename = Path.rename
 
     def busy(self: Path, target: Path) -> Path:

@@ -157,6 +157,18 @@ def test_a_compiler_that_fails_halfway_is_said_in_one_line_and_leaves_nothing(
     assert list(fresh_cache.iterdir()) == []
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="the compiler is a shell script")
+def test_temporary_files_of_a_compiler_that_is_killed_are_with_what_it_was_to_make(tmp_path: Path) -> None:
+    killed = tmp_path / "cc"
+    killed.write_text('#!/bin/sh\ntouch "$TMPDIR/program-1.o"\nkill -9 $$\n', encoding="utf-8")
+    killed.chmod(0o700)
+    aside = tmp_path / "aside"
+    aside.mkdir()
+    with pytest.raises(CompilerError):
+        native.build("int one(void) { return 1; }", aside, [str(killed)])
+    assert (aside / "program-1.o").exists()
+
+
 def test_what_has_no_c_is_refused() -> None:
     with pytest.raises(ProgramError, match="cannot be translated"):
         native.translated_text(NO_C)

@@ -1,20 +1,28 @@
 """A recording from a bench that speaks the protocol: its samples, put in order, as channels over time."""
 
+import contextlib
+import os
 import time
+from array import array
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import final
 
 import numpy as np
 
-from ppafo.errors import DataError
+from ppafo.errors import DataError, reason
 from ppafo.exports.hil import wire
 from ppafo.signals import CHANNELS as KNOWN
-from ppafo.signals import Channel, Recording
+from ppafo.signals import Channel, Recording, RecordingKind
+from ppafo.storage.comma_separated import mark_of
 
 MOST_SAMPLES = 5_000_000
+ASIDE = ".recording"
+"""Stands before the ending of a file that is being recorded."""
 _LISTENING = 0.1
+_BETWEEN_KEEPING = 0.5
 _HALF = wire.WRAP // 2
 
 
@@ -39,12 +47,21 @@ class Collector:
     """Samples of one run of a bench, by number; the first one says which run, and which channels."""
 
     def __init__(self) -> None:
-        self.samples: dict[int, wire.Sample] = {}
         self.ignored: Counter[str] = Counter()
         self.is_over = False
         self._first: wire.Sample | None = None
         self._newest = 0
+        self._newest_stamp = 0
         self._elapsed = 0
+        self._is_computed = False
+        # In the order in which they came, as plain numbers: an hour of a bench has millions of samples.
+        self._numbers, self._stamps, self._counts = array("q"), array("Q"), array("i")
+        self._seen: set[int] = set()
+        self._kept = 0
+        self._last_kept: tuple[int, int, int] | None = None
+
+    def __len__(self) -> int:
+        return len(self._numbers)
 
     def take(self, packet: wire.Packet) -> bool:
         """Look at a good packet; true where it is a new sample."""
@@ -57,7 +74,7 @@ class Collector:
                 self.ignored["without a channel"] += 1
                 return False
             self._first = first = packet
-            self._newest = packet.sequence
+            self._newest, self._newest_stamp = packet.sequence, packet.time
         if packet.run != first.run:
             self.ignored["of another run"] += 1
             return False
@@ -66,14 +83,18 @@ class Collector:
             self.ignored["with other channels"] += 1
             return False
         number = self._newest + _difference(packet.sequence, self._newest)
-        if number in self.samples:
+        if number in self._seen:
             self.ignored["doubled"] += 1
             return False
         if number > self._newest:
             # From sample to sample: half of what a time stamp holds is 36 minutes, and a recording may be longer.
-            self._elapsed += _difference(packet.time, self.samples[self._newest].time)
-            self._newest = number
-        self.samples[number] = packet
+            self._elapsed += _difference(packet.time, self._newest_stamp)
+            self._newest, self._newest_stamp = number, packet.time
+        self._is_computed = self._is_computed or bool(packet.flags & wire.COMPUTED)
+        self._seen.add(number)
+        self._numbers.append(number)
+        self._stamps.append(packet.time)
+        self._counts.extend(packet.counts.values())
         return True
 
     @property
@@ -86,23 +107,56 @@ class Collector:
 
         A sample whose time does not go on from the one before is left out and counted.
         """
-        kept: list[wire.Sample] = []
+        kept: list[int] = []
         times: list[int] = []
-        for number in sorted(self.samples):
-            sample = self.samples[number]
-            moment = sample.time if not times else times[-1] + _difference(sample.time, times[-1])
+        for place in np.argsort(np.array(self._numbers), kind="stable").tolist():
+            moment = self._stamps[place] if not times else times[-1] + _difference(self._stamps[place], times[-1])
             if times and moment <= times[-1]:
                 self.ignored["of a clock that went back"] += 1
                 continue
             times.append(moment)
-            kept.append(sample)
-        names = list(kept[0].counts)
-        values = {name: np.array([wire.value_of(name, sample.counts[name]) for sample in kept]) for name in names}
-        channels = {name: Channel(values[name], KNOWN[name].unit) for name in names}
-        computed = any(sample.flags & wire.COMPUTED for sample in kept)
+            kept.append(place)
+        counts = np.array(self._counts).reshape(len(self), -1)[kept]
+        channels = {
+            name: Channel(column / wire.counts_per_unit(name), KNOWN[name].unit)
+            for name, column in zip(self._names, counts.T, strict=True)
+        }
         time_axis = (np.array(times, dtype=np.float64) - times[0]) / wire.MICROSECONDS
-        lost = max(self.samples) - min(self.samples) + 1 - len(self.samples)
-        return Recording(label, time_axis, channels, "simulated" if computed else "measured"), lost
+        lost = max(self._numbers) - min(self._numbers) + 1 - len(self)
+        return Recording(label, time_axis, channels, self._kind), lost
+
+    def fresh_lines(self) -> str:
+        """What came since the last call as lines of a CSV file, which begins with its heading; for a file aside.
+
+        A sample that was overtaken by lines of an earlier call is not among them.
+        """
+        lines = []
+        if self._first is not None and self._last_kept is None:
+            headings = ["time [s]", *(f"{name} [{KNOWN[name].unit}]" for name in self._names)]
+            lines.append(f"{mark_of(self._kind)}{','.join(headings)}\n")
+        fresh = sorted(range(self._kept, len(self)), key=self._numbers.__getitem__)
+        self._kept = len(self)
+        width = len(self._names)
+        for place in fresh:
+            number, stamp = self._numbers[place], self._stamps[place]
+            before, stamp_before, elapsed = self._last_kept or (number, stamp, 0)
+            step = _difference(stamp, stamp_before)
+            if self._last_kept is not None and (number <= before or step <= 0):
+                continue
+            elapsed += step
+            self._last_kept = (number, stamp, elapsed)
+            counts = self._counts[place * width : (place + 1) * width]
+            values = map(wire.value_of, self._names, counts)
+            lines.append(",".join([repr(elapsed / wire.MICROSECONDS), *map(repr, values)]) + "\n")
+        return "".join(lines)
+
+    @property
+    def _names(self) -> list[str]:
+        return list(self._first.counts) if self._first is not None else []
+
+    @property
+    def _kind(self) -> RecordingKind:
+        return "simulated" if self._is_computed else "measured"
 
 
 def _difference(later: int, earlier: int) -> int:
@@ -117,20 +171,25 @@ def record(
     patience: float,
     is_stopped: Callable[[], bool] = lambda: False,
     clock: Callable[[], float] = time.perf_counter,
+    keep: Callable[[str], None] = lambda _lines: None,
 ) -> Recorded:
     """Record what a bench sends: for a time of the bench [s], until it says that it is over, or until it is silent.
 
-    ``patience`` [s] is how long silence lasts. DataError where no sample came.
+    ``patience`` [s] is how long silence lasts. Once a second ``keep`` gets what came as lines of a CSV file, so that
+    little is lost with this process. DataError where no sample came.
     """
     reader, collector = wire.Reader(port.is_stream), Collector()
-    heard = clock()
+    heard = kept = clock()
     ended = ""
     while not ended:
         data = port.receive(_LISTENING)
         fresh = [collector.take(packet) for packet in reader.take(data)]
         heard = clock() if any(fresh) else heard
+        if clock() - kept >= _BETWEEN_KEEPING:
+            keep(collector.fresh_lines())
+            kept = clock()
         ended = _why_ended(collector, port, duration, clock() - heard >= patience, is_stopped())
-    if not collector.samples:
+    if not collector:
         if is_stopped():
             raise KeyboardInterrupt("interrupted before a sample came; nothing is written")
         others = [*collector.ignored.items(), ("of somebody else", port.strangers)]
@@ -140,16 +199,58 @@ def record(
     return Recorded(recording, lost, reader.refused, collector.ignored, port.strangers, ended, is_stopped())
 
 
+@contextlib.contextmanager
+def kept_aside(target: Path) -> Iterator[Callable[[str], None]]:
+    """A file beside the one to be written that takes lines as they come, and goes away where all is written.
+
+    Where writing fails or is interrupted it stays, and the error says so. One that is there was left by a process that
+    was killed: DataError says what may be done with it.
+    """
+    aside = target.with_name(f"{target.stem}{ASIDE}{target.suffix}")
+    try:
+        file = os.open(aside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+    except FileExistsError:
+        raise DataError(
+            f"{aside}: is there; it has what an earlier recording kept that was killed, or one that goes on: "
+            "rename it to keep it, or remove it"
+        ) from None
+    except OSError as error:
+        raise DataError(f"{aside}: cannot be written: {reason(error)}") from error
+    is_full = False
+
+    def keep(lines: str) -> None:
+        # A disk that is full ends no recording: what came is in memory too.
+        nonlocal is_full
+        if lines and not is_full:
+            try:
+                os.write(file, lines.encode())
+            except OSError:
+                is_full = True
+
+    left = ""
+    try:
+        yield keep
+    except (DataError, KeyboardInterrupt) as error:
+        if os.fstat(file).st_size:
+            left = f"; what came is in {aside}"
+            raise type(error)(f"{str(error) or 'interrupted'}{left}") from error
+        raise
+    finally:
+        os.close(file)
+        if not left:
+            aside.unlink(missing_ok=True)
+
+
 def _why_ended(collector: Collector, port: wire.Port, duration: float | None, is_silent: bool, is_stopped: bool) -> str:
     """What ends a recording now; empty while it goes on."""
     if is_stopped:
         return "stopped"
-    if duration is not None and collector.samples and collector.duration >= duration:
+    if duration is not None and collector and collector.duration >= duration:
         return "its duration"
     if collector.is_over:
         return "the bench said that it is over"
     if port.failure:
         return port.failure
-    if len(collector.samples) >= MOST_SAMPLES:
+    if len(collector) >= MOST_SAMPLES:
         return f"{MOST_SAMPLES} samples"
     return "silence of the bench" if is_silent else ""

@@ -105,8 +105,12 @@ def count_of(name: str, value: float) -> int:
 
 def value_of(name: str, counts: int) -> float:
     """SI value of counts of a channel; the nearest float to the decimal fraction that they are."""
-    per_unit = round(1.0 / CHANNELS[_NUMBERS[name]].scale)
-    return counts / per_unit
+    return counts / counts_per_unit(name)
+
+
+def counts_per_unit(name: str) -> int:
+    """Counts of a channel for 1 in its SI unit; a quotient by it is rounded once, a product with the scale twice."""
+    return round(1.0 / CHANNELS[_NUMBERS[name]].scale)
 
 
 def sample_bytes(sample: Sample) -> bytes:

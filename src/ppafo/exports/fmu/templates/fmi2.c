@@ -201,7 +201,7 @@ fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
 {
     (void)c;
-    *size = size_of_state(state);
+    *size = size_outside(state);
     return fmi2OK;
 }
 

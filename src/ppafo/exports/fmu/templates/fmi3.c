@@ -306,7 +306,7 @@ fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
 fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t *size)
 {
     (void)instance;
-    *size = size_of_state(FMUState);
+    *size = size_outside(FMUState);
     return fmi3OK;
 }
 

@@ -337,10 +337,36 @@ static bool keep_state(unit *item, void **kept)
     return true;
 }
 
+/* Bytes outside this unit end with their FNV-1a hash: a file may be damaged in a number that is still a number. */
+static uint64_t hash_of(const void *bytes, size_t size)
+{
+    const unsigned char *given = (const unsigned char *)bytes;
+    uint64_t hash = UINT64_C(14695981039346656037);
+    size_t index;
+    for (index = 0; index < size; index++) {
+        hash = (hash ^ given[index]) * UINT64_C(1099511628211);
+    }
+    return hash;
+}
+
+static size_t size_outside(const void *kept)
+{
+    return size_of_state(kept) + sizeof(uint64_t);
+}
+
 static bool state_from(unit *item, const void *bytes, size_t size, void **kept)
 {
     void *made;
     unit tried;
+    uint64_t hash;
+    if (size < sizeof(hash)) {
+        return refuse(item, "this is no state of this unit");
+    }
+    size -= sizeof(hash);
+    memcpy(&hash, (const char *)bytes + size, sizeof(hash));
+    if (hash != hash_of(bytes, size)) {
+        return refuse(item, "this is no state of this unit, or one that was changed");
+    }
     memset(&tried, 0, sizeof(tried));
     if (!read_state(&tried, bytes, size)) {
         return refuse(item, "%s", tried.said);
@@ -357,9 +383,12 @@ static bool state_from(unit *item, const void *bytes, size_t size, void **kept)
 
 static bool state_to(unit *item, void *kept, void *bytes, size_t size)
 {
-    if (size < size_of_state(kept)) {
-        return refuse(item, "the state has %lu bytes", (unsigned long)size_of_state(kept));
+    const size_t own = size_of_state(kept);
+    const uint64_t hash = hash_of(bytes_in(kept), own);
+    if (size < size_outside(kept)) {
+        return refuse(item, "the state has %lu bytes", (unsigned long)size_outside(kept));
     }
-    memcpy(bytes, bytes_in(kept), size_of_state(kept));
+    memcpy(bytes, bytes_in(kept), own);
+    memcpy((char *)bytes + own, &hash, sizeof(hash));
     return true;
 }
