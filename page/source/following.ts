@@ -13,6 +13,27 @@ function nearestWhole(value: number): number {
 const stepUnlessGiven = (duration: number, period: number) => Math.min(duration, period, LONGEST_STEP);
 const dividingStep = (period: number, step: number) => period / Math.max(1, Math.ceil((period / step) * (1 - RELATIVE)));
 
+const UNIVERSAL_GAS_CONSTANT = 8.314;
+const REFERENCE_DENSITY = 1.185;
+const REFERENCE_TEMPERATURE = 293.15;
+const AIR_CONSTANT = 1e5 / (REFERENCE_DENSITY * REFERENCE_TEMPERATURE);
+
+const gasProduct = (mass: number, temperature: number) => (UNIVERSAL_GAS_CONSTANT / mass) * temperature;
+const criticalRatio = (k: number) => (2 / (k + 1)) ** (k / (k - 1));
+
+/** R T times the conductance Cd A C1 of an area. */
+function flowOfArea(mass: number, k: number, temperature: number, area: number, discharge: number): number {
+  const product = gasProduct(mass, temperature);
+  const choked = Math.sqrt(k / product) * (2 / (k + 1)) ** ((k + 1) / (2 * (k - 1)));
+  return product * discharge * area * choked;
+}
+
+/** R T times a sonic conductance of ISO 6358, for a gas other than air too. */
+function flowOfSonic(mass: number, temperature: number, sonic: number): number {
+  const air = sonic * REFERENCE_DENSITY * Math.sqrt(REFERENCE_TEMPERATURE / temperature);
+  return gasProduct(mass, temperature) * air * Math.sqrt(AIR_CONSTANT / (UNIVERSAL_GAS_CONSTANT / mass));
+}
+
 const RULES: Readonly<Record<string, (...given: number[]) => number>> = {
   "clock.step_unless_given": (duration = 0, period = 0) => stepUnlessGiven(duration, period),
   "clock.step_with_output": (duration = 0, period = 0, output = 0) => Math.min(stepUnlessGiven(duration, period), output),
@@ -23,6 +44,15 @@ const RULES: Readonly<Record<string, (...given: number[]) => number>> = {
   "solenoid.no_dead_time": () => 0,
   "proportional.lag": (_band = 0, delay = 0, frequency = 0, damping = 0, slew = 0) =>
     delay + (frequency > 0 ? (2 * damping) / (TURN * frequency) : 0) + (slew > 0 ? 1 / slew : 0),
+  "graph.itself": (number = 0) => number,
+  "gas.critical_pressure_ratio": (k = 0) => criticalRatio(k),
+  "nominal.flow_of_area": (mass = 0, k = 0, temperature = 0, area = 0, discharge = 0) => flowOfArea(mass, k, temperature, area, discharge),
+  "nominal.flow_of_sonic": (mass = 0, temperature = 0, sonic = 0) => flowOfSonic(mass, temperature, sonic),
+  "nominal.per_content": (number = 0, mass = 0, temperature = 0) => number / gasProduct(mass, temperature),
+  "nominal.as_content": (number = 0, mass = 0, temperature = 0) => number * gasProduct(mass, temperature),
+  "nominal.time_of_joint": (joining = 0, holding = 0) => joining + holding,
+  "nominal.yes": () => 1,
+  "nominal.no": () => 0,
   "proportional.dead_time": (_band = 0, delay = 0) => delay,
 };
 

@@ -19,7 +19,7 @@ from ppafo.model.regulator import SupplyLines
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.graph import Follows, Graph, Term
-from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE, Reading, kind_at, value_at
+from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE, SUPPLY_LINES, Reading, kind_at, line_paths, value_at
 from ppafo.simulation.loading import (
     Hardware,
     Layout,
@@ -33,6 +33,7 @@ from ppafo.simulation.loading import (
     scenario_of,
     split_override,
 )
+from ppafo.simulation.numbers import device_number_at
 from ppafo.simulation.scenario import Assumption, Control, MotionKind, Origin, Scenario, Sensors
 from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk, rules
@@ -65,6 +66,7 @@ from ppafo.walking.motion import (
     walk_of,
     with_duration,
 )
+from ppafo.walking.nominal import nominal_terms
 from ppafo.walking.planning import NO_REFERENCE, course_of_walk, noise, plan_walks, switches, walking_valve
 from ppafo.walking.preparation import FaultSettings, SensorSettings
 from ppafo.walking.result import lacks, measured
@@ -137,7 +139,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     settings = _sensor_settings(reading)
     # Which settings of controller and timing follow others because the file does not give them.
     timing = timing_settings(timing_of(reading.document))
-    found = links_of_defaults({"controller": law.quantities, "timing": timing}, device)
+    found = links_of_defaults({"controller": law.quantities, "timing": timing}, device, lines)
     links = {path: links for path, links in found.items() if value_at(reading.document, path) is None}
     _check_timing(law, reading)
     motion = WalkMotion(
@@ -164,7 +166,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         motion=motion,
         initial_pressure_1=supply.atmospheric_pressure,
         initial_pressure_2=supply.atmospheric_pressure,
-        control=_control(reading, law, device, settings, links),
+        control=_control(reading, law, device, lines, settings, links),
         reference=NO_REFERENCE,
         sensors=_sensors(reading, settings),
         assumptions=_assumed(reading, carried),
@@ -233,13 +235,20 @@ def _check_timing(law: ControllerKind, reading: Reading) -> None:
 
 
 def _settings(
-    reading: Reading, law: ControllerKind, device: Device, sensors: SensorSettings, links: Graph
+    reading: Reading,
+    law: ControllerKind,
+    device: Device,
+    lines: SupplyLines | None,
+    sensors: SensorSettings,
+    links: Graph,
 ) -> dict[str, float]:
     """Return the settings of controller and timing [SI]; what is not given may follow valve and sensors."""
     present = {f"valve.{name}": number for name, number in device.valve.settings.items()}
     present |= {f"sensors.{name}": number for name, number in sensors.numbers.items()}
     sections = {"controller": law.quantities, "timing": timing_settings(timing_of(reading.document))}
     found: dict[str, float] = {}
+    present |= _of_lines(lines)
+    present |= {path: device_number_at(device, path) for path in _followed(links, present)}
     for section, items in sections.items():
         paths = {f"{section}.{item.name}": item for item in items}
         known = (with_default(item, path, links, present.__getitem__) for path, item in paths.items())
@@ -247,11 +256,31 @@ def _settings(
     return found
 
 
-def _control(reading: Reading, law: ControllerKind, device: Device, sensors: SensorSettings, links: Graph) -> Control:
+def _control(
+    reading: Reading,
+    law: ControllerKind,
+    device: Device,
+    lines: SupplyLines | None,
+    sensors: SensorSettings,
+    links: Graph,
+) -> Control:
     """Return the controller with its settings and those of its timing and its converter."""
-    settings = _settings(reading, law, device, sensors, links) | _converter(reading, law)
+    settings = _settings(reading, law, device, lines, sensors, links) | _converter(reading, law)
     arithmetic = value_at(reading.document, ARITHMETIC) or FLOAT
     return Control(law.name, settings, _period(reading), arithmetic=arithmetic)
+
+
+def _of_lines(lines: SupplyLines | None) -> dict[str, float]:
+    """Return the numbers of supply lines by path, none without lines."""
+    if lines is None:
+        return {}
+    numbered = {line: number for number, line in enumerate(SUPPLY_LINES, start=1)}
+    return {path: getattr(lines, f"{path.split('.')[2]}_{numbered[path.split('.')[1]]}") for path in line_paths()}
+
+
+def _followed(links: Graph, present: Mapping[str, Any]) -> set[str]:
+    """Return the numbers of the device that settings follow."""
+    return {source for found in links.values() for link in found for source in link.sources} - set(present)
 
 
 def _converter(reading: Reading, law: ControllerKind) -> dict[str, float]:
@@ -348,9 +377,9 @@ def lag_of_bandwidth(bandwidth: float) -> float:
     return 1.0 / (_TURN * bandwidth) if bandwidth > 0.0 else 0.0
 
 
-def links_of_defaults(sections: Mapping[str, Iterable[Quantity]], device: Device) -> Graph:
+def links_of_defaults(sections: Mapping[str, Iterable[Quantity]], device: Device, lines: SupplyLines | None) -> Graph:
     """Return the links of the quantities of some sections whose defaults follow others, by path."""
-    terms = _terms(device.valve)
+    terms = _terms(device.valve) | nominal_terms(device, lines)
     return {
         f"{section}.{item.name}": (Follows(tuple(terms[name] for name in item.follows), item.default or 0.0),)
         for section, items in sections.items()

@@ -15,7 +15,8 @@ Signs are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep
 
 from typing import NamedTuple
 
-from ppafo.control.walking import signs
+from ppafo.control.walking import observer, signs
+from ppafo.control.walking.observer import Observer
 from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT, VENTS_ABOVE
@@ -70,6 +71,7 @@ class SafetyState(NamedTuple):
     toe_strides: float
     steady: float
     valve_times: ValveTimes
+    observer: Observer
     emptying: signs.Emptying
     slow_pressure_1: float
     slow_pressure_2: float
@@ -87,6 +89,7 @@ START = SafetyState(
     toe_strides=0.0,
     steady=0.0,
     valve_times=ValveTimes(0.0, 0.0, 0.0),
+    observer=observer.START,
     emptying=signs.NOT_EMPTYING,
     slow_pressure_1=0.0,
     slow_pressure_2=0.0,
@@ -149,7 +152,9 @@ def steady_sign(rules: signs.SafetyRules, before: PhaseState, phase: PhaseState,
 
 
 def valve_sign(rules: signs.SafetyRules, now: SafetyState, phase: PhaseState, measurement: GaitMeasurement) -> float:
-    """The sign of a pressure that is not what the valve was told long enough.
+    """The sign of a pressure that is not what the valve was commanded long enough, by limits that no device decides.
+
+    The observer of the chambers needs but one of them, against what it expects: a pressure that a vented chamber shows.
 
     A foot in the air or on its toes presses gas out of a vented chamber: those are judged while it stands flat. There
     the ankle compresses chamber 1, which may vent for longer than ``vent_time`` through a narrow valve, but does vent.
@@ -159,12 +164,16 @@ def valve_sign(rules: signs.SafetyRules, now: SafetyState, phase: PhaseState, me
     no_rise_1 = (valve_times.filling_1 > rules.fill_time) & (measurement.pressure_1 < rules.filled_pressure)
     no_rise_2 = (valve_times.filling_2 > rules.fill_time) & (measurement.pressure_2 < rules.filled_pressure)
     stands = (phase.phase == MID_STANCE) & (phase.heel.loaded > 0.5)
-    left = signs.holds_pressure(rules, measurement.pressure_1, now.slow_pressure_1)
-    left = left | signs.holds_pressure(rules, measurement.pressure_2, now.slow_pressure_2)
+    expected_1, expected_2 = now.observer.chamber_1.pressure, now.observer.chamber_2.pressure
+    left = signs.holds_pressure(rules, measurement.pressure_1, expected_1, now.slow_pressure_1)
+    left = left | signs.holds_pressure(rules, measurement.pressure_2, expected_2, now.slow_pressure_2)
+    held = stands & (valve_times.venting > rules.vent_time) & left
     late = (valve_times.venting > LATE * rules.vent_time) & (measurement.pressure_2 > rules.filled_pressure)
-    no_fall = stands & ((valve_times.venting > rules.vent_time) & left | late)
+    no_fall = held | (stands & late)
     found = signs.NO_FALL if no_fall | (now.emptying.rising > signs.LASTS) else signs.NO_SIGN
-    return signs.NO_RISE if no_rise_1 | no_rise_2 else found
+    found = signs.NO_RISE if no_rise_1 | no_rise_2 else found
+    observed = signs.PRESSURE_SENSOR if held else signs.NO_SIGN
+    return observed if rules.nominal.nominal_flow > 0.0 else found
 
 
 def next_good_strides(state: SafetyState, before: PhaseState, phase: PhaseState, sign: float) -> float:
@@ -213,6 +222,17 @@ def remembered(
         stance=next_stance(state.stance, before, phase, period),
         toe_strides=(state.toe_strides + 1.0 if on_toes else 0.0) if enters else state.toe_strides,
         steady=steady,
+        observer=observer.next_observer(
+            rules.nominal,
+            state.observer,
+            state.readings.angle,
+            state.readings.pressure_1,
+            state.readings.pressure_2,
+            measurement.angle,
+            measurement.pressure_1,
+            measurement.pressure_2,
+            period,
+        ),
         emptying=signs.next_emptying(rules, state.emptying, vented, measurement, period),
         slow_pressure_1=signs.next_slow_pressure(state.slow_pressure_1, measurement.pressure_1, period),
         slow_pressure_2=signs.next_slow_pressure(state.slow_pressure_2, measurement.pressure_2, period),
@@ -238,7 +258,10 @@ def found_sign(
     sign = signs.first_sign(signs.still_sign(rules, now.readings, before, phase), sign)
     sign = signs.first_sign(signs.gone_sign(rules, last, measurement, period), sign)
     sign = signs.first_sign(signs.range_sign(rules, measurement, now.thin), sign)
-    return signs.first_sign(valve_sign(rules, now, phase, measurement), sign)
+    sign = signs.first_sign(valve_sign(rules, now, phase, measurement), sign)
+    pressure_1, pressure_2 = measurement.pressure_1, measurement.pressure_2
+    cause = observer.found_cause(rules.nominal, now.observer, measurement.angle, pressure_1, pressure_2, period)
+    return signs.first_sign(cause, sign)
 
 
 def monitor(
@@ -296,4 +319,4 @@ def safe_command(state: SafetyState, phase: float, command: float, period: float
         feed_time(state.valve_times.filling_2, -opening, period),
         state.valve_times.venting + period if vents else 0.0,
     )
-    return sent, state._replace(valve_times=valve_times)
+    return sent, state._replace(valve_times=valve_times, observer=state.observer._replace(command=sent))

@@ -14,6 +14,17 @@ Signs are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from ppafo.control.walking.observer import (
+    LEAK,
+    NOMINAL_QUANTITIES,
+    SUPPLY_HIGH,
+    SUPPLY_LOST,
+    SUPPLY_LOW,
+    VALVE_OPEN,
+    VALVE_SHUT,
+    NominalDevice,
+    pressure_above,
+)
 from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, lifts
 from ppafo.model.declaration import PRESSURE_LAG, VALVE_LAG, Quantity
 from ppafo.model.sensors import GaitMeasurement
@@ -29,25 +40,27 @@ ANGLE_RANGE = 2.0
 PRESSURE_RANGE = 3.0
 NO_RISE = 4.0
 NO_FALL = 5.0
-FROZEN_HEEL = 6.0
-FROZEN_TOE = 7.0
-FROZEN_ANGLE = 8.0
-FORCE_GONE = 9.0
-STILL_HEEL = 10.0
-STILL_TOE = 11.0
-STILL_ANGLE = 12.0
-ENDLESS_PHASE = 13.0
-RESTLESS = 14.0
-NO_TOES = 15.0
-NOT_FLAT = 16.0
-FLAT_ANGLE = 17.0
-SHORT_SWING = 18.0
-NO_HEEL = 19.0
-TOE_STRIDES = 20.0
-LATE_FORCES = 21.0
+PRESSURE_SENSOR = 12.0
+FROZEN_HEEL = 13.0
+FROZEN_TOE = 14.0
+FROZEN_ANGLE = 15.0
+FORCE_GONE = 16.0
+STILL_HEEL = 17.0
+STILL_TOE = 18.0
+STILL_ANGLE = 19.0
+ENDLESS_PHASE = 20.0
+RESTLESS = 21.0
+NO_TOES = 22.0
+NOT_FLAT = 23.0
+FLAT_ANGLE = 24.0
+SHORT_SWING = 25.0
+NO_HEEL = 26.0
+TOE_STRIDES = 27.0
+LATE_FORCES = 28.0
 
 FORCES = ("heel_force", "toe_force")
 PRESSURES = ("pressure_1", "pressure_2")
+SEEN = ("nominal_flow", "nominal_supply_pressure")
 
 
 class SafetyRules(NamedTuple):
@@ -55,7 +68,7 @@ class SafetyRules(NamedTuple):
 
     Force [N], angles [rad], times in stride times (``longest_phase``, ``flat_from``, ``flat_to``, ``shortest_swing``)
     or [s], strides, and absolute pressures [Pa]. ``fill_time`` is that of a valve fully open; half open it takes twice
-    as long.
+    as long. ``nominal`` is what the observer of the chambers believes of the device.
     """
 
     lowest_force: float
@@ -79,6 +92,7 @@ class SafetyRules(NamedTuple):
     highest_flat_angle: float
     follow_time: float
     highest_toe_off_angle: float
+    nominal: NominalDevice
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +122,29 @@ SIGNS: dict[float, Sign] = {
         "a vented chamber that shows a pressure which does not fall",
         PRESSURES,
         ("filled_pressure", "vent_time", "follow_time"),
+    ),
+    SUPPLY_HIGH: Sign(
+        "supply_high", "more gas in a chamber than its supply can have given: supply pressure too high", PRESSURES, SEEN
+    ),
+    SUPPLY_LOW: Sign(
+        "supply_low",
+        "less gas in a chamber than its supply gives: supply pressure too low, or a hose kinked",
+        PRESSURES,
+        SEEN,
+    ),
+    SUPPLY_LOST: Sign(
+        "supply_lost", "no gas comes to a chamber: supply lost, hose off, or a valve that never opens", PRESSURES, SEEN
+    ),
+    VALVE_OPEN: Sign("valve_open", "gas comes to a chamber that is given none: a valve stuck open", PRESSURES, SEEN),
+    VALVE_SHUT: Sign(
+        "valve_shut", "a vented chamber keeps its gas: a valve stuck shut, or a hose kinked", PRESSURES, SEEN
+    ),
+    LEAK: Sign("leak", "a chamber loses gas that its valve keeps in: a leak", PRESSURES, SEEN),
+    PRESSURE_SENSOR: Sign(
+        "pressure_sensor",
+        "a vented chamber that shows a pressure which does not fall and which its gas does not have",
+        PRESSURES,
+        ("filled_pressure", "vent_time"),
     ),
     FROZEN_HEEL: Sign("frozen_heel", "a heel force that stays the same while the toes move", FORCES, ("frozen_time",)),
     FROZEN_TOE: Sign("frozen_toe", "a toe force that stays the same while the heel moves", FORCES, ("frozen_time",)),
@@ -200,11 +237,14 @@ SAFETY_QUANTITIES = (
         follows=(VALVE_LAG, PRESSURE_LAG),
     ),
     Quantity("highest_toe_off_angle", "rad", "no ankle has more while its toes still carry", 2.06, -10.0, 10.0),
+    *NOMINAL_QUANTITIES,
 )
 
 
 class LastReadings(NamedTuple):
-    """Last readings of heel, toe [N] and angle [rad], how long each stayed the same [s], and each filtered.
+    """Last readings of heel, toe [N], angle [rad] and both pressures [Pa].
+
+    Of the first three how long each stayed the same [s], and each filtered.
 
     Only time in which another sensor moves, or the wearer steps, counts as time in which one stayed the same; for the
     angle only since the strike before, for a foot that hangs or sits may show one angle for long.
@@ -213,6 +253,8 @@ class LastReadings(NamedTuple):
     heel_force: float
     toe_force: float
     angle: float
+    pressure_1: float
+    pressure_2: float
     heel_unchanged: float
     toe_unchanged: float
     angle_unchanged: float
@@ -249,6 +291,8 @@ NOTHING_READ = LastReadings(
     heel_force=0.0,
     toe_force=0.0,
     angle=0.0,
+    pressure_1=0.0,
+    pressure_2=0.0,
     heel_unchanged=0.0,
     toe_unchanged=0.0,
     angle_unchanged=0.0,
@@ -367,6 +411,8 @@ def next_readings(
         heel_force=measurement.heel_force,
         toe_force=measurement.toe_force,
         angle=measurement.angle,
+        pressure_1=measurement.pressure_1,
+        pressure_2=measurement.pressure_2,
         heel_unchanged=time_unchanged(
             last.heel_force, measurement.heel_force, last.heel_unchanged, beside_heel, period
         ),
@@ -477,9 +523,13 @@ def next_slow_pressure(last: float, pressure: float, period: float) -> float:
     return last + (pressure - last) * period / (period + FALL_TIME)
 
 
-def holds_pressure(rules: SafetyRules, pressure: float, slow: float) -> bool:
-    """True where a vented chamber shows a pressure [Pa] that does not fall."""
-    return (pressure > rules.filled_pressure) & (slow <= (1.0 + FALLS) * pressure)
+def holds_pressure(rules: SafetyRules, pressure: float, expected: float, slow: float) -> bool:
+    """True where a vented chamber shows a pressure [Pa] that does not fall, and which its gas is not expected to have.
+
+    The ankle compresses the gas of a vented chamber, which then shows that pressure for as long as it flows out.
+    """
+    above = pressure - pressure_above(rules.nominal, expected)
+    return (above > rules.filled_pressure) & (slow <= (1.0 + FALLS) * pressure)
 
 
 def next_emptying(

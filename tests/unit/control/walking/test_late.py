@@ -9,10 +9,11 @@ from ppafo.control.walking import phases, safety, signs
 from ppafo.control.walking.phases import PHASE_QUANTITIES, PUSH_OFF, SWING, PhaseRules, PhaseState, Switch
 from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.signs import SAFETY_QUANTITIES, SafetyRules
+from ppafo.engine.rows import rebuilt
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
 
-RULES = SafetyRules(*[float(item.default or 0.0) for item in SAFETY_QUANTITIES])
+RULES = rebuilt(SafetyRules, [float(item.default or 0.0) for item in SAFETY_QUANTITIES])
 PHASES = PhaseRules(*[float(item.default or 0.0) for item in PHASE_QUANTITIES])
 PERIOD = 1.0e-3
 BEGINS = 3

@@ -8,10 +8,12 @@ from ppafo.control.walking import phases, safety, signs
 from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, Switch
 from ppafo.control.walking.safety import Finding, SafetyState, Stance, ValveTimes
 from ppafo.control.walking.signs import SAFETY_QUANTITIES, SafetyRules
+from ppafo.engine.rows import leaf_paths, rebuilt
+from ppafo.model.regulator import SupplyLines
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
 
-RULES = SafetyRules(*[float(item.default or 0.0) for item in SAFETY_QUANTITIES])
+RULES = rebuilt(SafetyRules, [float(item.default or 0.0) for item in SAFETY_QUANTITIES])
 PERIOD = 1.0e-3
 GOOD = GaitMeasurement(1.5, 1.1e5, 1.05e5, 0.0, 300.0, 200.0)
 
@@ -46,7 +48,9 @@ def vents(
 
 
 def test_the_rules_are_declared_in_their_order() -> None:
-    assert tuple(item.name for item in SAFETY_QUANTITIES) == SafetyRules._fields
+    lines = {f"nominal_line_{name}": name for name in SupplyLines._fields}
+    named = [lines.get(item.name, item.name) for item in SAFETY_QUANTITIES]
+    assert [path.rpartition(".")[2] for path in leaf_paths(SafetyRules, "")] == named
     assert RULES.most_toe_strides == 1.0
 
 

@@ -1,0 +1,454 @@
+"""What each chamber should hold, by command, measured angle and the nominal device; and what contradicts it.
+
+The content of a chamber is p V, its mass times R T, which no movement of the ankle changes: a residual in pressure
+would grow without bounds where a foot squeezes a chamber at its stop, the content stays. So from sample to sample
+
+    content += residual h / ``FORGETS`` + flow h,    residual = (pressure shown - pressure expected) V
+
+and the flow is that of the nominal valve at the pressure *expected*, for an offset of a sensor would add up in it. An
+alarm is a residual beyond what devices, sensors and heat explain: a share of the gas that has passed lately, and an
+error of pressure and angle in a mean volume. Its sign names the likely cause: whether gas comes or goes, and where the
+valve is. A valve and a pressure sensor cannot be told apart at that moment, and both stop the device.
+
+Every number is a setting whose default follows the device; ``nominal_flow`` 0 switches the observer off.
+"""
+
+import math
+from typing import NamedTuple
+
+from ppafo.model.declaration import (
+    NOMINAL,
+    PRESSURE_LAG,
+    Quantity,
+)
+from ppafo.model.regulator import LineState, SupplyLines, step_lines
+from ppafo.model.valves.kind import VENTS_ABOVE
+
+NO_CAUSE = 0.0
+SUPPLY_HIGH = 6.0
+SUPPLY_LOW = 7.0
+SUPPLY_LOST = 8.0
+VALVE_OPEN = 9.0
+VALVE_SHUT = 10.0
+LEAK = 11.0
+"""Signs that stop, numbered among those of ``signs``."""
+
+
+class NominalDevice(NamedTuple):
+    """The device that the observer believes in, SI units; absolute pressures.
+
+    ``nominal_flow`` is R T times the valve's conductance [m^3/s]: content that a choked flow moves in a second, over
+    the pressure before it. ``nominal_pair`` is 1 for on/off valves that vent where they do not feed, else 0: a spool
+    with a dump valve, which follows its command with ``nominal_lag`` beyond ``nominal_dead_band``.
+    ``nominal_joining_time`` is how long both chambers are joined after chamber 1 was fed. ``nominal_lines`` count gas
+    as its content p V [J]; a volume of 0 stands for a supply that needs none.
+    """
+
+    nominal_flow: float
+    nominal_critical_ratio: float
+    nominal_supply_pressure: float
+    nominal_dorsiflexion_pressure: float
+    nominal_atmospheric_pressure: float
+    nominal_relieving: float
+    nominal_volume_per_angle: float
+    nominal_dead_volume_1: float
+    nominal_dead_volume_2: float
+    nominal_angle_min: float
+    nominal_angle_max: float
+    nominal_pair: float
+    nominal_opening_delay: float
+    nominal_closing_delay: float
+    nominal_switching_interval: float
+    nominal_lag: float
+    nominal_dead_band: float
+    nominal_joining_time: float
+    nominal_sensor_lag: float
+    nominal_lines: SupplyLines
+
+
+def _nominal(name: str, unit: str, summary: str, maximum: float, lowest: float = 0.0) -> Quantity:
+    follows = (PRESSURE_LAG,) if name == "sensor_lag" else (NOMINAL[name],)
+    return Quantity(
+        f"nominal_{name}", unit, f"{summary}; that of the device unless given", 0.0, lowest, maximum, follows=follows
+    )
+
+
+NOMINAL_QUANTITIES = (
+    Quantity(
+        "nominal_flow",
+        "m^3/s",
+        "R T times the conductance of the valve, which the observer of the chambers believes; 0 switches it off; "
+        "that of the device unless given",
+        0.0,
+        0.0,
+        1.0,
+        follows=(NOMINAL["flow"],),
+    ),
+    _nominal("critical_ratio", "", "critical pressure ratio of the valve", 0.95),
+    _nominal("supply_pressure", "Pa_a", "pressure to chamber 1", 1.0e8),
+    _nominal("dorsiflexion_pressure", "Pa_a", "pressure to chamber 2", 1.0e8),
+    _nominal("atmospheric_pressure", "Pa_a", "pressure of the atmosphere", 1.0e8),
+    _nominal("relieving", "", "1 where the supplies take gas back", 1.0),
+    _nominal("volume_per_angle", "m^3/rad", "growth of chamber 1 with the angle", 1.0),
+    _nominal("dead_volume_1", "m^3", "dead volume of chamber 1", 1.0),
+    _nominal("dead_volume_2", "m^3", "dead volume of chamber 2", 1.0),
+    _nominal("angle_min", "rad", "lower stop", 10.0, -10.0),
+    _nominal("angle_max", "rad", "upper stop", 10.0, -10.0),
+    _nominal("pair", "", "1 for a pair of on/off valves, 0 for a spool with a dump valve", 1.0),
+    _nominal("opening_delay", "s", "time from energising a coil to flow", 1.0),
+    _nominal("closing_delay", "s", "time from de-energising it to venting", 1.0),
+    _nominal("switching_interval", "s", "shortest time between two switchings of a coil", 1.0),
+    _nominal("lag", "s", "time after which a spool has followed", 1.0),
+    _nominal("dead_band", "", "smallest command that opens a spool", 0.99),
+    _nominal("joining_time", "s", "time for which the chambers are joined after chamber 1 was fed", 10.0),
+    _nominal("sensor_lag", "s", "lag of the pressure sensors", 1.0e3),
+    *(
+        _nominal(f"line_{name}_{line}", unit, f"{what} of line {line}", most)
+        for line in (1, 2)
+        for name, unit, what, most in (
+            ("droop", "Pa s/J", "droop per content that flows", 1.0e10),
+            ("largest_flow", "W", "largest flow of content", 1.0e10),
+            ("volume", "m^3", "volume, 0 without lines,", 1.0),
+        )
+    ),
+    _nominal("line_relieving", "", "1 where gas flows back through the regulators", 1.0),
+)
+"""Fields of ``NominalDevice``, in order."""
+
+
+class Coil(NamedTuple):
+    """One on/off valve: where the flow is (0 or 1) and where it goes, since when, and in what time [s] it is there."""
+
+    position: float
+    target: float
+    since: float
+    waits: float
+
+
+class Chamber(NamedTuple):
+    """Content p V [J], pressure expected of its sensor [Pa], gas that passed lately [J], time of an alarm [s].
+
+    ``began`` [J] is the content measured when the chamber was last connected otherwise.
+    """
+
+    content: float
+    pressure: float
+    passed: float
+    contrary: float
+    began: float
+
+
+class Observer(NamedTuple):
+    """Both chambers; the command in force; what the valve is believed to do; how long chambers are joined yet [s].
+
+    ``lines`` are contents [J]: those of lines behind regulators.
+    """
+
+    chamber_1: Chamber
+    chamber_2: Chamber
+    command: float
+    coil_1: Coil
+    coil_2: Coil
+    spool: float
+    joined: float
+    lines: LineState
+
+
+LONG_AGO = 1.0e9
+_EMPTY = Chamber(content=0.0, pressure=0.0, passed=0.0, contrary=0.0, began=0.0)
+_OFF = Coil(position=0.0, target=0.0, since=LONG_AGO, waits=0.0)
+_FULL = LineState(mass_1=0.0, mass_2=0.0, regulated_mass=0.0)
+START = Observer(_EMPTY, _EMPTY, command=2.0, coil_1=_OFF, coil_2=_OFF, spool=0.0, joined=0.0, lines=_FULL)
+
+FORGETS = 0.128
+"""Time [s] in which contents follow what is measured, and gas that has passed is forgotten."""
+
+WARM = 1.1
+"""Flow over that of isothermal gas: between that and gas without walls."""
+
+OF_PASSED = 0.375
+"""Part of the gas that has passed which errors of area, volume, supply and heat explain."""
+
+OFFSET, OF_PRESSURE = 1.2e4, 1.0 / 16.0
+"""Error of a pressure [Pa] that offset, step and noise explain, and its part that two degrees of the angle explain."""
+
+ALARM_TIME, ALARM_SAMPLES = 5.0e-3, 5.0
+"""Time [s], and samples, that a residual lasts before it counts."""
+
+LINEAR_RATIO = 0.95
+"""Pressure ratio above which the flow falls along a straight line."""
+
+TINY = 1.0e-12
+"""A volume [m^3] and a droop that stand for none."""
+
+SAME = 1.0e-6
+"""Times [s] closer to each other than this are one."""
+
+
+def flow_share(nominal: NominalDevice, ratio: float) -> float:
+    """Flow over choked flow [-], 0 to 1, at a pressure ratio r; b is the critical one. ISO 6358-1:2013.
+
+    psi(r) = sqrt(1 - ((r - b) / (1 - b))^2), 1 below b, and a straight line to 0 at r = 1 above ``LINEAR_RATIO``.
+    """
+    critical = nominal.nominal_critical_ratio
+    place = (min(max(ratio, critical), LINEAR_RATIO) - critical) / (1.0 - critical)
+    return math.sqrt(1.0 - place * place) * min((1.0 - ratio) / (1.0 - LINEAR_RATIO), 1.0)
+
+
+def flow_into(nominal: NominalDevice, pressure: float, node: float, takes_back: float) -> float:
+    """Content [J/s] that enters a chamber at ``pressure`` from a node [Pa] through the open valve; below 0 it leaves.
+
+    A node with ``takes_back`` 0 takes no gas back. Equations (6), (7).
+    """
+    upstream = max(pressure, node)
+    share = flow_share(nominal, min(pressure, node) / upstream)
+    return nominal.nominal_flow * upstream * share * (1.0 if node >= pressure else -takes_back)
+
+
+def next_coil(nominal: NominalDevice, coil: Coil, wanted: float, period: float) -> tuple[Coil, float]:
+    """A coil after a sample [s] in which it was ordered to be at ``wanted``, and its mean position [-] in that time."""
+    accepts = (wanted != coil.target) & (coil.since >= nominal.nominal_switching_interval - SAME)
+    delay = nominal.nominal_opening_delay if wanted > 0.5 else nominal.nominal_closing_delay
+    target = wanted if accepts else coil.target
+    waits = delay if accepts else coil.waits
+    before = min(waits, period) / period
+    return Coil(
+        position=target if waits <= period + SAME else coil.position,
+        target=target,
+        since=(0.0 if accepts else coil.since) + period,
+        waits=max(waits - period, 0.0),
+    ), before * coil.position + (1.0 - before) * target
+
+
+def next_spool(nominal: NominalDevice, spool: float, command: float, period: float) -> float:
+    """Opening of a spool [-], -1 to 1, after a sample [s] with a command; it rests in the middle while all vents."""
+    size = max(min(abs(command), 1.0) - nominal.nominal_dead_band, 0.0) / (1.0 - nominal.nominal_dead_band)
+    target = 0.0 if command > VENTS_ABOVE else (size if command >= 0.0 else -size)
+    return spool + (target - spool) * period / (period + nominal.nominal_lag)
+
+
+def passed_chamber(
+    nominal: NominalDevice,
+    chamber: Chamber,
+    volume: float,
+    measured: float,
+    source: float,
+    vent: float,
+    supply: float,
+    was_fed: bool,
+    period: float,
+) -> tuple[Chamber, float]:
+    """A chamber after a sample [s] in which it had a volume [m^3] and a reading [Pa], and was open to two nodes.
+
+    ``source`` and ``vent`` [-] are the openings to a supply [Pa] and to the atmosphere; ``was_fed`` before. And what it
+    took from the supply [J].
+    """
+    room = nominal.nominal_atmospheric_pressure
+    held = chamber.content / volume
+    entered = source * flow_into(nominal, held, supply, nominal.nominal_relieving) + vent * flow_into(
+        nominal, held, room, 1.0
+    )
+    # In one sample no flow leads beyond the pressures between which it runs.
+    low, high = min(held, room if vent > 0.0 else supply), max(held, supply if source > 0.0 else room)
+    added = max((low - held) * volume, min((high - held) * volume, WARM * period * entered))
+    share = period / FORGETS
+    turns = (source > vent) != was_fed
+    return Chamber(
+        content=chamber.content + added,
+        pressure=chamber.pressure,
+        passed=chamber.passed + abs(added) - share * chamber.passed,
+        contrary=chamber.contrary,
+        began=measured * volume if turns else chamber.began,
+    ), added if source > vent else 0.0
+
+
+def met_chamber(
+    nominal: NominalDevice,
+    chamber: Chamber,
+    volume: float,
+    mean_volume: float,
+    measured: float,
+    blind: bool,
+    period: float,
+) -> Chamber:
+    """A chamber after a reading [Pa] in its volume [m^3]: residual, how long it has contradicted, what it teaches.
+
+    ``blind`` is True where the content is taken from the sensor: at first, and while the chambers are joined.
+    """
+    content = measured * volume if blind else chamber.content
+    held = content / volume
+    lag = nominal.nominal_sensor_lag
+    expected = measured if blind else chamber.pressure + (held - chamber.pressure) * period / (period + lag)
+    residual = (measured - expected) * volume
+    allowed = OF_PASSED * chamber.passed + mean_volume * (OFFSET + OF_PRESSURE * abs(measured))
+    return Chamber(
+        content=max(content + residual * min(period / FORGETS, 1.0), 0.0),
+        pressure=expected,
+        passed=0.0 if blind else chamber.passed,
+        contrary=chamber.contrary + period if abs(residual) > allowed else 0.0,
+        began=measured * volume if blind else chamber.began,
+    )
+
+
+def volumes(nominal: NominalDevice, angle: float) -> tuple[float, float]:
+    """Volumes of both chambers [m^3] at a measured angle [rad], not below the dead ones. Equations (4), (5)."""
+    growth = nominal.nominal_volume_per_angle
+    return (
+        nominal.nominal_dead_volume_1 + max(growth * (angle - nominal.nominal_angle_min), 0.0),
+        nominal.nominal_dead_volume_2 + max(growth * (nominal.nominal_angle_max - angle), 0.0),
+    )
+
+
+def next_observer(
+    nominal: NominalDevice,
+    state: Observer,
+    last_angle: float,
+    last_1: float,
+    last_2: float,
+    angle: float,
+    pressure_1: float,
+    pressure_2: float,
+    period: float,
+) -> Observer:
+    """Both chambers after a sample [s] that the command in force has lasted; readings before it and after it.
+
+    Angles [rad], absolute pressures [Pa].
+    """
+    if nominal.nominal_flow <= 0.0:
+        return state
+    command, begins = state.command, state.chamber_1.content <= 0.0
+    vents = command > VENTS_ABOVE
+    coil_1, on_1 = next_coil(nominal, state.coil_1, 1.0 if (command > 0.0) & (not vents) else 0.0, period)
+    coil_2, on_2 = next_coil(nominal, state.coil_2, 1.0 if command < 0.0 else 0.0, period)
+    spool, is_pair = next_spool(nominal, state.spool, command, period), nominal.nominal_pair > 0.5
+    towards_1, towards_2 = max(spool, 0.0), max(-spool, 0.0)
+    source_1, source_2 = on_1 if is_pair else towards_1, on_2 if is_pair else towards_2
+    vent_1 = 1.0 - on_1 if is_pair else (1.0 if vents else towards_2)
+    vent_2 = 1.0 - on_2 if is_pair else (1.0 if vents else towards_1)
+    fed_1, fed_2 = is_fed(nominal, state.coil_1, state.spool), is_fed(nominal, state.coil_2, -state.spool)
+    left = max(state.joined - period, 0.0)
+    joined = nominal.nominal_joining_time if coil_1.position > 0.5 else left
+    before_1, before_2 = volumes(nominal, last_angle)
+    now_1, now_2 = volumes(nominal, angle)
+    lines = filled_lines(nominal) if begins else state.lines
+    to_1, to_2 = supplied(nominal, lines)
+    mean_1, mean_2 = volumes(nominal, 0.5 * (nominal.nominal_angle_min + nominal.nominal_angle_max))
+    blind = begins | ((joined > 0.0) & (coil_1.position < 0.5))
+    passed_1, taken_1 = passed_chamber(
+        nominal, state.chamber_1, before_1, last_1, source_1, vent_1, to_1, fed_1, period
+    )
+    passed_2, taken_2 = passed_chamber(
+        nominal, state.chamber_2, before_2, last_2, source_2, vent_2, to_2, fed_2, period
+    )
+    return Observer(
+        chamber_1=met_chamber(nominal, passed_1, now_1, mean_1, pressure_1, blind, period),
+        chamber_2=met_chamber(nominal, passed_2, now_2, mean_2, pressure_2, blind, period),
+        command=command,
+        coil_1=coil_1,
+        coil_2=coil_2,
+        spool=spool,
+        joined=joined,
+        lines=next_lines(nominal, lines, taken_1, taken_2, period),
+    )
+
+
+def filled_lines(nominal: NominalDevice) -> LineState:
+    """Lines at the set pressures of their regulators, in contents [J]."""
+    return LineState(
+        mass_1=nominal.nominal_supply_pressure * nominal.nominal_lines.volume_1,
+        mass_2=nominal.nominal_dorsiflexion_pressure * nominal.nominal_lines.volume_2,
+        regulated_mass=0.0,
+    )
+
+
+def supplied(nominal: NominalDevice, lines: LineState) -> tuple[float, float]:
+    """Absolute pressures [Pa] before the valve: of both lines, or of a supply that needs none."""
+    first, second = max(nominal.nominal_lines.volume_1, TINY), max(nominal.nominal_lines.volume_2, TINY)
+    has_lines = nominal.nominal_lines.volume_1 > 0.0
+    return (
+        lines.mass_1 / first if has_lines else nominal.nominal_supply_pressure,
+        lines.mass_2 / second if has_lines else nominal.nominal_dorsiflexion_pressure,
+    )
+
+
+def next_lines(nominal: NominalDevice, lines: LineState, taken_1: float, taken_2: float, period: float) -> LineState:
+    """Lines after a sample [s] in which the chambers took two contents [J]; as they are where there are none."""
+    has_lines = nominal.nominal_lines.volume_1 > 0.0
+    given = nominal.nominal_lines
+    real = SupplyLines(
+        droop_1=max(given.droop_1, TINY),
+        largest_flow_1=given.largest_flow_1,
+        volume_1=max(given.volume_1, TINY),
+        droop_2=max(given.droop_2, TINY),
+        largest_flow_2=given.largest_flow_2,
+        volume_2=max(given.volume_2, TINY),
+        relieving=given.relieving,
+    )
+    set_1, set_2 = nominal.nominal_supply_pressure, nominal.nominal_dorsiflexion_pressure
+    after = step_lines(real, set_1, set_2, 1.0, lines, taken_1, taken_2, 0.0, period).after
+    return LineState(
+        mass_1=max(after.mass_1, 0.0) if has_lines else 0.0,
+        mass_2=max(after.mass_2, 0.0) if has_lines else 0.0,
+        regulated_mass=0.0,
+    )
+
+
+def is_fed(nominal: NominalDevice, coil: Coil, spool: float) -> bool:
+    """True where a valve is believed to feed its chamber; ``spool`` [-] is above 0 towards it."""
+    return (coil.position > 0.5) if nominal.nominal_pair > 0.5 else (spool > 0.0)
+
+
+def is_vented(nominal: NominalDevice, coil: Coil, spool: float, command: float) -> bool:
+    """True where a valve is believed to vent its chamber; ``spool`` [-] is above 0 towards it."""
+    return (coil.position < 0.5) if nominal.nominal_pair > 0.5 else ((command > VENTS_ABOVE) | (spool < 0.0))
+
+
+SHOWS_GAS = 0.25
+"""Part of the pressure over the atmosphere that shows that some gas has come."""
+
+NEARLY_FULL = 0.8
+"""Part of the supply's pressure above which a chamber that is vented stays open to it."""
+
+
+def cause_of(
+    nominal: NominalDevice,
+    chamber: Chamber,
+    volume: float,
+    measured: float,
+    supply: float,
+    fed: bool,
+    vented: bool,
+    period: float,
+) -> float:
+    """The sign of a chamber with a reading [Pa] in its volume [m^3], fed from a supply [Pa] or vented; 0 for none."""
+    alarm = chamber.contrary > max(ALARM_TIME, ALARM_SAMPLES * period) - SAME
+    room = nominal.nominal_atmospheric_pressure
+    gains = measured > chamber.pressure
+    some = measured - room > SHOWS_GAS * (chamber.pressure - room)
+    into_vent = (measured > NEARLY_FULL * supply) | (measured * volume > chamber.began + OFFSET * volume)
+    in_fill = SUPPLY_HIGH if gains else (SUPPLY_LOW if some else SUPPLY_LOST)
+    in_vent = (VALVE_OPEN if into_vent else VALVE_SHUT) if gains else LEAK
+    closed = VALVE_OPEN if gains else LEAK
+    found = in_fill if fed else (in_vent if vented else closed)
+    return found if alarm else NO_CAUSE
+
+
+def found_cause(
+    nominal: NominalDevice, state: Observer, angle: float, pressure_1: float, pressure_2: float, period: float
+) -> float:
+    """The sign of a sample [s] with an angle [rad] and absolute pressures [Pa]; ``NO_CAUSE`` where there is none."""
+    if nominal.nominal_flow <= 0.0:
+        return NO_CAUSE
+    now_1, now_2 = volumes(nominal, angle)
+    fed_1, fed_2 = is_fed(nominal, state.coil_1, state.spool), is_fed(nominal, state.coil_2, -state.spool)
+    vented_1 = is_vented(nominal, state.coil_1, state.spool, state.command)
+    vented_2 = is_vented(nominal, state.coil_2, -state.spool, state.command)
+    to_1, to_2 = supplied(nominal, state.lines)
+    first = cause_of(nominal, state.chamber_1, now_1, pressure_1, to_1, fed_1, vented_1, period)
+    second = cause_of(nominal, state.chamber_2, now_2, pressure_2, to_2, fed_2, vented_2, period)
+    return first if first > NO_CAUSE else second
+
+
+def pressure_above(nominal: NominalDevice, expected: float) -> float:
+    """By how much [Pa] a chamber may show more than the atmosphere, by the gas expected in it; 0 when off."""
+    return max(expected - nominal.nominal_atmospheric_pressure, 0.0) if nominal.nominal_flow > 0.0 else 0.0
