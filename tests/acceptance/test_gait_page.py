@@ -10,7 +10,7 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.gait.recorded.mapping import GaitMap
-from ppafo.gait.recorded.table import read_table
+from ppafo.gait.recorded.reading import read_table
 from ppafo.storage.opensim import read_opensim
 
 PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "use-your-own-gait.md").read_text(encoding="utf-8")

@@ -63,6 +63,9 @@ def _add_import_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--minimum-strides", metavar="N", help="minimum number of whole strides; default 2, overground 1"
     )
+    parser.add_argument(
+        "--form", metavar="FORM", default="", help="form of the files, such as opensim; default: what they look like"
+    )
     parser.add_argument("--start", metavar="TIME", help="leave out what is before, such as '1.2 s'")
     parser.add_argument("--end", metavar="TIME", help="leave out what is after, such as '3.4 s'")
     parser.add_argument(
@@ -122,6 +125,7 @@ def _import(parsed: argparse.Namespace) -> int:
         stature=_optional("--stature", parsed.stature, "m"),
         start=_optional("--start", parsed.start, "s"),
         end=_optional("--end", parsed.end, "s"),
+        form=parsed.form,
         longest_gap=_optional("--fill-gaps", parsed.fill_gaps, "s") or 0.0,
         ankle_neutral=_optional("--ankle-neutral", parsed.ankle_neutral, "rad"),
     )

@@ -11,8 +11,9 @@ import pytest
 from ppafo.errors import DataError
 from ppafo.gait import Gait
 from ppafo.gait.recorded import ImportSettings, import_gait
+from ppafo.gait.recorded.forms.c3d import open_c3d
 from ppafo.gait.recorded.mapping import AngleMap, ForceMap, GaitMap, KneeMap, ShankMap
-from ppafo.gait.recorded.table import open_c3d, read_table
+from ppafo.gait.recorded.reading import read_table
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 
@@ -126,7 +127,7 @@ def test_the_weight_on_a_plate_is_upwards_whichever_axis_is_up(
     plates = [{"force": stored * np.array([0.1 * weight, weight, -0.02 * weight])}]
     read = {"header": content["header"], "parameters": content["parameters"]}
     read["data"] = {name: content["data"][name] for name in ("points", "analogs")} | {"platform": plates}
-    monkeypatch.setattr("ppafo.gait.recorded.table.open_c3d", lambda _path: read)
+    monkeypatch.setattr("ppafo.gait.recorded.forms.c3d.open_c3d", lambda _path: read)
     assert np.all(read_table(path).columns["force plate 1.y"] == weight)
 
 

@@ -24,7 +24,6 @@ from ppafo.gait.plausible import (
     standing_tilt,
     zero_remarks,
 )
-from ppafo.gait.recorded.conventions import Convention, column_names, find_convention, turned_forward
 from ppafo.gait.recorded.footfalls import (
     LEAST_STRIDES,
     SHANK,
@@ -36,8 +35,10 @@ from ppafo.gait.recorded.footfalls import (
     strides_within,
     usable_strides,
 )
-from ppafo.gait.recorded.mapping import GaitMap, ImportSettings, check_settings
-from ppafo.gait.recorded.table import MotionTable, fill_gaps, read_table
+from ppafo.gait.recorded.form import Convention
+from ppafo.gait.recorded.mapping import GaitMap, ImportSettings, check_settings, column_names
+from ppafo.gait.recorded.reading import arranged, find_convention, read_table
+from ppafo.gait.recorded.table import MotionTable, fill_gaps
 from ppafo.gait.recorded.walk import (
     LOADS,
     Person,
@@ -80,48 +81,39 @@ def phases() -> Floats:
     return np.linspace(0.0, 1.0, SAMPLES)
 
 
-def statistics(signal: Signal, strides: Sequence[Stride]) -> CurveStatistics:
-    """Return the curves of a signal over strides that it covers; between samples runs a cubic spline."""
+def statistics(name: str, signal: Signal, strides: Sequence[Stride]) -> CurveStatistics:
+    """Return the curves of a signal over strides that it covers; between samples runs a cubic spline.
+
+    Of a position the curves are its acceleration [m/s^2]; each stride has its own time.
+    """
     from scipy.interpolate import CubicSpline
 
     spline = CubicSpline(signal.time, signal.values)
     at = [np.clip(item.start + item.time * phases(), signal.time[0], signal.time[-1]) for item in strides]
-    curves = np.array([spline(times) for times in at])
-    return _over_strides(curves, strides)
+    curves = np.array([spline(times) for times in at]).reshape(-1, SAMPLES)
+    if signal.is_position and strides:
+        pairs = zip(curves, strides, strict=True)
+        curves = np.array([acceleration_of(way, HARMONICS[name], item.time) for way, item in pairs])
+    return over_strides(name, curves, strides)
 
 
-def _over_strides(curves: Floats, strides: Sequence[Stride]) -> CurveStatistics:
+def over_strides(name: str, curves: Floats, strides: Sequence[Stride]) -> CurveStatistics:
+    """Return the curves (strides x 101) with mean and deviation over the strides, nan where there is none.
+
+    A centre of pressure has a straight line over swing, where it has no meaning.
+    """
+    if not strides:
+        return CurveStatistics(curves, np.full(SAMPLES, np.nan), np.full(SAMPLES, np.nan), ())
+    mean = curves.mean(axis=0)
     deviation = curves.std(axis=0, ddof=1) if len(strides) > 1 else np.zeros(SAMPLES)
-    return CurveStatistics(curves, curves.mean(axis=0), deviation, tuple(strides))
-
-
-def mean_curve(name: str, signal: Signal, strides: Sequence[Stride], inside: Sequence[Stride]) -> CurveStatistics:
-    """Return the curves of the strides ``inside``, which a signal covers; at least one of all ``strides`` has to be."""
-    if not inside:
-        raise DataError(
-            f"{signal.file}: {name} goes from {signal.time[0]:.4g} to {signal.time[-1]:.4g} s and covers no whole "
-            f"stride ({strides[0].start:.4g} to {strides[0].end:.4g} s is the first); give a longer file, or "
-            "leave it out"
-        )
-    result = statistics(signal, inside)
-    if signal.is_position:
-        # Each stride has its own time.
-        pairs = zip(result.curves, inside, strict=True)
-        return _over_strides(
-            np.array([acceleration_of(way, HARMONICS[name], item.time) for way, item in pairs]), inside
-        )
-    return _bridge_swing(result) if name == "centre_of_pressure" else result
-
-
-def _bridge_swing(result: CurveStatistics) -> CurveStatistics:
-    """Return a centre of pressure with a straight line over swing, where it has no meaning."""
-    percent = phases()
-    fraction = float(np.mean([item.stance_share for item in result.strides]))
-    inside = (percent > _UNLOADED_FORCE) & (percent < fraction - _UNLOADED_FORCE)
-    at, first = percent[inside], float(result.mean[inside][0])
-    mean = np.interp(percent, [*at, 1.0 + at[0]], [*result.mean[inside], first], period=None)
-    deviation = np.where(inside, result.deviation, 0.0)
-    return CurveStatistics(result.curves, mean, deviation, result.strides)
+    if name == "centre_of_pressure":
+        percent = phases()
+        fraction = float(np.mean([item.stance_share for item in strides]))
+        inside = (percent > _UNLOADED_FORCE) & (percent < fraction - _UNLOADED_FORCE)
+        at, first = percent[inside], float(mean[inside][0])
+        mean = np.interp(percent, [*at, 1.0 + at[0]], [*mean[inside], first], period=None)
+        deviation = np.where(inside, deviation, 0.0)
+    return CurveStatistics(curves, mean, deviation, tuple(strides))
 
 
 @dataclass(frozen=True, slots=True)
@@ -309,9 +301,10 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings) -> Source
     """Return the signals in recorded files; DataError names what is wrong and what to do."""
     if not files:
         raise DataError("no file was given; a gait needs at least the angles of shank and ankle")
-    tables = [read_table(path, settings.longest_gap, settings.start, settings.end) for path in files]
+    cut = settings.longest_gap, settings.start, settings.end
+    tables = [read_table(path, *cut, settings.form) for path in files]
     if settings.columns is None:
-        tables = [turned_forward(table) for table in tables]
+        tables = [arranged(table) for table in tables]
     settings, said = _with_subject(settings, tables)
     person = Person(settings.body_mass or 0.0, settings.stature)
     convention = (
@@ -416,29 +409,34 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     least = settings.least_strides or (1 if footfalls.is_one_cycle or footfalls.is_overground else LEAST_STRIDES)
     strides = of_usual_time(usable_strides(walk, found), least)
     _check_enough(strides, found, {name: walk[name] for name in (*REQUIRED, events) if name in walk})
-    covered = _covered(footfalls, walk, strides)
+    covered = {name: strides_of_curve(footfalls, name, signal, strides.taken) for name, signal in walk.items()}
     unmeasured = [
         name for name in LOADS if name in walk and not covered[name] and strides_within(walk[name], strides.taken)
     ]
     walk = {name: signal for name, signal in walk.items() if name not in unmeasured}
     strides = without_drop_outs(walk, source.tables, covered, strides)
     smooth = walk if settings.low_pass is None else {n: low_pass(s, settings.low_pass) for n, s in walk.items()}
-    strides = without_odd_shapes(_curves(footfalls, smooth, strides), strides)
-    curves = _curves(footfalls, smooth, strides)
+    curves = {
+        name: statistics(name, signal, [item for item in covered[name] if item in strides.taken])
+        for name, signal in smooth.items()
+    }
+    strides = without_odd_shapes(curves, strides)
+    for name, item in curves.items():
+        kept = [stride in strides.taken for stride in item.strides]
+        if not any(kept):
+            signal = walk[name]
+            raise DataError(
+                f"{signal.file}: {name} goes from {signal.time[0]:.4g} to {signal.time[-1]:.4g} s and covers no whole "
+                f"stride ({strides.taken[0].start:.4g} to {strides.taken[0].end:.4g} s is the first); give a longer "
+                "file, or leave it out"
+            )
+        if not all(kept):
+            curves[name] = over_strides(
+                name, item.curves[kept], [stride for stride in item.strides if stride in strides.taken]
+            )
     missing = [f"{name} is left out: in no whole stride was it measured throughout the stance" for name in unmeasured]
     remarks = [*source.remarks, *footfalls.remarks, *missing]
     return _finish(source, replace(footfalls, walk=walk), curves, strides, remarks)
-
-
-def _covered(footfalls: Footfalls, walk: Mapping[str, Signal], strides: Strides) -> dict[str, list[Stride]]:
-    """The strides that each curve covers."""
-    return {name: strides_of_curve(footfalls, name, signal, strides.taken) for name, signal in walk.items()}
-
-
-def _curves(footfalls: Footfalls, walk: Mapping[str, Signal], strides: Strides) -> dict[str, CurveStatistics]:
-    """The curves over the strides that each covers."""
-    covered = _covered(footfalls, walk, strides)
-    return {name: mean_curve(name, signal, strides.taken, covered[name]) for name, signal in walk.items()}
 
 
 def _finish(

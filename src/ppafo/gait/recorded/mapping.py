@@ -1,11 +1,12 @@
 """Gait maps: which columns of recorded files make the curves of a gait, in which unit and with which sign.
 
-A map is a TOML file, or what ``conventions`` finds for files without one. A term is the name of a column; ``-`` before
-it takes it away.
+A map is a TOML file, or what the form of the files says where there is none. A term is the name of a column; ``-``
+before it takes it away.
 """
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -138,6 +139,22 @@ class GaitMap(StrictTable):
     knee: KneeMap | None = None
 
 
+def column_names(mapped: object) -> tuple[str, ...]:
+    """Return the columns that the map of one curve names, a minus before those that are taken away."""
+    if isinstance(mapped, KneeMap):
+        return (*mapped.forward, *mapped.up, *(mapped.thigh or ()))
+    if isinstance(mapped, ShankMap) and mapped.terms is None:
+        return _marker_columns((mapped.knee, mapped.ankle), mapped.forward, mapped.vertical)
+    if isinstance(mapped, AngleMap) and mapped.terms is None:
+        return _marker_columns((mapped.heel, mapped.toe), mapped.forward, mapped.vertical)
+    terms: tuple[str, ...] = getattr(mapped, "terms")  # noqa: B009  # every other map has them, by its own class
+    return terms
+
+
+def _marker_columns(markers: Sequence[str | None], forward: str, vertical: str) -> tuple[str, ...]:
+    return tuple(f"{marker}.{axis}" for marker in markers for axis in (forward.removeprefix("-"), vertical))
+
+
 Side = Literal["right", "left"]
 
 
@@ -192,11 +209,11 @@ _NAME = "imported-gait"
 class ImportSettings:
     """What the files do not say: body mass [kg], side, speed [m/s], map, low pass [Hz], least number of strides.
 
-    The least number of strides is 2 unless given, and 1 overground and of one cycle that wraps around.
-    ``body_mass`` may be None where a C3D file states it. ``stature`` [m] gives the length of the thigh where no map
-    does. ``start`` and ``end`` [s] cut the files, ``longest_gap`` [s] is up to where gaps are filled, and
-    ``ankle_neutral`` [rad] the reading of the file with the foot perpendicular to the shank, where it is not that of
-    map or convention.
+    The least number of strides is 2 unless given, and 1 overground and of one cycle that wraps around. ``body_mass``
+    may be None where a file states it. ``form`` names the form of the files, empty for what they look like. ``stature``
+    [m] gives the length of the thigh where no map does. ``start`` and ``end`` [s] cut the files, ``longest_gap`` [s] is
+    up to where gaps are filled, and ``ankle_neutral`` [rad] the reading of the file with the foot perpendicular to the
+    shank, where it is not that of map or convention.
     """
 
     body_mass: float | None = None
@@ -212,6 +229,7 @@ class ImportSettings:
     end: float | None = None
     longest_gap: float = 0.0
     ankle_neutral: float | None = None
+    form: str = ""
 
 
 def check_settings(settings: ImportSettings) -> None:

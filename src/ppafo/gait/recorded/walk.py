@@ -16,9 +16,17 @@ from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import DataError, UnitError, check_all, nearest_name, one_line, refused_as
 from ppafo.gait.gait import HARMONICS, REQUIRED, fit_curve
 from ppafo.gait.plausible import SignSource, other_sign
-from ppafo.gait.recorded.conventions import column_names
-from ppafo.gait.recorded.mapping import AngleMap, ForceMap, GaitMap, KneeMap, MomentMap, PressureMap, ShankMap
-from ppafo.gait.recorded.table import LONGEST_FILLED, OPENSIM, MotionTable
+from ppafo.gait.recorded.mapping import (
+    AngleMap,
+    ForceMap,
+    GaitMap,
+    KneeMap,
+    MomentMap,
+    PressureMap,
+    ShankMap,
+    column_names,
+)
+from ppafo.gait.recorded.table import LONGEST_FILLED, MotionTable
 from ppafo.signals.recording import Floats
 from ppafo.units import parse_quantity, to_si
 
@@ -87,7 +95,6 @@ def low_pass(signal: Signal, cut_off: float) -> Signal:
 LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
 """Where they were not measured, off a force plate, is no gap."""
 
-_KNEE = "knee_angle_"
 _LONGEST_SHOWN = 12
 
 
@@ -149,12 +156,9 @@ def check_finite(values: Floats, place: str, time: Floats) -> None:
 
 
 def find_columns(
-    curve: str, names: Sequence[str], tables: Sequence[MotionTable], optional: bool, is_default: bool
+    curve: str, names: Sequence[str], tables: Sequence[MotionTable], optional: bool
 ) -> CurveColumns | None:
-    """Return the one table that has every column of a curve; None where it may be missing and no table has one.
-
-    The sign of the knee is detected only with the map of the package (``is_default``): a user's map states it.
-    """
+    """Return the one table that has every column of a curve; None where it may be missing and no table has one."""
     bare = [name.removeprefix("-") for name in names]
     holders = [table for table in tables if all(name in table.columns for name in bare)]
     if len(holders) > 1:
@@ -163,13 +167,6 @@ def find_columns(
     if holders:
         signs = [-1.0 if name.startswith("-") else 1.0 for name in names]
         terms = tuple(zip(signs, bare, strict=True))
-        if is_default and holders[0].form == OPENSIM:
-            # Where its flexion counts above 0, as in the newer OpenSim models, the knee is taken away.
-            terms = tuple(
-                (-sign if name.startswith(_KNEE) and np.nanmax(values) > -np.nanmin(values) else sign, name)
-                for sign, name in terms
-                for values in (holders[0].columns[name],)
-            )
         return CurveColumns(f"{curve}.unit", holders[0], terms, curve in LOADS)
     if optional and not any(name in table.columns for name in bare for table in tables):
         return None
@@ -246,7 +243,7 @@ def knee_signals(
             return {}
         raise DataError("knee.thigh needs a length: give knee.thigh_length in the gait map, or the stature")
     thigh = mapped.thigh or ()
-    found = find_columns("knee", (*mapped.forward, *mapped.up, *thigh), tables, is_default, is_default)
+    found = find_columns("knee", (*mapped.forward, *mapped.up, *thigh), tables, is_default)
     if found is None:
         return {}
     ends = len(mapped.forward), len(mapped.forward) + len(mapped.up)
@@ -359,7 +356,7 @@ def walk_signals(
     def read_curve(name: str) -> None:
         mapped = getattr(columns, name)
         optional = is_default and name not in REQUIRED
-        found = None if mapped is None else find_columns(name, column_names(mapped), tables, optional, is_default)
+        found = None if mapped is None else find_columns(name, column_names(mapped), tables, optional)
         if found is None:
             return
         if isinstance(mapped, AngleMap) and mapped.terms is None:

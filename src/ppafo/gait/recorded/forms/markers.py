@@ -1,178 +1,48 @@
-"""The gait map of files that come without one: labels, axes and units as laboratories and programs write them."""
+"""Markers and outputs of models as laboratories name them, the axes they stand in, and TRC files with markers."""
 
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ppafo.errors import DataError
-from ppafo.gait.recorded.mapping import (
-    AngleMap,
-    Axis,
-    ForceMap,
-    GaitMap,
-    KneeMap,
-    MomentMap,
-    PressureMap,
-    ShankMap,
-    Side,
-    Vertical,
-    opensim_map,
-    package_map,
-)
-from ppafo.gait.recorded.table import CSV, OPENSIM, PLATE, MotionTable
+from ppafo.gait.recorded.form import Convention, GaitForm
+from ppafo.gait.recorded.mapping import AngleMap, Axis, ForceMap, GaitMap, KneeMap, MomentMap, ShankMap, Side, Vertical
+from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats
+from ppafo.storage.opensim import read_trc
+
+PLATE = "force plate "
+"""Columns ``force plate 1.x``, ``.y``, ``.z`` [N]: what the plate's channels make in the axes of the laboratory."""
 
 _FORWARDS: tuple[Axis, ...] = ("x", "y", "z", "-x", "-y", "-z")
+
 _UPWARDS: tuple[Vertical, ...] = ("x", "y", "z")
-_WORD = re.compile(r"[a-z]+|\d+")
-_SIDES = {"right": {"r", "right"}, "left": {"l", "left"}}
+
 _ANGLES = "ankleangles?v?"
+
 _MOMENTS = "anklemoments?v?"
+
 _REACTIONS = ("groundreactionforcev?", "normali[sz]edgrfv?")
+
 _KNEES = ("kne", "kneelat", "knee", "kneestudy", "kjc", "feo")
+
 _ANKLES = ("ank", "anklelat", "ankle", "anklestudy", "ajc", "tio")
+
 _HEELS = ("hee", "heel", "calc", "calcstudy")
+
 _TOES = ("toe", "toetip", "toestudy", "mt2")
+
 _LEAST_WAY = 0.5
 """Metres; a marker that goes further shows the direction of walking, a shorter way is that of a treadmill."""
+
 _MOST_OBLIQUE = 25.0
 """Degrees between walk and axis; the lean of the shank is short by 10 % there."""
 
 
-@dataclass(frozen=True, slots=True)
-class Convention:
-    """The map of files that come without one, columns of force plates to choose by the foot's motion, and remarks."""
-
-    columns: GaitMap
-    plates: tuple[str, ...] = ()
-    remarks: tuple[str, ...] = ()
-
-
-def find_convention(tables: Sequence[MotionTable], side: Side, body_mass: float) -> Convention:
-    """Return the map of files by what is in them; ``body_mass`` [kg] tells moments of a body from those per mass."""
-    forms = sorted({table.form for table in tables})
-    if CSV in forms and len(forms) > 1:
-        raise DataError(
-            f"the files have different formats ({', '.join(forms)}); name the columns of all of them in a gait map"
-        )
-    if forms == [CSV]:
-        if side != "right":
-            raise DataError(
-                "a CSV file without a gait map has the columns of one foot; --side left has no meaning there"
-            )
-        return Convention(package_map(side))
-    found = [
-        _of_opensim(table, side) if table.form == OPENSIM else _of_markers(table, side, body_mass) for table in tables
-    ]
-    # One convention for all files: each curve is from the first file that has its columns.
-    known = {name for table in tables for name in table.columns}
-    columns = {}
-    for name in GaitMap.model_fields:
-        choices = [getattr(item.columns, name) for item in found]
-        fitting = [item for item in choices if name != "schema_version" and item and _is_there(item, known)]
-        columns[name] = fitting[0] if fitting else choices[0]
-    plates = tuple(dict.fromkeys(plate for item in found for plate in item.plates))
-    remarks = tuple(dict.fromkeys(remark for item in found for remark in item.remarks))
-    has_force = columns["vertical_force"] is not None and _is_there(columns["vertical_force"], known)
-    return Convention(GaitMap(**columns), () if has_force else plates, remarks)
-
-
-def _is_there(mapped: object, known: set[str]) -> bool:
-    return all(name.removeprefix("-") in known for name in column_names(mapped))
-
-
-def column_names(mapped: object) -> tuple[str, ...]:
-    """Return the columns that the map of one curve names, a minus before those that are taken away."""
-    if isinstance(mapped, KneeMap):
-        return (*mapped.forward, *mapped.up, *(mapped.thigh or ()))
-    if isinstance(mapped, ShankMap) and mapped.terms is None:
-        return _marker_columns((mapped.knee, mapped.ankle), mapped.forward, mapped.vertical)
-    if isinstance(mapped, AngleMap) and mapped.terms is None:
-        return _marker_columns((mapped.heel, mapped.toe), mapped.forward, mapped.vertical)
-    terms: tuple[str, ...] = getattr(mapped, "terms")  # noqa: B009  # every other map has them, by its own class
-    return terms
-
-
-def _marker_columns(markers: Sequence[str | None], forward: str, vertical: str) -> tuple[str, ...]:
-    return tuple(f"{marker}.{axis}" for marker in markers for axis in (forward.removeprefix("-"), vertical))
-
-
-def _of_opensim(table: MotionTable, side: Side) -> Convention:
-    """Return the map of OpenSim's labels; a force plate with a number only is of the foot that moves with it."""
-    usual = opensim_map(side).model_copy(update=_own_columns(table, side[0]))
-    own, other, numbered = _forces(table.columns, side)
-    if own or (other and len(numbered) == 1):
-        terms = own or numbered
-        said = (f"vertical force: the sum of {' and '.join(terms)}",) if len(terms) > 1 else ()
-        return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=terms)}), (), said)
-    if len(numbered) == 1 and side == "right":
-        return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=numbered)}))
-    return Convention(usual.model_copy(update={"vertical_force": None}), numbered)
-
-
-_ALONG = np.radians(5.0)
-"""Mean rotation of the pelvis up to which a walk counts as one along x."""
-
-
-def turned_forward(table: MotionTable) -> MotionTable:
-    """Return an OpenSim table with ``pelvis_tx``, ``_tz`` and ``_tilt`` of a walk along x, whichever way it goes.
-
-    The pelvis is turned about z by the tilt t, about x by the list l, then about y by the rotation. A walker who faces
-    by r (its mean) to the left of x goes along h = (cos r, 0, -sin r) and leans against it by what the upright of the
-    pelvis, (-sin t cos l, cos t cos l, sin l), has in that direction. A walk within 5 deg of x stays as it is.
-    """
-    names = ("pelvis_tx", "pelvis_tz", "pelvis_rotation")
-    if table.form != OPENSIM or any(name not in table.columns for name in names):
-        return table
-    degree = {name: np.pi / 180.0 if table.units.get(name) == "deg" else 1.0 for name in table.columns}
-    rotation = table.columns["pelvis_rotation"] * degree["pelvis_rotation"]
-    facing = float(np.arctan2(np.nanmean(np.sin(rotation)), np.nanmean(np.cos(rotation))))
-    if abs(facing) <= _ALONG:
-        return table
-    cosine, sine = np.cos(facing), np.sin(facing)
-    x, z = table.columns["pelvis_tx"], table.columns["pelvis_tz"]
-    columns = {**table.columns, "pelvis_tx": cosine * x - sine * z, "pelvis_tz": sine * x + cosine * z}
-    if "pelvis_tilt" in columns:
-        tilt = columns["pelvis_tilt"] * degree["pelvis_tilt"]
-        tipped = columns["pelvis_list"] * degree["pelvis_list"] if "pelvis_list" in columns else 0.0 * tilt
-        forward = -np.sin(tilt) * np.cos(tipped) * cosine - np.sin(tipped) * sine
-        columns["pelvis_tilt"] = np.arctan2(-forward, np.cos(tilt) * np.cos(tipped)) / degree["pelvis_tilt"]
-    said = (
-        f"the walk goes {np.degrees(facing):.0f} deg to the left of x (pelvis_rotation): the pelvis is turned into it"
-    )
-    return replace(table, columns=columns, remarks=(*table.remarks, said))
-
-
-def _own_columns(table: MotionTable, foot: str) -> dict[str, object]:
-    """Return the maps of what this package writes for OpenSim beside its coordinates (``storage/opensim.py``)."""
-    found: dict[str, object] = {}
-    if f"shank_angle_{foot}" in table.columns:
-        found["shank_angle"] = ShankMap(terms=(f"shank_angle_{foot}",))
-    if {"knee_forward", "knee_up"} <= set(table.columns):
-        found["knee"] = KneeMap(forward=("knee_forward",), up=("knee_up",), unit="m/s^2")
-    if "centre_of_pressure" in table.columns:
-        found["centre_of_pressure"] = PressureMap(terms=("centre_of_pressure",), unit="m")
-    return found
-
-
-def _forces(names: Iterable[str], side: Side) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
-    """Return the columns of vertical force that name this foot, the other foot, or none."""
-    own: list[str] = []
-    other: list[str] = []
-    numbered: list[str] = []
-    for name in names:
-        words = _WORD.findall(name.lower())
-        if "force" not in words or words[-1] != "vy":
-            continue
-        sides = {foot for foot, marks in _SIDES.items() if marks & set(words)}
-        (numbered if len(sides) != 1 else own if side in sides else other).append(name)
-    return tuple(own), tuple(other), tuple(numbered)
-
-
-def _of_markers(table: MotionTable, side: Side, body_mass: float) -> Convention:
+def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Convention:
     """Return the map of markers and outputs of Plug-in Gait, with the axes of the laboratory found in the markers."""
     foot = side[0]
     labels = list(dict.fromkeys(name.rpartition(".")[0] for name in table.columns if "." in name))
@@ -313,6 +183,7 @@ _FACTORS = {
 }
 """What makes N m/kg or N/kg of a number in the unit; None where the body mass does."""
 
+
 _PLAUSIBLE = {"moment": (0.35, 2.6), "force": (5.5, 20.0)}
 """Peaks of walking in N m/kg and N/kg, narrow enough for no two units to fit up to a body mass of 130 kg."""
 
@@ -340,3 +211,19 @@ def load_unit(table: MotionTable, name: str, kind: str, body_mass: float) -> tup
         )
     was = f"the file states {stated!r}" if stated in _FACTORS[kind] else "the file does not state it"
     return fitting[0], [f"column '{name}' was read in {fitting[0] or 'body weights'} by its size: {was}"]
+
+
+def _read_trc(path: str | Path) -> MotionTable:
+    """Return the markers of a TRC file as columns ``LABEL.x``, ``.y``, ``.z``."""
+    trc = read_trc(path)
+    columns = {f"{name}.{axis}": xyz[row] for name, xyz in trc.markers.items() for row, axis in enumerate("xyz")}
+    return MotionTable(str(path), trc.time, columns, dict.fromkeys(columns, trc.unit))
+
+
+TRC = GaitForm(
+    name="trc",
+    summary="TRC files with markers",
+    suffixes=(".trc",),
+    read=_read_trc,
+    convention=marker_convention,
+)

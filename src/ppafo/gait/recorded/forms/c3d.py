@@ -1,0 +1,217 @@
+"""C3D files: points, what models made of them, analog channels and force plates, subject and events."""
+
+from collections.abc import Iterable, Iterator
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ppafo.errors import DataError, first_twice, one_line
+from ppafo.gait.recorded.form import GaitForm
+from ppafo.gait.recorded.forms.markers import PLATE, marker_convention
+from ppafo.gait.recorded.table import Events, MotionTable, Trial
+from ppafo.signals.recording import Floats
+from ppafo.storage.files import read_bytes
+from ppafo.storage.trial_reading import check_can_be_read
+
+_AXES = "xyz"
+_MARK = b"\x50"
+"""Second byte of every C3D file."""
+
+_UNITS = {
+    "Nmm/kg": "N mm/kg",
+    "N.mm/kg": "N mm/kg",
+    "Nmm": "N mm",
+    "N.mm": "N mm",
+    "Nm": "N m",
+    "N.m": "N m",
+    "Nm/kg": "N m/kg",
+    "N.m/kg": "N m/kg",
+    "degrees": "deg",
+    "": "",
+}
+
+_GROUPS = (("ANGLES", "ANGLE_UNITS"), ("MOMENTS", "MOMENT_UNITS"), ("FORCES", "FORCE_UNITS"))
+
+_BODY, _HEIGHT = ("Bodymass", "BODYMASS", "BodyMass"), ("Height", "HEIGHT")
+
+
+def read_c3d(path: str | Path) -> MotionTable:
+    """Return the columns of a C3D file and what it says of subject and events.
+
+    Analog channels are faster; the samples at the times of the points are taken. Where a point was not seen it is NaN,
+    for whoever uses the column to fill or refuse. The clock is that of the trial, which may begin before the file.
+    """
+    try:
+        import ezc3d  # noqa: F401  # its absence is reported before the file is looked at
+    except ImportError as error:
+        raise DataError(f"{path}: C3D files need ezc3d; install it with 'pip install ppafo[c3d]'") from error
+    if read_bytes(path)[1:2] != _MARK:
+        raise DataError(f"{path}: is not a C3D file")
+    check_can_be_read(Path(path), __name__, "open_c3d", "ezc3d")
+    content = open_c3d(path)
+    parameters: Any = content["parameters"]
+    rate = _rate(parameters, path)
+    points: Floats = content["data"]["points"]
+    # The labels, without the subject's name before a colon.
+    group = parameters["POINT"]
+    number = points.shape[1]
+    labels = [_bare(label) for label in _texts(group, "LABELS")][:number]
+    twice = first_twice(labels)
+    if twice is not None or len(labels) != number:
+        what = f"two of {twice!r}" if twice is not None else f"{len(labels)} labels for {number} columns"
+        raise DataError(f"{path}: there are {what}; every point and channel needs a label of its own")
+    frames = points.shape[2]
+    columns = {
+        f"{label}.{axis}": points[row, number, :]
+        for number, label in enumerate(labels)
+        for row, axis in enumerate(_AXES)
+    }
+    units = _units(parameters["POINT"], labels)
+    analogs: Floats = content["data"]["analogs"][0]
+    if analogs.shape[0] and frames:
+        for name, values, unit in _channels(parameters["ANALOG"], analogs, frames):
+            columns[name], units[name] = values, unit
+    for name, values in _plates(content, frames):
+        columns[name], units[name] = values, "N"
+    first = max(0, int(content["header"]["points"].get("first_frame", 0)))
+    trial = _trial(parameters)
+    time = (first + np.arange(frames)) / rate
+    return MotionTable(str(path), time, columns, units, remarks=trial.remarks, trial=trial)
+
+
+def open_c3d(path: str | Path) -> Any:
+    """Return what ezc3d makes of a file, with its force plates where it can; damage can bring down the process."""
+    import ezc3d
+
+    try:
+        try:
+            return ezc3d.c3d(str(path), extract_forceplat_data=True)
+        except (OSError, RuntimeError, ValueError, IndexError, KeyError):
+            return ezc3d.c3d(str(path))
+    except (OSError, RuntimeError, ValueError, IndexError, KeyError) as error:
+        raise DataError(f"{path}: ezc3d cannot read it: {one_line(error)}") from error
+
+
+def _rate(parameters: Any, path: str | Path) -> float:
+    values = np.atleast_1d(parameters["POINT"]["RATE"]["value"])
+    rate = float(values[0]) if values.size else 0.0
+    if not 0.0 < rate < np.inf:
+        raise DataError(f"{path}: POINT:RATE is {rate:g}; points need a rate above 0 Hz")
+    return rate
+
+
+def _bare(label: str) -> str:
+    return label.rpartition(":")[2].strip()
+
+
+def _channels(group: Any, analogs: Floats, frames: int) -> Iterator[tuple[str, Floats, str]]:
+    """Yield name, values at the times of the points and unit of each channel whose label is its own."""
+    step = analogs.shape[1] // frames
+    labels = [_bare(label) for label in _texts(group, "LABELS")][: analogs.shape[0]]
+    stated = _texts(group, "UNITS")
+    for number, label in enumerate(labels):
+        if label and labels.count(label) == 1:
+            yield label, analogs[number, ::step][:frames], _unit_name(stated[number]) if number < len(stated) else ""
+
+
+def _plates(content: Any, frames: int) -> Iterator[tuple[str, Floats]]:
+    """Yield the forces [N] of every plate in the axes of the laboratory, upwards above 0, as often as the points."""
+    for number, plate in enumerate(content["data"].get("platform", ()), start=1):
+        force: Floats = np.asarray(plate["force"], dtype=np.float64)
+        if frames == 0 or force.ndim != 2 or force.shape[1] < frames:
+            continue
+        # Some laboratories store what the plate feels, some what it gives back; a foot loads it downwards.
+        force = force[:, :: force.shape[1] // frames][:, :frames]
+        # Whichever axis is up, the weight is the largest of the sums.
+        total = np.nansum(force, axis=1)
+        sign = -1.0 if total[np.argmax(np.abs(total))] < 0.0 else 1.0
+        for row, axis in enumerate(_AXES):
+            yield f"{PLATE}{number}.{axis}", sign * force[row]
+
+
+def _units(group: Any, labels: Iterable[str]) -> dict[str, str]:
+    """Return the unit of every point's coordinates: those of model outputs stand in groups of their own."""
+    usual = _unit_name(next(iter(_texts(group, "UNITS")), ""))
+    units = {label: usual for label in labels}
+    for names, unit in _GROUPS:
+        stated = _unit_name(next(iter(_texts(group, unit)), ""))
+        units.update({_bare(label): stated for label in _texts(group, names)})
+    return {f"{label}.{axis}": unit for label, unit in units.items() for axis in _AXES}
+
+
+def _unit_name(unit: str) -> str:
+    return _UNITS.get(unit.strip(), unit.strip())
+
+
+def _texts(group: Any, key: str) -> list[str]:
+    """Return the texts of a parameter; one with more than 255 goes on in KEY2, KEY3 and so on."""
+    keys = [key]
+    for number in count(2):
+        if f"{key}{number}" not in group:
+            break
+        keys.append(f"{key}{number}")
+    return [str(text) for name in keys if name in group for text in group[name]["value"]]
+
+
+def _trial(parameters: Any) -> Trial:
+    """Return subject and events; those of other laboratories' spelling, or nonsense, are as if they were absent."""
+    group = parameters.get("PROCESSING", {})
+    mass, height = _number(group, _BODY), _number(group, _HEIGHT)
+    # Plug-in Gait keeps the height in mm.
+    stature = None if height is None else height / 1000.0 if height > 100.0 else height
+    return Trial(
+        mass if mass is not None and 1.0 <= mass <= 500.0 else None,
+        stature if stature is not None and 0.5 <= stature <= 2.5 else None,
+        *_events(parameters.get("EVENT", {})),
+    )
+
+
+def _number(group: Any, names: Iterable[str]) -> float | None:
+    for name in names:
+        if name in group:
+            values = np.atleast_1d(group[name]["value"])
+            if values.size and values.dtype.kind in "fi" and np.isfinite(values[0]):
+                return float(values[0])
+    return None
+
+
+def _events(group: Any) -> tuple[Events, tuple[str, ...]]:
+    """Return the times of strikes and offs, and what there is to say of them.
+
+    A time is stored as minutes and seconds, in two rows; some programs write a flat list, of such pairs or of seconds.
+    """
+    present = [name for name in ("CONTEXTS", "LABELS", "TIMES") if name in group]
+    if len(present) < 3:
+        return {}, ("its events are not read: one of EVENT:CONTEXTS, LABELS and TIMES is missing",) if present else ()
+    sides, kinds = _texts(group, "CONTEXTS"), _texts(group, "LABELS")
+    times = np.asarray(group["TIMES"]["value"], dtype=np.float64)
+    count, said = len(kinds), ""
+    if times.shape == (2, count) or (count < 2 and times.size == 2 * count):
+        pairs = times.reshape(2, count)
+    elif times.size == 2 * count:
+        pairs, said = times.reshape(count, 2).T, "a flat list of minutes and seconds"
+    elif times.size == count:
+        pairs, said = np.array([np.zeros(count), times.reshape(-1)]), "a flat list of seconds"
+    else:
+        pairs = np.zeros((2, 0))
+    if not count == len(sides) == pairs.shape[1]:
+        return {}, (
+            f"its events are not read: EVENT has {len(sides)} contexts, {count} labels and {times.size} times, which "
+            "do not fit together",
+        )
+    found: Events = {}
+    for side, kind, time in zip(sides, kinds, (60.0 * pairs[0] + pairs[1]).tolist(), strict=True):
+        if np.isfinite(time):
+            found.setdefault((side.strip().lower(), kind.strip().lower()), []).append(time)
+    return {key: sorted(found[key]) for key in found}, (f"times of its events read as {said}",) if said else ()
+
+
+FORM = GaitForm(
+    name="c3d",
+    summary="C3D files with markers, or with the angles, moments and forces of Plug-in Gait",
+    suffixes=(".c3d",),
+    read=read_c3d,
+    convention=marker_convention,
+)

@@ -1,0 +1,111 @@
+"""CSV files: of this package, with its names and units, and plain ones with any usual delimiter.
+
+A CSV file need not have the header ``name [unit]``: names alone or with the unit in brackets will do.
+"""
+
+import re
+from pathlib import Path
+from typing import Literal
+
+from ppafo.documents.regular_file import decoded
+from ppafo.errors import DataError, first_twice, one_line
+from ppafo.gait.recorded.form import Convention, GaitForm
+from ppafo.gait.recorded.mapping import Side, package_map
+from ppafo.gait.recorded.table import MotionTable
+from ppafo.storage.comma_separated import read_csv
+from ppafo.storage.files import read_bytes
+from ppafo.storage.foreign import ColumnMap, MappedChannel, read_foreign
+
+_DELIMITERS: dict[str, Literal["comma", "semicolon", "tab"]] = {",": "comma", ";": "semicolon", "\t": "tab"}
+
+_NAME = re.compile(r"(.*?)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?")
+
+_TIMES = {"time": "s", "t": "s", "time_s": "s", "time_ms": "ms"}
+
+_LONGEST_SHOWN = 40
+
+
+def _read(path: str | Path) -> MotionTable:
+    """Return a table of this package, or a plain one."""
+    if is_plain(path):
+        return read_plain_csv(path)
+    recording = read_csv(path)
+    columns = {name: recording[name] for name in recording.names}
+    units = {name: recording.unit(name) for name in recording.names}
+    return MotionTable(str(path), recording.time, columns, units, kind=recording.kind)
+
+
+def _convention(_table: MotionTable, side: Side, _body_mass: float) -> Convention:
+    """Return the map of columns with the names and signs of the package, which do not name the foot."""
+    if side != "right":
+        raise DataError("a CSV file without a gait map has the columns of one foot; --side left has no meaning there")
+    return Convention(package_map(side))
+
+
+def is_plain(path: str | Path) -> bool:
+    """Tell whether the first column of a CSV file has a header without its unit in square brackets."""
+    return "[" not in re.split(r"[,;\t]", _header(path))[0]
+
+
+def plain_names(path: str | Path) -> list[str]:
+    """Return the names in the header of a plain CSV file."""
+    return [name for name, _ in _named_columns(_header(path))]
+
+
+def _named_columns(header: str) -> list[tuple[str, str]]:
+    cells = [cell.strip().strip('"').strip() for cell in header.split(_delimiter(header))]
+    return [(match[1], match[2] or "") for cell in cells if (match := _NAME.fullmatch(cell))]
+
+
+def _delimiter(header: str) -> str:
+    return max(_DELIMITERS, key=header.count)
+
+
+def read_plain_csv(path: str | Path) -> MotionTable:
+    """Return the table of a plain CSV file; units are empty where the header does not state one.
+
+    DataError names the line of what cannot be read.
+    """
+    header = _header(path)
+    delimiter, pairs = _delimiter(header), _named_columns(header)
+    names, units = [name for name, _ in pairs], [unit for _, unit in pairs]
+    if names[0].lower() not in _TIMES:
+        raise DataError(f"{path}: the first column must be 'time', it is {one_line(names[0])[:_LONGEST_SHOWN]!r}")
+    twice = first_twice(names)
+    if twice is not None or "" in names:
+        what = "a column has no name" if twice is None else f"there are two columns {one_line(twice)!r}"
+        raise DataError(f"{path}: {what}; every column needs a name of its own")
+    channels = {f"c{number}": MappedChannel(column=number + 1) for number in range(1, len(names))}
+    channels["time"] = MappedChannel(column=1, unit=units[0] or _TIMES[names[0].lower()])
+    mapped = ColumnMap(
+        delimiter=_DELIMITERS[delimiter],
+        decimal="point" if delimiter == "," or not re.search(r"\d,\d", _text(path)) else "comma",
+        channels=channels,
+    )
+    recording = read_foreign(path, mapped)
+    columns = {name: recording[f"c{number}"] for number, name in enumerate(names) if number > 0}
+    stated = dict(zip(names, units, strict=True))
+    return MotionTable(str(path), recording.time, columns, {name: stated[name] for name in columns})
+
+
+def _header(path: str | Path) -> str:
+    lines = (line for line in _text(path).splitlines() if line.strip() and not line.startswith("#"))
+    return next(lines, "")
+
+
+def _text(path: str | Path) -> str:
+    content = read_bytes(path)
+    try:
+        return decoded(content)
+    except UnicodeDecodeError:
+        return content.decode("utf-8", errors="replace")
+
+
+FORM = GaitForm(
+    name="csv",
+    summary="CSV files with the names and signs of this package, or others with a gait map",
+    suffixes=(".csv",),
+    read=_read,
+    convention=_convention,
+    is_whole=True,
+)

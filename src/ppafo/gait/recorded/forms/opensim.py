@@ -1,0 +1,157 @@
+"""OpenSim's tables of motion and force, .mot and .sto, and CSV files whose columns have OpenSim's names."""
+
+import re
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ppafo.gait.recorded.form import Convention, GaitForm
+from ppafo.gait.recorded.forms.comma_separated import is_plain, plain_names, read_plain_csv
+from ppafo.gait.recorded.mapping import ForceMap, KneeMap, PressureMap, ShankMap, Side, opensim_map
+from ppafo.gait.recorded.table import MotionTable
+from ppafo.signals.recording import Floats
+from ppafo.storage.opensim import read_opensim_with_gaps
+
+_CSV = ".csv"
+_STATE = re.compile(r".*/([^/]+)/value")
+"""A coordinate among OpenSim's states, such as ``/jointset/ankle_r/ankle_angle_r/value``; its speed is beside it."""
+
+
+def _recognises(path: str | Path) -> bool:
+    """Recognise OpenSim's own files, and a plain CSV file by an ankle that OpenSim names."""
+    if Path(path).suffix.lower() != _CSV:
+        return True
+    return is_plain(path) and any(name.startswith("ankle_angle_") for name in plain_names(path))
+
+
+def _read(path: str | Path) -> MotionTable:
+    """Return the table with the units that OpenSim's labels imply; angles are as the header says.
+
+    A coordinate that is named by its path among the states is there by its own name too.
+    """
+    if Path(path).suffix.lower() == _CSV:
+        plain = read_plain_csv(path)
+        return replace(plain, units={name: unit or _unit(name, name, "") for name, unit in plain.units.items()})
+    table = read_opensim_with_gaps(path)
+    is_unstated = table.in_degrees is None and table.is_old
+    angle = "deg" if is_unstated else {True: "deg", False: "rad", None: ""}[table.in_degrees]
+    paths = {match[1]: name for name in table.columns if (match := _STATE.fullmatch(name))}
+    columns = {**table.columns, **{name: table.columns[path] for name, path in paths.items()}}
+    units = {name: _unit(paths.get(name, name), name, angle) for name in columns}
+    remarks = table.remarks
+    if is_unstated and any(unit == "deg" for unit in units.values()):
+        remarks = (*remarks, "the header does not state the unit of angles: degrees, as in files of its older style")
+    return MotionTable(str(path), table.time, columns, units, kind=table.kind, remarks=remarks)
+
+
+def _unit(path: str, label: str, angle: str) -> str:
+    if path != label:
+        # States are in radians and metres whatever the header says of other columns.
+        angle = angle or "rad"
+    if label.endswith("_moment") or "torque" in label or label.endswith(("_mx", "_my", "_mz")):
+        return "N m"
+    if label.endswith("_force") or label.endswith(("_vx", "_vy", "_vz")):
+        return "N"
+    if label.endswith(("_tx", "_ty", "_tz", "_px", "_py", "_pz")):
+        return "m"
+    return angle
+
+
+_WORD = re.compile(r"[a-z]+|\d+")
+_SIDES = {"right": {"r", "right"}, "left": {"l", "left"}}
+_KNEE = "knee_angle_"
+
+
+def _convention(table: MotionTable, side: Side, _body_mass: float) -> Convention:
+    """Return the map of OpenSim's labels; a force plate with a number only is of the foot that moves with it."""
+    usual = opensim_map(side)
+    terms = tuple(
+        # Where its flexion counts above 0, as in the newer OpenSim models, the knee is taken away.
+        f"-{name}" if name.startswith(_KNEE) and _counts_above(table.columns.get(name)) else name
+        for name in usual.shank_angle.terms or ()
+    )
+    usual = usual.model_copy(update={"shank_angle": ShankMap(terms=terms), **_own_columns(table, side[0])})
+    own, other, numbered = _forces(table.columns, side)
+    if own or (other and len(numbered) == 1):
+        terms = own or numbered
+        said = (f"vertical force: the sum of {' and '.join(terms)}",) if len(terms) > 1 else ()
+        return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=terms)}), (), said)
+    if len(numbered) == 1 and side == "right":
+        return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=numbered)}))
+    return Convention(usual.model_copy(update={"vertical_force": None}), numbered)
+
+
+def _counts_above(flexion: Floats | None) -> bool:
+    return flexion is not None and bool(np.nanmax(flexion) > -np.nanmin(flexion))
+
+
+def _own_columns(table: MotionTable, foot: str) -> dict[str, object]:
+    """Return the maps of what this package writes for OpenSim beside its coordinates (``storage/opensim.py``)."""
+    found: dict[str, object] = {}
+    if f"shank_angle_{foot}" in table.columns:
+        found["shank_angle"] = ShankMap(terms=(f"shank_angle_{foot}",))
+    if {"knee_forward", "knee_up"} <= set(table.columns):
+        found["knee"] = KneeMap(forward=("knee_forward",), up=("knee_up",), unit="m/s^2")
+    if "centre_of_pressure" in table.columns:
+        found["centre_of_pressure"] = PressureMap(terms=("centre_of_pressure",), unit="m")
+    return found
+
+
+def _forces(names: Iterable[str], side: Side) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """Return the columns of vertical force that name this foot, the other foot, or none."""
+    own: list[str] = []
+    other: list[str] = []
+    numbered: list[str] = []
+    for name in names:
+        words = _WORD.findall(name.lower())
+        if "force" not in words or words[-1] != "vy":
+            continue
+        sides = {foot for foot, marks in _SIDES.items() if marks & set(words)}
+        (numbered if len(sides) != 1 else own if side in sides else other).append(name)
+    return tuple(own), tuple(other), tuple(numbered)
+
+
+_ALONG = np.radians(5.0)
+"""Mean rotation of the pelvis up to which a walk counts as one along x."""
+
+
+def _turned_forward(table: MotionTable) -> MotionTable:
+    """Return an OpenSim table with ``pelvis_tx``, ``_tz`` and ``_tilt`` of a walk along x, whichever way it goes.
+
+    The pelvis is turned about z by the tilt t, about x by the list l, then about y by the rotation. A walker who faces
+    by r (its mean) to the left of x goes along h = (cos r, 0, -sin r) and leans against it by what the upright of the
+    pelvis, (-sin t cos l, cos t cos l, sin l), has in that direction. A walk within 5 deg of x stays as it is.
+    """
+    names = ("pelvis_tx", "pelvis_tz", "pelvis_rotation")
+    if any(name not in table.columns for name in names):
+        return table
+    degree = {name: np.pi / 180.0 if table.units.get(name) == "deg" else 1.0 for name in table.columns}
+    rotation = table.columns["pelvis_rotation"] * degree["pelvis_rotation"]
+    facing = float(np.arctan2(np.nanmean(np.sin(rotation)), np.nanmean(np.cos(rotation))))
+    if abs(facing) <= _ALONG:
+        return table
+    cosine, sine = np.cos(facing), np.sin(facing)
+    x, z = table.columns["pelvis_tx"], table.columns["pelvis_tz"]
+    columns = {**table.columns, "pelvis_tx": cosine * x - sine * z, "pelvis_tz": sine * x + cosine * z}
+    if "pelvis_tilt" in columns:
+        tilt = columns["pelvis_tilt"] * degree["pelvis_tilt"]
+        tipped = columns["pelvis_list"] * degree["pelvis_list"] if "pelvis_list" in columns else 0.0 * tilt
+        forward = -np.sin(tilt) * np.cos(tipped) * cosine - np.sin(tipped) * sine
+        columns["pelvis_tilt"] = np.arctan2(-forward, np.cos(tilt) * np.cos(tipped)) / degree["pelvis_tilt"]
+    said = (
+        f"the walk goes {np.degrees(facing):.0f} deg to the left of x (pelvis_rotation): the pelvis is turned into it"
+    )
+    return replace(table, columns=columns, remarks=(*table.remarks, said))
+
+
+FORM = GaitForm(
+    name="opensim",
+    summary="OpenSim's .mot and .sto, and CSV files with OpenSim's names of columns",
+    suffixes=(".mot", ".sto", _CSV),
+    read=_read,
+    convention=_convention,
+    recognises=_recognises,
+    arrange=_turned_forward,
+)
