@@ -18,10 +18,10 @@ import stat
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextvars import ContextVar, copy_context
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from types import ModuleType
 
@@ -247,6 +247,8 @@ def _compile_and_keep(kept: Path, wanted: _Wanted) -> ModuleType:
             module = wanted.compile(path)
         (aside / SECONDS_FILE).write_text(f"{time.perf_counter() - start:.2f}", encoding="ascii")
         (aside / _CHECKSUMS).write_text(json.dumps(_checksums(aside), indent=2), encoding="utf-8")
+        for place in aside.rglob("*"):  # compilers let a group write where the user's habits (umask) do
+            place.chmod(0o700 if place.is_dir() else 0o600)
         with contextlib.suppress(OSError):  # another process was quicker, with the same program
             aside.rename(kept)
         evict(kept.parent)
@@ -286,13 +288,18 @@ def _is_whole(kept: Path) -> bool:
         stated = json.loads(read_regular_file(kept / _CHECKSUMS))
         # What else lies there is no part of it: Numba tries, for an instant, whether it could write a file of its own.
         files = stated.items() if isinstance(stated, dict) else ()
-        return _is_own(kept) and bool(files) and all(_checksum(kept / name) == given for name, given in files)
+        return _is_own(kept, [name for name, _ in files]) and all(
+            _checksum(kept / name) == given for name, given in files
+        )
     except (OSError, ValueError, RecursionError):
         return False
 
 
-def _is_own(kept: Path) -> bool:
-    """Tell whether a program and all in it is this user's: one that came while others could write stays theirs."""
+def _is_own(kept: Path, files: Collection[str]) -> bool:
+    """Tell whether a program and all in it is this user's, and nobody else can write into its ``files`` and folders.
+
+    What came while others could write stays theirs. Nobody else can then change a file between this look and its use.
+    """
     found = [kept.lstat()]
     for place in kept.rglob("*"):
         with contextlib.suppress(FileNotFoundError):
@@ -300,8 +307,10 @@ def _is_own(kept: Path) -> bool:
     if not hasattr(os, "geteuid"):
         return stat.S_ISDIR(found[0].st_mode)
     is_whose = all(item.st_uid in (0, os.geteuid()) for item in found)
-    folders = [item for item in found if stat.S_ISDIR(item.st_mode)]
-    return is_whose and found[0] in folders and not any(item.st_mode & WRITTEN_BY_OTHERS for item in folders)
+    used = [item for item in found if stat.S_ISDIR(item.st_mode)]
+    is_folder = found[0] in used
+    used += [(kept / name).lstat() for name in (_CHECKSUMS, *files)]
+    return is_whose and is_folder and bool(files) and not any(item.st_mode & WRITTEN_BY_OTHERS for item in used)
 
 
 def _checksums(folder: Path) -> dict[str, str]:
@@ -381,8 +390,23 @@ def _why_not_private(folder: Path, found: os.stat_result, above: list[os.stat_re
 
 def _can_be_exchanged(place: os.stat_result) -> bool:
     """Tell whether another user can rename what lies in a folder."""
-    is_theirs = place.st_uid not in (0, os.geteuid())
-    return is_theirs or bool(place.st_mode & stat.S_IWOTH and not place.st_mode & stat.S_ISVTX)
+    if place.st_uid not in (0, os.geteuid()):
+        return True
+    writers = stat.S_IWOTH if _is_own_group(place.st_gid) else WRITTEN_BY_OTHERS
+    return bool(place.st_mode & writers and not place.st_mode & stat.S_ISVTX)
+
+
+@cache
+def _is_own_group(number: int) -> bool:
+    """Tell whether a group is this user's alone: many systems give each user one, which may write where they may."""
+    import grp
+    import pwd
+
+    try:
+        user, group = pwd.getpwuid(os.geteuid()), grp.getgrgid(number)
+    except KeyError:
+        return False
+    return user.pw_gid == number and group.gr_name == user.pw_name and set(group.gr_mem) <= {user.pw_name}
 
 
 @contextlib.contextmanager
@@ -539,7 +563,8 @@ def _is_own_file(found: os.stat_result, above: os.stat_result) -> bool:
     """Tell whether a file is this user's, and so its folder, where nobody else can write: what is in it may be run."""
     if not hasattr(os, "geteuid"):
         return True
-    return {found.st_uid, above.st_uid} <= {0, os.geteuid()} and not above.st_mode & WRITTEN_BY_OTHERS
+    is_written = (found.st_mode | above.st_mode) & WRITTEN_BY_OTHERS
+    return {found.st_uid, above.st_uid} <= {0, os.geteuid()} and not is_written
 
 
 def _write(place: Path, content: bytes) -> None:
@@ -549,6 +574,7 @@ def _write(place: Path, content: bytes) -> None:
     aside = place.with_name(f".writing-{secrets.token_hex(8)}")
     try:
         aside.write_bytes(hashlib.sha256(content).digest() + content)
+        aside.chmod(0o600)
         aside.replace(place)
     finally:
         aside.unlink(missing_ok=True)

@@ -243,10 +243,36 @@ def test_program_that_another_user_left_in_the_folder_is_not_run(compiled: Path,
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no permission bits here")
-def test_program_into_which_others_can_write_is_compiled_anew(compiled: Path) -> None:
-    compiled.chmod(0o777)
+@pytest.mark.parametrize("which", ["folder", "file", "checksums"])
+def test_program_into_which_others_can_write_is_compiled_anew(compiled: Path, which: str) -> None:
+    (index,) = compiled.rglob("*.nbi")
+    place = {"folder": compiled, "file": index, "checksums": compiled / "checksums.json"}[which]
+    place.chmod(0o777)
     assert loaded() == 42.0
-    assert compiled.stat().st_mode & 0o022 == 0
+    assert place.stat().st_mode & 0o022 == 0
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no permission bits here")
+def test_a_program_is_this_users_whatever_the_habits_of_files(fresh_cache: Path) -> None:
+    before = os.umask(0o002)
+    try:
+        assert loaded() == 42.0
+    finally:
+        os.umask(before)
+    (kept,) = list_programs(fresh_cache)
+    assert not any(place.stat().st_mode & 0o022 for place in (kept.place, *kept.place.rglob("*")))
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no permission bits here")
+def test_a_folder_above_may_be_written_by_a_group_of_this_user_alone(
+    fresh_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert refusal(fresh_cache) == ""
+    tmp_path.chmod(0o770)
+    monkeypatch.setattr(cache, "_is_own_group", lambda _number: True)
+    assert refusal(fresh_cache) == ""
+    monkeypatch.setattr(cache, "_is_own_group", lambda _number: False)
+    assert "others can put another folder in the place" in refusal(fresh_cache)
 
 
 def test_entry_that_is_a_link_to_itself_is_no_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
