@@ -81,6 +81,12 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         """Return the kinds that are loaded by name, those of this package first, in their order."""
         return {name: self._kinds[name] for name in self if name in self._kinds}
 
+    def loaded_or_own(self) -> dict[str, Kind]:
+        """Return the kinds that are loaded; where nothing named one, all of this package."""
+        if not self._kinds:
+            self.load_own()
+        return self.loaded()
+
     def is_own(self, name: str) -> bool:
         """Tell whether a name is that of a kind of this package."""
         return name in self._own

@@ -13,10 +13,10 @@ from typing import Any
 
 import pytest
 
-from ppafo.model import plant, sensors
+from ppafo.model import places, plant, sensors
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.model.declaration import Quantity
-from ppafo.model.effects.kind import Effect, equation_lines, nomenclature_lines
+from ppafo.model.effects.kind import Effect, Moment, equation_lines, nomenclature_lines
 from ppafo.parameters import declaration, device
 from ppafo.signals.recording import CHANNELS
 
@@ -136,7 +136,7 @@ def test_every_dotted_name_on_the_page_of_equations_is_a_function() -> None:
 @pytest.mark.parametrize("number", PAPER_EQUATIONS)
 def test_the_functions_of_an_equation_name_it_in_their_docstrings(number: int) -> None:
     silent = [name for name in sections_of_equations()[number] if number not in equations_of(found(name).__doc__ or "")]
-    assert silent == []
+    assert silent == [], f"write 'Equation ({number}).' into the first line of the docstring of each of them"
 
 
 def test_numbers_of_equations_are_read_from_every_way_of_writing_them() -> None:
@@ -161,12 +161,19 @@ def test_every_name_of_the_nomenclature_is_a_parameter_or_field_or_declared_valu
 @pytest.mark.parametrize("group", [*GROUPS_OF_NUMBERS, *DEVICE_PARTS], ids=lambda group: group.__name__)
 def test_every_field_of_plant_state_and_device_is_in_the_nomenclature(group: Any) -> None:
     fields = [item.name for item in dataclasses.fields(group)] if dataclasses.is_dataclass(group) else group._fields
-    assert [name for name in fields if name not in dict(nomenclature())] == []
+    missing = [f"| - | `{name}` | - | what it is |" for name in fields if name not in dict(nomenclature())]
+    assert missing == [], f"paste into docs/nomenclature.md, with symbol, unit and meaning of {group.__name__}:\n" + (
+        "\n".join(missing)
+    )
 
 
 def test_every_number_that_the_physics_takes_or_keeps_is_in_the_nomenclature() -> None:
     data_only = {"default", "minimum", "maximum"}
-    assert sorted(names_of(SOURCE / "model", only_numbers=True) - data_only - set(dict(nomenclature()))) == []
+    missing = sorted(names_of(SOURCE / "model", only_numbers=True) - data_only - set(dict(nomenclature())))
+    assert missing == [], (
+        "paste into the table of its subject in docs/nomenclature.md, with symbol, unit, meaning:\n"
+        + ("\n".join(f"| - | `{name}` | - | what it is |" for name in missing))
+    )
 
 
 @pytest.mark.parametrize("effect", EFFECTS.values(), ids=lambda effect: effect.name)
@@ -174,9 +181,18 @@ def test_an_effect_has_its_lines_in_nomenclature_and_equations(effect: Effect) -
     nomenclature_page, equations = (
         (ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("nomenclature.md", "equations.md")
     )
-    for line in nomenclature_lines(effect):
-        assert line in nomenclature_page.splitlines()
-    assert "\n".join(equation_lines(effect)) in equations
+    missing = [line for line in nomenclature_lines(effect) if line not in nomenclature_page.splitlines()]
+    assert missing == [], "paste into docs/nomenclature.md, below 'Effects':\n" + "\n".join(missing)
+    section = "\n".join(equation_lines(effect))
+    assert section in equations, (
+        f"paste into docs/equations.md, below 'Effects beside the paper's equations':\n{section}"
+    )
+
+
+def test_the_page_on_effects_lists_every_field_of_a_moment_and_every_place() -> None:
+    page = (ROOT / "docs" / "how-to" / "add-an-effect.md").read_text(encoding="utf-8")
+    laws = [name for name, law in inspect.getmembers(places, inspect.isfunction) if law.__module__ == places.__name__]
+    assert [name for name in (*Moment._fields, *laws) if f"`{name}" not in page] == []
 
 
 def test_units_of_the_nomenclature_are_the_declared_ones() -> None:

@@ -1,4 +1,4 @@
-"""A workbench of scenarios and walks: which of them share a tab, what they are called there, what the page is told."""
+"""A workbench of scenarios and walks: which of them share a tab, what they are called there, what the page gets."""
 
 import json
 import math
@@ -56,7 +56,7 @@ _NICE = (1.0, 2.0, 2.5, 5.0, 10.0)
 
 @dataclass(frozen=True, slots=True)
 class Simulated:
-    """A scenario or walk and the module that simulates it; ``label`` tells it from others of its tab."""
+    """A scenario or walk and the module that simulates it; ``label`` distinguishes it from others of its tab."""
 
     scenario: Scenario
     module: WasmModule
@@ -71,31 +71,31 @@ def words() -> dict[str, Any]:
 
 def program_content(item: Simulated, module: str, intervals: Mapping[str, Interval]) -> dict[str, Any]:
     """Return what the page knows of a scenario; ``module`` is the element that holds its program."""
-    told = item.module.description
-    gauge = _gauge_texts(item.scenario, told["settings"])
+    described = item.module.description
+    gauge = _gauge_texts(item.scenario, described["settings"])
     # The file of a scenario or walk with the overrides in it; those of the device stay overrides.
     declared = OF_A_VANE
-    if told["kind"] == "walk":
+    if described["kind"] == "walk":
         from ppafo.walking.declaration import OF_A_WALK
 
         declared = OF_A_WALK
-    changed = apply_overrides(told["document"], told["overrides"], told["name"], declared)
+    changed = apply_overrides(described["document"], described["overrides"], described["name"], declared)
     document, own = changed.document, changed.device
     overrides = [*document.get("device", {}).get("overrides", ()), *own]
     document["device"] = {**document.get("device", {}), **({"overrides": overrides} if overrides else {})}
     return {
-        "name": told["name"],
-        "kind": told["kind"],
+        "name": described["name"],
+        "kind": described["kind"],
         "label": item.label,
         # With and without the device, a walk takes colours in their order, as its figures do.
         "look": PAGE_LOOKS.get(item.scenario.device.valve.kind, 0) if worn_kind(item.scenario) is None else 0,
-        "description": " ".join(told["title"].split()),
+        "description": " ".join(described["title"].split()),
         "document": document,
         "usual": usual_changes(item.scenario),
         "deviceSections": sorted(
-            {entry["key"].partition(".")[0] for entry in told["settings"] if is_of_device(entry["key"])}
+            {entry["key"].partition(".")[0] for entry in described["settings"] if is_of_device(entry["key"])}
         ),
-        "settings": [_setting(_as_in_files(entry, item.scenario), gauge, intervals) for entry in told["settings"]],
+        "settings": [_setting(_as_in_files(entry, item.scenario), gauge, intervals) for entry in described["settings"]],
         "relations": [
             {
                 "key": one["key"],
@@ -104,11 +104,11 @@ def program_content(item: Simulated, module: str, intervals: Mapping[str, Interv
                 "factor": 1.0 + one["tolerance"] * one["is_share"],
                 "slack": 0.0 if one["is_share"] else one["tolerance"],
             }
-            for one in told["relations"]
+            for one in described["relations"]
         ]
-        + _relations_of_files(told),
-        "channels": [_shown(entry) for entry in told["channels"] if entry["name"] != "time"],
-        "metrics": [_shown(entry) for entry in told["metrics"]],
+        + _relations_of_files(described),
+        "channels": [_shown(entry) for entry in described["channels"] if entry["name"] != "time"],
+        "metrics": [_shown(entry) for entry in described["metrics"]],
         "module": module,
     }
 
@@ -122,9 +122,9 @@ def usual_changes(scenario: Scenario) -> dict[str, str]:
     return {"run.duration": f"{max(_WALKED, math.ceil(SHORTEST_STRIDES * walk_of(scenario).gait.stride_time))} s"}
 
 
-def _relations_of_files(told: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _relations_of_files(described: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Contradictions that the file of a walk refuses and its program does not."""
-    if told["kind"] != "walk":
+    if described["kind"] != "walk":
         return []
     from ppafo.walking.contradictions import COMPRESSION
 
@@ -135,7 +135,7 @@ def _relations_of_files(told: Mapping[str, Any]) -> list[dict[str, Any]]:
         ("controller.fill_time", "valve.delay", 1.0),
         ("controller.vent_time", "valve.delay", 1.0),
     )
-    keys = {entry["key"] for entry in told["settings"]}
+    keys = {entry["key"] for entry in described["settings"]}
     return [
         {"key": key, "relation": "above", "other": other, "factor": factor, "slack": 0.0}
         for key, other, factor in above
@@ -399,8 +399,8 @@ def known_intervals() -> Mapping[str, Interval]:
 
     They are those of a study, which takes long to read: ``scripts/known_intervals.py`` writes the file.
     """
-    told = json.loads(files("ppafo.live").joinpath("intervals.json").read_text(encoding="utf-8"))
-    return {path: (low, high) for path, (low, high) in told.items()}
+    described = json.loads(files("ppafo.live").joinpath("intervals.json").read_text(encoding="utf-8"))
+    return {path: (low, high) for path, (low, high) in described.items()}
 
 
 def _label(scenario: Scenario) -> str:

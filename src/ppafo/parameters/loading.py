@@ -109,10 +109,8 @@ def parameter_file() -> type[BaseModel]:
 
     A file that names none of a kind is compared with all of this package.
     """
-    for kinds in (VALVES, ACTUATORS):
-        if not kinds.loaded():
-            kinds.load_own()
-    return _parameter_file(tuple(item for kinds in _KINDS for item in kinds.loaded().items()))
+    named = (VALVES.loaded_or_own(), ACTUATORS.loaded_or_own(), EFFECTS.loaded())
+    return _parameter_file(tuple(item for kinds in named for item in kinds.items()))
 
 
 def whole_parameter_file() -> type[BaseModel]:

@@ -200,9 +200,7 @@ def scenario_file() -> type[BaseModel]:
 
     A file that names no controller is compared with all of this package.
     """
-    if not CONTROLLERS.loaded():
-        CONTROLLERS.load_own()
-    return _scenario_file(*(tuple(kinds.loaded().items()) for kinds in (CONTROLLERS, PROFILES)))
+    return _scenario_file(tuple(CONTROLLERS.loaded_or_own().items()), tuple(PROFILES.loaded().items()))
 
 
 def whole_scenario_file() -> type[BaseModel]:

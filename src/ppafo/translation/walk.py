@@ -338,7 +338,7 @@ class Expressions:
         least = FLOAT if own in LIBRARY | {"sqrt", "float"} else INT
         known = FUNCTIONS | {"float", "int", "bool", "len"} | (self.library - {"pow"})
         if own not in known or node.keywords:
-            raise self.refused(node, f"'{name}' is a function of a library")
+            raise self.refused(node, f"'{name}' is a function of a library{_INSTEAD.get(own, '')}")
         if len(node.args) < 1 or (own in ("min", "max")) != (len(node.args) > 1):
             raise self.refused(node, f"'{ast.unparse(node)}' with {len(node.args)} arguments")
         if own == "len":
@@ -374,6 +374,15 @@ def _linked(node: ast.BoolOp, parts: list[Term]) -> Term:
     for part in parts[1:]:
         made = Term(SIGN_OF[type(node.op)], BOOL, (made, part))
     return made
+
+
+_INSTEAD = {
+    "exp": ", whose last bits differ between computers: decay_factors(rate, step) of ppafo.model.sensors gives "
+    "exp(-rate * step) with the same bits everywhere, exponential(exponent) of ppafo.model.elementary any other",
+    "log": ", whose last bits differ between computers: take logarithm(number) of ppafo.model.elementary",
+    "pow": ", whose last bits differ between computers: take power(base, exponent) of ppafo.model.elementary",
+}
+"""What to write in the place of a function of a library, where the package has that."""
 
 
 def _literal(item: Term) -> int | None:

@@ -1,7 +1,7 @@
 """A scenario or a walk as a WebAssembly module, for a page that simulates; this is how such a module is called.
 
-``module_of(item)`` gives the ``wasm`` bytes and a ``description``, plain data for JSON that tells of each setting,
-channel and metric what a person and a page must know. A module imports nothing. It needs 128-bit vectors, which
+``module_of(item)`` gives the ``wasm`` bytes and a ``description``, plain data for JSON with what a person and a page
+must know of each setting, channel and metric. A module imports nothing. It needs 128-bit vectors, which
 every browser in use has; without them ``WebAssembly.validate`` says false. All numbers are 64-bit floats in SI units,
 pressures absolute; all arguments and results are 32-bit integers, and pointers are bytes from the start of ``memory``.
 
@@ -56,9 +56,9 @@ What a page must know of a module: settings with range, unit and origin, channel
 
 ``key=value unit`` is an override of the scenario as ``ppafo simulate --set`` takes it. A value in SI is ``zero`` plus
 ``factor`` times the one that is shown. ``origin`` is that of the parameter set (published, datasheet, derived,
-identified, fitted, assumed), ``task`` for a number of the scenario itself, ``default`` for one that nobody gave, or
+identified, fitted, assumed), ``task`` for a number of the scenario itself, ``default`` for one that is not given, or
 ``changed`` for one that an override or a caller put there. What ``follows`` another setting is the same number as
-long as nobody changes it by itself; what is ``made`` of others is the sum of a gap and of what rules make of them.
+long as it is not changed itself; what is ``made`` of others is the sum of a gap and of what rules make of them.
 ``kept`` says that a setting must stay 0, or above 0, as another program would be needed.
 """
 
@@ -320,7 +320,7 @@ _RULES_OF_TIMES = (
 """What the file of a scenario must keep of its times too (``simulation/clock.py``): setting named, rule, of what."""
 _COMMENT = re.compile(r"\s*/\*.*?\*/\s*", re.DOTALL)
 _INSIDE = re.compile(r"(?:PPAFO_INLINE\s[\w\s*]*?\b|^\} )(\w+)(?=[(;])", re.MULTILINE)
-"""Names of functions and types that nobody sees outside a module, where they are declared."""
+"""Declarations of functions and types that are not visible outside a module."""
 _HOW_TO_INSTALL = "pip install 'ppafo[workbench]'"
 
 
