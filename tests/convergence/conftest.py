@@ -1,25 +1,12 @@
 """Makes the random draws importable."""
 
-import importlib.util
-import sys
-from pathlib import Path
+import importlib
 from types import ModuleType
 
 import pytest
 
 
-def load_draws() -> ModuleType:
-    """The module ``draws`` beside this file."""
-    spec = importlib.util.spec_from_file_location("ppafo_test_draws", Path(__file__).with_name("draws.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.fixture(scope="session")
 def draws() -> ModuleType:
     """Random scenarios by seed."""
-    return load_draws()
+    return importlib.import_module("tests.convergence.draws")

@@ -351,7 +351,8 @@ def _replay_block(batch: Batch, inputs: StepInputs, runs: slice) -> BatchResult:
     numbered = row_numbers(program.parameter_rows())
     rows = [numbered[path] for path in parameters]
     table = np.array([*parameters.values(), *(() if command is None else (command,))])
-    starts = _changes(table)
+    # Steps at which any input differs from the step before, the first step among them.
+    starts = [0, *(np.flatnonzero((np.diff(table, axis=1) != 0.0).any(axis=0)) + 1).tolist()]
     for start, end in zip(starts, [*starts[1:], batch.clock.step_count], strict=True):
         if command is not None:
             block.states[command_row] = command[start]
@@ -359,9 +360,3 @@ def _replay_block(batch: Batch, inputs: StepInputs, runs: slice) -> BatchResult:
             block.set_parameters(rows, table[: len(rows), start])
         block.advance(end - start)
     return block.result()
-
-
-def _changes(table: Floats) -> list[int]:
-    """Steps at which any input differs from the step before, the first step among them."""
-    changed = (np.diff(table, axis=1) != 0.0).any(axis=0)
-    return [0, *(np.flatnonzero(changed) + 1).tolist()]

@@ -15,9 +15,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from ppafo.documents.models import NAME, StrictTable, Text, make_schema, validate
-from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, read_regular_file
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import IdentificationError, UnitError, nearest_name, reason, refused_as
+from ppafo.errors import IdentificationError, UnitError, nearest_name, refused_as
 from ppafo.identification.bench.flow_laws import GasAt
 from ppafo.identification.bench.free_decay import FreeDecaySettings, decay_prospects, free_decay
 from ppafo.identification.bench.open_valve_flow import OpenValveFlowSettings, flow_prospects, open_valve_flow
@@ -330,11 +329,7 @@ def load_problem(path: str | Path) -> ProblemFile:
 
     IdentificationError for a file that is not usable.
     """
-    try:
-        content = read_regular_file(Path(path), MAXIMUM_BYTES_TYPED)
-    except (OSError, ValueError) as error:
-        raise IdentificationError(f"{label(str(path))}: cannot be read: {reason(error)}") from error
-    return parse_problem(content, label(str(path)))
+    return parse_problem(_FILE.read(path), label(str(path)))
 
 
 def parse_problem(content: bytes, file: str) -> ProblemFile:

@@ -23,10 +23,6 @@ def _still(rows: Any, gas: str) -> str:
     return gas if rows.program.keeps_volumes else f"{gas}.still"
 
 
-def _ends(rows: Any, gas: str) -> str:
-    return f"{_still(rows, gas)}.end_1, {_still(rows, gas)}.end_2"
-
-
 def _second(rows: Any, gas: str) -> Second:
     program, add, still = rows.program, rows.add, _still(rows, gas)
     next_angle = "state.angle" if program.is_held else "begun.next_angle"
@@ -49,7 +45,7 @@ ISOTHERMAL = GasScheme(
     begun=lambda program: StillGas if program.keeps_volumes else MovingGas,
     change=GasChange,
     begin=_begin,
-    ends=_ends,
+    ends=lambda rows, gas: f"{_still(rows, gas)}.end_1, {_still(rows, gas)}.end_2",
     first=lambda rows, gas: f"{_still(rows, gas)}.first",
     second=_second,
     add=lambda rows: f"fed = {rows.add(with_gas)}(state, change)",

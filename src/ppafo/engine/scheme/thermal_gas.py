@@ -511,11 +511,6 @@ def with_work(plant: PlantParameters, masses: ThermalState, before: PlantState, 
     )
 
 
-def _begin(rows: Any) -> str:
-    given = "plant, thermal, state, masses, next_angle, flowing, length"
-    return f"gas = {rows.add(begin_thermal_gas)}({given})"
-
-
 def _second(rows: Any, gas: str) -> Second:
     add = rows.add
     return Second(
@@ -526,15 +521,6 @@ def _second(rows: Any, gas: str) -> Second:
     )
 
 
-def _move(rows: Any, state: str, assumed: str, reached: str) -> list[str]:
-    return [f"{state} = {rows.add(after_motion)}(plant, thermal, {state}, {assumed}, {reached})"]
-
-
-def _work(rows: Any) -> list[str]:
-    """A held vane takes none."""
-    return [] if rows.program.is_held else [f"warmed = {rows.add(with_work)}(plant, warmed, state, after)"]
-
-
 ENERGY_BALANCE = GasScheme(
     parameters={"thermal": ThermalParameters},
     states={"masses": ThermalState},
@@ -542,11 +528,16 @@ ENERGY_BALANCE = GasScheme(
     stored={"masses": "warmed"},
     begun=lambda _program: ThermalGas,
     change=ThermalFlows,
-    begin=_begin,
+    begin=lambda rows: (
+        f"gas = {rows.add(begin_thermal_gas)}(plant, thermal, state, masses, next_angle, flowing, length)"
+    ),
     ends=lambda rows, gas: f"{rows.add(end_pressures)}(plant, {gas})",
     first=lambda _rows, gas: f"{gas}.first",
     second=_second,
     add=lambda rows: f"fed, warmed = {rows.add(with_thermal_gas)}(state, masses, change)",
-    move=_move,
-    work=_work,
+    move=lambda rows, state, assumed, reached: [
+        f"{state} = {rows.add(after_motion)}(plant, thermal, {state}, {assumed}, {reached})"
+    ],
+    # A held vane takes no work.
+    work=lambda rows: [] if rows.program.is_held else [f"warmed = {rows.add(with_work)}(plant, warmed, state, after)"],
 )

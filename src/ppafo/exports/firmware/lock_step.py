@@ -1,15 +1,16 @@
 """A controller on the chip's simulator beside the same in Python: drawn samples, or a run with the lanes as plant."""
 
 import random
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from ppafo.answers.style import BLACK, REFERENCE, Margins, figure_of_panels, house_style, look_of_valve, mark_kind
 from ppafo.control.fixed.torque_laws import TARGETS
-from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, Converter, Readings, read
+from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, Readings, read
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import SimulationError
 from ppafo.exports.firmware import ChipController, chip_controller, firmware
@@ -23,7 +24,6 @@ from ppafo.exports.firmware.simulators import (
     chip_simulator,
     missing_tools,
 )
-from ppafo.model.sensors import Measurement
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate
@@ -63,11 +63,16 @@ class PythonChip:
 
 
 class ChipLaw:
-    """The simulated chip as a controller of a scenario; it keeps the decision of every sample."""
+    """The simulated chip as a controller of a scenario or a walk; it keeps the decision of every sample.
 
-    def __init__(self, simulator: ChipSimulator, converter: Converter) -> None:
+    ``shown`` makes the converter's readings of a reference and a measurement; ``at_zero`` is the command for no steps.
+    """
+
+    def __init__(
+        self, simulator: ChipSimulator, shown: Callable[[float, Any], tuple[int, ...]], at_zero: float = 0.0
+    ) -> None:
         self.simulator = simulator
-        self.converter = converter
+        self._shown, self._at_zero = shown, at_zero
         self.decisions: list[Decision] = []
 
     def reset(self) -> None:
@@ -75,11 +80,12 @@ class ChipLaw:
         self.simulator.begin()
         self.decisions.clear()
 
-    def update(self, time: float, reference: float, measurement: Measurement) -> float:
+    def update(self, time: float, reference: float, measurement: Any) -> float:
         """Command from -1 to 1, from what the converter shows; the chip needs no time [s], it counts samples."""
         del time
-        self.decisions.append(self.simulator.sample(read(self.converter, reference, measurement)))
-        return self.decisions[-1].command / COMMAND_STEPS
+        found = self.simulator.sample(self._shown(reference, measurement))
+        self.decisions.append(found)
+        return found.command / COMMAND_STEPS if found.command else self._at_zero
 
 
 class Cost(NamedTuple):
@@ -119,7 +125,7 @@ def run_on_chip(scenario: Scenario, target: str = TARGETS[0]) -> ChipRun:
     """
     chip = chip_controller(scenario)
     with chip_simulator(firmware(scenario, target), target_of(target)) as (simulator, image):
-        law = ChipLaw(simulator, chip.converter)
+        law = ChipLaw(simulator, partial(read, chip.converter))
         on_chip = simulate(scenario.controlled_by(law))
         cost = cost_of(target_of(target), image, simulator.stack(), law.decisions)
     in_lanes = simulate(scenario)

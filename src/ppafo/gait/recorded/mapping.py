@@ -14,10 +14,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from ppafo.documents.models import NAME, StrictTable, Text, make_schema, validate
-from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, read_regular_file
-from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import DataError, UnitError, reason, refused_as
+from ppafo.documents.models import NAME, StrictTable, Text, make_schema, read_model
+from ppafo.documents.toml_text import TomlKind
+from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.gait.recorded.table import LONGEST_FILLED
 from ppafo.units import parse_quantity
 
@@ -189,12 +188,7 @@ def opensim_map(side: Side) -> GaitMap:
 
 def load_map(path: str | Path) -> GaitMap:
     """Return the map in a TOML file. DataError where it cannot be used."""
-    file = label(str(path))
-    try:
-        content = read_regular_file(Path(path), MAXIMUM_BYTES_TYPED)
-    except (OSError, ValueError) as error:
-        raise DataError(f"{file}: cannot be read: {reason(error)}") from error
-    return validate(GaitMap, _FILE.parse(content, file), file, DataError)
+    return read_model(_FILE, GaitMap, path)[0]
 
 
 def json_schema() -> dict[str, Any]:

@@ -20,7 +20,6 @@ import numpy as np
 from ppafo.control.fixed.torque_laws import WALK_TARGETS
 from ppafo.control.fixed.walking_law import TOP, GaitConverter, GaitReadings, read_gait
 from ppafo.control.fixed.walking_numbers import FIXED_WALKS, SIGN_BITS
-from ppafo.control.fixed.whole_numbers import COMMAND_STEPS
 from ppafo.control.walking.signs import SIGNS
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.rows import row_numbers
@@ -29,8 +28,8 @@ from ppafo.errors import ScenarioError
 from ppafo.exports import filled, licence, template
 from ppafo.exports.firmware import TICK, ChipController, law_source, parameters_header, ticks_of
 from ppafo.exports.firmware.catalog import MSP430G2553
-from ppafo.exports.firmware.lock_step import Comparison, Cost, PythonChip, compare_with, cost_of
-from ppafo.exports.firmware.simulators import ChipSimulator, Decision, chip_simulator
+from ppafo.exports.firmware.lock_step import ChipLaw, Comparison, Cost, PythonChip, compare_with, cost_of
+from ppafo.exports.firmware.simulators import chip_simulator
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
 from ppafo.simulation.declaration import quantity_text
@@ -501,26 +500,6 @@ _INSIDE = ("controller_state.", "gait_seen.")
 """What only the lanes keep: state of their controller, and the last readings."""
 
 
-class ChipOfWalk:
-    """The simulated chip as a controller of a walk; it keeps the decision of every sample."""
-
-    def __init__(self, simulator: ChipSimulator, converter: GaitConverter) -> None:
-        self.simulator = simulator
-        self.converter = converter
-        self.decisions: list[Decision] = []
-
-    def reset(self) -> None:
-        """Reset the processor."""
-        self.simulator.begin()
-        self.decisions.clear()
-
-    def update(self, time: float, reference: float, measurement: GaitMeasurement) -> float:  # noqa: ARG002
-        """Command from -1 to 1, or ``VENT``, from what the converter shows."""
-        found = self.simulator.sample(read_gait(self.converter, measurement))
-        self.decisions.append(found)
-        return found.command / COMMAND_STEPS if found.command else VENT
-
-
 @dataclass(frozen=True, slots=True)
 class WalkOnChip:
     """A walk with the chip's simulator in charge, and the same with the integer controller in the lanes.
@@ -546,7 +525,7 @@ def walk_on_chip(configuration: Scenario, minutes: float | None = None) -> WalkO
     walked = lasting(configuration, minutes)
     run = plan_walk(walked)
     with chip_simulator(walk_firmware(configuration), MSP430G2553) as (simulator, image):
-        law = ChipOfWalk(simulator, chip.converter)
+        law = ChipLaw(simulator, lambda _, measurement: read_gait(chip.converter, measurement), at_zero=VENT)
         outside = run_sampled(batch_of(plan_walk(walked.controlled_by(law))), law)
         cost = cost_of(MSP430G2553, image, simulator.stack(), law.decisions)
     inside = run_batch(batch_of(run))
