@@ -288,7 +288,7 @@ def settings_of(scenario: Scenario) -> tuple[Setting, ...]:
             replace(item, summary=SAID.get(path, item.summary)),
             times[path] if path in TIMES else number_at(scenario, path),
         )
-        for path, item in _declared(scenario).items()
+        for path, item in declared_settings(scenario).items()
     )
 
 
@@ -305,7 +305,7 @@ def relations_of(scenario: Scenario) -> tuple[Relation, ...]:
         ("run.output_interval", "at most", "run.duration", 0.0),
         ("sensors.delay", "at most", "run.duration", 0.0),
     ]
-    if HELD_ANGLE in _declared(scenario):
+    if HELD_ANGLE in declared_settings(scenario):
         rules.append((HELD_ANGLE, "at least", "actuator.angle_min", TOLERANCE))
         rules.append((HELD_ANGLE, "at most", "actuator.angle_max", TOLERANCE))
     if scenario.supply_lines is not None:
@@ -320,7 +320,7 @@ def relations_of(scenario: Scenario) -> tuple[Relation, ...]:
     )
 
 
-def _declared(scenario: Scenario) -> dict[str, Quantity]:
+def declared_settings(scenario: Scenario) -> dict[str, Quantity]:
     """Declarations by path, without the form of an orifice that is not used, and without second names."""
     declared = used_numbers(scenario.device, declared_numbers(scenario))
     unused = {"controller.rate"}

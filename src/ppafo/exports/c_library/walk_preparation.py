@@ -11,18 +11,18 @@ from ppafo.engine.program import Program
 from ppafo.engine.source_text import Collector
 from ppafo.errors import ScenarioError
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
-from ppafo.exports.c_library.preparation import SAID, Writing, used_numbers
+from ppafo.exports.c_library.preparation import SAID, Writing, declared_settings
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait import gait_at
 from ppafo.model.sensors import NOTHING_SEEN
 from ppafo.parameters.building import consistency
 from ppafo.parameters.graph import Follows, Graph, Term, holding
-from ppafo.simulation.declaration import PERIOD, RUN, SUPPLY_LINES, THERMAL_GAS, line_paths
-from ppafo.simulation.numbers import device_number_at, device_numbers
+from ppafo.simulation.declaration import RUN, SUPPLY_LINES
+from ppafo.simulation.numbers import device_numbers, number_at
 from ppafo.simulation.plan import profile_parameters
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.course import flat_foot
-from ppafo.walking.declaration import SEED, STEP, WALK_SENSORS, fault_numbers
+from ppafo.walking.declaration import PERSON, STEP, WALK_SENSORS, fault_numbers
 from ppafo.walking.gait_series import fit_rocker, gait_series, gait_timing
 from ppafo.walking.motion import record_interval, walk_of
 from ppafo.walking.planning import NO_REFERENCE, course_of_walk, law_of, sensor_settings
@@ -96,37 +96,30 @@ def settings_of_walk(configuration: Scenario) -> tuple[Setting, ...]:
 
 def _numbers(configuration: Scenario) -> dict[str, tuple[Quantity, float]]:
     """Declaration and value of every number of a walk, by path."""
-    device, sensors = configuration.device, sensor_settings(configuration)
-    of_device = used_numbers(device, device_numbers(device))
-    found = {path: (item, device_number_at(device, path)) for path, item in of_device.items()}
     duration = configuration.duration
-    clock = {"duration": duration, "step": configuration.time_step, "output_interval": record_interval(duration)}
-    items = {item.name: item for item in (*RUN, STEP)}
-    found |= {f"run.{name}": (items[name], value) for name, value in clock.items()}
-    found |= {f"wearer.{item.name}": (item, getattr(walk_of(configuration).wearer, item.name)) for item in WEARER}
-    found["controller.period"] = (PERIOD, configuration.control.period)
-    for path, item in _control(configuration).items():
-        found[path] = (item, configuration.control.settings[item.name])
-    found |= {f"sensors.{item.name}": (item, sensors.numbers[item.name]) for item in WALK_SENSORS}
-    found["sensors.seed"] = (SEED, float(configuration.sensors.seed))
-    for sensor, fault in sensors.faults.items():
-        for item in fault_numbers(sensor, fault.kind):
-            found[f"faults.{sensor}.{item.name}"] = (item, fault.numbers[item.name])
-    return found | _gas_numbers(configuration)
-
-
-def _gas_numbers(configuration: Scenario) -> dict[str, tuple[Quantity, float]]:
-    """Declaration and value of what the gas model and the lines of the supply have."""
-    walls, lines = configuration.thermal, configuration.supply_lines
-    found = {}
-    if walls is not None:
-        given = walls.heat_transfer_coefficient, walls.area_per_volume
-        found = {f"gas_model.{item.name}": (item, value) for item, value in zip(THERMAL_GAS, given, strict=True)}
-    if lines is not None:
-        for path, item in line_paths().items():
-            _, line, name = path.split(".")
-            found[path] = (item, getattr(lines, f"{name}_{1 + SUPPLY_LINES.index(line)}"))
-    return found
+    of_run = {
+        "run.duration": duration,
+        "run.step": configuration.time_step,
+        "run.output_interval": record_interval(duration),
+    }
+    times, control = of_run | {"controller.period": configuration.control.period}, _control(configuration)
+    declared = (
+        declared_settings(configuration)
+        | control
+        | {
+            **{f"run.{item.name}": item for item in (*RUN, STEP)},
+            # A library takes the 0 of a sensor that is instant; the effect of one that is not has a bandwidth above it.
+            **{f"sensors.{item.name}": item for item in WALK_SENSORS},
+        }
+    )
+    # The structures of libraries have the times behind the device. Persons are drawn in Python.
+    wearer = (f"wearer.{item.name}" for item in WEARER)
+    paths = dict.fromkeys((*device_numbers(configuration.device), *of_run, *wearer, *times, *control, *declared))
+    return {
+        path: (declared[path], times[path] if path in times else number_at(configuration, path))
+        for path in paths
+        if path in declared and path != f"wearer.{PERSON.name}"
+    }
 
 
 def sensors_that_fail(configuration: Scenario) -> dict[str, FaultSettings]:
@@ -146,6 +139,7 @@ def links_of_walk(configuration: Scenario) -> Graph:
     """What follows other settings of a walk as long as nobody changes it."""
     known = _numbers(configuration)
     recorded = {"run.output_interval": (Follows((Term(("run.duration",), record_interval),)),)}
+    # A plant alone has no settings of the controller that its walk had.
     links = {path: links for path, links in {**configuration.graph, **recorded}.items() if path in known}
     return holding(links, lambda path: known[path][1])
 
