@@ -7,15 +7,20 @@ get the course of the reference too, which is looked at once before the first sa
 from ppafo.engine.lane_rows import LaneRows, indent
 from ppafo.engine.led_leg import GAIT_SHANK
 from ppafo.engine.program import Program
-from ppafo.engine.rows import leaf_paths
+from ppafo.engine.rows import leaf_paths, leaves
 from ppafo.engine.scheme.actuators import seen_with_torque, torque_at
 from ppafo.engine.scheme.motion import SAME_INSTANT
 from ppafo.engine.scheme.pneumatics import held_pressures
 from ppafo.model.gait import foot_in_gait
 from ppafo.model.places import shown_signals
 from ppafo.model.plant import actuator_torque, chamber_pressures
+from ppafo.model.plant_faults import is_dark, is_due, next_unpowered, runs_at
 from ppafo.model.sensors import GaitMeasurement, Measurement, late_measurement, measure, measure_gait, samples_late
+from ppafo.model.valves.kind import VENT
 from ppafo.signals.meter import SAME_LEVEL, FootSample, Sample, StrideSample, advance_course, is_away
+
+STOPPED, LEVEL = 3.0, "safety.level"
+"""Level of a controller of walking that has stopped for good, and where it keeps it."""
 
 SIGNALS = ("angle", "pressure_1", "pressure_2")
 READINGS = {
@@ -43,7 +48,35 @@ def control_loop(rows: LaneRows) -> list[str]:
         *rows.store("controller_state"),
         f"{rows.cells['result.command']} = command",
     ]
+    if rows.program.fails:
+        lines = [*lines[: len(groups)], *sampled_with_faults(rows, lines[len(groups) :])]
     return ["if step_index % steps_per_sample == 0:", *indent([*places(rows), *rows.over_lanes(lines)])]
+
+
+def sampled_with_faults(rows: LaneRows, lines: list[str]) -> list[str]:
+    """The lines of a sample where the controller may miss it or have no power, and where a valve may take it late."""
+    add, before = rows.add, rows.program.controller
+    assert before is not None, "a controller takes samples"
+    stored = dict(zip(leaf_paths(type(before.initial), "controller_state"), leaves(before.initial), strict=True))
+    kept = [line for line in lines if not any(line.startswith(f"{rows.cells[path]} = ") for path in stored)]
+    called = [line.replace("command, controller_state =", "ordered, after_state =") for line in kept[:-1]]
+    level = "after_state.safety.level" if f"controller_state.{LEVEL}" in stored else "0.0"
+    return [
+        *[rows.load(group) for group in ("result", "plant_faults", "unpowered", "sensors")],
+        "now = step_index * timing.step",
+        f"dark = {add(is_dark)}(plant_faults, now)",
+        f"runs = {add(runs_at)}(plant_faults, now, timing.period, int(sensors.seed), step_index // steps_per_sample)",
+        *called,
+        f"takes = {add(is_due)}(plant_faults.slow_time, plant_faults.slow_delay, now, timing.period)",
+        f"{rows.cells['result.command']} = {VENT!r} if dark else (ordered if runs & takes else result.command)",
+        *[
+            f"{rows.cells[path]} = {float(first)!r} if dark else "
+            f"({path.replace('controller_state', 'after_state', 1)} if runs else {path})"
+            for path, first in stored.items()
+        ],
+        f"unpowered = {add(next_unpowered)}(unpowered, {level} >= {STOPPED!r}, dark, timing.period)",
+        *rows.store("unpowered"),
+    ]
 
 
 def places(rows: LaneRows) -> list[str]:

@@ -11,6 +11,7 @@ end, and the state, unless its error refuses it.
 """
 
 import re
+from typing import get_type_hints
 
 from ppafo.engine.lane_rows import HANDED, LaneRows, count_lanes, indent
 from ppafo.engine.lane_samples import present_pressures, pressures_of, sense_end
@@ -19,8 +20,10 @@ from ppafo.engine.pieces import Phases, RarePhase
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.scheme import motion, pneumatics
 from ppafo.engine.source_text import woven
+from ppafo.model import plant_faults
 from ppafo.model.effects.kind import Moment, State
 from ppafo.model.places import at_valve, way_across
+from ppafo.model.plant import SinglePort
 
 IMPOSSIBLE_RATE = 1.0e6
 IMPOSSIBLE_MASS = 1.0e3
@@ -68,7 +71,8 @@ def opening(rows: LaneRows) -> list[str]:
     names += ["load", "shank"] if rows.program.shank is not None else []
     names += ["held"] if rows.program.hands_chambers_on else []
     names += ["start"] if rows.program.starts_apart else []
-    return [*[rows.load(name) for name in names], time_of_step(rows), "command = result.command"]
+    leaks = [f"plant = {rows.add(plant_faults.failed_plant)}(plant, plant_faults, time)"] if rows.program.fails else []
+    return [*[rows.load(name) for name in names], time_of_step(rows), *leaks, "command = result.command"]
 
 
 def command_at_valve(rows: LaneRows) -> list[str]:
@@ -120,7 +124,12 @@ def connect(rows: LaneRows, *fed_from: str) -> list[str]:
     """The ports of both chambers; where lines feed them, at the pressures of a state of these."""
     feed = rows.program.feed
     source = "plant" if feed is None else feed.source(rows, *fed_from)
-    return [f"port_1, port_2 = {rows.add(rows.program.valve.connect)}({source}, shown)"]
+    lines = [f"port_1, port_2 = {rows.add(rows.program.valve.connect)}({source}, shown)"]
+    if not rows.program.fails:
+        return lines
+    is_single = get_type_hints(rows.program.valve.connect)["return"] == tuple[SinglePort, SinglePort]
+    failed = rows.add(plant_faults.failed_single_ports if is_single else plant_faults.failed_blended_ports)
+    return [*lines, f"port_1, port_2 = {failed}(plant, plant_faults, shut_off, unpowered, port_1, port_2, time)"]
 
 
 def leak_now(rows: LaneRows) -> list[str]:

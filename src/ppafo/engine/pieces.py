@@ -88,7 +88,7 @@ class LegScheme:
     ``loads`` and ``stored`` are as in ``GasScheme``. ``led``, ``handed`` and ``ended`` are rows that phases hand on:
     before the gas, from the step before, at the end. ``find`` makes what a step is handed by the one before, ``lead``
     are phases before the gas, ``assume`` where the gas takes the vane to be, ``reach`` phases that find where the
-    step ends, ``end`` the state after it.
+    step ends, ``end`` the state after it. One that ``fails`` has faults of the plant, and a shut-off valve.
     """
 
     takes_course: bool
@@ -105,3 +105,4 @@ class LegScheme:
     assume: Callable[[Any], list[str]]
     reach: Callable[[Any, str], Phases]
     end: Callable[[Any], list[str]]
+    fails: bool = False

@@ -164,6 +164,11 @@ class Program:
         return self.leg is not None and self.leg.takes_course
 
     @property
+    def fails(self) -> bool:
+        """True where the plant of a walk may fail, or a shut-off valve is in its line."""
+        return self.leg is not None and self.leg.fails
+
+    @property
     def has_lines(self) -> bool:
         """True where lines behind regulators feed the chambers."""
         return self.feed is not None

@@ -21,6 +21,7 @@ from ppafo.model.gait import Course, GaitSeries, GaitTiming
 from ppafo.model.leg import LegParameters
 from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, chamber_pressures
+from ppafo.model.plant_faults import POWERED, PlantFaults, ShutOff
 from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters
 
@@ -38,7 +39,10 @@ WHOLE = 1.0e-9
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """What a walking leg adds to a run; ``course`` None where it walks stride after equal stride."""
+    """What a walking leg adds to a run; ``course`` None where it walks stride after equal stride.
+
+    ``failing`` are the faults of the plant and its shut-off valve, None where it has neither.
+    """
 
     leg: LegParameters
     share: DeviceShare
@@ -47,6 +51,7 @@ class Walk:
     sensors: GaitSensors
     initial: WalkState
     course: Course | None = None
+    failing: tuple[PlantFaults, ShutOff] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,7 +238,8 @@ def _walk_groups(walk: Walk | None) -> tuple[list[Any], list[Any]]:
         return [], []
     parameters = [walk.leg, walk.share, walk.gait, walk.timing, walk.sensors]
     parameters += [] if walk.course is None else [walk.course]
-    return parameters, [walk.initial, NOTHING_SEEN]
+    parameters += [] if walk.failing is None else [*walk.failing]
+    return parameters, [walk.initial, NOTHING_SEEN, *([] if walk.failing is None else [POWERED])]
 
 
 def _members(group: Members, groups: int) -> list[Members]:

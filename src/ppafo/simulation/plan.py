@@ -165,8 +165,14 @@ def compose_run(pieces: Pieces, plant: PlantParameters, rule: StepRule, start: S
 
 _ENERGY_BALANCE = "ppafo.engine.scheme.thermal_gas:ENERGY_BALANCE"
 _LINES = "ppafo.engine.scheme.supply_lines:LINES"
-_STRIDES, _COURSE = "ppafo.engine.scheme.walking:STRIDES", "ppafo.engine.scheme.walking:COURSE"
+_WALKING = "ppafo.engine.scheme.walking:"
 """Where pieces of programs are that most runs do not have."""
+
+
+def _leg_scheme(walk: Walk) -> str:
+    """Return where the scheme of a walking leg is."""
+    which = "STRIDES" if walk.course is None else "COURSE"
+    return f"{_WALKING}{which}" if walk.failing is None else f"{_WALKING}FAILING_{which}"
 
 
 def _program(pieces: Pieces, steps: Steps, walk: Walk | None, has_delay: bool) -> Program:
@@ -183,7 +189,7 @@ def _program(pieces: Pieces, steps: Steps, walk: Walk | None, has_delay: bool) -
         late_signals=walk is None and is_late,
         late_readings=walk is not None and is_late,
         gas=ISOTHERMAL if pieces.thermal is None else kind_at(_ENERGY_BALANCE),
-        leg=None if walk is None else kind_at(_STRIDES if walk.course is None else _COURSE),
+        leg=None if walk is None else kind_at(_leg_scheme(walk)),
         feed=None if pieces.supply_lines is None else kind_at(_LINES),
         is_adaptive=bool(first(steps.needs_parts)),
         samples_inside=bool(first(steps.record_every % 1.0)),

@@ -18,6 +18,7 @@ from ppafo.control.walking.catalog import (
 from ppafo.documents.models import make_schema, one_of, optional, table
 from ppafo.errors import KindError, ScenarioError, refused_as
 from ppafo.model.declaration import Quantity
+from ppafo.model.plant_faults import PLANT_FAULTS, SHUT_OFF
 from ppafo.simulation.declaration import (
     PERIOD,
     RATE,
@@ -159,6 +160,9 @@ def quantities(controller: str, timing: str = THRESHOLDS) -> dict[str, Quantity]
     for sensor in FAULTY:
         items = (FAULT_TIME, PERIOD_OF_FAULT, READINGS[sensor], *DISTORTIONS[sensor])
         found |= {f"faults.{sensor}.{item.name}": item for item in items}
+    for part, kinds in PLANT_FAULTS.items():
+        found |= {f"faults.{part}.{item.name}": item for fault in kinds.values() for item in fault.quantities}
+    found |= {f"shut_off.{item.name}": item for item in SHUT_OFF}
     return found | line_paths()
 
 
@@ -176,7 +180,12 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
 def _texts(document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the paths of every text that a document can hold."""
     arithmetic = (ARITHMETIC,) if kind_at(document, "controller") in FIXED_WALKS else ()
-    kinds = ("controller.kind", "timing.kind", "gas_model.kind", *(f"faults.{sensor}.kind" for sensor in FAULTY))
+    kinds = (
+        "controller.kind",
+        "timing.kind",
+        "gas_model.kind",
+        *(f"faults.{part}.kind" for part in (*FAULTY, *PLANT_FAULTS)),
+    )
     return (*TEXTS, "gait", "course", BOTTLE_NAME, *kinds, *arithmetic)
 
 
@@ -223,6 +232,19 @@ def _fault(sensor: str) -> Any:
     )
 
 
+def _broken(part: str) -> Any:
+    """Return the table of a part of the plant that fails."""
+    return one_of(
+        [
+            table(
+                f"{model_name(part)}{model_name(kind)}",
+                kind_field(kind, fault.summary) | quantity_fields(fault.quantities),
+            )
+            for kind, fault in PLANT_FAULTS[part].items()
+        ]
+    )
+
+
 def _bottle() -> dict[str, Any]:
     numbers = {item.name: optional(number_type(item), item.summary) for item in BOTTLE_NUMBERS}
     changes: Any = (list[str], Field(default_factory=list, description="such as 'room.temperature=5 degC'"))
@@ -241,6 +263,7 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
     sensors |= {item.name: optional(number_type(item), item.summary) for item in BANDWIDTHS}
     sensors["seed"] = (seed, Field(1, description=SEED.summary))
     faults = {name: optional(_fault(name), f"fault of the {name} sensor") for name in FAULTY}
+    faults |= {part: optional(_broken(part), f"fault of the plant: {part}") for part in PLANT_FAULTS}
     run = {"duration": optional(number_type(DURATION), DURATION.summary)}
     run |= quantity_fields((STEP,))
     which = {
@@ -266,7 +289,11 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
             "who walks; the subject of the gait that is named, else the paper's, unless given",
         ),
         "sensors": optional(table("WalkSensors", sensors), "sensors of the controller; ideal unless given"),
-        "faults": optional(table("Faults", faults), "sensors that fail during the walk"),
+        "faults": optional(table("Faults", faults), "sensors and parts of the plant that fail during the walk"),
+        "shut_off": optional(
+            table("ShutOffValve", quantity_fields(SHUT_OFF)),
+            "normally closed 3/2 valve in the supply line, part of the safe state; none unless given",
+        ),
         BOTTLE: optional(
             table("WalkBottle", _bottle()), "bottle that the device hangs on; a supply without end unless given"
         ),

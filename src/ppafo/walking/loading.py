@@ -15,6 +15,7 @@ from ppafo.errors import ParameterError, ScenarioError, one_line, refused_as
 from ppafo.gait import NORMATIVE, load_gait
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG, Quantity
+from ppafo.model.plant_faults import PLANT_FAULTS, SHUT_OFF
 from ppafo.model.regulator import SupplyLines
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.device import Device, Valve
@@ -153,6 +154,8 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         bottle=carried,
         wearer_origin=wearer_origin(reading, walked, is_named),
         person=_person(reading),
+        broken=_broken(reading, lines),
+        shut_off=_shut_off(reading),
     )
     more = tuple(f"{path}={_absolute(item)}" for path, item in instead.items())
     supply, step = device.supply, reading.number("run.step", STEP)
@@ -342,6 +345,33 @@ def _fault(reading: Reading, sensor: str) -> FaultSettings:
     kind = kind_at(reading.document, section)
     items = fault_numbers(sensor, kind)
     return FaultSettings(kind, {item.name: reading.number(f"{section}.{item.name}", item) for item in items})
+
+
+def _broken(reading: Reading, lines: SupplyLines | None) -> dict[str, FaultSettings]:
+    """Return the parts of the plant that fail; ScenarioError for one that a walk with supply lines does not have."""
+    found = {}
+    for part, kinds in PLANT_FAULTS.items():
+        kind = kind_at(reading.document, f"faults.{part}")
+        if not kind:
+            continue
+        if lines is not None and part.startswith(("regulator", "bottle")):
+            raise reading.refusal(
+                f"faults.{part}.kind", "a walk with [supply_line] has regulators of its own: leave these lines out"
+            )
+        section = f"faults.{part}"
+        numbers = {item.name: reading.number(f"{section}.{item.name}", item) for item in kinds[kind].quantities}
+        found[part] = FaultSettings(kind, numbers)
+    return found
+
+
+def _shut_off(reading: Reading) -> dict[str, float]:
+    """Return the settings of the shut-off valve [SI], {} where none is fitted."""
+    if "shut_off" not in reading.document:
+        return {}
+    found = reading.section("shut_off", SHUT_OFF)
+    if found["area"] <= 0.0:
+        raise reading.refusal("shut_off.area", "must be above 0; leave [shut_off] out where none is fitted")
+    return found
 
 
 def _period(reading: Reading) -> float:

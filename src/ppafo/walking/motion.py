@@ -14,6 +14,7 @@ from ppafo.gait import Gait
 from ppafo.gait.plausible import gait_file_remarks
 from ppafo.model.columns import Problem, at, over_runs
 from ppafo.model.declaration import Quantity
+from ppafo.model.plant_faults import PLANT_FAULTS, SHUT_OFF
 from ppafo.simulation.clock import Clock
 from ppafo.simulation.declaration import gas_settings, line_paths
 from ppafo.simulation.scenario import MotionKind, Scenario
@@ -38,10 +39,11 @@ class WalkMotion:
     """The device on a leg whose shank and loaded foot a gait leads, while it moves the free foot.
 
     ``timing`` is how the controller knows the time in the stride, ``forces`` are the settings [SI] of sensors that no
-    vane has, by name, and ``faults`` those that fail, by sensor. ``course`` is what the wearer does one after the
-    other, None where stride follows equal stride; ``bottle`` the one that the device hangs on, None where its supply
-    does not end. ``wearer_origin`` says in words whose body mass it is. ``person`` is the number of the person of the
-    population who walks, 0 for the wearer with the gait as it is, or a ``Person`` who is drawn already. It, and numbers
+    vane has, by name, and ``faults`` those that fail, by sensor; ``broken`` are parts of the plant that fail, and
+    ``shut_off`` is the valve of the safe state, {} where none is fitted. ``course`` is what the wearer does one after
+    the other, None where stride follows equal stride; ``bottle`` the one that the device hangs on, None where its
+    supply does not end. ``wearer_origin`` says in words whose body mass it is. ``person`` is the number of the person
+    of the population who walks, 0 for the wearer with the gait as it is, or a ``Person`` who is drawn already. It, and numbers
     of wearer, ``forces`` and ``faults``, may be arrays (runs,).
     """
 
@@ -55,6 +57,8 @@ class WalkMotion:
     bottle: BottleSupply | None = None
     wearer_origin: str = "the paper's subject"
     person: Any = 0.0
+    broken: Mapping[str, FaultSettings] = field(default_factory=dict)
+    shut_off: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -91,6 +95,13 @@ PLACES: Mapping[str, tuple[str, ...]] = {
         for kind in ("stuck", "distorted")
         for item in fault_numbers(sensor, kind)
     },
+    **{
+        f"faults.{part}.{item.name}": ("motion", "broken", part, "numbers", item.name)
+        for part, kinds in PLANT_FAULTS.items()
+        for fault in kinds.values()
+        for item in fault.quantities
+    },
+    **{f"shut_off.{item.name}": ("motion", "shut_off", item.name) for item in SHUT_OFF},
 }
 """The attributes, or keys, that lead to the numbers of a walk that other scenarios have not."""
 
@@ -106,6 +117,9 @@ def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
     kept |= set() if scenario.supply_lines is None else set(line_paths())
     for sensor, fault in motion.faults.items():
         kept |= {f"faults.{sensor}.{name}" for name in fault.numbers}
+    for part, fault in motion.broken.items():
+        kept |= {f"faults.{part}.{name}" for name in fault.numbers}
+    kept |= {f"shut_off.{name}" for name in motion.shut_off}
     # An object in charge has no settings, and a timing is one of a controller that has some.
     lost = {path for path in kept if path.startswith("timing.") and path.partition(".")[2] not in control.settings}
     return {path: item for path, item in known.items() if path in kept - lost}

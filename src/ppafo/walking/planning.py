@@ -14,7 +14,7 @@ from ppafo.control.fixed.walking_numbers import FIXED_WALKS
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
 from ppafo.engine.lanes import Batch
-from ppafo.engine.rows import leaves, rebuilt
+from ppafo.engine.rows import leaf_paths, leaves, rebuilt
 from ppafo.engine.run import Run, Walk, batches_of
 from ppafo.engine.scheme.walking import WalkState
 from ppafo.errors import ScenarioError
@@ -23,7 +23,9 @@ from ppafo.model.catalog import VALVES
 from ppafo.model.columns import Problem, at, first, over_runs, smaller, truncated, whole
 from ppafo.model.gait import Course, GaitSeries, GaitTiming, gait_at
 from ppafo.model.leg import LegParameters
+from ppafo.model.orifice import area_conductance
 from ppafo.model.plant import PlantParameters
+from ppafo.model.plant_faults import NOT_FITTED, PLANT_FAULTS, SOUND, PlantFaults, ShutOff
 from ppafo.model.sensors import GaitSensors
 from ppafo.model.valves import dump
 from ppafo.model.valves.kind import ValveModel
@@ -86,6 +88,7 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         sensors=sensors,
         initial=_start(leg, person.series, person.timing, course),
         course=course,
+        failing=failing_of(scenario),
     )
     controller, settings, problems = controller_of(_fitted(scenario, person))
     pieces = Pieces(
@@ -177,6 +180,27 @@ def gait_sensors_of(scenario: Scenario) -> GaitSensors:
     return over_runs(made, scenario.control.period, *values)
 
 
+def failing_of(scenario: Scenario) -> tuple[PlantFaults, ShutOff] | None:
+    """What fails of the plant of a walk, and its shut-off valve; None where it has neither."""
+    motion = walk_of(scenario)
+    if not motion.broken and not motion.shut_off:
+        return None
+    names = leaf_paths(PlantFaults, "")
+    numbers: dict[str, Any] = dict(zip((name.lstrip(".") for name in names), leaves(SOUND), strict=True))
+    for part, fault in motion.broken.items():
+        declared = PLANT_FAULTS[part][fault.kind]
+        numbers |= {declared.fields[name]: number for name, number in fault.numbers.items()}
+    return rebuilt(PlantFaults, list(numbers.values())), _shut_off(motion.shut_off, scenario.device)
+
+
+def _shut_off(settings: Mapping[str, Any], device: Device) -> ShutOff:
+    if not settings:
+        return NOT_FITTED
+    gas = device.gas.heat_capacity_ratio, device.gas.specific_gas_constant, device.gas.temperature
+    conductance = over_runs(area_conductance, settings["area"], settings["discharge_coefficient"], *gas)
+    return ShutOff(conductance, settings["delay"])
+
+
 def sensor_settings(scenario: Scenario) -> SensorSettings:
     """What a walk states of its sensors and their faults, in SI units."""
     sensors, motion = scenario.sensors, walk_of(scenario)
@@ -216,6 +240,7 @@ def noise(scenario: Scenario) -> Any:
     """The sum of what is random in the sensors of a walk: noise, and shares of samples that are lost."""
     sensors, motion = scenario.sensors, walk_of(scenario)
     lost = [fault.numbers.get("lost_share", 0.0) for fault in motion.faults.values()]
+    lost += [fault.numbers["share"] for fault in motion.broken.values() if fault.kind == "jittering"]
     own = [number for name, number in motion.forces.items() if name == "force_noise" or name.endswith("lost_share")]
     return sum((*own, *lost), sensors.angle_noise + sensors.pressure_noise)
 

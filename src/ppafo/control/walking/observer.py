@@ -128,14 +128,14 @@ class Coil(NamedTuple):
 class Chamber(NamedTuple):
     """Content p V [J], pressure expected of its sensor [Pa], gas that passed lately [J], time of an alarm [s].
 
-    ``began`` [J] is the content measured when the chamber was last connected otherwise.
+    ``least`` [J] is the lowest content measured since the chamber was connected otherwise.
     """
 
     content: float
     pressure: float
     passed: float
     contrary: float
-    began: float
+    least: float
 
 
 class Observer(NamedTuple):
@@ -155,7 +155,7 @@ class Observer(NamedTuple):
 
 
 LONG_AGO = 1.0e9
-_EMPTY = Chamber(content=0.0, pressure=0.0, passed=0.0, contrary=0.0, began=0.0)
+_EMPTY = Chamber(content=0.0, pressure=0.0, passed=0.0, contrary=0.0, least=0.0)
 _OFF = Coil(position=0.0, target=0.0, since=LONG_AGO, waits=0.0)
 _FULL = LineState(mass_1=0.0, mass_2=0.0, regulated_mass=0.0)
 START = Observer(_EMPTY, _EMPTY, command=2.0, coil_1=_OFF, coil_2=_OFF, spool=0.0, joined=0.0, lines=_FULL)
@@ -258,7 +258,7 @@ def passed_chamber(
         pressure=chamber.pressure,
         passed=chamber.passed + abs(added) - share * chamber.passed,
         contrary=chamber.contrary,
-        began=measured * volume if turns else chamber.began,
+        least=measured * volume if turns else min(chamber.least, measured * volume),
     ), added if source > vent else 0.0
 
 
@@ -286,7 +286,7 @@ def met_chamber(
         pressure=expected,
         passed=0.0 if blind else chamber.passed,
         contrary=chamber.contrary + period if abs(residual) > allowed else 0.0,
-        began=measured * volume if blind else chamber.began,
+        least=measured * volume if blind else chamber.least,
     )
 
 
@@ -425,7 +425,7 @@ def cause_of(
     room = nominal.nominal_atmospheric_pressure
     gains = measured > chamber.pressure
     some = measured - room > SHOWS_GAS * (chamber.pressure - room)
-    into_vent = (measured > NEARLY_FULL * supply) | (measured * volume > chamber.began + OFFSET * volume)
+    into_vent = (measured > NEARLY_FULL * supply) | (measured * volume > chamber.least + 0.5 * OFFSET * volume)
     in_fill = SUPPLY_HIGH if gains else (SUPPLY_LOW if some else SUPPLY_LOST)
     in_vent = (VALVE_OPEN if into_vent else VALVE_SHUT) if gains else LEAK
     closed = VALVE_OPEN if gains else LEAK

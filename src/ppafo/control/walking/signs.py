@@ -135,7 +135,12 @@ SIGNS: dict[float, Sign] = {
     SUPPLY_LOST: Sign(
         "supply_lost", "no gas comes to a chamber: supply lost, hose off, or a valve that never opens", PRESSURES, SEEN
     ),
-    VALVE_OPEN: Sign("valve_open", "gas comes to a chamber that is given none: a valve stuck open", PRESSURES, SEEN),
+    VALVE_OPEN: Sign(
+        "valve_open",
+        "gas comes to a chamber that is given none: a valve stuck open, or a leak across the vane",
+        PRESSURES,
+        SEEN,
+    ),
     VALVE_SHUT: Sign(
         "valve_shut", "a vented chamber keeps its gas: a valve stuck shut, or a hose kinked", PRESSURES, SEEN
     ),

@@ -36,6 +36,7 @@ from ppafo.model.gait import (
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, passive_torque, torque_of_shank_on
 from ppafo.model.places import friction_in_motion
 from ppafo.model.plant import PlantParameters, PlantState, actuator_torque
+from ppafo.model.plant_faults import PlantFaults, ShutOff, Unpowered
 from ppafo.model.sensors import GaitSeen, GaitSensors
 
 
@@ -469,15 +470,16 @@ def mark_stride(rows: Any) -> list[str]:
     return [rows.load("marks"), f"walk_after = {add(WalkState)}({fields})"]
 
 
-def _scheme(takes_course: bool) -> LegScheme:
+def _scheme(takes_course: bool, fails: bool) -> LegScheme:
     gait = {"leg": LegParameters, "share": DeviceShare, "gait": GaitSeries}
     timing = {"gait_timing": GaitTiming, "gait_sensors": GaitSensors}
     place = {} if takes_course else {"place": GaitPlace}
+    faults = {"plant_faults": PlantFaults, "shut_off": ShutOff} if fails else {}
     return LegScheme(
         takes_course=takes_course,
-        parameters={**gait, **timing, **({"walk_course": Course} if takes_course else {})},
-        states={"walk": WalkState, "gait_seen": GaitSeen},
-        loads=("leg", "share", "gait_timing", "walk"),
+        parameters={**gait, **timing, **({"walk_course": Course} if takes_course else {}), **faults},
+        states={"walk": WalkState, "gait_seen": GaitSeen, **({"unpowered": Unpowered} if fails else {})},
+        loads=("leg", "share", "gait_timing", "walk", *faults, *(["unpowered"] if fails else [])),
         stored={"walk": "walk_after"},
         begun=WalkStep,
         led={**place, "next_gait": GaitNow, **({"marks": Marks} if takes_course else {})},
@@ -488,8 +490,11 @@ def _scheme(takes_course: bool) -> LegScheme:
         assume=assume,
         reach=reach,
         end=end,
+        fails=fails,
     )
 
 
-STRIDES, COURSE = _scheme(takes_course=False), _scheme(takes_course=True)
+STRIDES, COURSE = _scheme(takes_course=False, fails=False), _scheme(takes_course=True, fails=False)
 """A leg that walks stride after equal stride, and one that stands, starts, changes its speed and stops."""
+FAILING_STRIDES, FAILING_COURSE = _scheme(takes_course=False, fails=True), _scheme(takes_course=True, fails=True)
+"""The same with a plant that may fail, or whose line has a shut-off valve."""

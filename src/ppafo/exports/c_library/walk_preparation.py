@@ -14,6 +14,7 @@ from ppafo.exports.c_library.files import Relation, Setting, c_identifier
 from ppafo.exports.c_library.preparation import SAID, Writing, declared_settings
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait import gait_at
+from ppafo.model.plant_faults import POWERED
 from ppafo.model.sensors import NOTHING_SEEN
 from ppafo.parameters.building import consistency
 from ppafo.parameters.graph import Follows, Graph, Term, holding
@@ -25,7 +26,7 @@ from ppafo.walking.course import flat_foot
 from ppafo.walking.declaration import PERSON, STEP, WALK_SENSORS, fault_numbers
 from ppafo.walking.gait_series import fit_rocker, gait_series, gait_timing
 from ppafo.walking.motion import record_interval, walk_of
-from ppafo.walking.planning import NO_REFERENCE, course_of_walk, law_of, sensor_settings
+from ppafo.walking.planning import NO_REFERENCE, course_of_walk, failing_of, law_of, sensor_settings
 from ppafo.walking.preparation import (
     DISTORTED,
     FROZEN,
@@ -168,6 +169,7 @@ def preparation_of_walk(configuration: Scenario, program: Program, collector: Co
         *writing.plant("bare", "0.0"),
         *_leg(configuration, writing),
         *_gait_sensors(configuration, writing),
+        *_plant_faults(configuration, writing),
         *_steps(configuration, writing),
         *writing.timing("signal_delay"),
         *_pieces(configuration, writing),
@@ -199,6 +201,15 @@ def _gait_sensors(configuration: Scenario, writing: Writing) -> Iterator[str]:
     faults = ", ".join(f"{sensor}_fault" for sensor in settings.faults)
     yield f"gait_sensors = {add(gait_sensors)}({row}, controller_period, {faults})"
     yield f"signal_delay = {add(longest_delay)}(gait_sensors) * controller_period"
+
+
+def _plant_faults(configuration: Scenario, writing: Writing) -> Iterator[str]:
+    """Lines that make what fails of the plant and the shut-off valve, numbers written out, where there are any."""
+    failing = failing_of(configuration)
+    if failing is not None:
+        yield f"plant_faults = {writing.constant(failing[0], 'plant_faults')}"
+        yield f"shut_off = {writing.constant(failing[1], 'shut_off')}"
+        yield f"unpowered = {writing.constant(POWERED, 'unpowered')}"
 
 
 def _fault(writing: Writing, kind: str, names: Mapping[str, str]) -> str:

@@ -370,12 +370,22 @@ def _assumptions_section(assumed: Mapping[str, str]) -> tuple[Section, ...]:
 
 
 def _safety(worn: WalkResult) -> list[str]:
-    """Return the pauses, the stop and the returns of help, and how many strides had help; [] where all had."""
+    """Return the pauses, the stop and the returns of help, and how many strides had help, and what is fitted for safety."""
+    fitted = shut_off_line(worn.scenario)
     if not worn.events:
-        return []
+        return fitted
     helped, strides = int(worn.helped.sum()), worn.helped.size
     counted = f"help in {helped} of {strides} strides"
-    return [*event_lines(worn.events), counted if worn.is_helped else f"{counted}: fewer than half"]
+    return [*fitted, *event_lines(worn.events), counted if worn.is_helped else f"{counted}: fewer than half"]
+
+
+def shut_off_line(scenario: Scenario) -> list[str]:
+    """Return what a fitted shut-off valve weighs and takes."""
+    given = walk_of(scenario).shut_off
+    if not given:
+        return []
+    mass, power = 1.0e3 * float(given["mass"]), float(given["power"])
+    return [f"shut-off valve: {mass:.0f} g, {power:.2g} W as long as the device helps ({60.0 * power:.0f} J a minute)"]
 
 
 def _bottle(life: Endurance | None) -> str:

@@ -1,0 +1,100 @@
+"""Faults of the plant in ``[faults]`` of a walk, and the shut-off valve of its safe state."""
+
+import numpy as np
+import pytest
+
+from ppafo.engine.lanes import run_batch
+from ppafo.engine.rows import leaf_paths
+from ppafo.engine.run import batch_of
+from ppafo.errors import ScenarioError
+from ppafo.model.plant_faults import NOT_FITTED, PLANT_FAULTS, SOUND, PlantFaults
+from ppafo.walking.loading import load_walk
+from ppafo.walking.motion import walk_of, with_duration
+from ppafo.walking.planning import failing_of, plan_walk
+from ppafo.walking.walk import WalkResult, walk
+
+FAILS = 4.3
+SHUT_OFF = "shut_off.area=10 mm^2"
+
+
+def broken(name: str, part: str, kind: str, *more: str) -> WalkResult:
+    given = [f"faults.{part}.kind={kind}", f"faults.{part}.time={FAILS} s", *more]
+    return walk(load_walk(name, given), 0.16)
+
+
+def test_every_fault_of_the_catalogue_sets_fields_that_there_are() -> None:
+    known = {path.lstrip(".") for path in leaf_paths(PlantFaults, "")}
+    for part, kinds in PLANT_FAULTS.items():
+        for kind, fault in kinds.items():
+            assert (fault.part, fault.kind) == (part, kind)
+            assert set(fault.fields) == {item.name for item in fault.quantities}
+            assert set(fault.fields.values()) <= known
+            assert fault.summary
+
+
+def test_a_walk_without_faults_is_composed_without_them_and_sound_numbers_change_no_bit() -> None:
+    sound = plan_walk(with_duration(load_walk("solenoid"), 6.0))
+    assert not sound.program.fails
+    assert sound.walk is not None
+    never = plan_walk(with_duration(load_walk("solenoid", ["faults.vane.kind=leaking", "faults.vane.time=1e5 s"]), 6.0))
+    assert never.program.fails
+    first, second = (run_batch(batch_of(run)).states[:, 0] for run in (sound, never))
+    for path, row in rows_of(sound).items():
+        assert first[row] == second[rows_of(never)[path]], path
+
+
+def rows_of(run) -> dict[str, int]:  # type: ignore[no-untyped-def]
+    paths = [path for name, row in run.program.state_rows().items() for path in leaf_paths(row, name)]
+    return {path: place for place, path in enumerate(paths)}
+
+
+@pytest.mark.parametrize("part", ["valve_1", "valve_2"])
+def test_a_valve_stuck_open_is_found_and_only_a_shut_off_takes_its_torque_away(part: str) -> None:
+    bare, safe = broken("proportional", part, "stuck"), broken("proportional", part, "stuck", SHUT_OFF)
+    for result in (bare, safe):
+        assert result.events[0].sign is not None
+        assert result.events[0].sign.name in ("valve_open", "valve_shut")
+        assert result.events[0].time < FAILS + 2.0 * walk_of(result.scenario).gait.stride_time
+    settled = bare.recording.time > bare.events[0].time + 0.5
+    assert np.abs(bare.recording["torque"][settled]).max() > 8.0
+    assert np.abs(safe.recording["torque"][safe.recording.time > safe.events[0].time + 0.5]).max() < 2.0
+
+
+def test_the_sign_names_the_cause() -> None:
+    for part, kind, names in (
+        ("regulator_1", "high", ("supply_high",)),
+        ("regulator_2", "creeping", ("supply_high",)),
+        ("regulator_2", "frozen", ("supply_low",)),
+        ("bottle", "empty", ("supply_low", "supply_lost")),
+        ("hose_1", "off", ("supply_lost",)),
+        ("hose_2", "kinked", ("supply_low",)),
+    ):
+        (event, *_) = broken("solenoid", part, kind).events
+        assert event.sign is not None
+        assert event.sign.name in names, (part, kind)
+
+
+def test_help_comes_back_after_a_brown_out() -> None:
+    result = broken("solenoid", "controller", "brown_out")
+    dark = (result.recording.time > FAILS + 0.02) & (result.recording.time < FAILS + 0.28)
+    assert (result.recording["command"][dark] == 2.0).all()
+    assert result.helped[-1]
+
+
+def test_a_fault_that_a_part_does_not_have_and_a_regulator_behind_lines_are_refused() -> None:
+    with pytest.raises(ScenarioError, match="burst"):
+        load_walk("solenoid", ["faults.hose_1.kind=burst", "faults.hose_1.time=1 s"])
+    with pytest.raises(ScenarioError, match="supply_line"):
+        load_walk("solenoid-regulators", ["faults.regulator_1.kind=high", "faults.regulator_1.time=1 s"])
+    with pytest.raises(ScenarioError, match=r"shut_off\.area"):
+        load_walk("solenoid", ["shut_off.delay=10 ms"])
+
+
+def test_without_a_fault_and_a_shut_off_valve_there_is_nothing_that_fails() -> None:
+    assert failing_of(load_walk("solenoid")) is None
+    found = failing_of(load_walk("solenoid", ["faults.vane.kind=leaking", "faults.vane.time=1 s"]))
+    assert found == (replace_leak(1.0), NOT_FITTED)
+
+
+def replace_leak(time: float) -> PlantFaults:
+    return SOUND._replace(leak_time=time, leak_factor=50.0)
