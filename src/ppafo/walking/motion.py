@@ -43,8 +43,8 @@ class WalkMotion:
     ``shut_off`` is the valve of the safe state, {} where none is fitted. ``course`` is what the wearer does one after
     the other, None where stride follows equal stride; ``bottle`` the one that the device hangs on, None where its
     supply does not end. ``wearer_origin`` says in words whose body mass it is. ``person`` is the number of the person
-    of the population who walks, 0 for the wearer with the gait as it is, or a ``Person`` who is drawn already. It, and numbers
-    of wearer, ``forces`` and ``faults``, may be arrays (runs,).
+    of the population who walks, 0 for the wearer with the gait as it is, or a ``Person`` who is drawn already. It, and
+    numbers of wearer, ``forces`` and ``faults``, may be arrays (runs,).
     """
 
     kind: MotionKind = field(compare=False)

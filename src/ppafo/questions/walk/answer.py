@@ -370,7 +370,7 @@ def _assumptions_section(assumed: Mapping[str, str]) -> tuple[Section, ...]:
 
 
 def _safety(worn: WalkResult) -> list[str]:
-    """Return the pauses, the stop and the returns of help, and how many strides had help, and what is fitted for safety."""
+    """Return what is fitted for safety, the pauses, the stop and the returns of help, and how many strides had help."""
     fitted = shut_off_line(worn.scenario)
     if not worn.events:
         return fitted
