@@ -8,7 +8,7 @@ import numpy as np
 
 from ppafo.answers import Answer, Cell, Column, Figure, Section, Table
 from ppafo.answers.display_units import display_value
-from ppafo.answers.style import house_style, look_of_valve, mark_kind
+from ppafo.answers.style import GREY, house_style, look_of_valve, mark_kind
 from ppafo.progress import Report
 from ppafo.questions.league.standing import UNCERTAINTIES, Bound, Bounded, Entrant, Robustness, Standing
 from ppafo.questions.question import Solved
@@ -159,7 +159,8 @@ _MARGIN, _LEAST_RANGE = 1.2, 4.0
 """Factors: around everything drawn, and the least that an axis spans."""
 _NAMED = ((10.0, (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)), (200.0, (1.0, 2.0, 5.0)), (float("inf"), (1.0,)))
 """Which multiples of the powers of ten are named on an axis that spans less than a factor."""
-_MARKERS = "osD^v<>PX*hdpH8"
+_NAMES_APART = 0.052
+"""Distance between two names beside the figure, as a part of its height."""
 
 
 def league_figure(league: League, look: Look) -> "matplotlib.figure.Figure":
@@ -173,8 +174,8 @@ def league_figure(league: League, look: Look) -> "matplotlib.figure.Figure":
         for valve, bounded in league.bounds.items():
             errors, gas = _points(bounded)
             axes.plot(errors, gas, color=look_of_valve(valve).colour, label=f"lower bound, {valve}")
-        for number, standing in enumerate(league.standings):
-            _draw_standing(axes, league, standing, look, _MARKERS[number % len(_MARKERS)])
+        for standing in league.standings:
+            _draw_standing(axes, league, standing, look)
         if look.is_logarithmic:
             axes.set_xscale("log")
             axes.set_yscale("log")
@@ -184,6 +185,7 @@ def league_figure(league: League, look: Look) -> "matplotlib.figure.Figure":
                 _name_numbers(axis)
             for valve, bounded in league.bounds.items():
                 _draw_end(axes, bounded, look_of_valve(valve).colour)
+                _draw_sampled(axes, valve, bounded)
         else:
             axes.set_xscale("log")
             _name_numbers(axes.xaxis)
@@ -192,7 +194,9 @@ def league_figure(league: League, look: Look) -> "matplotlib.figure.Figure":
         axes.set_xlabel(look.error_label)
         axes.set_ylabel(look.gas_label)
         axes.set_title(look.title)
-        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, handlelength=1.6)
+        _name_standings(axes, league, look)
+        if league.bounds:
+            axes.legend(loc="lower left", bbox_to_anchor=(1.03, 0.0), borderaxespad=0.0, handlelength=1.6)
         mark_kind(figure, "simulated")
         return figure
 
@@ -223,6 +227,69 @@ def _draw_end(axes: "Axes", bounded: Bounded[Bound], colour: str) -> None:
     axes.plot(*end, color=colour, linewidth=0.9, linestyle=":")
 
 
+def _draw_sampled(axes: "Axes", valve: str, bounded: Bounded[Bound]) -> None:
+    """Draw the error that no decisions at the sample rate of a valve are below, where it is above that of any rate."""
+    least, (any_rate, *_) = bounded.least_error, _points(bounded)[0]
+    if least is None or display_value(least, "torque") <= 1.001 * any_rate:
+        return
+    look = look_of_valve(valve)
+    axes.axvline(
+        display_value(least, "torque"),
+        color=look.colour,
+        linewidth=1.0,
+        linestyle="--",
+        label=f"{valve}, at its sample rate",
+    )
+
+
+def _name_standings(axes: "Axes", league: League, look: Look) -> None:
+    """Name the marks beside the figure, in the order of their gas, with a line from each name to its mark."""
+    shown = [item for item in league.standings if None not in _place(league, item, look)]
+    to_axes = axes.transData + axes.transAxes.inverted()
+    named = sorted(
+        ((float(to_axes.transform(_shown_place(league, item, look))[1]), item) for item in shown),
+        key=lambda pair: -pair[0],
+    )
+    heights: list[float] = []
+    for height, _ in named:
+        heights.append(min(1.0, height, *(last - _NAMES_APART for last in heights[-1:])))
+    # What would be below the lowest place moves those above it up.
+    lowest = 0.2
+    for number in reversed(range(len(heights))):
+        heights[number] = max(heights[number], lowest)
+        lowest = heights[number] + _NAMES_APART
+    for height, (_, standing) in zip(heights, named, strict=True):
+        axes.annotate(
+            standing.entrant.name,
+            xy=_shown_place(league, standing, look),
+            xytext=(1.03, height),
+            textcoords="axes fraction",
+            va="center",
+            fontsize=9,
+            color=look_of_valve(standing.entrant.valve).colour,
+            arrowprops={
+                "arrowstyle": "-",
+                "color": GREY,
+                "linewidth": 0.5,
+                "relpos": (0.0, 0.5),
+                "shrinkA": 2.0,
+                "shrinkB": 3.5,
+            },
+        )
+
+
+def _place(league: League, standing: Standing, look: Look) -> tuple[float | None, float | None]:
+    return standing.measures.get(look.error), standing.measures.get(league.contest.gas)
+
+
+def _shown_place(league: League, standing: Standing, look: Look) -> tuple[float, float]:
+    """Return error and gas of a mark as they are shown."""
+    error, gas = _place(league, standing, look)
+    assert error is not None, "a mark has an error"
+    assert gas is not None, "a mark has gas"
+    return error, display_value(gas, "gas mass")
+
+
 def _limits(axes: "Axes", which: int) -> tuple[float, float]:
     """Return the limits of an axis that leave a margin around everything drawn, at least a factor of 4 apart."""
     drawn = [float(value) for line in axes.lines for value in np.asarray(line.get_xydata())[:, which]]
@@ -231,11 +298,12 @@ def _limits(axes: "Axes", which: int) -> tuple[float, float]:
     return lowest / widened, highest * widened
 
 
-def _draw_standing(axes: "Axes", league: League, standing: Standing, look: Look, marker: str) -> None:
-    error, taken = standing.measures.get(look.error), standing.measures.get(league.contest.gas)
+def _draw_standing(axes: "Axes", league: League, standing: Standing, look: Look) -> None:
+    error, taken = _place(league, standing, look)
     if error is None or taken is None:
         return
-    gas, colour = display_value(taken, "gas mass"), look_of_valve(standing.entrant.valve).colour
+    gas, of_valve = display_value(taken, "gas mass"), look_of_valve(standing.entrant.valve)
+    colour = of_valve.colour
     robust, least = standing.robustness, league.least_gas(standing)
     if robust is not None and not robust.failed:
         across = [robust.not_exceeded(look.error, fraction) for fraction in (0.05, 0.95)]
@@ -245,12 +313,11 @@ def _draw_standing(axes: "Axes", league: League, standing: Standing, look: Look,
     axes.plot(
         [error],
         [gas],
-        marker=marker,
+        marker=of_valve.marker,
         linestyle="none",
         color=colour,
         markerfacecolor="white",
         markersize=6.5,
-        label=standing.entrant.name,
         clip_on=look.is_logarithmic,
     )
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import ppafo
+from ppafo.answers.style import PROPORTIONAL, SOLENOID
 from ppafo.answers.writing import row_texts, text_of
 from ppafo.control.controllers.feedback import KNOTS
 from ppafo.errors import ScenarioError
@@ -96,8 +97,9 @@ def test_the_head_of_a_distance_to_a_bound_lists_what_it_relaxes_and_a_bound_tha
 
 def test_without_a_bound_the_figure_has_only_marks_and_the_table_dashes(league: League) -> None:
     bare = dataclasses.replace(league, bounds={}, without_bound="no CasADi")
-    labels = bare.plot().axes[0].get_legend_handles_labels()[1]
-    assert labels == ["pid-paper"]
+    axes = bare.plot().axes[0]
+    assert [text.get_text() for text in axes.texts] == ["pid-paper"]
+    assert axes.get_legend() is None
     assert row_texts(league_table(bare))[0][6] == "-"
     assert "no lower bound: no CasADi" in text_of(bare.answer())
 
@@ -111,6 +113,22 @@ def test_the_bound_ends_upwards_or_to_the_left_where_its_error_counts_as_none(le
         ends.append((np.ptp(np.asarray(line.get_xdata())), np.ptp(np.asarray(line.get_ydata()))))
     assert ends[0][0] == 0.0 < ends[0][1]
     assert ends[1][1] == 0.0 < ends[1][0]
+
+
+def test_the_figure_has_the_looks_of_the_valves_and_the_error_that_no_decisions_at_a_sample_rate_are_below(
+    league: League,
+) -> None:
+    standing = league.standings[0]
+    pair = dataclasses.replace(standing, entrant=dataclasses.replace(standing.entrant, name="pair", valve="solenoid"))
+    sampled = TorqueBound(league.bounds["proportional"].bound, (), {}, 0.85, (FORESEEN,))
+    both = dataclasses.replace(league, standings=(standing, pair), bounds={"solenoid": sampled})
+    axes = both.plot().axes[0]
+    marks = [(line.get_marker(), line.get_color()) for line in axes.lines if line.get_marker() not in ("None", "")]
+    assert marks == [(look.marker, look.colour) for look in (PROPORTIONAL, SOLENOID)]
+    named = {text.get_text(): text.get_position()[1] for text in axes.texts}
+    assert abs(named["pair"] - named["pid-paper"]) > 0.05, "names of equal marks are apart"
+    (least,) = [line for line in axes.lines if line.get_label() == "solenoid, at its sample rate"]
+    assert list(least.get_xdata()) == pytest.approx([0.85, 0.85])
 
 
 TASK = "torque-task-proportional"
