@@ -488,6 +488,7 @@ def _left_open(reproduction: Reproduction) -> list[str]:
         "of experiments the 5 to 95 % of completions that agree with everything else that the paper says",
         "*: ours is nearer to the published number than 95 % of that; the assumptions were chosen for this row",
     ]
+    found += [f"{claim.id}: {claim.open_by}" for claim in reproduction.claims if claim.open_by and not claim.left_open]
     unread = [f"  {entry.id}: {entry.not_testable.rstrip('.')}" for entry in reproduction.unread]
     return [*(found if reproduction.family is not None else []), "stated, and tested by nothing here:", *unread]
 

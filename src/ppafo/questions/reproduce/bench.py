@@ -410,7 +410,7 @@ def _step_error(item: _StepError, agreement: RecordingAgreement, rests_on: tuple
 
 
 def step_error_values(times: Floats, traces: Mapping[str, Floats], agreement: RecordingAgreement) -> dict[str, Floats]:
-    """Return the RMS errors of other simulated step responses (runs,) against the rig's, by claim, in its unit.
+    """Return what claims on the errors of figure 7 come to with other simulated step responses (runs,), in their units.
 
     ``traces`` (times, runs) have the vane angle and both pressures [SI]; the rig's delay is that of the agreement.
     """
@@ -423,7 +423,11 @@ def step_error_values(times: Floats, traces: Mapping[str, Floats], agreement: Re
         assert recorded is not None, "the rig records every channel of figure 7"
         simulated = np.array([np.interp(at, times, course) for course in known[item.channel].T])
         found[item.id] = np.sqrt(((simulated - recorded) ** 2).mean(axis=1)) / item.scale
-    return found
+    first, second, difference = (found[f"step_rms_{name}"] for name in _PRESSURES)
+    return found | {"step_error_correlation": (first**2 + second**2 - difference**2) / (2.0 * first * second)}
+
+
+_PRESSURES = ("pressure_1", "pressure_2", "pressure_difference")
 
 
 def _step_percentages() -> list[Claim]:
@@ -444,7 +448,7 @@ def _step_percentages() -> list[Claim]:
 def _error_correlation(agreement: RecordingAgreement) -> Claim:
     """Return the correlation of the errors of both pressures on the rig, by the same arithmetic as the paper's."""
     entries, rms = paper_entries(), {channel.channel: channel.rms for channel in agreement.channels}
-    first, second, difference = (rms[name] for name in ("pressure_1", "pressure_2", "pressure_difference"))
+    first, second, difference = (rms[name] for name in _PRESSURES)
     value = (first**2 + second**2 - difference**2) / (2.0 * first * second)
     entry = entries["step_error_correlation"]
     holds = (entry.at_least or -1.0) <= value <= (entry.at_most or 1.0)

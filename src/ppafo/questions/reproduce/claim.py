@@ -1,11 +1,12 @@
 """Claims of the paper beside our numbers, the paper's numbers as printed, and the claims that are arithmetic."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any, Literal
 
 from ppafo.answers.writing import format_printed_quantity, quantity
-from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import ParameterError
 from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio, subsonic_flow_constant
 from ppafo.model.orifice import isentropic_flow_function
@@ -30,8 +31,9 @@ class Claim:
     """A number that the paper states and ours, both in ``unit``; ``value`` None where there is nothing to compute.
 
     ``paper`` is None where the paper says it in ``words``, which are empty where only ``own`` arithmetic gives it.
-    ``left_open`` are the ends of what is open about our number, ``open_by`` says by what; ``is_chosen`` marks that our
-    assumptions were chosen for this very number: ours is nearer to it than to 95 % of what they could give.
+    ``left_open`` are the ends of what is open about our number, ``open_by`` says by what, or why there are none;
+    ``is_chosen`` marks that our assumptions were chosen for this very number: ours is nearer to it than to 95 % of what
+    they could give.
 
     ``source`` is where the paper says it, ``assumptions`` what our number rests on beside the paper, ``note`` why the
     verdict is what it is. A claim that has to hold for this package to be sound has a window that it must fall into.
@@ -269,46 +271,53 @@ def arithmetic_claims(printed: Printed) -> list[Claim]:
     ]
 
 
+_GAS_NUMBERS = ("gas.heat_capacity_ratio", "gas.molar_mass", "gas.temperature")
+
+
 def _flow_constants(printed: Printed) -> list[Claim]:
     gas = printed.gas()
-    k, constant, temperature = gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature
-    found = (
+    printed_gas = gas.heat_capacity_ratio, gas.molar_mass, gas.temperature
+    found: tuple[tuple[str, str, str, Callable[[float, float, float], float], str], ...] = (
         (
             "c1",
             "C1 of choked flow",
             "reported.choked_flow_constant",
-            choked_flow_constant(k, constant, temperature),
+            lambda k, mass, temperature: choked_flow_constant(k, UNIVERSAL_GAS_CONSTANT / mass, temperature),
             " With the exponent (k + 1)/(k - 1) under the root, not the printed one: see the audit.",
         ),
         (
             "c2",
             "C2 of subsonic flow",
             "reported.subsonic_flow_constant",
-            subsonic_flow_constant(k, constant, temperature),
+            lambda k, mass, temperature: subsonic_flow_constant(k, UNIVERSAL_GAS_CONSTANT / mass, temperature),
             "",
         ),
         (
             "critical_pressure_ratio",
             "the pressure ratio where flow chokes",
             "reported.critical_pressure_ratio",
-            1.0 / critical_pressure_ratio(k),
+            lambda k, _mass, _temperature: 1.0 / critical_pressure_ratio(k),
             "",
         ),
     )
     claims = []
-    for identifier, name, path, value, remark in found:
+    for identifier, name, path, computed, remark in found:
+        value = computed(*printed_gas)
+        # Each rises or falls with every number of the gas, so that its ends are at ends of theirs.
+        ends = [computed(*corner) for corner in product(*(printed.range(number) for number in _GAS_NUMBERS))]
         holds = printed.range(path).meets(Interval(value, value))
         statement = f"{name[0].upper()}{name[1:]} follows from the gas: k, molar mass and temperature as printed."
         note = f"{'Agrees' if holds else 'Does not agree'} {_DIGITS}.{remark}"
-        claims.append(_claim(printed, identifier, statement, path, value, holds, note))
+        claim = _claim(printed, identifier, statement, path, value, holds, note)
+        claims.append(replace(claim, left_open=(min(ends), max(ends)), open_by=f"{PRINTED_DIGITS} of the gas"))
     return claims
 
 
 def _product(printed: Printed, identifier: str, path: str, rate_path: str, rate_name: str) -> Claim:
     """Compare a printed product with inertia times the printed rate; a rate in 1/s is one, whatever it is called."""
     name = identifier.replace("_", " ")
-    product = printed.range(_INERTIA).times(printed.range(rate_path))
-    holds = product.meets(printed.range(path))
+    implied_range = printed.range(_INERTIA).times(printed.range(rate_path))
+    holds = implied_range.meets(printed.range(path))
     value = printed.in_printed_unit(path, printed.in_si(_INERTIA) * abs(printed.in_si(rate_path)))
     rate = f"{abs(printed.number(rate_path)):g} {printed.unit(rate_path)}"
     implied = printed.in_printed_unit(_INERTIA, printed.in_si(path) / abs(printed.in_si(rate_path)))
@@ -320,7 +329,7 @@ def _product(printed: Printed, identifier: str, path: str, rate_path: str, rate_
         f"inertia of {implied:.2g} {printed.unit(_INERTIA)}. The measured {rate_name} itself cannot be tested here."
     )
     claim = _claim(printed, identifier, statement, path, value, holds, note)
-    low, high = (printed.in_printed_unit(path, end) for end in product)
+    low, high = (printed.in_printed_unit(path, end) for end in implied_range)
     return replace(claim, left_open=(low, high), open_by=PRINTED_DIGITS)
 
 

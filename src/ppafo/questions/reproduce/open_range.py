@@ -18,6 +18,11 @@ CHOSEN = 0.05
 """A number is chosen where less than this fraction of what was open is as near to the published one as ours."""
 LIKELIEST = 128
 """Completions that are run with other laws, and whose step responses are compared with the rig's."""
+WITHOUT_RANGE = {
+    "beyond_improved_control": "no range here: the search for the best decisions takes seconds for each completion; "
+    "docs/what-the-comparison-shows.md has it over some of them",
+    "large_and_heavy": "no range: there is no number",
+}
 WEIGHED = "completions that agree with the other evidence"
 
 
@@ -35,7 +40,7 @@ def with_open_ranges(claims: Sequence[Claim], family: Family, synthetic: Synthet
             weights = family.weights_without((entry.id, *entry.same_data))
             found.append(_with_range(claim, OBSERVABLES[entry.observable](family.metrics), weights))
         else:
-            found.append(claim)
+            found.append(claim if claim.left_open else replace(claim, open_by=WITHOUT_RANGE.get(claim.id, "")))
     return found
 
 

@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -124,14 +124,15 @@ def recycling_work(values: Values) -> float:
     return recycling / plain
 
 
-def event_reduction(wearer: str) -> float:
+def event_reduction(wearer: str, values: Values) -> float:
     """Share [-] by which state estimation lowers the error of event times of one wearer, against thresholds."""
     configuration = load_walk(PAIR, WEARERS[wearer])
+    device = _chambers(values).of(configuration.device)
     course = uneven_course(2.0 / walk_of(configuration).gait.stride_time)
     errors = []
     for timing in ("thresholds", "estimated"):
         walked = load_walk(PAIR, (*WEARERS[wearer], f"timing.kind={timing}"))
-        walked = replace(walked, motion=replace(walk_of(walked), course=course))
+        walked = replace(walked, device=device, motion=replace(walk_of(walked), course=course))
         errors.append(rms_of([event.errors for event in timed_events(walked, 1.0).values()]))
     return 1.0 - errors[1] / errors[0]
 
@@ -168,14 +169,14 @@ COMPUTATIONS: dict[str, Computation] = {
     "healthy_event_reduction": Computation(
         "error of event times less with state estimation than with thresholds, nondisabled wearer, uneven strides",
         "1",
-        {},
-        lambda _: event_reduction("healthy"),
+        _OF_CHAMBERS,
+        partial(event_reduction, "healthy"),
     ),
     "impaired_event_reduction": Computation(
         "error of event times less with state estimation than with thresholds, drop foot, uneven strides",
         "1",
-        {},
-        lambda _: event_reduction("impaired"),
+        _OF_CHAMBERS,
+        partial(event_reduction, "impaired"),
     ),
 }
 
