@@ -53,8 +53,10 @@ def test_the_table_aligns_its_columns(reproduction: Reproduction) -> None:
 
 
 def test_below_the_table_verdicts_are_counted_and_what_nothing_tests_is_listed(reproduction: Reproduction) -> None:
-    *_, counts, _, _, _, untested, first, second = text_of(answer_of(reproduction)).splitlines()
+    *_, counts, _, _, _, searched, numberless, untested, first, second = text_of(answer_of(reproduction)).splitlines()
     assert counts.startswith(f"{len(reproduction.claims)} claims: ")
+    assert searched.startswith("beyond_improved_control: no range here: ")
+    assert numberless.startswith("large_and_heavy: no range: ")
     assert untested == "stated, and tested by nothing here:"
     assert first.startswith("  unmodelled_dynamics: ")
     assert second.startswith("  temperature_would_help: ")

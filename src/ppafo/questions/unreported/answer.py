@@ -47,42 +47,30 @@ class Family(Solved):
     """All completions that could be run: settings by name, metrics by valve and name, and how densely they were drawn.
 
     Each (draws,). The first ``even`` are spread evenly over what is allowed, the others lie where the results agree.
-    ``replicate`` is which search drew each; ``densities`` (draws, searches) is how densely each search draws there,
-    over the even spread, 1 from another search where a completion can have no weight; ``sizes`` (searches,) is how much
-    each drew. ``drawn`` counts also those that no run can have or that failed.
+    ``density`` is how densely they were drawn there, over the even spread, ``replicate`` which replicate each is of.
+    ``drawn`` counts also those that no run can have or that failed.
     """
 
     draws: Draws
     metrics: Metrics
-    densities: Floats
-    sizes: Floats
+    density: Floats
     replicate: NDArray[np.intp]
     even: int
     drawn: int
     seed: int
 
-    @property
-    def density(self) -> Floats:
-        """How densely all searches together draw, over the even spread."""
-        return np.asarray(self.densities @ self.sizes / np.sum(self.sizes))
-
     def without_each(self) -> "list[Family]":
-        """Return, for each search, what the others found, weighed as if there had been no more."""
+        """Return, for each replicate, what the others found."""
         found = []
-        for number in range(self.sizes.size):
+        for number in range(REPLICATES):
             kept = self.replicate != number
-            even = int(np.count_nonzero(kept[: self.even]))
-            others = np.delete(self.densities[kept], number, axis=1)
-            # The numbers of the searches close up, as their columns do.
-            numbers = self.replicate[kept] - (self.replicate[kept] > number)
             found.append(
                 Family(
                     {name: values[kept] for name, values in self.draws.items()},
                     {valve: {name: item[kept] for name, item in of.items()} for valve, of in self.metrics.items()},
-                    others,
-                    np.delete(self.sizes, number),
-                    numbers,
-                    even,
+                    self.density[kept],
+                    self.replicate[kept],
+                    int(np.count_nonzero(kept[: self.even])),
                     self.drawn,
                     self.seed,
                 )
@@ -340,7 +328,7 @@ def unreported_figure(family: Family) -> "matplotlib.figure.Figure":
 
 
 ERRORS = (
-    f"each ±: 95 % by the spread between {REPLICATES} independent searches; the effective sample size shows how "
+    f"each ±: 95 % by the spread between {REPLICATES} independent replicates; the effective sample size shows how "
     "unequal the weights are, not how precise a fraction is"
 )
 _CAPTION = (

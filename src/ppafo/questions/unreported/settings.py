@@ -1,10 +1,6 @@
-"""The settings that the paper does not print, what it reports that they have to agree with, and where to draw next.
+"""The settings that the paper does not print, and what it reports that they have to agree with.
 
-Completions are points in the unit cube, evenly spread before anything is compared. A proposal is a mixture of bells
-around some points, with the spread and the correlations of those that agreed, and of the even spread; a choice is kept
-with some probability or drawn anew. What falls outside the cube is no completion and is dropped. The density is known,
-so every completion can be weighed as if all had been drawn from the mixture of all proposals (deterministic mixture;
-Owen and Zhou, J. Am. Stat. Assoc. 95 (2000) 135).
+Completions are points in the unit cube, evenly spread before anything is compared.
 """
 
 import math
@@ -328,10 +324,14 @@ def agreement(metrics: Metrics, left_out: Collection[str] = ()) -> Floats:
 
 def agreement_with(identifiers: Collection[str], metrics: Metrics) -> Floats:
     """How well each completion (draws,) agrees with some entries, 0 to 1."""
+    return np.exp(log_agreement(identifiers, metrics))
+
+
+def log_agreement(identifiers: Collection[str], metrics: Metrics) -> Floats:
+    """The logarithm of that (draws,); -inf where a completion contradicts a strict limit, or did not run."""
     chosen = [entry for entry in EVIDENCE if entry.id in identifiers]
     logarithm = -sum((_misfit(entry, OBSERVABLES[entry.observable](metrics)) for entry in chosen), np.zeros(1))
-    agrees = np.isfinite(logarithm)
-    return np.where(agrees, np.exp(np.where(agrees, logarithm, 0.0)), 0.0)
+    return np.where(np.isfinite(logarithm), logarithm, -np.inf)
 
 
 def _misfit(entry: ClaimEntry, found: Floats) -> Floats:
@@ -347,145 +347,7 @@ def _misfit(entry: ClaimEntry, found: Floats) -> Floats:
     return np.asarray(0.5 * (away / entry.deviation) ** 2)
 
 
-ANYWHERE = 0.1
-KEEPS_CHOICE = 0.9
-CENTRES = 100
-NARROWEST = 0.02
-"""Smallest standard deviation of a bell along any direction, of the side of the cube."""
-ENOUGH = 30.0
-"""Effective number of completions that the bells are laid around; weights are tempered until there are as many."""
-_ROWS = 512
-"""Points whose densities are computed together: few enough that their table of bells stays in the cache of a core."""
-
-
-@dataclass(frozen=True, slots=True)
-class Proposal:
-    """Bells around ``centres`` (bells, dimensions); ``cells`` of a choice, 0 for a number.
-
-    ``shape`` (numbers, numbers) is the lower Cholesky factor of the bells' covariance over the numbers.
-    """
-
-    centres: Floats
-    shape: Floats
-    cells: tuple[int, ...]
-
-    @property
-    def numbers(self) -> list[int]:
-        """Columns that are numbers, not choices."""
-        return [column for column, cells in enumerate(self.cells) if not cells]
-
-    def draw(self, count: int, chance: np.random.Generator) -> Floats:
-        """Those of ``count`` drawn points that lie in the cube (points, dimensions)."""
-        chosen = self.centres[chance.integers(len(self.centres), size=count)]
-        near = chosen.copy()
-        steps = chance.standard_normal((count, len(self.numbers))) @ self.shape.T
-        near[:, self.numbers] += steps
-        for column, cells in enumerate(self.cells):
-            if cells:
-                within = (np.floor(chosen[:, column] * cells) + chance.random(count)) / cells
-                anew = chance.random(count) > KEEPS_CHOICE
-                near[:, column] = np.where(anew, chance.random(count), within)
-        anywhere = chance.random(count) < ANYWHERE
-        points = np.where(anywhere[:, None], chance.random(chosen.shape), near)
-        return np.asarray(points[((points >= 0.0) & (points < 1.0)).all(axis=1)])
-
-    def density(self, points: Floats) -> Floats:
-        """Density (points,) over the even spread, of points in the cube."""
-        parts = [self._density(points[first : first + _ROWS]) for first in range(0, len(points), _ROWS)]
-        return np.concatenate([np.empty(0), *parts])
-
-    def _density(self, points: Floats) -> Floats:
-        here, there = (np.linalg.solve(self.shape, rows[:, self.numbers].T).T for rows in (points, self.centres))
-        squares = (here**2).sum(axis=1)[:, None] + (there**2).sum(axis=1)[None, :] - 2.0 * here @ there.T
-        scale = (2.0 * math.pi) ** (-0.5 * len(self.numbers)) / np.prod(np.diag(self.shape))
-        total = scale * np.exp(-0.5 * np.maximum(squares, 0.0))
-        for column, cells in enumerate(self.cells):
-            if cells:
-                same = np.floor(points[:, column, None] * cells) == np.floor(self.centres[None, :, column] * cells)
-                total *= (1.0 - KEEPS_CHOICE) + KEEPS_CHOICE * cells * same
-        return np.asarray(ANYWHERE + (1.0 - ANYWHERE) * total.mean(axis=1))
-
-
 def effective(weights: Floats) -> float:
     """Number of points [-] that equal weights would need to say as much."""
     squares = float((weights**2).sum())
     return float(weights.sum()) ** 2 / squares if squares > 0.0 else 0.0
-
-
-def temper(weights: Floats) -> Floats:
-    """The weights, flattened by the least power that leaves enough of them; they add up to 1."""
-    power = 1.0
-    positive = weights > 0.0
-    enough = min(ENOUGH, 0.5 * float(positive.sum()))
-    flat = weights
-    while power > 0.01:
-        flat = np.where(positive, np.where(positive, weights, 1.0) ** power, 0.0)
-        if effective(flat) >= enough:
-            break
-        power *= 0.8
-    return np.asarray(flat / flat.sum())
-
-
-@dataclass(frozen=True, slots=True)
-class Aim:
-    """What points gave of some observables (points, observables), what is wanted of them and how sharply."""
-
-    found: Floats
-    wanted: Floats
-    deviation: Floats
-
-
-def aim_of(metrics: Metrics, left_out: Collection[str]) -> Aim:
-    """Return what completions gave of the numbers that the paper prints of the torque task."""
-    entries = [entry for entry in EVIDENCE if entry.published is not None and entry.id not in left_out]
-    return Aim(
-        np.array([OBSERVABLES[entry.observable](metrics) for entry in entries]).T,
-        np.array([entry.published for entry in entries], dtype=np.float64),
-        np.array([entry.deviation for entry in entries], dtype=np.float64),
-    )
-
-
-def next_proposal(
-    points: Floats, weights: Floats, cells: tuple[int, ...], chance: np.random.Generator, aim: Aim | None = None
-) -> Proposal | None:
-    """The proposal after points with weights; None where nothing has any weight.
-
-    With an ``aim`` each bell is moved and narrowed to what is wanted, as far as the observables are straight lines
-    (the update of an ensemble Kalman filter).
-    """
-    if not weights.sum() > 0.0:
-        return None
-    flat = temper(weights)
-    chosen = chance.choice(len(points), size=CENTRES, p=flat)
-    columns = [column for column, count in enumerate(cells) if not count]
-    centres, numbers = points[chosen], points[:, columns]
-    away = numbers - flat @ numbers
-    covariance = (flat[:, None] * away).T @ away
-    if aim is not None:
-        gain, seen = _gain(points, flat, cells, covariance, aim)
-        moved = centres[:, columns] + (aim.wanted - aim.found[chosen]) @ gain.T
-        centres[:, columns] = np.clip(moved, 0.0, 1.0)
-        covariance = covariance - gain @ seen
-    shape = np.asarray(np.linalg.cholesky(covariance + NARROWEST**2 * np.eye(len(covariance))), dtype=np.float64)
-    return Proposal(centres, shape, cells)
-
-
-def _gain(
-    points: Floats, weights: Floats, cells: tuple[int, ...], covariance: Floats, aim: Aim
-) -> tuple[Floats, Floats]:
-    """Return the gain (numbers, observables) of a bell, and the covariance of observables with numbers."""
-    numbers = [points[:, [column]] for column, count in enumerate(cells) if not count]
-    chosen = [
-        (np.floor(points[:, [column]] * count) == np.arange(count)).astype(np.float64)
-        for column, count in enumerate(cells)
-        if count
-    ]
-    # A constant, for where there are no choices.
-    regressors = np.hstack([*numbers, *chosen, np.ones((len(points), 1))])
-    root = np.sqrt(weights)[:, None]
-    slopes = np.linalg.lstsq(root * regressors, root * aim.found, rcond=1.0e-6)[0]
-    left = aim.found - regressors @ slopes
-    noise = (weights[:, None] * left).T @ left + np.diag(aim.deviation**2)
-    jacobian = slopes[: len(covariance)].T
-    seen = jacobian @ covariance
-    return np.linalg.solve(seen @ jacobian.T + noise, seen).T, seen

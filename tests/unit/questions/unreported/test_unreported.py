@@ -18,6 +18,7 @@ from ppafo.questions.unreported.answer import (
     weighted_quantiles,
     within_reach,
 )
+from ppafo.questions.unreported.proposal import Proposal, from_rows, normal_scale, shipped_proposal, to_rows
 from ppafo.questions.unreported.settings import (
     ATTITUDE,
     CELLS,
@@ -37,18 +38,14 @@ from ppafo.questions.unreported.settings import (
     TEXT_OF_SOLENOID,
     TEXT_OF_STEP,
     VOLUME,
-    Aim,
-    Proposal,
     agreement,
     agreement_with,
     columns,
     effective,
     improvement,
-    next_proposal,
     spread,
     step_columns,
     step_observables,
-    temper,
     values_of,
 )
 from ppafo.questions.unreported.solve import NEGLIGIBLE, infer_settings, step_metrics
@@ -117,39 +114,6 @@ def test_a_completion_is_the_scenario_with_the_same_overrides(family: Family, va
     alone = simulate(load_scenario(f"torque-task-{valve}", texts)).metrics
     for name, value in family.metrics[valve].items():
         assert value[0] == pytest.approx(alone[name].value, rel=1e-9)
-
-
-def test_a_proposal_has_the_density_that_it_draws_from() -> None:
-    chance = np.random.default_rng(5)
-    cells = (0, 3)
-    proposal = Proposal(np.array([[0.3, 0.1], [0.9, 0.9]]), np.array([[0.1]]), cells)
-    points = proposal.draw(200_000, chance)
-    even = chance.random((200_000, 2))
-    for low, high in ((0.0, 0.1), (0.1, 0.5), (0.9, 1.0)):
-        share = ((points[:, 0] >= low) & (points[:, 0] < high)).sum() / 200_000
-        inside = (even[:, 0] >= low) & (even[:, 0] < high)
-        expected = (proposal.density(even) * inside).mean()
-        assert share == pytest.approx(expected, abs=0.006)
-    assert proposal.density(even).mean() == pytest.approx(len(points) / 200_000, abs=0.01)
-
-
-def test_tempering_leaves_enough_weights_and_keeps_their_order() -> None:
-    weights = np.exp(-np.linspace(0.0, 300.0, 2000))
-    flat = temper(weights)
-    assert effective(flat) >= 29.0 > effective(weights)
-    assert (np.diff(flat) < 0.0).all()
-
-
-def test_where_nothing_agrees_there_is_no_proposal() -> None:
-    points = spread(64, seed=1)
-    assert next_proposal(points, np.zeros(64), CELLS, np.random.default_rng(1)) is None
-
-
-def test_rounds_find_what_even_draws_rarely_meet(family: Family) -> None:
-    agrees = agreement(family.metrics) > 1e-6
-    assert agrees[family.even :].mean() > 2.0 * agrees[: family.even].mean()
-    assert family.weights.sum() == pytest.approx(1.0)
-    assert family.drawn >= family.weights.size
 
 
 def test_the_conclusion_on_gas_holds_over_nearly_all_completions(family: Family) -> None:
@@ -225,22 +189,6 @@ def test_the_step_response_is_inferred_with_its_leg_and_the_attitude_of_its_shan
         assert family.metrics[STEP][name][0] == pytest.approx(value[0], abs=1e-6)
 
 
-def test_an_aim_moves_and_narrows_a_proposal_to_what_is_wanted() -> None:
-    """An observable that is a straight line of two numbers, with a choice beside them, wanted to 0.01."""
-    chance = np.random.default_rng(2)
-    cells = (0, 0, 3)
-    points = chance.random((4000, 3))
-    found = (points[:, 0] + points[:, 1] + np.floor(3.0 * points[:, 2]))[:, None]
-    weights = np.exp(-0.5 * ((found[:, 0] - 1.7) / 0.3) ** 2)
-    aim = Aim(found, np.array([1.7]), np.array([0.01]))
-    met = []
-    for proposal in (next_proposal(points, weights, cells, chance, item) for item in (None, aim)):
-        assert proposal is not None
-        drawn = proposal.draw(4000, chance)
-        met.append((np.abs(drawn[:, 0] + drawn[:, 1] + np.floor(3.0 * drawn[:, 2]) - 1.7) < 0.05).mean())
-    assert met[1] > 3.0 * met[0]
-
-
 def test_what_the_text_rules_out_is_not_run_any_further(family: Family) -> None:
     later = slice(family.even, None)
     assert family.drawn > family.weights.size
@@ -257,23 +205,6 @@ def test_every_setting_gets_a_verdict(family: Family) -> None:
     ramp = found[1]
     assert ramp.low <= ramp.median <= ramp.high
     assert len(strongest_links(family)) == 4
-
-
-def test_every_share_has_the_error_between_searches_that_know_nothing_of_each_other(family: Family) -> None:
-    from scipy.stats import t as student
-
-    assert set(family.replicate) == set(range(REPLICATES))
-    others = family.without_each()
-    assert [set(other.replicate) for other in others] == [set(range(REPLICATES - 1))] * REPLICATES
-    shares = np.array([[item.of_all for item in conclusions(other)] for other in others])
-    reach = student(REPLICATES - 1).ppf(0.975) * np.sqrt((REPLICATES - 1) * np.var(shares, axis=0))
-    assert [item.error[0] for item in conclusions(family)] == pytest.approx(reach)
-    for item in implications_of(family):
-        errors = item.error["shares"] if item.setting.choices else item.error["median"]
-        assert max(errors) > 0.0
-    text = text_of(family.answer())
-    assert text.count("±") > 20
-    assert "4 independent searches" in text
 
 
 def test_the_share_of_all_is_within_its_error_as_often_as_is_said() -> None:
@@ -327,11 +258,84 @@ def test_a_choice_is_implied_where_one_alone_is_left_and_open_where_all_are_alik
     assert np.isnan(spread_of([0.0, 0.0]))
 
 
-def test_how_densely_a_proposal_draws_does_not_depend_on_how_many_points_are_judged_together() -> None:
-    chance = np.random.default_rng(1)
-    shape = np.linalg.cholesky(0.05 * np.eye(CELLS.count(0)) + 0.01)
-    proposal = Proposal(chance.random((50, len(CELLS))), shape, CELLS)
-    points = chance.random((1300, len(CELLS)))
-    together = proposal.density(points)
-    assert np.array_equal(together, np.concatenate([proposal.density(part) for part in np.array_split(points, 13)]))
-    assert np.array_equal(together, proposal.density(points))
+def mixture() -> Proposal:
+    """Two parts over two numbers and a choice of three."""
+    shapes = np.array([[[0.5, 0.0], [0.3, 0.2]], [[0.8, 0.0], [-0.4, 0.6]]])
+    shares = (np.array([[0.6, 0.3, 0.1], [0.2, 0.2, 0.6]]),)
+    return Proposal(np.array([0.7, 0.3]), np.array([[-0.5, 0.2], [1.0, -0.3]]), shapes, shares, (0, 3, 0))
+
+
+def test_a_proposal_has_the_density_that_it_draws_from() -> None:
+    chance = np.random.default_rng(5)
+    drawn, even = mixture().draw(200_000, chance), chance.random((200_000, 3))
+    density = mixture().density(even)
+    assert density.mean() == pytest.approx(1.0, abs=0.02)
+    for column in range(3):
+        for low, high in ((0.0, 0.1), (0.1, 0.5), (0.7, 1.0)):
+            share = ((drawn[:, column] >= low) & (drawn[:, column] < high)).mean()
+            inside = (even[:, column] >= low) & (even[:, column] < high)
+            assert share == pytest.approx((density * inside).mean(), abs=0.012)
+
+
+def test_weights_by_a_proposal_recover_a_posterior_that_is_known() -> None:
+    """Two correlated numbers, normally distributed in the normal scale, and a choice; the mixture fits neither well.
+
+    With a quarter spread evenly, means, correlation and shares are those of the posterior within five times the error
+    that the effective sample size has.
+    """
+    chance = np.random.default_rng(11)
+    count, even = 40_000, 10_000
+    points = np.concatenate([chance.random((even, 3)), mixture().draw(count - even, chance)])
+    density = 0.25 + 0.75 * mixture().density(points)
+    at = normal_scale(points[:, [0, 2]])
+    mean, covariance = np.array([0.3, -0.6]), np.array([[0.25, 0.15], [0.15, 0.36]])
+    away = at - mean
+    logarithm = -0.5 * np.einsum("ni,ij,nj->n", away, np.linalg.inv(covariance), away) + 0.5 * (at**2).sum(axis=1)
+    shares = np.array([0.2, 0.5, 0.3])
+    chosen = np.floor(3.0 * points[:, 1]).astype(int)
+    weights = np.exp(logarithm) * shares[chosen] / density
+    weights /= weights.sum()
+    error = 5.0 / np.sqrt(effective(weights))
+    assert effective(weights) > 2000.0
+    assert weights @ at == pytest.approx(mean, abs=error * 0.6)
+    assert (weights[:, None] * away).T @ away == pytest.approx(covariance, abs=error * 0.5)
+    assert np.bincount(chosen, weights) == pytest.approx(shares, abs=error * 0.5)
+
+
+def test_a_proposal_is_the_same_when_it_is_written_and_read() -> None:
+    again = from_rows(to_rows(mixture()), (0, 3, 0))
+    points = np.random.default_rng(2).random((100, 3))
+    assert again.density(points) == pytest.approx(mixture().density(points), rel=1e-12)
+
+
+def test_the_shipped_proposal_covers_the_cube_and_every_choice() -> None:
+    proposal = shipped_proposal()
+    even = spread(256, seed=4)
+    assert proposal.cells == CELLS
+    assert np.isfinite(np.log(proposal.density(even))).all()
+    assert all((table > 0.0).all() for table in proposal.shares)
+
+
+def test_the_proposal_finds_what_even_draws_rarely_meet(family: Family) -> None:
+    agrees = agreement(family.metrics) > 1e-3
+    assert agrees[family.even :].mean() > 20.0 * agrees[: family.even].mean()
+    assert family.weights.sum() == pytest.approx(1.0)
+    assert family.drawn >= family.weights.size
+
+
+def test_every_share_has_the_error_between_independent_replicates(family: Family) -> None:
+    from scipy.stats import t as student
+
+    assert set(family.replicate) == set(range(REPLICATES))
+    others = family.without_each()
+    for number, other in enumerate(others):
+        assert set(other.replicate) == set(range(REPLICATES)) - {number}
+    shares = np.array([[item.of_all for item in conclusions(other)] for other in others])
+    reach = student(REPLICATES - 1).ppf(0.975) * np.sqrt((REPLICATES - 1) * np.var(shares, axis=0))
+    assert [item.error[0] for item in conclusions(family)] == pytest.approx(reach)
+    for item in implications_of(family):
+        errors = item.error["shares"] if item.setting.choices else item.error["median"]
+        assert max(errors) > 0.0
+    text = text_of(family.answer())
+    assert text.count("±") > 20
+    assert "4 independent replicates" in text
