@@ -13,6 +13,7 @@ import math
 import statistics
 import sys
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -70,9 +71,12 @@ def planned(duration: float = 0.4) -> dict[str, Scenario]:
 
 
 def recorded(
-    scenarios: dict[str, Scenario], tolerances: Tolerances, random: np.random.Generator
+    scenarios: dict[str, Scenario],
+    tolerances: Tolerances,
+    random: np.random.Generator,
+    truth: Mapping[str, float] | None = None,
 ) -> dict[str, Recording]:
-    """What a bench with these tolerances records of the planned scenarios."""
+    """What a bench with these tolerances records of the planned scenarios, on a device with other numbers [SI]."""
 
     def even(limit: float) -> float:
         return float(random.uniform(-limit, limit))
@@ -87,10 +91,10 @@ def recorded(
             for path in ("supply.pressure", "supply.dorsiflexion_pressure")
         }
         changed["motion.external_torque"] = scenario.motion.external_torque * (1.0 + even(tolerances.load))
-        clean = simulate(with_numbers(scenario, changed)).recording
+        clean = simulate(with_numbers(scenario, {**changed, **(truth or {})})).recording
         rest = {"angle": 0.0}
         atmosphere = scenario.device.supply.atmospheric_pressure
-        channels = {}
+        channels = {"command": clean.channels["command"]} if "command" in clean else {}
         for name, noise in NOISE.items():
             zero = rest.get(name, atmosphere)
             values = zero + gains[name] * (clean[name] - zero) + zeros[name]

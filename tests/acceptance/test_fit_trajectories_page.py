@@ -26,7 +26,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The working folder after the commands of the page."""
     pytest.importorskip("sksundae")
     home = tmp_path_factory.mktemp("page")
-    (toml,) = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+    toml = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)[0]
     (home / "problem.toml").write_text(toml)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(home)

@@ -22,6 +22,7 @@ from ppafo.identification.source import Source, Use, common_use, source_of
 from ppafo.identification.trajectory.fitting import TrajectoryFit, fit, noise_in, residuals_of
 from ppafo.identification.trajectory.follow_up import Candidate, Expected, Profile, expected_information, profile
 from ppafo.identification.trajectory.information import correlation, covariance, directions_for, precision
+from ppafo.identification.trajectory.next_experiment import NextExperiments, propose
 from ppafo.identification.trajectory.problem import (
     ALL_INPUTS,
     FITTED_CHANNELS,
@@ -42,8 +43,9 @@ from ppafo.identification.trajectory.problem import (
 )
 from ppafo.identification.trajectory.residuals import FIRST_STEP, Floats, Residuals, prior_coordinates
 from ppafo.identification.trajectory.search import moved_alone
-from ppafo.identification.trajectory.tolerances import Tolerances, tolerance_parameters
+from ppafo.identification.trajectory.tolerances import Ability, Tolerances, tolerance_parameters
 from ppafo.identification.trajectory.uncertainty import FROM_PRIOR, STRONG, relative_to_number
+from ppafo.identification.trajectory.unseen import unseen_in_words
 from ppafo.parameters import apply_overrides, build_device
 from ppafo.parameters.device import Device
 from ppafo.parameters.parameter_set import ParameterSet
@@ -188,7 +190,7 @@ class Setting:
     ``read`` gives the recording of an experiment, ``folder`` is where paths of scenarios begin, ``file`` what messages
     call the section. ``parameter_set`` takes the place of the sets that scenarios name, ``valve`` that of their valves.
     ``bench`` are estimates that came before, by path; ``used`` are the recordings from which they came. ``tolerances``
-    are those of the bench.
+    are those of the bench, ``ability`` is what it can do, and ``following`` how many next experiments are wanted.
     """
 
     read: Callable[[ExperimentSection], Source]
@@ -199,6 +201,8 @@ class Setting:
     bench: Mapping[str, Estimate] = field(default_factory=dict)
     used: tuple[Use, ...] = ()
     tolerances: Tolerances = field(default_factory=Tolerances)
+    ability: Ability | None = None
+    following: int = 0
 
 
 @contextmanager
@@ -528,8 +532,9 @@ ACCEPTABLE_FRACTION = 0.10
 class TrajectoryOutcome:
     """The fit, the requested profiles, candidates by what they would bring, the best first, and checks.
 
-    ``beforehand`` is what the recordings could give and what not, known before the search. ``remarks`` are sentences
-    about the fit as a whole, also about where it contradicts a bench procedure.
+    ``beforehand`` is what the recordings could give and what not, known before the search, ``unseen`` what they leave
+    open of effects that the model lacks, ``following`` the next experiments that were wanted. ``remarks`` are about the
+    fit as a whole, also about where it contradicts a bench procedure.
     """
 
     fit: TrajectoryFit
@@ -538,6 +543,8 @@ class TrajectoryOutcome:
     checks: tuple[Check, ...]
     remarks: tuple[str, ...]
     beforehand: tuple[Prospect, ...] = ()
+    unseen: tuple[str, ...] = ()
+    following: NextExperiments | None = None
 
     @property
     def failed(self) -> tuple[Check, ...]:
@@ -570,8 +577,23 @@ def solve_section(section: TrajectorySection, setting: Setting, report: Report) 
         if candidates:
             report(Progress(f"expected information of {count_of(len(candidates), 'further experiment')}"))
         expected = expected_information(found, candidates)
+        following = None
+        if setting.ability is not None and setting.following:
+            following = propose(
+                found,
+                setting.ability,
+                setting.tolerances,
+                setting.following,
+                lambda name, changes: _scenario(name, changes, setting),
+                report,
+            )
     remarks = (*found.remarks, *_contradictions(found, setting.bench))
-    return TrajectoryOutcome(found, tuple(profiles), expected, _checks(found), remarks, beforehand)
+    unseen: tuple[str, ...] = ()
+    if found.doubt is not None:
+        half_widths = 0.5 * (found.uncertainty.high - found.uncertainty.low)
+        ranges, point = found.optimum.residuals.ranges, found.uncertainty.centre
+        unseen = unseen_in_words(found.doubt, ranges, point, half_widths, found.scenarios)
+    return TrajectoryOutcome(found, tuple(profiles), expected, _checks(found), remarks, beforehand, unseen, following)
 
 
 def _contradictions(found: TrajectoryFit, bench: Mapping[str, Estimate]) -> list[str]:

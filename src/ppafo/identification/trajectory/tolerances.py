@@ -49,9 +49,11 @@ class AbilitySection(StrictTable):
     command: Annotated[
         tuple[float, float], Field(strict=False, description="of the valve, from -1 to 1; both signs where it can")
     ] = (-1.0, 1.0)
-    half_cycle: Annotated[
-        tuple[Text, Text], Field(strict=False, description="time after which the command changes over")
-    ] = ("50 ms", "500 ms")
+    torque: Annotated[
+        tuple[Text, Text] | None,
+        Field(strict=False, description="amplitude of a sine that a torque controller follows; default: it has none"),
+    ] = None
+    frequency: Annotated[tuple[Text, Text], Field(strict=False, description="of that sine")] = ("0.5 Hz", "5 Hz")
     angle: Annotated[
         tuple[Text, Text] | None, Field(strict=False, description="where the vane starts; default: at a stop")
     ] = None
@@ -60,6 +62,8 @@ class AbilitySection(StrictTable):
         "1 s",
     )
     sample_rate: Annotated[Text, Field(description="samples per second of all channels")] = "1 kHz"
+    candidates: Annotated[int, Field(ge=4, le=2000, description="experiments that are drawn to choose from")] = 80
+    seed: Annotated[int, Field(ge=0, description="random seed of the draws")] = 1
 
 
 class BenchSection(StrictTable):
@@ -81,18 +85,22 @@ class BenchSection(StrictTable):
 
 @dataclass(frozen=True, slots=True)
 class Ability:
-    """What a bench can do, lowest and highest of each, in SI units; ``angle`` None starts at a stop.
+    """What a bench can do, lowest and highest of each, in SI units.
 
-    ``interval`` [s] is the time between two samples.
+    ``angle`` None starts at a stop, ``torque`` None has no torque controller. ``interval`` [s] is the time between
+    two samples.
     """
 
     supply_pressure: tuple[float, float]
     load: tuple[float, float]
     command: tuple[float, float]
-    half_cycle: tuple[float, float]
+    torque: tuple[float, float] | None
+    frequency: tuple[float, float]
     angle: tuple[float, float] | None
     duration: tuple[float, float]
     interval: float
+    candidates: int = 80
+    seed: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,11 +163,11 @@ def ability_of(section: AbilitySection, atmosphere: float, file: str) -> Ability
 
     rate = _quantity(f"{said}: sample_rate", section.sample_rate, "Hz")
     command = _in_order(f"{said}: command", *section.command)
-    half_cycle, duration = ends("half_cycle", "s"), ends("duration", "s")
+    frequency, duration = ends("frequency", "Hz"), ends("duration", "s")
     for name, is_possible, rule in (
         ("sample_rate", 10.0 <= rate <= 1.0e5, "10 Hz to 100 kHz"),
         ("command", command[0] >= -1.0 and command[1] <= 1.0, "-1 to 1"),
-        ("half_cycle", half_cycle[0] > 0.0, "above 0 s"),
+        ("frequency", frequency[0] > 0.0 and frequency[1] <= 100.0, "above 0 Hz and at most 100 Hz"),
         ("duration", duration[0] > 0.0 and duration[1] <= 100.0, "above 0 s and at most 100 s"),
     ):
         if not is_possible:
@@ -168,10 +176,13 @@ def ability_of(section: AbilitySection, atmosphere: float, file: str) -> Ability
         supply_pressure=ends("supply_pressure", "Pa_a"),
         load=ends("load", "N m"),
         command=command,
-        half_cycle=half_cycle,
+        torque=None if section.torque is None else ends("torque", "N m"),
+        frequency=frequency,
         angle=None if section.angle is None else ends("angle", "rad"),
         duration=duration,
         interval=1.0 / rate,
+        candidates=section.candidates,
+        seed=section.seed,
     )
 
 

@@ -364,8 +364,8 @@ def _of_bench(item: Range, value: float, low: float, high: float) -> tuple[Verdi
     """Return whether the interval of a tolerance meets what the bench states, and both in words."""
     assert item.prior is not None
     stated, limit = item.prior.mean, item.prior.standard_deviation * math.sqrt(3.0)
-    found, unit = f"the recordings want {value - stated:+.3g}", item.unit.removesuffix("_d")
-    text = f"the bench states {stated:.6g} within {limit:.3g} {unit}, {found}".replace(" -,", ",")
+    unit = "" if item.unit in ("1", "-") else f" {item.unit.removesuffix('_d')}"
+    text = f"the bench states {stated:.6g} within {limit:.3g}{unit}, the recordings want {value - stated:+.3g}"
     is_beyond = low > stated + limit or high < stated - limit
     return ("beyond its tolerance" if is_beyond else "within its tolerance"), f"{text}."
 

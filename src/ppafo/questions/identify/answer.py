@@ -34,6 +34,7 @@ from ppafo.identification.trajectory.follow_up import Expected, Profile
 from ppafo.identification.trajectory.section import TrajectoryOutcome
 from ppafo.parameters.loading import parameter_set_toml
 from ppafo.parameters.parameter_set import ParameterSet
+from ppafo.questions.identify.plan import PLAN_FIGURE, Plan, bench_file, plan_figure, plan_section, rig_requests
 from ppafo.questions.question import Solved
 from ppafo.signals import Recording, RecordingKind
 from ppafo.signals.recording import Floats
@@ -62,6 +63,7 @@ class Identification(Solved):
     trajectory: TrajectoryOutcome | None
     before: ParameterSet
     new_set: NewSet
+    plan: Plan | None = None
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -279,6 +281,12 @@ def answer_of(identification: Identification) -> Answer:
     files = {f"{name}.toml": lambda: parameter_set_toml(new_set.parameter_set).encode()}
     if fitted is not None:
         files[POSTERIOR] = partial(_posterior, fitted.fit)
+    plan = identification.plan
+    if plan is not None:
+        files |= {
+            "next-bench.toml": lambda: bench_file(plan).encode(),
+            "next-rig.sh": lambda: rig_requests(plan).encode(),
+        }
     kinds = {result.kind for result in identification.results}
     if identification.trajectory is not None:
         kinds.add(kind_of_fit(identification.trajectory.fit))
@@ -291,6 +299,7 @@ def answer_of(identification: Identification) -> Answer:
             *(_beforehand_section(item) for item in identification.beforehand),
             *(_procedure_section(result, identification.before) for result in identification.results),
             *((_trajectory_section(fitted, identification.before),) if fitted else ()),
+            *((plan_section(plan),) if plan else ()),
             Section(paragraphs=(f"new set '{name}': {_count_sentence(identification)}", *problem)),
             *(Section(figure=figure, is_detail=True) for figure in _figures(identification)),
         ),
@@ -357,6 +366,7 @@ def _trajectory_section(outcome: TrajectoryOutcome, before: ParameterSet) -> Sec
             *(f"bench: {item.path}: {item.explanation}" for item in of_bench),
             *_checks(outcome.checks),
             *(f"remark: {remark}" for remark in outcome.remarks),
+            *(f"cannot see: {sentence}" for sentence in outcome.unseen),
             *(f"profile: {_profile(curve, before)}" for curve in outcome.profiles),
             *(f"next experiment {number}: {_candidate(candidate)}" for number, candidate in candidates),
         ),
@@ -426,6 +436,10 @@ def _figures(identification: Identification) -> list[Figure]:
         figures.append(Figure(name, result.summary, partial(procedure_figure, result)))
     if identification.trajectory is not None:
         figures += _trajectory_figures(identification.trajectory, identification.before)
+    if identification.plan is not None:
+        figures.append(
+            Figure(PLAN_FIGURE, "What the next experiments promise.", partial(plan_figure, identification.plan))
+        )
     both = figure_3(identification.results)
     return figures if both is None else [*figures, Figure("figure-3", "Like figure 3 of the paper.", lambda: both)]
 
@@ -496,6 +510,8 @@ def _trajectory_data(outcome: TrajectoryOutcome | None) -> dict[str, Any]:
                 for item in outcome.profiles
             ],
             "next_experiments": [plain(item) for item in outcome.expected],
+            "cannot_see": list(outcome.unseen),
+            **({} if outcome.following is None else {"proposal": plain(outcome.following)}),
         }
     }
 

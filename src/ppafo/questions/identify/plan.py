@@ -1,0 +1,132 @@
+"""The next experiments as people use them: what they promise, a bench file and requests to the virtual rig."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ppafo.answers import Column, Section, Table
+from ppafo.answers.style import BLUE, GREY, VERMILION, house_style
+from ppafo.identification.trajectory.next_experiment import NextExperiments
+from ppafo.identification.trajectory.unseen import name_of
+from ppafo.units import percentage
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+
+PLAN_FIGURE = "next-experiments"
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """The next experiments, the problem file that they belong to, the new set, its valve, and the sample rate."""
+
+    following: NextExperiments
+    problem_file: str
+    set_file: str
+    valve: str | None
+    rate: str
+
+
+def plan_section(plan: Plan) -> Section:
+    """Return what was chosen and what it promises, beside three at random."""
+    found = plan.following
+    number = len(found.chosen)
+    if not number:
+        text = (
+            f"next experiment: none of {found.candidates} candidates can be relied upon: all are rough or bend too much"
+        )
+        return Section(paragraphs=(text,))
+    head = ("", "now", f"with {'it' if number == 1 else f'these {number}'}", "three at random")
+    widths = [(one.name, *(_share(value) for value in (one.now, one.after, one.at_random))) for one in found.widths]
+    seen = [
+        (f"{name_of(one.name)}, {one.size}", *(f"{value:.1f} SE" for value in (one.now, one.after, one.at_random)))
+        for one in found.visibility
+    ]
+    return Section(
+        f"next experiment{'s' if number > 1 else ''}, of {found.candidates} candidates ({found.dropped} left out: "
+        "rough, or bent by a harmful size of an effect):",
+        table=Table(tuple(Column(title) for title in head), (*widths, *seen)),
+        remarks=(
+            *(f"{one.label}: {one.scenario}: {', '.join(one.overrides)}" for one in found.chosen),
+            "promised half widths of intervals, and standard errors of each effect at the smallest size that would "
+            "move a number by half its interval",
+        ),
+    )
+
+
+def _share(value: float) -> str:
+    return percentage(value, 2) if value < 10.0 else "unknown"
+
+
+def bench_file(plan: Plan) -> str:
+    """Return the tables [[trajectory.experiments]] of the recordings to be made, for the end of the problem."""
+    lines = [
+        f"# Put at the end of {plan.problem_file} once the recordings are there: what was chosen, word for word.",
+        "# A recording needs columns for angle, both pressures and, where its command is followed, the command.",
+    ]
+    for one in plan.following.chosen:
+        lines += [
+            "",
+            "[[trajectory.experiments]]",
+            f'label = "{one.label}"',
+            f'recording = "{one.label}/{one.rig_experiment}.csv"',
+            f'scenario = "{one.scenario}"',
+            f"overrides = [{', '.join(_quoted(item) for item in one.overrides)}]",
+        ]
+        lines += ['inputs = ["command"]'] if one.follows_command else []
+    return "\n".join(lines) + "\n"
+
+
+def _quoted(text: str) -> str:
+    return f'"{text}"'
+
+
+def rig_requests(plan: Plan) -> str:
+    """Return the commands with which the virtual rig records what was chosen: synthetic, on the set that was found."""
+    lines = [
+        "# The virtual rig in place of the bench, on the device as it was identified: what it records is synthetic.",
+        "# Where earlier recordings are synthetic, too, name their device and its --set in the place of this one.",
+    ]
+    valve = "" if plan.valve is None else f" --valve {plan.valve}"
+    for number, one in enumerate(plan.following.chosen, start=1):
+        changes = " ".join(f'--set "{item}"' for item in one.overrides)
+        lines.append(
+            f"ppafo rig record {one.rig_experiment} --preset ideal-laboratory --device {plan.set_file}{valve} "
+            f'--seed {number} --set "rig.sampling.rate={plan.rate}" {changes} --out {one.label}'
+        )
+    return "\n".join(lines) + "\n"
+
+
+def plan_figure(plan: Plan) -> "matplotlib.figure.Figure":
+    """Return half widths and visibilities now, with what was chosen, and with three at random, on log axes."""
+    import matplotlib.figure
+
+    found = plan.following
+    rows = max(len(found.widths), len(found.visibility), 1)
+    with house_style():
+        figure = matplotlib.figure.Figure(figsize=(9.6, 1.5 + 0.36 * rows), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        for axes, promises, scale, title in (
+            (left, found.widths, 100.0, "Half width of the interval (%)"),
+            (right, found.visibility, 1.0, "Visibility of an effect (standard errors)"),
+        ):
+            names = [one.name if axes is left else name_of(one.name).split(" (")[0] for one in promises]
+            places = np.arange(len(promises))
+            for label, colour, marker, values in (
+                ("now", GREY, "o", [one.now for one in promises]),
+                ("three at random", BLUE, "s", [one.at_random for one in promises]),
+                ("chosen", VERMILION, "D", [one.after for one in promises]),
+            ):
+                shown = np.maximum(scale * np.array(values), _LEAST)
+                axes.plot(shown, places, marker, color=colour, label=label, markersize=5)
+            axes.set_yticks(places, names)
+            axes.set_ylim(len(promises) - 0.5, -0.5)
+            axes.set_xscale("log")
+            axes.set_title(title)
+        figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+        return figure
+
+
+_LEAST = 0.01
+"""Percent, or standard errors, below which a figure shows no difference."""
