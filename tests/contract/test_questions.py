@@ -67,13 +67,17 @@ def test_what_a_question_comes_to_answers_draws_saves_and_becomes_data(name: str
 def test_every_question_is_a_verb_with_its_errors_documented(name: str) -> None:
     solver, (home, _, verb) = QUESTIONS[name].solver(), QUESTIONS[name].solve.partition(":")
     result = solved_types(name)[0]
-    assert getattr(ppafo, verb, None) is solver, (
-        "paste into src/ppafo/__init__.py, the imports below TYPE_CHECKING, the rest into _HOMES:\n"
-        f"    from {result.__module__} import {result.__name__} as {result.__name__}\n"
-        f"    from {home} import {verb} as {verb}\n"
-        f'    "{result.__module__}": ("{result.__name__}",),\n'
-        f'    "{home}": ("{verb}",),\n'
-        "then: python scripts/public_api.py"
+    names = {result.__name__: result.__module__, verb: home}
+    imports = [f"    from {place} import {name} as {name}" for name, place in names.items()]
+    homes = [f'    "{place}": ({", ".join(repr(n) for n in names if names[n] == place)},),' for place in names.values()]
+    assert getattr(ppafo, verb, None) is solver, "\n".join(
+        [
+            "paste into src/ppafo/__init__.py, below TYPE_CHECKING:",
+            *imports,
+            "and into _HOMES:",
+            *dict.fromkeys(homes),
+            "then: python scripts/public_api.py",
+        ]
     )
     assert solver.__doc__ is not None
     assert "Error" in solver.__doc__

@@ -285,6 +285,21 @@ def check_moment(walk: MeanStride) -> None:
         )
 
 
+_UNCLEAR_MOMENT = 0.5
+"""Of the largest moment into plantarflexion; healthy walking has 0.05 to 0.2 of it into dorsiflexion."""
+
+
+def moment_remarks(moment: Floats) -> list[str]:
+    """Return what there is to say of an ankle moment [N m/kg] whose sign its curve hardly shows."""
+    down, up = float(np.max(moment)), float(-np.min(moment))
+    if up <= _UNCLEAR_MOMENT * down:
+        return []
+    return [
+        f"the ankle moment hardly shows its sign: {down:.2g} N m/kg into plantarflexion and {up:.2g} N m/kg into "
+        "dorsiflexion at most; check that push-off is above 0"
+    ]
+
+
 def check_moment_time(walk: MeanStride) -> None:
     """Raise DataError for an ankle moment, where there is one, that works while the foot is off the ground."""
     if "ankle_moment" not in walk.curves:

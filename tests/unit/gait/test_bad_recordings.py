@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError
+from ppafo.gait.plausible import moment_remarks
 from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.gait.recorded.mapping import (
     AngleMap,
@@ -470,3 +471,60 @@ def test_a_wrong_map_is_refused_with_key_and_value(tmp_path: Path, text: str, me
 def test_a_missing_map_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"none.toml: cannot be read: no such file"):
         load_map(tmp_path / "none.toml")
+
+
+def test_a_hip_below_the_ground_is_a_sign_and_no_unit(opensim_files: dict[str, Path]) -> None:
+    top, _, body = opensim_files["ik"].read_text().partition("endheader\n")
+    labels, *lines = body.splitlines()
+    place = labels.split("\t").index("pelvis_ty")
+    cells = [line.split("\t") for line in lines]
+    for row in cells:
+        row[place] = repr(-float(row[place]))
+    table = "\n".join([labels, *("\t".join(row) for row in cells)])
+    opensim_files["ik"].write_text(f"{top}endheader\n{table}\n")
+    with pytest.raises(DataError) as caught:
+        import_gait(list(opensim_files.values()), ImportSettings(62.0, stature=1.63))
+    assert re.search(r"the hip is -0\.87 m high \(pelvis_ty\), .* its sign is reversed", str(caught.value))
+
+
+def test_an_ankle_that_rests_and_is_written_with_one_decimal_is_no_drop_out(
+    csv_of: Callable[..., Path], columns: dict[str, Floats]
+) -> None:
+    away = np.degrees(columns[ANKLE]) - 90.0
+    resting = 90.0 + np.sign(away) * np.maximum(np.abs(away) - 2.5, 0.0)
+    written = {**columns, ANKLE: np.radians(np.round(resting, 1))}
+    stays = np.flatnonzero(np.diff(written[ANKLE]) != 0.0)
+    assert np.diff(stays).max() > 0.1 * 200.0, "the case is there: one value for more than 0.1 s"
+    found = import_gait([csv_of(written)], ImportSettings(62.0))
+    assert found.gait.strides == 5
+
+
+def test_few_samples_and_a_scattering_plate_are_remarked(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], walk: Recording
+) -> None:
+    few = {name: values[::5] for name, values in columns.items()}
+    found = import_gait([csv_of(few, walk.time[::5])], ImportSettings(62.0))
+    (said,) = (line for line in found.remarks if "samples a second" in line)
+    assert said.endswith("40 samples a second; heel strikes and toe-offs are known to about 12 ms")
+    noise = np.random.default_rng(4).normal(0.0, 0.025, columns[FORCE].size)
+    found = import_gait([csv_of({**columns, FORCE: columns[FORCE] - 0.025 + noise})], ImportSettings(62.0))
+    assert any("the vertical force scatters by 0.0" in line for line in found.remarks)
+
+
+def test_a_moment_that_hardly_shows_its_sign_is_remarked() -> None:
+    curve = np.sin(np.linspace(0.0, 2.0 * np.pi, 101))
+    assert moment_remarks(np.maximum(curve, -0.1)) == []
+    (said,) = moment_remarks(np.maximum(curve, -0.8))
+    assert "1 N m/kg into plantarflexion and 0.8 N m/kg into dorsiflexion" in said
+
+
+def test_a_walker_who_turns_within_the_record_is_remarked(opensim_files: dict[str, Path]) -> None:
+    top, _, body = opensim_files["ik"].read_text().partition("endheader\n")
+    labels, *lines = body.splitlines()
+    for degrees, is_said in ((30.0, False), (80.0, True)):
+        turned = np.linspace(-0.5 * degrees, 0.5 * degrees, len(lines))
+        rows = [f"{line}\t{angle!r}\t0.0" for line, angle in zip(lines, turned.tolist(), strict=True)]
+        table = "\n".join([f"{labels}\tpelvis_rotation\tpelvis_tz", *rows])
+        opensim_files["ik"].write_text(f"{top}endheader\n{table}\n")
+        found = import_gait(list(opensim_files.values()), ImportSettings(62.0))
+        assert any("the walker turns by 80 deg within the record" in line for line in found.remarks) is is_said

@@ -20,6 +20,7 @@ from ppafo.gait.plausible import (
     SignSource,
     check_plausible,
     force_remarks,
+    moment_remarks,
     sign_remarks,
     standing_tilt,
     zero_remarks,
@@ -149,8 +150,10 @@ LONGEST_HELD = 0.1
 
 _ABOUT_STANCE = 0.05
 """Of the stride, at either end of the stance, in which a load may rest too."""
-_COARSE = 0.002
+_COARSE = 0.001
 """Fraction of the range; a sensor with coarser steps keeps a value where its curve turns round."""
+_STEPS_OF_REST = 3.0
+"""Smallest steps by which such a sensor may enter and leave a value at which the leg rests."""
 
 
 def without_drop_outs(
@@ -229,12 +232,14 @@ def without_odd_shapes(curves: Mapping[str, CurveStatistics], strides: Strides) 
 
 
 def _by_coarse_steps(values: Floats, first: int, last: int) -> bool:
-    """Tell whether the value changes by the smallest step of a coarse sensor on both sides of a stretch."""
+    """Tell whether the value changes by a few of the smallest steps of a coarse sensor on both sides of a stretch."""
     steps = np.abs(np.diff(values))
     # Rounding makes equal steps of a sensor differ in the last digits.
     smallest = 1.001 * float(np.min(steps[steps > 0.0]))
     beside = [float(steps[place]) for place in (first - 1, last) if 0 <= place < steps.size]
-    return smallest > _COARSE * float(np.nanmax(values) - np.nanmin(values)) and max(beside) <= smallest
+    return (
+        smallest > _COARSE * float(np.nanmax(values) - np.nanmin(values)) and max(beside) <= _STEPS_OF_REST * smallest
+    )
 
 
 REMARKED_SPREAD, REFUSED_SPREAD = 0.1, 0.25
@@ -464,6 +469,8 @@ def _finish(
     said = [*remarks, *_remarks(curves, strides, footfalls.events)]
     said += knee_remarks(source.columns.knee, walk, settings.stature)
     said += sign_remarks(means["shank_angle"], means["ankle_angle"])
+    said += moment_remarks(means["ankle_moment"]) if "ankle_moment" in means else []
+    said += _sampling_remarks(walk, taken)
     tilt = standing_tilt(means["shank_angle"], means["ankle_angle"])
     sign, taken_off = source.columns.ankle_angle.sign_and_neutral()
     # The reading of the file that would be neutral.
@@ -542,6 +549,39 @@ def _gait(
         knee_forward=curves.get("knee_forward"),
         knee_up=curves.get("knee_up"),
     )
+
+
+_COARSE_RATE = 50.0
+"""Samples a second; below it an event is known to no better than a hundredth of a stride."""
+_NOISY_FORCE = 0.02
+"""Body weights, standard deviation in swing; the events are at 0.05 and 0.03."""
+_WITHIN_SWING = 0.1
+"""Of the swing, at either end, in which the foot may still be on the plate, or again."""
+
+
+def _sampling_remarks(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> list[str]:
+    """Return which curves have few samples, and by how much the force scatters while the foot is in the air."""
+    rates: dict[int, list[str]] = {}
+    for name, signal in walk.items():
+        if signal.rate < _COARSE_RATE:
+            rates.setdefault(round(signal.rate), []).append(name)
+    said = [
+        f"{', '.join(names)}: {rate} samples a second; heel strikes and toe-offs are known to about "
+        f"{500.0 / rate:.0f} ms"
+        for rate, names in rates.items()
+    ]
+    force = walk.get("vertical_force")
+    if force is None:
+        return said
+    spans = [(item.toe_off, item.end, _WITHIN_SWING * (item.end - item.toe_off)) for item in strides]
+    swings = [force.values[(force.time > off + slack) & (force.time < end - slack)] for off, end, slack in spans]
+    scatter = max((float(np.std(values)) for values in swings if values.size > 1), default=0.0)
+    if scatter > _NOISY_FORCE:
+        said.append(
+            f"the vertical force scatters by {scatter:.2g} body weights while the foot is in the air: events are found "
+            "at 0.05 and 0.03; a low pass of the plate, or --low-pass, makes them surer"
+        )
+    return said
 
 
 def _remarks(curves: Mapping[str, CurveStatistics], strides: Strides, events: str) -> list[str]:

@@ -226,6 +226,8 @@ THIGH_FRACTION = 0.245
 ed. 2009."""
 
 _LENGTHS = (0.2, 0.7)
+_HIP_HEIGHT = 0.3
+"""Metres; a hip that is further below the origin stands upside down, as no laboratory has its origin above a hip."""
 _FASTEST_BACK = 0.2
 """Metres a second that a walker may lose on a treadmill, over the whole recording."""
 
@@ -260,6 +262,13 @@ def knee_signals(
                     f"{found.table.file}: the hip does not move ({', '.join(terms)} is constant), and without its "
                     "motion that of the knee is unknown; omit the stature, or knee in the gait map"
                 )
+        height = float(np.mean(up[np.isfinite(up)]))
+        if -height > _HIP_HEIGHT:
+            raise DataError(
+                f"{found.table.file}: the hip is {height:.2f} m high ({', '.join(mapped.up)}), below the ground, and "
+                f"{-height:.2f} m with the other sign: its sign is reversed; correct it in the file, or change the "
+                "sign of knee.up in a gait map"
+            )
         forward, up = knee_position(forward, up, lean, _thigh_length(mapped, stature))
     file, time = found.table.file, found.table.time
     columns = tuple(dict.fromkeys(name for _, name in found.terms))

@@ -113,6 +113,8 @@ def _forces(names: Iterable[str], side: Side) -> tuple[tuple[str, ...], tuple[st
     return tuple(own), tuple(other), tuple(numbered)
 
 
+_TURN = 45.0
+"""Degrees; the pelvis of a straight walk turns by 5 to 30 from side to side."""
 _ALONG = np.radians(5.0)
 """Mean rotation of the pelvis up to which a walk counts as one along x."""
 
@@ -130,6 +132,17 @@ def _turned_forward(table: MotionTable) -> MotionTable:
     degree = {name: np.pi / 180.0 if table.units.get(name) == "deg" else 1.0 for name in table.columns}
     rotation = table.columns["pelvis_rotation"] * degree["pelvis_rotation"]
     facing = float(np.arctan2(np.nanmean(np.sin(rotation)), np.nanmean(np.cos(rotation))))
+    seen = rotation[np.isfinite(rotation)]
+    turned = float(np.degrees(np.ptp(np.unwrap(seen)))) if seen.size else 0.0
+    if turned > _TURN:
+        table = replace(
+            table,
+            remarks=(
+                *table.remarks,
+                f"the walker turns by {turned:.0f} deg within the record (pelvis_rotation), and the walk is seen along "
+                "its mean direction: give a straight part with --start and --end",
+            ),
+        )
     if abs(facing) <= _ALONG:
         return table
     cosine, sine = np.cos(facing), np.sin(facing)
