@@ -109,8 +109,6 @@ def _cells(values: Floats, quantity: str, digits: int) -> list[str | None]:
 
 
 def _wearers_data(population: Population) -> dict[str, Any]:
-    configuration = population.scenario
-    # The quantiles of outcomes and traits.
     return {
         "format": WEARERS_FORMAT,
         "schema_version": WEARERS_SCHEMA_VERSION,
@@ -131,12 +129,10 @@ def _wearers_data(population: Population) -> dict[str, Any]:
             "gait": "stride time, stance share and series coefficients by the deviations of the gait",
             "most_deviations": MAXIMUM_DEVIATIONS,
         },
-        **{
-            "outcomes": quantiles(population.outcomes, OUTCOMES),
-            "traits": quantiles(population.traits, TRAITS),
-        },
+        "outcomes": quantiles(population.outcomes, OUTCOMES),
+        "traits": quantiles(population.traits, TRAITS),
         "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
-        "configuration": walk_document(configuration),
+        "configuration": walk_document(population.scenario),
     }
 
 
@@ -144,9 +140,7 @@ def wearers_csv(population: Population) -> bytes:
     """Return one line for each wearer, in SI units."""
     columns = {f"{name} [{item.unit}]": population.traits[name] for name, item in TRAITS.items()}
     columns |= {f"{name} [{item.unit}]": population.outcomes[name] for name, item in OUTCOMES.items()}
-    lines = ["# simulated: a model's own output, not measured", ",".join(columns)]
-    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    return ("\n".join([*lines, *(",".join(map(repr, row)) for row in rows)]) + "\n").encode()
+    return _csv(columns)
 
 
 def quantiles(table: Mapping[str, Floats], numbers: Mapping[str, Number]) -> dict[str, dict[str, object]]:
