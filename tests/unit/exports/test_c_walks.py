@@ -22,6 +22,7 @@ from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
 from ppafo.exports.c_library import c_library, walk_library
 from ppafo.exports.c_library.files import Setting, c_identifier
+from ppafo.exports.c_library.walk_preparation import settings_of_walk
 from ppafo.loading import load_scenario
 from ppafo.simulation.scenario import Scenario, worn_kind
 from ppafo.walking import list_walks, load_walk
@@ -277,3 +278,17 @@ def test_a_setting_that_contradicts_another_is_refused_by_name_and_a_flaw_needs_
         changed[names.index(name)] = value
         assert library.proportional_bad_setting(changed) == said
         assert library.proportional_size(changed) == 0
+
+
+def test_what_is_written_out_in_the_source_is_no_setting() -> None:
+    """A setting that changes nothing would be worse than none: faults of the plant, its shut-off valve, the person."""
+    given = ("faults.valve_1.kind=stuck", "faults.valve_1.time=3 s", "shut_off.area=10 mm^2")
+    paths = [item.path for item in settings_of_walk(load_walk("solenoid", given))]
+    assert "valve.area" in paths
+    assert not [path for path in paths if path.startswith(("faults.", "shut_off.", "wearer.person"))]
+
+
+def test_a_walk_has_its_settings_in_the_order_of_earlier_libraries() -> None:
+    paths = [item.path for item in settings_of_walk(load_walk("solenoid"))]
+    sections = [section for section, _ in itertools.groupby(paths, key=lambda path: path.partition(".")[0])]
+    assert sections[sections.index("valve") :] == ["valve", "run", "wearer", "controller", "sensors"]

@@ -113,13 +113,15 @@ def _numbers(configuration: Scenario) -> dict[str, tuple[Quantity, float]]:
             **{f"sensors.{item.name}": item for item in WALK_SENSORS},
         }
     )
-    # The structures of libraries have the times behind the device. Persons are drawn in Python.
+    # What fails of the plant, with its shut-off valve, is written out in the source; persons are drawn in Python.
+    fixed = ("shut_off.", *(f"faults.{part}." for part in walk_of(configuration).broken), f"wearer.{PERSON.name}")
+    # The structures of libraries have the times behind the device.
     wearer = (f"wearer.{item.name}" for item in WEARER)
     paths = dict.fromkeys((*device_numbers(configuration.device), *of_run, *wearer, *times, *control, *declared))
     return {
         path: (declared[path], times[path] if path in times else number_at(configuration, path))
         for path in paths
-        if path in declared and path != f"wearer.{PERSON.name}"
+        if path in declared and not path.startswith(fixed)
     }
 
 
