@@ -76,7 +76,7 @@ def test_the_new_set_is_a_device_whose_values_name_both_recordings(folder: Path)
 
 
 def test_the_output_on_the_page_is_that_of_the_command(folder: Path) -> None:
-    (shown,) = re.findall(r"```text\n(.*?)```", PAGE, re.DOTALL)
+    shown = re.findall(r"```text\n(.*?)```", PAGE, re.DOTALL)[0]
     printed = (folder / "identified" / "identify.txt").read_text()
 
     def words(text: str) -> list[str]:
