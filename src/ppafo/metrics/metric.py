@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.errors import DataError, nearest_name
 from ppafo.model.columns import choose
 from ppafo.signals import Recording
 from ppafo.signals.meter import SAME_LEVEL, MeterKind
@@ -26,6 +27,16 @@ class Metric:
     value: float
     unit: str
     summary: str
+
+
+class Metrics(dict[str, Metric]):
+    """Metrics by name; a name that is not there is answered with the nearest one."""
+
+    def __missing__(self, name: str) -> Metric:
+        """Refuse a name. DataError with the nearest one, as for a channel of a recording."""
+        raise DataError(
+            f"there is no metric '{name}'{nearest_name(name, self)}; available: {', '.join(self) or 'none'}"
+        )
 
 
 @dataclass(frozen=True, slots=True)

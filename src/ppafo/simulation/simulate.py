@@ -19,7 +19,7 @@ from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_to
 from ppafo.engine.scheme.actuators import pressures_of, torque_of, volumes_of
 from ppafo.errors import SimulationError
 from ppafo.metrics import evaluate
-from ppafo.metrics.metric import Metric
+from ppafo.metrics.metric import Metric, Metrics
 from ppafo.model.gait import foot_in_gait
 from ppafo.model.gas import energy_per_content
 from ppafo.model.leg import torque_on_foot
@@ -198,7 +198,7 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     return Result(
         scenario=scenario,
         recording=recording,
-        metrics=metrics,
+        metrics=Metrics(metrics),
         status=status,
         versions={"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
         engine={"step": run.step, "steps": run.step_count, "steps_per_sample": run.steps_per_sample},

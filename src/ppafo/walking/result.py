@@ -12,7 +12,7 @@ from ppafo.engine.lanes import BatchResult, Floats
 from ppafo.engine.program import LaneResult
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run
 from ppafo.metrics import METRICS, Metric, evaluate
-from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, MetricKind
+from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, MetricKind, Metrics
 from ppafo.model.contact import SWING
 from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix, passive_torque
 from ppafo.model.plant import chamber_pressures
@@ -308,7 +308,7 @@ def _walk_result(
         recording=recording,
         strides=strides,
         averages=averages,
-        metrics=metrics,
+        metrics=Metrics(metrics),
         status=status,
         starts=starts,
         helped=helped,

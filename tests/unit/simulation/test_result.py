@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import ppafo
+from ppafo.errors import DataError
 from ppafo.metrics import Metric
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.scenario import Scenario, plain, scenario_document
@@ -97,3 +99,12 @@ def test_a_plot_of_a_completed_run_has_no_remark_and_one_of_a_diverged_run_has(r
     assert "diverged at t = 0.05 s" not in [text.get_text() for text in result.plot().texts]
     assert "diverged at t = 0.05 s" in [text.get_text() for text in diverged.plot().texts]
     assert not diverged.status.is_completed
+
+
+@pytest.mark.parametrize(("name", "near"), [("switching", "switchings"), ("gas_suplied", "gas_supplied")])
+def test_a_metric_that_is_not_there_is_answered_with_the_nearest(name: str, near: str) -> None:
+    metrics = ppafo.simulate("torque-task-proportional", ["run.duration=0.02 s"]).metrics
+    with pytest.raises(DataError, match=rf"there is no metric '{name}', did you mean '{near}'\?; available: "):
+        metrics[name]
+    assert metrics.get(name) is None
+    assert name not in metrics

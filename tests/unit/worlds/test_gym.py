@@ -254,12 +254,56 @@ def test_what_is_no_number_is_cut_off_at_the_lowest() -> None:
         (TORQUE, {"overrides": ["run.output_interval=1.5 ms"]}, "a whole number of steps"),
         (WALK, {"vary": {"valve.area": ("1 mm^2", "2 mm^2")}}, "draws wearers and gaits"),
         (WALK, {"scenario": "off"}, "has no torque profile"),
+        (TORQUE, {"observations": "scale"}, "'physical' or 'scaled', did you mean 'scaled'?"),
+        (TORQUE, {"frame_skip": 0}, "frame_skip = 0: must be a whole number of samples, at least 1"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(name: str, settings: dict[str, Any], line: str) -> None:
     with pytest.raises(ppafo.PpafoError, match=line.replace("?", r"\?")) as refused:
         one(name, **settings)
     assert "\n" not in str(refused.value)
+
+
+def test_an_action_is_held_for_the_samples_of_a_frame_and_the_last_frame_ends_with_the_episode() -> None:
+    held, each = one(TORQUE, duration=0.022, frame_skip=4), one(TORQUE, duration=0.022)
+    for env in (held, each):
+        env.reset(seed=5)
+    for action in np.random.default_rng(2).uniform(-1.0, 1.0, (5, 1)).astype(np.float32):
+        found = held.step(action)
+        single = [each.step(action) for _ in range(4)]
+        assert found[1] == pytest.approx(sum(step[1] for step in single), rel=1e-12)
+        assert found[0].tolist() == single[-1][0].tolist()
+        assert found[2:] == single[-1][2:]
+    found, single = held.step(action), [each.step(action) for _ in range(2)]
+    assert found[3] is single[-1][3] is True
+    assert found[0].tolist() == single[-1][0].tolist()
+    assert found[1] == pytest.approx(sum(step[1] for step in single), rel=1e-12)
+
+
+def test_scaled_observations_are_the_physical_ones_between_their_bounds() -> None:
+    scaled, plain = one(TORQUE, duration=0.02, observations="scaled"), one(TORQUE, duration=0.02)
+    many = vector(TORQUE, AutoresetMode.DISABLED, 2, duration=0.02, observations="scaled")
+    seen, whole, first = scaled.reset(seed=5)[0], plain.reset(seed=5)[0], many.reset(seed=5)[0]
+    assert np.array_equal(first[0], seen)
+    low, high = plain.observation_space.low, plain.observation_space.high
+    assert seen == pytest.approx(2.0 * (whole - low) / (high - low) - 1.0, abs=1e-6)
+    assert scaled.observation_space == gymnasium.spaces.Box(-1.0, 1.0, whole.shape, np.float32)
+
+
+@pytest.mark.parametrize("name", [TORQUE, ANGLE])
+def test_an_episode_has_a_picture(name: str) -> None:
+    env = one(name, duration=0.02, render_mode="rgb_array")
+    with pytest.raises(SimulationError, match="call reset"):
+        env.render()
+    env.reset(seed=1)
+    first = env.render()
+    for _ in range(20):
+        env.step(np.float32([1.0]))
+    last = env.render()
+    assert first.shape == last.shape == (360, 640, 3)
+    assert first.dtype == np.uint8
+    assert (first != last).any()
+    assert one(name, duration=0.02).render() is None
 
 
 def test_an_action_that_is_no_number_is_refused() -> None:

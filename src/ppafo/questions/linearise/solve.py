@@ -16,7 +16,7 @@ from ppafo.engine.program import Program, python_place
 from ppafo.engine.reference.solver import mode_at_rest, torque_on_vane
 from ppafo.engine.rows import leaf_paths, leaves, numbers, rebuilt
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
-from ppafo.errors import ScenarioError, SimulationError
+from ppafo.errors import ScenarioError, SimulationError, UnitError, refused_as
 from ppafo.model.elementary import TURN, sine_and_cosine_of_turns
 from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
 from ppafo.model.orifice import FlowCurve
@@ -44,6 +44,7 @@ from ppafo.translation.plant_rates import (
     vane_acceleration,
 )
 from ppafo.translation.symbolic import Compare, both_sides, symbolic
+from ppafo.units import parse_quantity
 
 VALVE = "valve_"
 """Begins the names of the states of a valve."""
@@ -395,7 +396,9 @@ DEAF = "no small change of the command changes it (dead band, slew limit, beyond
 def linearise(
     scenario: Scenario | str | Path, at: float | str = EQUILIBRIUM, overrides: Sequence[str] = ()
 ) -> LinearModel:
-    """Return the linear model of a scenario's plant, without controller and sensors, at a time [s] or ``equilibrium``.
+    """Return the linear model of a scenario's plant, without controller and sensors, at a time or ``equilibrium``.
+
+    A time is a number [s] or a text such as ``0.5 s``.
 
     The equilibrium is the steady state whose torque is the last value of the reference, or, where the controller is a
     constant command, whose command is that one; the ankle stands where the run leaves it. Derivatives are exact.
@@ -422,7 +425,8 @@ def linearise(
             "command; set device.valve to one that opens in proportion"
         )
     if at != EQUILIBRIUM and not isinstance(at, Real):
-        raise ScenarioError(f"{chosen.name}: --at '{at}' is neither a time nor '{EQUILIBRIUM}'")
+        with refused_as(ScenarioError, f"{chosen.name}: --at '{at}' is neither a time nor '{EQUILIBRIUM}'", UnitError):
+            at = parse_quantity(str(at), "s")
     point = equilibrium(chosen) if isinstance(at, str) else point_at(chosen, at)
     return _model(chosen, run, point)
 

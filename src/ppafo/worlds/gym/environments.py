@@ -27,6 +27,7 @@ from ppafo.worlds.gym.episodes import (
     scenario_episodes,
     walk_episodes,
 )
+from ppafo.worlds.gym.pictures import picture
 from ppafo.worlds.gym.tasks import BAR, LONGEST_SINCE, TASKS, Task
 
 CONSISTENT = "device.set=ppafo2011-consistent"
@@ -65,6 +66,8 @@ TARGETS = ("40 deg", "110 deg")
 WALKING_TIME = 6.0
 """Length of an episode on a leg that walks [s]."""
 CONTINUOUS, ON_OFF = "continuous", "on_off"
+PHYSICAL, SCALED = "physical", "scaled"
+PICTURE = "rgb_array"
 COMMANDS = 3
 """Of a pair of on/off valves: -1, 0 and 1."""
 LARGEST_RATE, LARGEST_FORCE = 1.0e3, 5.0e3
@@ -90,11 +93,20 @@ class World:
         duration: float | None,
         error_weight: float | None,
         gas_weight: float | None,
+        frame_skip: int,
+        observations: str,
     ) -> None:
         self.task = TASKS[task]
-        if actions not in (CONTINUOUS, ON_OFF):
-            hint = nearest_name(actions, (CONTINUOUS, ON_OFF))
-            raise ScenarioError(f"actions = {actions!r}: must be '{CONTINUOUS}' or '{ON_OFF}'{hint}")
+        for name, given, allowed in (
+            ("actions", actions, (CONTINUOUS, ON_OFF)),
+            ("observations", observations, (PHYSICAL, SCALED)),
+        ):
+            if given not in allowed:
+                hint = nearest_name(given, allowed)
+                raise ScenarioError(f"{name} = {given!r}: must be '{allowed[0]}' or '{allowed[1]}'{hint}")
+        if not (isinstance(frame_skip, int) and frame_skip >= 1):
+            raise ScenarioError(f"frame_skip = {frame_skip!r}: must be a whole number of samples, at least 1")
+        self.frame_skip = frame_skip
         usual, flaws = DEFAULTS[task]
         file, words = (usual, (*flaws, *overrides)) if scenario is None else (scenario, tuple(overrides))
         varied = VARIED.get(task, {}) if vary is None and scenario is None else vary or {}
@@ -117,6 +129,10 @@ class World:
             bounds=bounds,
         )
         self.observation_space = gymnasium.spaces.Box(*bounds.astype(np.float32), dtype=np.float32)
+        self._middle, self._half = 0.5 * (bounds[0] + bounds[1]), 0.5 * (bounds[1] - bounds[0])
+        self.is_scaled = observations == SCALED
+        if self.is_scaled:
+            self.observation_space = gymnasium.spaces.Box(-1.0, 1.0, bounds.shape[1:], np.float32)
         self.is_continuous = actions == CONTINUOUS
         self.action_space: Any = gymnasium.spaces.Discrete(COMMANDS)
         if self.is_continuous:
@@ -126,8 +142,18 @@ class World:
         """Return lanes for some environments."""
         return Environments(self.episodes.program, self.episodes.clock, self.task, count, self.judging)
 
+    def begin(
+        self, lanes: Environments, places: Places, generators: Sequence[np.random.Generator]
+    ) -> tuple[Seen, Floats]:
+        """Draw and begin episodes of some environments; return what is seen of all, and what was drawn."""
+        columns, drawn = self.episodes.draw(generators)
+        return self._shown(lanes.begin(places, columns)), drawn
+
     def take(self, lanes: Environments, actions: Any) -> Seen:
-        """Return what follows from actions; SimulationError for one that is no finite number."""
+        """Return what follows from actions that are held for ``frame_skip`` samples, or to the end of an episode.
+
+        Rewards are added up. SimulationError for an action that is no finite number.
+        """
         given = lanes.actions
         if self.is_continuous:
             given[:] = np.reshape(actions, given.shape)
@@ -137,7 +163,15 @@ class World:
         if not np.isfinite(given).all():
             bad = int(np.flatnonzero(~np.isfinite(given).all(axis=1))[0])
             raise SimulationError(f"the action of environment {bad} is {given[bad]}; it must be finite")
-        return lanes.step()
+        seen = lanes.step()
+        for _ in range(self.frame_skip - 1):
+            seen = seen.then(lanes.step())
+        return self._shown(seen)
+
+    def _shown(self, seen: Seen) -> Seen:
+        if self.is_scaled:
+            seen.observations[:] = np.clip((seen.observations - self._middle) / self._half, -1.0, 1.0)
+        return seen
 
 
 def observed_bounds(task: Task, device: Device) -> Floats:
@@ -170,11 +204,12 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
     to 2 for commands of -1, 0 and 1. ``randomise`` draws each episode: what the parameter set has an interval for,
     what ``vary`` gives lowest and highest values for, by path, the seed of the noise, an angle in ``targets``; or the
     wearer and the gait of a walk. ``duration`` of an episode [s]. The reward of a sample is
-    -(error_weight error^2 period + gas_weight gas), in N m or rad, s and g. ScenarioError or ParameterError for bad
-    input.
+    -(error_weight error^2 period + gas_weight gas), in N m or rad, s and g. An action is held for ``frame_skip``
+    samples, whose rewards are added up. ``observations`` are 'physical', or 'scaled' between -1 and 1. With
+    ``render_mode`` 'rgb_array' an episode can be shown as a picture. ScenarioError or ParameterError for bad input.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - Gymnasium's own declaration
+    metadata: dict[str, Any] = {"render_modes": [PICTURE], "render_fps": 25}  # noqa: RUF012 - Gymnasium's own declaration
 
     def __init__(
         self,
@@ -188,13 +223,32 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         duration: float | None = None,
         error_weight: float | None = None,
         gas_weight: float | None = None,
+        frame_skip: int = 1,
+        observations: str = PHYSICAL,
+        render_mode: str | None = None,
     ) -> None:
+        if render_mode not in (None, PICTURE):
+            raise ScenarioError(f"render_mode = {render_mode!r}: must be '{PICTURE}' or None")
         self.world = World(
-            task, scenario, overrides, actions, randomise, vary, targets, duration, error_weight, gas_weight
+            task,
+            scenario,
+            overrides,
+            actions,
+            randomise,
+            vary,
+            targets,
+            duration,
+            error_weight,
+            gas_weight,
+            frame_skip,
+            observations,
         )
         self.observation_space, self.action_space = self.world.observation_space, self.world.action_space
+        self.render_mode = render_mode
         self._drawn: Floats | None = None
         self._lanes = self.world.lanes(1)
+        self._period = 0.0
+        self._trail: list[tuple[float, float, float]] = []
 
     def reset(
         self,
@@ -204,9 +258,13 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
     ) -> tuple[Observations, dict[str, Any]]:
         """Begin an episode; return what is observed at its start, and nothing else. There are no ``options``."""
         super().reset(seed=seed)
-        columns, drawn = self.world.episodes.draw([self.np_random])
+        seen, drawn = self.world.begin(self._lanes, np.zeros(1, dtype=np.intp), [self.np_random])
         self._drawn = drawn[:, 0]
-        return self._lanes.begin(np.zeros(1, dtype=np.intp), columns).observations[0], {}
+        self._trail = []
+        if self.render_mode is not None:
+            self._period = self.episode().control.period * self.world.frame_skip
+            self._remember(float(seen.errors[0]))
+        return seen.observations[0], {}
 
     def step(self, action: Any) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
         """Return observation, reward, whether the run failed, whether it is over, error and gas [kg] after an action.
@@ -215,6 +273,8 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         """
         seen = self.world.take(self._lanes, action)
         info = {"error": float(seen.errors[0]), "supplied_mass": float(seen.supplied[0])}
+        if self.render_mode is not None:
+            self._remember(info["error"])
         return (
             seen.observations[0],
             float(seen.rewards[0]),
@@ -222,6 +282,18 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
             bool(seen.truncated[0]),
             info,
         )
+
+    def render(self) -> Any:
+        """Return the episode so far as a picture (height, width, 3) of bytes; None without a render mode."""
+        if self.render_mode is None:
+            return None
+        if not self._trail:
+            raise SimulationError("there is no episode yet: call reset")
+        return picture(self._trail, self.world.task.unit, self._period)
+
+    def _remember(self, error: float) -> None:
+        """Keep what a picture shows: time [s], angle [rad] and error."""
+        self._trail.append((len(self._trail) * self._period, self.numbers()["state.angle"], error))
 
     def episode(self) -> Any:
         """Return the scenario of this episode with the numbers that were drawn, or the walk before anything is drawn.
@@ -256,10 +328,23 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         duration: float | None = None,
         error_weight: float | None = None,
         gas_weight: float | None = None,
+        frame_skip: int = 1,
+        observations: str = PHYSICAL,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
     ) -> None:
         self.world = World(
-            task, scenario, overrides, actions, randomise, vary, targets, duration, error_weight, gas_weight
+            task,
+            scenario,
+            overrides,
+            actions,
+            randomise,
+            vary,
+            targets,
+            duration,
+            error_weight,
+            gas_weight,
+            frame_skip,
+            observations,
         )
         self.num_envs = num_envs
         self.autoreset_mode = AutoresetMode(autoreset_mode)
@@ -338,8 +423,7 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
 
     def _begin(self, places: Places) -> Seen:
         drawn = [self._generators[place] for place in places]
-        columns, _ = self.world.episodes.draw([generator for generator in drawn if generator is not None])
-        return self._lanes.begin(places, columns)
+        return self.world.begin(self._lanes, places, [generator for generator in drawn if generator is not None])[0]
 
 
 def _masked(values: Mapping[str, Floats], there: Flags) -> dict[str, Any]:

@@ -206,6 +206,19 @@ class Seen:
     terminated: Flags
     truncated: Flags
 
+    def then(self, later: "Seen") -> "Seen":
+        """Return what two samples show one after the other; an episode that ended with the first stays as it was."""
+        ended = self.terminated | self.truncated
+        pairs = {name: (getattr(self, name), getattr(later, name)) for name in ("errors", "supplied")}
+        chosen = {name: np.where(ended, *pair) for name, pair in pairs.items()}
+        return Seen(
+            observations=np.where(ended[:, None], self.observations, later.observations),
+            rewards=self.rewards + np.where(ended, 0.0, later.rewards),
+            terminated=self.terminated | (later.terminated & ~ended),
+            truncated=self.truncated | (later.truncated & ~ended),
+            **chosen,
+        )
+
 
 def episode_program(batch: Batch) -> tuple[Program, Clock]:
     """Program and clock of a run whose commands come from outside; ScenarioError for samples inside a step."""

@@ -218,7 +218,8 @@ def test_a_closed_spool_is_taken_to_open_to_chamber_1_too() -> None:
 
 
 def test_a_time_is_taken_to_the_nearest_step_before_the_first_one_too() -> None:
-    assert [linearise(TASK, at).time for at in (1e-9, 4e-4, 6e-4, 3.0)] == [0.0, 0.0, 1e-3, 3.0]
+    times = (1e-9, 4e-4, 6e-4, 3.0, "0.5 s", "600 ms")
+    assert [linearise(TASK, at).time for at in times] == [0.0, 0.0, 1e-3, 3.0, 0.5, 0.6]
 
 
 def test_what_python_hands_over_wrongly_is_refused_in_one_line(steady: LinearModel) -> None:
