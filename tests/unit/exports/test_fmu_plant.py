@@ -57,6 +57,20 @@ def driven(instance: Instance, recording: Recording, channels: tuple[str, ...], 
     return largest
 
 
+@pytest.mark.parametrize("which", ["free", "moved"])
+def test_tools_may_show_units_of_the_bench_and_know_the_limits_of_the_command(
+    which: str, request: pytest.FixtureRequest
+) -> None:
+    described = fmpy.read_model_description(request.getfixturevalue(which))
+    factors = {unit.name: unit.displayUnits[0] for unit in described.unitDefinitions if unit.displayUnits}
+    shown = {item.name: item for item in described.modelVariables}
+    for name, unit, one in (("pressure_1", "psi", 6894.757293), ("angle", "deg", math.radians(1.0))):
+        assert shown[name].displayUnit == unit
+        kind = factors[shown[name].unit]
+        assert (kind.name, float(kind.factor) * one) == (unit, pytest.approx(1.0, rel=1e-9))
+    assert (float(shown["command"].min), float(shown["command"].max)) == (-1.0, 1.0)
+
+
 def test_under_the_commands_of_a_closed_loop_a_free_vane_moves_with_its_bits(free: str) -> None:
     recording = simulate(*FREE).recording
     assert np.ptp(recording["angle"]) > 0.5

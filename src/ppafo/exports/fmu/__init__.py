@@ -271,9 +271,14 @@ def _archive(contents: Mapping[str, bytes]) -> bytes:
     return target.getvalue()
 
 
-COMMAND = Input("command", "-", "command to the valve, clipped to -1 to 1; above 0 feeds chamber 1", 0.0)
+COMMAND = Input("command", "-", "command to the valve, clipped to -1 to 1; above 0 feeds chamber 1", 0.0, -1.0, 1.0)
 WALKING_COMMAND = Input(
-    "command", "-", "command to the valve, clipped to -1 to 2; above 0 feeds chamber 1, above 1.5 vents both", VENT
+    "command",
+    "-",
+    "command to the valve, clipped to -1 to 2; above 0 feeds chamber 1, above 1.5 vents both",
+    VENT,
+    -1.0,
+    VENT,
 )
 PLANT_TIME = (
     "Inputs are taken at the beginning of a communication step. It is a multiple of <code>run.step</code>; the engine "

@@ -6,7 +6,7 @@ from typing import Any
 from xml.etree import ElementTree as Xml
 
 from ppafo.exports.c_library.files import OUTPUTS, Library, Setting
-from ppafo.units import dimension
+from ppafo.units import base_value, dimension
 from ppafo.version import __version__
 
 FIXED_SECTIONS = ("run", "initial", "gas", "actuator", "foot_plate", "wearer", "motion", "motion.profile")
@@ -39,12 +39,14 @@ class Variable:
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """What a unit is given at each step: name, unit, meaning and first value."""
+    """What a unit is given at each step: name, unit, meaning, first value and limits, None for none."""
 
     name: str
     unit: str
     summary: str
     start: float
+    minimum: float | None = None
+    maximum: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +110,17 @@ def variables_of(interface: Interface) -> tuple[Variable, ...]:
             for place, kind in enumerate(library.program.metrics if interface.shows_metrics else ())
         ),
         *(
-            Variable(item.name, first_input + place, item.unit, item.summary, "input", "continuous", item.start)
+            Variable(
+                item.name,
+                first_input + place,
+                item.unit,
+                item.summary,
+                "input",
+                "continuous",
+                item.start,
+                item.minimum,
+                item.maximum,
+            )
             for place, item in enumerate(interface.inputs)
         ),
     )
@@ -127,6 +139,16 @@ BASE_UNITS = {
     "[substance]": "mol",
     "[angle]": "rad",
 }
+DISPLAY_UNITS = {
+    "Pa": "psi",
+    "kg": "g",
+    "m^2": "mm^2",
+    "m^3": "cm^3",
+    "m^3/rad": "cm^3/rad",
+    "rad": "deg",
+    "rad/s": "deg/s",
+}
+"""What a tool shows in place of an SI unit, whose values it exchanges: units of the bench, as in the files of ppafo."""
 TOOL = f"ppafo {__version__}"
 
 
@@ -242,6 +264,8 @@ def _real(item: Variable) -> dict[str, str]:
     limits = {"min": item.minimum, "max": item.maximum, "start": item.start}
     unit = _shown(item.unit)
     found = {"unit": unit} if unit else {}
+    if unit in DISPLAY_UNITS:
+        found["displayUnit"] = DISPLAY_UNITS[unit]
     return found | {name: repr(float(value)) for name, value in limits.items() if value is not None}
 
 
@@ -255,7 +279,11 @@ def _units(root: Xml.Element, variables: Iterable[Variable]) -> None:
     table = Xml.SubElement(root, "UnitDefinitions")
     for name in sorted({_shown(item.unit) for item in variables} - {""}):
         exponents = {BASE_UNITS[base]: str(power) for base, power in dimension(name).items()}
-        Xml.SubElement(Xml.SubElement(table, "Unit", name=name), "BaseUnit", exponents)
+        unit = Xml.SubElement(table, "Unit", name=name)
+        Xml.SubElement(unit, "BaseUnit", exponents)
+        if name in DISPLAY_UNITS:
+            factor = 1.0 / base_value(1.0, DISPLAY_UNITS[name]) * base_value(1.0, name)
+            Xml.SubElement(unit, "DisplayUnit", name=DISPLAY_UNITS[name], factor=repr(factor))
 
 
 def _truth(value: bool) -> str:
