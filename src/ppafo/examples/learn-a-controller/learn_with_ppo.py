@@ -100,6 +100,9 @@ def main(steps: int, blocks: int, seed: int) -> None:
     counts, _, errors = np.array(rows).T
     axes.semilogy(counts / 1000, errors, "o-", color="#0072B2", label="PPO")
     axes.axhline(pid, color="#6e6e6e", linestyle="--", label="PID controller with the paper's gains")
+    ticks = (0.1, 0.2, 0.5, 1.0, 2.0)
+    axes.set_yticks(ticks, labels=[f"{tick:g}" for tick in ticks])
+    axes.minorticks_off()
     axes.set_xlabel("Decisions (thousands)")
     axes.set_ylabel("RMS error (N m)")
     axes.set_title("Following a torque on random devices (simulated)", loc="left")
