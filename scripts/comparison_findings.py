@@ -1,6 +1,6 @@
 """Every number of docs/what-the-comparison-shows.md, and its figure.
 
-    python scripts/comparison_findings.py [--draws 262144] [--figure docs/images/comparison.png]
+    python scripts/comparison_findings.py [--draws 40960] [--only SECTION] [--figure docs/images/comparison.png]
 
 Needs the extra ``optimal`` for the bound of the proportional valve, and takes some minutes.
 """
@@ -263,10 +263,12 @@ def draw(family: Family, file: str) -> None:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print every number, section by section, and draw the figure."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("--draws", type=int, default=262_144, help="completions; default 262144")
+    parser.add_argument("--draws", type=int, default=40_960, help="completions; default 40960")
+    parser.add_argument("--only", default="", help="beginning of the title of the one section that is wanted")
     parser.add_argument("--figure", default="docs/images/comparison.png", help="where the figure is written")
     chosen = parser.parse_args(arguments)
     family = infer_settings(chosen.draws)
+    draw(family, chosen.figure)
     for title, lines in (
         ("Where 15 % comes from", where_it_comes_from()),
         ("Law and valve", (line for level in (6.0, 4.0) for line in law_and_valve(level))),
@@ -276,11 +278,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
         ("Improved control", improved_control(family)),
         ("For a builder", for_a_builder()),
     ):
-        print(f"{title}\n")
+        if chosen.only and not title.startswith(chosen.only):
+            continue
+        print(f"{title}\n", flush=True)
         for line in lines:
             print(f"    {line}", flush=True)
         print()
-    draw(family, chosen.figure)
 
 
 if __name__ == "__main__":

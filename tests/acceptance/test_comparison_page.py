@@ -2,7 +2,10 @@
 
 from pathlib import Path
 
-from scripts.comparison_findings import figure_7, where_it_comes_from
+import pytest
+
+from ppafo.questions.unreported.solve import infer_settings
+from scripts.comparison_findings import figure_7, what_is_open, where_it_comes_from
 
 PAGE = (Path(__file__).parents[2] / "docs" / "what-the-comparison-shows.md").read_text(encoding="utf-8")
 
@@ -15,3 +18,8 @@ def test_the_page_shows_what_one_change_at_a_time_gives() -> None:
 
 def test_the_page_shows_what_each_set_gives_of_figure_7() -> None:
     assert [line for line in figure_7() if f"    {line}\n" not in PAGE] == []
+
+
+@pytest.mark.long
+def test_the_page_shows_what_the_evidence_leaves_open() -> None:
+    assert [line for line in what_is_open(infer_settings(40_960)) if f"    {line}\n" not in PAGE] == []

@@ -20,7 +20,7 @@ LIKELIEST = 128
 """Completions that are run with other laws, and whose step responses are compared with the rig's."""
 WITHOUT_RANGE = {
     "beyond_improved_control": "no range here: the search for the best decisions takes seconds for each completion; "
-    "docs/what-the-comparison-shows.md has it over some of them",
+    "'python scripts/comparison_findings.py' makes it for some of them",
     "large_and_heavy": "no range: there is no number",
 }
 WEIGHED = "completions that agree with the other evidence"
