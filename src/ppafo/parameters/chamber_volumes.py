@@ -34,6 +34,13 @@ class ChamberVolumes:
         volumes = {name: getattr(self, name) for name in _FIELDS}
         return replace(device, actuator=replace(device.actuator, **volumes))
 
+    def overrides(self) -> tuple[str, ...]:
+        """Return the same as overrides, which whatever is set by the chambers follows."""
+        units = ("m^3/rad", "m^3", "m^3")
+        return tuple(
+            f"actuator.{name}={getattr(self, name)!r} {unit}" for name, unit in zip(_FIELDS, units, strict=True)
+        )
+
     def fits(self, actuator: Actuator) -> bool:
         """Tell whether an actuator has these chambers."""
         return all(math.isclose(getattr(self, name), getattr(actuator, name), rel_tol=_SAME) for name in _FIELDS)

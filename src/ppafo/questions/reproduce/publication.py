@@ -65,8 +65,7 @@ def _pressure(values: Values) -> float:
 @lru_cache(maxsize=16)
 def _walked(name: str, chambers: ChamberVolumes, overrides: tuple[str, ...]) -> WalkResult:
     """Return a shipped walk with some chambers; SimulationError where it does not reach its end with help."""
-    configuration = load_walk(name, overrides)
-    result = walk(replace(configuration, device=chambers.of(configuration.device)), MINUTES)
+    result = walk(load_walk(name, (*overrides, *chambers.overrides())), MINUTES)
     if not (result.status.is_completed and result.is_helped):
         raise SimulationError(f"{name}: {result.status.message}; the claims need a walk with help in most strides")
     return result
@@ -127,12 +126,12 @@ def recycling_work(values: Values) -> float:
 def event_reduction(wearer: str, values: Values) -> float:
     """Share [-] by which state estimation lowers the error of event times of one wearer, against thresholds."""
     configuration = load_walk(PAIR, WEARERS[wearer])
-    device = _chambers(values).of(configuration.device)
+    chambers = _chambers(values).overrides()
     course = uneven_course(2.0 / walk_of(configuration).gait.stride_time)
     errors = []
     for timing in ("thresholds", "estimated"):
-        walked = load_walk(PAIR, (*WEARERS[wearer], f"timing.kind={timing}"))
-        walked = replace(walked, device=device, motion=replace(walk_of(walked), course=course))
+        walked = load_walk(PAIR, (*WEARERS[wearer], f"timing.kind={timing}", *chambers))
+        walked = replace(walked, motion=replace(walk_of(walked), course=course))
         errors.append(rms_of([event.errors for event in timed_events(walked, 1.0).values()]))
     return 1.0 - errors[1] / errors[0]
 
