@@ -29,6 +29,7 @@ from ppafo.questions.walk.course import (
     course_sections,
     trust_remark,
 )
+from ppafo.questions.walk.risks import Risks, risks_of_walk
 from ppafo.questions.walk.volumes import (
     VolumeReading,
     volumes_data,
@@ -500,19 +501,23 @@ def walk_with_and_without(
     wearers: int | None = None,
     seed: int = 1,
     overrides: Sequence[str] = (),
+    risks: bool = False,
     progress: Report | None = None,
-) -> WalkPair | Wearers:
+) -> WalkPair | Wearers | Risks:
     """Walk with the device, with it switched off, and beside the healthy gait; or let many wearers walk with it.
 
     ``configuration`` is a walk file, its name or a loaded one; ``minutes`` the length of the walk [min], one or
     that of its course unless given; ``gait``, ``course`` and ``bottle`` stand in place of those of the configuration;
-    ``wearers`` the number of different wearers, drawn with ``seed``. ScenarioError for bad input; a walk that diverges
+    ``wearers`` the number of different wearers, drawn with ``seed``. With ``risks`` faults begin in the walk, and the
+    answer is a table of what they do. ScenarioError for bad input; a walk that diverges
     is an answer that has not passed.
     """
     chosen = configuration
     if not isinstance(chosen, Scenario):
         chosen = load_walk(chosen, overrides, gait, course, bottle)
     report = progress or report_nothing
+    if risks:
+        return risks_of_walk(chosen)
     if wearers is not None:
         advance = _reporter(report, "walking", "wearers", 0.0)
         return Wearers(*wearers_by_volume(chosen, minutes, wearers, seed, advance))

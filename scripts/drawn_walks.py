@@ -1,0 +1,237 @@
+"""Walks by chance: courses, speeds, wearers and devices are drawn, and what must hold of all of them is counted.
+
+    python scripts/drawn_walks.py --courses 1000 --seed 32
+    python scripts/drawn_walks.py --faults 60 --seed 32
+
+The first prints for each valve how many walks without a fault stop, pause to their end, or press against the wearer.
+The second draws faults of the plant with a shut-off valve fitted, and prints how soon each is found, by which sign, and
+what is left on the wearer half a second later. The controller believes in the nominal device, whatever device is drawn.
+They print tables of docs/walking-faults.md; all of it is simulated.
+"""
+
+import argparse
+import tempfile
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ppafo.control.walking.signs import PAUSED, STOPPED
+from ppafo.errors import ScenarioError
+from ppafo.model import contact as ground
+from ppafo.model.plant_faults import PLANT_FAULTS
+from ppafo.parameters.device import Orifice
+from ppafo.simulation.numbers import with_numbers
+from ppafo.simulation.scenario import Scenario
+from ppafo.walking.loading import load_walk
+from ppafo.walking.motion import walk_of
+from ppafo.walking.result import WalkResult
+from ppafo.walking.walk import walk
+
+VALVES = ("solenoid", "proportional")
+ON_HEEL, ON_TOES, AT_REST, AFTER = 0.5, 1.0, 0.5, 2.0
+"""Most torque [N m]: plantarflexion on a loaded heel, dorsiflexion on the toes, on who stands, and after a fault."""
+
+SETTLED, SHUT_OFF = 0.5, "shut_off.area=10 mm^2"
+"""Time after an alarm [s] from which its torque counts, and the valve that is then in the line."""
+
+LASTING = 0.06
+"""A torque counts that lasts this long [s]: a foot that comes down needs as long to empty a chamber."""
+
+
+STANDS = 0.5
+"""Who has stood still for so long [s] is not helped."""
+
+WITHOUT = (
+    "| Valve | Walks | Stops | Paused to the end | Pressed down on the heel | Lifted on the toes | On who stands |"
+)
+WITH = "| Fault | Valve | Within two strides | Last (strides) | Signs | N m after it is found | N m where it is not |"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one walk came to: stops, a pause to its end, peak torques [N m], strides to the first sign, its name."""
+
+    stopped: bool
+    paused: bool
+    on_heel: float
+    on_toes: float
+    at_rest: float
+    found: float
+    sign: str
+    after: float
+
+
+def drawn_course(draws: np.random.Generator) -> str:
+    """The text of a course: level walking, stairs, changes of speed, stumbles, scuffs, stops and sitting."""
+    parts, walks = ["stand"], False
+    for _ in range(int(draws.integers(3, 7))):
+        kinds = ["walk", "walk", "stairs", "ramp", *(["stumble", "scuff", "stop"] if walks else []), "rest"]
+        parts.append(str(draws.choice(kinds)))
+        walks = parts[-1] in ("walk", "stairs", "ramp", "stumble", "scuff")
+    parts += ["walk"]
+    lines = ["schema_version = 1", 'name = "drawn"']
+    for kind in parts:
+        lines += ["", "[[segment]]", f'kind = "{kind}"', *_values(kind, draws)]
+    return "\n".join(lines) + "\n"
+
+
+def _values(kind: str, draws: np.random.Generator) -> Iterator[str]:
+    if kind in ("walk", "ramp", "stairs"):
+        fastest = 1.0 if kind == "stairs" else 1.6
+        yield f'speed = "{draws.uniform(0.4, fastest):.3f} m/s"'
+        yield f"strides = {int(draws.integers(2, 8))}"
+    elif kind in ("stand", "rest"):
+        yield f'duration = "{draws.uniform(1.0, 5.0):.2f} s"'
+    elif kind == "stumble":
+        yield f"time = {draws.uniform(0.65, 1.5):.3f}"
+        yield f"length = {draws.uniform(0.3, 1.3):.3f}"
+
+
+def drawn_device(base: Scenario, draws: np.random.Generator) -> dict[str, float]:
+    """Numbers of a device beside the nominal one, which the controller goes on to believe in."""
+    device, orifice, leak = base.device, base.device.valve.orifice, base.device.actuator.leak
+    assert isinstance(orifice, Orifice), "both valves of the package have an area"
+    assert isinstance(leak, Orifice), "and so has the leak"
+    supply = device.supply.atmospheric_pressure + draws.uniform(0.95, 1.05) * (
+        device.supply.pressure - device.supply.atmospheric_pressure
+    )
+    believed = {f"controller.{name}": value for name, value in base.control.settings.items() if name[:8] == "nominal_"}
+    return believed | {
+        "supply.pressure": supply,
+        "supply.dorsiflexion_pressure": supply,
+        "actuator.volume_per_angle": draws.uniform(0.8, 1.2) * device.actuator.volume_per_angle,
+        "actuator.dead_volume_1": 2.0 ** draws.uniform(-1.0, 1.0) * device.actuator.dead_volume_1,
+        "actuator.dead_volume_2": 2.0 ** draws.uniform(-1.0, 1.0) * device.actuator.dead_volume_2,
+        "valve.area": draws.uniform(0.9, 1.1) * orifice.area,
+        "actuator.leak.area": 3.0 ** draws.uniform(-1.0, 1.0) * leak.area,
+    }
+
+
+def drawn_walk(valve: str, draws: np.random.Generator, folder: Path, overrides: Iterable[str] = ()) -> Scenario:
+    """A walk with a drawn course, wearer and device; drawn again where no such gait can walk the course."""
+    while True:
+        file = folder / "drawn.toml"
+        file.write_text(drawn_course(draws))
+        sensors = [
+            f"faults.{sensor}.{name}={value}"
+            for sensor, offset in (
+                ("angle", f"{draws.uniform(-2.0, 2.0):.3f} deg"),
+                ("pressure_1", f"{draws.uniform(-0.5, 0.5):.3f} psi_d"),
+                ("pressure_2", f"{draws.uniform(-0.5, 0.5):.3f} psi_d"),
+            )
+            for name, value in (("kind", "distorted"), ("time", "0 s"), ("offset", offset))
+        ]
+        person = f"wearer.person={int(draws.integers(1, 100_000))}"
+        try:
+            base = load_walk(valve, [person, *sensors, *overrides], course=file)
+        except ScenarioError:
+            continue
+        return with_numbers(base, drawn_device(base, draws))
+
+
+def lasting_peak(torque: np.ndarray, where: np.ndarray, time: np.ndarray) -> float:
+    """The largest torque [N m] that is reached for ``LASTING`` on end in some samples; 0 where never."""
+    count = max(1, round(LASTING / float(time[1] - time[0])))
+    kept = np.where(where, torque, 0.0)
+    if kept.size < count:
+        return 0.0
+    least = np.lib.stride_tricks.sliding_window_view(kept, count).min(axis=1)
+    return float(max(least.max(), 0.0))
+
+
+def outcome(result: WalkResult, begins: float = np.inf) -> Outcome:
+    """What a walk came to; ``begins`` [s] is when a fault began."""
+    data, time = result.recording, result.recording.time
+    torque, contact, level, shank = data["torque"], data["contact"], data["safe_state"], data["shank_angle"]
+    heel = (contact == ground.HEEL) | (contact == ground.FLAT)
+    still = (contact == ground.FLAT) & (np.abs(np.gradient(shank, time)) < 1.0e-3)
+    held = np.cumsum(still) - np.maximum.accumulate(np.where(still, 0, np.cumsum(still)))
+    still = held * (time[1] - time[0]) > STANDS
+    event = next((item for item in result.events if item.sign is not None and item.time >= begins), None)
+    stride = walk_of(result.scenario).gait.stride_time
+    against = np.where(contact == ground.TOE, -torque, torque)
+    late = time > (event.time + SETTLED if event is not None else min(begins, 1.0e9))
+    return Outcome(
+        stopped=bool((level >= STOPPED).any()),
+        paused=bool(level[-1] == PAUSED),
+        on_heel=lasting_peak(torque, heel, time),
+        on_toes=lasting_peak(-torque, contact == ground.TOE, time),
+        at_rest=lasting_peak(np.abs(torque), still, time),
+        found=np.inf if event is None else (event.time - begins) / stride,
+        sign="-" if event is None or event.sign is None else event.sign.name,
+        after=lasting_peak(against, late, time) if np.isfinite(begins) else 0.0,
+    )
+
+
+def without_faults(valve: str, count: int, seed: int) -> list[Outcome]:
+    """Outcomes of drawn walks without any fault."""
+    draws, found = np.random.default_rng([seed, VALVES.index(valve)]), []
+    with tempfile.TemporaryDirectory() as folder:
+        found += [outcome(walk(drawn_walk(valve, draws, Path(folder)))) for _ in range(count)]
+    return found
+
+
+def with_fault(valve: str, part: str, kind: str, count: int, seed: int) -> list[Outcome]:
+    """Outcomes of drawn level walks in which a part fails at a drawn time, with a shut-off valve in the line."""
+    draws, found = np.random.default_rng([seed, VALVES.index(valve), *map(ord, part + kind)]), []
+    for _ in range(count):
+        begins = float(draws.uniform(3.0, 4.1))
+        given = [f"faults.{part}.kind={kind}", f"faults.{part}.time={begins!r} s", SHUT_OFF]
+        base = load_walk(valve, [f"wearer.person={int(draws.integers(1, 100_000))}", *given])
+        found.append(outcome(walk(with_numbers(base, drawn_device(base, draws)), 0.17), begins))
+    return found
+
+
+def row_without(valve: str, found: list[Outcome]) -> str:
+    """One row of the table of walks without a fault."""
+    above = [
+        sum(item.on_heel > ON_HEEL for item in found),
+        sum(item.on_toes > ON_TOES for item in found),
+        sum(item.at_rest > AT_REST for item in found),
+    ]
+    peaks = [max(getattr(item, name) for item in found) for name in ("on_heel", "on_toes", "at_rest")]
+    cells = [f"{many} (at most {peak:.2f} N m)" for many, peak in zip(above, peaks, strict=True)]
+    stops = Counter(item.sign for item in found if item.stopped)
+    words = "" if not stops else " (" + ", ".join(f"{name} {many}" for name, many in stops.items()) + ")"
+    stopped, paused = f"{sum(item.stopped for item in found)}{words}", str(sum(item.paused for item in found))
+    return f"| {' | '.join((valve, str(len(found)), stopped, paused, *cells))} |"
+
+
+def row_with(valve: str, part: str, kind: str, found: list[Outcome]) -> str:
+    """One row of the table of faults."""
+    times = [item.found for item in found if np.isfinite(item.found)]
+    quick = sum(time <= 2.0 for time in times)
+    names = ", ".join(f"`{name}` {many}" for name, many in Counter(item.sign for item in found).most_common())
+    worst = max((item.after for item in found if np.isfinite(item.found)), default=0.0)
+    missed = max((item.after for item in found if not np.isfinite(item.found)), default=0.0)
+    last = f"{max(times):.2f}" if times else "-"
+    shown = f"{missed:.1f}" if len(times) < len(found) else "-"
+    return f"| {part}: {kind} | {valve} | {quick} of {len(found)} | {last} | {names} | {worst:.1f} | {shown} |"
+
+
+def main() -> None:
+    """Print what is asked for."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--courses", type=int, default=0, help="drawn walks without a fault, of each valve")
+    parser.add_argument("--faults", type=int, default=0, help="drawn walks of each fault and valve")
+    parser.add_argument("--seed", type=int, default=32)
+    given = parser.parse_args()
+    if given.courses:
+        print(f"{WITHOUT}\n|{'---|' * (WITHOUT.count('|') - 1)}")
+        for valve in VALVES:
+            print(row_without(valve, without_faults(valve, given.courses, given.seed)), flush=True)
+    if given.faults:
+        print(f"{WITH}\n|{'---|' * (WITH.count('|') - 1)}")
+        for part, kinds in PLANT_FAULTS.items():
+            for kind in kinds:
+                for valve in VALVES:
+                    print(
+                        row_with(valve, part, kind, with_fault(valve, part, kind, given.faults, given.seed)), flush=True
+                    )
+
+
+if __name__ == "__main__":
+    main()
