@@ -1,5 +1,6 @@
 """What can be wrong with recorded numbers, found in the numbers alone: gaps in time, and sensors at their limit."""
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -14,6 +15,15 @@ GAP_SAMPLES = 10.0
 FEWEST_AT_LIMIT = 20
 """Samples at exactly the same value from which a sensor may be at its limit."""
 
+MINIMUM_SAMPLES = 10
+"""Fewer do not show how large their noise is."""
+
+_SPREAD_OF_MEDIAN = 1.4826
+_KEPT = 3.0
+_SHARE_OF_KEPT = 0.98658
+"""Standard deviation of a normal distribution cut at 3 standard deviations, over that of the whole."""
+_GAIN_OF_DIFFERENCES = math.sqrt(20.0)
+"""Standard deviation of the third difference of white noise over that of the noise."""
 _NOISY_FRACTION = 0.2
 _ABRUPT_FRACTION = 0.3
 _BEFORE = 5
@@ -115,3 +125,16 @@ def _runs_into(values: Floats, plateau: Plateau) -> bool:
         return False
     steps = np.abs(values[_BEFORE:] - values[:-_BEFORE])
     return float(steps[plateau.first - _BEFORE]) > _ABRUPT_FRACTION * float(steps.max())
+
+
+def noise_of(values: Floats) -> float:
+    """Return the standard deviation of white noise [unit of the signal], from third differences that are not unusual.
+
+    What the signal itself does between four samples counts as noise where it is larger; a few jumps do not matter.
+    """
+    if values.size < MINIMUM_SAMPLES:
+        return 0.0
+    differences = np.abs(np.diff(values, n=3))
+    most = _KEPT * _SPREAD_OF_MEDIAN * float(np.median(differences))
+    inner = differences[differences <= most]
+    return float(np.sqrt(np.mean(inner * inner)) / _SHARE_OF_KEPT / _GAIN_OF_DIFFERENCES)

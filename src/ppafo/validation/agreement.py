@@ -11,6 +11,7 @@ import numpy as np
 from ppafo.errors import DataError
 from ppafo.parameters.device import Device
 from ppafo.signals import Recording
+from ppafo.signals.faults import noise_of
 from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded import SUPPLY, regular_interval, with_fixed_volume
 from ppafo.simulation.scenario import Leg
@@ -30,6 +31,8 @@ from ppafo.validation.replay import Motion, Replayed, initial_in_fixed_volume, r
 DEFAULT_LIMIT = 0.02
 """Largest delay [s] that is looked for; sensors, filters and valves are late by less, and a model by more is wrong."""
 
+LEAST_NOISE = 5.0e-4
+"""Noise of samples over the full range that is taken at least: the engine keeps to twice that."""
 _SHIFTS = 81
 _MAXIMUM_SAMPLES = 4000
 _MINIMUM_GAIN = 25.0
@@ -146,14 +149,15 @@ class ChannelAgreement:
     """Errors (model less measured) in one channel, in its SI unit, after the common delay was taken out.
 
     ``rms``, ``bias`` and ``largest`` (with its sign, at ``largest_time`` [s]); ``rms_unaligned`` is the RMS error
-    without any shift; ``delay`` [s] is what this channel alone would have; ``delay_is_at_limit`` says that the
-    search for it ended at its limit, so that it is none of a sensor. ``limit`` is the largest fraction of
-    ``full_range`` that passes.
+    without any shift; ``noise`` is that of its samples; ``delay`` [s] is what this channel alone would have;
+    ``delay_is_at_limit`` says that the search for it ended at its limit, so that it is none of a sensor. ``limit`` is
+    the largest fraction of ``full_range`` that passes.
     """
 
     channel: str
     unit: str
     full_range: float
+    noise: float
     rms: float
     rms_unaligned: float
     bias: float
@@ -167,6 +171,11 @@ class ChannelAgreement:
     def fraction(self) -> float:
         """RMS error over the full range [-]."""
         return self.rms / self.full_range
+
+    @property
+    def in_noise(self) -> float:
+        """RMS error over the noise of the samples [-]: 1 where the model explains all of the course."""
+        return self.rms / self.noise
 
     @property
     def passes(self) -> bool:
@@ -216,6 +225,7 @@ def channel_agreement(item: Comparison, delay: float, longest_delay: float) -> C
         channel=item.channel,
         unit=item.unit,
         full_range=curve.full_range,
+        noise=max(noise_of(curve.values), LEAST_NOISE * curve.full_range),
         rms=_rms(error, weights),
         rms_unaligned=_rms(errors(curve, 0.0), weights),
         bias=float(weights @ error),

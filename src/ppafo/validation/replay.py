@@ -33,7 +33,7 @@ from ppafo.simulation.recorded import (
     with_prescribed_angle,
 )
 from ppafo.simulation.sampled import state_row_numbers
-from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion
+from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, Scenario
 from ppafo.units import parse_quantity
 from ppafo.validation.measured import ANGLE, PRESSURE_1, PRESSURE_2, Measured
 
@@ -65,11 +65,8 @@ def replay_recording(
     run = _plan(measured, device, start, motion, extra, leg)
     if motion == "measured":
         run = with_prescribed_angle(run, start.angle)
-    # The torque on a prescribed vane is what moves it, not an input.
-    followed = [name for name in (SUPPLY, DORSIFLEXION_SUPPLY) if measured.has(name)]
-    followed += [EXTERNAL_TORQUE] if measured.has(EXTERNAL_TORQUE) and motion == "free" else []
-    followed += [ANGLE] if motion == "measured" else []
-    inputs = RecordedInputs(measured.recording, (COMMAND, *followed), float(measured.recording.time[0]))
+    followed = followed_channels(measured, motion)
+    inputs = RecordedInputs(measured.recording, followed, float(measured.recording.time[0]))
     outcome = replay(batch_of(run), step_inputs(inputs, device, run))
     rows = state_row_numbers(run)
     failed = float(outcome.states[rows["result.failure_time"], 0])
@@ -82,15 +79,30 @@ def replay_recording(
     return Replayed(_recording(measured, run, outcome.record[:, :, 0]), run.step, inputs.names)
 
 
-def _plan(measured: Measured, device: Device, start: Start, motion: Motion, extra: float, leg: Leg | None) -> Run:
-    """The run of a vane that is free, held or on a leg; a free one's steps are fine enough for a prescribed one too."""
+def followed_channels(measured: Measured, motion: Motion) -> tuple[str, ...]:
+    """Return the channels that a replay follows; the torque on a prescribed vane is what moves it, not an input."""
+    followed = [name for name in (SUPPLY, DORSIFLEXION_SUPPLY) if measured.has(name)]
+    followed += [EXTERNAL_TORQUE] if measured.has(EXTERNAL_TORQUE) and motion == "free" else []
+    return (COMMAND, *followed, *([ANGLE] if motion == "measured" else []))
+
+
+def replayed_scenario(
+    measured: Measured, device: Device, start: Start, motion: Motion, extra: float, leg: Leg | None
+) -> Scenario:
+    """Return the run of a recording and ``extra`` seconds more: of a vane that is free, held or on a leg."""
     recording = measured.recording
     duration = recording.duration + max(extra, sample_period(recording.time))
     highest = with_highest_supply(device, recording, recording.names)
     given: FreeMotion | PrescribedMotion | None = held_vane(start.angle) if motion == "held" else None
     if motion == "leg":
         given = FreeMotion(start.angle, start.angular_velocity, leg=leg or leg_of_fixture())
-    scenario = replay_scenario(recording, highest, start, duration, measured.file, given)
+    return replay_scenario(recording, highest, start, duration, measured.file, given)
+
+
+def _plan(measured: Measured, device: Device, start: Start, motion: Motion, extra: float, leg: Leg | None) -> Run:
+    """The run of a vane that is free, held or on a leg; a free one's steps are fine enough for a prescribed one too."""
+    scenario = replayed_scenario(measured, device, start, motion, extra, leg)
+    duration = scenario.duration
     run = plan_run(scenario)
     if run.step_count > MAXIMUM_STEPS:
         raise DataError(

@@ -447,7 +447,7 @@ def _of_record(found: WhitenedFit) -> list[Column]:
                 f"zero of {sensor}",
                 f"the zero of {sensor} seems to be off by {{size}}",
                 f"the zero of {sensor} is not off by more than {{size}}",
-                _angle_in_words if is_angle else _pressure_in_words,
+                size_of_angle if is_angle else size_of_pressure,
                 -LARGEST_ZERO[sensor],
                 LARGEST_ZERO[sensor],
                 np.concatenate(zero),
@@ -456,11 +456,13 @@ def _of_record(found: WhitenedFit) -> list[Column]:
     return made
 
 
-def _angle_in_words(size: float) -> str:
+def size_of_angle(size: float) -> str:
+    """Return an angle [rad] in words."""
     return f"{math.degrees(size):.2g} deg"
 
 
-def _pressure_in_words(size: float) -> str:
+def size_of_pressure(size: float) -> str:
+    """Return a difference of pressures [Pa] in words."""
     return f"{1e-3 * size:.2g} kPa"
 
 

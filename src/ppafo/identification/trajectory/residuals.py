@@ -35,7 +35,7 @@ from ppafo.model.catalog import VALVES
 from ppafo.model.columns import at, over_runs
 from ppafo.model.plant import chamber_1_volume, chamber_2_volume, chamber_pressure
 from ppafo.parameters.plant import effect_rows, plant_parameters, switches_of
-from ppafo.signals.faults import is_at_limit, plateaus
+from ppafo.signals.faults import MINIMUM_SAMPLES, is_at_limit, noise_of, plateaus
 from ppafo.simulation.plan import (
     exact_orifice,
     initial_lines,
@@ -55,23 +55,15 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
-MINIMUM_SAMPLES = 10
 FIT_TOLERANCE = 0.02
 """Error that a run of a fit is allowed over that of any other run; columns of differences keep to 1e-3 with it."""
 _FINER = 0.25
 _FITS = 1.0e-6
-_SPREAD_OF_MEDIAN = 1.4826
-_KEPT = 3.0
-_SHARE_OF_KEPT = 0.98658
-"""Standard deviation of a normal distribution cut at 3 standard deviations, over that of the whole."""
 
 _READ_INTERVAL = 5.0e-5
 """Seconds between two records that samples lie in between: a chamber fills within milliseconds ..."""
 _MAXIMUM_RECORDS = 100_000
 """... and more where a recording is so long that memory would run out."""
-
-_GAIN_OF_DIFFERENCES = math.sqrt(20.0)
-"""Standard deviation of the third difference of white noise over that of the noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,19 +176,6 @@ def with_half_steps(prepared: PreparedExperiment, numbers: Mapping[str, float]) 
     scenario = replace(prepared.scenario, time_step=0.5 * prepared.run.step)
     run = plan_run(with_numbers(scenario, numbers))
     return _place_samples(prepared, replace(run, tolerance=_FINER * prepared.run.tolerance))
-
-
-def noise_of(values: Floats) -> float:
-    """Return the standard deviation of white noise [unit of the signal], from third differences that are not unusual.
-
-    What the signal itself does between four samples counts as noise where it is larger; a few jumps do not matter.
-    """
-    if values.size < MINIMUM_SAMPLES:
-        return 0.0
-    differences = np.abs(np.diff(values, n=3))
-    most = _KEPT * _SPREAD_OF_MEDIAN * float(np.median(differences))
-    inner = differences[differences <= most]
-    return float(np.sqrt(np.mean(inner * inner)) / _SHARE_OF_KEPT / _GAIN_OF_DIFFERENCES)
 
 
 def _place_samples(prepared: PreparedExperiment, run: Run) -> PreparedExperiment:

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.display_units import axis_unit, display_unit, display_value, display_values
+from ppafo.answers.display_units import (
+    axis_unit,
+    display_unit,
+    display_value,
+    display_values,
+    quantity_of_unit,
+    quantity_text,
+)
 from ppafo.answers.style import (
     ACTUAL,
     BLACK,
@@ -23,11 +30,14 @@ from ppafo.answers.style import (
     mark_kind,
 )
 from ppafo.errors import DataError, nearest_name, one_line
+from ppafo.identification.trajectory.explanations import Explanation, Explanations, explanations_of
+from ppafo.identification.trajectory.problem import FITTED_CHANNELS, Experiment
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.question import Solved
 from ppafo.signals.recording import Floats
+from ppafo.simulation.recorded import with_fixed_volume
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.foreign import ColumnMap, load_column_map
 from ppafo.validation import ChannelAgreement
@@ -38,8 +48,24 @@ from ppafo.validation.agreement import (
     compare_recording,
     measured_values,
 )
-from ppafo.validation.measured import COMPARED, PRESSURE_1, PRESSURE_2, parse_thresholds, read_measured
-from ppafo.validation.replay import MOTIONS, Motion, parse_initial
+from ppafo.validation.measured import (
+    ANGLE,
+    COMPARED,
+    PRESSURE_1,
+    PRESSURE_2,
+    Measured,
+    parse_thresholds,
+    read_measured,
+)
+from ppafo.validation.replay import (
+    MOTIONS,
+    Motion,
+    followed_channels,
+    initial_in_fixed_volume,
+    parse_initial,
+    replayed_scenario,
+    start_of,
+)
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
@@ -59,11 +85,14 @@ class Validation(Solved):
     overrides: tuple[str, ...]
     settings: ReplaySettings
     recordings: tuple[RecordingAgreement, ...]
+    explanations: Explanations
+    has_limits: bool
 
     @property
     def passes(self) -> bool:
-        """True where every channel of every recording is within its limit."""
-        return all(recording.passes for recording in self.recordings)
+        """True where every error is within its limit and, unless limits were given, no change explains more."""
+        within = all(recording.passes for recording in self.recordings)
+        return within and (self.has_limits or not self.explanations.found)
 
 
 def validate(
@@ -85,8 +114,10 @@ def validate(
     and external torque; ``motion`` is ``free``, ``measured`` (the recorded angle is prescribed) or ``held``. With a
     ``volume`` [m^3] there is no vane and chamber 1 is a fixed volume. ``initial`` are texts such as
     ``pressure_2=0 psi_g`` for channels that were not recorded, ``thresholds`` texts such as ``5%`` or ``angle=2 deg``:
-    the largest RMS errors that pass, of the full range or in a unit, 10 % by default. ``longest_delay`` [s], at most
-    1 s, limits the delay of the measurement that is taken out. ``columns`` is a column map, or ``FILE.toml[:NAME]``.
+    the largest RMS errors that pass, of the full range or in a unit. Without any it is 10 %, and no single change of
+    record, set or model may explain the recordings better than noise of the sensors could. ``longest_delay`` [s], at
+    most 1 s, limits the delay of the measurement that is taken out. ``columns`` is a column map or
+    ``FILE.toml[:NAME]``.
 
     The result has ``passes`` and, in ``recordings``, one ``RecordingAgreement`` each: ``measured`` and ``model`` are
     recordings, their channels of shape (samples,) in SI; ``channels`` has RMS error, bias, largest error and delay [s]
@@ -117,7 +148,47 @@ def validate(
     for measured in read:
         report(Progress(f"replaying {measured.file}"))
         agreements.append(compare_recording(measured, device, settings))
-    return Validation(str(parameter_set), device, tuple(overrides), settings, tuple(agreements))
+    report(Progress("searching what would explain the recordings better"))
+    explanations = _explanations(read, device, settings, agreements)
+    return Validation(
+        str(parameter_set), device, tuple(overrides), settings, tuple(agreements), explanations, bool(thresholds)
+    )
+
+
+def _explanations(
+    read: Sequence[Measured], device: Device, settings: ReplaySettings, agreements: Sequence[RecordingAgreement]
+) -> Explanations:
+    """Return what single change would explain all recordings better than the set does.
+
+    Recordings that were compared in no channel of a fit are left out. Where the vane follows the recorded angle nothing
+    is searched: a delay of the sensors is then one of an input as well.
+    """
+    if settings.motion == "measured":
+        return Explanations((), 0.0, 0)
+    if settings.volume is not None:
+        device = with_fixed_volume(device, settings.volume)
+        settings = replace(settings, motion="held", initial=initial_in_fixed_volume(device, settings.initial))
+    experiments, delays = [], []
+    for number, (measured, agreement) in enumerate(zip(read, agreements, strict=True), start=1):
+        noise = {one.channel: one.noise for one in agreement.channels if one.channel in FITTED_CHANNELS}
+        if not noise or (tuple(noise) == (ANGLE,) and settings.motion == "held"):
+            continue
+        start = start_of(measured, device, settings.initial)
+        experiments.append(
+            Experiment(
+                label=f"{measured.file} ({number})",
+                scenario=replayed_scenario(
+                    measured, device, start, settings.motion, settings.longest_delay, settings.leg
+                ),
+                recording=measured.recording,
+                start=float(measured.recording.time[0]),
+                channels=tuple(noise),
+                noise=noise,
+                inputs=followed_channels(measured, settings.motion),
+            )
+        )
+        delays.append(agreement.delay.correction)
+    return explanations_of(experiments, delays) if experiments else Explanations((), 0.0, 0)
 
 
 def _motion(text: str) -> Motion:
@@ -238,8 +309,13 @@ def _level_in_display_unit(values: Floats, name: str, atmosphere: float) -> Floa
 
 
 _MILLISECONDS = 1.0e3
+_NOISE = 2.0
+"""RMS error over the noise from sample to sample up to which what is left is called noise."""
 _HEAD = tuple(
-    map(Column, ("channel", "RMS error", "of range", "limit", "bias", "largest", "at", "own delay", "verdict"))
+    map(
+        Column,
+        ("channel", "RMS error", "in noise", "of range", "limit", "bias", "largest", "at", "own delay", "verdict"),
+    )
 )
 _UNUSUAL = re.compile(r"[^A-Za-z0-9_.-]+")
 
@@ -257,6 +333,7 @@ def answer_of(validation: Validation) -> Answer:
         title=f"{validation.device.name} against {count} recording{'' if count == 1 else 's'}",
         lead=(verdict(validation), *_departures(validation, sorted(kinds - {"measured"}))),
         sections=(
+            _explained(validation),
             Section(paragraphs=(_method(validation),), is_detail=True),
             *(_section(validation, name, agreement) for name, agreement in pairs),
             (Section("Files", table=Table((), rows), is_detail=True) if rows else Section()),
@@ -271,6 +348,15 @@ def answer_of(validation: Validation) -> Answer:
             "longest_delay": validation.settings.longest_delay,
             "passes": validation.passes,
             "summary": verdict(validation),
+            "explanations": {
+                "tried": validation.explanations.tried,
+                "chance": validation.explanations.limit,
+                "found": [
+                    {"name": one.name, "same": list(one.others), "words": in_words(one), "gain": one.gain}
+                    | {"numbers": {path: number for path, (number, _) in one.numbers.items()}}
+                    for one in validation.explanations.found
+                ],
+            },
             "recordings": [_recording_data(agreement) for agreement in validation.recordings],
             "versions": {"ppafo": __version__},
         },
@@ -289,18 +375,74 @@ def recording_names(files: Sequence[str]) -> list[str]:
 
 
 def verdict(validation: Validation) -> str:
-    """Return in one sentence whether every error is within its limit and, if not, which are not."""
-    count = len(validation.recordings)
+    """Return in one sentence whether the set agrees and, if not, by what it is off and what would explain it."""
+    count, name = len(validation.recordings), validation.device.name
     noun = "recording" if count == 1 else "recordings"
-    if validation.passes:
-        return f"{validation.device.name} agrees with {count} {noun}: every RMS error is within its limit"
+    pairs = [(channel, agreement) for agreement in validation.recordings for channel in agreement.channels]
+    worst = max((channel for channel, _ in pairs), key=lambda one: one.in_noise)
+    size = (
+        f"{worst.channel} is off by {worst.in_noise:.2g} times its noise ({100 * worst.fraction:.2g} % of full range)"
+    )
     failed = [
         f"{channel.channel} in {agreement.file} ({100 * channel.fraction:.3g} %, limit {100 * channel.limit:.3g} %)"
-        for agreement in validation.recordings
-        for channel in agreement.channels
+        for channel, agreement in pairs
         if not channel.passes
     ]
-    return f"{validation.device.name} does not agree: {', '.join(failed)}"
+    found = validation.explanations.found
+    if not validation.passes:
+        which = ", ".join(failed)
+        if not found:
+            return f"{name} does not agree: {which}; {size}"
+        return f"{name} does not agree: {in_words(found[0])}; {size}{f'; beyond the limit: {which}' if failed else ''}"
+    if found:
+        return (
+            f"{name} agrees with {count} {noun} to the limits given: every RMS error is within its limit, but {size}, "
+            f"and {in_words(found[0])}"
+        )
+    is_noise = worst.in_noise < _NOISE
+    why = ", and no single change explains more" if validation.explanations.tried else ""
+    rest = "nothing but noise is left" if is_noise else f"{size}{why}"
+    return f"{name} agrees with {count} {noun}: every RMS error is within its limit; {rest}"
+
+
+def in_words(one: Explanation) -> str:
+    """Return a change in words, one of the set with its value in the unit in which people see it."""
+    values = []
+    for number, unit in one.numbers.values():
+        # An atmosphere in gauge pressure says nothing.
+        is_pressure = unit == "Pa_a"
+        values.append(
+            f"{1e-3 * number:.4g} kPa" if is_pressure else quantity_text(number, quantity_of_unit(unit), ".4g")
+        )
+        if not is_pressure and not quantity_of_unit(unit):
+            values[-1] = f"{values[-1]} {unit}".rstrip()
+    return f"{one.in_words} ({', '.join(values)})" if values else one.in_words
+
+
+def _explained(validation: Validation) -> Section:
+    """Return what would explain the recordings better, with the margin, beside the next best."""
+    found = validation.explanations
+    if not found.tried:
+        return Section()
+    tried = f"{found.tried} single changes of record, set and model were tried"
+    if not found.found:
+        return Section("What would explain more", paragraphs=(f"{tried}: none explains more than noise could.",))
+    alike, rest = found.alike, [one for one in found.found if one not in found.alike]
+    rows = tuple((in_words(one), ", ".join(one.others), f"{one.gain:.3g}") for one in found.found)
+    if len(alike) > 1:
+        margin = f"The first {len(alike)} cannot be told apart for certain: another experiment would."
+    elif rest:
+        margin = f"The first is ahead of the next by {alike[0].gain - rest[0].gain:.3g}."
+    else:
+        margin = "No other comes near."
+    return Section(
+        "What would explain more",
+        paragraphs=(
+            f"{tried}, each with the size that leaves least. Gain: what a change adds to twice the logarithm of the "
+            f"likelihood, with noise of any kind estimated anew; chance makes less than {found.limit:.2g}. {margin}",
+        ),
+        table=Table((Column("change"), Column("the same would do"), Column("gain")), rows),
+    )
 
 
 def _departures(validation: Validation, kinds: Sequence[str]) -> list[str]:
@@ -357,10 +499,11 @@ def replay_sentence(agreement: RecordingAgreement) -> str:
 
 
 def channel_cells(channel: ChannelAgreement) -> tuple[str, ...]:
-    """Return the cells of a row: name, RMS error, share, limit, bias, largest error, its time, delay, verdict."""
+    """Return the cells of a row: name, RMS error, over noise, share, limit, bias, largest, its time, delay, verdict."""
     return (
         channel.channel,
         _error(channel, channel.rms),
+        _number(channel.in_noise),
         f"{_number(100 * channel.fraction)} %",
         f"{_number(100 * channel.limit)} %",
         _error(channel, channel.bias),
@@ -406,6 +549,7 @@ def _channel_data(channel: ChannelAgreement) -> dict[str, Any]:
         "unit": channel.unit,
         "rms": channel.rms,
         "rms_share": channel.fraction,
+        "noise": channel.noise,
         "limit_share": channel.limit,
         "passes": channel.passes,
         "full_range": channel.full_range,

@@ -17,8 +17,9 @@ from ppafo.identification.trajectory.problem import (
     ranges_of,
     with_numbers,
 )
-from ppafo.identification.trajectory.residuals import FIT_TOLERANCE, noise_of, prepare, with_half_steps
+from ppafo.identification.trajectory.residuals import FIT_TOLERANCE, prepare, with_half_steps
 from ppafo.running import simulate
+from ppafo.signals.faults import noise_of
 from ppafo.simulation.scenario import Scenario
 
 INERTIA = FreeParameter("foot_plate.inertia")

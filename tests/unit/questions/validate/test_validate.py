@@ -87,7 +87,7 @@ def test_a_wrong_parameter_and_a_strict_threshold_give_exit_code_1(
 ) -> None:
     step = str(bench / "step.csv")
     assert main([*SET, step, "--set", "valve.area=8 mm^2"]) == 1
-    assert "does not agree: angle in" in capsys.readouterr().out
+    assert "does not agree: valves.proportional.area seems to be 3.9" in capsys.readouterr().out
     assert main([*SET, step, "--threshold", "angle=10%", "--threshold", "pressure_1=0.01 psi_d"]) == 1
     printed = capsys.readouterr().out
     assert "does not agree: pressure_1 in" in printed
