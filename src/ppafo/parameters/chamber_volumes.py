@@ -5,9 +5,9 @@ factor of 3.5 (docs/decisions/0014). Every figure of gas rests on them, so it is
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from ppafo.parameters.device import Actuator, Device
+from ppafo.parameters.device import Actuator
 from ppafo.parameters.loading import load_device
 
 PRINTED_VOLUMES, CONSISTENT_VOLUMES = "ppafo2011", "ppafo2011-consistent"
@@ -29,10 +29,9 @@ class ChamberVolumes:
     dead_volume_1: float
     dead_volume_2: float
 
-    def of(self, device: Device) -> Device:
-        """Return a device with these chambers and nothing else changed."""
-        volumes = {name: getattr(self, name) for name in _FIELDS}
-        return replace(device, actuator=replace(device.actuator, **volumes))
+    def numbers(self) -> dict[str, float]:
+        """Return the same by path, in SI units; what follows the chambers moves too, as what a controller knows of them."""
+        return {f"actuator.{name}": getattr(self, name) for name in _FIELDS}
 
     def overrides(self) -> tuple[str, ...]:
         """Return the same as overrides, which whatever is set by the chambers follows."""

@@ -18,6 +18,7 @@ from ppafo.parameters.chamber_volumes import other_readings
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.loading import scenario_from_dict
+from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario, scenario_document
 from ppafo.simulation.simulate import simulate
 from ppafo.storage.result_folder import RUN_FILE, read_document, read_json, read_recording
@@ -345,7 +346,7 @@ def other_draws(recording: str | Path, step_time: float | None) -> dict[str, Dra
         return {}
     found = {}
     for chambers in other_readings(scenario.device.actuator):
-        result = simulate(replace(scenario, device=chambers.of(scenario.device)))
+        result = simulate(with_numbers(scenario, chambers.numbers()))
         if result.status.is_completed:
             found[chambers.name] = draw_of_recording(result.recording, step_time)
     return found

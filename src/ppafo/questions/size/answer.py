@@ -454,7 +454,7 @@ def _actuator_of(problem: SizingProblem) -> Actuator:
 def _tried(
     problem: SizingProblem, valve: Part, pressure: float, chambers: ChamberVolumes, threads: int | None
 ) -> OtherChambers:
-    scenario = replace(problem.scenario, device=chambers.of(problem.scenario.device))
+    scenario = with_numbers(problem.scenario, chambers.numbers())
     # Without the part, whose printed volume per angle would stand in for that of the reading.
     trial = Trials(replace(problem, scenario=scenario, actuator=None), threads).best(valve, np.array([pressure]))
     error, gas = float(trial.error[0]), float(trial.gas[0])

@@ -24,6 +24,7 @@ from ppafo.model.contact import foot_angle
 from ppafo.model.plant import chamber_mass, chamber_pressures, chamber_volumes
 from ppafo.parameters.device import Device, Orifice
 from ppafo.progress import Progress, Report
+from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
@@ -44,11 +45,11 @@ AS_IT_IS = "timing.kind=thresholds"
 
 @dataclass(frozen=True, slots=True)
 class Factor:
-    """One thing that may contribute: its name, and the walk with it from the overrides and the device without."""
+    """One thing that may contribute: its name, overrides of the walk, numbers by path from the device without it."""
 
     name: str
     overrides: tuple[str, ...]
-    device: Callable[[Device], Device]
+    numbers: Callable[[Device], dict[str, float]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,43 +107,35 @@ class SlapStudy:
         return self.walks[0].falls
 
 
-def larger_valves(device: Device) -> Device:
-    """The device with valves of a larger area."""
+def larger_valves(device: Device) -> dict[str, float]:
+    """Valves of a larger area."""
     orifice = device.valve.orifice
-    larger = (
-        replace(orifice, area=LARGER * orifice.area)
-        if isinstance(orifice, Orifice)
-        else replace(orifice, sonic_conductance=LARGER * orifice.sonic_conductance)
-    )
-    return replace(device, valve=replace(device.valve, orifice=larger))
+    if isinstance(orifice, Orifice):
+        return {"valve.area": LARGER * orifice.area}
+    return {"valve.sonic_conductance": LARGER * orifice.sonic_conductance}
 
 
-def smaller_chambers(device: Device) -> Device:
-    """The device with smaller chambers and the same torque constant."""
-    actuator = device.actuator
-    volumes = {
-        name: getattr(actuator, name) / LARGER for name in ("volume_per_angle", "dead_volume_1", "dead_volume_2")
-    }
-    return replace(device, actuator=replace(actuator, **volumes))
+def smaller_chambers(device: Device) -> dict[str, float]:
+    """Smaller chambers and the same torque constant."""
+    names = ("volume_per_angle", "dead_volume_1", "dead_volume_2")
+    return {f"actuator.{name}": getattr(device.actuator, name) / LARGER for name in names}
 
 
-def higher_pressure(device: Device) -> Device:
-    """The device with more pressure of both supplies."""
-    supply = device.supply
-    pressures = {name: getattr(supply, name) + HIGHER for name in ("pressure", "dorsiflexion_pressure")}
-    return replace(device, supply=replace(supply, **pressures))
+def higher_pressure(device: Device) -> dict[str, float]:
+    """More pressure of both supplies."""
+    return {f"supply.{name}": getattr(device.supply, name) + HIGHER for name in ("pressure", "dorsiflexion_pressure")}
 
 
-def same_device(device: Device) -> Device:
+def no_number(_device: Device) -> dict[str, float]:
     """The device as it is."""
-    return device
+    return {}
 
 
 FACTORS = (
     Factor(f"valves {LARGER:g} times as large", (), larger_valves),
     Factor(f"chambers of 1/{LARGER:g} the volume", (), smaller_chambers),
     Factor("20 psi more pressure", (), higher_pressure),
-    Factor("time in the stride known", ("timing.kind=fractional",), same_device),
+    Factor("time in the stride known", ("timing.kind=fractional",), no_number),
 )
 
 
@@ -189,10 +182,8 @@ def shares_of(values: Mapping[frozenset[str], float], names: Sequence[str]) -> t
 def _with(factors: Sequence[Factor], file: str, overrides: Sequence[str], gait: str | Path | None) -> Scenario:
     timing = tuple(text for factor in factors for text in factor.overrides)
     configuration = load_walk(file, (*overrides, AS_IT_IS, *timing), gait)
-    device = configuration.device
-    for factor in factors:
-        device = factor.device(device)
-    return replace(configuration, device=device)
+    numbers = [factor.numbers(configuration.device) for factor in factors]
+    return with_numbers(configuration, {path: number for some in numbers for path, number in some.items()})
 
 
 def falls_of(configuration: Scenario, strikes: Sequence[Strike]) -> Falls:

@@ -1,7 +1,7 @@
 """The walk, of one wearer or of many, with other readings of the paper's chambers: what each comes to."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from ppafo.parameters.chamber_volumes import ChamberVolumes, other_readings, own
 from ppafo.questions.endurance.answer import Endurance
 from ppafo.questions.endurance.draw import draw_of_numbers, full_chambers, largest_flow, walk_gas
 from ppafo.questions.endurance.solve import WITHOUT_REST, endurance_of_walk, follow_bottle
+from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.bottle import DIVERGED, WALKED
 from ppafo.walking.motion import walk_of
@@ -35,7 +36,7 @@ _HEAD = (
 _ENDED = Column("ended")
 _EXPLAINED = (
     "The paper's torque constant and volume per angle contradict each other by virtual work, so the walk is repeated, "
-    f"for at most {LONGEST:g} min, with other chambers. Controllers keep what they believe of them. With the volume by "
+    f"for at most {LONGEST:g} min, with other chambers, which the observer of the controller knows. With the volume by "
     "virtual work and dead volumes that are as large as the torque task's gas wants, the torque that was published of "
     "walking at 90 psig does not come in time; with short lines it does, and the torque task does not take its "
     "gas. Work of the gas is the integral of (P1 - P2) dV over a stride with help, work at the shaft that of the "
@@ -74,7 +75,7 @@ def walks_by_volume(
     found = [_read(own, result, life)]
     for chambers in others:
         configuration = result.scenario
-        other = walk(replace(configuration, device=chambers.of(configuration.device)), minutes)
+        other = walk(with_numbers(configuration, chambers.numbers()), minutes)
         if other.status.is_completed and other.averages:
             found.append(_read(chambers, other, endurance_of_walk(other) if other.supply is None else None))
     return tuple(found)
@@ -209,7 +210,7 @@ def wearers_by_volume(
     shorter = minutes if walk_of(configuration).course is not None else min(population.minutes, LONGEST)
     found = {own.name: population}
     for chambers in other_readings(actuator):
-        other = replace(configuration, device=chambers.of(configuration.device))
+        other = with_numbers(configuration, chambers.numbers())
         found[chambers.name] = walk_population(other, shorter, min(wearers, LARGEST), seed)
     return population, found
 
