@@ -30,7 +30,7 @@ class ChamberVolumes:
     dead_volume_2: float
 
     def numbers(self) -> dict[str, float]:
-        """Return the same by path, in SI units; what follows the chambers moves too, as what a controller knows of them."""
+        """Return the same by path, in SI units; whatever follows the chambers moves with them."""
         return {f"actuator.{name}": getattr(self, name) for name in _FIELDS}
 
     def overrides(self) -> tuple[str, ...]:
