@@ -10,9 +10,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_SIZE = (9.2, 4.4)
+_SIZE = (9.2, 4.85)
 """Inches; the drawing is in the same units, with the origin at the lower left."""
+_MIDDLE = 2.4
+"""Height of the proportional valve and of the shaft."""
+_BRANCHES = (("plantarflexion", "valve A, 3/2", CHAMBER_1, 3.9), ("dorsiflexion", "valve B, 3/2", CHAMBER_2, 0.9))
+"""Direction, its solenoid valve, colour and height of the two branches of the circuit."""
 _BOX = 0.42
+_SPOOL = 2.95
+"""Left edge of the three positions of the proportional valve."""
+_REGULATED, _TO_ACTUATOR = 2.25, 4.75
+"""Where the lines between regulators and valves, and between valves and actuator, are coupled."""
 
 
 def device_figure() -> "Figure":
@@ -26,7 +34,7 @@ def device_figure() -> "Figure":
         axes.axis("off")
         _supply(axes)
         _valves(axes)
-        _actuator(axes, 6.15, 2.15)
+        _actuator(axes, 6.15, _MIDDLE)
         _leg(axes)
         return figure
 
@@ -76,15 +84,16 @@ def _supply(axes: "Axes") -> None:
     from matplotlib.patches import FancyBboxPatch
 
     axes.add_patch(
-        FancyBboxPatch((0.32, 1.45), 0.46, 1.5, boxstyle="round,pad=0,rounding_size=0.2", fill=False, linewidth=1.3)
+        FancyBboxPatch((0.32, 1.65), 0.46, 1.5, boxstyle="round,pad=0,rounding_size=0.2", fill=False, linewidth=1.3)
     )
-    _line(axes, (0.47, 2.95), (0.47, 3.08), (0.63, 3.08), (0.63, 2.95))
-    _words(axes, 0.55, 2.2, "CO$_2$", size=10.0)
-    _words(axes, 0.55, 1.25, "bottle, 9 oz", GREY)
-    _line(axes, (0.55, 3.08), (0.55, 3.45), (1.25, 3.45))
-    _line(axes, (0.95, 3.45), (0.95, 0.85), (1.25, 0.85))
-    axes.plot([0.95], [3.45], "o", color=BLACK, markersize=4)
-    for y, name, look in ((3.45, "plantarflexion", CHAMBER_1), (0.85, "dorsiflexion", CHAMBER_2)):
+    _line(axes, (0.47, 3.15), (0.47, 3.28), (0.63, 3.28), (0.63, 3.15))
+    _words(axes, 0.55, _MIDDLE, "CO$_2$", size=10.0)
+    _words(axes, 0.55, 1.45, "bottle, 9 oz", GREY)
+    upper, lower = (height for _, _, _, height in _BRANCHES)
+    _line(axes, (0.55, 3.28), (0.55, upper), (1.25, upper))
+    _line(axes, (1.02, upper), (1.02, lower), (1.25, lower))
+    axes.plot([1.02], [upper], "o", color=BLACK, markersize=4)
+    for name, _, look, y in _BRANCHES:
         _box(axes, 1.25, y - 0.5 * _BOX, look.colour)
         _arrow(axes, (1.27, y), (1.25 + _BOX - 0.02, y), look.colour)
         _line(axes, (1.25 + 0.5 * _BOX, y + 0.5 * _BOX), (1.25 + 0.5 * _BOX, y + 0.5 * _BOX + 0.05))
@@ -106,20 +115,21 @@ def _supply(axes: "Axes") -> None:
         )
         _words(axes, 1.46, y + 0.62, "regulator", GREY)
         _words(axes, 1.86, y - 0.25, "$P_s$", look.colour, align="left")
-        _words(axes, 4.85, 2.15 + 0.7 * (y - 2.15) + 0.4 * np.sign(y - 2.15), name, look.colour, align="left")
+        _words(axes, _TO_ACTUATOR + 0.1, y - 0.25 * np.sign(y - _MIDDLE), name, look.colour, align="left")
 
 
 def _valves(axes: "Axes") -> None:
-    """Two 3/2 valves with solenoid and spring, or one proportional 5/3 valve in their place."""
-    for y, name, look, wire in ((3.45, "valve A, 3/2", CHAMBER_1, 2.55), (0.85, "valve B, 3/2", CHAMBER_2, 1.75)):
+    """Two 3/2 valves with solenoid and spring, or one proportional 5/3 valve in their place, on the same four lines."""
+    for _, name, look, y in _BRANCHES:
         x = 3.1
+        supplied, below = x + _BOX + 0.12, y - 0.5 * _BOX - 0.16
         _line(
             axes,
             (1.25 + _BOX, y),
             (2.72, y),
-            (2.72, y - 0.5 * _BOX - 0.16),
-            (x + _BOX + 0.12, y - 0.5 * _BOX - 0.16),
-            (x + _BOX + 0.12, y - 0.5 * _BOX),
+            (2.72, below),
+            (supplied, below),
+            (supplied, y - 0.5 * _BOX),
             colour=look.colour,
         )
         for left in (x, x + _BOX):
@@ -143,23 +153,41 @@ def _valves(axes: "Axes") -> None:
         )
         _line(axes, (x - 0.2, low + 0.08), (x - 0.06, high - 0.08), width=1.0)
         _spring(axes, x + 2 * _BOX, y, 1.0)
-        top = x + _BOX + 0.21
-        _line(axes, (top, high), (top, high + 0.2), (4.75, high + 0.2), (4.75, wire), (5.35, wire), colour=look.colour)
-        _words(axes, x + _BOX, high + 0.38, name, SOLENOID.colour)
-    x, y = 2.35, 2.15
-    for number in range(3):
-        _box(axes, x + number * _BOX, y - 0.5 * _BOX, PROPORTIONAL.colour)
-    low, high = y - 0.5 * _BOX, y + 0.5 * _BOX
-    for offset, tilt in ((0.0, 1.0), (2 * _BOX, -1.0)):
-        _arrow(axes, (x + offset + 0.21, low), (x + offset + 0.21 - tilt * 0.11, high), PROPORTIONAL.colour)
-        _arrow(
-            axes, (x + offset + 0.21 + tilt * 0.11, high), (x + offset + 0.21 + tilt * 0.11, low), PROPORTIONAL.colour
+        top, wire = x + _BOX + 0.21, _MIDDLE + 0.4 * np.sign(y - _MIDDLE)
+        _line(
+            axes,
+            (top, high),
+            (top, high + 0.2),
+            (_TO_ACTUATOR, high + 0.2),
+            (_TO_ACTUATOR, wire),
+            (5.35, wire),
+            colour=look.colour,
         )
-    for place in (0.1, 0.32):
-        _line(axes, (x + _BOX + place, high), (x + _BOX + place, high - 0.1), width=1.0)
-        _line(axes, (x + _BOX + place - 0.05, high - 0.1), (x + _BOX + place + 0.05, high - 0.1), width=1.0)
+        _words(axes, x + _BOX, high + 0.38, name, SOLENOID.colour)
+    _proportional_valve(axes, _SPOOL, _MIDDLE)
+
+
+def _proportional_valve(axes: "Axes", x: float, y: float) -> None:
+    """The 5/3 valve: work ports on top, and below one exhaust between the ports of the two regulators."""
+    blue = PROPORTIONAL.colour
+    low, high = y - 0.5 * _BOX, y + 0.5 * _BOX
+    for number in range(3):
+        _box(axes, x + number * _BOX, low, blue)
+    first, second = 0.11, 0.31
+    plantarflexion, exhaust, dorsiflexion = 0.07, 0.21, 0.35
+    right = x + 2 * _BOX
+    _arrow(axes, (x + plantarflexion, low), (x + first, high), blue)
+    _arrow(axes, (x + second, high), (x + exhaust, low), blue)
+    _arrow(axes, (right + dorsiflexion, low), (right + second, high), blue)
+    _arrow(axes, (right + first, high), (right + exhaust, low), blue)
+    centre = x + _BOX
+    blocked_below = (x + dorsiflexion, right + plantarflexion, *(centre + at for at in (0.07, 0.21, 0.35)))
+    for places, edge, step in ((blocked_below, low, 0.09), ((centre + first, centre + second), high, -0.09)):
+        for place in places:
+            _line(axes, (place, edge), (place, edge + step), width=1.0)
+            _line(axes, (place - 0.045, edge + step), (place + 0.045, edge + step), width=1.0)
     for edge in (low - 0.05, high + 0.05):
-        _line(axes, (x, edge), (x + 3 * _BOX, edge), colour=PROPORTIONAL.colour, width=1.0)
+        _line(axes, (x, edge), (x + 3 * _BOX, edge), colour=blue, width=1.0)
     for left in (x - 0.24, x + 3 * _BOX):
         _line(
             axes,
@@ -171,7 +199,46 @@ def _valves(axes: "Axes") -> None:
             width=1.0,
         )
         _arrow(axes, (left + 0.02, low + 0.02), (left + 0.22, high - 0.02))
-    _words(axes, x + 1.5 * _BOX, y - 0.42, "or one proportional 5/3 valve\nin place of A and B", PROPORTIONAL.colour)
+    _exhaust(axes, centre + exhaust, low)
+    upper, lower = (height for _, _, _, height in _BRANCHES)
+    left, beside = _REGULATED, _TO_ACTUATOR - 0.15
+    couplings = ((left, upper), (left, lower), (_TO_ACTUATOR, y + 0.62), (_TO_ACTUATOR, y - 0.62))
+    _line(
+        axes,
+        (centre + plantarflexion, low),
+        (centre + plantarflexion, y - 0.45),
+        (left, y - 0.45),
+        couplings[0],
+        colour=blue,
+    )
+    _line(
+        axes,
+        (centre + dorsiflexion, low),
+        (centre + dorsiflexion, y - 0.58),
+        (left, y - 0.58),
+        couplings[1],
+        colour=blue,
+    )
+    _line(axes, (centre + first, high), (centre + first, y + 0.62), couplings[2], colour=blue)
+    _line(
+        axes,
+        (centre + second, high),
+        (centre + second, y + 0.4),
+        (beside, y + 0.4),
+        (beside, y - 0.62),
+        couplings[3],
+        colour=blue,
+    )
+    axes.plot(
+        *zip(*couplings, strict=True),
+        "o",
+        color=blue,
+        markersize=6,
+        markerfacecolor="white",
+        linestyle="none",
+        zorder=4,
+    )
+    _words(axes, 3.3, y + 0.85, "or one proportional 5/3 valve\nin place of A and B", blue)
 
 
 def _actuator(axes: "Axes", x: float, y: float) -> None:
@@ -199,18 +266,18 @@ def _leg(axes: "Axes") -> None:
     """Shank and foot in the sagittal plane, with the angles of the model."""
     from matplotlib.patches import Arc
 
-    knee, ankle = (7.55, 3.95), (7.75, 1.6)
-    foot = (8.75, 1.05)
-    _line(axes, (7.25, 2.15), (7.25, ankle[1]), (ankle[0] - 0.08, ankle[1]), width=1.2, dashed=True)
+    knee, ankle = (7.55, 4.2), (7.75, 1.85)
+    foot = (8.75, 1.3)
+    _line(axes, (7.25, _MIDDLE), (7.25, ankle[1]), (ankle[0] - 0.08, ankle[1]), width=1.2, dashed=True)
     for start, end in ((knee, ankle), (ankle, foot)):
         axes.plot(*zip(start, end, strict=True), color=BLACK, linewidth=5.0, solid_capstyle="round")
     for place in (knee, ankle):
         axes.plot(*place, "o", color=BLACK, markersize=9, markerfacecolor="white", zorder=4)
-    _line(axes, knee, (knee[0], 2.5), colour=GREY, width=0.9, dashed=True)
+    _line(axes, knee, (knee[0], 2.75), colour=GREY, width=0.9, dashed=True)
     axes.add_patch(Arc(knee, 2.6, 2.6, theta1=270.0, theta2=275.0, color=GREY, linewidth=1.0))
     axes.add_patch(Arc(ankle, 1.0, 1.0, theta1=-29.0, theta2=95.0, color=BLACK, linewidth=1.0))
-    _words(axes, 7.78, 2.75, r"$\varphi$", GREY, size=10.0, align="left")
-    _words(axes, 8.3, 1.95, r"ankle angle $\theta$", align="left", size=9.0)
-    _words(axes, 7.95, 3.2, "shank", align="left")
-    _words(axes, 8.6, 1.42, "foot", align="left")
-    _words(axes, 8.05, 0.62, "plantarflexion:\n" + r"$\theta$ grows, chamber 1 fills", CHAMBER_1.colour)
+    _words(axes, 7.78, 3.0, r"$\varphi$", GREY, size=10.0, align="left")
+    _words(axes, 8.3, 2.2, r"ankle angle $\theta$", align="left", size=9.0)
+    _words(axes, 7.95, 3.45, "shank", align="left")
+    _words(axes, 8.6, 1.67, "foot", align="left")
+    _words(axes, 8.05, 0.87, "plantarflexion:\n" + r"$\theta$ grows, chamber 1 fills", CHAMBER_1.colour)
