@@ -2,6 +2,7 @@
 
 import ctypes
 import importlib.util
+import re
 import shutil
 import sys
 from collections.abc import Iterator, Sequence
@@ -159,8 +160,10 @@ def test_an_exported_library_makes_the_numbers_of_a_run_that_python_makes(name: 
     built = ctypes.CDLL(str(shared_library(source, "-O0", "-ffp-contract=off", "-DPPAFO_ENTRY=extern", "-w")))
     batch = batch_of(plan_walk(walked) if is_walk else plan_run(walked))
     settings = np.array([item.value for item in library.settings])
-    found = np.zeros(len(batch.parameters))
-    built.prepare(*map(handed, (settings, found, np.zeros(len(batch.states)), np.zeros(6))))
+    # An exported walk has the states of a meter too, which a run in Python does without.
+    sizes = dict(re.findall(r"^    (STATES|PARAMETERS|COUNTS) = (\d+)", source.read_text("utf-8"), re.MULTILINE))
+    found, states, counts = (np.zeros(int(sizes[name])) for name in ("PARAMETERS", "STATES", "COUNTS"))
+    built.prepare(*map(handed, (settings, found, states, counts)))
     assert found.tobytes() == batch.parameters[:, 0].tobytes()
 
 
