@@ -19,8 +19,8 @@ CHOSEN = 0.05
 LIKELIEST = 128
 """Completions that are run with other laws, and whose step responses are compared with the rig's."""
 WITHOUT_RANGE = {
-    "beyond_improved_control": "no range here: the search for the best decisions takes seconds for each completion; "
-    "'python scripts/comparison_findings.py' makes it for some of them",
+    # The search for the best decisions takes seconds for each completion.
+    "beyond_improved_control": "no range here: 'python scripts/comparison_findings.py --only Improved' finds one",
     "large_and_heavy": "no range: there is no number",
 }
 WEIGHED = "completions that agree with the other evidence"
