@@ -31,11 +31,20 @@ from ppafo.answers.style import (
 )
 from ppafo.errors import DataError, nearest_name, one_line
 from ppafo.identification.trajectory.explanations import Explanation, Explanations, explanations_of
+from ppafo.identification.trajectory.prediction import Ranking
 from ppafo.identification.trajectory.problem import FITTED_CHANNELS, Experiment
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.question import Solved
+from ppafo.questions.validate.several import (
+    parse_sets,
+    ranking_data,
+    ranking_of,
+    ranking_section,
+    ranking_sentence,
+    seen_by,
+)
 from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded import with_fixed_volume
 from ppafo.storage.comma_separated import marked_csv_bytes
@@ -87,6 +96,8 @@ class Validation(Solved):
     recordings: tuple[RecordingAgreement, ...]
     explanations: Explanations
     has_limits: bool
+    ranking: Ranking | None = None
+    seen: tuple[str, ...] = ()
 
     @property
     def passes(self) -> bool:
@@ -106,6 +117,7 @@ def validate(
     thresholds: Sequence[str] = (),
     longest_delay: float = DEFAULT_LIMIT,
     columns: ColumnMap | str | Path | None = None,
+    against: Sequence[str] = (),
     progress: Report | None = None,
 ) -> Validation:
     """Return the errors (model less measured) of the model with a parameter set against each recording.
@@ -117,7 +129,8 @@ def validate(
     the largest RMS errors that pass, of the full range or in a unit. Without any it is 10 %, and no single change of
     record, set or model may explain the recordings better than noise of the sensors could. ``longest_delay`` [s], at
     most 1 s, limits the delay of the measurement that is taken out. ``columns`` is a column map or
-    ``FILE.toml[:NAME]``.
+    ``FILE.toml[:NAME]``. ``against`` are other sets, ``NAME`` or ``NAME:PATH=VALUE,PATH=VALUE`` (after ``overrides``,
+    which hold for all of them), with which the set is compared by log predictive density: ``ranking``, else None.
 
     The result has ``passes`` and, in ``recordings``, one ``RecordingAgreement`` each: ``measured`` and ``model`` are
     recordings, their channels of shape (samples,) in SI; ``channels`` has RMS error, bias, largest error and delay [s]
@@ -127,7 +140,9 @@ def validate(
     override, SimulationError where the model diverges.
     """
     report = progress or report_nothing
+    sets = parse_sets(str(parameter_set), against)
     device = load_device(parameter_set, valve, overrides)
+    others = [load_device(one.parameter_set, valve, (*overrides, *one.overrides)) for one in sets[1:]]
     device.check_vane("a replay of recordings")
     if volume is not None and not volume > 0.0:
         raise DataError(f"volume of {volume:g} m^3: must be above 0")
@@ -150,8 +165,21 @@ def validate(
         agreements.append(compare_recording(measured, device, settings))
     report(Progress("searching what would explain the recordings better"))
     explanations = _explanations(read, device, settings, agreements)
+    ranking = None
+    if others:
+        report(Progress("comparing the sets"))
+        theirs = [[compare_recording(measured, other, settings) for measured in read] for other in others]
+        ranking = ranking_of(sets, [agreements, *theirs])
     return Validation(
-        str(parameter_set), device, tuple(overrides), settings, tuple(agreements), explanations, bool(thresholds)
+        parameter_set=str(parameter_set),
+        device=device,
+        overrides=tuple(overrides),
+        settings=settings,
+        recordings=tuple(agreements),
+        explanations=explanations,
+        has_limits=bool(thresholds),
+        ranking=ranking,
+        seen=seen_by(sets, agreements) if others else (),
     )
 
 
@@ -322,7 +350,7 @@ _UNUSUAL = re.compile(r"[^A-Za-z0-9_.-]+")
 
 def answer_of(validation: Validation) -> Answer:
     """Return the answer of a validation; it has passed where every error is within its limit."""
-    count = len(validation.recordings)
+    count, ranking = len(validation.recordings), validation.ranking
     names = recording_names([agreement.file for agreement in validation.recordings])
     kinds = {agreement.measured.kind for agreement in validation.recordings}
     pairs = list(zip(names, validation.recordings, strict=True))
@@ -331,8 +359,13 @@ def answer_of(validation: Validation) -> Answer:
         name="validate",
         kicker="Validation of a parameter set",
         title=f"{validation.device.name} against {count} recording{'' if count == 1 else 's'}",
-        lead=(verdict(validation), *_departures(validation, sorted(kinds - {"measured"}))),
+        lead=(
+            verdict(validation),
+            *([ranking_sentence(ranking)] if ranking else []),
+            *_departures(validation, sorted(kinds - {"measured"})),
+        ),
         sections=(
+            ranking_section(ranking, validation.seen) if ranking else Section(),
             _explained(validation),
             Section(paragraphs=(_method(validation),), is_detail=True),
             *(_section(validation, name, agreement) for name, agreement in pairs),
@@ -357,6 +390,7 @@ def answer_of(validation: Validation) -> Answer:
                     for one in validation.explanations.found
                 ],
             },
+            **({"ranking": ranking_data(ranking, validation.seen)} if ranking else {}),
             "recordings": [_recording_data(agreement) for agreement in validation.recordings],
             "versions": {"ppafo": __version__},
         },
