@@ -23,12 +23,14 @@ from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, refused_as
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
+from ppafo.model.effects.kind import SECTION, Effect
 from ppafo.model.gas import heat_capacity_at_constant_volume
 from ppafo.model.orifice import ExactOrifice, area_conductance
 from ppafo.model.plant import PlantParameters
 from ppafo.model.sensors import quantise
 from ppafo.parameters.declaration import is_within
 from ppafo.parameters.device import Device, SonicOrifice
+from ppafo.parameters.plant import switches_of
 from ppafo.rig.dynamics import RigPhysics
 from ppafo.signals.recording import Recording
 from ppafo.units import parse_quantity, to_si
@@ -295,7 +297,16 @@ SECOND_VIRIAL = {"CO2": -123.0e-6, "air": -7.4e-6, "N2": -4.5e-6, "He": 11.8e-6}
 
 
 def real_device(device: Device, preset: Preset) -> Device:
-    """Return the device as it stands on the rig: the valve with its dynamics, the leak of its seals."""
+    """Return the device as it stands on the rig: the valve with its dynamics, the leak of its seals.
+
+    ParameterError for a device with an effect that is on: the rig has physics of its own, and would record without it.
+    """
+    for effect, is_on in switches_of(device).items():
+        if is_on:
+            raise ParameterError(
+                f"the virtual rig has no effect '{effect.name}': switch it off with {_off(effect)}, or take the "
+                "recording of a simulated run"
+            )
     declared = {item.name for item in VALVES[device.valve.kind].quantities}
     added = {name: value for name, value in preset.section("valve").items() if name in declared}
     given = {name for name in added if device.valve.settings.get(name, 0.0) != 0.0 and name != "spool_damping_ratio"}
@@ -307,6 +318,12 @@ def real_device(device: Device, preset: Preset) -> Device:
     else:
         leak = replace(leak, area=leak.area * factor)
     return replace(device, valve=valve, actuator=replace(device.actuator, leak=leak))
+
+
+def _off(effect: Effect) -> str:
+    """Settings that switch an effect off, such as "effects.ice.blockage=0 1/kg"."""
+    units = {item.name: item.unit for item in effect.quantities}
+    return " and ".join(f"'{SECTION}.{effect.name}.{name}={f'0 {units[name]}'.strip()}'" for name in effect.switch)
 
 
 def rig_plant(plant: PlantParameters, preset: Preset) -> PlantParameters:

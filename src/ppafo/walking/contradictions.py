@@ -114,7 +114,9 @@ def _valve(scenario: Scenario, law: ControllerKind) -> Iterator[Contradiction]:
     yield Contradiction(
         "controller.kind",
         valve != "proportional" and not law.only_switches,
-        lambda _run: f"opens its valve gradually, which a {valve} valve cannot: {remedy}",
+        lambda _run: (
+            f"opens its valve gradually, which in a walk only a proportional valve does, not a {valve} one: {remedy}"
+        ),
     )
 
 

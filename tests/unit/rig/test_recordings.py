@@ -46,6 +46,16 @@ WANTED = {
 }
 
 
+@pytest.mark.parametrize("name", ["free-decay", "static-torque", "step-response", "valve-map"])
+def test_an_effect_that_the_rig_does_not_have_is_refused_before_it_records_without_it(name: str) -> None:
+    with pytest.raises(
+        ParameterError,
+        match=r"no effect 'silencer': switch it off with 'effects\.silencer\.sonic_conductance=0 m\^3/\(s Pa\)'",
+    ):
+        record(name, "ideal-laboratory", 1, overrides=["effects.silencer.sonic_conductance=1e-8 m^3/(s Pa)"])
+    record("valve-map", "ideal-laboratory", 1, overrides=["effects.silencer.sonic_conductance=0 m^3/(s Pa)"])
+
+
 @pytest.mark.parametrize("name", EXPERIMENTS)
 def test_an_experiment_records_its_channels_as_synthetic_and_reads_back(name: str, tmp_path: Path) -> None:
     made = record(name, "paper-bench", 3, overrides=SHORT.get(name, []))
