@@ -421,8 +421,8 @@ def linearise(
     slopes = casadi.Function("slopes", [command], [casadi.jacobian(casadi.vertcat(*openings, *moves), command)])
     if not any(abs(slope) > 0.0 for value in (-0.5, 0.5) for slope in slopes(value).nonzeros()):
         raise ScenarioError(
-            f"{chosen.name}: valve '{chosen.device.valve_name}' is on or off: its flow has no derivative by the "
-            "command; set device.valve to one that opens in proportion"
+            f"{chosen.name}: valve '{chosen.device.valve_name}' is on or off, or moves at one speed: its flow "
+            "has no derivative by the command; set device.valve to one that opens in proportion"
         )
     if at != EQUILIBRIUM and not isinstance(at, Real):
         with refused_as(ScenarioError, f"{chosen.name}: --at '{at}' is neither a time nor '{EQUILIBRIUM}'", UnitError):

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from ppafo.model.declaration import Quantity
 from ppafo.model.plant import Openings, single_port_flow, single_port_flow_slopes, single_ports
-from ppafo.model.valves.kind import ValveKind, ValveModel
+from ppafo.model.valves.kind import VENTS_ABOVE, ValveKind, ValveModel
 
 
 class ThreePosition(NamedTuple):
@@ -22,8 +22,12 @@ class Position(NamedTuple):
 
 
 def position_of(valve: ThreePosition, command: float) -> float:
-    """Opening [-], -1, 0 or 1, that a command asks for; above 0 feeds chamber 1."""
-    return 1.0 if command >= valve.threshold else (-1.0 if command <= -valve.threshold else 0.0)
+    """Opening [-], -1, 0 or 1, that a command asks for; above 0 feeds chamber 1.
+
+    A walk commands 2 (``VENT``) to vent both chambers, for which this valve has no position: it closes.
+    """
+    opens = (command >= valve.threshold) & (command <= VENTS_ABOVE)
+    return 1.0 if opens else (-1.0 if command <= -valve.threshold else 0.0)
 
 
 def advance(valve: ThreePosition, state: Position, command: float, time: float, step: float) -> tuple[float, Position]:
