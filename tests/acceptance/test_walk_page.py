@@ -25,7 +25,7 @@ def test_the_commands_and_the_python_of_the_page_run(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     commands = [line for block in blocks("sh") for line in block.splitlines()]
-    assert [main(shlex.split(command)[1:]) for command in commands] == [0] * 15
+    assert [main(shlex.split(command)[1:]) for command in commands] == [0] * 16
     table = PAGE.partition("| In the folder |")[2].partition("\n\n")[0]
     listed = {
         name for cell in re.findall(r"^\| (`.*?`) \|", table, re.MULTILINE) for name in re.findall(r"`(.*?)`", cell)

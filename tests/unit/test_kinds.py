@@ -160,16 +160,18 @@ def test_kinds_are_a_mapping_that_can_be_changed_for_a_while() -> None:
     assert len(kinds) == 0
 
 
-def test_help_and_a_scenario_of_the_package_look_for_no_other_packages() -> None:
+def test_help_looks_for_questions_of_other_packages_and_a_scenario_of_the_package_for_nothing() -> None:
     code = (
-        "import sys, ppafo.cli.main as main\n"
-        "try:\n    main.main(['--help'])\nexcept SystemExit:\n    pass\n"
-        "assert 'importlib.metadata' not in sys.modules and 'ppafo.kinds' not in sys.modules\n"
         "import importlib.metadata as m\n"
-        "original = m.entry_points\n"
-        "def scan(group):\n    assert not group.startswith('ppafo'), group\n    return original(group=group)\n"
+        "looked, original = [], m.entry_points\n"
+        "def scan(group):\n    looked.append(group)\n    return original(group=group)\n"
         "m.entry_points = scan\n"
+        "import ppafo.cli.main as main\n"
+        "try:\n    main.main(['--help'])\nexcept SystemExit:\n    pass\n"
+        "assert [one for one in looked if one.startswith('ppafo')] == ['ppafo.questions'], looked\n"
+        "looked.clear()\n"
         "import ppafo\nppafo.load_scenario('torque-task-proportional')\nppafo.load_walk('proportional')\n"
+        "assert not [one for one in looked if one.startswith('ppafo')], looked\n"
     )
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -2,6 +2,7 @@
 
 import io
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -128,8 +129,7 @@ def test_an_earlier_walk_is_replaced_and_other_folders_are_not(
     assert "is not empty and not a result of 'ppafo walk' (it has no ppafo.json)" in capsys.readouterr().err
     assert names(tmp_path / "mine") == ["notes.txt"]
     copy = tmp_path / "copy"
-    copy.mkdir()
-    (copy / "walk.json").write_bytes((walked / "walk.json").read_bytes())
+    shutil.copytree(walked, copy)
     assert main(["walk", "off", *SHORT, "--out", str(copy)]) == 0
     assert json.loads((copy / "walk.json").read_text())["configuration"]["name"] == "off"
 

@@ -186,6 +186,9 @@ _LARGE_PRODUCT = 1.0e100
 _LEAST = 1.0e-30
 LOG_RATIO = (-20.0, 12.0)
 LOG_JITTER = (math.log(1.0e-9), math.log(0.1))
+_LEAST_JITTER = 3.0e-5
+"""Time [s] below which stamps that are off look like a model that is a little wrong where it is steepest: that is said
+to be a misfit, for it may be one, and hardly any clock is so good and yet noisy."""
 _JITTER = 2.0
 """Standard errors of the score of jitter from which it is tried."""
 _SMALLEST_LEVEL = 1.0e-6
@@ -538,7 +541,7 @@ def _growing(
             )
             for one in (white, drift, *found)
         ]
-    return found
+    return [one for one in found if one.jitter == 0.0 or one.jitter >= _LEAST_JITTER]
 
 
 def _within(numbers: Floats, longest: float) -> tuple[tuple[float, float], float]:
