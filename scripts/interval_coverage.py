@@ -71,7 +71,7 @@ def run(parsed: argparse.Namespace) -> int:
     draws, seed, processes = parsed.draws, parsed.seed, parsed.threads
     fits = FITS.format(truths="drawn" if parsed.from_prior else "fixed", seed=seed)
     tasks = tasks_of(parsed.noise or tuple(NOISE_KINDS), draws, seed, parsed.from_prior)
-    check_output(parsed)
+    check_output(parsed, _files_to_keep(parsed.out) if parsed.out is not None else None)
     if parsed.out is not None:
         # The folder is marked as ours before the first fit is kept in it.
         write_files(parsed, {fits: b""} | _files_to_keep(parsed.out))

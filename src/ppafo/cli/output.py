@@ -50,13 +50,16 @@ def add_override_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def check_output(parsed: argparse.Namespace) -> None:
-    """Refuse, before anything runs, a folder of ``--out`` that is not absent, empty or this command's own result."""
+def check_output(parsed: argparse.Namespace, kept: Mapping[str, bytes] | None = None) -> None:
+    """Refuse, before anything runs, a folder of ``--out`` that is not absent, empty or this command's own result.
+
+    Files that will be ``kept`` as they are may have grown since it was written.
+    """
     if parsed.out is not None:
         from ppafo.storage.result_folder import check_owned_folder, marked_folder
 
         with blame_out_option():
-            check_owned_folder(parsed.out, marked_folder(_command(parsed)))
+            check_owned_folder(parsed.out, marked_folder(_command(parsed)), kept or {})
 
 
 def check_new_file(path: Path) -> None:

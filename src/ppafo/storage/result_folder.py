@@ -11,6 +11,7 @@ import os
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
@@ -45,6 +46,7 @@ MARK = "ppafo.json"
 
 _FORMAT = "ppafo files"
 _HASHES = "sha256"
+NOTHING_KEPT: Mapping[str, bytes] = MappingProxyType({})
 
 
 def marked_folder(command: str) -> FolderKind:
@@ -108,10 +110,13 @@ def write_marked_folder(folder: Path, contents: Mapping[str, bytes], command: st
     write_owned_folder(folder, marked, marked_folder(command))
 
 
-def check_owned_folder(folder: Path, kind: FolderKind) -> None:
-    """Refuse a folder that holds anything of somebody else's, or that cannot be made. It is a DataError."""
+def check_owned_folder(folder: Path, kind: FolderKind, kept: Mapping[str, bytes] = NOTHING_KEPT) -> None:
+    """Refuse a folder that holds anything of somebody else's, or that cannot be made. It is a DataError.
+
+    Files that are ``kept`` as they are, such as one that grows from run to run, may have been changed.
+    """
     if os.path.isdir(folder):  # noqa: PTH112  # Path.is_dir raises where no file can have the name
-        _check_own(folder, kind)
+        _check_own(folder, kind, kept)
     elif os.path.lexists(folder):
         raise DataError(f"{folder}: is a file; a {kind.noun} needs a folder")
     check_folder_can_be_replaced(folder)
@@ -119,7 +124,7 @@ def check_owned_folder(folder: Path, kind: FolderKind) -> None:
 
 def write_owned_folder(folder: Path, contents: Mapping[str, bytes], kind: FolderKind) -> None:
     """Make a folder hold exactly these files, where ``check_owned_folder`` lets it be taken."""
-    check_owned_folder(folder, kind)
+    check_owned_folder(folder, kind, contents)
     replace_folder(folder, contents)
 
 
@@ -131,7 +136,7 @@ def read_json(path: Path) -> Any:
         raise DataError(f"{path}: is not JSON: {one_line(error)}") from error
 
 
-def _check_own(folder: Path, kind: FolderKind) -> None:
+def _check_own(folder: Path, kind: FolderKind, kept: Mapping[str, bytes]) -> None:
     present = {entry.name for entry in _listed(folder)}
     if not present:
         return
@@ -144,7 +149,8 @@ def _check_own(folder: Path, kind: FolderKind) -> None:
             f"{folder}: contains files that are not part of its {kind.noun} ({_some(foreign)}); move them or use "
             "another folder"
         )
-    changed = sorted(name for name, stated in hashes.items() if _is_changed(folder / name, stated))
+    known = ((name, {stated, *([_checksum(kept[name])] if name in kept else [])}) for name, stated in hashes.items())
+    changed = sorted(name for name, sums in known if _is_changed(folder / name, sums))
     if changed:
         raise DataError(
             f"{folder}: contains files that were changed since its {kind.noun} was written ({_some(changed)}); move "
@@ -156,12 +162,12 @@ def _some(names: Sequence[str]) -> str:
     return ", ".join(names[:_NAMED]) + (", ..." if len(names) > _NAMED else "")
 
 
-def _is_changed(path: Path, stated: str) -> bool:
-    """Tell whether a file is there and has another hash than the one that was stated."""
+def _is_changed(path: Path, known: Collection[str]) -> bool:
+    """Tell whether a file is there and has another hash than those that are known."""
     if not os.path.lexists(path):
         return False
     try:
-        return _checksum(read_regular_file(path)) != stated
+        return _checksum(read_regular_file(path)) not in known
     except OSError:
         return True  # a link to nowhere, a pipe: not what was written
 
