@@ -35,7 +35,7 @@ MISTAKES = {
     "controller.kind=event_of": "'event_of' is not known",
     "faults.heel.time=3 s": "'faults.heel.kind' is missing",
     "faults.pressure_1.kind=stuck; faults.pressure_1.time=3 s; faults.pressure_1.reading=3 N": "a pressure level is",
-    "controller.kind=event_proportional": "which a solenoid valve cannot: take device.valve 'proportional', or cont",
+    "controller.kind=event_proportional": "not a solenoid one: take device.valve 'proportional', or cont",
     "controller.flat_from=0.3": "must be below controller.flat_to, which is 0.24",
     "supply.atmospheric_pressure=80 kPa_a; controller.lowest_pressure=90 kPa_a": "must be below the atmosphere, which",
     "controller.filled_pressure=60 psi_g": "must be between atmosphere and supply, which are 0 psi_g and 50 psi_g",
