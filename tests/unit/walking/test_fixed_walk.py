@@ -121,7 +121,7 @@ def test_faults_are_found_as_soon_as_with_floats_and_end_in_the_same_state() -> 
     assert not np.isfinite(floats[[17, 35]]).any()
     seen = np.isfinite(floats)
     assert seen.sum() >= 30
-    # An angle or a pressure that stays as it is contradicts the observer, which only floats have, before it leaves a limit.
+    # An angle or a pressure that freezes contradicts the observer, which only floats have, before it leaves a limit.
     held = np.isin(np.arange(len(faults)), [7, 8, 9, 25, 26, 27])
     assert np.abs(fixed[seen & ~held] - floats[seen & ~held]).max() <= 0.02
     assert (fixed[held] >= floats[held] - 0.02).all()
