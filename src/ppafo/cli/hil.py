@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ppafo.cli import output
-from ppafo.errors import ScenarioError, UnitError
+from ppafo.errors import ScenarioError, UnitError, refused_as
 from ppafo.exports.hil.wire import DEFAULT_BAUD, FORMS, HIGHEST_RATE, LOWEST_RATE, RATE
 
 if TYPE_CHECKING:
@@ -65,10 +65,8 @@ def seconds_of(option: str, text: str, longest: float = math.inf) -> float:
     """Return the time that an option gives, such as ``10 s``, in seconds. UnitError where it is none."""
     from ppafo.units import parse_quantity
 
-    try:
+    with refused_as(UnitError, f"{option} {text}", UnitError):
         seconds = parse_quantity(text, "s")
-    except UnitError as error:
-        raise UnitError(f"{option} {text}: {error}") from error
     if not 0.0 < seconds <= longest:
         limit = "" if math.isinf(longest) else f", at most {longest:g} s"
         raise UnitError(f"{option} {text}: must be above 0 s{limit}")

@@ -149,8 +149,7 @@ def _check_own(folder: Path, kind: FolderKind, kept: Mapping[str, bytes]) -> Non
             f"{folder}: contains files that are not part of its {kind.noun} ({_some(foreign)}); move them or use "
             "another folder"
         )
-    known = ((name, {stated, *([_checksum(kept[name])] if name in kept else [])}) for name, stated in hashes.items())
-    changed = sorted(name for name, sums in known if _is_changed(folder / name, sums))
+    changed = sorted(name for name, stated in hashes.items() if _is_changed(folder / name, stated, kept.get(name)))
     if changed:
         raise DataError(
             f"{folder}: contains files that were changed since its {kind.noun} was written ({_some(changed)}); move "
@@ -162,14 +161,15 @@ def _some(names: Sequence[str]) -> str:
     return ", ".join(names[:_NAMED]) + (", ..." if len(names) > _NAMED else "")
 
 
-def _is_changed(path: Path, known: Collection[str]) -> bool:
-    """Tell whether a file is there and has another hash than those that are known."""
+def _is_changed(path: Path, stated: str, kept: bytes | None) -> bool:
+    """Tell whether a file is there, has another hash than the one that was stated, and is not kept as it is."""
     if not os.path.lexists(path):
         return False
     try:
-        return _checksum(read_regular_file(path)) not in known
+        content = read_regular_file(path)
     except OSError:
         return True  # a link to nowhere, a pipe: not what was written
+    return content != kept and _checksum(content) != stated
 
 
 def _listed(folder: Path) -> list[Path]:
