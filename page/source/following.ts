@@ -18,20 +18,52 @@ const REFERENCE_DENSITY = 1.185;
 const REFERENCE_TEMPERATURE = 293.15;
 const AIR_CONSTANT = 1e5 / (REFERENCE_DENSITY * REFERENCE_TEMPERATURE);
 
-const gasProduct = (mass: number, temperature: number) => (UNIVERSAL_GAS_CONSTANT / mass) * temperature;
-const criticalRatio = (k: number) => (2 / (k + 1)) ** (k / (k - 1));
+/** e^x and ln x as `ppafo.model.elementary` has them: those of a browser differ from each other in the last bits. */
+function exponential(exponent: number): number {
+  if (Number.isNaN(exponent)) return exponent;
+  const inside = Math.max(-709, Math.min(exponent, 709));
+  const doublings = Math.trunc(inside / 0.6931471805599453 + (inside >= 0 ? 0.5 : -0.5));
+  let rest = inside - doublings * UPPER_PART;
+  rest = rest - doublings * LOWER_PART;
+  let series = 0;
+  for (let term = 14; term > 0; term--) series = ((series + 1) * rest) / term;
+  let value = 1 + series;
+  for (let turn = 0; turn < Math.abs(doublings); turn++) value *= doublings > 0 ? 2 : 0.5;
+  return value;
+}
 
-/** R T times the conductance Cd A C1 of an area. */
+const UPPER_PART = 0.693147180369123816490;
+const LOWER_PART = 1.90821492927058770002e-10;
+const ROOT_OF_HALF = 0.7071067811865476;
+
+function logarithm(number: number): number {
+  let [doublings, mantissa] = [0, number];
+  for (; mantissa >= 2 * ROOT_OF_HALF && doublings < 1100; doublings++) mantissa *= 0.5;
+  for (; mantissa < ROOT_OF_HALF && doublings > -1100; doublings--) mantissa *= 2;
+  const share = (mantissa - 1) / (mantissa + 1);
+  const square = share * share;
+  let series = 0;
+  for (let term = 12; term > 0; term--) series = (series + 1 / (2 * term + 1)) * square;
+  const small = 2 * share + (2 * share * series + doublings * LOWER_PART);
+  return doublings * UPPER_PART + small;
+}
+
+const power = (base: number, exponent: number) => exponential(exponent * logarithm(base));
+const gasConstant = (mass: number) => UNIVERSAL_GAS_CONSTANT / mass;
+const criticalRatio = (k: number) => power(2 / (k + 1), k / (k - 1));
+
+/** R T times the conductance Cd A C1 of an area. The order of operations is the package's: the same bits. */
 function flowOfArea(mass: number, k: number, temperature: number, area: number, discharge: number): number {
-  const product = gasProduct(mass, temperature);
-  const choked = Math.sqrt(k / product) * (2 / (k + 1)) ** ((k + 1) / (2 * (k - 1)));
-  return product * discharge * area * choked;
+  const constant = gasConstant(mass);
+  const choked = Math.sqrt((k / (constant * temperature)) * power(2 / (k + 1), (k + 1) / (k - 1)));
+  return constant * temperature * (discharge * area * choked);
 }
 
 /** R T times a sonic conductance of ISO 6358, for a gas other than air too. */
 function flowOfSonic(mass: number, temperature: number, sonic: number): number {
-  const air = sonic * REFERENCE_DENSITY * Math.sqrt(REFERENCE_TEMPERATURE / temperature);
-  return gasProduct(mass, temperature) * air * Math.sqrt(AIR_CONSTANT / (UNIVERSAL_GAS_CONSTANT / mass));
+  const constant = gasConstant(mass);
+  const sameGas = sonic * REFERENCE_DENSITY * Math.sqrt(REFERENCE_TEMPERATURE / temperature);
+  return constant * temperature * (sameGas * Math.sqrt(AIR_CONSTANT / constant));
 }
 
 const RULES: Readonly<Record<string, (...given: number[]) => number>> = {
@@ -48,8 +80,8 @@ const RULES: Readonly<Record<string, (...given: number[]) => number>> = {
   "gas.critical_pressure_ratio": (k = 0) => criticalRatio(k),
   "nominal.flow_of_area": (mass = 0, k = 0, temperature = 0, area = 0, discharge = 0) => flowOfArea(mass, k, temperature, area, discharge),
   "nominal.flow_of_sonic": (mass = 0, temperature = 0, sonic = 0) => flowOfSonic(mass, temperature, sonic),
-  "nominal.per_content": (number = 0, mass = 0, temperature = 0) => number / gasProduct(mass, temperature),
-  "nominal.as_content": (number = 0, mass = 0, temperature = 0) => number * gasProduct(mass, temperature),
+  "nominal.per_content": (number = 0, mass = 0, temperature = 0) => number / (gasConstant(mass) * temperature),
+  "nominal.as_content": (number = 0, mass = 0, temperature = 0) => number * gasConstant(mass) * temperature,
   "nominal.time_of_joint": (joining = 0, holding = 0) => joining + holding,
   "nominal.yes": () => 1,
   "nominal.no": () => 0,
