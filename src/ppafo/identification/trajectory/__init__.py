@@ -1,7 +1,7 @@
 """Trajectory fit: any numbers of a device from any recordings of its motion, with intervals and verdicts.
 
 Each file leans on those before it: ``problem`` says what is requested, ``residuals`` runs it, ``information`` is the
-algebra, ``sensor_noise`` the noise of a sensor with its compiled loops (``sample_loops``), ``posterior`` draws it and
+algebra, ``ppafo.identification.noise`` the noise of a sensor, ``posterior`` draws it and
 the coordinates in turn, ``search`` finds the least misfit, ``uncertainty`` tests the model against itself and gives
 intervals and verdicts. ``fitting`` does all of it, ``follow_up`` asks further, ``section`` does so for a problem file.
 """

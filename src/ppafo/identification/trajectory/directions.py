@@ -12,6 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ppafo.identification.noise.choice import sensor_noise
+from ppafo.identification.noise.heavy_tails import sample_weights
+from ppafo.identification.noise.sensor_noise import SensorNoise
+from ppafo.identification.noise.shapes import Drift, from_reflections, reflections_of
 from ppafo.identification.trajectory.information import inverse_with_root, solution
 from ppafo.identification.trajectory.posterior import whiten
 from ppafo.identification.trajectory.problem import TIME_OFFSET, ZERO_OF, with_numbers
@@ -25,14 +29,6 @@ from ppafo.identification.trajectory.residuals import (
     trajectories,
 )
 from ppafo.identification.trajectory.search import WhitenedFit
-from ppafo.identification.trajectory.sensor_noise import (
-    Drift,
-    SensorNoise,
-    from_reflections,
-    reflections_of,
-    sample_weights,
-    sensor_noise,
-)
 from ppafo.model.catalog import find_effects
 from ppafo.parameters.plant import effects_of
 from ppafo.simulation.numbers import number_at

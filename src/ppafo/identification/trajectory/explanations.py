@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ppafo.errors import PpafoError
+from ppafo.identification.noise.choice import sensor_noise
+from ppafo.identification.noise.sensor_noise import Course, SensorNoise, course_of
 from ppafo.identification.trajectory.directions import (
     EFFECT_DIRECTIONS,
     HEAT,
@@ -30,7 +32,6 @@ from ppafo.identification.trajectory.problem import (
     with_numbers,
 )
 from ppafo.identification.trajectory.residuals import Floats, PreparedExperiment, prepare, signals_at
-from ppafo.identification.trajectory.sensor_noise import Course, SensorNoise, course_of, sensor_noise
 from ppafo.model.catalog import find_effects
 from ppafo.signals.recording import Recording
 from ppafo.simulation.recorded import ANGLE, COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY, supply_paths

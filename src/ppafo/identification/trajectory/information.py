@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 
+from ppafo.identification.noise.sample_loops import sample_loops
 from ppafo.identification.trajectory.residuals import Floats, Mask, Neighbourhood, Residuals, prior_coordinates
-from ppafo.identification.trajectory.sample_loops import sample_loops
 
 ROBUST_SCALE = 1.345
 """Residual, in standard deviations, beyond which a robust loss counts less: 95 % efficient for normal noise."""

@@ -11,6 +11,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ppafo.identification.noise.heavy_tails import sample_weights
+from ppafo.identification.noise.sensor_noise import (
+    LOG_JITTER,
+    SensorNoise,
+    numbers_of,
+    profile_likelihood,
+    with_numbers,
+    without_common_stamps,
+)
+from ppafo.identification.noise.shapes import (
+    LOG_RATIO,
+    AutoRegression,
+    Drift,
+    errors_of,
+    from_coefficients,
+    from_reflections,
+    longest_memory,
+    regression_of,
+)
+from ppafo.identification.noise.t_distribution import FREEDOMS, t_likelihood
 from ppafo.identification.trajectory.information import (
     LEAST,
     inverse_with_root,
@@ -18,25 +38,6 @@ from ppafo.identification.trajectory.information import (
     solution_with_root,
 )
 from ppafo.identification.trajectory.residuals import Floats
-from ppafo.identification.trajectory.sensor_noise import (
-    FREEDOMS,
-    LOG_JITTER,
-    LOG_RATIO,
-    AutoRegression,
-    Drift,
-    SensorNoise,
-    errors_of,
-    from_coefficients,
-    from_reflections,
-    longest_memory,
-    numbers_of,
-    profile_likelihood,
-    regression_of,
-    sample_weights,
-    t_likelihood,
-    with_numbers,
-    without_common_stamps,
-)
 
 CHAINS, DRAWS, HEAVY_DRAWS, SETTLING = 2, 100, 300, 20
 """Chains, draws of each that count, the same where weights of samples are drawn too, and draws before them."""

@@ -12,8 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ppafo.identification.noise.choice import sensor_noise
+from ppafo.identification.noise.sensor_noise import SensorNoise
+from ppafo.identification.noise.shapes import Drift, errors_of
+from ppafo.identification.noise.t_distribution import t_likelihood
 from ppafo.identification.trajectory.residuals import Floats, Indices
-from ppafo.identification.trajectory.sensor_noise import Drift, SensorNoise, errors_of, sensor_noise, t_likelihood
 
 BLOCKS = 40
 """Blocks of all recordings together, or one a recording where there are more."""

@@ -13,6 +13,10 @@ import numpy as np
 
 from ppafo.engine.lane_rows import LANES
 from ppafo.errors import IdentificationError
+from ppafo.identification.noise.choice import sensor_noise
+from ppafo.identification.noise.heavy_tails import sample_weights
+from ppafo.identification.noise.sensor_noise import Course, SensorNoise, course_of, without_common_stamps
+from ppafo.identification.noise.shapes import errors_of, from_reflections, reflections_of
 from ppafo.identification.trajectory.information import (
     ROBUST_SCALE,
     directions_for,
@@ -33,17 +37,6 @@ from ppafo.identification.trajectory.residuals import (
     Residuals,
     coordinate_bounds,
     prior_coordinates,
-)
-from ppafo.identification.trajectory.sensor_noise import (
-    Course,
-    SensorNoise,
-    course_of,
-    errors_of,
-    from_reflections,
-    reflections_of,
-    sample_weights,
-    sensor_noise,
-    without_common_stamps,
 )
 from ppafo.progress import Progress, Report, report_nothing
 

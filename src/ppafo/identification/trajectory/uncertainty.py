@@ -13,6 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ppafo.identification.estimate import Estimate, Verdict, interval_factor
+from ppafo.identification.noise.choice import sensor_noise
+from ppafo.identification.noise.sensor_noise import SensorNoise
+from ppafo.identification.noise.shapes import Drift
 from ppafo.identification.trajectory.information import (
     covariance,
     data_information,
@@ -32,7 +35,6 @@ from ppafo.identification.trajectory.posterior import (
 from ppafo.identification.trajectory.problem import Range, Search, is_nuisance
 from ppafo.identification.trajectory.residuals import Floats
 from ppafo.identification.trajectory.search import Sensor, WhitenedFit, is_at_bound
-from ppafo.identification.trajectory.sensor_noise import Drift, SensorNoise, sensor_noise
 from ppafo.units import percentage
 
 ALARM = 5.0e-4

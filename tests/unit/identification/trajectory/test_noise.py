@@ -9,24 +9,15 @@ import pytest
 
 from benchmarks.intervals.calibration import FIVE_PARAMETERS, Task, repetition
 from benchmarks.intervals.noise_kinds import NOISE_KINDS, noise_kind
+from ppafo.identification.noise.choice import sensor_noise
+from ppafo.identification.noise.sensor_noise import Course, SensorNoise, course_of, without_common_stamps
+from ppafo.identification.noise.shapes import AutoRegression, Drift, from_coefficients, reflections_of
+from ppafo.identification.noise.t_distribution import t_likelihood, t_nodes
 from ppafo.identification.trajectory import Experiment, FreeParameter, TrajectoryProblem, fit
 from ppafo.identification.trajectory.information import inverse_with_root, solution
 from ppafo.identification.trajectory.posterior import LinearModel, _without_columns, draw_posterior
 from ppafo.identification.trajectory.residuals import Floats
 from ppafo.identification.trajectory.search import hum_of
-from ppafo.identification.trajectory.sensor_noise import (
-    AutoRegression,
-    Course,
-    Drift,
-    SensorNoise,
-    course_of,
-    from_coefficients,
-    reflections_of,
-    sensor_noise,
-    t_likelihood,
-    t_nodes,
-    without_common_stamps,
-)
 from ppafo.signals.recording import Channel, Recording
 
 COUNT = 500

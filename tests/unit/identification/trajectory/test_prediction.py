@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from ppafo.identification.noise.choice import sensor_noise
 from ppafo.identification.trajectory.prediction import Left, Ranking, log_density, rank
 from ppafo.identification.trajectory.residuals import Floats
-from ppafo.identification.trajectory.sensor_noise import sensor_noise
 
 TIME = np.arange(400) * 1e-3
 RISE = np.where(TIME > 0.02, np.exp(-(TIME - 0.02) / 0.04) * (TIME - 0.02) / 0.04, 0.0)

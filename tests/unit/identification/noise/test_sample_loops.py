@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from ppafo.engine.loading import array_module
-from ppafo.identification.trajectory import sample_loops
-from ppafo.identification.trajectory.sample_loops import (
+from ppafo.identification.noise import sample_loops
+from ppafo.identification.noise.sample_loops import (
     innovations,
     likelihood_left,
     mixture_likelihood,
@@ -18,7 +18,8 @@ from ppafo.identification.trajectory.sample_loops import (
     sum_of_innovations,
     sums_of_logs,
 )
-from ppafo.identification.trajectory.sensor_noise import from_coefficients, from_reflections, t_nodes
+from ppafo.identification.noise.shapes import from_coefficients, from_reflections
+from ppafo.identification.noise.t_distribution import t_nodes
 from tests.compilers_here import modules_of
 
 COUNT, WIDTH = 60, 3
