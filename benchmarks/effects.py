@@ -21,6 +21,7 @@ from ppafo.simulation.plan import plan_run
 
 ON = (
     "effects.line_resistance.area=10 mm^2",
+    "effects.second_virial.share=1",
     "effects.silencer.sonic_conductance=2e-8 m^3/(s Pa)",
     "effects.ice.blockage_per_gas=100 1/kg",
     "effects.leak_opening.pressure=30 kPa_d",

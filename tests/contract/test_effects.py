@@ -45,6 +45,7 @@ NARROW = f"{AREA}=4 mm^2"
 NAME, SHORT = "step-response", ("run.duration=0.3 s",)
 BOTTLE = "bottle.name=paper-co2-9oz"
 ICE = ("effects.ice.blockage_per_gas=3e4 1/kg", "effects.ice.melting_time=30 ms")
+REAL = "effects.second_virial.share=1"
 EXAMPLE = files("ppafo.examples") / "add-an-effect"
 
 
@@ -149,7 +150,11 @@ def test_a_linear_model_has_it_as_a_difference_of_two_runs_has() -> None:
 @pytest.mark.parametrize("name", [NAME, "proportional"])
 def test_an_exported_library_makes_the_numbers_of_a_run_that_python_makes(name: str, tmp_path: Path) -> None:
     is_walk = name == "proportional"
-    walked: Any = load_walk("proportional", [NARROW, *ICE]) if is_walk else load_scenario(name, (*SHORT, NARROW, *ICE))
+    walked: Any = (
+        load_walk("proportional", [NARROW, *ICE, REAL])
+        if is_walk
+        else load_scenario(name, (*SHORT, NARROW, *ICE, REAL))
+    )
     library = library_of(walked)
     places = {item.path: place for place, item in enumerate(library.settings)}
     assert {AREA, "effects.mesh.discharge_coefficient"} <= set(places)
@@ -165,6 +170,9 @@ def test_an_exported_library_makes_the_numbers_of_a_run_that_python_makes(name: 
     found, states, counts = (np.zeros(int(sizes[name])) for name in ("PARAMETERS", "STATES", "COUNTS"))
     built.prepare(*map(handed, (settings, found, states, counts)))
     assert found.tobytes() == batch.parameters[:, 0].tobytes()
+    rows = row_numbers(batch.program.state_rows())
+    for path in ("masses.mass_1", "masses.mass_2"):
+        assert batch.states[rows[path], 0] in states
 
 
 class Handed(ctypes.Structure):
@@ -180,20 +188,21 @@ def handed(values: Any) -> Handed:
 )
 def test_a_unit_has_its_settings_and_the_bits_of_python(tmp_path: Path) -> None:
     fmpy = importlib.import_module("fmpy")
-    scenario = load_scenario(NAME, (*SHORT, NARROW))
+    scenario = load_scenario(NAME, (*SHORT, NARROW, REAL))
     ((file, content),) = functional_unit(closed_loop(scenario), 2, ["linux64"]).items()
     (tmp_path / file).write_bytes(content)
-    moved = simulate(load_scenario(NAME, (*SHORT, f"{AREA}=7e-06 m^2")))
+    moved = simulate(load_scenario(NAME, (*SHORT, f"{AREA}=7e-06 m^2", REAL)))
     given = {"stop_time": scenario.duration, "step_size": scenario.output_interval, "start_values": {AREA: 7e-6}}
     found = fmpy.simulate_fmu(
-        str(tmp_path / file), output=["torque"], output_interval=scenario.output_interval, **given
+        str(tmp_path / file), output=["torque", "mass_1"], output_interval=scenario.output_interval, **given
     )
-    np.testing.assert_array_equal(found["torque"], moved.recording["torque"])
+    for name in ("torque", "mass_1"):
+        np.testing.assert_array_equal(found[name], moved.recording[name])
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
 def test_the_page_has_its_words_and_the_bits_of_python() -> None:
-    module = module_of(load_scenario(NAME, (*SHORT, NARROW, *ICE)))
+    module = module_of(load_scenario(NAME, (*SHORT, NARROW, *ICE, REAL)))
     (entry,) = [item for item in module.description["settings"] if item["key"] == AREA]
     assert entry["description"] == "open area of the mesh, 0 for none"
     assert AREA not in words()["labels"], "a page needs no words of its own for it"
@@ -201,8 +210,9 @@ def test_the_page_has_its_words_and_the_bits_of_python() -> None:
 
 
 def test_it_walks() -> None:
-    without, narrow, iced = (walk(load_walk("proportional", texts), 0.1) for texts in ((), (NARROW,), (NARROW, *ICE)))
-    for one, other in ((narrow, without), (iced, narrow)):
+    texts = ((), (NARROW,), (NARROW, *ICE), (NARROW, *ICE, REAL))
+    without, narrow, iced, real = (walk(load_walk("proportional", given), 0.1) for given in texts)
+    for one, other in ((narrow, without), (iced, narrow), (real, iced)):
         assert one.status.is_completed
         assert slower(one, other)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ppafo.engine.reference.solver import compare_with_reference
-from ppafo.errors import SimulationError
+from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.effects.leak_opening import LeakOpening, lifted
 from ppafo.model.effects.line_resistance import fed_through_line, prepare
 from ppafo.model.effects.spool_play import SpoolPlace, SpoolPlay, behind_play, settle
@@ -160,3 +160,61 @@ def test_a_line_counts_as_the_orifice_of_the_rig_does() -> None:
     alone = area_conductance(2e-5, 0.6, 1.289, 188.92, 293.15)
     assert row.resistance == pytest.approx(alone**-2, rel=0.02)
     assert fed_through_line(1.0, row) == pytest.approx(row.resistance**-0.5)
+
+
+REAL = ("effects.second_virial.share=1",)
+
+
+@pytest.mark.parametrize(
+    ("name", "texts"),
+    [
+        ("step-response", REAL),
+        ("torque-task-solenoid", (*REAL, "motion.kind=free", "run.duration=0.3 s")),
+        ("torque-task-proportional", (*REAL, *LINE, *PLAY, "run.duration=0.3 s")),
+    ],
+)
+def test_gas_that_is_not_ideal_in_the_lanes_is_that_of_the_reference_solver(name: str, texts: tuple[str, ...]) -> None:
+    agreement = compare_with_reference(plan_run(load_scenario(name, texts)))
+    assert agreement.angle < 2e-4
+    assert agreement.worst_pressure < 1e-3
+
+
+def test_gas_that_is_not_ideal_loses_no_mass_and_fills_a_chamber_with_two_percent_more() -> None:
+    ideal, real = (simulate(load_scenario("step-response", texts)).recording for texts in ((), REAL))
+    stored = real["mass_1"] + real["mass_2"]
+    balance = real["supplied_mass"] - real["vented_mass"] - (stored - stored[0])
+    assert np.abs(balance).max() < 1e-15
+    assert real["mass_1"][-1] / ideal["mass_1"][-1] == pytest.approx(1.025, abs=0.002)
+    assert real["pressure_1"][-1] == pytest.approx(ideal["pressure_1"][-1], rel=1e-3)
+
+
+def test_a_column_of_the_second_virial_coefficient_has_the_bits_and_the_gas_of_the_single_runs() -> None:
+    shares = np.array([0.0, 0.5, 1.0])
+    base = load_scenario("step-response", ("run.duration=0.3 s",))
+    names = ["gas_supplied", "gas_vented", "gas_imbalance"]
+    found = run_ensemble(base, {"effects.second_virial.share": shares}, names).metrics
+    for place, share in enumerate(shares.tolist()):
+        texts = ("run.duration=0.3 s", f"effects.second_virial.share={share}")
+        alone = simulate(load_scenario("step-response", texts)).metrics
+        assert [found[name][place] for name in names] == [alone[name].value for name in names]
+    assert np.diff(found["gas_supplied"]).min() > 0.0
+    assert np.abs(found["gas_imbalance"]).max() < 1e-15
+
+
+def test_a_linear_model_of_gas_that_is_not_ideal_is_a_difference_of_two_runs() -> None:
+    moving = ("controller.kind=constant", "controller.command=-0.4", "run.duration=0.3 s", *REAL)
+    rates = linearise("torque-task-proportional", 0.2, moving).rates
+    step = ("run.step=0.01 ms", "run.output_interval=0.01 ms")
+    found = simulate(load_scenario("torque-task-proportional", (*moving, *step))).recording
+    here = int(np.searchsorted(found.time, 0.2 - 1e-9))
+    slope = (found["pressure_2"][here + 20] - found["pressure_2"][here - 20]) / (40 * 1e-5)
+    assert rates[1] == pytest.approx(slope, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("texts", "what"),
+    [(THERMAL, "gas_model.kind=thermal"), (("supply_line.plantarflexion.droop=3e6 Pa s/kg",), r"\[supply_line\]")],
+)
+def test_gas_that_is_not_ideal_is_refused_where_it_has_no_step(texts: tuple[str, ...], what: str) -> None:
+    with pytest.raises(ScenarioError, match=f"effect 'second_virial'.*{what}.*effects.second_virial.share=0"):
+        plan_run(load_scenario("step-response", (*texts, *REAL)))

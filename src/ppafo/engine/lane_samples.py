@@ -238,7 +238,7 @@ TRACED_IN_WALKS: dict[str, str] = {
 REQUEST = "controller_state.request.torque"
 """Where a controller of walking keeps the torque that it wants, if it wants one."""
 TRUE_MASSES = {name: f"masses.{name}" for name in ("mass_1", "mass_2")}
-"""Where it has those that a recording has otherwise of gas with an energy balance."""
+"""Where it has those that a recording has otherwise of gas with an energy balance, or that is not ideal."""
 
 
 def measure_sample(rows: LaneRows, moment: str) -> list[str]:
@@ -271,7 +271,7 @@ def sample_lines(rows: LaneRows, moment: str) -> list[str]:
     add, program = rows.add, rows.program
     has_reference = program.has_reference and not program.walks
     wanted = f"{add(program.reference.value)}(reference, {moment} * timing.step)[0]" if has_reference else "0.0"
-    thermal = ("thermal", "masses") if program.is_thermal else ()
+    thermal = program.is_thermal
     warm = [f"thermal.temperature * (state.mass_{chamber} / masses.mass_{chamber})" for chamber in (1, 2)]
     values = {
         "number": "float(next_record)",
@@ -295,8 +295,9 @@ def sample_lines(rows: LaneRows, moment: str) -> list[str]:
         on_gait = [f"foot = {add(foot_in_gait)}(shank, {moment} * timing.step, state.angle)"]
         foot = {name: f"foot.{name}" for name in FootSample._fields}
     values |= {"foot": _row(add(FootSample), foot), "stride": _row(add(StrideSample), stride)}
+    of_gas = (*program.gas.parameters, *program.gas.states)
     return [
-        *[rows.load(group) for group in ("timing", "plant", "state", "result", "reference", *thermal, *groups)],
+        *[rows.load(group) for group in ("timing", "plant", "state", "result", "reference", *of_gas, *groups)],
         *present_pressures(rows),
         torque_line(rows, "state.angle"),
         f"wanted = {wanted}",
@@ -349,7 +350,7 @@ def _trace_lines(rows: LaneRows, moment: str) -> list[str]:
         return []
     # A trace with less room than samples keeps the last ones.
     place = "next_record // trace_every % trace.shape[0]"
-    paths = TRACED | walk_traces(rows.program) | (TRUE_MASSES if rows.program.is_thermal else {})
+    paths = TRACED | walk_traces(rows.program) | (TRUE_MASSES if rows.program.has_true_masses else {})
     keep = [f"trace[{place}, {row}, lane] = {paths.get(name, name)}" for row, name in enumerate(traced)]
     return [
         "if next_record % trace_every == 0:",

@@ -38,14 +38,16 @@ class GasScheme:
     """How the gas in both chambers goes through a step of two stages.
 
     ``loads`` are the groups that a step asks for from its begin on, ``stored`` has for groups of ``states`` what they
-    are called at its end. ``begun(program)`` is the row of the first stage, which the line ``begin(rows)`` makes as
-    ``gas``; ``first`` are its rates, and the flows of the second stage belong to the pressures ``ends``. ``add`` makes
-    ``fed``, the state with the gas of the step; ``move(rows, state, from, to)`` follows a vane that ends elsewhere than
-    assumed, ``work`` counts what the gas did on it.
+    are called at its end; ``start(plant, initial)`` makes the only group of states, None where there is none.
+    ``begun(program)`` is the row of the first stage, which the line ``begin(rows)`` makes as ``gas``; ``first`` are its
+    rates, and the flows of the second stage belong to the pressures ``ends``. ``add`` makes ``fed``, the state with the
+    gas of the step; ``move(rows, state, from, to)`` follows a vane that ends elsewhere than assumed, ``work`` counts
+    what the gas did on it.
     """
 
     parameters: Mapping[str, type]
     states: Mapping[str, type]
+    start: Callable[..., Any] | None
     loads: tuple[str, ...]
     stored: Mapping[str, str]
     begun: Callable[[Any], type]

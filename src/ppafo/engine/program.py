@@ -151,6 +151,11 @@ class Program:
     @property
     def is_thermal(self) -> bool:
         """True where the gas has an energy balance."""
+        return bool(self.gas.parameters)
+
+    @property
+    def has_true_masses(self) -> bool:
+        """True where the true masses of the gas stand beside what ``PlantState`` counts."""
         return bool(self.gas.states)
 
     @property
@@ -222,7 +227,7 @@ class Program:
     @property
     def keeps_volumes(self) -> bool:
         """True where the chamber volumes of a held vane are computed once; all other chambers are treated as moving."""
-        return self.is_held and not (self.is_thermal or self.has_lines or self.has_shape)
+        return self.is_held and not (self.has_true_masses or self.has_lines or self.has_shape)
 
     @property
     def hands_chambers_on(self) -> bool:
@@ -296,6 +301,27 @@ def link_effects(effects: Sequence[Effect], collector: Collector, own: Mapping[A
             collector.effects[law] = tuple(row for row in effect.rows if row in asked)
 
 
+class Composed(NamedTuple):
+    """A function of the model as Python calls it with effects: before its own arguments it takes ``needed`` rows."""
+
+    function: Callable[..., Any]
+    needed: tuple[str, ...]
+
+
+def composed_with(function: Callable[..., Any], effects: Sequence[Effect]) -> Composed | None:
+    """Return a function of the model with the laws of effects in it; None where no effect acts in it."""
+    if not effects:
+        return None
+    collector = SourceCollector("")
+    link_effects(effects, collector)
+    name = collector.add(function)
+    if name not in collector.needs:
+        return None
+    scope: dict[str, Any] = {"math": math, "namedtuple": namedtuple}
+    exec(collector.text(), scope)
+    return Composed(scope[name], tuple(collector.needs[name]))
+
+
 def python_place(
     place: Callable[..., Any], effects: Sequence[Effect], rows: Sequence[Any]
 ) -> Callable[..., Any] | None:
@@ -303,19 +329,13 @@ def python_place(
 
     Before its own arguments it takes the states of effects by name. Any other function of the model will do too.
     """
-    if not effects:
+    composed = composed_with(place, effects)
+    if composed is None:
         return None
     given = {effect.name: row for effect, row in zip(effects, rows, strict=True)}
-    collector = SourceCollector("")
-    link_effects(effects, collector)
-    name = collector.add(place)
-    if name not in collector.needs:
-        return None
-    scope: dict[str, Any] = {"math": math, "namedtuple": namedtuple}
-    exec(collector.text(), scope)
-    composed, needed = scope[name], collector.needs[name]
+    function, needed = composed
 
     def called(states: Mapping[str, Any], *own: float) -> Any:
-        return composed(*((given | dict(states))[row] for row in needed), *own)
+        return function(*((given | dict(states))[row] for row in needed), *own)
 
     return called

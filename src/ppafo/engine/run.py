@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from ppafo.engine.lane_step import MAXIMUM_PARTS
 from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_batch
 from ppafo.engine.led_leg import LedLeg
-from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program
-from ppafo.engine.rows import leaves, rebuilt, table
+from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program, composed_with
+from ppafo.engine.rows import leaf_paths, leaves, rebuilt, table
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import Pace
 from ppafo.engine.scheme.walking import DeviceShare, WalkState
@@ -20,7 +20,7 @@ from ppafo.model.effects.kind import Moment, State
 from ppafo.model.gait import Course, GaitSeries, GaitTiming
 from ppafo.model.leg import LegParameters
 from ppafo.model.orifice import ExactOrifice
-from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, chamber_pressures
+from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_pressures
 from ppafo.model.plant_faults import POWERED, PlantFaults, ShutOff
 from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters
@@ -134,12 +134,11 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, *leg, *run.effects]
     parameters = table([timing, *plant, *valve, *rest], runs)
     controller_state = NoParameters() if program.controller is None else program.controller.initial
-    # The gas begins at the reference temperature, where its true mass is what the state counts.
-    masses = initial_masses(run.initial) if program.is_thermal else NoParameters()
     result = LaneResult(command=0.0, failure_time=NEVER_FAILED, too_many_parts=0.0)
     further = [*walk_states, *line_states, *states_at_start(run)]
     states = table(
-        [result, Pace(run.step), run.initial, masses, program.valve.initial(), controller_state, *further], runs
+        [result, Pace(run.step), run.initial, gas_at_start(run), program.valve.initial(), controller_state, *further],
+        runs,
     )
     counts = np.empty((runs, 6))
     numbers = (run.needs_parts, run.step_count, run.steps_per_sample, run.record_every, signal_steps, command_steps)
@@ -178,16 +177,33 @@ def _program_and_clock(program: Program, counts: Floats) -> tuple[Program, Clock
     return own, Clock(int(step_count), int(steps_per_sample), every, int(signal_delay), int(command_delay))
 
 
-def initial_masses(initial: PlantState) -> ThermalState:
-    """True masses of gas at the reference temperature, and no energy yet."""
-    return ThermalState(
-        mass_1=initial.mass_1,
-        mass_2=initial.mass_2,
-        supplied_content=0.0,
-        vented_content=0.0,
-        heat_content=0.0,
-        gas_work=0.0,
-    )
+def gas_at_start(run: Run) -> Any:
+    """State that the gas of a run has beside ``PlantState`` at its beginning; of columns for each run."""
+    program, start = run.program, run.program.gas.start
+    if start is None:
+        return NoParameters()
+    composed = composed_with(start, program.effects)
+    if composed is None:
+        return start(run.plant, run.initial)
+    rows = dict(zip((effect.name for effect in program.effects), run.effects, strict=True))
+    types = [*(program.effect_rows[name] for name in composed.needed), program.actuator.plant, PlantState]
+    given = [*(rows[name] for name in composed.needed), run.plant, run.initial]
+    counts = [len(leaves(row)) for row in given]
+
+    def alone(*values: float) -> Any:
+        rest = iter(values)
+        parts = [rebuilt(kind, [next(rest) for _ in range(count)]) for kind, count in zip(types, counts, strict=True)]
+        return composed.function(*parts)
+
+    return over_runs(alone, *(number for row in given for number in leaves(row)))
+
+
+def gas_by_path(run: Run) -> dict[str, Any]:
+    """Numbers of the gas of a run at its beginning, by their paths among the rows of states."""
+    found = {"state.mass_1": run.initial.mass_1, "state.mass_2": run.initial.mass_2}
+    for name, row in run.program.gas.states.items():
+        found |= dict(zip(leaf_paths(row, name), leaves(gas_at_start(run)), strict=True))
+    return found
 
 
 def states_at_start(run: Run) -> list[Any]:

@@ -45,6 +45,7 @@ EFFECTS: Kinds[Effect] = Kinds(
     {
         "restitution": restitution.EFFECT,
         "line_resistance": "ppafo.model.effects.line_resistance:EFFECT",
+        "second_virial": "ppafo.model.effects.second_virial:EFFECT",
         "silencer": "ppafo.model.effects.silencer:EFFECT",
         "ice": "ppafo.model.effects.ice:EFFECT",
         "leak_opening": "ppafo.model.effects.leak_opening:EFFECT",

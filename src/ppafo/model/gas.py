@@ -1,9 +1,8 @@
 """Gases: the constants of orifice flow that follow from them, and gas that is not isothermal.
 
 The energy of a chamber changes with the enthalpy of the gas that flows in or out, the work of the moving wall and the
-heat through it: ``dE/dt = sum of m_dot h_up - P dV/dt + h A (T_wall - T)``. The equation of state is the virial one cut
-after its second term, ``P = rho R T (1 + b rho)`` with a constant ``b``; for a constant ``b`` the internal energy is
-that of the ideal gas, so energy and state agree with each other. With ``b = 0`` all of it is the ideal gas.
+heat through it: ``dE/dt = sum of m_dot h_up - P dV/dt + h A (T_wall - T)``. Gas that is not ideal is
+``effects/second_virial.py``.
 """
 
 import math
@@ -79,28 +78,6 @@ def gas_energy(mass: float, temperature: float, heat_capacity: float) -> float:
 def heat_capacity_at_constant_volume(gas_constant: float, heat_capacity_ratio: float) -> float:
     """Specific heat c_v = R/(k - 1) [J/(kg K)] of an ideal gas; ``gas_constant`` is the specific one."""
     return gas_constant / (heat_capacity_ratio - 1.0)
-
-
-def real_gas_factor(density: float, virial: float) -> float:
-    """Compressibility Z = 1 + b rho [-] at a density [kg/m^3]; ``virial`` is b [m^3/kg], below 0 for CO2."""
-    return 1.0 + virial * density
-
-
-def real_pressure(mass: float, volume: float, temperature: float, gas_constant: float, virial: float) -> float:
-    """Absolute pressure [Pa] of ``mass`` [kg] in ``volume`` [m^3]; equation (3) times the real-gas factor."""
-    density = mass / volume
-    return density * gas_constant * temperature * real_gas_factor(density, virial)
-
-
-def real_density(pressure: float, temperature: float, gas_constant: float, virial: float) -> float:
-    """Density [kg/m^3] at an absolute pressure [Pa]; the inverse of ``real_pressure``, by its smaller root."""
-    product = gas_constant * temperature
-    return 2.0 * pressure / (product * (1.0 + math.sqrt(1.0 + 4.0 * virial * pressure / product)))
-
-
-def gas_enthalpy(temperature: float, density: float, gas_constant: float, heat_capacity: float, virial: float) -> float:
-    """Specific enthalpy [J/kg], internal energy and P/rho; c_p T for an ideal gas. ``heat_capacity`` is c_v."""
-    return temperature * (heat_capacity + gas_constant * real_gas_factor(density, virial))
 
 
 def heat_from_wall(temperature: float, wall_temperature: float, heat_transfer_coefficient: float, area: float) -> float:

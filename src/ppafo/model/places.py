@@ -48,3 +48,13 @@ def friction_at_rest(torque: float, pressure_1: float, pressure_2: float) -> flo
 def friction_in_motion(torque: float, angular_velocity: float, pressure_1: float, pressure_2: float) -> float:
     """Size of friction in motion [N m], from the dynamic one; rate [rad/s], absolute pressures [Pa]. Equation (10)."""
     return torque
+
+
+def gas_density(density: float) -> float:
+    """Density [kg/m^3] of the gas in a chamber, from that of an ideal gas at its pressure. Equation (3)."""
+    return density
+
+
+def ideal_density(density: float) -> tuple[float, float]:
+    """The inverse of ``gas_density`` [kg/m^3], and how it grows with the density [-]. Equation (3)."""
+    return density, 1.0

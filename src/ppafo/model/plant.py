@@ -90,6 +90,13 @@ class ThermalState(NamedTuple):
     gas_work: float
 
 
+class TrueMasses(NamedTuple):
+    """True masses of the gas in both chambers [kg] where it is not ideal: ``PlantState`` counts it by its pressure."""
+
+    mass_1: float
+    mass_2: float
+
+
 class Openings(NamedTuple):
     """Fraction of the valve's full area that joins each chamber to the source and to the atmosphere, each 0 to 1."""
 

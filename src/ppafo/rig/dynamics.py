@@ -7,15 +7,8 @@ chamber with its own orifice, a laminar part of the leak, friction that grows wi
 import math
 from typing import NamedTuple
 
-from ppafo.model.gas import (
-    energy_rate,
-    gas_enthalpy,
-    gas_temperature,
-    heat_from_wall,
-    real_density,
-    real_pressure,
-    temperature_flow_factor,
-)
+from ppafo.model.effects.second_virial import gas_enthalpy, real_density, real_pressure
+from ppafo.model.gas import energy_rate, gas_temperature, heat_from_wall, temperature_flow_factor
 from ppafo.model.orifice import ExactOrifice, exact_flow
 from ppafo.model.plant import (
     Openings,

@@ -21,7 +21,8 @@ from ppafo.documents.json_text import json_text
 from ppafo.engine.run import Run
 from ppafo.errors import DataError, ParameterError, ScenarioError, nearest_name, one_line, reason
 from ppafo.model.catalog import VALVES
-from ppafo.model.gas import gas_energy, real_density
+from ppafo.model.effects.second_virial import real_density
+from ppafo.model.gas import gas_energy
 from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import chamber_volumes
 from ppafo.parameters import load_device

@@ -24,6 +24,7 @@ from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, refu
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION, Effect
+from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.model.gas import heat_capacity_at_constant_volume
 from ppafo.model.orifice import ExactOrifice, area_conductance
 from ppafo.model.plant import PlantParameters
@@ -291,9 +292,6 @@ class Outcome:
 
 
 TWO_PI = 6.283185307179586
-
-SECOND_VIRIAL = {"CO2": -123.0e-6, "air": -7.4e-6, "N2": -4.5e-6, "He": 11.8e-6}
-"""Second virial coefficient [m^3/mol] of every gas that a set can name, at 298 K, rounded; from handbooks."""
 
 
 def real_device(device: Device, preset: Preset) -> Device:

@@ -4,7 +4,7 @@ What the numbers come to is pure functions of one run or of columns of runs: Pyt
 library has them in C.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -16,6 +16,7 @@ from ppafo.control.fixed.torque_laws import FIXED_LAWS
 from ppafo.control.fixed.whole_numbers import SETTINGS, Converter, converter_of
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.engine.led_leg import GAIT_SHANK, LedLeg
+from ppafo.engine.pieces import GasScheme
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.rows import leaves, rebuilt
 from ppafo.engine.run import Lines, Run, Walk
@@ -39,9 +40,11 @@ from ppafo.model.columns import (
     truncated,
     whole,
 )
+from ppafo.model.effects.kind import Effect
 from ppafo.model.gas import wall_exchange
 from ppafo.model.leg import FootLoad
 from ppafo.model.orifice import ExactOrifice
+from ppafo.model.places import gas_density
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_mass, chamber_volumes
 from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import SensorParameters
@@ -164,6 +167,7 @@ def compose_run(pieces: Pieces, plant: PlantParameters, rule: StepRule, start: S
 
 
 _ENERGY_BALANCE = "ppafo.engine.scheme.thermal_gas:ENERGY_BALANCE"
+_REAL = "ppafo.engine.scheme.real_gas:REAL"
 _LINES = "ppafo.engine.scheme.supply_lines:LINES"
 _WALKING = "ppafo.engine.scheme.walking:"
 """Where pieces of programs are that most runs do not have."""
@@ -175,9 +179,27 @@ def _leg_scheme(walk: Walk) -> str:
     return f"{_WALKING}{which}" if walk.failing is None else f"{_WALKING}FAILING_{which}"
 
 
+def _gas_scheme(pieces: Pieces, effects: Sequence[Effect]) -> GasScheme:
+    """Return what the gas keeps or exchanges; ScenarioError for an effect on the density of gas that has no step."""
+    real = next((effect for effect in effects if gas_density in effect.laws), None)
+    if real is None:
+        return ISOTHERMAL if pieces.thermal is None else kind_at(_ENERGY_BALANCE)
+    lacks = {
+        "gas_model.kind=thermal": pieces.thermal is not None,
+        "[supply_line]": pieces.supply_lines is not None,
+        f"actuator.kind={pieces.device.actuator.kind}": ACTUATORS[pieces.device.actuator.kind].model.shape is not None,
+    }
+    for what, is_there in lacks.items():
+        if is_there:
+            off = " and ".join(f"{real.section}.{name}=0" for name in real.switch)
+            raise ScenarioError(f"effect '{real.name}' does not work together with {what} yet; omit it, or set {off}")
+    scheme: GasScheme = kind_at(_REAL)
+    return scheme
+
+
 def _program(pieces: Pieces, steps: Steps, walk: Walk | None, has_delay: bool) -> Program:
     """Return what the lanes are composed of."""
-    is_late = first(pieces.signal_delay) > 0.0
+    is_late, effects = first(pieces.signal_delay) > 0.0, effects_of(pieces.device, pieces.sections)
     return Program(
         actuator=ACTUATORS[pieces.device.actuator.kind].model,
         valve=pieces.valve,
@@ -188,12 +210,12 @@ def _program(pieces: Pieces, steps: Steps, walk: Walk | None, has_delay: bool) -
         late_commands=has_delay,
         late_signals=walk is None and is_late,
         late_readings=walk is not None and is_late,
-        gas=ISOTHERMAL if pieces.thermal is None else kind_at(_ENERGY_BALANCE),
+        gas=_gas_scheme(pieces, effects),
         leg=None if walk is None else kind_at(_leg_scheme(walk)),
         feed=None if pieces.supply_lines is None else kind_at(_LINES),
         is_adaptive=bool(first(steps.needs_parts)),
         samples_inside=bool(first(steps.record_every % 1.0)),
-        effects=effects_of(pieces.device, pieces.sections),
+        effects=effects,
         shank=None if pieces.leg is None else shank_kind(pieces.leg),
     )
 

@@ -281,12 +281,12 @@ def gas_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tu
         line_1, line_2 = line_pressures(run.lines.parameters, run.plant.gas_product, lines)
         found |= {"line_pressure_1": (np.asarray(line_1), "Pa"), "line_pressure_2": (np.asarray(line_2), "Pa")}
         found["regulated_mass"] = (np.asarray(lines.regulated_mass), "kg")
+    if run.program.has_true_masses:
+        found |= {name: (rows[f"masses.{name}"], "kg") for name in ("mass_1", "mass_2")}
     if not run.program.is_thermal:
         return found
     for chamber in (1, 2):
-        mass = rows[f"masses.mass_{chamber}"]
-        warmth = rows[f"state.mass_{chamber}"] / mass
-        found[f"mass_{chamber}"] = (mass, "kg")
+        warmth = rows[f"state.mass_{chamber}"] / rows[f"masses.mass_{chamber}"]
         found[f"temperature_{chamber}"] = (gas.temperature * warmth, "K")
     per_content = energy_per_content(run.plant.gas_product, gas.heat_capacity_ratio)
     found["gas_energy"] = (per_content * (rows["state.mass_1"] + rows["state.mass_2"]), "J")

@@ -8,11 +8,11 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from ppafo.engine.reference.right_hand_side import free_motion
+from ppafo.engine.reference.right_hand_side import free_motion, real_gas_rates
 from ppafo.engine.scheme.thermal_gas import ThermalFlows, thermal_flows
 from ppafo.errors import SimulationError
 from ppafo.model.orifice import orifice_flow
-from ppafo.model.places import way_across
+from ppafo.model.places import gas_density, way_across
 from ppafo.model.plant import (
     Openings,
     PlantParameters,
@@ -115,7 +115,13 @@ def gas_rates(
     """
     flows = symbolic(gas_flows, PlantParameters, Openings, float, float, around=around, compare=compare, acting=acting)
     found = flows(plant, openings, *pressures)
-    slopes = _pressure_rates(plant, angle, rate, pressures, (found.mass_1, found.mass_2), acting)
+    gained = found.mass_1, found.mass_2
+    if any(gas_density in effect.laws for effect in acting or ()):
+        types = (PlantParameters, float, float, float, float, float, float)
+        gained = symbolic(real_gas_rates, *types, compare=compare, acting=acting)(
+            plant, angle, rate, *gained, *_contents(plant, angle, pressures, acting)
+        )
+    slopes = _pressure_rates(plant, angle, rate, pressures, gained, acting)
     return PlantRates(
         pressure_1=slopes[0],
         pressure_2=slopes[1],
@@ -138,8 +144,7 @@ def thermal_gas_rates(
     acting: Acting | None = None,
 ) -> PlantRates:
     """As ``gas_rates`` for gas with an energy balance at temperatures [K]."""
-    per_mass = symbolic(pressures_per_mass, PlantParameters, float, acting=acting)(plant, angle)
-    content_1, content_2 = (pressure / factor for pressure, factor in zip(pressures, per_mass, strict=True))
+    content_1, content_2 = _contents(plant, angle, pressures, acting)
     mass_1, mass_2 = (
         content * thermal.temperature / warm for content, warm in zip((content_1, content_2), temperatures, strict=True)
     )
@@ -169,6 +174,12 @@ def thermal_gas_rates(
         supplied=found.supplied,
         vented=found.supplied - found.mass_1 - found.mass_2,
     )
+
+
+def _contents(plant: PlantParameters, angle: Any, pressures: tuple[Any, Any], acting: Acting | None) -> tuple[Any, Any]:
+    """What ``PlantState`` counts of the gas [kg] at two absolute pressures [Pa]. Equation (3)."""
+    per_mass = symbolic(pressures_per_mass, PlantParameters, float, acting=acting)(plant, angle)
+    return pressures[0] / per_mass[0], pressures[1] / per_mass[1]
 
 
 def _pressure_rates(

@@ -6,10 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ppafo.model.gas import SPECIES
 from ppafo.rig import record
 from ppafo.rig.dynamics import RigState
-from ppafo.rig.preset import SECOND_VIRIAL, Preset, load_preset
+from ppafo.rig.preset import Preset, load_preset
 from ppafo.rig.solution import RigRun, RigSolution, solve_rig, spool_position
 from ppafo.running import simulate
 
@@ -166,11 +165,6 @@ def test_play_swallows_small_reversals_and_still_reaches_full_opening(
     position: float, command: float, expected: float
 ) -> None:
     assert spool_position(position, command, 0.1) == pytest.approx(expected)
-
-
-def test_every_gas_has_a_second_virial_coefficient_of_a_likely_size() -> None:
-    assert set(SECOND_VIRIAL) == set(SPECIES)
-    assert SECOND_VIRIAL["CO2"] < SECOND_VIRIAL["air"] < SECOND_VIRIAL["N2"] < 0.0 < SECOND_VIRIAL["He"]
 
 
 def test_a_real_gas_takes_two_percent_more_to_fill_a_chamber(perfect: Preset, on_the_rig: OnTheRig) -> None:

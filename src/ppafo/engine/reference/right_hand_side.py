@@ -8,6 +8,7 @@ from ppafo.engine.led_leg import torque_lines
 from ppafo.engine.loading import ARRAY, FLOAT, HEADER, INLINE, entry_text
 from ppafo.engine.program import NoParameters, Program, link_program
 from ppafo.engine.rows import leaf_paths, row_expression
+from ppafo.engine.scheme.real_gas import content_rate
 from ppafo.engine.source_text import SourceCollector, woven
 from ppafo.model.effects.kind import Moment
 from ppafo.model.leg import FootLoad
@@ -78,6 +79,24 @@ def gas_rates(
         supplied=source_1 + source_2,
         vented=vent_1 + vent_2,
         leaked=abs(leak),
+    )
+
+
+def real_gas_rates(
+    plant: PlantParameters,
+    angle: float,
+    angular_velocity: float,
+    flow_1: float,
+    flow_2: float,
+    content_1: float,
+    content_2: float,
+) -> tuple[float, float]:
+    """Rates of both contents [kg/s] of gas that is not ideal, from the flows into its chambers. Equation (3)."""
+    volume_1, volume_2 = chamber_volumes(plant, angle)
+    growth = plant.volume_per_angle * angular_velocity
+    return (
+        content_rate(content_1, volume_1, growth, flow_1),
+        content_rate(content_2, volume_2, -growth, flow_2),
     )
 
 
@@ -289,12 +308,11 @@ def gas_lines(program: Program, add: Callable[..., str]) -> list[str]:
     if not program.is_thermal:
         if joint is not None:
             joined.append(f"gas = {add(joined_gas_rates)}(gas, valve_orifice, joined, pressure_1, pressure_2)")
-        return [
-            f"gas = {add(gas_rates)}(plant, {orifices}, pressure_1, pressure_2)",
-            *joined,
-            "slopes[2] = gas.mass_1",
-            "slopes[3] = gas.mass_2",
-        ]
+        rates = [f"gas = {add(gas_rates)}(plant, {orifices}, pressure_1, pressure_2)", *joined]
+        if not program.has_true_masses:
+            return [*rates, "slopes[2] = gas.mass_1", "slopes[3] = gas.mass_2"]
+        moved = f"{add(real_gas_rates)}(plant, angle, rate, gas.mass_1, gas.mass_2, y[2], y[3])"
+        return [*rates, f"slopes[2], slopes[3] = {moved}"]
     given = "(y[2], y[3]), (y[7], y[8]), angle, rate"
     if joint is not None:
         across = "valve_orifice, joined, pressure_1, pressure_2, y[2] / y[7], y[3] / y[8]"

@@ -40,6 +40,7 @@ def _second(rows: Any, gas: str) -> Second:
 ISOTHERMAL = GasScheme(
     parameters={},
     states={},
+    start=None,
     loads=(),
     stored={},
     begun=lambda program: StillGas if program.keeps_volumes else MovingGas,

@@ -511,6 +511,18 @@ def with_work(plant: PlantParameters, masses: ThermalState, before: PlantState, 
     )
 
 
+def masses_at_start(_plant: PlantParameters, initial: PlantState) -> ThermalState:
+    """True masses [kg] of gas at the reference temperature, where they are what the state counts, and no energy yet."""
+    return ThermalState(
+        mass_1=initial.mass_1,
+        mass_2=initial.mass_2,
+        supplied_content=0.0,
+        vented_content=0.0,
+        heat_content=0.0,
+        gas_work=0.0,
+    )
+
+
 def _second(rows: Any, gas: str) -> Second:
     add = rows.add
     return Second(
@@ -524,6 +536,7 @@ def _second(rows: Any, gas: str) -> Second:
 ENERGY_BALANCE = GasScheme(
     parameters={"thermal": ThermalParameters},
     states={"masses": ThermalState},
+    start=masses_at_start,
     loads=("thermal", "masses"),
     stored={"masses": "warmed"},
     begun=lambda _program: ThermalGas,

@@ -10,7 +10,7 @@ from ppafo.engine.lane_rows import indent
 from ppafo.engine.lanes import RECORDED_ANGLE, Segment
 from ppafo.engine.program import LaneResult, LaneTiming, Program
 from ppafo.engine.rows import leaf_paths, numbers, row_expression
-from ppafo.engine.run import NEVER_FAILED, initial_masses, moment_at_start, whole_and_rest
+from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
 from ppafo.engine.scheme.motion import Pace
 from ppafo.engine.source_text import Collector, woven
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
@@ -241,8 +241,8 @@ class Writing:
         program, add = self.program, self.add
         yield f"result = {add(LaneResult)}(0.0, {NEVER_FAILED!r}, 0.0)"
         yield f"pace = {add(Pace)}(step)"
-        if program.is_thermal:
-            yield f"masses = {add(initial_masses)}(state)"
+        if program.gas.start is not None:
+            yield f"masses = {add(program.gas.start)}(plant, state)"
         yield f"valve_state = {add(program.valve.initial)}()"
         if program.controller is not None:
             yield f"controller_state = {self.constant(program.controller.initial, 'controller_state')}"

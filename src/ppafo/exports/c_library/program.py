@@ -23,7 +23,14 @@ from ppafo.engine.source_text import Collector, SourceCollector, woven
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import WALK, MetricKind, Readings
 from ppafo.model.columns import over_runs
-from ppafo.simulation.ensemble.running import ThermalTotals, Totals, has_channels, thermal_totals, totals
+from ppafo.simulation.ensemble.running import (
+    ThermalTotals,
+    Totals,
+    has_channels,
+    real_totals,
+    thermal_totals,
+    totals,
+)
 
 
 def for_one_run(function: FunctionType, tree: ast.FunctionDef) -> ast.FunctionDef:
@@ -239,7 +246,10 @@ def metrics_entry(item: ExportedProgram, collector: Collector) -> str:
     """The metrics of a run, from its first and its last states."""
     program, groups = item.program, item.program.state_rows()
     names = [kind.name for kind in program.meters]
-    kind, make = (ThermalTotals, thermal_totals) if program.is_thermal else (Totals, totals)
+    kind: Any = ThermalTotals if program.is_thermal else Totals
+    make: Callable[..., Any] = thermal_totals if program.is_thermal else totals
+    if program.has_true_masses and not program.is_thermal:
+        make = real_totals
     further = ", plant, thermal" if program.is_thermal else ""
     parameters = program.parameter_rows()
     given = ("plant", *program.gas.parameters, *(effect.name for effect in program.effects))
@@ -248,7 +258,7 @@ def metrics_entry(item: ExportedProgram, collector: Collector) -> str:
     add = collector.add
     for array in ("first", "states"):
         state = _loaded("state", groups, array, collector)
-        masses = f", {_loaded('masses', groups, array, collector)}" if program.is_thermal else ""
+        masses = f", {_loaded('masses', groups, array, collector)}" if program.has_true_masses else ""
         lines.append(f"{array}_total = {add(make)}({state}{masses}{further})")
     gains = ", ".join(f"{name}=states_total.{name} - first_total.{name}" for name in kind._fields)
     meters = ", ".join(

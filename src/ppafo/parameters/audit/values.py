@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import UnitError
 from ppafo.model.declaration import Quantity
+from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.audit.evidence import Evidence, Finding, Side
 from ppafo.parameters.declaration import is_within
@@ -208,9 +209,6 @@ def _differs(evidence: Evidence, path: str, value: float, expected: float, sourc
 
 # How much gas does the ideal gas law miscount at supply pressure? Equation (3).
 
-SECOND_VIRIAL_COEFFICIENT = {"CO2": -123e-6, "N2": -4.5e-6, "air": -7.5e-6, "He": 11.8e-6}
-"""m^3/mol at 298 K; J. H. Dymond and E. B. Smith, The Virial Coefficients of Pure Gases and Mixtures, 1980."""
-
 _TABULATED_TEMPERATURE = 298.0
 _TEMPERATURE_ROOM = 20.0
 _WORTH_A_WARNING = 0.05
@@ -220,7 +218,7 @@ _SUPPLY = "supply.pressure"
 def check_ideal_gas(evidence: Evidence) -> Iterator[Finding]:
     """Yield a note on the error of the ideal gas law at supply pressure, a warning where it exceeds 5 %."""
     gas, pressure = evidence.gas(), evidence.number(_SUPPLY)
-    virial = SECOND_VIRIAL_COEFFICIENT.get(evidence.text("gas.species") or "")
+    virial = SECOND_VIRIAL.get(evidence.text("gas.species") or "")
     if gas is None or pressure is None or virial is None:
         return
     if abs(gas.temperature - _TABULATED_TEMPERATURE) > _TEMPERATURE_ROOM:

@@ -17,7 +17,7 @@ import numpy as np
 from ppafo.engine.lane_rows import lanes_of
 from ppafo.engine.lanes import Floats, LaneBlock, begin_block
 from ppafo.engine.rows import row_numbers
-from ppafo.engine.run import NEVER_FAILED, Run, batch_of
+from ppafo.engine.run import NEVER_FAILED, Run, batch_of, gas_by_path
 from ppafo.engine.scheme.walking import foot_direction
 from ppafo.errors import SimulationError
 from ppafo.model.contact import foot_angle
@@ -261,3 +261,8 @@ def _impose(run: Run, column: Floats, rows: Mapping[str, int], strike: Strike) -
         if true is not None:
             column[true] *= mass / column[rows[f"state.mass_{chamber}"]]
         column[rows[f"state.mass_{chamber}"]] = mass
+    if run.program.has_true_masses and not run.program.is_thermal:
+        masses = {f"mass_{chamber}": float(column[rows[f"state.mass_{chamber}"]]) for chamber in "12"}
+        imposed = replace(run, initial=run.initial._replace(angle=strike.angle, **masses))
+        for path, number in gas_by_path(imposed).items():
+            column[rows[path]] = number

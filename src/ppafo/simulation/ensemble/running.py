@@ -12,14 +12,14 @@ from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import Batch, BatchResult, Floats, add_meters, group_of, meters_of, run_blocks
 from ppafo.engine.led_leg import GAIT_SHANK
 from ppafo.engine.program import Program
-from ppafo.engine.rows import row_numbers
+from ppafo.engine.rows import leaf_paths, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.errors import ScenarioError
 from ppafo.metrics import METRICS
 from ppafo.metrics.gas import ENERGIES
 from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, WALK, MetricKind, Readings
 from ppafo.model.gas import energy_per_content
-from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
+from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, TrueMasses
 from ppafo.simulation.sampled import run_in_turn
 from ppafo.simulation.scenario import FreeMotion, Scenario, worn_kind
 from ppafo.simulation.simulate import OPEN_LOOP
@@ -55,8 +55,7 @@ class ThermalTotals(NamedTuple):
 
 
 _OF_STATE = tuple(f"state.{name}" for name in Totals._fields)
-_OF_MASSES = tuple(f"masses.{name}" for name in ThermalState._fields)
-"""Paths of the numbers that totals are made of; those of the true masses with an energy balance only."""
+"""Paths of the numbers that totals are made of, beside the true masses where there are any."""
 
 
 def totals(state: PlantState) -> Totals:
@@ -67,6 +66,17 @@ def totals(state: PlantState) -> Totals:
         leaked_mass=state.leaked_mass,
         mass_1=state.mass_1,
         mass_2=state.mass_2,
+    )
+
+
+def real_totals(state: PlantState, masses: TrueMasses) -> Totals:
+    """Gas [kg] of a state that is not ideal; its numbers may be arrays (runs,)."""
+    return Totals(
+        supplied_mass=state.supplied_mass,
+        vented_mass=state.vented_mass,
+        leaked_mass=state.leaked_mass,
+        mass_1=masses.mass_1,
+        mass_2=masses.mass_2,
     )
 
 
@@ -207,9 +217,11 @@ def _totals(program: Program, parameters: Floats, states: Floats) -> dict[str, F
     """Gas in the chambers and totals of each run, by channel."""
     groups = program.state_rows()
     state = group_of("state", groups, states)
-    if not program.is_thermal:
+    if not program.has_true_masses:
         return totals(state)._asdict()
     masses = group_of("masses", groups, states)
+    if not program.is_thermal:
+        return real_totals(state, masses)._asdict()
     groups = program.parameter_rows()
     plant, thermal = (group_of(name, groups, parameters) for name in ("plant", "thermal"))
     return thermal_totals(state, masses, plant, thermal)._asdict()
@@ -280,7 +292,7 @@ def _late_totals(plain: Batch, metrics: Mapping[str, MetricKind]) -> tuple[str, 
     needed = {channel for kind in metrics.values() for channel in kind.channels}
     if ends_there or needed.isdisjoint(ThermalTotals._fields):
         return ()
-    return (*_OF_STATE, *_OF_MASSES) if program.is_thermal else _OF_STATE
+    return (*_OF_STATE, *(path for name, row in program.gas.states.items() for path in leaf_paths(row, name)))
 
 
 def intervals(batch: Batch) -> Floats:

@@ -4,6 +4,7 @@ Gas here and skeleton there: a device's torque and OpenSim's ankle are exchanged
 """
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
@@ -13,7 +14,7 @@ import opensim
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.engine.lanes import begin_block
 from ppafo.engine.rows import row_numbers
-from ppafo.engine.run import NEVER_FAILED, Run, batch_of
+from ppafo.engine.run import NEVER_FAILED, Run, batch_of, gas_by_path
 from ppafo.errors import DataError, ScenarioError, SimulationError, nearest_name, one_line
 from ppafo.exports.opensim.add_device import add_actuator, check_coordinate, line, read_model
 from ppafo.model.plant import actuator_torque, chamber_pressures
@@ -167,9 +168,8 @@ class DeviceAtAnkle:
         self._path = [row_numbers(self._batch.program.parameter_rows())[name] for name in _PATH]
         rows = row_numbers(self._batch.program.state_rows())
         self._command, self._failure = rows["result.command"], rows["result.failure_time"]
+        self._run, self._rows = run, rows
         self._state = [rows[f"state.{name}"] for name in ("angle", "mass_1", "mass_2")]
-        # True masses, which gas with an energy balance has beside those at the reference temperature.
-        self._true = [rows[path] for path in ("masses.mass_1", "masses.mass_2") if path in rows]
         self._supplied = rows["state.supplied_mass"]
 
     def begin(self, angle: float) -> None:
@@ -178,9 +178,9 @@ class DeviceAtAnkle:
         self.taken = 0
         self._block = begin_block(self._batch)
         state = vented_state(self._fed, angle, 0.0)
-        self._block.states[self._state, 0] = state.angle, state.mass_1, state.mass_2
-        if self._true:
-            self._block.states[self._true, 0] = state.mass_1, state.mass_2
+        self._block.states[self._rows["state.angle"], 0] = state.angle
+        for path, number in gas_by_path(replace(self._run, initial=state)).items():
+            self._block.states[self._rows[path], 0] = number
 
     def pressures(self) -> tuple[float, float]:
         """Absolute pressures [Pa] in both chambers."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ppafo.control.walking.assistance import TorqueProfile, profile_torque
 from ppafo.engine.lanes import Batch, Floats, run_batch
 from ppafo.engine.rows import row_numbers
-from ppafo.engine.run import NEVER_FAILED, Run, Walk, batch_of
+from ppafo.engine.run import NEVER_FAILED, Run, Walk, batch_of, gas_by_path
 from ppafo.errors import SimulationError
 from ppafo.gait import Gait
 from ppafo.model import contact as ground
@@ -521,7 +521,8 @@ def _with_devices(run: Run, batch: Batch, plants: list[PlantParameters]) -> Batc
     parameters[rows["share.viscous_damping"]] = damping
     for draw, plant in enumerate(plants):
         begin = vented_state(plant, states[state_rows["state.angle"], draw], 0.0)
-        states[state_rows["state.mass_1"], draw], states[state_rows["state.mass_2"], draw] = begin.mass_1, begin.mass_2
+        for path, number in gas_by_path(replace(run, plant=plant, initial=begin)).items():
+            states[state_rows[path], draw] = number
     return Batch(batch.program, replace(batch.clock, record_every=run.record_every), parameters, states)
 
 

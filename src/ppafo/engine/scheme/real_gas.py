@@ -1,0 +1,162 @@
+"""Gas of one temperature whose pressure is not in proportion to its density: the step of ``pneumatics`` on true masses.
+
+``PlantState`` counts the gas as its content, ``P V M / (R T_0)``, so that all that reads pressures stays as it is; the
+true masses stand beside it. The equation of state is that of the places ``gas_density`` and ``ideal_density``.
+"""
+
+from typing import Any, NamedTuple
+
+from ppafo.engine.pieces import GasScheme, Second
+from ppafo.engine.scheme.pneumatics import (
+    SHORTEST,
+    Flows,
+    GasChange,
+    MovingGas,
+    SlopedFlows,
+    StillGas,
+    added_flows,
+    gas_error,
+    linearise,
+    moving_change,
+    opening_error,
+    response,
+    second_moving_stage,
+    solve_stage,
+)
+from ppafo.model.places import gas_density, ideal_density
+from ppafo.model.plant import PlantParameters, PlantState, TrueMasses, chamber_volumes
+
+
+class RealGas(NamedTuple):
+    """First stage of a step, and both volumes [m^3] to which it leads."""
+
+    moving: MovingGas
+    volume_1: float
+    volume_2: float
+
+
+class RealChange(NamedTuple):
+    """What one step adds: as ``GasChange`` [kg], and to the contents of both chambers [kg]."""
+
+    gas: GasChange
+    content_1: float
+    content_2: float
+
+
+def true_mass(content: float, volume: float) -> float:
+    """True mass [kg] of the gas in a volume [m^3] from its content [kg]. Equation (3)."""
+    return volume * gas_density(content / volume)
+
+
+def masses_at_start(plant: PlantParameters, initial: PlantState) -> TrueMasses:
+    """True masses [kg] of the gas in a state."""
+    volume_1, volume_2 = chamber_volumes(plant, initial.angle)
+    return TrueMasses(true_mass(initial.mass_1, volume_1), true_mass(initial.mass_2, volume_2))
+
+
+def content_of(mass: float, volume: float) -> float:
+    """Content [kg] of a true mass [kg] in a volume [m^3]: the mass of an ideal gas at its pressure. Equation (3)."""
+    ideal, _ = ideal_density(mass / volume)
+    return volume * ideal
+
+
+def content_rate(content: float, volume: float, growth: float, flow: float) -> float:
+    """Rate of a content [kg/s] in a volume [m^3] that grows [m^3/s] while gas flows in [kg/s].
+
+    With the density u of the content and rho of the gas, ``d(u V)/dt = du/drho (flow - rho V') + u V'``.
+    """
+    density = gas_density(content / volume)
+    ideal, stiffness = ideal_density(density)
+    return stiffness * (flow - density * growth) + ideal * growth
+
+
+def begin_real_gas(
+    plant: PlantParameters,
+    state: PlantState,
+    masses: TrueMasses,
+    next_angle: float,
+    flowing: SlopedFlows,
+    step: float,
+) -> RealGas:
+    """First stage of one step [s] in which the angle runs to ``next_angle`` [rad]; as ``begin_moving_gas``."""
+    volume_1, volume_2 = chamber_volumes(plant, state.angle)
+    next_1, next_2 = chamber_volumes(plant, next_angle)
+    density_1, density_2 = masses.mass_1 / volume_1, masses.mass_2 / volume_2
+    _, stiffness_1 = ideal_density(density_1)
+    _, stiffness_2 = ideal_density(density_2)
+    per_mass_1, per_mass_2 = plant.gas_product * stiffness_1 / volume_1, plant.gas_product * stiffness_2 / volume_2
+    linear, flows = linearise(per_mass_1, per_mass_2, flowing, step)
+    # A growing volume lowers the pressure as a loss of mass at this rate would; parts of a step may have no length.
+    per_duration = 1.0 / max(step, SHORTEST)
+    drift = response(
+        linear, density_1 * (volume_1 - next_1) * per_duration, density_2 * (volume_2 - next_2) * per_duration
+    )
+    first = solve_stage(linear, added_flows(flows, drift))
+    end_1 = content_of(masses.mass_1 + step * first.mass_1, next_1) * plant.gas_product / next_1
+    end_2 = content_of(masses.mass_2 + step * first.mass_2, next_2) * plant.gas_product / next_2
+    return RealGas(MovingGas(StillGas(linear=linear, first=first, end_1=end_1, end_2=end_2), drift), next_1, next_2)
+
+
+def real_change(
+    plant: PlantParameters, state: PlantState, masses: TrueMasses, begun: RealGas, second: Flows, step: float
+) -> RealChange:
+    """What both stages of one step [s] add."""
+    gas = moving_change(plant, begun.moving.still, second, step)
+    return RealChange(
+        gas=gas,
+        content_1=content_of(masses.mass_1 + gas.mass_1, begun.volume_1) - state.mass_1,
+        content_2=content_of(masses.mass_2 + gas.mass_2, begun.volume_2) - state.mass_2,
+    )
+
+
+def with_real_gas(state: PlantState, masses: TrueMasses, change: RealChange) -> tuple[PlantState, TrueMasses]:
+    """State and true masses with the gas of one step added."""
+    gas = change.gas
+    vented = gas.supplied - gas.mass_1 - gas.mass_2
+    return (
+        PlantState(
+            angle=state.angle,
+            angular_velocity=state.angular_velocity,
+            mass_1=state.mass_1 + change.content_1,
+            mass_2=state.mass_2 + change.content_2,
+            supplied_mass=state.supplied_mass + gas.supplied,
+            vented_mass=state.vented_mass + vented,
+            leaked_mass=state.leaked_mass + abs(gas.leaked),
+        ),
+        TrueMasses(masses.mass_1 + gas.mass_1, masses.mass_2 + gas.mass_2),
+    )
+
+
+def at_angle(plant: PlantParameters, state: PlantState, masses: TrueMasses, angle: float) -> PlantState:
+    """State whose contents are those of its gas at the angle [rad] that the vane reached."""
+    volume_1, volume_2 = chamber_volumes(plant, angle)
+    return state._replace(mass_1=content_of(masses.mass_1, volume_1), mass_2=content_of(masses.mass_2, volume_2))
+
+
+def _second(rows: Any, gas: str) -> Second:
+    add, next_angle = rows.add, "state.angle" if rows.program.is_held else "begun.next_angle"
+    still = f"{gas}.moving.still"
+    return Second(
+        stage=f"{add(second_moving_stage)}({gas}.moving, passing)",
+        change=f"{add(real_change)}(plant, state, masses, {gas}, second, length)",
+        error=f"{add(gas_error)}(plant, {still}, second, {next_angle}, length)",
+        shifted=f"{add(opening_error)}(plant, {still}, shift, {next_angle}, length)",
+    )
+
+
+REAL = GasScheme(
+    parameters={},
+    states={"masses": TrueMasses},
+    start=masses_at_start,
+    loads=("masses",),
+    stored={"masses": "filled"},
+    begun=lambda _program: RealGas,
+    change=RealChange,
+    begin=lambda rows: f"gas = {rows.add(begin_real_gas)}(plant, state, masses, next_angle, flowing, length)",
+    ends=lambda _rows, gas: f"{gas}.moving.still.end_1, {gas}.moving.still.end_2",
+    first=lambda _rows, gas: f"{gas}.moving.still.first",
+    second=_second,
+    add=lambda rows: f"fed, filled = {rows.add(with_real_gas)}(state, masses, change)",
+    move=lambda rows, state, _assumed, reached: [f"{state} = {rows.add(at_angle)}(plant, {state}, filled, {reached})"],
+    work=lambda _rows: [],
+)

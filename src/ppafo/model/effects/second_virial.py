@@ -1,0 +1,86 @@
+"""Gas that is not ideal: the virial equation of state cut after its second term, ``P = rho R T (1 + b rho)``.
+
+With a constant ``b`` the internal energy is that of the ideal gas, so that energy and state agree with each other; with
+``b = 0`` all of it is the ideal gas. Lanes, reference solver and virtual rig have these functions.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+from ppafo.model.declaration import Quantity
+from ppafo.model.effects.kind import Effect
+from ppafo.model.places import gas_density, ideal_density
+
+SECOND_VIRIAL = {"CO2": -123.0e-6, "air": -7.4e-6, "N2": -4.5e-6, "He": 11.8e-6}
+"""Second virial coefficient [m^3/mol] at 298 K of every gas that a set can name; J. H. Dymond and E. B. Smith, 1980."""
+
+
+class SecondVirial(NamedTuple):
+    """Second virial coefficient over the molar mass, b [m^3/kg], below 0 for CO2."""
+
+    per_mass: float
+
+
+def prepare(settings: Any, device: Any) -> SecondVirial:
+    """The row of a share of a molar coefficient, with the molar mass of the device's gas."""
+    return SecondVirial(settings["share"] * settings["coefficient"] / device.gas.molar_mass)
+
+
+def real_gas_factor(density: float, virial: float) -> float:
+    """Compressibility Z = 1 + b rho [-] at a density [kg/m^3]; ``virial`` is b [m^3/kg]."""
+    return 1.0 + virial * density
+
+
+def real_pressure(mass: float, volume: float, temperature: float, gas_constant: float, virial: float) -> float:
+    """Absolute pressure [Pa] of ``mass`` [kg] in ``volume`` [m^3]; equation (3) times the real-gas factor."""
+    density = mass / volume
+    return density * gas_constant * temperature * real_gas_factor(density, virial)
+
+
+def real_density(pressure: float, temperature: float, gas_constant: float, virial: float) -> float:
+    """Density [kg/m^3] at an absolute pressure [Pa]; the inverse of ``real_pressure``, by its smaller root.
+
+    Where the gas would condense first, at 4 b rho_ideal below -1, it is twice that of the ideal gas.
+    """
+    product = gas_constant * temperature
+    return 2.0 * pressure / (product * (1.0 + math.sqrt(max(1.0 + 4.0 * virial * pressure / product, 0.0))))
+
+
+def gas_enthalpy(temperature: float, density: float, gas_constant: float, heat_capacity: float, virial: float) -> float:
+    """Specific enthalpy [J/kg], internal energy and P/rho; c_p T for an ideal gas. ``heat_capacity`` is c_v."""
+    return temperature * (heat_capacity + gas_constant * real_gas_factor(density, virial))
+
+
+def compressed(density: float, second_virial: SecondVirial) -> float:
+    """Density [kg/m^3] of the gas, from that of an ideal gas at its pressure and temperature."""
+    return real_density(density, 1.0, 1.0, second_virial.per_mass)
+
+
+def expanded(density: float, second_virial: SecondVirial) -> tuple[float, float]:
+    """Density [kg/m^3] of an ideal gas with the pressure of this one, ``rho Z``, and how it grows with rho [-]."""
+    virial = second_virial.per_mass
+    return density * real_gas_factor(density, virial), 1.0 + 2.0 * virial * density
+
+
+EFFECT = Effect(
+    name="second_virial",
+    summary="Gas that is not ideal, by its second virial coefficient.",
+    quantities=(
+        Quantity("share", "", "share of the second virial coefficient that the gas has, 0 for ideal", 0.0, 0.0, 5.0),
+        Quantity(
+            "coefficient",
+            "m^3/mol",
+            "second virial coefficient, by default of CO2 at 298 K",
+            SECOND_VIRIAL["CO2"],
+            -1.0e-3,
+            1.0e-3,
+        ),
+    ),
+    parameters=SecondVirial,
+    prepare=prepare,
+    switch=("share",),
+    laws={gas_density: compressed, ideal_density: expanded},
+    source="J. H. Dymond and E. B. Smith, The Virial Coefficients of Pure Gases and Mixtures, 1980",
+    equation="P = rho (R/M) T (1 + b rho), b = share B / M",
+    symbols=(("b", "per_mass", "m^3/kg", "second virial coefficient over the molar mass"),),
+)
