@@ -51,6 +51,8 @@ if TYPE_CHECKING:
     from ppafo.questions.design.answer import Design as Design
     from ppafo.questions.design.problem import load_design as load_design
     from ppafo.questions.design.solve import design as design
+    from ppafo.questions.devices.answer import DeviceSpread as DeviceSpread
+    from ppafo.questions.devices.solve import pool_devices as pool_devices
     from ppafo.questions.endurance.answer import Endurance as Endurance
     from ppafo.questions.endurance.solve import endurance as endurance
     from ppafo.questions.endurance.solve import endurance_of_walk as endurance_of_walk
@@ -131,6 +133,8 @@ _HOMES = {
     "ppafo.questions.design.answer": ("Design",),
     "ppafo.questions.design.problem": ("load_design",),
     "ppafo.questions.design.solve": ("design",),
+    "ppafo.questions.devices.answer": ("DeviceSpread",),
+    "ppafo.questions.devices.solve": ("pool_devices",),
     "ppafo.questions.endurance.answer": ("Endurance",),
     "ppafo.questions.endurance.solve": ("endurance", "endurance_of_walk"),
     "ppafo.questions.find.solve": ("Found", "find"),

@@ -15,6 +15,7 @@ QUESTIONS: Kinds[Question] = Kinds(
         "unreported": "ppafo.questions.unreported:QUESTION",
         "parts": "ppafo.questions.parts:QUESTION",
         "identify": "ppafo.questions.identify:QUESTION",
+        "devices": "ppafo.questions.devices:QUESTION",
         "validate": "ppafo.questions.validate:QUESTION",
         "sweep": "ppafo.questions.sweep:QUESTION",
         "compare": "ppafo.questions.compare:QUESTION",

@@ -1,7 +1,7 @@
 """The answer of an identification: estimates and checks in the units of the set, the new set, the figures."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -76,6 +76,12 @@ class Identification(Solved):
         """Whether every check holds and the new set makes a device where the old one did."""
         fitted = () if self.trajectory is None else self.trajectory.failed
         return not self.new_set.problem and not fitted and not any(result.failed for result in self.results)
+
+    @property
+    def kind(self) -> RecordingKind:
+        """The kind of all recordings together."""
+        kinds = [result.kind for result in self.results]
+        return kind_of_all([*kinds, *(() if self.trajectory is None else (kind_of_fit(self.trajectory.fit),))])
 
 
 _COLUMNS = 3
@@ -287,9 +293,6 @@ def answer_of(identification: Identification) -> Answer:
             "next-bench.toml": lambda: bench_file(plan).encode(),
             "next-rig.sh": lambda: rig_requests(plan).encode(),
         }
-    kinds = {result.kind for result in identification.results}
-    if identification.trajectory is not None:
-        kinds.add(kind_of_fit(identification.trajectory.fit))
     return Answer(
         name="identify",
         kicker="Identification",
@@ -318,7 +321,7 @@ def answer_of(identification: Identification) -> Answer:
             },
         },
         passed=identification.is_good,
-        kind=next((kind for kind in _KINDS if kind in kinds), "measured"),
+        kind=identification.kind,
         files=files,
     )
 
@@ -459,13 +462,14 @@ def _trajectory_figures(outcome: TrajectoryOutcome, before: ParameterSet) -> lis
     return figures
 
 
-_KINDS: tuple[RecordingKind, ...] = ("synthetic", "simulated", "measured")
+def kind_of_all(kinds: Collection[RecordingKind]) -> RecordingKind:
+    """Return the kind of several recordings together: one synthetic recording makes a fit synthetic."""
+    return next((kind for kind in ("synthetic", "simulated") if kind in kinds), "measured")
 
 
 def kind_of_fit(fit: TrajectoryFit) -> RecordingKind:
-    """Return the kind of all recordings together: one synthetic recording makes the fit synthetic."""
-    kinds = {recording.kind for recording in fit.measurements}
-    return next(kind for kind in _KINDS if kind in kinds)
+    """Return the kind of all recordings of a fit together."""
+    return kind_of_all([recording.kind for recording in fit.measurements])
 
 
 def _procedure_data(result: BenchResult) -> dict[str, Any]:
