@@ -25,9 +25,14 @@ NAME, SHORT = "proportional", "run.duration=6 s"
 MOTION = '\n[motion]\nkind = "walk"\n'
 
 
-def text_of(name: str) -> str:
+def shipped(name: str) -> str:
     folder = "walking/configurations" if name in ppafo.list_walks() else "scenarios"
     return (resources.files("ppafo") / folder / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def text_of(name: str) -> str:
+    """The file of a walk in its older form, without a motion."""
+    return shipped(name).replace(MOTION, "")
 
 
 def written(folder: Path, text: str) -> Path:
@@ -42,9 +47,15 @@ def recorded(scenario: Scenario) -> dict[str, list[float]]:
 
 
 def test_a_file_whose_motion_is_a_walk_gives_the_bits_of_the_older_form(tmp_path: Path) -> None:
-    older, new = load_scenario(NAME, [SHORT]), load_scenario(written(tmp_path, text_of(NAME) + MOTION), [SHORT])
+    older, new = load_scenario(written(tmp_path, text_of(NAME)), [SHORT]), load_scenario(NAME, [SHORT])
     assert recorded(new) == recorded(older)
     assert load_walk(tmp_path / "mine.toml", [SHORT]).motion == new.motion == older.motion
+
+
+def test_every_shipped_walk_says_in_its_motion_that_it_is_one() -> None:
+    template = (resources.files("ppafo.cli") / "templates" / "walk.toml").read_text(encoding="utf-8")
+    texts = {name: shipped(name) for name in ppafo.list_walks()} | {"template": template}
+    assert {name: tomllib.loads(text)["motion"]["kind"] for name, text in texts.items()} == dict.fromkeys(texts, "walk")
 
 
 def test_gait_and_course_may_stand_in_the_motion_or_above_and_not_in_both(tmp_path: Path) -> None:
@@ -117,7 +128,7 @@ def test_the_schema_of_scenarios_takes_every_shipped_one_and_a_motion_that_is_a_
     schema = json_schema()
     validator = jsonschema.Draft202012Validator(schema)
     validator.check_schema(schema)
-    documents = [tomllib.loads(text_of(name)) for name in list_all_scenarios()]
+    documents = [tomllib.loads(form(name)) for name in list_all_scenarios() for form in (shipped, text_of)]
     documents.append(tomllib.loads(text_of(NAME) + MOTION + 'gait = "mine.toml"\n'))
     assert [list(validator.iter_errors(document)) for document in documents] == [[]] * len(documents)
     assert list(validator.iter_errors(documents[-1] | {"reference": {"kind": "constant", "level": "1 N m"}}))
