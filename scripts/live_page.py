@@ -35,7 +35,15 @@ from ppafo.units import parse_quantity
 from ppafo.walking.loading import load_walk
 from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import walk
-from scripts.page_states import address_of, disagreements, hard_states, mutated, random_changes
+from scripts.page_states import (
+    address_of,
+    disagreements,
+    hard_states,
+    is_of_page,
+    mutated,
+    python_refusal,
+    random_changes,
+)
 
 READY = '[data-ready="true"]'
 METRICS = 1.0e-12
@@ -94,7 +102,9 @@ def differences(
     """
     refused = page.evaluate("address => workbench.open(address)", address_of(tab, program["name"], changes))
     if refused:
-        return f"the page does not open it: {refused}"
+        texts = [f"{key}={text}" for key, text in changes.items()]
+        is_refused = any(is_of_page(program, key) for key in changes) or python_refusal(program, texts)
+        return None if is_refused else f"the page does not open it: {refused}"
     page.wait_for_selector(READY, state="attached")
     while page.evaluate("workbench.run(0) === null"):
         page.wait_for_timeout(20)

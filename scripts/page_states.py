@@ -174,9 +174,9 @@ def disagreements(page: Any, tab: int, program: Mapping[str, Any], given: Sequen
             continue
         if verdict["refused"]:
             # The file of a walk has no length: only the page can refuse one.
-            texts = [f"{key}={text}" for key, text in changes.items() if not _is_of_page(program, key)]
+            texts = [f"{key}={text}" for key, text in changes.items() if not is_of_page(program, key)]
             said = python_refusal(program, texts)
-            if not said and not any(_is_of_page(program, key) for key in one):
+            if not said and not any(is_of_page(program, key) for key in one):
                 found.append(f"{program['name']}: only the page refuses {changes}: {verdict['refused']}")
             continue
         file.write_text(verdict["scenario"], encoding="utf-8")
@@ -186,7 +186,8 @@ def disagreements(page: Any, tab: int, program: Mapping[str, Any], given: Sequen
     return found
 
 
-def _is_of_page(program: Mapping[str, Any], key: str) -> bool:
+def is_of_page(program: Mapping[str, Any], key: str) -> bool:
+    """Whether only the page knows a setting: the file of a walk has no length."""
     return program["kind"] == "walk" and key in ("run.duration", "run.output_interval")
 
 

@@ -8,13 +8,14 @@ import { Controls } from "./controls";
 import { say, whenQuiet } from "./dom";
 import { Engine, failedRun, type Run } from "./engine";
 import { Extras } from "./extras";
+import { factsOf } from "./facts";
 import { Workers } from "./jobs";
 import { OutcomeTable } from "./outcome";
 import type { Named, Page } from "./page";
 import { Panels } from "./panels";
 import { changed, type Configuration, contradiction, normalText, settingsByKey, valuesOf } from "./settings";
 import { Stage } from "./stage";
-import { addressOf, firstState, History, MOST_CONFIGURATIONS, type State, stateOfAddress } from "./state";
+import { addressOf, contradictionIn, firstState, History, MOST_CONFIGURATIONS, type State, stateOfAddress } from "./state";
 import { InputError, telling } from "./units";
 import { unpacked } from "./unpacking";
 import { makeFrame, type PageFrame } from "./frame";
@@ -273,6 +274,11 @@ export class App implements Page {
     }
   }
 
+  /** Which settings of the page contradict each other, in one line; empty where it can be run. */
+  get refused(): string {
+    return contradictionIn(this.content, this.state);
+  }
+
   /** Draw with the next frame. */
   schedule(): void {
     if (this.isDue) return;
@@ -299,6 +305,7 @@ export class App implements Page {
     const faults = done.filter(({ run }) => run.fault !== "").map(({ name, run }) => `${name}: ${run.fault}.`);
     say(this.frame.fault, faults.join(" "));
     this.frame.fault.hidden = faults.length === 0;
+    say(this.frame.facts, factsOf(this.content, done));
     const shown = done.filter(({ run }) => run.time.length > 1);
     this.outcome.show(done);
     this.extras.follow(named);
@@ -316,7 +323,8 @@ export class App implements Page {
   private settled(): void {
     if (this.content.form === "page") {
       const address = addressOf(this.content, this.state);
-      if (address !== location.hash.slice(1)) history.replaceState(null, "", `#${address}`);
+      // What is refused is not shared: the address keeps the last state that can be run.
+      if (this.refused === "" && address !== location.hash.slice(1)) history.replaceState(null, "", `#${address}`);
     }
     this.workers.rest();
     this.extras.settle();

@@ -12,9 +12,14 @@ export function colour(name: string): string {
   return found;
 }
 
-/** The colour of a configuration by its number. */
+/** The colour in which a configuration is named, by its number: dark enough for words. */
 export function colourOf(look: number): string {
   return colour(`run-${look}`);
+}
+
+/** The colour of the curves of a configuration: that of the figures. */
+export function lineColourOf(look: number): string {
+  return colour(`line-${look}`);
 }
 
 /** Numbers of colours: the first configuration with a valve has that of the valve in every figure, others what is left. */

@@ -80,6 +80,8 @@ export interface Program {
   readonly relations: readonly Relation[];
   readonly channels: readonly Channel[];
   readonly metrics: readonly Metric[];
+  /** The torque that the supplies sustain is the value of `factor` times `raised` or `lowered` above `zero`; null where it is no such product. */
+  readonly sustained: Readonly<Record<"factor" | "raised" | "lowered" | "zero", string>> | null;
   /** Which of the modules of the page it is. */
   readonly module: string;
 }
@@ -94,6 +96,15 @@ export interface Tab {
   readonly first: readonly string[];
   /** Metrics that claims are about. */
   readonly claims: readonly string[];
+  /** What somebody may ask, and the texts by key that answer it. */
+  readonly questions: readonly { readonly text: string; readonly changes: Readonly<Record<string, string>> }[];
+}
+
+/** How many minutes a full bottle lasts, by the mean flow [kg/s] that is taken from it. */
+export interface Bottle {
+  readonly name: string;
+  readonly flows: readonly number[];
+  readonly minutes: readonly number[];
 }
 
 export interface Content {
@@ -101,6 +112,7 @@ export interface Content {
   readonly title: string;
   readonly form: "page" | "block";
   readonly tabs: readonly Tab[];
+  readonly bottle: Bottle;
   readonly programs: readonly Program[];
   readonly units: Readonly<Record<string, readonly UnitScale[]>>;
 }

@@ -23,7 +23,8 @@ export class Drawing {
   readonly root: SVGSVGElement;
   private readonly chambers = [shape("path", { class: "chamber" }), shape("path", { class: "chamber" })];
   private readonly vane = shape("line", { class: "vane" });
-  private readonly texts = [shape("text", { class: "pressure" }), shape("text", { class: "pressure" })];
+  /** Beside the chambers and not in them, where a narrow one has no room for a number. */
+  private readonly texts = [shape("text", { class: "words", x: 2, y: 14 }), shape("text", { class: "words", x: 182, y: 14, "text-anchor": "end" })];
   private readonly spool = shape("rect", { class: "spool", y: 167, width: 26, height: 14, rx: 2 });
   private readonly ways = [shape("path", { class: "way" }), shape("path", { class: "way" })];
   private readonly leg = shape("g");
@@ -32,7 +33,6 @@ export class Drawing {
   private readonly words = shape("text", { class: "words", x: ANKLE[0], y: 196, "text-anchor": "middle" });
 
   constructor(name: string) {
-    const marks = [shape("text", { class: "chamber-name", x: 36, y: 34 }, "1"), shape("text", { class: "chamber-name", x: 142, y: 34 }, "2")];
     this.root = shape(
       "svg",
       { viewBox: "0 0 384 204", role: "img", class: "drawing" },
@@ -42,7 +42,6 @@ export class Drawing {
       this.vane,
       shape("circle", { class: "hub", cx: CENTRE[0], cy: CENTRE[1], r: 7 }),
       ...this.texts,
-      ...marks,
       shape("rect", { class: "valve", x: 46, y: 164, width: 92, height: 20, rx: 4 }),
       this.spool,
       shape("text", { class: "words", x: 92, y: 198, "text-anchor": "middle" }, "valve"),
@@ -83,12 +82,7 @@ export class Drawing {
       this.chambers[place]?.setAttribute("d", sector(from, to));
       this.chambers[place]?.setAttribute("fill", `rgb(${shade(0.12 + 0.8 * share).join()})`);
       const text = this.texts[place];
-      const [x, y] = onCircle((from + to) / 2, RADIUS * 0.66);
-      text?.setAttribute("x", x.toFixed(1));
-      text?.setAttribute("y", (y + 4).toFixed(1));
-      text?.setAttribute("fill", share > 0.3 ? "#fff" : "#1a1a1a");
-      text?.setAttribute("visibility", to - from > 0.45 ? "visible" : "hidden");
-      if (text !== undefined) say(text, plain((pressure - frame.atmosphere) / PSI, 2));
+      if (text !== undefined) say(text, `${place + 1}: ${plain((pressure - frame.atmosphere) / PSI, 2)} psi`);
     });
     const [x, y] = onCircle(at(angle), RADIUS + 3);
     for (const [name, given] of [["x1", CENTRE[0]], ["y1", CENTRE[1]], ["x2", x], ["y2", y]] as const) {
@@ -105,7 +99,7 @@ export class Drawing {
       const towards = place === 0 ? share : -share;
       const way = this.ways[place];
       way?.setAttribute("d", line);
-      way?.setAttribute("stroke", isVenting || towards < 0 ? colour("soft") : towards > 0 ? colour("run-1") : colour("line"));
+      way?.setAttribute("stroke", isVenting || towards < 0 ? colour("soft") : towards > 0 ? colour("ink") : colour("line"));
       way?.setAttribute("stroke-dasharray", isVenting || towards < 0 ? "4 4" : "none");
       way?.setAttribute("stroke-width", (1.5 + 3.5 * Math.abs(isVenting ? 1 : towards)).toFixed(2));
     });

@@ -74,6 +74,8 @@ export class Extras {
       if (file !== undefined) void this.loadState(file);
     });
     const link = element("input", { type: "text", readonly: true, hidden: true, "aria-label": "Address of this state" });
+    /** Do what hands the state on, unless it is one that would be refused where it is opened. */
+    const sharing = (work: () => void) => () => (app.refused === "" ? work() : app.tell(`Nothing is shared: ${app.refused}.`));
     const copy = () => {
       const address = `${location.href.split("#")[0]}#${addressOf(app.content, app.state)}`;
       link.value = address;
@@ -87,7 +89,7 @@ export class Extras {
     const button = (words: string, work: () => void) => element("button", { type: "button", onclick: work }, words);
     const own =
       app.content.form === "page"
-        ? [button("Copy address", copy), button("Save state", () => saveState(app.content, app.state)), button("Load state", () => chooser.click()), chooser, link]
+        ? [button("Copy address", sharing(copy)), button("Save state", sharing(() => saveState(app.content, app.state))), button("Load state", () => chooser.click()), chooser, link]
         : [];
     const menu = element(
       "details",
@@ -131,6 +133,7 @@ export class Extras {
   }
 
   private makeRecording(): void {
+    const { app } = this;
     const chooser = element("input", { type: "file", accept: ".csv,text/csv,.txt", "aria-label": "Recording as CSV" });
     const clear = element("button", { type: "button", onclick: () => this.clear() }, "Remove recording");
     chooser.addEventListener("change", () => {
@@ -147,9 +150,11 @@ export class Extras {
     addEventListener("dragover", (event) => event.preventDefault());
     addEventListener("drop", (event) => {
       event.preventDefault();
-      const file = event.dataTransfer?.files[0];
+      const [file, ...others] = event.dataTransfer?.files ?? [];
       if (file === undefined) return;
-      void (file.name.endsWith(".json") ? this.loadState(file) : this.read(file));
+      const read = file.name.endsWith(".json") ? this.loadState(file) : this.read(file);
+      // One at a time: the others are named, so that nobody thinks that they are in the picture.
+      if (others.length > 0) void read.then(() => app.tell(`${app.told} Not opened, as one file is read at a time: ${others.map(({ name }) => name).join(", ")}.`.trim()));
     });
   }
 

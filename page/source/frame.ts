@@ -3,12 +3,14 @@
 import { type Content, programNamed } from "./content";
 import { element } from "./dom";
 import type { Named, Page } from "./page";
-import { MOST_CONFIGURATIONS, type State } from "./state";
+import { settingsByKey } from "./settings";
+import { addressOf, firstState, MOST_CONFIGURATIONS, type State } from "./state";
 
 export interface PageFrame {
   readonly root: HTMLElement;
   readonly notice: HTMLElement;
   readonly fault: HTMLElement;
+  readonly facts: HTMLElement;
   readonly controls: HTMLElement;
   readonly panels: HTMLElement;
   readonly stage: HTMLElement;
@@ -26,6 +28,8 @@ export function makeFrame(host: HTMLElement, content: Content, app: Page): PageF
   const [share, map, recording, assumptions] = [place("share"), place("map-place"), place("recording"), place("assumptions")];
   const notice = element("p", { class: "notice", role: "status", hidden: true });
   const fault = element("p", { class: "fault", role: "alert", hidden: true });
+  const facts = element("p", { class: "facts" });
+  const questions = element("p", { class: "questions" });
   const tabs = element("div", { class: "tabs", role: "tablist", "aria-label": "What is simulated" });
   const bench = element("div", { class: "bench" });
   const target = element("div", { class: "target", role: "radiogroup", "aria-label": "Which configuration the controls change" });
@@ -46,20 +50,23 @@ export function makeFrame(host: HTMLElement, content: Content, app: Page): PageF
     controls,
     element("p", { class: "key" }, ...originKey()),
   );
-  const main = element(
-    "main",
-    { id: "panel", role: "tabpanel", tabindex: -1 },
+  const isPage = content.form === "page";
+  const panel = element(
+    "div",
+    { id: "panel", class: "content", tabindex: -1, ...(content.tabs.length > 1 ? { role: "tabpanel", "aria-label": "Simulation" } : {}) },
     fault,
     element("div", { class: "bench-line" }, bench, element("div", { class: "switches" }, band.label, beside.label)),
+    facts,
+    questions,
     stage,
     panels,
     element("h2", {}, "Results"),
     outcome,
   );
   const folded = (title: string, inner: HTMLElement) => element("details", { class: "folded" }, element("summary", {}, title), inner);
-  const further = content.form === "page" ? [folded("Map of two settings", map), folded("Which assumption matters", assumptions), folded("Your own recording", recording)] : [folded("Which assumption moves which claim", assumptions)];
-  const [heading, lead] = content.form === "page" ? [element("h1", {}, content.title), element("p", { class: "lead" }, LEAD)] : [element("span"), element("span")];
-  main.append(...further);
+  const further = isPage ? [folded("Map of two settings", map), folded("Which assumption matters", assumptions), folded("Your own recording", recording)] : [folded("Which assumption moves which claim", assumptions)];
+  const [heading, lead] = isPage ? [element("h1", {}, content.title), element("p", { class: "lead" }, LEAD)] : [element("span"), element("span")];
+  panel.append(...further);
   const root = element(
     "div",
     { class: `workbench ${content.form}` },
@@ -67,8 +74,9 @@ export function makeFrame(host: HTMLElement, content: Content, app: Page): PageF
     notice,
     ...(content.tabs.length > 1 ? [tabs] : []),
     summary,
-    element("div", { class: "columns-of-page" }, side, main),
-    ...(content.form === "page" ? [element("footer", {}, ABOUT, ` ppafo ${content.version}.`)] : []),
+    // A report that the block is in has a main part of its own.
+    element("div", { class: "columns-of-page" }, side, element(isPage ? "main" : "div", { class: "main" }, panel)),
+    ...(isPage ? [element("footer", {}, ABOUT, ` ppafo ${content.version}.`)] : []),
   );
   host.replaceChildren(root);
   addEventListener("keydown", (event) => keyed(event, app));
@@ -80,10 +88,11 @@ export function makeFrame(host: HTMLElement, content: Content, app: Page): PageF
     summary.textContent = content.tabs[state.tab]?.summary ?? "";
     const isChoosing = target.contains(document.activeElement);
     fillBench(bench, content, named, app);
+    if (isPage) fillQuestions(questions, content, state);
     fillTarget(target, named, chosen, app);
     if (isChoosing && !target.contains(document.activeElement)) (target.hidden ? bench : target).querySelector<HTMLElement>("input:checked, select")?.focus();
   };
-  return { root, notice, fault, controls, panels, stage, outcome, share, map, recording, assumptions, follow };
+  return { root, notice, fault, facts, controls, panels, stage, outcome, share, map, recording, assumptions, follow };
 }
 
 const LEAD = "Drag a slider: the device is simulated again, here, in your browser. Nothing is fetched and nothing leaves this page.";
@@ -141,6 +150,24 @@ function fillBench(bench: HTMLElement, content: Content, named: readonly Named[]
     ...app.tab.programs.map((name) => element("option", { value: name, title: programNamed(content, name).description }, programNamed(content, name).label)),
   );
   refill(bench, ...chips, ...(named.length < MOST_CONFIGURATIONS ? [add] : []));
+}
+
+/** Links that set the sliders of a tab: what it opens with, and what a question changes of that. */
+function fillQuestions(host: HTMLElement, content: Content, state: State): void {
+  const { questions } = content.tabs[state.tab]!;
+  const links = questions.map(({ text, changes }) => {
+    const bench = firstState(content).benches[state.tab]!.map(({ program, changes: usual }) => {
+      const known = settingsByKey(programNamed(content, program));
+      return { program, changes: Object.keys(changes).every((key) => known.has(key)) ? { ...usual, ...changes } : usual };
+    });
+    const asked = { ...state, benches: state.benches.map((other, place) => (place === state.tab ? bench : other)) };
+    return [text, `#${addressOf(content, asked)}`] as const;
+  });
+  const layout = JSON.stringify(links);
+  if (host.dataset["layout"] === layout) return;
+  host.dataset["layout"] = layout;
+  host.replaceChildren(...links.map(([text, href]) => element("a", { href }, text)));
+  host.hidden = links.length === 0;
 }
 
 /** Fill a place anew. The focus stays with the control that comes to be in the same place, or is the last one as it was. */

@@ -3,6 +3,7 @@
 import { type Content, type Metric, programNamed, scalesOf } from "./content";
 import { element, say, whenQuiet } from "./dom";
 import type { Run } from "./engine";
+import { minutesOfBottle } from "./facts";
 import { fromSi, plain, readableUnit, scaleOf } from "./units";
 
 export interface Column {
@@ -14,12 +15,15 @@ export interface Column {
 
 interface Row {
   readonly metric: Metric;
+  readonly row: HTMLElement;
   readonly cells: readonly HTMLElement[];
   readonly changes: readonly HTMLElement[];
 }
 
 /** Metrics this small in SI are what rounding leaves of a balance. */
 const ROUNDING = 1e-12;
+const GAS = ["gas_supplied", "gas"];
+const MINUTES: Metric = { name: "minutes", unit: "s", shown: "min", label: "How long a full bottle lasts" };
 const TOLD = ["rms_error", "gas_supplied", "switchings", "gas", "push_off_work", "toe_clearance"];
 
 export class OutcomeTable {
@@ -27,6 +31,9 @@ export class OutcomeTable {
   private layout = "";
   private columns: readonly Column[] = [];
   private readonly told = element("p", { class: "told", "aria-live": "polite", role: "status" });
+  private readonly nothing = element("p", { class: "note" });
+  /** Metrics that have not been zero in all configurations since these are shown: only they have a row. */
+  private readonly seen = new Set<string>();
   private readonly table = element("table", { class: "outcome" });
   private readonly tell = whenQuiet(700, () => say(this.told, this.summary()));
 
@@ -34,7 +41,7 @@ export class OutcomeTable {
     host: HTMLElement,
     private readonly content: Content,
   ) {
-    host.append(element("div", { class: "wide", tabindex: 0, role: "region", "aria-label": "Metrics" }, this.table), this.told);
+    host.append(element("div", { class: "wide", tabindex: 0, role: "region", "aria-label": "Metrics" }, this.table), this.nothing, this.told);
   }
 
   show(columns: readonly Column[]): void {
@@ -44,12 +51,21 @@ export class OutcomeTable {
       this.layout = layout;
       this.build();
     }
-    for (const { metric, cells, changes } of this.rows) {
-      const values = columns.map(({ run }) => run.metrics.get(metric.name));
+    for (const { metric, row, cells, changes } of this.rows) {
+      const values = columns.map(({ run }) => this.valueOf(metric, run));
+      if (values.some((value) => !isNothing(value))) this.seen.add(metric.name);
+      row.hidden = !this.seen.has(metric.name);
       cells.forEach((cell, place) => say(cell, this.text(metric, values[place])));
       changes.forEach((cell, place) => say(cell, changeText(values[0], values[place + 1])));
     }
+    const nothing = this.rows.filter(({ row }) => row.hidden).map(({ metric }) => metric.label);
+    say(this.nothing, nothing.length === 0 ? "" : `Zero, or without a value, in all: ${nothing.map((label) => label.slice(0, 1).toLowerCase() + label.slice(1)).join("; ")}.`);
     this.tell();
+  }
+
+  /** A metric of a run; the minutes of the bottle are made of its gas. */
+  private valueOf(metric: Metric, run: Run): number | undefined {
+    return metric === MINUTES ? 60 * minutesOfBottle(this.content.bottle, run) : run.metrics.get(metric.name);
   }
 
   private build(): void {
@@ -63,15 +79,21 @@ export class OutcomeTable {
       ...this.columns.map(({ name, look }) => element("th", { scope: "col", class: `number run-${look}` }, name)),
       ...others.map(({ name }) => element("th", { scope: "col", class: "number change" }, `${others.length > 1 ? `${name} ` : ""}vs first`)),
     );
-    this.rows = [...metrics.values()].map((metric) => ({
+    const listed = [...metrics.values()];
+    const gas = listed.findIndex(({ name }) => GAS.includes(name));
+    if (gas >= 0) listed.splice(gas + 1, 0, MINUTES);
+    this.seen.clear();
+    this.rows = listed.map((metric) => ({
       metric,
+      row: element("tr"),
       cells: this.columns.map(() => element("td", { class: "number" })),
       changes: others.map(() => element("td", { class: "number change" })),
     }));
-    const body = this.rows.map(({ metric, cells, changes }) => {
+    const body = this.rows.map(({ metric, row, cells, changes }) => {
       const unit = readableUnit(metric.shown);
       const words = unit === "" || unit === "-" ? metric.label : `${metric.label} (${unit})`;
-      return element("tr", {}, element("th", { scope: "row" }, words), ...cells, ...changes);
+      row.append(element("th", { scope: "row" }, metric === MINUTES ? `How long ${this.content.bottle.name} lasts (min)` : words), ...cells, ...changes);
+      return row;
     });
     this.table.replaceChildren(
       element("caption", { class: "unseen" }, "Metrics of each configuration"),
@@ -82,6 +104,7 @@ export class OutcomeTable {
 
   private text(metric: Metric, value: number | undefined): string {
     if (value === undefined || !Number.isFinite(value)) return "–";
+    if (Math.abs(value) < ROUNDING) return "0";
     return plain(shownMetric(this.content, metric, value));
   }
 
@@ -95,6 +118,11 @@ export class OutcomeTable {
       })
       .join(" ");
   }
+}
+
+/** Whether a metric says nothing: there is none, or what rounding leaves of zero. */
+function isNothing(value: number | undefined): boolean {
+  return value === undefined || !Number.isFinite(value) || Math.abs(value) < ROUNDING;
 }
 
 export function shownMetric(content: Content, metric: Metric, value: number): number {

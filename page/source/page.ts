@@ -25,6 +25,8 @@ export interface Page {
   readonly tab: Tab;
   readonly bench: readonly Configuration[];
   readonly named: readonly Named[];
+  readonly told: string;
+  readonly refused: string;
   runOf(configuration: Configuration): Run | null;
   become(state: State): void;
   changeOne(place: number, texts: readonly (readonly [string, string])[]): void;

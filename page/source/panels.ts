@@ -3,36 +3,40 @@
 import uPlot from "../vendor/uplot/uPlot.esm.js";
 import type { Overlay } from "./agreement";
 import { clockOf, firstAfter, onClock } from "./clock";
-import { colour, colourOf, DASHES } from "./colours";
+import { colour, DASHES, lineColourOf } from "./colours";
 import { type Content, scalesOf } from "./content";
-import { element, whenQuiet } from "./dom";
+import { element, say, whenQuiet } from "./dom";
 import type { Run } from "./engine";
+import { sustainedTorque } from "./facts";
 import { lineOn, pathsOf } from "./paths";
 import { atmosphereOf, type Values } from "./settings";
 import { fromSi, plain, readableUnit, scaleOf } from "./units";
 
 export interface Panel {
   readonly title: string;
+  /** What its vertical axis is called, before the unit. */
+  readonly axis: string;
   readonly channels: readonly string[];
   /** A channel that is drawn once, in ink: what was asked for. */
   readonly wanted?: string;
-  /** What the title says after the unit. */
+  /** What the title says after its name. */
   readonly note?: string;
 }
 
 export const PANELS: readonly Panel[] = [
-  { title: "Torque", channels: ["torque"], wanted: "reference" },
-  { title: "Pressures", channels: ["pressure_1", "pressure_2"], note: ", 2 dashed" },
-  { title: "Command to the valve", channels: ["command"] },
-  { title: "Gas taken from the supply", channels: ["supplied_mass"] },
-  { title: "Angle of the ankle", channels: ["angle"], wanted: "healthy_angle" },
-  { title: "Torque on the wearer", channels: ["external_torque"] },
-  { title: "0 helps, 1 lifts only, 2 pauses, 3 stopped", channels: ["safe_state"] },
+  { title: "Torque", axis: "Torque", channels: ["torque"], wanted: "reference" },
+  { title: "Pressures", axis: "Pressure", channels: ["pressure_1", "pressure_2"], note: ", chamber 2 dashed" },
+  { title: "Command to the valve", axis: "Command", channels: ["command"] },
+  { title: "Gas taken from the supply", axis: "Gas", channels: ["supplied_mass"] },
+  { title: "Angle of the ankle", axis: "Angle", channels: ["angle"], wanted: "healthy_angle" },
+  { title: "Torque on the wearer", axis: "Torque", channels: ["external_torque"] },
+  { title: "0 helps, 1 lifts only, 2 pauses, 3 stopped", axis: "Controller state", channels: ["safe_state"] },
 ];
 
 /** What a run is called, and what came of it. */
 export interface Shown {
   readonly name: string;
+  readonly program: string;
   readonly place: number;
   readonly look: number;
   readonly run: Run;
@@ -68,7 +72,8 @@ interface Line {
   readonly isWanted: boolean;
 }
 
-const AXIS_SIZE = 52;
+const AXIS_SIZE = 46;
+const LABEL_SIZE = 18;
 /** Plots this near to the window are drawn too, so that they are there when somebody scrolls. */
 const NEAR = "100px";
 /** Milliseconds without a change after which the other plots are drawn too. */
@@ -84,6 +89,9 @@ export class Panels {
   /** The time [s] of the cursor, null where there is none. */
   private time: number | null = null;
   private first: Panel | null = null;
+  private programs = "";
+  private readonly moving = new Set<Panel>();
+  private readonly still = element("p", { class: "note still", hidden: true });
   private ranges = new Map<Panel, readonly [number, number]>();
   private readonly watcher = new ResizeObserver(() => this.fit());
   private readonly rest = whenQuiet(UNHURRIED, () => this.drawRest());
@@ -103,11 +111,14 @@ export class Panels {
   show(shown: readonly Shown[], isBeside: boolean, overlay: Overlay | null): void {
     this.shown = shown;
     this.overlay = overlay;
-    const layout = JSON.stringify([isBeside, shown.map((item) => [item.name, item.look, ...item.run.channels.keys()])]);
+    const layout = JSON.stringify([isBeside, [...this.moving].map(({ title }) => title), shown.map((item) => [item.name, item.look, ...item.run.channels.keys()])]);
     const present = PANELS.filter((panel) => shown.some(({ run }) => panel.channels.some((name) => run.channels.has(name))));
     // What is asked for comes first: a torque, else how the vane moves.
     const leads = (panel: Panel) => panel.channels[0] === (shown.some(({ run }) => run.channels.has("reference")) ? "torque" : "angle");
-    const panels = [...present.filter(leads), ...present.filter((panel) => !leads(panel))];
+    this.rememberMoving(present);
+    const moving = present.filter((panel) => this.moving.has(panel) || leads(panel));
+    const panels = [...moving.filter(leads), ...moving.filter((panel) => !leads(panel))];
+    this.sayStill(present.filter((panel) => !panels.includes(panel)));
     this.ranges.clear();
     if (layout !== this.layout || this.drawn.length === 0) {
       this.layout = layout;
@@ -137,6 +148,34 @@ export class Panels {
     );
   }
 
+  /** Which panels have had a line that is not flat since these programs are shown: only they are drawn. */
+  private rememberMoving(present: readonly Panel[]): void {
+    const programs = JSON.stringify(this.shown.map(({ program }) => program));
+    if (programs !== this.programs) this.moving.clear();
+    this.programs = programs;
+    const isFlat = (values: Float64Array | undefined) => values === undefined || values.every((value) => value === values[0]);
+    for (const panel of present) {
+      const names = [...panel.channels, ...(panel.wanted === undefined ? [] : [panel.wanted])];
+      if (names.some((name) => this.overlay?.channels.has(name) || !this.shown.every(({ run }) => isFlat(run.channels.get(name))))) this.moving.add(panel);
+    }
+  }
+
+  /** Say of each panel that is left out at which value it stays. */
+  private sayStill(panels: readonly Panel[]): void {
+    const texts = panels.map((panel) => {
+      const channel = panel.channels[0] ?? "";
+      const values = this.shown.flatMap((item) => {
+        const [factor, offset] = this.lineOf(channel, item);
+        const value = item.run.channels.get(channel)?.[0];
+        return value === undefined ? [] : [plain(value * factor + offset, 3)];
+      });
+      const unit = readableUnit(this.unitOf(channel).shown);
+      return `${panel.axis} stays at ${`${[...new Set(values)].join(" and ")} ${unit}`.trim()}.`;
+    });
+    say(this.still, texts.join(" "));
+    this.still.hidden = texts.length === 0;
+  }
+
   private rebuild(): void {
     const isBeside = this.host.classList.contains("beside");
     this.layout = "";
@@ -158,7 +197,7 @@ export class Panels {
       const host = element("div", { class: "plot", role: "img", "aria-label": `${name}${this.titleOf(panel)} over time; the table of metrics says it in numbers` });
       return { panel, shown, readout, host, figure: element("figure", { class: "panel" }, title, host), plot: null, isInSight: false, isStale: true };
     });
-    this.host.replaceChildren(...figures.map(({ figure }) => figure));
+    this.host.replaceChildren(...figures.map(({ figure }) => figure), this.still);
     this.drawn = figures;
     for (const item of this.drawn) {
       if (item.panel === this.first) this.draw(item);
@@ -196,16 +235,20 @@ export class Panels {
   }
 
   private titleOf(panel: Panel): string {
+    return `${panel.title}${panel.note ?? ""}`;
+  }
+
+  private axisOf(panel: Panel): string {
     const unit = readableUnit(this.unitOf(panel.channels[0] ?? "").shown);
-    return `${panel.title}${unit === "" || unit === "-" ? "" : ` (${unit})`}${panel.note ?? ""}`;
+    return `${panel.axis}${unit === "" || unit === "-" ? "" : ` (${unit})`}`;
   }
 
   private plotOf({ panel, shown, host }: Drawn, width: number): uPlot {
     const lines = this.linesOf(panel, shown);
     const ink = colour("ink");
-    const axis = { stroke: colour("soft"), grid: { stroke: colour("line"), width: 1 }, ticks: { show: false }, font: "12px system-ui, sans-serif" };
+    const axis = { stroke: colour("soft"), grid: { stroke: colour("line"), width: 1 }, ticks: { show: false }, font: "12px system-ui, sans-serif", labelSize: LABEL_SIZE, labelGap: 0, labelFont: "12px system-ui, sans-serif" };
     const series: uPlot.Series[] = lines.map((line) => ({
-      stroke: line.isWanted ? ink : colourOf(this.shown[line.place]?.look ?? 1),
+      stroke: line.isWanted ? ink : lineColourOf(this.shown[line.place]?.look ?? 1),
       width: line.isWanted ? 1.5 : 2,
       dash: line.isWanted ? [6, 4] : (DASHES[panel.channels.indexOf(line.channel)] ?? []),
       points: { show: false },
@@ -216,7 +259,10 @@ export class Panels {
       legend: { show: false },
       cursor: { sync: { key: "time" }, drag: { x: false, y: false }, points: { size: 7 } },
       scales: { x: { time: false, range: () => [...this.span] as [number, number] }, y: { range: () => [...this.rangeFor(panel)] as [number, number] } },
-      axes: [{ ...axis, size: 28, space: 80, values: (_, ticks) => ticks.map((tick) => `${plain(tick)}`) }, { ...axis, size: AXIS_SIZE, values: (_, ticks) => ticks.map((tick) => plain(tick)) }],
+      axes: [
+        { ...axis, label: "Time (s)", size: 24, space: 80, values: (_, ticks) => ticks.map((tick) => plain(tick)) },
+        { ...axis, label: this.axisOf(panel), size: AXIS_SIZE, values: (_, ticks) => ticks.map((tick) => plain(tick)) },
+      ],
       series: [{}, ...series],
       hooks: {
         drawAxes: [(plot) => this.drawBehind(plot, panel, shown)],
@@ -342,11 +388,12 @@ export class Panels {
     ctx.beginPath();
     ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
     ctx.clip();
+    if (panel.wanted === "reference") this.shadeUnreached(plot, shown);
     for (const channel of panel.channels) {
       for (const place of shown) {
         const item = this.shown[place];
         const band = item?.band?.get(channel);
-        if (item !== undefined && band !== undefined) this.drawBand(plot, band, this.lineOf(channel, item), colourOf(item.look));
+        if (item !== undefined && band !== undefined) this.drawBand(plot, band, this.lineOf(channel, item), lineColourOf(item.look));
       }
       const recorded = this.overlay?.channels.get(channel);
       const first = this.shown[shown[0] ?? 0];
@@ -354,6 +401,43 @@ export class Panels {
       this.drawRecorded(plot, this.overlay.time, displayed(recorded, this.lineOfRecorded(channel, first)));
     }
     ctx.restore();
+  }
+
+  /** Shade where a torque is required that the supply does not sustain, with a line at what it does; once where all share it. */
+  private shadeUnreached(plot: uPlot, shown: readonly number[]): void {
+    const { ctx, bbox } = plot;
+    const limits = new Map<number, Shown>();
+    for (const place of shown) {
+      const item = this.shown[place];
+      const wanted = item?.run.channels.get("reference");
+      const ends = item === undefined ? null : sustainedTorque(this.content, item);
+      if (item === undefined || wanted === undefined || ends === null) continue;
+      if (wanted.some((value) => value > ends[1])) limits.set(ends[1], item);
+      if (wanted.some((value) => value < ends[0])) limits.set(ends[0], item);
+    }
+    for (const [limit, { run }] of limits) {
+      const wanted = run.channels.get("reference") ?? new Float64Array();
+      const edge = plot.valToPos(limit, "y", true);
+      const right = bbox.left + bbox.width;
+      ctx.save();
+      ctx.beginPath();
+      ctx.rect(bbox.left, limit > 0 ? bbox.top : edge, bbox.width, limit > 0 ? edge - bbox.top : bbox.top + bbox.height - edge);
+      ctx.clip();
+      ctx.beginPath();
+      ctx.moveTo(bbox.left, edge);
+      for (let place = 0; place < run.time.length; place += 1) ctx.lineTo(plot.valToPos(run.time[place] ?? 0, "x", true), plot.valToPos(wanted[place] ?? 0, "y", true));
+      ctx.lineTo(plot.valToPos(run.time.at(-1) ?? 0, "x", true), edge);
+      ctx.globalAlpha = 0.14;
+      ctx.fillStyle = colour("ink");
+      ctx.fill();
+      ctx.restore();
+      ctx.fillStyle = colour("soft");
+      ctx.font = `${12 * devicePixelRatio}px system-ui, sans-serif`;
+      ctx.textAlign = "right";
+      ctx.textBaseline = "middle";
+      const middle = plot.valToPos((limit + (wanted.at(-1) ?? limit)) / 2, "y", true);
+      ctx.fillText("more than the supply sustains", right - 8 * devicePixelRatio, middle);
+    }
   }
 
   private drawBand(plot: uPlot, band: Band, [factor, offset]: Scaling, fill: string): void {

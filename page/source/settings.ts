@@ -7,6 +7,7 @@ import { fromSi, InputError, plain, readableUnit, scaleOf, short, splitQuantity,
 export const ATMOSPHERE = "supply.atmospheric_pressure";
 const STANDARD_ATMOSPHERE = 101325;
 const RELATIVE = 1e-9;
+const RAISED: Readonly<Record<string, string>> = { ...Object.fromEntries([..."⁰¹²³⁴⁵⁶⁷⁸⁹"].map((sign, digit) => [String(digit), sign])), "−": "⁻" };
 
 /** The pressure [Pa] from which the gauge pressures of a configuration count. */
 export function atmosphereOf(values: Values): number {
@@ -115,11 +116,22 @@ export function normalText(setting: Setting, text: string): string {
 export function rangeText(content: Content, setting: Setting, atmosphere: number): string {
   const { low, high, isLowAllowed } = setting;
   const scale = scaleOf(setting.shown, scalesOf(content, setting.unit));
-  const text = (end: number) => plain(fromSi(end, scale, atmosphere), 6);
-  const begin = low === null ? "" : `${isLowAllowed ? "from" : "above"} ${text(low)}`;
-  const end = high === null ? "" : `up to ${text(high)}`;
-  const both = [begin, end].filter(Boolean).join(" ") || "any number";
-  return `${both} ${readableUnit(setting.shown)}`.trim();
+  const end = (value: number | null, isLow: boolean) => (value === null ? null : written(fromSi(value, scale, atmosphere), isLow));
+  const [least, most] = [end(low, true), end(high, false)];
+  const unit = ` ${readableUnit(setting.shown)}`.trimEnd();
+  if (least === null) return most === null ? "any number" : `at most ${most}${unit}`;
+  if (most === null) return `${isLowAllowed ? "at least" : "more than"} ${least}${unit}`;
+  return isLowAllowed ? `${least} to ${most}${unit}` : `more than ${least}, at most ${most}${unit}`;
+}
+
+/** An end of a range as people write it, with three digits: rounded inwards, so that it is allowed itself. */
+function written(value: number, isLow: boolean): string {
+  const unit = value === 0 ? 1 : 10 ** (Math.floor(Math.log10(Math.abs(value)) + 1e-12) - 2);
+  const share = value / unit;
+  const whole = isLow ? Math.ceil(share - 1e-6) : Math.floor(share + 1e-6);
+  const text = Math.abs(value) < 1e-4 && value !== 0 ? `${plain(whole / 100, 3)} × 10^${Math.round(Math.log10(unit)) + 2}` : plain(whole * unit, 3, 1e15);
+  return text.replace(/^1 × /, "").replace(/-/g, "−").replace(/\^−?\d+/, (power) => [...power.slice(1)].map((sign) => RAISED[sign] ?? "").join(""))
+    .replace(/\B(?=(\d{3})+(?!\d)(?<!\.\d*))/g, ",");
 }
 
 /** A value as a control shows it, without its unit. */

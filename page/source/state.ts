@@ -1,7 +1,7 @@
 /** The state of the page: which tab, which configurations; as an address, as a file, and the states before it. */
 
 import { type Content, programNamed } from "./content";
-import { type Configuration, settingsByKey, valuesOf } from "./settings";
+import { type Configuration, contradiction, settingsByKey, valuesOf } from "./settings";
 import { InputError, short } from "./units";
 
 export const MOST_CONFIGURATIONS = 4;
@@ -101,6 +101,14 @@ export function checkState(content: Content, state: State): void {
       valuesOf(content, configuration);
     }
   });
+  const wrong = contradictionIn(content, state);
+  if (wrong !== "") throw new InputError(wrong);
+}
+
+/** The first pair of settings of a state that contradict each other, as one line; empty where there is none. */
+export function contradictionIn(content: Content, { benches }: State): string {
+  const found = benches.flat().map((one) => contradiction(programNamed(content, one.program), valuesOf(content, one)));
+  return found.find((wrong) => wrong !== "") ?? "";
 }
 
 /** A question after the nearest name, as the package asks it; empty where none is near. */

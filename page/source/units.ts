@@ -76,11 +76,11 @@ export function fromSi(value: number, scale: UnitScale, atmosphere: number): num
 }
 
 /** A number with a few significant digits, without an exponent where that is readable. */
-export function plain(value: number, digits = 4): string {
+export function plain(value: number, digits = 4, largest = 1e6): string {
   if (!Number.isFinite(value)) return "–";
   if (value === 0) return "0";
   const size = Math.abs(value);
-  if (size < 1e-4 || size >= 1e6) return trimmed(value.toExponential(digits - 1));
+  if (size < 1e-4 || size >= largest) return trimmed(value.toExponential(digits - 1));
   return trimmed(Number(value.toPrecision(digits)).toFixed(decimalsFor(size, digits)));
 }
 

@@ -43,8 +43,10 @@ EXPERIMENT = Look(GREY, marker=".")
 ACTUAL = Look(BLUE)
 """What a device does whose valve is no matter."""
 _VALVES = MappingProxyType({"proportional": PROPORTIONAL, "solenoid": SOLENOID, "solenoid_recycling": SOLENOID})
-PAGE_LOOKS = MappingProxyType({"proportional": 1, "solenoid": 2, "solenoid_recycling": 2})
-"""Numbers of these two colours on the page that simulates, by kind of valve."""
+PAGE_COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
+"""Curves of the page that simulates, on white: numbers 1 to 4 of its style sheet."""
+PAGE_LOOKS = MappingProxyType({kind: PAGE_COLOURS.index(look.colour) + 1 for kind, look in _VALVES.items()})
+"""Which of these the curves of a kind of valve have there."""
 
 
 def look_of_valve(kind: str) -> Look:

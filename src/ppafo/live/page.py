@@ -54,7 +54,7 @@ def check_start(start: Sequence[Mapping[str, Any]], content: Mapping[str, Any]) 
                 f"start, configuration {place + 1}: '{name}' is not on this page{nearest_name(name, programs)}; "
                 f"allowed: {', '.join(programs)}"
             )
-        _check_changes(changes, programs[name], content["units"])
+        values_of_changes(changes, programs[name], content["units"])
     for tab in content["tabs"]:
         count = sum(item["program"] in tab["programs"] for item in start)
         if count > MOST_CONFIGURATIONS:
@@ -63,7 +63,10 @@ def check_start(start: Sequence[Mapping[str, Any]], content: Mapping[str, Any]) 
             )
 
 
-def _check_changes(changes: Mapping[str, Any], program: Mapping[str, Any], units: Mapping[str, Any]) -> None:
+def values_of_changes(
+    changes: Mapping[str, Any], program: Mapping[str, Any], units: Mapping[str, Any]
+) -> dict[str, float]:
+    """Return the numbers in SI, by key, that the texts of a configuration are; ScenarioError where one is none."""
     settings = {one["key"]: one for one in program["settings"]}
     where = f"start, '{program['name']}'"
     for key, text in changes.items():
@@ -77,10 +80,12 @@ def _check_changes(changes: Mapping[str, Any], program: Mapping[str, Any], units
     if ATMOSPHERE_PATH in changes:
         own = settings[ATMOSPHERE_PATH]
         atmosphere = _checked(where, own, changes[ATMOSPHERE_PATH], scales=units[own["unit"]], zero=STANDARD_ATMOSPHERE)
+    found = {ATMOSPHERE_PATH: atmosphere} if ATMOSPHERE_PATH in changes else {}
     for setting, text in _texts(settings, changes):
         # The controller of a walk knows no weather: its gauge pressures count from the standard atmosphere.
         zero = STANDARD_ATMOSPHERE if setting["key"].startswith("controller.") else atmosphere
-        _checked(where, setting, text, scales=units[setting["unit"]], zero=zero)
+        found[setting["key"]] = _checked(where, setting, text, scales=units[setting["unit"]], zero=zero)
+    return found
 
 
 def _texts(settings: Mapping[str, Mapping[str, Any]], changes: Mapping[str, str]) -> Iterator[tuple[Any, str]]:
@@ -144,9 +149,13 @@ def _range(setting: Mapping[str, Any], scales: Sequence[Mapping[str, Any]], zero
         else (end - (zero if scale["isGauge"] else 0.0) - float(scale["offset"])) / float(scale["scale"])
         for end in (setting["low"], setting["high"])
     )
-    begin = "" if low is None else f"{'from' if setting['isLowAllowed'] else 'above'} {low:.6g}"
-    end = "" if high is None else f"up to {high:.6g}"
-    return " ".join(word for word in (begin or ("" if end else "any finite number"), end, setting["shown"]) if word)
+    begin = "" if low is None else f"{'' if setting['isLowAllowed'] else 'more than '}{low:,.6g}"
+    if low is None or high is None:
+        least = f"at least {begin}" if setting["isLowAllowed"] else begin
+        words = f"at most {high:,.6g}" if high is not None else (least if low is not None else "any finite number")
+    else:
+        words = f"{begin} to {high:,.6g}" if setting["isLowAllowed"] else f"{begin}, at most {high:,.6g}"
+    return f"{words} {setting['shown']}".strip()
 
 
 _POLICY = (
@@ -166,7 +175,9 @@ _PAGE = """<!DOCTYPE html>
 <style>{style}</style>
 </head>
 <body class="live-page">
-<div id="workbench"><noscript><p>This page simulates in the browser and needs JavaScript for it.</p></noscript></div>
+<div id="workbench"><noscript><h1>{title}</h1>
+<p>This page simulates in the browser and needs JavaScript for it. This is what it opens with:</p>
+{still}</noscript></div>
 {data}
 <script>{script}</script>
 </body>
@@ -195,12 +206,15 @@ def is_page(path: Path) -> bool:
         return False
 
 
-def page_of(title: str, content: Mapping[str, Any], modules: Mapping[str, str]) -> bytes:
-    """Return a page; ``modules`` has the packed programs by the name that the content has for them."""
+def page_of(title: str, content: Mapping[str, Any], modules: Mapping[str, str], still: str) -> bytes:
+    """Return a page; ``modules`` has the packed programs by the name that the content has for them.
+
+    ``still`` is the picture, as SVG, for readers whose browser runs no scripts.
+    """
     script, style = bundled("loader.js"), bundled("page.css")
     policy = _POLICY.format(script=digest(script), style=digest(style))
     filled = _PAGE.format(
-        policy=policy, title=escape(title), style=style, script=script, data=data_of(content, modules)
+        policy=policy, title=escape(title), style=style, script=script, data=data_of(content, modules), still=still
     )
     return filled.encode()
 

@@ -13,7 +13,9 @@ from ppafo.answers import LivePart
 from ppafo.answers.style import PAGE_LOOKS
 from ppafo.errors import PpafoError, ScenarioError, UnitError
 from ppafo.exports.wasm import WasmModule, module_of
-from ppafo.live.page import block_of, check_start, packed_once, page_of, policy_of_block
+from ppafo.live.opening import computed_opening, first_settings, opening_like, opening_of
+from ppafo.live.page import block_of, check_start, packed_once, page_of, policy_of_block, values_of_changes
+from ppafo.live.still import still_of
 from ppafo.loading import load_scenario
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.simulation.declaration import OF_A_VANE, PRESSURE_WORDS
@@ -65,7 +67,7 @@ class Simulated:
 
 @cache
 def words() -> dict[str, Any]:
-    """Return names, first settings and sliders: ``words.toml``."""
+    """Return names, sliders and questions: ``words.toml``."""
     return tomllib.loads(files("ppafo.live").joinpath("words.toml").read_text(encoding="utf-8"))
 
 
@@ -109,8 +111,20 @@ def program_content(item: Simulated, module: str, intervals: Mapping[str, Interv
         + _relations_of_files(described),
         "channels": [_shown(entry) for entry in described["channels"] if entry["name"] != "time"],
         "metrics": [_shown(entry) for entry in described["metrics"]],
+        "sustained": _sustained({entry["key"] for entry in described["settings"]}),
         "module": module,
     }
+
+
+def _sustained(keys: set[str]) -> dict[str, str] | None:
+    """The settings of which the torques are made that the supplies sustain, of an actuator that makes them so."""
+    torque = {
+        "factor": "actuator.torque_constant",
+        "raised": "supply.pressure",
+        "lowered": "supply.dorsiflexion_pressure",
+        "zero": ATMOSPHERE_PATH,
+    }
+    return torque if keys >= set(torque.values()) else None
 
 
 def usual_changes(scenario: Scenario) -> dict[str, str]:
@@ -174,6 +188,7 @@ def page_content(
         "title": title,
         "form": form,
         "tabs": list(tabs),
+        "bottle": json.loads(files("ppafo.live").joinpath("minutes.json").read_text(encoding="utf-8")),
         "programs": list(programs),
         "units": _scales(shown | recorded),
     }
@@ -337,13 +352,10 @@ def workbench(
     ScenarioError for none, too many, two of one name, or a start that the page does not have; ProgramError where a
     program has to be built and cannot be.
     """
-    content, modules = _content(list(scenarios), overrides, title, "page")
-    check_start(start, content)
+    content, modules, still = _content(list(scenarios), overrides, title, "page", start)
     for tab in content["tabs"]:
-        own = [dict(item) for item in start if item["program"] in tab["programs"]]
-        tab["start"] = own or tab["start"]
         tab["summary"] = summary if summary and len(content["tabs"]) == 1 else tab["summary"]
-    return page_of(title, content, modules)
+    return page_of(title, content, modules, still)
 
 
 def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
@@ -353,7 +365,7 @@ def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
     """
     named = {item if isinstance(item, str) else item.name: item for item in reversed(scenarios)}
     try:
-        content, modules = _content(list(reversed(named.values())), (), TITLE, "block")
+        content, modules, _ = _content(list(reversed(named.values())), (), TITLE, "block", ())
     except PpafoError:
         return None
     differences = [_difference(item) for item in named.values() if isinstance(item, Scenario)]
@@ -371,9 +383,13 @@ def _difference(scenario: Scenario) -> str:
 
 
 def _content(
-    scenarios: "Sequence[str | Scenario]", overrides: Sequence[str], title: str, form: str
-) -> tuple[dict[str, Any], dict[str, str]]:
-    """Content of a page, and its modules by name; programs that are the same are there once."""
+    scenarios: "Sequence[str | Scenario]",
+    overrides: Sequence[str],
+    title: str,
+    form: str,
+    start: Sequence[Mapping[str, Any]],
+) -> tuple[dict[str, Any], dict[str, str], str]:
+    """Content of a page, its modules by name, where programs that are the same are there once, and a still picture."""
     if not 1 <= len(scenarios) <= MOST_SCENARIOS:
         raise ScenarioError(f"a workbench has 1 to {MOST_SCENARIOS} scenarios, not {len(scenarios)}")
     loaded = [load_scenario(item, overrides) if isinstance(item, str) else item for item in scenarios]
@@ -390,7 +406,41 @@ def _content(
         name = names.setdefault(packed_once(item.module.wasm), f"module-{len(names) + 1}")
         programs.append(program_content(item, name, intervals))
     content = page_content(title, form, _tabs(simulated), programs)
-    return content, {name: text for text, name in names.items()}
+    check_start(start, content)
+    by_name = {item.scenario.name: item for item in simulated}
+    described = {program["name"]: program for program in programs}
+    stills = []
+    for tab in content["tabs"]:
+        tab["start"] = [dict(item) for item in start if item["program"] in tab["programs"]] or tab["start"]
+        openings = []
+        for item in tab["start"]:
+            one = by_name[item["program"]]
+            if form == "block":
+                openings.append(opening_like(one.module))
+                continue
+            given = values_of_changes(item["changes"], described[item["program"]], content["units"])
+            openings.append(opening_of(one.scenario, one.module, given, tab["claims"]))
+        shown = [described[item["program"]] for item in tab["start"]]
+        tab["first"] = first_settings(openings, shown)
+        tab["questions"] = [one for one in tab["questions"] if any(_takes(program, one) for program in shown)]
+        stills.append(still_of(tab, openings, shown))
+    return content, {name: text for text, name in names.items()}, stills[0]
+
+
+def _takes(program: Mapping[str, Any], question: Mapping[str, Any]) -> bool:
+    """Whether a program has all the settings that a question changes."""
+    return set(question["changes"]) <= {one["key"] for one in program["settings"] if one["kept"] != "zero"}
+
+
+def openings_of(names: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Return what ``opening_of`` finds of shipped scenarios and walks as a page opens with them, computed anew."""
+    found = {}
+    for name in names:
+        item = Simulated(load_scenario(name), module_of(load_scenario(name)), name)
+        content = page_content(TITLE, "page", _tabs([item]), [program_content(item, "", {})])
+        given = values_of_changes(usual_changes(item.scenario), content["programs"][0], content["units"])
+        found[name] = computed_opening(item.scenario, item.module, given, content["tabs"][0]["claims"])
+    return found
 
 
 @cache
@@ -431,8 +481,10 @@ def _tab(title: str, group: Sequence[Simulated]) -> dict[str, Any]:
         "summary": alone or _SUMMARIES.get(title, ""),
         "programs": [item.scenario.name for item in group],
         "start": [{"program": item.scenario.name, "changes": usual_changes(item.scenario)} for item in group[:_OPEN]],
-        "first": words()["first_of_walks" if title == _WALK else "first"],
         "claims": words()["claims_of_walks" if title == _WALK else "claims"],
+        "questions": [
+            {"text": one["text"], "changes": one["changes"]} for one in words()["questions"] if title in one["tabs"]
+        ],
     }
 
 

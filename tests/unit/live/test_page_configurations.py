@@ -101,6 +101,7 @@ def test_gauge_pressures_count_from_the_atmosphere_of_their_configuration(chromi
     high = "supply.atmospheric_pressure=70+kPa_a"
     address = f"#1=torque-task-proportional&1=torque-task-proportional;{high}"
     page = opened(chromium, file, address, viewport=LARGE)
+    page.locator(".panel", has_text="Pressures").scroll_into_view_if_needed()
     box = page.locator(".panel", has_text="Pressures").locator(".u-over").bounding_box()
     page.mouse.move(box["x"] + 0.999 * box["width"], box["y"] + 0.5 * box["height"])
     shown = [float(text) for text in page.locator(".panel", has_text="Pressures").locator("b").all_inner_texts()]

@@ -1,0 +1,61 @@
+/** What a tab comes to in a sentence or two: what its task requires of the supply, and how long its gas would last. */
+
+import { type Bottle, type Content, programNamed } from "./content";
+import type { Run } from "./engine";
+import type { Values } from "./settings";
+import { plain } from "./units";
+
+interface Simulated {
+  readonly name: string;
+  readonly program: string;
+  readonly run: Run;
+  readonly values: Values;
+}
+
+/** The least and the largest torque [N m] that the supplies sustain; null where the actuator has no such limits. */
+export function sustainedTorque(content: Content, { program, values }: Pick<Simulated, "program" | "values">): readonly [number, number] | null {
+  const { sustained } = programNamed(content, program);
+  if (sustained === null) return null;
+  const at = (key: string) => values.get(key) ?? NaN;
+  const above = (key: string) => Math.max(0, at(key) - at(sustained.zero)) * at(sustained.factor);
+  return [-above(sustained.lowered), above(sustained.raised)];
+}
+
+/** For how many minutes a full bottle lasts at the mean flow of a run, by the table of the package; NaN where it takes none. */
+export function minutesOfBottle({ flows, minutes }: Bottle, { time, channels }: Run): number {
+  const flow = (channels.get("supplied_mass")?.at(-1) ?? 0) / (time.at(-1) ?? 0);
+  const place = Math.min(flows.length - 1, Math.max(1, flows.findIndex((one) => one >= flow)));
+  if (!(flow >= (flows[0] ?? 0)) || flow > (flows.at(-1) ?? 0)) return NaN;
+  const [from, to] = [Math.log(flows[place - 1] ?? 1), Math.log(flows[place] ?? 1)];
+  const [before, after] = [Math.log(minutes[place - 1] ?? 1), Math.log(minutes[place] ?? 1)];
+  return Math.exp(before + ((after - before) * (Math.log(flow) - from)) / (to - from));
+}
+
+/** The main facts about what is simulated: one sentence about torques, one about gas. */
+export function factsOf(content: Content, all: readonly Simulated[]): string {
+  const done = all.filter(({ run }) => run.fault === "");
+  return [torqueFacts(content, done), gasFacts(content, done)].filter(Boolean).join(" ");
+}
+
+function torqueFacts(content: Content, done: readonly Simulated[]): string {
+  const facts = done.flatMap((item) => {
+    const [limits, wanted] = [sustainedTorque(content, item), item.run.channels.get("reference")];
+    if (limits === null || wanted === undefined) return [];
+    const [least, most] = [wanted.reduce((a, b) => Math.min(a, b), 0), wanted.reduce((a, b) => Math.max(a, b), 0)];
+    const [required, sustained] = -least > most ? [least, limits[0]] : [most, limits[1]];
+    const short = Math.abs(required) > Math.abs(sustained) * (1 + 1e-9);
+    const text = `the task requires ${plain(required, 3)} N\u00a0m; the supply sustains ${sustained.toFixed(1)} N\u00a0m${short ? ", so the shaded part is out of reach" : ""}.`;
+    return [[item.name, text] as const];
+  });
+  const texts = [...new Set(facts.map(([, text]) => text))];
+  if (texts.length === 1) return texts.map((text) => text.slice(0, 1).toUpperCase() + text.slice(1)).join("");
+  return facts.map(([name, text]) => `${name}: ${text}`).join(" ");
+}
+
+function gasFacts({ bottle }: Content, done: readonly Simulated[]): string {
+  const lasting = done.flatMap(({ name, run }) => {
+    const minutes = minutesOfBottle(bottle, run);
+    return Number.isFinite(minutes) ? [`${plain(minutes, 2)} minutes${done.length > 1 ? ` (${name})` : ""}`] : [];
+  });
+  return lasting.length === 0 ? "" : `Without rest, ${bottle.name} lasts ${lasting.join(", ")}.`;
+}

@@ -1,0 +1,155 @@
+"""What a page opens with, found by running its programs: what each setting changes there, and the first panel.
+
+The package keeps this of its own scenarios in ``opening.json``, which ``scripts/page_tables.py`` writes; of others it
+is computed when the page is made.
+"""
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+from ppafo.engine.cache import kept_bytes
+from ppafo.errors import ScenarioError
+from ppafo.exports.wasm import WasmModule
+from ppafo.signals.recording import Floats
+from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.scenario import Scenario
+
+MOST_FIRST = 12
+LEAST_CHANGE = 1e-3
+"""Change, as a fraction, below which a setting changes nothing that could be seen."""
+_STEP = 0.2
+"""How far a setting is moved to either side: this fraction of its value; of a gauge pressure above the atmosphere."""
+_PLACES = 150
+_NATURE = ("gas.", "gas_model.", "flow.", "run.", "sensors.seed", "supply.atmospheric_pressure")
+"""Settings that never come first: what nature sets, and how finely a run is computed and for how long."""
+_RANKED = ("published", "task", "changed", "identified", "fitted", "datasheet", "derived", "assumed", "default")
+"""Of two settings with one effect, such as an area and its discharge coefficient, the better known one is shown."""
+
+
+def lead_channel(channels: Sequence[str]) -> str:
+    """Return the channel of the first panel of a page: a torque that is controlled, else the motion of the vane."""
+    return "torque" if "reference" in channels else "angle"
+
+
+def opening_of(
+    scenario: Scenario, module: WasmModule, given: Mapping[str, float], claims: Sequence[str]
+) -> dict[str, Any]:
+    """Return ``changes`` by setting and the ``courses`` of the first panel, of a scenario with some values in SI.
+
+    A change is a list of fractions: of each claim, and of the span of the first panel.
+    """
+    key = _key(module, given, claims)
+    known = _known().get(scenario.name, {})
+    if known.get("key") == key:
+        return dict(known)
+    numbers = [[entry["key"], entry["value"]] for entry in module.description["settings"]]
+    made_from = json.dumps([key, hashlib.sha256(module.wasm).hexdigest(), numbers])
+    made = kept_bytes(
+        "opening", made_from, lambda: json.dumps(computed_opening(scenario, module, given, claims)).encode()
+    )
+    found: dict[str, Any] = json.loads(made)
+    return found
+
+
+def opening_like(module: WasmModule) -> dict[str, Any]:
+    """Return what is known of the shipped scenario that has most settings in common: a report computes nothing."""
+    keys = {entry["key"] for entry in module.description["settings"]}
+    known = _known()
+    named = known.get(module.description["name"])
+    return dict(named or max(known.values(), key=lambda one: len(keys & set(one["changes"]))))
+
+
+def _key(module: WasmModule, given: Mapping[str, float], claims: Sequence[str]) -> str:
+    """What names a scenario as its file and overrides have it, with what a page changes of it."""
+    told = [module.description["document"], module.description["overrides"], sorted(given.items()), list(claims)]
+    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:32]
+
+
+@cache
+def _known() -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(files("ppafo.live").joinpath("opening.json").read_text(encoding="utf-8"))
+    return found
+
+
+def computed_opening(
+    scenario: Scenario, module: WasmModule, given: Mapping[str, float], claims: Sequence[str]
+) -> dict[str, Any]:
+    """Return the same as ``opening_of``, computed."""
+    known = [one["name"] for one in module.description["metrics"]]
+    named, claims = claims, [name for name in claims if name in known]
+    channels = [one["name"] for one in module.description["channels"]]
+    lead = lead_channel(channels)
+
+    def runs(columns: Mapping[str, Floats], bands: Sequence[str]) -> Any:
+        count = max((len(column) for column in columns.values()), default=1)
+        usual = {path: np.full(count, value) for path, value in given.items()}
+        some = {**usual, **columns} or {"run.duration": np.full(count, scenario.duration)}
+        return run_ensemble(scenario, some, claims, bands)
+
+    shown = [lead, *(("reference",) if lead == "torque" else ())]
+    base = runs({}, shown)
+    usual = [float(base.metrics[name][0]) for name in claims]
+    course = base.traces[lead][:, 0]
+    span = float(np.ptp(course)) if np.isfinite(course).all() else 0.0
+    changes = {}
+    for entry in module.description["settings"]:
+        ends = _ends(entry, given, scenario.device.supply.atmospheric_pressure)
+        if entry["key"].startswith(_NATURE) or entry["kept"] == "zero" or ends is None:
+            continue
+        try:
+            found = runs({entry["key"]: np.array(ends)}, (lead,))
+        except ScenarioError:
+            continue  # what an ensemble does not vary, such as a time that others divide, is not a first slider
+        moved = [_share(found.metrics[name] - value, abs(value)) for name, value in zip(claims, usual, strict=True)]
+        apart = np.sqrt(np.mean((found.traces[lead] - course[:, None]) ** 2, axis=0))
+        if max(all_changes := [*moved, _share(apart, span)]) > LEAST_CHANGE:
+            changes[entry["key"]] = all_changes
+    thin = slice(None, None, max(1, len(base.times) // _PLACES))
+    return {
+        "key": _key(module, given, named),
+        "changes": changes,
+        "times": _short(base.times[thin]),
+        "courses": {name: _short(base.traces[name][thin, 0]) for name in shown},
+    }
+
+
+def _short(values: Floats) -> list[float | None]:
+    """Values with four digits, as a drawing needs them; None where a run had failed."""
+    return [float(f"{value:.4g}") if np.isfinite(value) else None for value in values.tolist()]
+
+
+def _ends(entry: Mapping[str, Any], given: Mapping[str, float], atmosphere: float) -> tuple[float, float] | None:
+    value = given.get(entry["key"], entry["value"])
+    size = _STEP * abs(value - (atmosphere if entry["unit"] == "Pa_a" else 0.0))
+    ends = value - size, value + size
+    low, high = entry["minimum"], entry["maximum"]
+    ends = (ends[0] if low is None else max(low, ends[0]), ends[1] if high is None else min(high, ends[1]))
+    return ends if ends[0] < ends[1] else None
+
+
+def _share(change: Floats, of: float) -> float:
+    sizes = np.abs(change[np.isfinite(change)])
+    return float(f"{sizes.max() / of:.3g}") if of > 0.0 and sizes.size else 0.0
+
+
+def first_settings(openings: Sequence[Mapping[str, Any]], programs: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the keys of at most twelve settings of some configurations, that with the largest change first."""
+    origins = {one["key"]: one["origin"] for program in programs for one in program["settings"]}
+    rank = {origin: place for place, origin in enumerate(_RANKED)}
+    largest: dict[str, float] = {}
+    for opening in openings:
+        same: dict[tuple[float, ...], str] = {}
+        for key, change in sorted(opening["changes"].items(), key=lambda item: rank.get(origins.get(item[0], ""), 99)):
+            if key in origins and same.setdefault(tuple(change), key) == key:
+                largest[key] = max(largest.get(key, 0.0), *change)
+    # Where nothing is known, as of a run that fails, the settings come in the order of the program.
+    named = sorted(largest, key=lambda key: (-largest[key], key)) or [
+        key for key in origins if not key.startswith(_NATURE)
+    ]
+    return named[:MOST_FIRST]

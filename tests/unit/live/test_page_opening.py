@@ -1,0 +1,204 @@
+"""What the page opens with: sliders, panels and rows by what they change, its main facts, and its questions."""
+
+import json
+import re
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ppafo.answers.style import PAGE_COLOURS
+from ppafo.live import page as pages
+from ppafo.live.opening import LEAST_CHANGE, MOST_FIRST
+from ppafo.live.workbench import DEFAULT, declared_workbenches, openings_of, words, workbench
+from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
+from ppafo.questions.endurance.draw import Schedule, draw_of_numbers
+from ppafo.questions.endurance.solve import follow_bottle
+from scripts.live_page import missing, opened
+from scripts.page_tables import FLOWS
+
+has_browser = pytest.mark.skipif(bool(missing()), reason=missing() or "there is a browser")
+LARGE = {"width": 1400, "height": 1000}
+
+
+def _opening() -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(files("ppafo.live").joinpath("opening.json").read_text(encoding="utf-8"))
+    return found
+
+
+def test_what_the_package_keeps_of_a_scenario_is_what_its_program_gives() -> None:
+    """Else run ``python scripts/page_tables.py``."""
+    name = "torque-task-proportional"
+    assert openings_of([name])[name] == _opening()[name]
+
+
+@has_browser
+def test_every_first_slider_changes_something_and_the_largest_change_is_first(chromium: Any, file: Path) -> None:
+    content = opened(chromium, file).evaluate("workbench.content")
+    kept = _opening()
+    for tab in content["tabs"]:
+        changes = [kept[one["program"]]["changes"] for one in tab["start"]]
+        largest = [max(max(one.get(key, [0.0])) for one in changes) for key in tab["first"]]
+        assert len(largest) == MOST_FIRST
+        assert largest == sorted(largest, reverse=True)
+        assert min(largest) > LEAST_CHANGE
+
+
+def test_minutes_of_the_bottle_are_those_of_endurance() -> None:
+    table = json.loads(files("ppafo.live").joinpath("minutes.json").read_text(encoding="utf-8"))
+    bottle, schedule = load_bottle(PAPER_BOTTLE), Schedule(3e6, 0.0, 3e6)
+    assert table["flows"] == [float(f"{flow:.4g}") for flow in FLOWS]
+    for place in (9, 16, 22):
+        lasting = follow_bottle(bottle, draw_of_numbers(float(FLOWS[place]), 1.0, None), schedule)
+        assert float(f"{lasting.discharge.walking_time / 60.0:.4g}") == table["minutes"][place]
+
+
+def test_curves_have_the_colours_of_the_figures() -> None:
+    style = pages.bundled("page.css")
+    light = style.split("@media")[0]
+    found = re.findall(r"--line-(\d): ?(#[0-9a-f]{3,6})", light)
+    long = [colour if len(colour) == 7 else "#" + "".join(2 * digit for digit in colour[1:]) for _, colour in found]
+    assert long == [colour.lower() for colour in PAGE_COLOURS]
+
+
+def test_each_question_is_of_a_tab_and_in_the_range_of_its_settings() -> None:
+    page = workbench(DEFAULT)
+    assert b"<noscript>" in page
+    tabs = {tab for one in words()["questions"] for tab in one["tabs"]}
+    for tab in tabs:
+        assert sum(tab in one["tabs"] for one in words()["questions"]) == 3
+    assert declared_workbenches()
+
+
+def test_without_scripts_there_is_a_picture(file: Path) -> None:
+    text = file.read_text(encoding="utf-8")
+    picture = text.split("<noscript>")[1].split("</noscript>")[0]
+    assert picture.count("<polyline") == 3
+    assert "Torque (N m)" in picture
+    assert "Time (s)" in picture
+    assert "Solenoid pair" in picture
+    assert PAGE_COLOURS[1] in picture
+    assert "style=" not in picture  # the policy allows no styles but one
+
+
+@has_browser
+def test_the_page_says_its_main_fact_and_its_questions_set_the_sliders(chromium: Any, file: Path) -> None:
+    page = opened(chromium, file, viewport=LARGE)
+    facts = page.locator(".facts")
+    said = facts.inner_text().replace("\u00a0", " ")
+    assert "The task requires 6 N m; the supply sustains 5.0 N m, so the shaded part is out of reach." in said
+    assert "lasts 9.4 minutes (Solenoid pair), 30 minutes (Proportional valve)" in facts.inner_text()
+    assert "shaded" in facts.inner_text()
+    page.get_by_role("link", name="What if the task required 4 N m?").click()
+    page.wait_for_timeout(300)
+    assert page.evaluate("workbench.values(1)['reference.level']") == 4.0
+    assert "shaded" not in facts.inner_text()
+    page.get_by_role("link", name="What if the valve switched at 80 Hz?").click()
+    page.wait_for_timeout(300)
+    values = page.evaluate("[0, 1].map(place => workbench.values(place)['controller.period'])")
+    assert values == [0.0125, 0.001]
+    assert page.evaluate("workbench.values(0)['reference.level']") == 6.0
+    for tab, question in (("Step response", "30 psi"), ("Walk", "110 kg")):
+        page.get_by_role("tab", name=tab).click()
+        page.get_by_role("link", name=re.compile(question)).click()
+        page.wait_for_timeout(300)
+        assert page.evaluate("Object.keys(JSON.parse(workbench.file()).benches.flat().at(-1).changes).length") > 0
+        assert page.locator(".notice").is_hidden()
+    assert page.said == []
+
+
+@has_browser
+def test_what_stays_is_said_in_a_line_until_it_moves(chromium: Any, file: Path) -> None:
+    page = opened(chromium, file, viewport=LARGE)
+    titles = page.locator(".panel .title").all_inner_texts()
+    assert titles == ["Torque", "Pressures, chamber 2 dashed", "Command to the valve", "Gas taken from the supply"]
+    assert page.locator(".still").inner_text() == "Angle stays at 75 deg."
+    rows = page.locator(".outcome tbody tr")
+    shown = [row for row in rows.all() if row.is_visible()]
+    assert len(shown) < rows.count()
+    for row in shown:
+        cells = row.locator("td:not(.change)").all_inner_texts()
+        assert set(cells) - {"0", "\u2013"}
+    page.get_by_role("tab", name="Step response").click()
+    page.wait_for_timeout(300)
+    assert "Angle of the ankle" in page.locator(".panel .title").all_inner_texts()
+
+
+@has_browser
+def test_a_refused_value_does_not_enter_the_shared_address(chromium: Any, file: Path) -> None:
+    page = opened(chromium, file, viewport=LARGE)
+    page.evaluate("workbench.open('1=torque-task-proportional;friction.static_torque=0.3+N+m')")
+    page.wait_for_timeout(400)
+    address = page.evaluate("location.hash")
+    assert "0.3" in address
+    page.locator("summary", has_text="Friction").click()
+    page.get_by_label("Dynamic friction", exact=True).fill("0.4")
+    page.get_by_label("Dynamic friction", exact=True).press("Enter")
+    page.locator(
+        "#panel > .fault", has_text="friction.dynamic_torque must be at most friction.static_torque"
+    ).wait_for()
+    page.wait_for_timeout(400)
+    assert page.evaluate("location.hash") == address
+    page.locator("summary", has_text="Share and export").click()
+    page.get_by_role("button", name="Copy address").click()
+    assert "Nothing is shared: friction.dynamic_torque must be at most" in page.locator(".notice").inner_text()
+    refused = "1=torque-task-proportional;friction.dynamic_torque=3+N+m"
+    assert "must be at most friction.static_torque" in page.evaluate(f"workbench.open('{refused}')")
+
+
+@has_browser
+def test_ranges_are_written_as_people_write_them(chromium: Any, file: Path) -> None:
+    page = opened(chromium, file, viewport=LARGE)
+    for group in ("Friction", "Actuator", "Run", "Gas"):
+        page.locator("summary", has_text=group).first.click()
+    said = {}
+    for key in ("friction.static_torque", "actuator.dead_volume_1", "actuator.angle_max", "run.step", "motion.angle"):
+        page.locator(f".control[data-key='{key}'] .name").click()
+        said[key] = page.locator(f"[id='about-{key}'] span").nth(1).inner_text().replace("\u00a0", " ")
+    assert said == {
+        "friction.static_torque": "0 to 10,000 N m. friction.static_torque",
+        "actuator.dead_volume_1": "More than 0 cm³. actuator.dead_volume_1",
+        "actuator.angle_max": "\u2212572 to 572 deg. actuator.angle_max",
+        "run.step": "10⁻⁸ to 1,000 s. run.step",
+        "motion.angle": "\u2212572 to 572 deg. motion.angle",
+    }
+
+
+@has_browser
+def test_files_that_are_not_opened_are_named(chromium: Any, file: Path) -> None:
+    page = opened(chromium, file, viewport=LARGE)
+    page.evaluate(
+        """() => {
+        const data = new DataTransfer();
+        const text = "time [s],torque [N m]\\n0,0\\n1,1\\n2,2\\n";
+        for (const name of ["one.csv", "two.csv", "three.csv"]) data.items.add(new File([text], name));
+        window.dispatchEvent(new DragEvent("drop", { dataTransfer: data, cancelable: true }));
+    }"""
+    )
+    page.locator(".notice", has_text="Not opened").wait_for()
+    said = page.locator(".notice").inner_text()
+    assert said.startswith("one.csv")
+    assert said.endswith("Not opened, as one file is read at a time: two.csv, three.csv.")
+
+
+@has_browser
+def test_there_is_one_main_landmark_and_pressures_have_units(chromium: Any, file: Path) -> None:
+    page = opened(chromium, file, viewport=LARGE)
+    assert page.get_by_role("main").count() == 1
+    assert page.get_by_role("tabpanel").count() == 1
+    pressures = page.locator(".drawing text").all_text_contents()
+    assert next(text for text in pressures if text.endswith(" psi")) == "1: 50 psi"
+    # Neither number runs across the vane or the other one, wherever the vane is.
+    for address in ("1=torque-task-solenoid;motion.angle=21+deg", "1=torque-task-solenoid;motion.angle=129+deg"):
+        page.evaluate(f"workbench.open('{address}')")
+        page.wait_for_timeout(300)
+        boxes = page.evaluate(
+            "['.drawing .vane', '.drawing .words:nth-of-type(1)', '.drawing .words:nth-of-type(2)']"
+            ".map(name => { const {left, right, top, bottom} = document.querySelector(name).getBoundingClientRect();"
+            " return [left, right, top, bottom]; })"
+        )
+        for one in range(3):
+            for other in range(one):
+                (a, b, c, d), (e, f, g, h) = boxes[one], boxes[other]
+                assert b <= e or f <= a or d <= g or h <= c
