@@ -55,9 +55,10 @@ RECORDINGS = ("step-response", "torque-task-solenoid", "torque-task-proportional
 
 @pytest.fixture(scope="module", autouse=True)
 def few_completions() -> Iterator[None]:
-    """As many completions of the torque task as a test needs; the command takes more."""
+    """As many completions of the torque task, and searches in them, as a test needs; the command takes more."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("ppafo.questions.reproduce.solve.COMPLETIONS", 1000)
+        patch.setattr("ppafo.questions.reproduce.open_range.SEARCHED", 2)
         yield
 
 

@@ -123,9 +123,14 @@ def sampled_bound(
     return SampledBound(found, _certified(task, found), decisions)
 
 
-def best_decisions(scenario: Scenario, commands: Sequence[float] = COMMANDS) -> tuple[float, tuple[float, ...]]:
-    """The RMS error [N m] and commands of the best run that was found, without the certificate, which takes as long."""
-    return _best_decisions(_task(scenario, commands))
+def best_decisions(
+    scenario: Scenario, commands: Sequence[float] = COMMANDS, most_states: int = MOST_STATES
+) -> tuple[float, tuple[float, ...]]:
+    """The RMS error [N m] and commands of the best run that was found, without the certificate, which takes as long.
+
+    ``most_states`` is how many states the search keeps from sample to sample: its time grows with them.
+    """
+    return _best_decisions(_task(scenario, commands), most_states)
 
 
 def _task(scenario: Scenario, commands: Sequence[float]) -> _Task:
@@ -163,7 +168,7 @@ def _cells(task: _Task, pressures: Floats, states: Floats, width: float) -> tupl
     return first, inverse.ravel()
 
 
-def _best_decisions(task: _Task) -> tuple[float, tuple[float, ...]]:
+def _best_decisions(task: _Task, most_states: int = MOST_STATES) -> tuple[float, tuple[float, ...]]:
     """RMS error [N m] and commands of the best run among those through the best state of each cell."""
     states = task.batch.states.copy()
     square = task.weights[0] * (task.reference[0] - task.torque(*task.pressures(states))) ** 2
@@ -175,7 +180,7 @@ def _best_decisions(task: _Task) -> tuple[float, tuple[float, ...]]:
         square = np.repeat(square, len(task.commands)) + task.weights[part] @ error**2
         order = np.argsort(square, kind="stable")
         places, _ = _cells(task, pressures[:, -1, order], after[:, order], CELL)
-        kept = order[np.sort(places)][:MOST_STATES]
+        kept = order[np.sort(places)][:most_states]
         ways.append(np.divmod(kept, len(task.commands)))
         states, square = after[:, kept], square[kept]
     place, decisions = int(np.argmin(square)), []
