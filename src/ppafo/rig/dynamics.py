@@ -7,6 +7,7 @@ chamber with its own orifice, a laminar part of the leak, friction that grows wi
 import math
 from typing import NamedTuple
 
+from ppafo.model.effects.seal_friction import SealFriction, pressed_at_rest, pressed_in_motion
 from ppafo.model.effects.second_virial import gas_enthalpy, real_density, real_pressure
 from ppafo.model.gas import energy_rate, gas_temperature, heat_from_wall, temperature_flow_factor
 from ppafo.model.orifice import ExactOrifice, exact_flow
@@ -39,8 +40,7 @@ class RigPhysics(NamedTuple):
     supply_rate: float
     line_volume: float
     laminar_conductance: float
-    static_per_pressure: float
-    dynamic_per_pressure: float
+    seal_friction: SealFriction
     stribeck_velocity: float
     angle_follow_rate: float
     pressure_follow_rate: float
@@ -167,14 +167,14 @@ def wall_heat(rig: RigPhysics, node: Node, volume: float) -> float:
 
 def static_limit(plant: PlantParameters, rig: RigPhysics, pressure_1: float, pressure_2: float) -> float:
     """Largest friction torque at rest [N m] under two absolute pressures [Pa]."""
-    return plant.static_torque + rig.static_per_pressure * abs(pressure_1 - pressure_2)
+    return pressed_at_rest(plant.static_torque, pressure_1, pressure_2, rig.seal_friction)
 
 
 def kinetic_friction(
     plant: PlantParameters, rig: RigPhysics, angular_velocity: float, pressure_1: float, pressure_2: float
 ) -> float:
     """Size of the friction torque in motion [N m]: dynamic, and near standstill more (Stribeck). Equation (10)."""
-    dynamic = plant.dynamic_torque + rig.dynamic_per_pressure * abs(pressure_1 - pressure_2)
+    dynamic = pressed_in_motion(plant.dynamic_torque, angular_velocity, pressure_1, pressure_2, rig.seal_friction)
     if rig.stribeck_velocity <= 0.0:
         return dynamic
     limit = static_limit(plant, rig, pressure_1, pressure_2)

@@ -22,6 +22,7 @@ from ppafo.engine.run import Run
 from ppafo.errors import DataError, ParameterError, ScenarioError, nearest_name, one_line, reason
 from ppafo.model.catalog import VALVES
 from ppafo.model.effects.second_virial import real_density
+from ppafo.model.effects.spool_play import spool_position
 from ppafo.model.gas import gas_energy
 from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import chamber_volumes
@@ -45,7 +46,7 @@ from ppafo.rig.preset import (
     rig_plant,
     sensor,
 )
-from ppafo.rig.solution import RigRun, RigSolution, sensor_signals, solve_rig, spool_position
+from ppafo.rig.solution import RigRun, RigSolution, sensor_signals, solve_rig
 from ppafo.signals.recording import CHANNELS, Channel, Recording
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.plan import exact_orifice, plan_run, profile_values

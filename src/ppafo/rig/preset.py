@@ -24,6 +24,7 @@ from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, refu
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION, Effect
+from ppafo.model.effects.seal_friction import SealFriction
 from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.model.gas import heat_capacity_at_constant_volume
 from ppafo.model.orifice import ExactOrifice, area_conductance
@@ -362,8 +363,7 @@ def rig_physics(device: Device, preset: Preset) -> RigPhysics:
         supply_rate=1.0 / recovery if droop > 0.0 else 0.0,
         line_volume=values["line.volume"],
         laminar_conductance=values["leak.laminar_conductance"],
-        static_per_pressure=values["friction.static_per_pressure"],
-        dynamic_per_pressure=values["friction.dynamic_per_pressure"],
+        seal_friction=SealFriction(values["friction.static_per_pressure"], values["friction.dynamic_per_pressure"]),
         stribeck_velocity=values["friction.stribeck_velocity"],
         angle_follow_rate=TWO_PI * values["angle_sensor.bandwidth"],
         pressure_follow_rate=TWO_PI * values["pressure_sensor.bandwidth"],

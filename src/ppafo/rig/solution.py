@@ -25,6 +25,7 @@ from ppafo.engine.rows import leaf_paths, numbers, rebuild, row_expression
 from ppafo.engine.run import Run
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import SimulationError
+from ppafo.model.effects.spool_play import spool_position
 from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import Openings, PlantParameters, actuator_torque, holds_still
 from ppafo.model.sensors import Measurement
@@ -63,14 +64,6 @@ class RigSolution:
     commands: Floats
     impacts: list[float] = field(default_factory=list)
     breakaways: list[float] = field(default_factory=list)
-
-
-def spool_position(position: float, command: float, width: float) -> float:
-    """Position [-1, 1] of a spool with play of a whole ``width`` [-] behind a command; it reaches full opening."""
-    half = 0.5 * width
-    inner = position * (1.0 - half)
-    inner = max(command - half, min(command + half, inner))
-    return max(-1.0, min(1.0, inner / (1.0 - half)))
 
 
 def sensor_signals(rig_run: RigRun, state: Floats, pressures: Floats) -> tuple[float, float, float]:

@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ppafo.model.effects.spool_play import spool_position
 from ppafo.rig import record
 from ppafo.rig.dynamics import RigState
 from ppafo.rig.preset import Preset, load_preset
-from ppafo.rig.solution import RigRun, RigSolution, solve_rig, spool_position
+from ppafo.rig.solution import RigRun, RigSolution, solve_rig
 from ppafo.running import simulate
 
 OnTheRig = Callable[[str, Preset], RigRun]

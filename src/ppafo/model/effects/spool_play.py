@@ -25,17 +25,23 @@ def prepare(settings: Any, _device: Any) -> SpoolPlay:
     return SpoolPlay(settings["width"])
 
 
-def behind_play(command: float, spool_play: SpoolPlay, spool_play_state: SpoolPlace) -> float:
-    """Command [-] that a spool follows with play behind its command, as the virtual rig has it.
+def spool_position(position: float, command: float, play_width: float) -> float:
+    """Position [-1, 1] to which a command [-] draws a spool with play of a whole ``play_width`` [-].
 
     The inside of the play, ``y``, is drawn along when the command leaves it: ``y = max(c - b/2, min(c + b/2, y))``.
-    The spool comes to ``y / (1 - b/2)``, so that it reaches full opening. A command that vents is no position.
+    The spool comes to ``y / (1 - b/2)``, so that it reaches full opening.
     """
+    half = 0.5 * play_width
+    inner = position * (1.0 - half)
+    inner = max(command - half, min(command + half, inner))
+    return max(-1.0, min(1.0, inner / (1.0 - half)))
+
+
+def behind_play(command: float, spool_play: SpoolPlay, spool_play_state: SpoolPlace) -> float:
+    """Command [-] that a spool follows with play behind its command. A command that vents is no position."""
     given = at_valve(command)
-    half = 0.5 * spool_play.play_width
-    inner = spool_play_state.spool_command * (1.0 - half)
-    inner = max(given - half, min(given + half, inner))
-    return given if given > VENTS_ABOVE else max(-1.0, min(1.0, inner / (1.0 - half)))
+    drawn = spool_position(spool_play_state.spool_command, given, spool_play.play_width)
+    return given if given > VENTS_ABOVE else drawn
 
 
 def start(_spool_play: SpoolPlay, _now: Moment) -> SpoolPlace:
