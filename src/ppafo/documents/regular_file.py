@@ -27,11 +27,19 @@ def read_regular_file(path: Path, maximum: int | None = None) -> bytes:
     raise OSError(None, f"it is larger than {maximum / 1e6:g} MB, the maximum size of such a file")
 
 
+_TWO_CHARACTERS = 4
+"""Bytes of UTF-16."""
+
+
 def decoded(content: bytes) -> str:
-    """Return the text of a file in UTF-8, with its byte-order mark or without, or in UTF-16 with one.
+    """Return the text of a file in UTF-8 or UTF-16, each with its byte-order mark or without.
 
     UnicodeDecodeError where it is neither. Spreadsheets and loggers on Windows write UTF-16.
     """
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return content.decode("utf-16")
+    # Without a mark: two plain characters, each with a byte of zero behind it or before it.
+    for place, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
+        if len(content) >= _TWO_CHARACTERS and not any(content[place:4:2]) and all(content[1 - place : 4 : 2]):
+            return content.decode(encoding)
     return content.decode("utf-8-sig")

@@ -121,10 +121,9 @@ def stands_out(values: Floats, plateau: Plateau) -> bool:
 
 def _runs_into(values: Floats, plateau: Plateau) -> bool:
     """Return whether the signal was still moving fast, for this signal, just before the plateau."""
-    if plateau.first < _BEFORE:
-        return False
-    steps = np.abs(values[_BEFORE:] - values[:-_BEFORE])
-    return float(steps[plateau.first - _BEFORE]) > _ABRUPT_FRACTION * float(steps.max())
+    before = min(plateau.first, _BEFORE)
+    steps = np.abs(values[before:] - values[:-before]) if before else np.zeros(1)
+    return float(steps[plateau.first - before]) > _ABRUPT_FRACTION * float(steps.max())
 
 
 def noise_of(values: Floats) -> float:

@@ -150,7 +150,7 @@ def test_what_a_channel_declares_between_its_samples_is_in_the_header(tmp_path: 
         read_csv(path)
 
 
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be"])
 def test_a_table_is_read_whatever_mark_its_encoding_has(tmp_path: Path, encoding: str) -> None:
     path = tmp_path / "bench.csv"
     path.write_text("time [s],angle [rad]\n0,1\n1,2\n", encoding=encoding)

@@ -216,14 +216,7 @@ def propose(
 
     ``load`` gives the scenario of a name with changes, on the device of the problem.
     """
-    ranges = fit.optimum.residuals.ranges
-    find_effects(path for one in EFFECT_DIRECTIONS for path in one.neutral)
-    parameters = tuple(item for item in ranges if not is_nuisance(item) and not item.recordings)
-    common = tuple(item for item in ranges if is_of_sensor(item) and not item.recordings)
-    noise: dict[str, float] = {}
-    for one in fit.optimum.residuals.experiments:
-        noise = {channel.name: channel.noise for channel in one.channels} | noise
-    design = _Design(fit, tolerances, parameters, common, harmful_sizes(fit), noise, load)
+    design = _design_of(fit, tolerances, harmful_sizes(fit), load)
     present = _present(design)
     points = _points(fit, DRAWS if count > 1 else 1)
     proposals = draw_proposals(ability, ability.candidates, np.random.default_rng(ability.seed))
@@ -245,17 +238,15 @@ def propose(
         [grams[int(place)] for place in random.choice(len(usable), min(AT_RANDOM, len(usable)), replace=False)]
         for _ in range(RANDOM_BATCHES if usable else 0)
     ]
-    after = _mean(present, [grams[place] for place in chosen])
-    beside = [_mean(present, batch) for batch in batches]
-    now_widths, after_widths = (_widths(design, one) for one in (present, after))
-    now_seen, after_seen = (_visibility(design, one) for one in (present, after))
-    random_widths = np.median([_widths(design, one) for one in beside] or [now_widths], axis=0)
-    random_seen = np.median([_visibility(design, one) for one in beside] or [now_seen], axis=0)
+    now_widths, now_seen = _promised(design, present, [])
+    after_widths, after_seen = _promised(design, present, [grams[place] for place in chosen])
+    beside = [_promised(design, present, batch) for batch in batches] or [(now_widths, now_seen)]
+    random_widths, random_seen = (np.median([one[place] for one in beside], axis=0) for place in (0, 1))
     return NextExperiments(
         tuple(replace(usable[place], label=f"next-{number}") for number, place in enumerate(chosen, start=1)),
         tuple(
             Promise(item.name, "", float(a), float(b), float(c))
-            for item, a, b, c in zip(parameters, now_widths, after_widths, random_widths, strict=True)
+            for item, a, b, c in zip(design.parameters, now_widths, after_widths, random_widths, strict=True)
         ),
         tuple(
             Promise(one.direction.name, one.in_words, float(a), float(b), float(c))
@@ -264,6 +255,42 @@ def propose(
         len(proposals),
         len(proposals) - len(usable),
     )
+
+
+def promised_by(
+    fit: TrajectoryFit,
+    tolerances: Tolerances,
+    proposals: Sequence[Proposal],
+    effects: Sequence[Sized],
+    load: Callable[[str, tuple[str, ...]], Scenario],
+) -> tuple[Floats, Floats] | None:
+    """Return what given experiments promise to a fit: half widths and visibilities of the effects, as in a ``Promise``.
+
+    None where one of them cannot be relied upon at the numbers of this fit.
+    """
+    design = _design_of(fit, tolerances, tuple(effects), load)
+    points = _points(fit, DRAWS if len(proposals) > 1 else 1)
+    grams = [[_gram(design, one, point) for point in points] for one in proposals]
+    known = [[one for one in own if one is not None] for own in grams]
+    if any(len(own) < len(points) for own in known):
+        return None
+    return _promised(design, _present(design), known)
+
+
+def _design_of(
+    fit: TrajectoryFit,
+    tolerances: Tolerances,
+    effects: tuple[Sized, ...],
+    load: Callable[[str, tuple[str, ...]], Scenario],
+) -> _Design:
+    ranges = fit.optimum.residuals.ranges
+    find_effects(path for one in EFFECT_DIRECTIONS for path in one.neutral)
+    parameters = tuple(item for item in ranges if not is_nuisance(item) and not item.recordings)
+    common = tuple(item for item in ranges if is_of_sensor(item) and not item.recordings)
+    noise: dict[str, float] = {}
+    for one in fit.optimum.residuals.experiments:
+        noise = {channel.name: channel.noise for channel in one.channels} | noise
+    return _Design(fit, tolerances, parameters, common, effects, noise, load)
 
 
 def harmful_sizes(fit: TrajectoryFit) -> tuple[Sized, ...]:
@@ -435,9 +462,14 @@ def _whitener(sensors: Sequence[Sensor], prepared: PreparedExperiment) -> Callab
     return whiten
 
 
-def _mean(present: Floats, batch: Sequence[Sequence[Floats]]) -> Floats:
-    """Return the Gram matrix after a batch, the mean over the draws of each."""
-    return np.asarray(present + sum((np.mean(one, axis=0) for one in batch), start=np.zeros_like(present)))
+def _promised(design: _Design, present: Floats, batch: Sequence[Sequence[Floats]]) -> tuple[Floats, Floats]:
+    """Return half widths and visibilities after a batch: the median over the draws of each.
+
+    A mean of the Gram matrices would promise what the one draw shows at which an experiment happens to show most.
+    """
+    after = [present + sum(draw, start=np.zeros_like(present)) for draw in zip(*batch, strict=True)] or [present]
+    widths, seen = (np.median([quantity(design, one) for one in after], axis=0) for quantity in (_widths, _visibility))
+    return widths, seen
 
 
 def _value(design: _Design, present: Floats, batch: Sequence[Sequence[Floats]]) -> float:

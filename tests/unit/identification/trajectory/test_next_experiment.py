@@ -10,8 +10,15 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.identification.problem import load_problem
-from ppafo.identification.trajectory.next_experiment import NextExperiments, Promise, Proposal, draw_proposals
-from ppafo.identification.trajectory.tolerances import Ability
+from ppafo.identification.trajectory.next_experiment import (
+    NextExperiments,
+    Promise,
+    Proposal,
+    draw_proposals,
+    harmful_sizes,
+    promised_by,
+)
+from ppafo.identification.trajectory.tolerances import Ability, tolerances_of
 from ppafo.questions.identify.plan import Plan, bench_file, plan_figure, plan_section, rig_requests
 from ppafo.questions.identify.solve import identify
 from ppafo.rig.experiments import record, write_rig_recording
@@ -139,6 +146,18 @@ def test_play_that_a_step_cannot_show_is_promised_to_show_and_the_rig_records_wh
     assert play.after > 3.0
     for width in plan.following.widths:
         assert width.after < 0.5 * width.now
+    # The same experiment promises the same where it is given and not drawn.
+    bench = load_problem(tmp_path / "problem.toml").bench
+    assert bench is not None
+    again = promised_by(
+        found.trajectory.fit,
+        tolerances_of(bench, "problem.toml"),
+        plan.following.chosen,
+        harmful_sizes(found.trajectory.fit),
+        load_scenario,
+    )
+    assert again is not None
+    assert again[0] == pytest.approx([one.after for one in plan.following.widths], rel=0.02)
     # The request to the rig and the bench file are ready: record, append, fit.
     line = rig_requests(plan).splitlines()[-1]
     changes = tuple(re.findall(r'--set "([^"]*)"', line))

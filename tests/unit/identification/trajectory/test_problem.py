@@ -197,6 +197,17 @@ def test_a_clipped_channel_is_called_so_and_not_without_noise(experiment: Experi
         prepare(without, {})
 
 
+def test_a_channel_that_is_at_its_limit_from_the_third_sample_on_is_not_one_without_noise(
+    experiment: Experiment,
+) -> None:
+    values = np.array(experiment.recording["pressure_1"])
+    values[2:] = values.max() + 1e5
+    recording = experiment.recording.with_channel("pressure_1", values, "Pa")
+    without = dataclasses.replace(experiment, recording=recording, noise={"angle": 1e-3, "pressure_2": 500.0})
+    with pytest.raises(IdentificationError, match=r"exactly its largest value for .* its sensor is at its limit"):
+        prepare(without, {})
+
+
 def test_a_fitted_start_below_the_atmosphere_is_no_start(step: Scenario) -> None:
     parameters = (FreeParameter("initial.pressure_1", recordings=("step",)), FreeParameter("friction.viscous_damping"))
     ranges = tuple(range_of(one, (Experiment("step", step, simulate(step).recording),)) for one in parameters)
