@@ -52,9 +52,9 @@ def test_the_commands_of_the_page_run_one_after_the_other_and_give_its_numbers(
         assert re.search(rf"\b{count} (steps|tasks)", TEXT), count
     assert [f"{saved * 1e3:.3g}" for saved in savings] == re.findall(r"saves (\S+) g", TEXT)
     assert (tmp_path / "out" / "bottle" / "endurance.png").is_file()
-    saved = results([*SEVERAL, "--reuse", "reservoir_volume=50 cm^3"], capsys)["recordings"][SEVERAL[1]]  # type: ignore[index]
+    saved = results([*SEVERAL[:2], "--reuse", "reservoir_volume=50 cm^3"], capsys)
     exec(re.findall(r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)[0], {})
-    grams, minutes = 1e3 * saved["reuse"]["balance"]["returned_mass"], saved["result"]["walking_time"] / 60.0
+    grams, minutes = 1e3 * saved["reuse"]["balance"]["returned_mass"], saved["result"]["walking_time"] / 60.0  # type: ignore[index]
     assert capsys.readouterr().out == f"{grams:.3f} g less a stride, {minutes:.2f} min\n"
 
 

@@ -46,9 +46,13 @@ def run(parsed: argparse.Namespace, question: Question) -> int:
             return output.EXIT_GOOD
         # Refuse a command without its file, which only ``--list`` does without.
         for argument in question.arguments:
-            if argument.nargs == "?" and getattr(parsed, argument.parameter) is None:
-                names = ", ".join(library.names())
-                raise library.error(f"no {library.noun} was given: name one ({names}) or give a .toml file")
+            stands_in = any(getattr(parsed, name) is not None for name in question.instead_of_file)
+            if argument.nargs == "?" and getattr(parsed, argument.parameter) is None and not stands_in:
+                names, options = ", ".join(library.names()), ", ".join(f"--{name}" for name in question.instead_of_file)
+                raise library.error(
+                    f"no {library.noun} was given: name one ({names}) or give a .toml file"
+                    f"{f', or say what is wanted by {options}' if options else ''}"
+                )
     solve = question.solver()
     values = {argument.parameter: getattr(parsed, argument.parameter) for argument in question.arguments}
     if question.fills_folder:

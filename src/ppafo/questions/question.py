@@ -96,7 +96,8 @@ class Question:
     entries of that list where these are more than the words of the files. ``default_folder`` (``module:function``)
     takes the values of the arguments by name and returns where the answer is written unless ``--out`` says so; without
     it nothing is. ``fills_folder`` is true where solving itself fills the folder, an argument ``out`` of its own, so
-    that a later call resumes; the data of its answer name it as ``folder``.
+    that a later call resumes; the data of its answer name it as ``folder``. ``instead_of_file`` are the parameters any
+    of which stands in place of the file.
     """
 
     name: str
@@ -108,6 +109,7 @@ class Question:
     listing: str = ""
     default_folder: str = ""
     fills_folder: bool = False
+    instead_of_file: tuple[str, ...] = ()
 
     def solver(self) -> Callable[..., Solved]:
         """Load and return the function that solves the question."""

@@ -7,13 +7,15 @@ parameters of any program with lines. The walk ends where the bottle no longer f
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from ppafo.answers.display_units import display_value
+from ppafo.answers.display_units import quantity_text as shown_text
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.engine.lanes import BatchResult, Floats, begin_block
 from ppafo.engine.rows import leaf_paths, leaves, row_numbers
@@ -90,6 +92,8 @@ _LARGEST_DRAW = 0.05
 """Share of the gas in the bottle that may leave between two meetings: what it offers stays until the next one."""
 
 _LEAST_FLOW = 1.0e-12
+_RESTING = 5.0
+"""Seconds between two states of a bottle that is kept of a rest."""
 _ABOVE_FREEZING = 0.02
 _OPEN = 0.999
 UNITS = {
@@ -349,6 +353,55 @@ class SupplyCourse:
         )
 
 
+class Schedule(NamedTuple):
+    """Walking and resting in turn [s], for at most ``longest`` [s]; a rest of 0 s is walking without a break."""
+
+    walk: float
+    rest: float
+    longest: float
+
+
+@dataclass(slots=True)
+class _Use:
+    """A bottle in use: where it met the device, time walked and in all [s], gas through its regulator [kg]."""
+
+    met: list[tuple[float, SupplyState, SupplyNow]]
+    walked: float = 0.0
+    rested: float = 0.0
+    regulated: float = 0.0
+    ending: SupplyEnding | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BottleLife:
+    """A bottle walked to its end: its course over all of the time, time walked and in all [s].
+
+    ``repeats`` is how many strides, or courses, were walked.
+    """
+
+    course: SupplyCourse
+    walked: float
+    total: float
+    repeats: float
+
+
+def lasted(course: SupplyCourse) -> float | None:
+    """Return how long a bottle lasted [s], None where the walk ended before it, or left what is possible."""
+    return None if course.ending.kind in (WALKED, DIVERGED) else course.ending.time
+
+
+def lasting_text(seconds: float, others: Iterable[float | None]) -> str:
+    """Return how long a bottle lasts in minutes, with the interval that the other readings of its chambers span [s]."""
+    known = [seconds, *(time for time in others if time is not None)]
+    low, high = minutes_text(min(known)).removesuffix(" min"), minutes_text(max(known))
+    return f"{minutes_text(seconds)}{f' ({low} to {high} by what is not known of the chambers)' * (len(known) > 1)}"
+
+
+def minutes_text(seconds: float) -> str:
+    """Return minutes with three digits, and whole ones where there are more."""
+    return shown_text(seconds, "duration", ".0f" if display_value(seconds, "duration") >= 999.5 else ".3g")
+
+
 def run_on_bottle(
     run: Run,
     device: Device,
@@ -361,14 +414,57 @@ def run_on_bottle(
     ``device`` is what the run was planned for; ``stride_time`` [s] is how long a stride takes; ``progress`` gets the
     minutes done and in all.
     """
+    use = _Use([(0.0, supply.start(), supply.offers_first())])
+    result, done = _use_bottle(run, device, supply, stride_time, use, progress)
+    count = batch_of(run).clock.step_count
+    record = result.record if done == count else result.record[: (done - 1) // int(run.record_every) + 1]
+    return BatchResult(result.states, record), _course_of_use(supply, use)
+
+
+def life_on_bottle(
+    run: Run,
+    device: Device,
+    supply: BottleSupply,
+    stride_time: float,
+    schedule: Schedule,
+    saved: float = 0.0,
+    progress: Callable[[float, float], None] = lambda _done, _total: None,
+) -> BottleLife:
+    """Walk until the bottle ends it: the same run as ``run_on_bottle``, with rests, and repeated where it is a course.
+
+    ``saved`` is the fraction of the gas that a reservoir gives back in every stride. The run is planned for as long as
+    may be walked at most.
+    """
+    use = _Use([(0.0, supply.start(), supply.offers_first())])
+    while use.ending is None and use.walked + use.rested < schedule.longest:
+        _use_bottle(run, device, supply, stride_time, use, progress, schedule, 1.0 - saved)
+    length = stride_time if run.walk is None or run.walk.course is None else batch_of(run).clock.step_count * run.step
+    return BottleLife(_course_of_use(supply, use), use.walked, use.walked + use.rested, use.walked / length)
+
+
+def _course_of_use(supply: BottleSupply, use: _Use) -> SupplyCourse:
+    time, state, _ = use.met[-1]
+    return _course(supply, use.met, use.regulated, use.ending or SupplyEnding(WALKED, _at_the_end(state), time))
+
+
+def _use_bottle(
+    run: Run,
+    device: Device,
+    supply: BottleSupply,
+    stride_time: float,
+    use: _Use,
+    progress: Callable[[float, float], None],
+    schedule: Schedule | None = None,
+    passed: float = 1.0,
+) -> tuple[BatchResult, int]:
+    """Walk a run on a bottle in ``use``, which is brought up to date; return its rows and the steps that were done."""
     batch = batch_of(run)
     count = batch.clock.step_count
     block = begin_block(batch)
     states = row_numbers(batch.program.state_rows())
     regulated, line = states["line_state.regulated_mass"], states["line_state.mass_1"]
     every = max(1, round(supply.coupling / run.step))
-    state, table = supply.start(), supply.bottle.fluid.table
-    met = [(0.0, state, supply.offers_first())]
+    table, met, walked_before = supply.bottle.fluid.table, use.met, use.walked
     assert run.lines is not None, "a bottle feeds lines"
     names = row_numbers(run.program.parameter_rows())
     effects = tuple(effect for effect in run.program.effects if effect.is_of_device)
@@ -383,31 +479,54 @@ def run_on_bottle(
     )
     window = max(2, math.ceil(_STRIDES * stride_time / (every * run.step))) * every
     gauges = [(0, 1.0)]
-    ending, done, before = None, 0, float(batch.states[regulated, 0])
-    while ending is None and done < count:
-        steps = min(_steps_to_meet(met[-1], run.step, every), count - done)
+    done, first = 0, float(batch.states[regulated, 0])
+    before, until_rest = first, count
+    if schedule is not None and schedule.rest > 0.0:
+        until_rest = max(1, round((schedule.walk - use.walked % schedule.walk) / run.step))
+    while use.ending is None and done < count:
+        steps = min(_steps_to_meet(met[-1], run.step, every), count - done, until_rest)
         block.set_parameters(lanes.rows, lanes.offered(met[-1][2]))
         block.advance(steps)
-        done += steps
-        progress(done * run.step / 60.0, count * run.step / 60.0)
-        ending = _divergence(block.states, states["result.failure_time"], state, done * run.step)
-        if ending is not None:
+        done, until_rest = done + steps, until_rest - steps
+        use.walked = walked_before + done * run.step
+        time, state = use.walked + use.rested, met[-1][1]
+        progress(use.walked / 60.0, (walked_before + count * run.step) / 60.0)
+        use.ending = _divergence(block.states, states["result.failure_time"], state, time)
+        if use.ending is not None:
             break
-        mass, before = float(block.states[regulated, 0]) - before, float(block.states[regulated, 0])
+        mass, before = passed * (float(block.states[regulated, 0]) - before), float(block.states[regulated, 0])
         content = met[-1][2].content
         state = advance_supply(table, supply.line, supply.bottle.supply, state, content, mass, steps * run.step)
         now = supply.offers(state, content.temperature, mass)
-        met.append((done * run.step, state, now))
+        met.append((time, state, now))
         gauges = [
             *(old for old in gauges if old[0] > done - window),
             (done, lanes.gauge(float(block.states[line, 0]), now)),
         ]
-        ending = _ending(supply, state, now, max(gauge for _, gauge in gauges), done * run.step)
-    result = block.result()
-    record = result.record if done == count else result.record[: (done - 1) // int(run.record_every) + 1]
-    last = ending or SupplyEnding(WALKED, _at_the_end(state), done * run.step)
-    let_through = before - float(batch.states[regulated, 0])
-    return BatchResult(result.states, record), _course(supply, met, let_through, last)
+        use.ending = _ending(supply, state, now, max(gauge for _, gauge in gauges), time)
+        if schedule is not None and use.ending is None:
+            if time >= schedule.longest:
+                break
+            if until_rest <= 0 and schedule.rest > 0.0:
+                _rest(supply, use, min(schedule.rest, schedule.longest - time))
+                gauges, until_rest = [(done, 1.0)], round(schedule.walk / run.step)
+                if use.walked + use.rested >= schedule.longest:
+                    break
+    use.regulated += passed * (before - first)
+    return block.result(), done
+
+
+def _rest(supply: BottleSupply, use: _Use, rest: float) -> None:
+    """Let a bottle warm for a time [s] in which no gas flows."""
+    parts = max(1, math.ceil(rest / _RESTING))
+    for _ in range(parts):
+        time, state, now = use.met[-1]
+        content = now.content
+        state = advance_supply(
+            supply.bottle.fluid.table, supply.line, supply.bottle.supply, state, content, 0.0, rest / parts
+        )
+        use.met.append((time + rest / parts, state, supply.offers(state, content.temperature, 0.0)))
+    use.rested += rest
 
 
 def _steps_to_meet(last: tuple[float, SupplyState, SupplyNow], step: float, every: int) -> int:

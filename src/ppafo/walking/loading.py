@@ -120,6 +120,38 @@ def load_walk(
     )
 
 
+def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable[str] = ()) -> Scenario:
+    """Return the same walk on a bottle, by name or file, or on its own where None is given.
+
+    ``overrides`` are values of the bottle, ``room.temperature=5 degC``. ScenarioError or ParameterError for what does
+    not go with a bottle, and where the walk is no longer what its file and overrides say.
+    """
+    origin = scenario.origin
+    folder = Path() if origin.file is None else Path(origin.file).parent
+    as_given = ScenarioRequest(scenario.name, origin.file, folder, origin.content, origin.overrides)
+    if _walked_with(scenario_of(as_given, WALKING)) != _walked_with(scenario):
+        raise ScenarioError(
+            f"{scenario.name}: this walk is not what its file says (a number was changed after it was loaded, or the "
+            "file or the package has changed since): give the bottle where the walk is loaded, with --bottle"
+        )
+    content, before = origin.content, origin.overrides
+    if bottle is not None:
+        content = {name: part for name, part in content.items() if name != BOTTLE}
+        before = tuple(text for text in before if not text.startswith(f"{BOTTLE}."))
+    changes = tuple(text if text.startswith(f"{BOTTLE}.") else f"{BOTTLE}.{text}" for text in overrides)
+    instead = {} if bottle is None else {BOTTLE_NAME: str(bottle)}
+    return scenario_of(
+        replace(as_given, content=content, overrides=(*before, *changes), instead=instead),
+        WALKING,
+    )
+
+
+def _walked_with(scenario: Scenario) -> tuple[Any, ...]:
+    """Return what a walk on another bottle shares with a walk."""
+    motion = walk_of(scenario)
+    return scenario.device, scenario.control, scenario.sensors, motion.wearer, motion.gait, motion.course, motion.broken
+
+
 def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenario:
     """Return the walk of a document that has the right keys.
 

@@ -1,5 +1,6 @@
 """Runs a walk, or one of many wearers; compares it with the device switched off and with a healthy ankle."""
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -23,7 +24,7 @@ from ppafo.metrics.strides import PER_STRIDE
 from ppafo.model.leg import passive_torque
 from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
-from ppafo.walking.bottle import run_on_bottle
+from ppafo.walking.bottle import BottleLife, Schedule, life_on_bottle, run_on_bottle
 from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.course import turns_walked
 from ppafo.walking.declaration import THRESHOLDS
@@ -33,6 +34,7 @@ from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import SHORTEST_STRIDES, duration_problems, walk_of, with_duration
 from ppafo.walking.person import crowd_of, draw_gaits
 from ppafo.walking.planning import course_of_walk, fed_device, plan_walk, plan_walks, unrecorded
+from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.result import REMEDY, WalkResult, result_of_walk
 from ppafo.walking.strides import PHASES, healthy_positive_work, healthy_toe_height, lowest_toes
 from ppafo.walking.wearer import draw_builds
@@ -85,6 +87,31 @@ def walk(
         return result_of_walk(chosen, run, _run_in_parts(batch_of(run), run.step, progress), None)
     outcome, supply = run_on_bottle(run, fed_device(chosen), carried, walk_of(chosen).gait.stride_time, progress)
     return result_of_walk(chosen, run, outcome, supply)
+
+
+def bottle_life(scenario: Scenario, schedule: Schedule, saved: float = 0.0, progress: Progress = silent) -> BottleLife:
+    """Walk on the bottle of a walk until that ends it: the one answer to how long a device lasts.
+
+    It is the run of ``walk`` on a bottle, for as long as ``schedule`` allows, with its rests; a course is repeated.
+    ``saved`` is the fraction of the gas that a reservoir gives back. Faults are left out: a device that has stopped
+    empties no bottle. ScenarioError for a walk on no bottle.
+    """
+    sound = dict.fromkeys(walk_of(scenario).faults, FaultSettings())
+    scenario = replace(scenario, motion=replace(walk_of(scenario), faults=sound, broken={}))
+    motion, planned = walk_of(scenario), course_of_walk(scenario)
+    if motion.bottle is None:
+        raise ScenarioError(f"{scenario.name}: hangs on no bottle")
+    if scenario.control.custom is not None:
+        check_no_bottle(scenario)
+    strides = math.ceil(schedule.longest / motion.gait.stride_time)
+    seconds = float(planned.duration) if planned is not None else strides * motion.gait.stride_time
+    unrecorded = 60.0 if planned is None else 1.0
+    count = max(1, round(seconds / unrecorded))
+    whole = with_duration(scenario, seconds if planned is not None else count * unrecorded)
+    if planned is None:
+        whole = replace(whole, output_interval=unrecorded)
+    run = plan_walk(whole)
+    return life_on_bottle(run, fed_device(whole), motion.bottle, motion.gait.stride_time, schedule, saved, progress)
 
 
 def lasting(scenario: Scenario, minutes: float | None) -> Scenario:

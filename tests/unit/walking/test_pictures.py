@@ -9,11 +9,13 @@ import pytest
 
 from ppafo.answers.writing import text_of
 from ppafo.questions.walk.answer import comparison_table, wearers_answer
+from ppafo.signals import Channel, Recording
 from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk, walk_population
 from ppafo.walking.figures.legs import animation, drags, frames_figure, last_phases, legs_of, strip_figure
 from ppafo.walking.figures.mean_stride import walk_figure
-from ppafo.walking.figures.over_time import over_time_figure
+from ppafo.walking.figures.over_time import acting_phase, over_time_figure
 from ppafo.walking.motion import walk_of
+from ppafo.walking.strides import settled
 from ppafo.walking.walk import population_figure
 
 if TYPE_CHECKING:
@@ -152,3 +154,19 @@ def test_histograms_hold_every_wearer() -> None:
     gas = [float(cell) for cell in next(line for line in lines if line.startswith("Gas")).split()[4:]]
     assert gas == sorted(gas)
     assert len(gas) == 5
+
+
+def test_the_walk_over_time_shows_no_push_off_where_the_device_did_not_push() -> None:
+    levels, phases = np.array([0.0, 0.0, 1.0, 1.0, 2.0, 3.0]), np.array([3.0, 1.0, 3.0, 0.0, 3.0, 0.0])
+    channels = {"controller_phase": Channel(phases, "-"), "safe_state": Channel(levels, "-")}
+    acting = acting_phase(Recording("walk", np.arange(6.0), channels))
+    assert acting.tolist() == [3.0, 1.0, 2.0, 0.0, 2.0, 2.0], "lifted only: no push; paused and stopped: free"
+
+
+def test_the_mean_stride_says_how_many_strides_it_is_the_mean_of() -> None:
+    failing = walk("solenoid", 0.25, overrides=["faults.toe.kind=stuck", "faults.toe.time=4 s"])
+    counted = int(settled(failing.helped).sum())
+    assert 0 < counted < failing.helped.size
+    assert failing.metrics["counted_strides"].value == counted
+    said = texts(walk_figure({"with the device": failing}))[0]
+    assert said.endswith(f"mean of {counted} of {failing.helped.size} strides")

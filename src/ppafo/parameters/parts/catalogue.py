@@ -29,15 +29,20 @@ NOMINAL_FLOW = Quantity(
 NOMINAL_DIAMETER = Quantity("nominal_diameter", "m", "diameter of the opening", minimum=0.0, maximum=0.1)
 CONTENT = Quantity("content", "kg", "gas in the full bottle", minimum=0.0, maximum=100.0, minimum_allowed=False)
 EMPTY_MASS = Quantity("empty_mass", "kg", "mass of the empty bottle with its valve", minimum=0.0, maximum=100.0)
+POWER = Quantity("power", "W", "electrical power: of an energised coil, of a spool at full stroke", None, 0.0, 1000.0)
+IDLE_POWER = Quantity("idle_power", "W", "electrical power without a stroke", None, 0.0, 1000.0)
+ENERGY = Quantity("energy", "J", "energy of the charged cell", None, 0.0, 1.0e8, minimum_allowed=False)
 
 _OF_ACTUATOR = ("torque_constant", "volume_per_angle")
 
-VALVE = (MASS, RATING, NOMINAL_FLOW, NOMINAL_DIAMETER, *ORIFICE)
+VALVE = (MASS, RATING, NOMINAL_FLOW, NOMINAL_DIAMETER, POWER, IDLE_POWER, *ORIFICE)
 GROUPS: dict[str, tuple[Quantity, ...]] = {
     "valves": VALVE + tuple(item for kind in VALVES.values() for item in kind.quantities),
     "actuators": (MASS, RATING, *(item for item in ACTUATOR if item.name in _OF_ACTUATOR)),
     "regulators": (MASS, RATING),
     "bottles": (CONTENT, EMPTY_MASS),
+    "processors": (MASS, POWER),
+    "batteries": (MASS, ENERGY),
 }
 """Figures by group; a valve has those of its kind."""
 
@@ -46,6 +51,8 @@ NEEDED: dict[str, tuple[str, ...]] = {
     "actuators": ("mass", *_OF_ACTUATOR),
     "regulators": ("mass",),
     "bottles": ("content", "empty_mass"),
+    "processors": ("mass", "power"),
+    "batteries": ("mass", "energy"),
 }
 """Figures without which a part is of no use to a study; a valve needs an orifice in one of its two forms besides."""
 
@@ -121,7 +128,10 @@ class Part:
         return {f"valve.{name}": number for name, number in (orifice | settings | own).items()}
 
 
-_TITLES = {"valves": "Valve", "actuators": "Actuator", "regulators": "Regulator", "bottles": "Bottle"}
+_TITLES = {"valves": "Valve", "actuators": "Actuator", "regulators": "Regulator", "bottles": "Bottle"} | {
+    "processors": "Processor",
+    "batteries": "Battery",
+}
 _NAMES = Annotated[tuple[str, ...], Field(strict=False)]
 
 

@@ -37,9 +37,8 @@ QUESTION = Question(
         Argument(
             ("--bottle",),
             "bottle",
-            "name of a bottle or a .toml file; default: the paper's bottle",
+            "name of a bottle or a .toml file; default: that of the walk, or the paper's bottle",
             metavar="BOTTLE",
-            default="paper-co2-9oz",
         ),
         Argument(
             ("--walk",),

@@ -25,12 +25,13 @@ from ppafo.model.exhaust_reuse import ReuseBalance, ReuseCycle, reuse_balance
 from ppafo.model.source import bottle_content
 from ppafo.parameters.bottles.bottle import Bottle
 from ppafo.questions.endurance.discharge import Discharge
-from ppafo.questions.endurance.draw import Draw, Schedule
+from ppafo.questions.endurance.draw import Draw
 from ppafo.questions.question import Solved
 from ppafo.signals.recording import Floats
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.units import format_quantity
 from ppafo.version import __version__
+from ppafo.walking.bottle import Schedule, lasting_text, minutes_text
 from ppafo.walking.figures.over_time import draw_bottle_pressure, draw_gas_left
 
 if TYPE_CHECKING:
@@ -59,8 +60,8 @@ class Endurance(Solved):
 
     ``discharge`` is the requested course; ``without_reuse`` the same without reuse, where there is one.
     ``steps_when_warm`` is the number of steps that a bottle which stays at room temperature gives: what cooling costs.
-    ``is_of_course`` is true where a step is a course, ``is_whole`` unless the walk ended before it did. ``others`` is
-    the same for a walk or a run with other readings of the paper's chambers, by their names.
+    ``is_of_course`` is true where a step is a course. ``others`` is the same for a walk or a run with other readings of
+    the paper's chambers, by their names.
     """
 
     bottle: Bottle
@@ -72,7 +73,6 @@ class Endurance(Solved):
     steps_when_warm: float
     is_of_course: bool = False
     others: Mapping[str, "Endurance"] = field(default_factory=dict)
-    is_whole: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,8 +134,8 @@ def _draw_temperature(axes: "Axes", found: Endurance, minutes: Floats) -> None:
 
 FORMAT = "ppafo endurance"
 _LEFT_OUT = (
-    "Not in the model: a regulator that its gas cools or ices (`ppafo walk --bottle` has it), liquid carried out with "
-    "the vapour, a bottle held upside down, leaking connections, and ice on the outside of the bottle."
+    "Not in the model: a regulator that its gas cools or ices, unless somebody walks on the bottle; liquid carried out "
+    "with the vapour, a bottle held upside down, leaking connections, and ice on the outside of the bottle."
 )
 _REUSE_ASSUMES = (
     "A balance for ideal gas at constant temperature: pressures equalise, check valves have no losses, nothing "
@@ -216,7 +216,7 @@ def _facts(found: Endurance) -> list[tuple[str, str]]:
     recording = course.recording
     flows = [quantity_text(flow, "mass flow") for flow in (draw.mean_flow, draw.peak_flow)]
     rows = [
-        ("run time", f"{_minutes(course.walking_time)} of walking, {_minutes(course.total_time)} in total"),
+        ("run time", f"{_lasting(found)} of walking, {minutes_text(course.total_time)} in total"),
         ("steps", steps_text(course.steps)),
         ("steps without cooling", f"{steps_text(found.steps_when_warm)} (a bottle that stays at room temperature)"),
         ("ended", course.ending.message),
@@ -234,6 +234,12 @@ def _facts(found: Endurance) -> list[tuple[str, str]]:
     return rows + _other_facts(found)
 
 
+def _lasting(found: Endurance) -> str:
+    """Return how long the bottle lasts, with the interval of a walk; a recording is one draw, whatever takes it."""
+    time = found.discharge.walking_time
+    return lasting_text(time, [other.discharge.walking_time for other in found.others.values()])
+
+
 def _other_facts(found: Endurance) -> list[tuple[str, str]]:
     """Return what the same walk comes to with the other readings of the paper's chambers, docs/decisions/0014."""
     return [
@@ -241,7 +247,7 @@ def _other_facts(found: Endurance) -> list[tuple[str, str]]:
             f"with {name}",
             f"{_gas(other.draw.mass_per_step + _saved(other))} a step, "
             f"{f'{_gas(_saved(other))} of it saved, ' if other.reuse else ''}"
-            f"{_minutes(other.discharge.walking_time)} of walking, {steps_text(other.discharge.steps)} steps"
+            f"{minutes_text(other.discharge.walking_time)} of walking, {steps_text(other.discharge.steps)} steps"
             f"{', without reuse' if found.reuse and not other.reuse else ''}",
         )
         for name, other in found.others.items()
@@ -259,7 +265,7 @@ def _reuse_facts(found: Endurance, reused: Reuse, without: Discharge) -> list[tu
     return [
         ("exhaust reused", f"{saved}; the exhaust holds {_gas(balance.exhausted_mass)}"),
         ("chambers", _chambers(reused)),
-        ("without reuse", f"{_minutes(without.walking_time)} of walking, {steps_text(without.steps)} steps"),
+        ("without reuse", f"{minutes_text(without.walking_time)} of walking, {steps_text(without.steps)} steps"),
     ]
 
 
@@ -276,7 +282,7 @@ def _dry_since(course: Discharge) -> str:
     dry = np.flatnonzero(liquid <= 0.0)
     if not dry.size:
         return f"no, {_gas(float(liquid[-1]))} left"
-    return f"after {_minutes(float(course.recording.time[dry[0]]))}"
+    return f"after {minutes_text(float(course.recording.time[dry[0]]))}"
 
 
 def _reuse_section(reused: Reuse) -> Section:
@@ -323,7 +329,7 @@ def _data(found: Endurance) -> dict[str, Any]:
         "ppafo": __version__,
         "result": _course_data(found.discharge) | {"steps_when_warm": found.steps_when_warm},
         "draw": asdict(found.draw) | {"mean_flow": found.draw.mean_flow},
-        "schedule": asdict(found.schedule),
+        "schedule": found.schedule._asdict(),
         "bottle": _bottle_data(found),
     }
     if found.others:
@@ -348,7 +354,7 @@ def _course_data(course: Discharge) -> dict[str, Any]:
         "ending": asdict(course.ending),
         "coldest_temperature": float(np.min(recording["bottle_temperature"])),
         "at_end": {name: float(recording[name][-1]) for name in recording.names},
-        "balance": asdict(course.balance),
+        "balance": course.balance._asdict(),
     }
 
 
@@ -368,11 +374,6 @@ def _bottle_data(found: Endurance) -> dict[str, Any]:
 def steps_text(steps: float) -> str:
     """Return a number of steps as it is shown: a decimal of few, such as of courses, whole ones of many."""
     return f"{steps:.1f}" if steps < 99.5 else f"{steps:.0f}"
-
-
-def _minutes(seconds: float) -> str:
-    """Return minutes with three digits, and whole ones where there are more."""
-    return quantity_text(seconds, "duration", ".0f" if display_value(seconds, "duration") >= 999.5 else ".3g")
 
 
 def _gas(mass: float) -> str:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -23,11 +23,12 @@ from ppafo.model.source import (
     regulator_flow_limit,
 )
 from ppafo.parameters.bottles.bottle import Bottle
-from ppafo.questions.endurance.draw import Draw, Schedule
+from ppafo.questions.endurance.draw import Draw
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
+from ppafo.walking.bottle import WALKED, BottleLife, Schedule, SupplyBalance
 
-EndKind = Literal["empty", "too cold", "frozen", "time is up"]
+TIME_IS_UP = "time is up"
 Stop = Literal["supply", "frozen", "time"]
 """What stopped a run: the supply pressure was not maintained, the table ended in the cold, the time was over."""
 _NEXT_TO_NOTHING = 0.01
@@ -38,7 +39,7 @@ _NEXT_TO_NOTHING = 0.01
 class Ending:
     """How a run ended: kind, a sentence, mass left [kg], and the part of it [kg] that a warm bottle would give."""
 
-    kind: EndKind
+    kind: str
     message: str
     mass_left: float
     usable_when_warm: float
@@ -88,7 +89,7 @@ def ending(bottle: Bottle, draw: Draw, mass: float, content: BottleContent, stop
     warm = f"{usable * GRAMS_PER_KILOGRAM:.3g} g of this would be usable at room temperature"
     if stopped_by == "time":
         return Ending(
-            "time is up", f"the supply pressure was maintained for the whole requested time; {left}", mass, usable
+            TIME_IS_UP, f"the supply pressure was maintained for the whole requested time; {left}", mass, usable
         )
     if stopped_by == "frozen":
         cold = "the liquid begins to freeze (dry ice)" if has_liquid(bottle.fluid.table) else "the gas is too cold"
@@ -125,8 +126,7 @@ class Stretch:
     stopped_by: Stop | None
 
 
-@dataclass(frozen=True, slots=True)
-class Balance:
+class Balance(NamedTuple):
     """What crossed the border of bottle and wall from start to end, and how much more there is inside.
 
     Crossed: gas [kg], its enthalpy [J], heat from the room [J]. Inside: mass [kg], energy of content and wall [J].
@@ -142,28 +142,23 @@ class Balance:
 
 @dataclass(frozen=True)
 class Discharge:
-    """The course of a bottle: time of walking and of all [s], steps, how it ended, the balance, and the solution."""
+    """The course of a bottle: time of walking and of all [s], steps, how it ended, the balance, and its recording."""
 
     walking_time: float
     total_time: float
     steps: float
     ending: Ending
-    balance: Balance
-    bottle: Bottle = field(repr=False)
-    stretches: tuple[Stretch, ...] = field(repr=False, compare=False)
+    balance: Balance | SupplyBalance
+    record: Callable[[], Recording] = field(repr=False, compare=False)
 
     @cached_property
     def recording(self) -> Recording:
-        """The course at evenly spaced times: made when it is first read, which takes as long as the course itself."""
-        return _recording(self.bottle, self.stretches)
+        """The course of the bottle: made when it is first read, which takes as long as following it."""
+        return self.record()
 
 
-def discharge(bottle: Bottle, draw: Draw, schedule: Schedule) -> Discharge:
-    """Return the course of a full bottle under a draw; walking takes the mean flow of a step.
-
-    Steps are a second long and bottles cool in minutes, so the mean stands for the pulses; the regulator is judged by
-    the largest flow. SimulationError where the solver fails.
-    """
+def check_schedule(schedule: Schedule) -> None:
+    """Refuse times of walking and resting that a bottle cannot be followed over."""
     for name, value, least in (("walk", schedule.walk, 1.0), ("longest", schedule.longest, 1.0)):
         if not least <= value < float("inf"):
             raise ParameterError(f"{name} must be at least {least:g} s and finite, it is {value:g} s")
@@ -174,6 +169,15 @@ def discharge(bottle: Bottle, draw: Draw, schedule: Schedule) -> Discharge:
             f"walking {schedule.walk:g} s and resting {schedule.rest:g} s over {schedule.longest:g} s are more "
             f"than {MAXIMUM_STRETCHES} periods: choose longer periods, or a smaller longest time"
         )
+
+
+def discharge(bottle: Bottle, draw: Draw, schedule: Schedule) -> Discharge:
+    """Return the course of a full bottle under a draw; walking takes the mean flow of a step.
+
+    Steps are a second long and bottles cool in minutes, so the mean stands for the pulses; the regulator is judged by
+    the largest flow. SimulationError where the solver fails.
+    """
+    check_schedule(schedule)
     content = bottle_content(bottle.fluid.table, bottle.mass, bottle.volume, bottle.room_temperature)
     if reserve(bottle, draw, content.pressure, content.temperature) <= 0.0:
         most = flow_limit(bottle, content.pressure, content.temperature) * GRAMS_PER_KILOGRAM
@@ -210,8 +214,22 @@ def discharge(bottle: Bottle, draw: Draw, schedule: Schedule) -> Discharge:
         steps=walked / draw.step_time,
         ending=ending(bottle, draw, float(last[0]), content_of(bottle, float(last[0]), float(last[1])), reason),
         balance=balance,
-        bottle=bottle,
-        stretches=tuple(stretches),
+        record=lambda: _recording(bottle, stretches),
+    )
+
+
+def discharge_of_life(life: BottleLife, draw: Draw) -> Discharge:
+    """Return the course of a bottle on which somebody walked to its end."""
+    course = life.course
+    ended, bottle = course.ending, course.supply.bottle
+    usable = max(0.0, course.last.mass - smallest_mass_when_warm(bottle, draw))
+    return Discharge(
+        walking_time=life.walked,
+        total_time=life.total,
+        steps=life.repeats,
+        ending=Ending(TIME_IS_UP if ended.kind == WALKED else ended.kind, ended.message, course.last.mass, usable),
+        balance=course.balance,
+        record=lambda: course.recording,
     )
 
 

@@ -3,7 +3,7 @@
 import math
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -11,20 +11,20 @@ from typing import Any
 import numpy as np
 
 from ppafo.constants import GRAMS_PER_KILOGRAM, STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, ParameterError, PpafoError
+from ppafo.errors import DataError, ParameterError, PpafoError, refused_as
 from ppafo.metrics.strides import SETTLING
 from ppafo.model.plant import chamber_1_volume, chamber_2_volume
 from ppafo.parameters.chamber_volumes import other_readings
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
-from ppafo.simulation.loading import scenario_from_dict
+from ppafo.simulation.loading import ScenarioRequest, scenario_from_dict, scenario_of
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario, scenario_document
 from ppafo.simulation.simulate import simulate
 from ppafo.storage.result_folder import RUN_FILE, read_document, read_json, read_recording
 from ppafo.walking import WalkResult
+from ppafo.walking.loading import WALKING
 from ppafo.walking.motion import walk_of
-from ppafo.walking.strides import is_whole_course
 
 PEAK_WINDOW = 0.1
 """Seconds over which the largest flow of a recording is averaged; lines and regulator even out what is shorter."""
@@ -33,9 +33,6 @@ _MAXIMUM_FALLEN = 0.1
 WALK_FILE = "walk.json"
 FORMAT = "ppafo walk"
 _VOLUMES = ("volume_per_angle", "dead_volume_1", "dead_volume_2")
-_STRIDE_KEYS = ("gas", "gas_per_stride", "stride_time")
-_COURSE_KEYS = ("course_gas", "gas_of_course", "course_time")
-"""Metric of the gas of a step, and what the readings of the chambers call that gas and the time of a step."""
 _CHANNELS = ("angle", "pressure_1", "pressure_2", "supplied_mass")
 _LEAST = 1.0e-12
 """Gas [kg] by which a walk that takes none may come out below 0: rounding of its totals."""
@@ -61,15 +58,6 @@ class Draw:
     def less(self, saved: float) -> "Draw":
         """Return the draw with a mass [kg] saved in every step; the largest flow stays, which is the safe side."""
         return replace(self, mass_per_step=self.mass_per_step - saved)
-
-
-@dataclass(frozen=True, slots=True)
-class Schedule:
-    """Walking and resting in turn [s], for at most ``longest`` [s]; a rest of 0 s is walking without a break."""
-
-    walk: float
-    rest: float
-    longest: float
 
 
 def draw_of_numbers(mass_per_step: float, step_time: float, peak_flow: float | None) -> Draw:
@@ -141,10 +129,9 @@ class Actuator:
 class WalkGas:
     """A walk as far as its gas goes: name, recording, gas [kg] and time [s] of a stride, and the actuator.
 
-    ``gas_per_stride`` is that of the strides with help, 0 where the walk took none. ``others`` is the gas use of the
-    same walk with other readings of the paper's chambers, by their names. A walk on a ``course``, "" without one, is
-    repeated as a whole: gas and time are then those of the course, which takes ``course_time`` [s]. The device lets gas
-    out into ``atmospheric_pressure`` [Pa absolute].
+    ``gas_per_stride`` is that of the strides with help at the set pressure, 0 where the walk took none. A walk on a
+    ``course``, "" without one, is repeated as a whole: gas and time are then those of the course. The device lets gas
+    out into ``atmospheric_pressure`` [Pa absolute]. ``scenario`` is what was walked.
     """
 
     name: str
@@ -152,15 +139,9 @@ class WalkGas:
     gas_per_stride: float
     stride_time: float
     actuator: Actuator
-    others: Mapping[str, "OtherGas"] = field(default_factory=dict)
     course: str = ""
-    course_time: float = 0.0
     atmospheric_pressure: float = STANDARD_ATMOSPHERE
-
-    @property
-    def is_whole(self) -> bool:
-        """True unless the walk ended before its course did."""
-        return not self.course or is_whole_course(self.stride_time, self.course_time)
+    scenario: Scenario | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,14 +153,6 @@ class FullChambers:
     fill_pressure: float
     fill_volume: float
     strides: int
-
-
-@dataclass(frozen=True, slots=True)
-class OtherGas:
-    """The gas use of a walk with other chambers, and how full these get, None where that is not known."""
-
-    draw: Draw
-    chambers: FullChambers | None
 
 
 def walk_gas(result: WalkResult) -> WalkGas:
@@ -194,8 +167,8 @@ def walk_gas(result: WalkResult) -> WalkGas:
         walk_of(configuration).gait.stride_time if course is None else result.metrics["course_time"].value,
         Actuator(**{name: getattr(actuator, name) for name in Actuator.__slots__}),
         course="" if course is None else course.name,
-        course_time=0.0 if course is None else result.metrics["course_planned_time"].value,
         atmospheric_pressure=configuration.device.supply.atmospheric_pressure,
+        scenario=configuration,
     )
 
 
@@ -218,9 +191,9 @@ def read_walk_gas(folder: Path) -> WalkGas:
         *(_number(document, f"configuration.device.actuator.{name}", path, 0.0) for name in _VOLUMES),
     )
     course = _table(document, "configuration", path).get("course")
-    keys = _STRIDE_KEYS if course is None else _COURSE_KEYS
-    has_gas = keys[0] in _table(document, "metrics", path)
-    gas = _number(document, f"metrics.{keys[0]}.value", path, -_LEAST) if has_gas else 0.0
+    key = "gas" if course is None else "course_gas"
+    has_gas = key in _table(document, "metrics", path)
+    gas = _number(document, f"metrics.{key}.value", path, -_LEAST) if has_gas else 0.0
     time = "configuration.gait.stride_time" if course is None else "metrics.course_time.value"
     name = document["configuration"].get("name", folder.name)
     return WalkGas(
@@ -229,37 +202,23 @@ def read_walk_gas(folder: Path) -> WalkGas:
         gas,
         _number(document, time, path, 0.0),
         actuator,
-        _others(document, actuator, path, keys[1:]),
         "" if course is None else str(_table({"course": course}, "course", path).get("name", "course")),
-        0.0 if course is None else _number(document, "metrics.course_planned_time.value", path, 0.0),
         _number(document, "configuration.device.supply.atmospheric_pressure", path, 0.0),
+        _walked(document["configuration"], path),
     )
 
 
-def _others(document: Mapping[str, Any], actuator: Actuator, file: Path, keys: tuple[str, ...]) -> dict[str, OtherGas]:
-    """Return the gas use of a walk with other chambers than its own, by name."""
-    listed = document.get("volumes", [])
-    if not isinstance(listed, list) or not all(isinstance(item, Mapping) for item in listed):
-        raise DataError(f"{file}: 'volumes' is not a list of tables; write the walk again")
-    found = {}
-    for item in listed:
-        takes_none = "peak_flow" in item and item["peak_flow"] is None
-        if takes_none or all(item.get(name) == getattr(actuator, name) for name in _VOLUMES):
-            continue
-        gas, time, peak = (_number(item, name, file, 0.0) for name in (*keys, "peak_flow"))
-        name = str(item.get("chambers", "other chambers"))
-        found[name] = OtherGas(draw_of_numbers(gas, time, max(peak, gas / time)), _full_of(item, file))
-    return found
-
-
-def _full_of(item: Mapping[str, Any], file: Path) -> FullChambers | None:
-    if item.get("full_chambers") is None:
+def _walked(configuration: Mapping[str, Any], file: Path) -> Scenario | None:
+    """Return the walk that a folder is of, by what its file said; None for a folder of an earlier version."""
+    content, overrides = configuration.get("content"), configuration.get("overrides", [])
+    if content is None:
         return None
-    names = ("exhaust_pressure", "exhaust_volume", "fill_pressure", "fill_volume", "strides")
-    exhaust, its_volume, fill, other_volume, strides = (
-        _number(item, f"full_chambers.{name}", file, 0.0) for name in names
-    )
-    return FullChambers(exhaust, its_volume, fill, other_volume, int(strides))
+    given, name = configuration.get("file"), str(configuration.get("name", "walk"))
+    with refused_as(DataError, f"{file}: its walk cannot be repeated", PpafoError):
+        if not (isinstance(content, dict) and isinstance(overrides, list) and isinstance(given, str | None)):
+            raise DataError("'configuration' says no walk")
+        folder = Path() if given is None else Path(given).parent
+        return scenario_of(ScenarioRequest(name, given, folder, content, tuple(map(str, overrides))), WALKING)
 
 
 def _recording(folder: Path) -> Recording:

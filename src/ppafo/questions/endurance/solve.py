@@ -1,7 +1,8 @@
 """How long one bottle lasts for a gas use, with and without reuse of the exhaust; for several uses side by side."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ppafo.constants import GRAMS_PER_KILOGRAM, STANDARD_ATMOSPHERE
@@ -11,14 +12,13 @@ from ppafo.model.exhaust_reuse import ReuseCycle
 from ppafo.model.plant import chamber_1_volume, chamber_2_volume
 from ppafo.parameters import load_device
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle, load_bottle
+from ppafo.parameters.chamber_volumes import other_readings, own_reading
 from ppafo.parameters.declaration import is_within
 from ppafo.questions.endurance.answer import GIVEN, Endurance, Endurances, Reuse
-from ppafo.questions.endurance.discharge import discharge, smallest_mass_when_warm
+from ppafo.questions.endurance.discharge import check_schedule, discharge, discharge_of_life, smallest_mass_when_warm
 from ppafo.questions.endurance.draw import (
     Draw,
     FullChambers,
-    OtherGas,
-    Schedule,
     WalkGas,
     draw_of_numbers,
     draw_of_recording,
@@ -30,9 +30,16 @@ from ppafo.questions.endurance.draw import (
     walk_gas,
 )
 from ppafo.signals import Recording
+from ppafo.simulation.numbers import with_numbers
+from ppafo.simulation.scenario import Scenario
 from ppafo.storage.result_folder import read_recording
 from ppafo.units import parse_quantity
 from ppafo.walking import WalkResult
+from ppafo.walking.bottle import Schedule
+from ppafo.walking.loading import on_bottle
+from ppafo.walking.motion import SHORTEST_STRIDES, walk_of
+from ppafo.walking.walk import bottle_life
+from ppafo.walking.walk import walk as walk_for
 
 REUSE = (
     Quantity("reservoir_volume", "m^3", "volume of the reservoir between the chambers", minimum=0.0, maximum=0.1),
@@ -137,6 +144,8 @@ GasUse = str | Path | Recording | WalkResult
 """A file, a result folder, the folder of a walk, or what was read or returned of them."""
 _STEP_TIME = 1.1
 _LONGEST = 24.0 * 3600.0
+_FEW = 15.0
+"""Seconds that are walked to see how full other chambers get."""
 WITHOUT_REST = Schedule(_LONGEST, 0.0, _LONGEST)
 
 
@@ -145,7 +154,7 @@ def endurance(
     gas_per_step: float | None = None,
     step_time: float | None = None,
     peak_flow: float | None = None,
-    bottle: str | Path = PAPER_BOTTLE,
+    bottle: str | Path | None = None,
     walk: float = 600.0,
     rest: float = 0.0,
     longest: float = _LONGEST,
@@ -154,16 +163,20 @@ def endurance(
 ) -> Endurance | Endurances:
     """Return how long a full bottle lasts for a gas use that continues; ``Endurances`` for several recordings.
 
-    The gas use is that of ``recordings``, or else ``gas_per_step`` [kg] every ``step_time`` [s] (default 1.1 s)
-    with at most ``peak_flow`` [kg/s] (the mean flow). ``walk`` [s] and ``rest`` [s] take turns, for at most ``longest``
-    [s]. ``reuse`` are texts such as ``reservoir_volume=50 cm^3``, ``overrides`` such as ``room.temperature=5 degC``.
+    A walk, its result or its folder, walks on the bottle until that ends it; ``bottle`` is its own, or the paper's,
+    unless given. Any other gas use is that of ``recordings``, or else ``gas_per_step`` [kg] every ``step_time`` [s]
+    (default 1.1 s) with at most ``peak_flow`` [kg/s] (the mean flow). ``walk`` [s] and ``rest`` [s] take turns, for at
+    most ``longest`` [s]. ``reuse`` are texts such as ``reservoir_volume=50 cm^3``, ``overrides`` such as
+    ``room.temperature=5 degC``.
     ParameterError or DataError for bad input, SimulationError where the solver fails.
     """
     given = (recordings,) if isinstance(recordings, str | Path | Recording | WalkResult) else tuple(recordings)
     if bool(given) == (gas_per_step is not None):
         raise ParameterError("give either a recording or --gas-per-step, for example --gas-per-step '0.3 g'")
-    full, schedule, changes = load_bottle(bottle, overrides), Schedule(walk, rest, longest), tuple(reuse)
+    schedule, changes = Schedule(walk, rest, longest), tuple(reuse)
+    chosen = _Bottle(bottle, tuple(overrides))
     if gas_per_step is not None:
+        full = chosen.load()
         draw = draw_of_numbers(gas_per_step, _STEP_TIME if step_time is None else step_time, peak_flow)
         return follow_bottle(full, draw, schedule, parse_reuse(changes, full) if changes else None)
     if peak_flow is not None:
@@ -172,45 +185,95 @@ def endurance(
     if len(set(names)) < len(names):
         raise ParameterError("the same recording is given twice")
     found = {
-        name: _endurance_of_use(use, step_time, full, schedule, changes) for name, use in zip(names, given, strict=True)
+        name: _endurance_of_use(use, step_time, chosen, schedule, changes)
+        for name, use in zip(names, given, strict=True)
     }
     return found[names[0]] if len(found) == 1 else Endurances(found)
 
 
 def endurance_of_walk(
-    result: WalkResult, bottle: str | Path = PAPER_BOTTLE, reuse: Iterable[str] = ()
+    result: WalkResult, bottle: str | Path | None = None, reuse: Iterable[str] = ()
 ) -> Endurance | None:
     """Return how long a bottle lasts when the walk continues without rest; None where the walk took no gas.
 
-    A step is a stride of the leg with the
-    device, or a whole course. ``reuse`` are texts such as ``reservoir_volume=50 cm^3``: what they
-    do not say of the chambers is taken from the walk.
+    The same device, without faults, walks on the bottle until that ends it, as ``ppafo walk --bottle`` does;
+    ``bottle`` is its own, or the paper's, unless given. A step is a stride of the leg with the device, or a whole
+    course. ``reuse`` are texts such as ``reservoir_volume=50 cm^3``: what they do not say of the chambers is taken from
+    the walk.
     """
     gas = walk_gas(result)
-    if gas.gas_per_stride <= 0.0:
-        return None
-    return endurance_of_walk_gas(gas, load_bottle(bottle), WITHOUT_REST, reuse)
+    return None if gas.gas_per_stride <= 0.0 else endurance_of_walk_gas(gas, bottle, WITHOUT_REST, reuse)
 
 
-def endurance_of_walk_gas(gas: WalkGas, bottle: Bottle, schedule: Schedule, reuse: Iterable[str] = ()) -> Endurance:
-    """Return how long a bottle lasts when a walk continues; DataError where it took no gas."""
-    changes, draw = tuple(reuse), draw_of_walk(gas)
-    zero = gas.atmospheric_pressure
-    plan = parse_reuse(changes, bottle, full_chambers(gas), zero) if changes else None
-    others = {name: _other(bottle, other, schedule, changes, zero) for name, other in gas.others.items()}
-    return replace(
-        follow_bottle(bottle, draw, schedule, plan), others=others, is_of_course=bool(gas.course), is_whole=gas.is_whole
+def endurance_of_walk_gas(
+    gas: WalkGas,
+    bottle: str | Path | None,
+    schedule: Schedule,
+    reuse: Iterable[str] = (),
+    overrides: Iterable[str] = (),
+) -> Endurance:
+    """Return how long a bottle lasts when a walk continues; DataError where it took no gas, or is not known."""
+    at_set_pressure, changes, zero = draw_of_walk(gas), tuple(reuse), gas.atmospheric_pressure
+    if gas.scenario is None:
+        raise DataError(f"{gas.name}: its folder does not say what was walked; write the walk again")
+    own = walk_of(gas.scenario).bottle
+    carried = on_bottle(gas.scenario, PAPER_BOTTLE if bottle is None and own is None else bottle, overrides)
+    supply = walk_of(carried).bottle
+    assert supply is not None, "it was put on one"
+    reused = parse_reuse(changes, supply.bottle, full_chambers(gas), zero) if changes else None
+    found = _walked_to_its_end(carried, at_set_pressure, schedule, reused)
+    others = {}
+    if own_reading(carried.device.actuator) is not None:
+        for chambers in other_readings(carried.device.actuator):
+            its_draw, its_reuse = at_set_pressure, None
+            if changes:
+                shortest = (SHORTEST_STRIDES + 1) * walk_of(gas.scenario).gait.stride_time
+                few = max(shortest, min(_FEW, float(gas.recording.time[-1]))) / 60.0
+                its_gas = walk_gas(walk_for(with_numbers(gas.scenario, chambers.numbers()), few))
+                its_draw = draw_of_walk(its_gas)
+                with suppress(ParameterError):
+                    its_reuse = parse_reuse(changes, supply.bottle, full_chambers(its_gas), zero)
+                    check_reuse(its_reuse, its_draw.mass_per_step)
+            its_walk = with_numbers(carried, chambers.numbers())
+            others[chambers.name] = _walked_to_its_end(its_walk, its_draw, schedule, its_reuse)
+    without = None if reused is None else _walked_to_its_end(carried, at_set_pressure, schedule, None).discharge
+    return replace(found, others=others, is_of_course=bool(gas.course), without_reuse=without)
+
+
+def _walked_to_its_end(carried: Scenario, at_set_pressure: Draw, schedule: Schedule, reused: Reuse | None) -> Endurance:
+    """Return how long the bottle of a walk lasts; ``at_set_pressure`` is the draw of the same walk at room warmth."""
+    supply = walk_of(carried).bottle
+    assert supply is not None, "a walk on a bottle"
+    check_schedule(schedule)
+    if reused is not None:
+        check_reuse(reused, at_set_pressure.mass_per_step)
+    saved = 0.0 if reused is None else reused.balance.returned_mass / at_set_pressure.mass_per_step
+    life = bottle_life(carried, schedule, saved)
+    steps = max(life.repeats, 1.0e-9)
+    step_time = life.walked / steps
+    mass = life.course.regulated / steps
+    taken = Draw(mass, step_time, max(at_set_pressure.peak_flow, mass / step_time), at_set_pressure.origin)
+    usable = supply.mass - smallest_mass_when_warm(supply.bottle, taken)
+    return Endurance(
+        bottle=supply.bottle,
+        draw=taken,
+        schedule=schedule,
+        discharge=discharge_of_life(life, taken),
+        reuse=reused,
+        without_reuse=None,
+        steps_when_warm=usable / taken.mass_per_step,
     )
 
 
-def _other(bottle: Bottle, other: OtherGas, schedule: Schedule, changes: tuple[str, ...], zero: float) -> Endurance:
-    """Return how long the bottle lasts with other chambers; without reuse where theirs is not known or not possible."""
-    if changes and other.chambers is not None:
-        try:
-            return follow_bottle(bottle, other.draw, schedule, parse_reuse(changes, bottle, other.chambers, zero))
-        except ParameterError:
-            pass
-    return follow_bottle(bottle, other.draw, schedule)
+@dataclass(frozen=True, slots=True)
+class _Bottle:
+    """The bottle that was named, if any, and what is set of it."""
+
+    name: str | Path | None
+    overrides: tuple[str, ...]
+
+    def load(self) -> Bottle:
+        return load_bottle(PAPER_BOTTLE if self.name is None else self.name, self.overrides)
 
 
 def follow_bottle(bottle: Bottle, draw: Draw, schedule: Schedule, reused: Reuse | None = None) -> Endurance:
@@ -237,7 +300,7 @@ def _name(use: GasUse) -> str:
 
 
 def _endurance_of_use(
-    use: GasUse, step_time: float | None, bottle: Bottle, schedule: Schedule, reuse: tuple[str, ...]
+    use: GasUse, step_time: float | None, chosen: _Bottle, schedule: Schedule, reuse: tuple[str, ...]
 ) -> Endurance:
     gas = walk_gas(use) if isinstance(use, WalkResult) else None
     if isinstance(use, str | Path) and is_walk_folder(Path(use)):
@@ -246,12 +309,8 @@ def _endurance_of_use(
         step = f"its whole course '{gas.course}'" if gas.course else "one stride of its walk"
         if step_time is not None:
             raise ParameterError(f"--step-time: a step of {_name(use)} is {step}; omit --step-time")
-        if not gas.is_whole:
-            raise DataError(
-                f"{_name(use)}: the walk ended after {gas.stride_time:.4g} s of the {gas.course_time:.4g} s of course "
-                f"'{gas.course}', so it cannot be repeated as a whole; walk the whole course, without a bottle"
-            )
-        return endurance_of_walk_gas(gas, bottle, schedule, reuse)
+        return endurance_of_walk_gas(gas, chosen.name, schedule, reuse, chosen.overrides)
+    bottle = chosen.load()
     recording = use if isinstance(use, Recording) else read_recording(Path(str(use)))
     draw = draw_of_recording(recording, step_time)
     found = follow_bottle(bottle, draw, schedule, parse_reuse(reuse, bottle) if reuse else None)

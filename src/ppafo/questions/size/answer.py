@@ -12,6 +12,7 @@ from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import axis_unit, display_value, display_values, quantity_text
 from ppafo.answers.style import ACTUAL, BLACK, BLUE, GREEN, GREY, ORANGE, REFERENCE, VERMILION, house_style, mark_kind
 from ppafo.control.catalog import CONTROLLERS
+from ppafo.errors import StudyError
 from ppafo.parameters.chamber_volumes import ChamberVolumes, other_readings
 from ppafo.parameters.device import Actuator
 from ppafo.parameters.parts import Part
@@ -31,6 +32,7 @@ from ppafo.questions.size.search import (
     limit_of,
     try_pressures,
 )
+from ppafo.questions.size.wearer import WearerSizing, Wish, size_for_wearer
 from ppafo.signals import Recording
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate
@@ -40,6 +42,9 @@ from ppafo.version import __version__
 if TYPE_CHECKING:
     import matplotlib.figure
     from matplotlib.axes import Axes
+
+
+FOR_A_WEARER = "--mass '72.5 kg' --torque '2.5 N m' --pressure '50 psi_g' --minutes 5"
 
 
 @dataclass(frozen=True, slots=True)
@@ -462,12 +467,31 @@ def _tried(
     return OtherChambers(chambers.name, keeps, error, gas, gas * problem.repetitions * (1.0 + problem.reserve))
 
 
-def size(problem: SizingProblem | str | Path, threads: int | None = None, progress: Report | None = None) -> Sizing:
-    """Return for each valve the lowest pressure that keeps the error limit and the smallest bottle that lasts.
+def size(
+    problem: SizingProblem | str | Path | None = None,
+    threads: int | None = None,
+    mass: float | None = None,
+    stature: float | None = None,
+    torque: float | None = None,
+    pressure: float | None = None,
+    minutes: float | None = None,
+    progress: Report | None = None,
+) -> Sizing | WearerSizing:
+    """Return the device for a wearer, or for a torque profile the lowest pressure and smallest bottle of each valve.
 
-    ``problem`` may be the name or path of a sizing file. StudyError or ParameterError for bad input, and where every
-    run with a valve fails.
+    A wearer has a body ``mass`` [kg] and may have a ``stature`` [m]; ``torque`` [N m], ``pressure`` [Pa absolute]
+    and ``minutes`` of walking [min] are what the device is for. ``problem`` may be the name or path of a sizing file.
+    StudyError or ParameterError for bad input, and where every run with a valve fails.
     """
+    wished = {"mass": mass, "torque": torque, "pressure": pressure, "minutes": minutes}
+    if problem is None:
+        missing = [f"--{name}" for name, value in wished.items() if value is None]
+        if mass is None or torque is None or pressure is None or minutes is None:
+            raise StudyError(f"for a wearer give {', '.join(missing)} too, for example {FOR_A_WEARER}")
+        return size_for_wearer(Wish(mass, stature, torque, pressure, 60.0 * minutes), progress or report_nothing)
+    given = [f"--{name}" for name, value in {**wished, "stature": stature}.items() if value is not None]
+    if given:
+        raise StudyError(f"{', '.join(given)}: a sizing file says itself what is wanted; give the one or the other")
     chosen = problem if isinstance(problem, SizingProblem) else load_sizing(problem)
     report = progress or report_nothing
     begun = time.perf_counter()

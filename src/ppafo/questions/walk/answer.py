@@ -13,10 +13,9 @@ from ppafo.answers.display_units import display_value, title_with_unit
 from ppafo.live.workbench import live_part
 from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE
+from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.questions.endurance.answer import Endurance
 from ppafo.questions.endurance.draw import FORMAT
-from ppafo.questions.endurance.solve import endurance_of_walk
 from ppafo.questions.question import Solved
 from ppafo.questions.walk.course import (
     bottle_data,
@@ -163,13 +162,12 @@ def _values(values: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkPair(Solved):
-    """A walk with the device and without it; ``life`` is how long one bottle lasts, None where no gas was taken.
+    """A walk with the device and without it.
 
     ``volumes`` has the walk and the same with the other readings of the paper's chambers; none for chambers of its own.
     """
 
     comparison: Comparison
-    life: Endurance | None
     volumes: tuple[VolumeReading, ...]
 
 
@@ -237,8 +235,13 @@ def _pair_answer(pair: WalkPair) -> Answer:
     worn, bare = comparison.with_device, comparison.without_device
     configuration, walked = worn.scenario, walk_of(worn.scenario)
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
-    bottles = (bottle_remark(worn), _bottle(pair.life))
-    remarks = [*person_remarks(configuration), *bottles, *_safety(worn), _slap(comparison), trust_remark(configuration)]
+    remarks = [
+        *person_remarks(configuration),
+        _bottle(pair),
+        *_safety(worn),
+        _slap(comparison),
+        trust_remark(configuration),
+    ]
     remarks += [f"{item.scenario.name}: {item.status.message}" for item in (worn, bare) if not item.status.is_completed]
     return Answer(
         name="walk",
@@ -256,7 +259,7 @@ def _pair_answer(pair: WalkPair) -> Answer:
             *(course_pictures(comparison) if walked.course is not None else _pictures(comparison)),
             *_assumptions_section({item.path: item.note for item in configuration.assumptions}),
         ),
-        data=_data(comparison, pair.life) | {"volumes": volumes_data(pair.volumes)},
+        data=_data(comparison) | {"volumes": volumes_data(pair.volumes)},
         passed=comparison.is_completed and worn.is_helped,
         files={
             "recording.nc": lambda: netcdf_bytes(worn.recording, None),
@@ -383,20 +386,15 @@ def shut_off_line(scenario: Scenario) -> list[str]:
     return [f"shut-off valve: {mass:.0f} g, {power:.2g} W as long as the device helps ({60.0 * power:.0f} J a minute)"]
 
 
-def _bottle(life: Endurance | None) -> str:
-    """Return how long one bottle lasts on the walk; empty where it took no gas."""
-    if life is None:
+def _bottle(pair: WalkPair) -> str:
+    """Return how long the bottle of the walk lasts and what ended it, or how to see that; empty without gas."""
+    worn = pair.comparison.with_device
+    if worn.supply is not None:
+        return bottle_remark(worn, [one.result for one in pair.volumes[1:]])
+    gas = worn.metrics.get("gas")
+    if gas is None or gas.value <= 0.0:
         return ""
-    course = life.discharge
-    return (
-        f"one bottle ({life.bottle.name}, {1.0e3 * life.bottle.mass:.0f} g): {course.walking_time / 60.0:.1f} min, "
-        f"{_steps(life)}; {course.ending.message}"
-    )
-
-
-def _steps(life: Endurance) -> str:
-    steps, walked = life.discharge.steps, "" if life.is_whole else "what was walked of "
-    return f"{steps:.1f} times {walked}this course" if life.is_of_course else f"{steps:.0f} strides of this leg"
+    return f"how long a bottle lasts: walk on it, --bottle {PAPER_BOTTLE}; here its supply pressure stays as it is set"
 
 
 def walk_document(scenario: Scenario) -> dict[str, Any]:
@@ -424,25 +422,11 @@ def walk_document(scenario: Scenario) -> dict[str, Any]:
         "assumed": {item.path: item.note for item in scenario.assumptions},
         "file": origin.file,
         "overrides": list(origin.overrides),
+        "content": origin.content,
     }
 
 
-def _bottle_data(life: Endurance | None) -> dict[str, Any] | None:
-    """Return the same as data, in SI units."""
-    if life is None:
-        return None
-    course = life.discharge
-    return {
-        "bottle": life.bottle.name,
-        "gas_per_stride": life.draw.mass_per_step,
-        "walking_time": course.walking_time,
-        "strides": course.steps,
-        "ending": course.ending.kind,
-        "message": course.ending.message,
-    }
-
-
-def _data(comparison: Comparison, life: Endurance | None) -> dict[str, Any]:
+def _data(comparison: Comparison) -> dict[str, Any]:
     configuration = comparison.with_device.scenario
     return {
         "format": FORMAT,
@@ -452,7 +436,6 @@ def _data(comparison: Comparison, life: Endurance | None) -> dict[str, Any]:
         "status_off": plain(comparison.without_device.status),
         "minutes": float(comparison.with_device.recording.time[-1]) / 60.0,
         "metrics": plain(dict(comparison.with_device.metrics)),
-        "bottle": _bottle_data(life),
         **course_data(comparison),
         **bottle_data(comparison.with_device),
         "metrics_vented": plain(dict(comparison.with_device.vented_metrics)),
@@ -522,8 +505,7 @@ def walk_with_and_without(
         advance = _reporter(report, "walking", "wearers", 0.0)
         return Wearers(*wearers_by_volume(chosen, minutes, wearers, seed, advance))
     comparison = compare_walks(chosen, minutes, _reporter(report, "walking", "min", _LONG))
-    life = endurance_of_walk(comparison.with_device) if walk_of(chosen).bottle is None else None
-    return WalkPair(comparison, life, walks_by_volume(comparison.with_device, life, minutes))
+    return WalkPair(comparison, walks_by_volume(comparison.with_device, minutes))
 
 
 def list_files() -> list[dict[str, Any]]:

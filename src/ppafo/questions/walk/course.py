@@ -1,6 +1,6 @@
 """What a walk on a course or on its bottle adds to the answer: tables, remarks, data, files, pictures."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
 from typing import Any
 
@@ -12,7 +12,7 @@ from ppafo.errors import DataError
 from ppafo.gait.gait import speed_range
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
-from ppafo.walking.bottle import WALKED, SupplyCourse
+from ppafo.walking.bottle import SupplyCourse, lasted, lasting_text
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.over_time import bottle_figure, course_figure, peak_torques
 from ppafo.walking.motion import walk_of
@@ -47,12 +47,13 @@ def bottle_sections(worn: WalkResult) -> tuple[Section, ...]:
     )
 
 
-def bottle_remark(worn: WalkResult) -> str:
-    """Return what ended a walk on its bottle, and when; empty without a bottle."""
+def bottle_remark(worn: WalkResult, others: Sequence[WalkResult]) -> str:
+    """Return what ended a walk on its bottle, and when; ``others`` is the walk with other readings of its chambers."""
     supply = worn.supply
-    if supply is None:
-        return ""
-    ended = "" if supply.ending.kind == WALKED else f"ended after {quantity_text(supply.ending.time, 'duration')}: "
+    assert supply is not None, "said of a walk on a bottle"
+    time = lasted(supply)
+    times = [None if other.supply is None else lasted(other.supply) for other in others]
+    ended = "" if time is None else f"lasts {lasting_text(time, times)}: "
     return f"bottle {supply.supply.bottle.name}: {ended}{supply.ending.message}"
 
 
@@ -63,7 +64,7 @@ def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
     rows = [
         ("bottle", f"{bottle.title}, with {_gas(supply.supply.mass)} at {_warmth(supply.supply.temperature)}"),
         ("what ended it", supply.ending.message),
-        ("when", f"{quantity_text(supply.ending.time, 'duration')}, after {worn.helped.size} strides"),
+        ("when", f"{quantity_text(supply.ending.time, 'duration')}, after {worn.helped.size} whole strides"),
         ("gas used", f"{_gas(supply.balance.left_bottle)}, left {_gas(float(values['bottle_mass'][-1]))}{liquid}"),
         ("bottle at the end", f"{_warmth(float(values['bottle_temperature'][-1]))}, {_pressure(supply)}"),
         ("coldest gas behind the regulator", _warmth(float(values["outlet_temperature"].min()))),

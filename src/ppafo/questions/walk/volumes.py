@@ -1,21 +1,16 @@
 """The walk, of one wearer or of many, with other readings of the paper's chambers: what each comes to."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ppafo.answers import Column, Section, Table
-from ppafo.errors import DataError
-from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.parameters.chamber_volumes import ChamberVolumes, other_readings, own_reading
-from ppafo.questions.endurance.answer import Endurance
-from ppafo.questions.endurance.draw import draw_of_numbers, full_chambers, largest_flow, walk_gas
-from ppafo.questions.endurance.solve import WITHOUT_REST, endurance_of_walk, follow_bottle
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
-from ppafo.walking.bottle import DIVERGED, WALKED
+from ppafo.walking.bottle import lasted
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult, integral_of_a_stride
 from ppafo.walking.walk import Population, Progress, walk, walk_population
@@ -31,9 +26,8 @@ _HEAD = (
     Column("at the shaft", "energy", ".2f"),
     Column("in push-off", "energy", ".2f"),
     Column("peak torque", "torque", ".2f"),
-    Column("bottle", "duration", ".3g"),
 )
-_ENDED = Column("ended")
+_ON_BOTTLE = (Column("bottle", "duration", ".3g"), Column("ended"))
 _EXPLAINED = (
     "The paper's torque constant and volume per angle contradict each other by virtual work, so the walk is repeated, "
     f"for at most {LONGEST:g} min, with other chambers, which the observer of the controller knows. With the volume by "
@@ -46,19 +40,16 @@ _EXPLAINED = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VolumeReading:
-    """A walk with some chambers; works of a stride [J], peak of the mean torque [N m]; ``life`` None without gas."""
+    """A walk with some chambers; works of a stride [J], peak of the mean torque [N m]."""
 
     chambers: ChamberVolumes
     result: WalkResult
     gas_work: float
     shaft_work: float
     peak_torque: float
-    life: Endurance | None
 
 
-def walks_by_volume(
-    result: WalkResult, life: Endurance | None, minutes: float | None = None
-) -> tuple[VolumeReading, ...]:
+def walks_by_volume(result: WalkResult, minutes: float | None = None) -> tuple[VolumeReading, ...]:
     """Return a walk and the same with the other readings of its chambers; none where it has chambers of its own.
 
     The walk is left alone where no gas was taken or it has no whole strides, for then nothing rests on the volume. On a
@@ -66,22 +57,22 @@ def walks_by_volume(
     """
     actuator = result.scenario.device.actuator
     others, own = other_readings(actuator), own_reading(actuator)
-    takes_gas = life is not None or (result.supply is not None and result.supply.regulated > 0.0)
+    takes_gas = float(result.recording["supplied_mass"][-1]) > 0.0
     if not takes_gas or own is None or not others or not result.averages:
         return ()
     if result.supply is None:
         walked = float(result.recording.time[-1]) / 60.0
         minutes = min(walked, LONGEST) if walk_of(result.scenario).course is None else walked
-    found = [_read(own, result, life)]
+    found = [_read(own, result)]
     for chambers in others:
         configuration = result.scenario
         other = walk(with_numbers(configuration, chambers.numbers()), minutes)
         if other.status.is_completed and other.averages:
-            found.append(_read(chambers, other, endurance_of_walk(other) if other.supply is None else None))
+            found.append(_read(chambers, other))
     return tuple(found)
 
 
-def _read(chambers: ChamberVolumes, result: WalkResult, life: Endurance | None) -> VolumeReading:
+def _read(chambers: ChamberVolumes, result: WalkResult) -> VolumeReading:
     recording = result.recording
     turned = integral_of_a_stride(result, recording["pressure_1"] - recording["pressure_2"])
     torque_constant = result.scenario.device.actuator.torque_constant
@@ -91,7 +82,6 @@ def _read(chambers: ChamberVolumes, result: WalkResult, life: Endurance | None) 
         gas_work=chambers.volume_per_angle * turned,
         shaft_work=torque_constant * turned,
         peak_torque=float(result.averages["torque"].mean.max()),
-        life=life,
     )
 
 
@@ -100,8 +90,8 @@ def volumes_sections(read: tuple[VolumeReading, ...]) -> tuple[Section, ...]:
     if not read:
         return ()
     on_bottle = any(one.result.supply is not None for one in read)
-    head = (*_HEAD, _ENDED) if on_bottle else _HEAD
-    table = Table(head, tuple((*_row(one), *([_ending(one)] if on_bottle else [])) for one in read))
+    head = (*_HEAD, *_ON_BOTTLE) if on_bottle else _HEAD
+    table = Table(head, tuple((*_row(one), *((_lasts(one), _ending(one)) if on_bottle else ())) for one in read))
     return (
         Section("What rests on the volume of the chambers", table=table),
         Section("Why there are several chambers", (_EXPLAINED,), is_detail=True),
@@ -119,22 +109,12 @@ def _row(one: VolumeReading) -> tuple[str | float | None, ...]:
         one.shaft_work,
         metrics["push_off_work"].value,
         one.peak_torque,
-        _lasts(one),
     )
 
 
 def _lasts(one: VolumeReading) -> float | None:
-    """Return how long the bottle lasts [s]: that of the walk where it ended it, else one that is followed alone."""
-    supply = one.result.supply
-    if supply is not None:
-        return None if supply.ending.kind in (WALKED, DIVERGED) else supply.ending.time
-    return None if one.life is None else one.life.discharge.walking_time
-
-
-def _peak_flow(one: VolumeReading) -> float | None:
-    if one.result.supply is not None:
-        return largest_flow(one.result.recording)
-    return None if one.life is None else one.life.draw.peak_flow
+    """Return how long the bottle lasts [s], None where the walk ended before it did."""
+    return None if one.result.supply is None else lasted(one.result.supply)
 
 
 def _ending(one: VolumeReading) -> str | None:
@@ -142,7 +122,7 @@ def _ending(one: VolumeReading) -> str | None:
 
 
 def volumes_data(read: tuple[VolumeReading, ...]) -> list[Mapping[str, Any]]:
-    """Return the readings as plain data in SI; the gas use of each is what a bottle is followed with."""
+    """Return the readings as plain data in SI."""
     return [
         {
             "chambers": one.chambers.name,
@@ -151,32 +131,18 @@ def volumes_data(read: tuple[VolumeReading, ...]) -> list[Mapping[str, Any]]:
             "dead_volume_2": one.chambers.dead_volume_2,
             "gas_per_stride": one.result.metrics["gas"].value,
             "stride_time": walk_of(one.result.scenario).gait.stride_time,
-            "peak_flow": _peak_flow(one),
-            "full_chambers": _full(one.result),
             "gas_work": one.gas_work,
             "shaft_work": one.shaft_work,
             "push_off_work": one.result.metrics["push_off_work"].value,
             "peak_torque": one.peak_torque,
-            "walking_time": _lasts(one),
-            **({} if one.result.supply is None else {"ending": one.result.supply.ending._asdict()}),
-            **_course_gas(one.result),
+            **(
+                {}
+                if one.result.supply is None
+                else {"walking_time": _lasts(one), "ending": one.result.supply.ending._asdict()}
+            ),
         }
         for one in read
     ]
-
-
-def _full(result: WalkResult) -> dict[str, Any] | None:
-    """Return how full the chambers get, by which a reuse of the exhaust is followed; None where strides differ."""
-    try:
-        return asdict(full_chambers(walk_gas(result)))
-    except DataError:
-        return None
-
-
-def _course_gas(result: WalkResult) -> dict[str, float]:
-    """Return the gas [kg] and the time [s] of a whole course, by which a bottle follows it."""
-    names = {"gas_of_course": "course_gas", "course_time": "course_time"}
-    return {own: result.metrics[name].value for own, name in names.items() if name in result.metrics}
 
 
 LARGEST = 200
@@ -188,12 +154,11 @@ _WEARERS_HEAD = (
     Column("median", "gas mass", ".3f"),
     Column("95 %", "gas mass", ".3f"),
     Column("work in push-off, median", "energy", ".2f"),
-    Column("bottle, median gas", "duration", ".3g"),
 )
 _WEARERS_EXPLAINED = (
     "The paper's torque constant and volume per angle contradict each other by virtual work (`ppafo audit`), so some "
     f"wearers walk again with other chambers: {LARGEST} at most, for at most {LONGEST:g} min, with the same "
-    "seed. The bottle is the paper's, followed with the median gas of a stride, drawn evenly."
+    "seed."
 )
 _QUANTILES = (0.05, 0.5, 0.95)
 
@@ -229,21 +194,12 @@ def wearers_volumes_sections(read: Mapping[str, Population]) -> tuple[Section, .
 def _wearers_row(population: Population) -> tuple[float | None, ...]:
     gas = np.quantile(population.outcomes["gas"], _QUANTILES).tolist() if population.count else [None] * 3
     work = float(np.median(population.outcomes["push_off_work"])) if population.count else None
-    return population.count, *gas, work, _wearers_last(population)
-
-
-def _wearers_last(population: Population) -> float | None:
-    """Return how long the paper's bottle lasts [s] with the median gas of a stride."""
-    if not population.count:
-        return None
-    gas, time = (float(np.median(values)) for values in (population.outcomes["gas"], population.traits["stride_time"]))
-    draw = draw_of_numbers(gas, time, None)
-    return follow_bottle(load_bottle(PAPER_BOTTLE), draw, WITHOUT_REST).discharge.walking_time
+    return population.count, *gas, work
 
 
 def wearers_volumes_data(read: Mapping[str, Population]) -> list[dict[str, Any]]:
     """Return the readings as plain data in SI units."""
-    names = ("wearers", "gas_low", "gas_median", "gas_high", "push_off_work_median", "walking_time")
+    names = ("wearers", "gas_low", "gas_median", "gas_high", "push_off_work_median")
     return [
         {"chambers": name, **dict(zip(names, _wearers_row(population), strict=True))}
         for name, population in read.items()

@@ -114,8 +114,8 @@ def _draw(axes: "Axes", panel: _Panel, result: Strides, name: str, colour: str) 
 
 def _head(figure: "Figure", axes: "Axes", result: Strides, height: float) -> None:
     configuration = result.scenario
-    counted = result.metrics["strides"].value
-    title = f"{configuration.name}: {walk_of(configuration).gait.name}, {counted:.0f} strides"
+    strides, counted = (f"{result.metrics[name].value:.0f}" for name in ("strides", "counted_strides"))
+    title = f"{configuration.name}: {walk_of(configuration).gait.name}, mean of {counted} of {strides} strides"
     figure.text(0.12 / _WIDTH, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
     handles, labels = axes.get_legend_handles_labels()
     place = (0.1 / _WIDTH, 1.0 - 0.3 / height)

@@ -48,6 +48,7 @@ _LEVELS = {
     STOPPED: ("stop", "#e08a8a"),
 }
 _PHASES = ("swing", "heel", "free", "push")
+_FREE, _PUSH = 2.0, 3.0
 _LONG = 120.0
 """Time [s] above which the axis is in minutes."""
 
@@ -105,7 +106,7 @@ def over_time_figure(result: WalkResult) -> "Figure":
         phases.set_yticks(range(len(_PHASES)), _PHASES)
         phases.set_ylim(-0.3, len(_PHASES) - 0.7)
         if "controller_phase" in result.recording:
-            phases.step(time, result.recording["controller_phase"], where="post", color=BLACK, linewidth=0.9)
+            phases.step(time, acting_phase(result.recording), where="post", color=BLACK, linewidth=0.9)
         _levels(level, result, time)
         level.set_xlabel(f"Time ({unit})")
         level.set_xlim(0.0, float(time[-1]))
@@ -115,6 +116,14 @@ def over_time_figure(result: WalkResult) -> "Figure":
         figure.text(0.12 / width, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
         mark_kind(figure, recording.kind)
         return figure
+
+
+def acting_phase(recording: Recording) -> Floats:
+    """Return the phase of each sample in which the device acts: none pushes in a lift, and a paused one is free."""
+    seen = recording["controller_phase"]
+    level = recording["safe_state"] if "safe_state" in recording else np.zeros(seen.size)
+    is_idle = (level > LIFTS) | ((level == LIFTS) & (seen == _PUSH))
+    return np.where(is_idle, _FREE, seen)
 
 
 def _levels(axes: "Axes", result: WalkResult, time: Floats) -> None:
@@ -221,7 +230,7 @@ def _course_phases(axes: "Axes", worn: WalkResult) -> None:
     """The phase that the controller sees, as a strip under the curve."""
     if "controller_phase" not in worn.recording:
         return
-    time, seen = worn.recording.time, worn.recording["controller_phase"]
+    time, seen = worn.recording.time, acting_phase(worn.recording)
     low, high = axes.get_ylim()
     strip = low - 0.18 * (high - low)
     for phase, colour in _COURSE_PHASES.items():

@@ -6,7 +6,8 @@ import pytest
 
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle, load_bottle
 from ppafo.questions.endurance.discharge import Discharge, discharge
-from ppafo.questions.endurance.draw import Schedule, draw_of_numbers
+from ppafo.questions.endurance.draw import draw_of_numbers
+from ppafo.walking.bottle import Schedule
 
 INSULATED = ("bottle.content_heat_transfer=0 W/K",)
 HELD_WARM = ("bottle.content_heat_transfer=100000 W/K", "bottle.room_heat_transfer=100000 W/K")

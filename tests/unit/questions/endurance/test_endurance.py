@@ -8,9 +8,10 @@ import pytest
 from ppafo.errors import DataError, ParameterError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.questions.endurance.answer import Endurance, Endurances
-from ppafo.questions.endurance.draw import Schedule, draw_of_numbers, draw_of_recording
+from ppafo.questions.endurance.draw import draw_of_numbers, draw_of_recording
 from ppafo.questions.endurance.solve import check_reuse, endurance, follow_bottle, parse_reuse
 from ppafo.signals import Channel, Recording
+from ppafo.walking.bottle import Schedule
 
 WITHOUT_REST = Schedule(600.0, 0.0, 86400.0)
 

@@ -5,20 +5,18 @@ import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.errors import DataError, ParameterError
+from ppafo.errors import DataError, ParameterError, ScenarioError
 from ppafo.model.plant import chamber_1_volume, chamber_2_volume
-from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
-from ppafo.questions.endurance import discharge
+from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
+from ppafo.questions.endurance.answer import Endurance
 from ppafo.questions.endurance.draw import (
     FORMAT,
     Actuator,
-    Schedule,
     WalkGas,
     draw_of_walk,
     full_chambers,
@@ -26,13 +24,17 @@ from ppafo.questions.endurance.draw import (
     read_walk_gas,
     walk_gas,
 )
-from ppafo.questions.endurance.solve import endurance_of_walk, endurance_of_walk_gas
+from ppafo.questions.endurance.solve import endurance, endurance_of_walk, endurance_of_walk_gas
 from ppafo.signals import Channel, Recording
+from ppafo.simulation.numbers import with_numbers
 from ppafo.storage.netcdf import netcdf_bytes
-from ppafo.walking import WalkResult, walk
+from ppafo.walking import WalkResult, load_walk, walk
+from ppafo.walking.bottle import Schedule, SupplyBalance
 
 ACTUATOR = Actuator(0.35, 2.27, 5.1e-5, 2e-6, 2e-6)
-LONG = Schedule(86400.0, 0.0, 86400.0)
+SMALL = ["bottle.gas_mass=20 g", "bottle.volume=30 cm^3"]
+"""A bottle that is walked to its end in a second."""
+FEW = Schedule(60.0, 0.0, 5.0)
 STRIDE = 1.0
 
 
@@ -52,7 +54,8 @@ def pulses(strides: float) -> WalkGas:
         "pressure_2": Channel(1e5 + 3e5 * second, "Pa"),
         "supplied_mass": Channel(6e-4 * time / STRIDE, "kg"),
     }
-    return WalkGas("pulses", Recording("pulses", time, channels, kind="simulated"), 6e-4, STRIDE, ACTUATOR)
+    recording = Recording("pulses", time, channels, kind="simulated")
+    return WalkGas("pulses", recording, 6e-4, STRIDE, ACTUATOR, scenario=load_walk("solenoid"))
 
 
 def folder_of(walk: WalkGas, path: Path) -> Path:
@@ -61,6 +64,10 @@ def folder_of(walk: WalkGas, path: Path) -> Path:
     actuator = {name: getattr(walk.actuator, name) for name in Actuator.__slots__}
     device = {"actuator": actuator, "supply": {"atmospheric_pressure": walk.atmospheric_pressure}}
     configuration = {"name": walk.name, "gait": {"stride_time": walk.stride_time}, "device": device}
+    if walk.scenario is not None:
+        origin = walk.scenario.origin
+        said = {"content": origin.content, "overrides": list(origin.overrides), "file": origin.file}
+        configuration |= said
     metrics = {"gas": {"value": walk.gas_per_stride, "unit": "kg"}}
     document = {"format": FORMAT, "configuration": configuration, "metrics": metrics}
     (path / "walk.json").write_text(json.dumps(document))
@@ -80,7 +87,7 @@ def test_chambers_are_taken_where_they_are_fullest_without_the_first_strides() -
 def test_a_walk_high_above_the_sea_lets_gas_out_into_its_own_atmosphere(tmp_path: Path) -> None:
     read = read_walk_gas(folder_of(replace(pulses(5.0), atmospheric_pressure=83e3), tmp_path / "walk"))
     given = ["reservoir_volume=5 cm^3", "fill_pressure=1 bar_g"]
-    reuse = endurance_of_walk_gas(read, load_bottle(PAPER_BOTTLE), LONG, given).reuse
+    reuse = endurance_of_walk_gas(read, PAPER_BOTTLE, FEW, given).reuse
     assert reuse is not None
     assert reuse.cycle.atmospheric_pressure == 83e3
     assert reuse.cycle.fill_pressure == pytest.approx(183e3)
@@ -104,7 +111,7 @@ def test_a_walk_of_two_strides_says_nothing_of_a_settled_one() -> None:
 def test_a_folder_says_what_the_walk_says(tmp_path: Path) -> None:
     here = walk_gas(solenoid())
     read = read_walk_gas(folder_of(here, tmp_path / "walk"))
-    assert replace(read, recording=here.recording) == here
+    assert replace(read, recording=here.recording, scenario=here.scenario) == here
     assert full_chambers(read) == full_chambers(here)
     assert draw_of_walk(read) == draw_of_walk(here)
     assert read.gas_per_stride == solenoid().metrics["gas"].value
@@ -175,8 +182,8 @@ def test_a_recording_without_pressures_is_refused(tmp_path: Path, capsys: pytest
 
 
 def test_reuse_takes_the_chambers_from_the_walk_and_a_given_value_overrides() -> None:
-    made = endurance_of_walk(solenoid(), reuse=["reservoir_volume=50 cm^3", "fill_pressure=20 psi_g"])
-    assert made is not None
+    made = endurance(solenoid(), reuse=["reservoir_volume=50 cm^3", "fill_pressure=20 psi_g"], overrides=SMALL)
+    assert isinstance(made, Endurance)
     assert made.reuse is not None
     assert made.without_reuse is not None
     full = full_chambers(walk_gas(solenoid()))
@@ -192,17 +199,17 @@ def test_reuse_takes_the_chambers_from_the_walk_and_a_given_value_overrides() ->
 
 def test_a_walk_lasts_the_same_with_and_without_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = folder_of(walk_gas(solenoid()), tmp_path / "walk")
-    assert main(["endurance", str(folder), "--reuse", "reservoir_volume=50cm^3", "--json"]) == 0
+    assert main(["endurance", str(folder), "--reuse", "reservoir_volume=50cm^3", "--json", "--longest", "5 s"]) == 0
     document = json.loads(capsys.readouterr().out)
-    made = endurance_of_walk(solenoid(), reuse=["reservoir_volume=50 cm^3"])
-    assert made is not None
+    made = endurance(solenoid(), reuse=["reservoir_volume=50 cm^3"], longest=5.0)
+    assert isinstance(made, Endurance)
     assert document["result"]["steps"] == pytest.approx(made.discharge.steps, rel=1e-6)
     assert document["reuse"]["origins"]["exhaust_pressure"].startswith("from the walk")
 
 
 def test_several_recordings_stand_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     one, two = (folder_of(walk_gas(solenoid()), tmp_path / name) for name in ("one", "two"))
-    assert main(["endurance", str(one), str(two), "--reuse", "reservoir_volume=50cm^3"]) == 0
+    assert main(["endurance", str(one), str(two), "--reuse", "reservoir_volume=50cm^3", "--longest", "5 s"]) == 0
     lines = capsys.readouterr().out.splitlines()
     titles = "gas use,gas per step (g),walking (min),steps,gas saved (g),walking with reuse (min),steps with reuse"
     assert re.split(r"\s{2,}", lines[2].replace("gas use", "gas use ")) == [*titles.split(","), "ended"]
@@ -228,29 +235,6 @@ def test_what_does_not_belong_to_a_walk_is_refused(
     assert words in capsys.readouterr().err
 
 
-def on_course(walk: WalkGas, planned: float, path: Path) -> Path:
-    """The folder of a walk on a course that takes a ``planned`` time [s], of which as much is walked as is recorded."""
-    folder = folder_of(walk, path)
-    document = json.loads((folder / "walk.json").read_text())
-    document["configuration"]["course"] = {"name": "corridor"}
-    times = {"course_time": walk.recording.duration, "course_planned_time": planned, "course_gas": 3.0e-3}
-    document["metrics"] |= {name: {"value": value} for name, value in times.items()}
-    (folder / "walk.json").write_text(json.dumps(document))
-    return folder
-
-
-def test_a_course_that_was_cut_short_is_not_taken_for_a_whole_one(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    whole, cut = (on_course(pulses(5.0), planned, tmp_path / f"{planned}") for planned in (5.0, 45.9))
-    assert main(["endurance", str(whole), "--longest", "39 s"]) == 0
-    assert re.search(r"steps +7\.8\n", capsys.readouterr().out), "7.8 courses are not 8"
-    assert main(["endurance", str(cut)]) == 2
-    assert "ended after 5 s of the 45.9 s of course 'corridor'" in capsys.readouterr().err
-    assert main(["endurance", str(whole), "--step-time", "1 s"]) == 2
-    assert "is its whole course 'corridor'; omit --step-time" in capsys.readouterr().err
-
-
 def test_several_recordings_have_one_folder_and_none_comes_twice(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -259,7 +243,7 @@ def test_several_recordings_have_one_folder_and_none_comes_twice(
     assert "given twice" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
     other = str(folder_of(pulses(6.0), tmp_path / "other"))
-    assert main(["endurance", folder, other, "--out", str(tmp_path / "out")]) == 0
+    assert main(["endurance", folder, other, "--longest", "2 s", "--out", str(tmp_path / "out")]) == 0
     names = ["endurance.json", "endurance.txt", "ppafo.json", "report.html"]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == names
     assert set(json.loads((tmp_path / "out" / "endurance.json").read_text())["recordings"]) == {folder, other}
@@ -268,7 +252,7 @@ def test_several_recordings_have_one_folder_and_none_comes_twice(
 def test_a_walk_whose_chambers_hold_more_than_it_took_is_refused() -> None:
     little = replace(pulses(5.0), gas_per_stride=1e-5)
     with pytest.raises(ParameterError, match=r"more than the 0\.01 g"):
-        endurance_of_walk_gas(little, load_bottle(PAPER_BOTTLE), LONG, ["reservoir_volume=50 cm^3"])
+        endurance_of_walk_gas(little, PAPER_BOTTLE, FEW, ["reservoir_volume=50 cm^3"])
 
 
 def test_a_walk_without_gas_lasts_for_ever() -> None:
@@ -287,20 +271,56 @@ def test_the_largest_flow_is_that_of_the_bottles_regulator_where_there_are_lines
     )
 
 
-def test_how_long_a_bottle_lasts_is_known_without_its_course(monkeypatch: pytest.MonkeyPatch) -> None:
-    made: list[object] = []
-    original = discharge._recording
+def test_every_door_says_how_long_a_device_lasts_in_the_same_words(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = ["--bottle", PAPER_BOTTLE]
+    assert main(["walk", "solenoid-regulators", *words, "--out", "on-bottle"]) == 0
+    said = re.search(rf"bottle {PAPER_BOTTLE}: lasts (.*?): (.*)", capsys.readouterr().out)
+    assert said is not None
+    assert re.fullmatch(r"[\d.]+ min \([\d.]+ to [\d.]+ min by what is not known of the chambers\)", said[1])
+    assert said[1] in (tmp_path / "on-bottle" / "report.html").read_text()
+    assert main(["walk", "solenoid-regulators", "--minutes", "0.1", "--out", "short"]) == 0
+    assert "min (" not in capsys.readouterr().out, "a walk at a constant supply says nothing of a bottle's minutes"
+    for folder in ("on-bottle", "short"):
+        assert main(["endurance", folder]) == 0
+        out = capsys.readouterr().out
+        assert f"{said[1]} of walking" in out
+        assert said[2] in out
+    made = endurance_of_walk(walk("solenoid-regulators", 0.1))
+    assert made is not None
+    assert f"{made.discharge.walking_time / 60.0:.3g} min" == said[1].partition(" (")[0]
 
-    def counted(*given: Any) -> Recording:
-        made.append(given)
-        return original(*given)
 
-    monkeypatch.setattr(discharge, "_recording", counted)
-    found = endurance_of_walk(solenoid())
-    assert found is not None
-    assert found.discharge.walking_time > 60.0
-    assert made == []
-    course = found.discharge.recording
-    assert course is found.discharge.recording
-    assert course.time[-1] == found.discharge.total_time
-    assert len(made) == 1
+def test_rests_warm_the_bottle_that_is_walked_on() -> None:
+    without, rested = (endurance(solenoid(), overrides=SMALL, walk=10.0, rest=rest) for rest in (0.0, 120.0))
+    assert isinstance(without, Endurance)
+    assert isinstance(rested, Endurance)
+    assert rested.discharge.walking_time > without.discharge.walking_time
+    assert isinstance(rested.discharge.balance, SupplyBalance)
+    assert isinstance(without.discharge.balance, SupplyBalance)
+    assert rested.discharge.balance.room > 8.0 * without.discharge.balance.room
+    rests = round((rested.discharge.total_time - rested.discharge.walking_time) / 120.0)
+    assert rests == int(rested.discharge.walking_time / 10.0)
+    mass = rested.discharge.recording["bottle_mass"]
+    assert mass[0] - mass[-1] == pytest.approx(rested.draw.mass_per_step * rested.discharge.steps)
+
+
+def test_a_device_that_a_fault_stops_is_asked_about_without_the_fault() -> None:
+    stopped = walk("solenoid", 0.2, overrides=["faults.toe.kind=stuck", "faults.toe.time=4 s"])
+    made, sound = (endurance(one, overrides=SMALL) for one in (stopped, walk("solenoid", 0.2)))
+    assert isinstance(made, Endurance)
+    assert isinstance(sound, Endurance)
+    assert made.discharge.walking_time == sound.discharge.walking_time
+
+
+def test_a_walk_whose_numbers_were_changed_in_python_is_not_taken_for_that_of_its_file() -> None:
+    changed = walk(with_numbers(load_walk("solenoid"), {"valve.area": 1.0e-6}), 0.1)
+    with pytest.raises(ScenarioError, match="give the bottle where the walk is loaded"):
+        endurance_of_walk(changed)
+
+
+def test_the_folder_of_an_earlier_version_is_to_be_written_again(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="does not say what was walked; write the walk again"):
+        endurance(folder_of(replace(pulses(5.0), scenario=None), tmp_path / "old"))

@@ -9,7 +9,6 @@ import ppafo
 from ppafo.answers.writing import text_of
 from ppafo.errors import DataError
 from ppafo.questions.endurance.answer import Endurance
-from ppafo.questions.endurance.draw import read_walk_gas
 from ppafo.questions.endurance.solve import endurance
 from ppafo.questions.walk.answer import WalkPair, Wearers, walk_with_and_without
 
@@ -66,62 +65,6 @@ def test_volumes_of_ones_own_and_a_walk_without_gas_have_no_other_rows() -> None
         assert "What rests on the volume" not in text_of(found.answer())
 
 
-def test_a_bottle_that_is_asked_about_the_folder_says_the_same(pair: WalkPair, folder: Path) -> None:
-    life = endurance(folder)
-    assert isinstance(life, Endurance)
-    _, *others = pair.volumes
-    assert list(life.others) == [one.chambers.name for one in others]
-    for one, other in zip(others, life.others.values(), strict=True):
-        assert one.life is not None
-        assert other.discharge.walking_time == pytest.approx(one.life.discharge.walking_time)
-    assert "with ppafo2011-consistent" in text_of(life.answer())
-
-
-@pytest.mark.parametrize("listed", ["none", [1], [{"volume_per_angle": 1.0}], [{"gas_per_stride": "0.4 g"}]], ids=repr)
-def test_volumes_that_are_no_list_of_numbers_are_refused_in_one_line(folder: Path, listed: object) -> None:
-    path = folder / "walk.json"
-    text = path.read_text(encoding="utf-8")
-    path.write_text(json.dumps(json.loads(text) | {"volumes": listed}), encoding="utf-8")
-    try:
-        with pytest.raises(DataError, match="write the walk again") as caught:
-            read_walk_gas(folder)
-        assert "\n" not in str(caught.value)
-    finally:
-        path.write_text(text, encoding="utf-8")
-
-
-def test_chambers_with_which_no_gas_was_taken_are_left_out(folder: Path) -> None:
-    path = folder / "walk.json"
-    text = path.read_text(encoding="utf-8")
-    document = json.loads(text)
-    document["volumes"][1] |= {"gas_per_stride": 0.0, "peak_flow": None}
-    path.write_text(json.dumps(document), encoding="utf-8")
-    try:
-        assert len(read_walk_gas(folder).others) == 1
-    finally:
-        path.write_text(text, encoding="utf-8")
-
-
-def test_a_folder_of_an_earlier_version_has_no_others(folder: Path, tmp_path: Path) -> None:
-    document = json.loads((folder / "walk.json").read_text(encoding="utf-8"))
-    del document["volumes"]
-    for name in ("recording.nc",):
-        (tmp_path / name).write_bytes((folder / name).read_bytes())
-    (tmp_path / "walk.json").write_text(json.dumps(document), encoding="utf-8")
-    assert read_walk_gas(tmp_path).others == {}
-
-
-def test_what_a_reservoir_saves_is_that_of_each_reading(pair: WalkPair, folder: Path) -> None:
-    life = endurance(folder, reuse=["reservoir_volume=50 cm^3"])
-    assert isinstance(life, Endurance)
-    for one, other in zip(pair.volumes[1:], life.others.values(), strict=True):
-        assert other.reuse is not None
-        alone = endurance(one.result, reuse=["reservoir_volume=50 cm^3"])
-        assert isinstance(alone, Endurance)
-        assert other.discharge.steps == pytest.approx(alone.discharge.steps)
-    assert text_of(life.answer()).count("of it saved") == len(pair.volumes[1:])
-
-
 @pytest.fixture(scope="module")
 def course() -> WalkPair:
     found = walk_with_and_without("solenoid", course="stairs")
@@ -129,12 +72,8 @@ def course() -> WalkPair:
     return found
 
 
-def test_a_course_is_walked_again_with_the_other_chambers_and_from_a_bottle(course: WalkPair) -> None:
-    gas, time = (course.comparison.with_device.metrics[name].value for name in ("course_gas", "course_time"))
-    assert course.life is not None
-    assert course.life.draw.mean_flow == pytest.approx(gas / time)
-    assert course.life.discharge.steps == pytest.approx(course.life.discharge.walking_time / time)
-    assert "times this course" in text_of(course.answer())
+def test_a_course_is_walked_again_with_the_other_chambers(course: WalkPair) -> None:
+    gas = course.comparison.with_device.metrics["course_gas"].value
     taken = [one.result.metrics["course_gas"].value for one in course.volumes]
     assert taken[0] == gas
     assert taken[2] < 0.8 * taken[1]
@@ -147,13 +86,12 @@ def test_a_bottle_takes_the_folder_of_a_course_and_refuses_to_reuse_its_exhaust(
     answer = course.answer()
     (tmp_path / "walk.json").write_text(json.dumps(answer.data), encoding="utf-8")
     (tmp_path / "recording.nc").write_bytes(answer.files["recording.nc"]())
-    life = endurance(tmp_path)
+    life = endurance(tmp_path, longest=30.0)
     assert isinstance(life, Endurance)
-    assert course.life is not None
-    assert life.discharge.steps == pytest.approx(course.life.discharge.steps)
-    assert [other.draw.mass_per_step for other in life.others.values()] == pytest.approx(
-        [one.result.metrics["course_gas"].value for one in course.volumes[1:]]
-    )
+    time = course.comparison.with_device.metrics["course_time"].value
+    assert life.discharge.walking_time == pytest.approx(30.0, abs=0.2)
+    assert life.discharge.steps == pytest.approx(life.discharge.walking_time / time, rel=1e-2)
+    assert len(life.others) == 2
     with pytest.raises(DataError, match="the strides of course 'stairs' differ"):
         endurance(tmp_path, reuse=["reservoir_volume=50 cm^3"])
 

@@ -1,0 +1,76 @@
+"""What coils, spool, shut-off valve and processor take over a walk, and the battery that feeds them."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ppafo.model.valves.kind import VENTS_ABOVE
+from ppafo.parameters.parts import Part
+from ppafo.signals import Recording
+from ppafo.signals.recording import Floats
+
+USABLE = 0.8
+"""Share of a battery's energy that is taken: cold, ageing and a converter of 90 % take the rest. Assumed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Electrical:
+    """Mean powers [W] by consumer, and the battery: how many cells, their mass [kg], how long they last [s]."""
+
+    powers: dict[str, float]
+    cell: Part
+    cells: int
+
+    @property
+    def power(self) -> float:
+        """Mean power [W] of all consumers."""
+        return sum(self.powers.values())
+
+    @property
+    def mass(self) -> float:
+        """Mass of the battery [kg]."""
+        return self.cells * self.cell.values["mass"]
+
+    @property
+    def lasts(self) -> float:
+        """Time [s] for which the battery lasts."""
+        return USABLE * self.cells * self.cell.values["energy"] / self.power
+
+
+def valve_power(valve: Part, command: Floats) -> Floats:
+    """Return the electrical power [W] of a valve, both of a pair, under a command (samples,) of -1 to 1, or to vent.
+
+    One coil of a pair is energised while its chamber is filled, none while both vent. A spool takes the power of its
+    centre, and what its data sheet states at full stroke in proportion to the stroke beyond.
+    """
+    stroke = np.where(command > VENTS_ABOVE, 0.0, np.abs(command))
+    idle, full = valve.values.get("idle_power", 0.0), valve.values["power"]
+    if valve.kind == "solenoid":
+        return np.where(stroke > 0.0, full, idle)
+    return idle + (full - idle) * stroke
+
+
+def electrical_of(
+    recording: Recording, valve: Part, shut_off_power: float, processor: Part, cell: Part, seconds: float
+) -> Electrical:
+    """Return the electrical side of a walk, with as many cells as a time [s] takes; means over the recorded walk."""
+    time, power = recording.time, valve_power(valve, recording["command"])
+    length = float(time[-1] - time[0])
+    mean = float(np.sum(power[:-1] * np.diff(time)) / length)
+    helps = recording["safe_state"] < 0.5 if "safe_state" in recording else np.ones(time.size)
+    share = float(np.sum(helps[:-1] * np.diff(time)) / length)
+    powers = {"valve": mean, "shut-off valve": shut_off_power * share, "processor": processor.values["power"]}
+    needed = sum(powers.values()) * seconds / (USABLE * cell.values["energy"])
+    return Electrical(powers, cell, max(1, math.ceil(needed)))
+
+
+def electrical_sentences(found: Electrical, seconds: float) -> list[str]:
+    """Return powers, and mass and minutes of the battery, against the time [s] that is wanted."""
+    parts = ", ".join(f"{name} {1000.0 * power:.3g} mW" for name, power in found.powers.items())
+    return [
+        f"electrical power: {found.power:.3g} W ({parts})",
+        f"battery: {found.cells} x {found.cell.title}, {1000.0 * found.mass:.0f} g, "
+        f"{found.lasts / 60.0:.0f} min of {seconds / 60.0:.3g} min; "
+        f"{100.0 * USABLE:.0f} % of its energy is counted",
+    ]

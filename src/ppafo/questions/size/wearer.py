@@ -1,0 +1,423 @@
+"""From a wearer to a device: the lightest parts with which a walk on its bottle has the torque and lasts the minutes.
+
+Every pair of valve and actuator walks a few strides; those with the torque walk on bottles, lightest first, until one
+lasts. That walk, whole, is the suggestion; where none does, walks say what would have to be given up.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ppafo.answers import Answer, Column, Figure, Section, Table
+from ppafo.answers.display_units import quantity_text
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.errors import ScenarioError, StudyError
+from ppafo.model.catalog import VALVES
+from ppafo.model.plant_faults import SHUT_OFF
+from ppafo.parameters.declaration import ACTUATOR, ORIFICE
+from ppafo.parameters.parts import Catalogue, Part, load_catalogue
+from ppafo.progress import Progress, Report
+from ppafo.questions.endurance.answer import Endurance
+from ppafo.questions.endurance.solve import endurance_of_walk
+from ppafo.questions.parts.solve import doubts_data, doubts_sections, titles_section
+from ppafo.questions.question import Solved
+from ppafo.questions.size.electrical import Electrical, electrical_of, electrical_sentences
+from ppafo.version import __version__
+from ppafo.walking.bottle import WALKED, Schedule, lasting_text
+from ppafo.walking.figures.over_time import bottle_figure, peak_torques
+from ppafo.walking.loading import load_walk
+from ppafo.walking.motion import LONGEST_MINUTES, walk_of
+from ppafo.walking.result import WalkResult
+from ppafo.walking.walk import bottle_life, walk
+from ppafo.walking.wearer import SCALED_MASS, SHANK_SHARE, Build, paper_subject, segment_values, who_walks
+
+WALKS = {"solenoid": "solenoid-regulators", "proportional": "proportional-regulators"}
+"""The walk, with its controller, of each kind of valve."""
+STATURES = (1.45, 2.0)
+"""Statures [m] of nearly all adults, in which the fractions of segments were measured."""
+_REQUESTS = (1.0, 1.3, 1.7)
+"""Torque that a torque controller is told, over the torque that is wanted: it lags behind its reference."""
+_FEW = 0.15
+"""Minutes of the walks that are compared at a constant supply."""
+_DORSIFLEXION = 0.9
+"""Gauge pressure of dorsiflexion over that of plantarflexion, of the walks with regulators: 45 of 50 psi."""
+_SHUT_OFF = {item.name: item.default or 0.0 for item in SHUT_OFF} | {"area": 1.0e-5}
+_REGULATORS = ("pipeline-jacpac-regulator", "festo-lrma-qs-4")
+_PROCESSOR, _CELL = "msp430g2553", "ncr18650b"
+_KEPT = 0.9
+"""Torque in the walk on the bottle over the wanted one: that at which a walk on a bottle ends."""
+_MORE_PRESSURE = (1.1, 1.25, 1.5, 1.8, 2.2)
+"""Times the gauge pressure that are tried where no torque suffices."""
+_USED = 0.75
+"""Share of its gas that a bottle gives before it is too cold, about; a walk on it decides."""
+_LIVES = 8
+"""Walks on a bottle that are tried at most before the answer is that there is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What is wanted: body mass [kg], stature [m] or None, torque [N m], supply pressure [Pa absolute], time [s]."""
+
+    mass: float
+    stature: float | None
+    torque: float
+    pressure: float
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tried:
+    """Valve, actuator and overrides of a walk; peak torque of the mean stride [N m], mean flow of gas [kg/s]."""
+
+    valve: Part
+    actuator: Part
+    overrides: tuple[str, ...]
+    torque: float
+    flow: float
+
+    @property
+    def mass(self) -> float:
+        """Mass of both parts [kg]."""
+        return self.valve.full_mass + self.actuator.full_mass
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Device:
+    """A device that was walked with on its bottle for the time that is wanted, how long it lasts, what it takes."""
+
+    tried: Tried
+    bottle: Part
+    walked: WalkResult
+    life: Endurance
+    electrical: Electrical
+    masses: Mapping[str, float]
+
+    @property
+    def torque(self) -> float:
+        """Peak torque of the mean stride on the bottle [N m]."""
+        return float(self.walked.averages["torque"].mean.max())
+
+    @property
+    def command(self) -> str:
+        """The command that walks with it."""
+        sets = " ".join(f"--set '{text}'" for text in self.tried.overrides)
+        minutes = float(self.walked.recording.time[-1]) / 60.0
+        return f"ppafo walk {WALKS[self.tried.valve.kind]} --bottle {self.bottle.name} --minutes {minutes:.4g} {sets}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WearerSizing(Solved):
+    """What was wanted and all that was tried; ``device`` is None where none has it, and ``instead`` what would do."""
+
+    wish: Wish
+    tried: tuple[Tried, ...]
+    device: Device | None
+    instead: tuple[str, ...]
+
+
+def size_for_wearer(wish: Wish, report: Report) -> WearerSizing:
+    """Return the lightest device for a wish, or what to give up; StudyError for a wish that is none."""
+    _check(wish)
+    catalogue = load_catalogue()
+    pairs = [
+        (valve, actuator)
+        for valve in catalogue.groups["valves"].values()
+        for actuator in catalogue.groups["actuators"].values()
+        if all(part.values.get("largest_pressure", np.inf) >= wish.pressure for part in (valve, actuator))
+    ]
+    tried: list[Tried] = []
+    for place, (valve, actuator) in enumerate(pairs):
+        report(Progress(f"walking with {valve.name}", place, len(pairs), noun="pairs"))
+        tried += _few_strides(wish, valve, actuator)
+    bottles = sorted(catalogue.groups["bottles"].values(), key=lambda bottle: bottle.full_mass)
+    strong = [one for one in tried if one.torque >= wish.torque]
+    for one, bottle in _lightest_first(strong, bottles, wish.seconds):
+        report(Progress(f"walking on {bottle.name}", 0, 0, noun="bottles"))
+        if not _lasts(one, bottle, wish.seconds):
+            continue
+        walked = walk(_on(one, bottle), wish.seconds / 60.0)
+        if walked.averages["torque"].mean.max() < _KEPT * wish.torque:
+            continue
+        life = endurance_of_walk(walked)
+        assert life is not None, "a walk on a bottle that has a torque took gas"
+        return WearerSizing(wish, tuple(tried), _device(wish, catalogue, one, bottle, walked, life), ())
+    return WearerSizing(wish, tuple(tried), None, tuple(_instead(wish, tried, strong, bottles)))
+
+
+def _check(wish: Wish) -> None:
+    low, high = STATURES
+    if not wish.pressure > STANDARD_ATMOSPHERE:
+        raise StudyError("--pressure: must be above the atmosphere, for example '50 psi_g'")
+    if not 0.0 < wish.torque < 100.0:
+        raise StudyError(f"--torque: {wish.torque:g} N m: must be above 0 and below 100 N m")
+    if not 6.0 <= wish.seconds <= 60.0 * LONGEST_MINUTES:
+        raise StudyError(
+            f"--minutes: {wish.seconds / 60.0:g} min: a walk on a bottle is followed for 0.1 to {LONGEST_MINUTES:g} min"
+        )
+    if wish.stature is not None and not low <= wish.stature <= high:
+        raise StudyError(
+            f"--stature: {wish.stature:g} m: segments are known of adults of {low:g} to {high:g} m; take a gait and "
+            "a wearer of your own in a walk file"
+        )
+
+
+def _wearer(wish: Wish) -> list[str]:
+    """Return the overrides of the person, whose segments are fractions of mass and stature as the paper's are."""
+    paper = paper_subject()
+    length = 1.0 if wish.stature is None else SHANK_SHARE * wish.stature / paper.shank_length
+    build = Build(np.array([wish.mass / paper.body_mass]), np.array([length]))
+    units = {"body_mass": "kg", "shank_mass": "kg", "foot_mass": "kg", "shank_inertia": "kg m^2"}
+    units["foot_inertia"] = "kg m^2"
+    return [
+        f"wearer.{name}={float(values[0]):.6g} {units.get(name, 'm')}"
+        for name, values in segment_values(paper, build).items()
+    ]
+
+
+def _few_strides(wish: Wish, valve: Part, actuator: Part) -> list[Tried]:
+    """Return a few strides with a pair of parts; with a torque controller the lowest request that gives the torque."""
+    gauge = wish.pressure - STANDARD_ATMOSPHERE
+    units = {item.name: item.unit for item in (*ORIFICE, *VALVES[valve.kind].quantities, *ACTUATOR)}
+    numbers = {**valve.model_numbers, **{f"actuator.{name}": actuator.values[name] for name in _OF_ACTUATOR}}
+    overrides = [
+        *_wearer(wish),
+        f"supply.pressure={wish.pressure:.7g} Pa_a",
+        f"supply.dorsiflexion_pressure={STANDARD_ATMOSPHERE + _DORSIFLEXION * gauge:.7g} Pa_a",
+        *(f"{path}={number:.6g} {units[path.partition('.')[2]]}".strip() for path, number in numbers.items()),
+        f"shut_off.area={_SHUT_OFF['area']:g} m^2",
+    ]
+    held = actuator.values["torque_constant"] * gauge
+    requests = [min(factor * wish.torque, held) for factor in _REQUESTS] if valve.kind == "proportional" else [None]
+    best = None
+    for request in dict.fromkeys(requests):
+        chosen = tuple(overrides if request is None else [*overrides, f"controller.peak_torque={request:.4g} N m"])
+        result = walk(load_walk(WALKS[valve.kind], chosen), _FEW)
+        if not result.status.is_completed or not result.is_helped or not result.averages:
+            continue
+        stride = walk_of(result.scenario).gait.stride_time
+        flow, torque = result.metrics["gas"].value / stride, float(result.averages["torque"].mean.max())
+        best = Tried(valve, actuator, chosen, torque, flow) if best is None or torque > best.torque else best
+        if torque >= wish.torque:
+            break
+    return [] if best is None else [best]
+
+
+_OF_ACTUATOR = ("torque_constant", "volume_per_angle")
+
+
+def _lightest_first(tried: list[Tried], bottles: list[Part], seconds: float) -> Iterator[tuple[Tried, Part]]:
+    """Yield pairs of design and bottle by mass, those whose gas alone would do."""
+    pairs = [(one, bottle) for one in tried for bottle in bottles if bottle.values["content"] >= one.flow * seconds]
+    yield from sorted(pairs, key=lambda pair: pair[0].mass + pair[1].full_mass)[:_LIVES]
+
+
+def _on(one: Tried, bottle: Part) -> Any:
+    return load_walk(WALKS[one.valve.kind], one.overrides, bottle=bottle.name)
+
+
+def _lasts(one: Tried, bottle: Part, seconds: float) -> bool:
+    """True where a bottle lasts for a time [s]; one that cannot feed the device at all does not."""
+    return _life(one, bottle, seconds) >= seconds
+
+
+def _life(one: Tried, bottle: Part, longest: float) -> float:
+    """Return how long a bottle lasts [s], at most ``longest``; 0 where it cannot feed the device at all."""
+    try:
+        life = bottle_life(_on(one, bottle), Schedule(longest, 0.0, longest))
+    except ScenarioError:
+        return 0.0
+    return longest if life.course.ending.kind == WALKED else life.walked
+
+
+def _device(wish: Wish, catalogue: Catalogue, one: Tried, bottle: Part, walked: WalkResult, life: Endurance) -> Device:
+    processor, cell = catalogue.part("processors", _PROCESSOR), catalogue.part("batteries", _CELL)
+    electrical = electrical_of(walked.recording, one.valve, _SHUT_OFF["power"], processor, cell, wish.seconds)
+    regulators = [catalogue.part("regulators", name) for name in _REGULATORS]
+    masses = {
+        f"actuator {one.actuator.name}": one.actuator.full_mass,
+        f"valve {one.valve.name}": one.valve.full_mass,
+        f"bottle {bottle.name}, full": bottle.full_mass,
+        **{f"regulator {part.name}": part.full_mass for part in regulators},
+        "shut-off valve": _SHUT_OFF["mass"],
+        f"processor {processor.name}": processor.full_mass,
+        f"battery, {electrical.cells} x {cell.name}": electrical.mass,
+    }
+    return Device(one, bottle, walked, life, electrical, masses)
+
+
+def _instead(wish: Wish, tried: list[Tried], strong: list[Tried], bottles: list[Part]) -> Iterator[str]:
+    """Yield what would do instead, each from a walk: less torque, more pressure, fewer minutes."""
+    largest = max(bottles, key=lambda bottle: bottle.values["content"])
+    if not tried:
+        yield "no pair of valve and actuator may have this pressure, or none helps: take another pressure"
+        return
+    if strong:
+        thrifty = min(strong, key=lambda one: one.flow)
+        lasts = _life(thrifty, largest, wish.seconds)
+        yield (
+            f"fewer minutes: {lasts / 60.0:.3g} min with {_named(thrifty)} on {largest.name}, the largest bottle, at "
+            f"{quantity_text(thrifty.torque, 'torque')}"
+        )
+    else:
+        best = max(tried, key=lambda one: one.torque)
+        yield f"less torque: {quantity_text(best.torque, 'torque')} at this pressure with {_named(best)}"
+        found = next(_more_pressure(wish, tried), None)
+        if found is not None:
+            yield found
+    weaker = sorted((one for one in tried if one.torque < wish.torque), key=lambda one: -one.torque)
+    usable = _USED * largest.values["content"]
+    for one in [one for one in weaker if usable >= one.flow * wish.seconds][:3]:
+        if _lasts(one, largest, wish.seconds):
+            yield (
+                f"less torque: {quantity_text(one.torque, 'torque')} for {wish.seconds / 60.0:.3g} min with "
+                f"{_named(one)} on {largest.name}"
+            )
+            break
+
+
+def _more_pressure(wish: Wish, tried: list[Tried]) -> Iterator[str]:
+    """Yield at which higher pressures the strongest pair of a kind of valve has the torque, the lowest first."""
+    strongest = [
+        max((one for one in tried if one.valve.kind == kind), key=lambda one: one.torque)
+        for kind in dict.fromkeys(one.valve.kind for one in tried)
+    ]
+    for more in _MORE_PRESSURE:
+        higher = replace(wish, pressure=STANDARD_ATMOSPHERE + more * (wish.pressure - STANDARD_ATMOSPHERE))
+        for one in strongest:
+            if min(part.values.get("largest_pressure", np.inf) for part in (one.valve, one.actuator)) < higher.pressure:
+                continue
+            for again in _few_strides(higher, one.valve, one.actuator):
+                if again.torque >= wish.torque:
+                    yield f"more pressure: {quantity_text(higher.pressure, 'pressure')} with {_named(one)}"
+
+
+def _named(one: Tried) -> str:
+    return f"{one.valve.name} and {one.actuator.name}"
+
+
+_HEAD = (
+    Column("valve"),
+    Column("actuator"),
+    Column("peak torque", "torque", ".3g"),
+    Column("gas", "mass flow", ".3g"),
+    Column("mass of both", "part mass"),
+)
+_CAPTION = "The walk of the suggestion on its bottle, for as long as was wanted, or until the bottle ended it."
+_READING = (
+    "Every pair of valve and actuator of the catalogue walks a few strides at the pressure. Those whose mean stride "
+    "reaches the torque walk on bottles, lightest first, until one lasts; that walk is shown. Dead volumes, friction "
+    "and sensors are those of the walk; dorsiflexion has nine tenths of the gauge pressure.",
+    "Power of the valve is what its coils, or its spool in proportion to the stroke, take over the walk; drivers lose "
+    "nothing. A shut-off valve is open as long as the device helps. Shell, straps and lines are not in the mass.",
+)
+
+
+def answer_of(sizing: WearerSizing) -> Answer:
+    """Return the answer: the device with its walk, or what to give up; it has not passed without a device."""
+    wish, device = sizing.wish, sizing.device
+    rows = tuple(
+        (one.valve.name, one.actuator.name, one.torque, one.flow, one.mass)
+        for one in sorted(sizing.tried, key=lambda one: -one.torque)
+    )
+    tried = Section("What was walked with", table=Table(_HEAD, rows, left=2), is_detail=device is not None)
+    stature = "" if wish.stature is None else f" and {wish.stature:.4g} m"
+    lead = (
+        f"a wearer of {wish.mass:.4g} kg{stature}; {quantity_text(wish.torque, 'torque')} at "
+        f"{quantity_text(wish.pressure, 'pressure')} for {wish.seconds / 60.0:.4g} min"
+    )
+    parts = [] if device is None else [device.tried.valve, device.tried.actuator, device.bottle, device.electrical.cell]
+    doubtful = [(part, name) for part in parts for name in part.doubtful]
+    sections = (
+        (Section(remarks=("no device of the catalogue has this; give up one of:", *sizing.instead)), tried)
+        if device is None
+        else (*_sections(wish, device), tried, *doubts_sections(doubtful), titles_section(parts))
+    )
+    return Answer(
+        name="size",
+        kicker="From a wearer to a device",
+        title="The device",
+        lead=(lead,),
+        sections=(*sections, Section("How to read it", _READING, is_detail=True)),
+        data=_data(sizing, doubtful),
+        passed=device is not None,
+    )
+
+
+def _sections(wish: Wish, device: Device) -> tuple[Section, ...]:
+    walked, supply = device.walked, device.walked.supply
+    assert supply is not None, "it walked on a bottle"
+    peaks = peak_torques(walked)
+    others = [other.discharge.walking_time for other in device.life.others.values()]
+    low, high = (share * walk_of(walked.scenario).gait.body_mass for share in SCALED_MASS)
+    facts = (
+        ("controller", f"{walked.scenario.control.kind}, walk '{WALKS[device.tried.valve.kind]}'"),
+        ("lasts", f"{lasting_text(device.life.discharge.walking_time, others)}, of {wish.seconds / 60.0:.4g} min"),
+        ("then", device.life.discharge.ending.message),
+        ("peak torque", f"{quantity_text(device.torque, 'torque')} in the mean stride, "
+         f"{quantity_text(float(peaks[-1]), 'torque')} in the last"),
+        ("gas", f"{quantity_text(walked.metrics['gas'].value, 'gas mass')} a stride"),
+        ("mass", quantity_text(sum(device.masses.values()), "part mass", ".0f")),
+    )  # fmt: skip
+    remarks = [
+        *electrical_sentences(device.electrical, wish.seconds),
+        who_walks(walk_of(walked.scenario).wearer, walk_of(walked.scenario).gait, "as requested"),
+        f"again: {device.command}",
+    ]
+    if not low <= wish.mass <= high:
+        remarks.append(f"the gait is known of {low:.0f} to {high:.0f} kg: beyond, torque and gas are a guess")
+    figure = Figure("bottle", _CAPTION, lambda: bottle_figure(walked))
+    masses = tuple((name, quantity_text(mass, "part mass", ".0f")) for name, mass in device.masses.items())
+    return (
+        Section("The walk on its bottle", table=Table((), facts), remarks=tuple(remarks)),
+        Section("What it weighs", table=Table((), masses)),
+        Section("The bottle over the walk", figure=figure, is_detail=True),
+    )
+
+
+def _data(sizing: WearerSizing, doubtful: list[tuple[Part, str]]) -> dict[str, Any]:
+    wish, device = sizing.wish, sizing.device
+    return {
+        "format": "ppafo wearer sizing",
+        "schema_version": 1,
+        "kind": "simulated",
+        "ppafo": __version__,
+        "wish": {
+            "body_mass": wish.mass,
+            "stature": wish.stature,
+            "torque": wish.torque,
+            "pressure": wish.pressure,
+            "time": wish.seconds,
+        },
+        "device": None
+        if device is None
+        else {
+            "valve": device.tried.valve.name,
+            "actuator": device.tried.actuator.name,
+            "bottle": device.bottle.name,
+            "controller": device.walked.scenario.control.kind,
+            "walk": WALKS[device.tried.valve.kind],
+            "overrides": list(device.tried.overrides),
+            "lasts": device.life.discharge.walking_time,
+            "lasts_with_other_chambers": {
+                name: other.discharge.walking_time for name, other in device.life.others.items()
+            },
+            "torque": device.torque,
+            "masses": dict(device.masses),
+            "electrical_power": dict(device.electrical.powers),
+            "battery": {
+                "cell": device.electrical.cell.name,
+                "cells": device.electrical.cells,
+                "mass": device.electrical.mass,
+                "lasts": device.electrical.lasts,
+            },
+            "command": device.command,
+        },
+        "instead": list(sizing.instead),
+        "tried": [
+            {"valve": one.valve.name, "actuator": one.actuator.name, "torque": one.torque, "flow": one.flow}
+            for one in sizing.tried
+        ],
+        "check_before_buying": doubts_data(doubtful),
+    }

@@ -1,0 +1,131 @@
+"""From a wearer to a device: the parts that are chosen walk as they are printed, or the answer says what to give up."""
+
+import shlex
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ppafo
+from ppafo.answers.writing import text_of
+from ppafo.cli.main import main
+from ppafo.errors import StudyError
+from ppafo.parameters.parts import load_catalogue
+from ppafo.parameters.parts.catalogue import Catalogue
+from ppafo.questions.size import wearer
+from ppafo.questions.size.electrical import electrical_of, valve_power
+from ppafo.questions.size.wearer import WearerSizing
+from ppafo.signals import Channel, Recording
+
+PSI = 6894.757
+
+
+@cache
+def few() -> Catalogue:
+    """Two valves and the paper's actuator, with a small and a large bottle, so that the search is short."""
+    whole = load_catalogue()
+    kept = {
+        "valves": ("festo-vovg-5v-pair", "festo-mpye-5-m5-010-b"),
+        "actuators": ("smc-crb2bw40-90d",),
+        "bottles": ("co2-3_5oz", "pipeline-jacpac-9oz"),
+    }
+    groups = {
+        group: {name: part for name, part in parts.items() if group not in kept or name in kept[group]}
+        for group, parts in whole.groups.items()
+    }
+    return Catalogue(whole.file, whole.name, whole.title, whole.notes, groups)
+
+
+@pytest.fixture
+def little(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(wearer, "load_catalogue", few)
+
+
+def sized(torque: float, minutes: float, stature: float | None = 1.75) -> WearerSizing:
+    pressure = 101325.0 + 50.0 * PSI
+    found = ppafo.size(mass=72.5, stature=stature, torque=torque, pressure=pressure, minutes=minutes)
+    assert isinstance(found, WearerSizing)
+    return found
+
+
+@pytest.mark.usefixtures("little")
+def test_what_is_suggested_is_the_walk_that_is_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = sized(2.5, 1.0)
+    device = found.device
+    assert device is not None
+    assert device.torque >= 0.9 * 2.5
+    assert device.life.discharge.walking_time >= 60.0
+    assert device.bottle.name == "co2-3_5oz", "the lightest bottle that lasts"
+    said = text_of(found.answer())
+    assert f"again: {device.command}" in said
+    # The printed command walks the same walk, with the same torque.
+    words = shlex.split(device.command)[1:]
+    assert main([*words, "--out", str(tmp_path / "again")]) == 0
+    peak = f"{device.torque:.2f}"
+    assert peak in capsys.readouterr().out
+    life = ppafo.endurance_of_walk(device.walked)
+    assert life is not None
+    assert life.discharge.walking_time == device.life.discharge.walking_time
+
+
+@pytest.mark.usefixtures("little")
+def test_where_nothing_does_it_the_answer_says_what_to_give_up() -> None:
+    too_strong, too_long = sized(5.0, 1.0), sized(2.5, 30.0)
+    for found in (too_strong, too_long):
+        assert found.device is None
+        assert not found.answer().passed
+    said = text_of(too_strong.answer())
+    assert "less torque: " in said
+    assert "more pressure: " in said
+    assert "fewer minutes: " in text_of(too_long.answer())
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "or say what is wanted by --mass, --stature, --torque, --pressure, --minutes"),
+        (["--mass", "70 kg"], "for a wearer give --torque, --pressure, --minutes too, for example --mass"),
+        (["push-off", "--torque", "3 N m"], "--torque: a sizing file says itself what is wanted"),
+        (["--mass", "70", "--torque", "3 N m"], "70"),
+    ],
+)
+def test_what_is_missing_is_said_with_what_to_write(
+    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["size", *words]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+
+
+@pytest.mark.parametrize("change", [{"pressure": 9.0e4}, {"torque": 0.0}, {"minutes": 90.0}, {"stature": 0.9}])
+def test_what_no_walk_can_be_asked_is_refused(change: dict[str, float]) -> None:
+    wanted = {"mass": 70.0, "stature": 1.7, "torque": 2.0, "pressure": 4.5e5, "minutes": 5.0}
+    with pytest.raises(StudyError, match=f"--{next(iter(change))}"):
+        ppafo.size(**{**wanted, **change})
+
+
+def test_coils_and_spool_take_the_power_of_their_command() -> None:
+    catalogue = load_catalogue()
+    pair, spool = (catalogue.part("valves", name) for name in ("festo-vovg-5v-pair", "festo-mpye-5-m5-010-b"))
+    command = np.array([0.0, 1.0, -1.0, 2.0, 0.5])
+    assert valve_power(pair, command).tolist() == [0.0, 1.0, 1.0, 0.0, 1.0]
+    assert valve_power(spool, command).tolist() == [2.0, 20.0, 20.0, 2.0, 11.0]
+
+
+def test_a_battery_has_as_many_cells_as_the_minutes_take() -> None:
+    catalogue = load_catalogue()
+    time = np.linspace(0.0, 10.0, 101)
+    half = np.where(time < 5.0, 1.0, 0.0)
+    channels = {"command": Channel(half, "-"), "safe_state": Channel(np.zeros(101), "-")}
+    recording = Recording("walk", time, channels)
+    parts = [catalogue.part("valves", "festo-vovg-5v-pair"), catalogue.part("processors", "msp430g2553")]
+    cell = catalogue.part("batteries", "ncr18650b")
+    found = electrical_of(recording, parts[0], 0.5, parts[1], cell, 600.0)
+    assert found.powers == pytest.approx({"valve": 0.5, "shut-off valve": 0.5, "processor": 0.03})
+    assert found.cells == 1
+    assert found.lasts == pytest.approx(0.8 * 43.4e3 / 1.03)
+    long = electrical_of(recording, parts[0], 0.5, parts[1], cell, 100.0 * 3600.0)
+    assert long.cells == 11
+    assert long.mass == pytest.approx(11 * 0.0485)
+    assert long.lasts >= 100.0 * 3600.0 > long.lasts * 10.0 / 11.0
