@@ -13,10 +13,11 @@ import numpy as np
 
 from ppafo.live.workbench import openings_of
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
-from ppafo.questions.endurance.draw import Schedule, draw_of_numbers
+from ppafo.questions.endurance.draw import draw_of_numbers
 from ppafo.questions.endurance.solve import follow_bottle
 from ppafo.simulation.loading import list_scenarios
 from ppafo.walking import list_walks
+from ppafo.walking.bottle import Schedule
 
 FLOWS = np.geomspace(2e-6, 5e-3, 24)
 """Mean flows [kg/s] of the table."""

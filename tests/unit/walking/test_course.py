@@ -215,7 +215,6 @@ def test_a_walk_longer_than_its_course_has_the_gas_and_the_time_of_the_course(co
     assert longer["course_gas"].value == corridor.recording["supplied_mass"][corridor.recording.time <= 40.0][-1]
     gas = walk_gas(replace(corridor, metrics={**corridor.metrics, **longer}))
     assert (gas.stride_time, gas.gas_per_stride) == (40.0, longer["course_gas"].value)
-    assert gas.is_whole
 
 
 def test_the_table_of_a_course_counts_helped_strides_as_it_counts_strides(corridor: WalkResult) -> None:
