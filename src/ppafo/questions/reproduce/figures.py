@@ -152,7 +152,7 @@ def _mark(every: "Sequence[Axes]", named: "Axes", events: StepEvents) -> None:
             axes.axvline(_MILLISECONDS * time, color=GREY, linewidth=0.8, linestyle=(0, (4, 3)), alpha=0.7, zorder=0.5)
     for time, name, height in (
         (events.breakaway_time, "vane breaks away", 0.93),
-        (events.stop_time, "vane stops", 0.07),
+        (events.stop_time, "vane at rest", 0.07),
     ):
         named.annotate(
             name,

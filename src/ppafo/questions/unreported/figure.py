@@ -19,6 +19,7 @@ from ppafo.questions.unreported.settings import (
     ON_OFF_RATE,
     PID_RATE,
     PROPORTIONAL,
+    QUIET,
     SETTINGS,
     SOLENOID,
     START,
@@ -30,6 +31,7 @@ from ppafo.questions.unreported.settings import (
     Floats,
     Metrics,
     Setting,
+    agreement_with,
     demand_over_ceiling,
     effective,
     improvement,
@@ -50,6 +52,10 @@ _SHOWN_DOTS = 4000
 _TICKS, _NEAR_TICKS = (0.3, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0), (15.0, 20.0, 30.0, 50.0)
 _PRINTED_REGION = (12.0, 18.0)
 """Improvement in percent that counts as the printed 15."""
+_REGION_GRID, _NEAR = 60, 0.07
+"""Points of the region either way, and how far around each completions count, as a fraction of the range."""
+_FRACTIONS, _SHADES = (0.05, 0.1, 0.2), ("#e3f0f8", "#c3dff0", "#9fcbe6")
+"""Fractions of completions from which on the region takes each shade."""
 
 
 class Weighed(Protocol):
@@ -89,7 +95,8 @@ def draw_settings(
         figure = matplotlib.figure.Figure(figsize=_SIZE)
         rows = -(-(len(SETTINGS) + 2) // _COLUMNS)
         figure.subplots_adjust(left=0.045, right=0.98, top=0.91, bottom=0.06, hspace=0.7, wspace=0.26)
-        panels = figure.subplots(rows, _COLUMNS).ravel().tolist()
+        grid = figure.add_gridspec(rows, _COLUMNS)
+        panels = [figure.add_subplot(grid[divmod(place, _COLUMNS)]) for place in range(len(SETTINGS))]
         shipped = shipped_values()
         for axes, setting, verdict in zip(panels, SETTINGS, verdicts, strict=False):
             axes.set_title(f"{setting.name}{f' ({_unit(setting.unit)})' if setting.unit else ''}", fontsize=9.5)
@@ -99,10 +106,8 @@ def draw_settings(
                 _draw_choices(axes, setting, fractions[setting.name], shipped[setting.name])
             else:
                 _draw_number(axes, setting, family, shipped[setting.name])
-        _draw_results(panels[len(SETTINGS)], family)
-        _draw_region(panels[len(SETTINGS) + 1], family, shipped)
-        for axes in panels[len(SETTINGS) + 2 :]:
-            axes.set_axis_off()
+        _draw_results(figure.add_subplot(grid[-1, : _COLUMNS // 2]), family)
+        _draw_region(figure.add_subplot(grid[-1, _COLUMNS // 2 :]), family, shipped)
         figure.text(
             0.012,
             0.987,
@@ -221,19 +226,42 @@ def _draw_results(axes: "Axes", family: Weighed) -> None:
 
 
 def _draw_region(axes: "Axes", family: Weighed, shipped: Mapping[str, float]) -> None:
-    """Draw where the improvement is about the printed one, under the printed readings, and what the supply holds."""
+    """Draw where the improvement is about the printed one, under the printed readings, and what the supply holds.
+
+    Completions in which the proportional valve oscillates on the ramp are left out, as in the answer's last remark.
+    """
     low, high = _PRINTED_REGION
-    shown = np.arange(family.draws[LEVEL].size) < family.even
+    quiet = agreement_with(QUIET, family.metrics) > 0.0
+    shown = quiet & (np.arange(family.draws[LEVEL].size) < family.even)
     for name in (VOLTS, DISCHARGE, ON_OFF_RATE):
         shown &= np.isclose(family.draws[name], shipped[name])
     better, pressure, level = (
         values[shown] for values in (improvement(family.metrics), family.draws[SUPPLY], family.draws[LEVEL])
     )
     printed = (better >= low) & (better <= high)
+    if printed.any():
+        # The fraction of completions near each point whose improvement is about the printed one.
+        ranges = [
+            (setting.low, setting.high) for name in (SUPPLY, LEVEL) for setting in SETTINGS if setting.name == name
+        ]
+        across, up = (np.linspace(*ends, _REGION_GRID) for ends in ranges)
+        apart = [
+            (grid[:, None] - values) / (_NEAR * (end - start))
+            for grid, values, (start, end) in zip((across, up), (pressure, level), ranges, strict=True)
+        ]
+        bells = np.exp(-0.5 * (apart[0][None, :] ** 2 + apart[1][:, None] ** 2))
+        fractions = bells @ printed / bells.sum(axis=2)
+        axes.contourf(across, up, fractions, _FRACTIONS, colors=_SHADES, extend="max")
     axes.plot(pressure[~printed], level[~printed], ".", markersize=1.6, color=GREY, alpha=0.6)
     axes.plot(pressure[printed], level[printed], "o", markersize=3.6, color=BLUE, markeredgewidth=0.0)
     ends = np.array([45.0, 60.0])
     axes.plot(ends, 1.0 / demand_over_ceiling({LEVEL: np.ones(2), SUPPLY: ends}), "--", color=BLACK, linewidth=1.2)
     axes.plot([shipped[SUPPLY]], [shipped[LEVEL]], "^", color=BLACK, markersize=6)
-    axes.set_title("level (N m) over supply (psig)", fontsize=9.5)
-    axes.set_xlabel(f"blue: {low:g} to {high:g} % better;\ndashed: what the supply holds", fontsize=8.0, color=GREY)
+    axes.set_title("reference level (N m) over source pressure (psig)", fontsize=9.5)
+    shades = ", ".join(f"{100 * fraction:.0f}" for fraction in _FRACTIONS)
+    axes.set_xlabel(
+        f"blue dots: {low:g} to {high:g} % better; shaded: more than {shades} % of the completions\n"
+        "dashed: what the supply holds; triangle: the scenario of the package",
+        fontsize=8.0,
+        color=GREY,
+    )
