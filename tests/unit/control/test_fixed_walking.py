@@ -19,15 +19,17 @@ from ppafo.control.fixed.walking_law import (
 from ppafo.control.fixed.walking_law import PhaseNumbers as Numbers
 from ppafo.control.fixed.walking_law import SwitchCounts as Switch
 from ppafo.control.fixed.walking_numbers import EVENT_ON_OFF
-from ppafo.control.walking import phases, signs
+from ppafo.control.walking import observer, phases, signs
 from ppafo.control.walking.event_on_off import EVENT_ON_OFF as FLOAT_KIND
 from ppafo.engine.rows import leaf_paths, rebuilt
-from ppafo.exports.firmware.walking import DrawnGait, Manner
+from ppafo.exports.firmware.walking import DrawnGait, Gas, Manner, nominal_device
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENTS_ABOVE
+from ppafo.walking.loading import load_walk
 
 PERIOD = 1.0e-3
-SET = {item.name: float(item.default or 0.0) for item in FLOAT_KIND.quantities}
+WALK = load_walk("solenoid")
+SET = {item.name: float(WALK.control.settings[item.name]) for item in FLOAT_KIND.quantities}
 GIVEN = {item.name: float(item.default or 0.0) for item in SETTINGS}
 # Both ends of this range of pressures are no readings with floats either.
 CONVERTER = gait_converter(*(GIVEN | {"converter_range": 2.2e6}).values())
@@ -37,13 +39,21 @@ RULES = Numbers(
 )  # 60 N, 30 N, 10 ms, 1.1 s, 0.3 and 0.4 at 1 kHz
 
 
+def gas() -> Gas:
+    return Gas(nominal_device(WALK), PERIOD)
+
+
 def own_names(row: type) -> list[str]:
     return [path.rpartition(".")[2] for path in leaf_paths(row, "")]
 
 
 def test_every_number_is_declared_in_the_order_of_its_rows() -> None:
-    assert own_names(EVENT_ON_OFF.kind.parameters) == [item.name for item in EVENT_ON_OFF.kind.quantities]
-    assert own_names(EVENT_ON_OFF.numbers) == [item.name for item in EVENT_ON_OFF.number_quantities] == list(NUMBERS)
+    paths = [path.replace(".", "_") for path in leaf_paths(EVENT_ON_OFF.kind.parameters, "")]
+    names = [item.name for item in EVENT_ON_OFF.kind.quantities]
+    assert len(set(names)) == len(paths)
+    assert all(path.endswith(f"_{name}") for path, name in zip(paths, names, strict=True))
+    assert len(leaf_paths(EVENT_ON_OFF.numbers, "")) == len(NUMBERS)
+    assert [item.name for item in EVENT_ON_OFF.number_quantities] == list(NUMBERS)
     assert set(own_names(type(EVENT_ON_OFF.begins))) == set(EVENT_ON_OFF.state_ranges)
 
 
@@ -54,10 +64,10 @@ def test_what_defaults_come_to_is_whole_and_within_what_is_declared() -> None:
 
 
 def test_times_that_must_be_passed_and_times_that_must_be_reached_keep_their_sample() -> None:
-    settings = SET | {"fill_time": 0.0504, "debounce": 0.0101}
+    settings = SET | {"vent_time": 0.2504, "debounce": 0.0101, "nominal_switching_interval": 0.0501}
     found = EVENT_ON_OFF.prepare(settings, PERIOD, CONVERTER)
-    assert (NUMBERS["fill"], NUMBERS["debounce"], NUMBERS["lasts"]) == (50.0, 10.0, 2.0)
-    assert (found["fill"], found["debounce"]) == (50.0, 11.0)
+    assert (NUMBERS["vent"], NUMBERS["debounce"], NUMBERS["interval"], NUMBERS["alarm"]) == (250.0, 10.0, 50.0, 5.0)
+    assert (found["vent"], found["debounce"], found["interval"]) == (250.0, 11.0, 51.0)
 
 
 def test_readings_are_counts_of_fourteen_bits_and_stay_in_their_range() -> None:
@@ -129,8 +139,8 @@ def steps(readings: tuple[int, ...]) -> GaitMeasurement:
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])
 def test_floats_and_whole_numbers_help_pause_and_stop_alike_on_drawn_gaits(seed: int) -> None:
-    drawn, command, both = DrawnGait(CONVERTER, seed), 0, Both()
-    levels, other_commands, other_signs, samples, differed = set(), 0, 0, 15_000, False
+    drawn, command, both = DrawnGait(CONVERTER, gas(), seed), 0, Both()
+    levels, other_commands, other_signs, samples, differed = set(), 0, 0, 15_000, 0
     for _ in range(samples):
         readings, begins = drawn.next(command)
         both = Both() if begins else both
@@ -140,20 +150,21 @@ def test_floats_and_whole_numbers_help_pause_and_stop_alike_on_drawn_gaits(seed:
         other_commands += wanted != found
         wanted_safety, found_safety = both.float_state.safety, both.fixed_state.safety
         differs = (wanted_safety.level, wanted_safety.finding.sign) != (found_safety.level, found_safety.finding.sign)
-        # Floats add up times, and so pass a limit a sample earlier or later.
-        assert not (differs and differed)
-        other_signs, differed = other_signs + differs, differs
+        # Floats add up times, and so pass a limit a sample earlier or later; a residual that grows slowly, some more.
+        differed = differed + 1 if differs else 0
+        assert differed <= 20
+        other_signs += differs
     assert {0.0, 3.0} <= levels
     assert other_commands < 0.0005 * samples
-    assert other_signs < 0.0002 * samples
+    assert other_signs < 0.001 * samples
 
 
 @pytest.mark.parametrize(
     ("odd", "sensor", "fault", "wanted"),
     [
         ("turns down", 0, "none", {signs.LATE_FORCES}),
-        ("", 3, "half", {signs.PRESSURE_RANGE}),
-        ("", 4, "half", {signs.PRESSURE_RANGE}),
+        ("", 3, "half", {observer.LEAK}),
+        ("", 4, "half", {observer.SUPPLY_LOW}),
         ("", 0, "frozen", {signs.STILL_HEEL, signs.FROZEN_HEEL}),
         ("", 1, "frozen", {signs.STILL_TOE, signs.FROZEN_TOE}),
         ("", 2, "frozen", {signs.STILL_ANGLE, signs.FROZEN_ANGLE}),
@@ -162,7 +173,7 @@ def test_floats_and_whole_numbers_help_pause_and_stop_alike_on_drawn_gaits(seed:
 def test_a_fault_is_found_by_the_same_signs_within_two_samples(
     odd: str, sensor: int, fault: str, wanted: set[float]
 ) -> None:
-    drawn, command, both = DrawnGait(CONVERTER, 1), 0, Both()
+    drawn, command, both = DrawnGait(CONVERTER, gas(), 1), 0, Both()
     manner = Manner(stride=800, spread=0.0, odd_share=1.0, odd=odd, sensor=sensor, fault=fault, begins=1700, value=0)
     drawn.begin(manner, 3000)
     floats: dict[float, int] = {}

@@ -1,7 +1,8 @@
 """The samples of a long comparison reach every condition of the walking law in C, but for three that cannot be.
 
-Those limit the moving average of the stride time to its range, for the proof of the widths, which knows no relation
-between two numbers: the average lies between both strides, so that neither limit is ever met.
+The observer of the chambers is left out: it has conditions of valves, delays and lags that one walk does not have.
+Those three limit the moving average of the stride time to its range, for the proof of the widths, which knows no
+relation between two numbers: the average lies between both strides, so that neither limit is ever met.
 """
 
 from pathlib import Path
@@ -13,11 +14,13 @@ from hypothesis import strategies as st
 from ppafo.control.fixed.walking_law import HALVES, LONGEST, LONGEST_STRIDE, TOP, next_stride
 from ppafo.control.fixed.whole_numbers import FRACTION_BITS, HALF, LARGEST_FRACTION, nearest_fraction_of
 from ppafo.exports.firmware.lock_step import PythonChip
-from ppafo.exports.firmware.walking import SAMPLES, gait_readings, walk_chip, walk_firmware
+from ppafo.exports.firmware.walking import SAMPLES, Gas, gait_readings, nominal_device, walk_chip, walk_firmware
 from ppafo.walking.loading import load_walk
 from tests.unit.control.test_fixed_walking import RULES
 from tests.unit.exports.test_firmware_conditions import TOOLS, reached
 
+OF_OBSERVER = ("chamber_observer", "valve_sign", "holds_pressure")
+"""Functions whose conditions depend on the device that is believed in."""
 WALK = ("solenoid", ("controller.arithmetic=fixed",))
 
 
@@ -27,7 +30,8 @@ def test_samples_reach_every_condition_that_can_be_both_ways_and_each_decides_al
     for name, content in walk_firmware(configuration).items():
         (tmp_path / name).write_bytes(content)
     chip = walk_chip(configuration)
-    given, python, lines = gait_readings(chip.converter, SAMPLES, 1), PythonChip(chip), []
+    gas = Gas(nominal_device(configuration), configuration.control.period)
+    given, python, lines = gait_readings(chip.converter, gas, SAMPLES, 1), PythonChip(chip), []
     readings, begins = next(given)
     for _ in range(SAMPLES):
         if begins:
@@ -40,7 +44,8 @@ def test_samples_reach_every_condition_that_can_be_both_ways_and_each_decides_al
     assert found.decisions > 50
     code = (tmp_path / "controller.c").read_text(encoding="utf-8").splitlines()
     never = ("next_stride: 0 >: never 1", *2 * (f"next_stride: {HALVES} <: never 1",))
-    assert sorted(shown(code, line) for line in found.missing) == sorted(never)
+    own = [line for line in found.missing if not any(name in line for name in OF_OBSERVER)]
+    assert sorted(shown(code, line) for line in own) == sorted(never)
 
 
 def shown(code: list[str], missing: str) -> str:

@@ -14,7 +14,15 @@ from ppafo.exports.firmware import proof
 from ppafo.exports.firmware.catalog import MSP430G2553
 from ppafo.exports.firmware.lock_step import PythonChip
 from ppafo.exports.firmware.simulators import built, missing_tools, sizes
-from ppafo.exports.firmware.walking import DrawnGait, compare_drawn_walk, walk_chip, walk_firmware, walk_on_chip
+from ppafo.exports.firmware.walking import (
+    DrawnGait,
+    Gas,
+    compare_drawn_walk,
+    nominal_device,
+    walk_chip,
+    walk_firmware,
+    walk_on_chip,
+)
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.widths import Interval
 from ppafo.walking.loading import load_walk
@@ -29,6 +37,11 @@ with_compiler = pytest.mark.skipif(
 
 def fixed_walk(*overrides: str) -> Scenario:
     return load_walk("solenoid", (FIXED, *overrides))
+
+
+def drawn_of(configuration: Scenario, seed: int) -> DrawnGait:
+    gas = Gas(nominal_device(configuration), configuration.control.period)
+    return DrawnGait(walk_chip(configuration).converter, gas, seed)
 
 
 def test_no_number_of_the_law_can_overflow_and_no_state_leaves_its_range() -> None:
@@ -50,7 +63,7 @@ def test_drawn_gaits_reach_every_phase_level_and_command_and_most_signs() -> Non
     chip = walk_chip(fixed_walk())
     seen: dict[str, set[int]] = {"phase": set(), "level": set(), "command": set(), "sign": set()}
     for seed in (3, 4, 5, 6):
-        drawn, python, command = DrawnGait(chip.converter, seed), PythonChip(chip), 0
+        drawn, python, command = drawn_of(fixed_walk(), seed), PythonChip(chip), 0
         for _ in range(30_000):
             readings, begins = drawn.next(command)
             if begins:
@@ -70,7 +83,7 @@ def test_the_c_of_the_law_decides_as_python_does_under_the_sanitizer(tmp_path: P
     configuration = fixed_walk()
     built(walk_firmware(configuration), tmp_path, ("host", "checked"))
     chip = walk_chip(configuration)
-    drawn, python, command, lines, wanted = DrawnGait(chip.converter, 5), PythonChip(chip), 0, [], []
+    drawn, python, command, lines, wanted = drawn_of(configuration, 5), PythonChip(chip), 0, [], []
     for _ in range(15_000):
         readings, begins = drawn.next(command)
         if begins:

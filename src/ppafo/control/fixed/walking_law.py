@@ -2,15 +2,18 @@
 
 What the converter shows is in counts of 14 bits, whatever its own number of bits is; times are counted up to
 ``LONGEST`` samples. The stride time is kept in halves of a sample, and so are its fractions: a fraction of up to two
-strides then has 15 bits, and no number needs more than 16.
+strides then has 15 bits, and no number of gait or sensors needs more than 16.
 
 Phases, signs and levels are those of ``control.walking``; the first sign there is the first that is looked for. One
 number holds the highest angle of a swing and then the angle of a strike in doubt: the one ends where the other begins.
-The valve has only three commands, so that one count and the command say how long it has fed or vented.
+The valve has only three commands, so that the last command and one count say for how long it has vented. What the
+chambers should hold is ``chamber_observer``; it alone needs more than 16 bits.
 """
 
 from typing import NamedTuple
 
+from ppafo.control.fixed import chamber_observer
+from ppafo.control.fixed.chamber_observer import NO_CAUSE, ObserverCounts, ObserverNumbers
 from ppafo.control.fixed.whole_numbers import (
     COMMAND_STEPS,
     FRACTION_BITS,
@@ -130,8 +133,7 @@ NO_SIGN: int = int(signs.NO_SIGN)
 FORCE_RANGE: int = int(signs.FORCE_RANGE)
 ANGLE_RANGE: int = int(signs.ANGLE_RANGE)
 PRESSURE_RANGE: int = int(signs.PRESSURE_RANGE)
-NO_RISE: int = int(signs.NO_RISE)
-NO_FALL: int = int(signs.NO_FALL)
+PRESSURE_SENSOR: int = int(signs.PRESSURE_SENSOR)
 FROZEN_HEEL: int = int(signs.FROZEN_HEEL)
 FROZEN_TOE: int = int(signs.FROZEN_TOE)
 FROZEN_ANGLE: int = int(signs.FROZEN_ANGLE)
@@ -271,17 +273,6 @@ class TraceNumbers(NamedTuple):
     toes_in_time: int
 
 
-class EmptyingNumbers(NamedTuple):
-    """When the pressure of a vented chamber 2 rises: samples, pressures and angles [counts]."""
-
-    follow: int
-    shown: int
-    rises: int
-    filled: int
-    compresses: int
-    squeezes: int
-
-
 class TraceCounts(NamedTuple):
     """The last reading of a sensor, samples in which it was the same while something else moved, the slow one.
 
@@ -311,14 +302,6 @@ class LandingCounts(NamedTuple):
     mark: int
     late: int
     late_toes: int
-
-
-class EmptyingCounts(NamedTuple):
-    """Lowest pressure of chamber 2 since it was joined to the atmosphere, angle then [counts], samples above it."""
-
-    lowest: int
-    angle: int
-    rising: int
 
 
 MOST_LATE = 2
@@ -394,21 +377,6 @@ def next_landing(
     return LandingCounts(lowest=lowest, mark=0 if lands else doubt, late=late, late_toes=late_toes)
 
 
-def next_emptying(numbers: EmptyingNumbers, last: EmptyingCounts, vented: int, given: GaitReadings) -> EmptyingCounts:
-    """Chamber 2 after a sample, joined to the atmosphere for so many before."""
-    pressure, angle = given.pressure_2, given.angle
-    if vented <= numbers.follow or pressure < last.lowest:
-        return EmptyingCounts(pressure, angle, 0)
-    rises = (
-        pressure > last.lowest + numbers.rises
-        and pressure > numbers.filled
-        and vented < numbers.shown
-        and angle < last.angle + numbers.compresses
-        and angle < numbers.squeezes
-    )
-    return EmptyingCounts(last.lowest, last.angle, counted(last.rising) if rises else 0)
-
-
 BOTH = 2
 """Sensors that are loaded where the foot stands on heel and toes."""
 LATE_STRIDES: int = int(signs.LATE_STRIDES)
@@ -462,13 +430,15 @@ class StillNumbers(NamedTuple):
     gone: int
 
 
-class ValveNumbers(NamedTuple):
-    """Samples after which a chamber is filled, vented, vented for sure, and in which a rise is noise."""
+class VentedNumbers(NamedTuple):
+    """After how many samples both chambers are vented; pressure above which one is filled [counts].
 
-    fill: int
+    From an angle ``squeezes`` [counts] on the ankle compresses chamber 2 to any pressure.
+    """
+
     vent: int
-    late_vent: int
-    lasts: int
+    filled: int
+    squeezes: int
 
 
 class SafetyNumbers(NamedTuple):
@@ -477,10 +447,10 @@ class SafetyNumbers(NamedTuple):
     ranges: RangeNumbers
     stride: StrideNumbers
     still: StillNumbers
-    valve: ValveNumbers
+    vented: VentedNumbers
     stands_up: int
     trace: TraceNumbers
-    emptying: EmptyingNumbers
+    observer: ObserverNumbers
 
 
 class PressureCounts(NamedTuple):
@@ -509,7 +479,7 @@ class SafetyCounts(NamedTuple):
     held: int
     seen: SensorCounts
     landing: LandingCounts
-    emptying: EmptyingCounts
+    observer: ObserverCounts
     slow: PressureCounts
     thin: int
 
@@ -524,9 +494,10 @@ def is_gone(numbers: StillNumbers, last: int, force: int) -> bool:
     return last > numbers.largest_drop and force < numbers.gone
 
 
-def holds_pressure(filled: int, pressure: int, slow: int) -> bool:
-    """True where a vented chamber shows a pressure [counts] that does not fall."""
-    return pressure > filled and slow <= pressure + (pressure >> FALLS_BITS)
+def holds_pressure(numbers: SafetyNumbers, pressure: int, expected: int, slow: int) -> bool:
+    """True where a vented chamber shows a pressure [counts] that does not fall, and that its gas does not have."""
+    above = pressure - max(expected - numbers.observer.room, 0)
+    return above > numbers.vented.filled and slow <= pressure + (pressure >> FALLS_BITS)
 
 
 def range_sign(numbers: RangeNumbers, squeezes: int, given: GaitReadings, thin: int) -> int:
@@ -546,22 +517,20 @@ def range_sign(numbers: RangeNumbers, squeezes: int, given: GaitReadings, thin: 
 
 
 def valve_sign(numbers: SafetyNumbers, now: SafetyCounts, phase: PhaseCounts, given: GaitReadings) -> int:
-    """The sign of a pressure that does not follow although the valve has been commanded for long enough."""
-    filled = numbers.emptying.filled
-    if now.held > numbers.valve.fill and (
-        (now.side > 0 and given.pressure_1 < filled) or (now.side < 0 and given.pressure_2 < filled)
-    ):
-        return NO_RISE
-    if now.emptying.rising > numbers.valve.lasts:
-        return NO_FALL
-    if now.side == 0 and phase.phase == MID_STANCE and phase.heel.loaded == 1:
-        if now.held > numbers.valve.late_vent and given.pressure_2 > filled:
-            return NO_FALL
-        if now.held > numbers.valve.vent and (
-            holds_pressure(filled, given.pressure_1, now.slow.first)
-            or holds_pressure(filled, given.pressure_2, now.slow.second)
+    """The sign of pressures that contradict what the chambers should hold.
+
+    Where the foot stands flat, a pressure that stays in a vented chamber is one of its sensor.
+    """
+    cause = chamber_observer.found_cause(numbers.observer, now.observer, now.side, given.pressure_1, given.pressure_2)
+    if cause != NO_CAUSE:
+        return cause
+    stands = now.side == 0 and phase.phase == MID_STANCE and phase.heel.loaded == 1
+    if stands and now.held > numbers.vented.vent:
+        first, second = now.observer.plantar.expected, now.observer.dorsal.expected
+        if holds_pressure(numbers, given.pressure_1, first, now.slow.first) or holds_pressure(
+            numbers, given.pressure_2, second, now.slow.second
         ):
-            return NO_FALL
+            return PRESSURE_SENSOR
     return NO_SIGN
 
 
@@ -630,7 +599,7 @@ def found_sign(
     given: GaitReadings,
 ) -> int:
     """The sign of a sample that comes first; ``now`` remembers the sample, a force is ``gone`` since the last."""
-    sign = range_sign(numbers.ranges, numbers.emptying.squeezes, given, now.thin)
+    sign = range_sign(numbers.ranges, numbers.vented.squeezes, given, now.thin)
     sign = valve_sign(numbers, now, phase, given) if sign == NO_SIGN else sign
     if sign != NO_SIGN:
         return sign
@@ -682,7 +651,9 @@ def remembered(
         landing=next_landing(
             numbers.trace, state.landing, seen.angle.slow, given.angle, before.phase, phase.phase, steady
         ),
-        emptying=next_emptying(numbers.emptying, state.emptying, state.held if state.side >= 0 else 0, given),
+        observer=chamber_observer.next_observer(
+            numbers.observer, state.observer, state.side, given.angle, given.pressure_1, given.pressure_2
+        ),
         slow=PressureCounts(
             followed(state.slow.first, given.pressure_1, numbers.trace.fall_share),
             followed(state.slow.second, given.pressure_2, numbers.trace.fall_share),

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from ppafo.control.fixed import walking_law
+from ppafo.control.fixed.chamber_observer import OBSERVER_RANGES, OBSERVER_START, OF_OBSERVER, observer_numbers
 from ppafo.control.fixed.torque_laws import FixedLaw
 from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, FRACTION_BITS, LARGEST_FRACTION, each
 from ppafo.control.walking import safety, signs
@@ -82,10 +83,9 @@ NUMBERS = (
     _stride_share("turns_back", "an angle for this part"),
     _count("largest_drop", "no force above this is gone within a sample"),
     _count("gone", "a force below this is gone"),
-    _samples("fill", "a chamber is filled when the valve has fed it for longer"),
-    _samples("vent", "both are vented when the valve has vented them for longer"),
-    _samples("late_vent", "and chamber 2 for sure after this"),
-    _samples("lasts", "a pressure that rises for longer in a vented chamber was there before"),
+    _samples("vent", "both chambers are vented when the valve has vented them for longer"),
+    _count("filled", "a filled chamber has a higher pressure, a vented one a lower"),
+    _count("squeezes", "from this angle on the ankle compresses chamber 2 to any pressure"),
     _samples("stands_up", "who stands for longer after sitting is helped again"),
     _share("slow_share", "share of a change that slow readings take at once"),
     _share("fall_share", "share of a change that slow pressures take at once"),
@@ -98,12 +98,7 @@ NUMBERS = (
     _count("is_flat", "one that turns up by more is flat"),
     _count("toes_late", "toes that leave the ground at a larger angle do so late"),
     _count("toes_in_time", "and at a smaller one in time"),
-    _samples("follow", "a pressure follows the valve within this"),
-    _samples("shown", "until here a vented chamber is watched"),
-    _count("rises", "a rise that is no noise"),
-    _count("filled", "a filled chamber has a higher pressure, a vented one a lower"),
-    _count("compresses", "from this angle on the ankle compresses chamber 2"),
-    _count("squeezes", "and from this one to any pressure"),
+    *OF_OBSERVER,
 )
 """Every number of ``event_on_off.WalkNumbers``, in order."""
 
@@ -122,8 +117,6 @@ def whole_numbers(
         "turned_up": signs.TURNED_UP / angle,
         "turns_down": signs.TURNS_DOWN / angle,
         "is_flat": signs.IS_FLAT / angle,
-        "rises": signs.RISES / pressure,
-        "compresses": signs.COMPRESSES / angle,
     }
     strides = {
         name: settings[name] * walking_law.STRIDE_SHARE
@@ -141,6 +134,7 @@ def whole_numbers(
     counted = {name: min(settings[name], walking_law.MOST_STRIDES) for name in ("most_toe_strides", "resume_strides")}
     found = _levels(settings, period, converter) | steps | strides | shares | counted
     rounded = {name: float(int(value + 0.5)) for name, value in found.items()} | _times(settings, period)
+    rounded |= observer_numbers(settings, period, angle, pressure)
     return {item.name: rounded[item.name] for item in NUMBERS}
 
 
@@ -181,16 +175,11 @@ def _times(settings: Mapping[str, float], period: float) -> dict[str, float]:
     passed = {
         "frozen": settings["frozen_time"],
         "thin_time": signs.THIN_TIME,
-        "fill": settings["fill_time"],
         "vent": settings["vent_time"],
-        "late_vent": safety.LATE * settings["vent_time"],
         "stands_up": safety.STANDS_UP,
-        "lasts": signs.LASTS,
-        "follow": settings["follow_time"],
     }
     found = {name: float(int(time / period + ROUNDING)) for name, time in passed.items()}
-    reached = {"debounce": settings["debounce"], "shown": settings["follow_time"] + signs.SHOWN}
-    found |= {name: float(-int(-(time / period - ROUNDING) // 1)) for name, time in reached.items()}
+    found["debounce"] = float(-int(-(settings["debounce"] / period - ROUNDING) // 1))
     return found | {"first_stride": float(int(2.0 * settings["first_stride_time"] / period + 0.5))}
 
 
@@ -263,7 +252,7 @@ START_COUNTS = walking_law.WalkCounts(
         held=0,
         seen=walking_law.SensorCounts(_TRACE, _TRACE, _TRACE),
         landing=walking_law.LandingCounts(lowest=0, mark=0, late=0, late_toes=0),
-        emptying=walking_law.EmptyingCounts(lowest=0, angle=0, rising=0),
+        observer=OBSERVER_START,
         slow=walking_law.PressureCounts(0, 0),
         thin=0,
     ),
@@ -296,8 +285,7 @@ STATE_RANGES = {
     "mark": _READING,
     "late": (0, walking_law.MOST_LATE),
     "late_toes": (0, walking_law.MOST_LATE),
-    "angle": _READING,
-    "rising": _TIME,
+    **OBSERVER_RANGES,
     "first": _READING,
     "second": _READING,
     "thin": _TIME,

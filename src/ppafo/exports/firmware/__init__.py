@@ -1,5 +1,6 @@
 """A scenario's controller as firmware for a small processor: proof, translated C, a thin layer, make file, page."""
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, get_type_hints
 
@@ -23,6 +24,9 @@ from ppafo.translation.widths import Interval, Narrowed, Range, hull, narrowed
 from ppafo.version import __version__
 
 PRELUDE = "prelude_whole.h"
+_NUMBER = r"(?:bool|int16_t|int32_t) \w+"
+_OF_NUMBERS = re.compile(rf"^PPAFO_INLINE(?= {_NUMBER}\((?:{_NUMBER},\s+)*{_NUMBER}\)$)", re.MULTILINE)
+"""Before the head of a function of numbers alone, in C."""
 
 
 def proof(law: FixedLaw, numbers: Sequence[Quantity] | None = None) -> Narrowed:
@@ -65,6 +69,7 @@ def law_source(law: FixedLaw, title: str, asked: tuple[str, str, str], told: Map
     entry = collector.add(law.sample)
     documents = documents_of(collector)
     text = c_source(proof(law).module, documents, f"{title} Not to be edited.", prelude=PRELUDE)
+    text = _OF_NUMBERS.sub("PPAFO_CALLED", text)
     numbers, state, readings = (collector.add(item) for item in (law.numbers, type(law.begins), law.readings))
     given = rebuilt(law.numbers, [macro(item) for item in law.number_quantities])
     parameters, name, values = asked

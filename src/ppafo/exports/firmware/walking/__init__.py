@@ -4,9 +4,9 @@ Readings of a gait for the comparison of a chip with Python: made ones for each 
 
 The made ones reach what drawn gaits reach by chance or never: each sign, its limits, counts at their ends. With them
 every condition of the controller in C is reached both ways, and each decides alone. A test measures it. Drawn are
-strides of all paces, people who stop, and faults; their pressures follow the command, so that what the safety checks
-make of the valve is reached too. Nothing here is a model of anybody: it is made to reach every phase, every level and
-most signs.
+strides of all paces, people who stop, and faults; their pressures follow command and angle as the observer of the
+chambers believes, so that only faults contradict it. Nothing here is a model of anybody: it is made to reach every
+phase, every level and most signs.
 """
 
 import math
@@ -20,9 +20,12 @@ import numpy as np
 from ppafo.control.fixed.torque_laws import WALK_TARGETS
 from ppafo.control.fixed.walking_law import TOP, GaitConverter, GaitReadings, read_gait
 from ppafo.control.fixed.walking_numbers import FIXED_WALKS, SIGN_BITS
+from ppafo.control.fixed.whole_numbers import COMMAND_STEPS
+from ppafo.control.walking import observer
+from ppafo.control.walking.observer import NominalDevice
 from ppafo.control.walking.signs import SIGNS
 from ppafo.engine.lanes import run_batch
-from ppafo.engine.rows import row_numbers
+from ppafo.engine.rows import leaf_paths, rebuilt, row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
 from ppafo.exports import filled, licence, template
@@ -73,14 +76,47 @@ class Part:
 Episode = tuple[Part, ...]
 
 
-def next_pressures(pressures: tuple[float, float], command: int) -> tuple[float, float]:
-    """Pressures [Pa] of both chambers a sample after a command [steps]: one is fed, and what is not vents."""
-    return _towards(pressures[0], command > 0), _towards(pressures[1], command < 0)
+def nominal_device(configuration: Scenario) -> NominalDevice:
+    """The device that the controller of a walk believes in."""
+    names = (path.rpartition(".")[2] for path in leaf_paths(NominalDevice, ""))
+    given = configuration.control.settings
+    lines = {f"{name}_{line}": f"nominal_line_{name}_{line}" for name in _OF_LINES for line in (1, 2)}
+    lines["relieving"] = "nominal_line_relieving"
+    found: NominalDevice = rebuilt(NominalDevice, [given[lines.get(name, name)] for name in names])
+    return found
 
 
-def _towards(pressure: float, feeds: bool) -> float:
-    target, lag = (FILLED, 12.0) if feeds else (ROOM, 25.0)
-    return pressure + (target - pressure) / lag
+_OF_LINES = ("droop", "largest_flow", "volume")
+
+
+class Gas:
+    """Pressures in the chambers of a sound device, which follow command and angle as the observer believes."""
+
+    def __init__(self, nominal: NominalDevice, period: float) -> None:
+        self._nominal, self._period = nominal, period
+        self.begin()
+
+    def begin(self) -> None:
+        """Both chambers are vented."""
+        self._state, self._angle = observer.START, UPRIGHT
+        self._pressures = self._nominal.nominal_atmospheric_pressure, self._nominal.nominal_atmospheric_pressure
+
+    def follow(self, command: int, angle: float) -> tuple[float, float]:
+        """Pressures [Pa] a sample after a command [steps], at an angle [rad]."""
+        sent = float(command) / COMMAND_STEPS if command else VENT
+        self._state = observer.next_observer(
+            self._nominal,
+            self._state._replace(command=sent),
+            self._angle,
+            *self._pressures,
+            angle,
+            *self._pressures,
+            self._period,
+        )
+        first, second = observer.volumes(self._nominal, angle)
+        self._pressures = self._state.chamber_1.content / first, self._state.chamber_2.content / second
+        self._angle = angle
+        return self._pressures
 
 
 def _measurements(episode: Episode) -> Iterator[GaitMeasurement]:
@@ -100,15 +136,16 @@ def _measurements(episode: Episode) -> Iterator[GaitMeasurement]:
             )
 
 
-def made_readings(converter: GaitConverter) -> Generator[tuple[GaitReadings, bool], int, None]:
+def made_readings(converter: GaitConverter, gas: Gas) -> Generator[tuple[GaitReadings, bool], int, None]:
     """Readings, and whether an episode begins with them; is sent the command [steps] that they led to."""
     for end in (TOP, 0):
         for begins in (True, False):
             yield GaitReadings._make([end] * len(GaitReadings._fields)), begins
     for episode in MADE_EPISODES:
-        pressures, command, begins = (ROOM, ROOM), 0, True
+        command, begins = 0, True
+        gas.begin()
         for seen in _measurements(episode):
-            first, second = pressures = next_pressures(pressures, command)
+            first, second = gas.follow(command, seen.angle)
             shown = seen._replace(pressure_1=seen.pressure_1 or first, pressure_2=seen.pressure_2 or second)
             command = yield read_gait(converter, shown), begins
             begins = False
@@ -131,13 +168,6 @@ def _turned_up(down: float, toes: float) -> Episode:
 def _leaves(angle: float) -> Episode:
     """A stride whose toes leave the ground at an angle [rad]."""
     return (_LANDING, _FLAT, Part(100, 0.0, _LOAD, -0.2, angle), Part(20, 0.0, 0.0, angle, angle), Part(30))
-
-
-def _rises(samples: int, start: float, end: float, pressure: float, lasts: int = 2) -> Episode:
-    """Who stands at one angle [rad] with vented chambers, then at another with a pressure 2 [Pa] for some samples."""
-    still = Part(20 + samples, _LOAD, _LOAD, start, start, ROOM, ROOM, "angle")
-    shown = replace(still, samples=lasts, start=end, end=end, pressure_2=pressure)
-    return (Part(10, _LOAD, _LOAD, start, start), still, shown, replace(still, samples=20))
 
 
 def _stands(pressure_1: float, pressure_2: float) -> Episode:
@@ -167,9 +197,6 @@ def _of_signs() -> Iterator[Episode]:
     yield (*_STRIDE, _LANDING, _FLAT, _PUSH, *3 * late, *late[:2], Part(150, 0.0, _LOAD, 0.08, -0.1), _SWING)
     yield (*_STRIDE, _LANDING, _FLAT, _PUSH, *_turned_up(-0.05, 0.03)[:4])
     yield tuple(part for angle in (0.3, 0.52, 0.52, 0.52, 0.46) for part in _leaves(angle))
-    yield from (_rises(70, 0.5, 0.5, _SOME), _rises(70, 0.0, 0.0, 1.18e5), _rises(180, 0.0, 0.0, _SOME))
-    yield from (_rises(70, 0.0, 0.03, _SOME), _rises(70, 0.5185, 0.5205, _SOME), _rises(70, 0.0, 0.0, _SOME))
-    yield _rises(70, 0.0, 0.0, _SOME, 4)
     yield from (_flat_at(_LOAD, -0.5), _flat_at(_LOAD, 0.5), _flat_at(0.0, -0.5))
     yield (*_STRIDE, Part(300, _LOAD, 0.0, 0.0, -0.1), _STANDS)
     yield (*_STRIDE, _LANDING, *2 * (_FLAT,), Part(100, 0.0, _LOAD, -0.2, 0.1), Part(100, 0.0, 0.0, 0.1, 0.0), _LANDING)
@@ -192,6 +219,7 @@ def _of_signs() -> Iterator[Episode]:
 def _of_ranges() -> Iterator[Episode]:
     """Episodes for readings that cannot be, and for pressures that the valve does not make."""
     yield from (_stands(_SOME, ROOM), _stands(ROOM, _SOME), _stands(ROOM, ROOM), _stands(5.0e4, ROOM))
+    yield (Part(350, _LOAD, _LOAD, -0.6, -0.6, 1.28e5, ROOM),)
     yield from (_stands(4.0e4, ROOM), _stands(1.0e6, ROOM), _stands(ROOM, 1.0e6))
     yield (
         Part(100, 0.0, 0.0, 0.7, 0.7),
@@ -202,6 +230,12 @@ def _of_ranges() -> Iterator[Episode]:
     yield from ((Part(20, 0.0, 0.0, angle, angle),) for angle in (-1.4, 0.9))
     yield (Part(100, _LOAD, 0.0, 0.0, 0.0, ROOM, ROOM),)
     yield (Part(450, _LOAD, _LOAD), Part(100, 0.0, _LOAD, 0.0, 0.0, ROOM, ROOM))
+    fed = Part(150, _LOAD, 0.0, 0.0, -0.05)
+    for pressure in (1.6e5, 2.6e5, 6.5e5):
+        yield (*_STRIDE, replace(fed, samples=40), replace(fed, pressure_2=pressure))
+    for pressure in (FILLED, 3.0e5, 7.0e4):
+        yield (*_STRIDE, _LANDING, Part(250, _LOAD, _LOAD, -0.1, -0.15), Part(60, _LOAD, _LOAD, -0.15, -0.15, pressure))
+        yield (*_STRIDE, _LANDING, _FLAT, _PUSH, Part(60, 0.0, 0.0, 0.1, 0.1, pressure))
     falls = (Part(12, _LOAD, _LOAD, 0.0, 0.0, FILLED * 0.9**place, ROOM) for place in range(14))
     yield (Part(200, _LOAD, _LOAD, 0.0, 0.0, FILLED, ROOM), *falls)
 
@@ -252,14 +286,16 @@ _ODD = (
 )
 
 
-def gait_readings(converter: GaitConverter, samples: int, seed: int) -> Generator[tuple[GaitReadings, bool], int, None]:
+def gait_readings(
+    converter: GaitConverter, gas: Gas, samples: int, seed: int
+) -> Generator[tuple[GaitReadings, bool], int, None]:
     """Readings without end, and whether an episode begins with them; is sent the command [steps] that they led to.
 
     Those that are made come first, where there is room for them in so many ``samples``, and then drawn ones.
     """
     if samples >= SAMPLES:
-        yield from made_readings(converter)
-    drawn, command = DrawnGait(converter, seed), 0
+        yield from made_readings(converter, gas)
+    drawn, command = DrawnGait(converter, gas, seed), 0
     while True:
         command = yield drawn.next(command)
 
@@ -283,8 +319,8 @@ class Manner(NamedTuple):
 class DrawnGait:
     """Readings of one episode after the other; ``next`` takes the command that the last ones led to [steps]."""
 
-    def __init__(self, converter: GaitConverter, seed: int) -> None:
-        self._converter = converter
+    def __init__(self, converter: GaitConverter, gas: Gas, seed: int) -> None:
+        self._converter, self._gas = converter, gas
         self._draw = random.Random(seed)
         self._begin_drawn()
 
@@ -308,7 +344,7 @@ class DrawnGait:
     def begin(self, manner: Manner, samples: int) -> None:
         """Begin an episode of some manner and so many samples."""
         self._manner, self._left, self._sample = manner, samples, 0
-        self._pressures = (ROOM, ROOM)
+        self._gas.begin()
         self._shown: tuple[int, ...] = (0,) * 5
         self._stride()
 
@@ -357,11 +393,12 @@ class DrawnGait:
             turned = 0.55
         if self._odd == _LATE:
             turned = 0.15 * math.sin(2.0 * math.pi * (part + 0.08))
-        self._pressures = next_pressures(self._pressures, command)
+        angle = UPRIGHT + turned + 1.0e-3 * moves
+        first, second = self._gas.follow(command, angle)
         return GaitMeasurement(
-            angle=UPRIGHT + turned + 1.0e-3 * moves,
-            pressure_1=self._pressures[0],
-            pressure_2=self._pressures[1],
+            angle=angle,
+            pressure_1=first,
+            pressure_2=second,
             torque=0.0,
             heel_force=max(0.0, heel + moves) if heel > 0.0 else 0.0,
             toe_force=max(0.0, toe + moves) if toe > 0.0 else 0.0,
@@ -544,5 +581,6 @@ def walk_on_chip(configuration: Scenario, minutes: float | None = None) -> WalkO
 def compare_drawn_walk(configuration: Scenario, samples: int, seed: int = 1) -> Comparison:
     """Give drawn readings of a gait to the chip's simulator and to Python, with a reset before every episode."""
     chip = walk_chip(configuration)
-    given = gait_readings(chip.converter, samples, seed)
+    gas = Gas(nominal_device(configuration), configuration.control.period)
+    given = gait_readings(chip.converter, gas, samples, seed)
     return compare_with(PythonChip(chip), given, samples, walk_firmware(configuration), MSP430G2553)
