@@ -20,6 +20,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
@@ -183,14 +184,9 @@ def at_gym(name: str, count: int, seed: int) -> Judged:
 OTHER_PROGRAM = "needs another program"
 
 
-class _Handed(ctypes.Structure):
-    """An array as the C of a library takes it."""
-
-    _fields_ = (("values", ctypes.POINTER(ctypes.c_double)), ("extent", ctypes.c_int64 * 3))
-
-
-def _handed(values: np.ndarray) -> _Handed:
-    return _Handed(values.ctypes.data_as(ctypes.POINTER(ctypes.c_double)), (ctypes.c_int64 * 3)(values.size, 0, 0))
+def _handed(values: np.ndarray) -> Any:
+    """Numbers where C has a struct of them."""
+    return values.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
 
 
 class BuiltLibrary:
@@ -201,7 +197,7 @@ class BuiltLibrary:
         for file, content in library_files(self.library).items():
             (folder / file).write_bytes(content)
         made, name = folder / "library.so", self.library.name
-        flags = ["-std=c99", "-O0", "-ffp-contract=off", "-DPPAFO_ENTRY=extern", "-shared", "-fPIC", "-w"]
+        flags = ["-std=c99", "-O0", "-ffp-contract=off", "-Dstatic=", "-Wl,-Bsymbolic", "-shared", "-fPIC", "-w"]
         subprocess.run(["gcc", *flags, str(folder / f"{name}.c"), "-o", str(made), "-lm"], check=True)
         self.c = ctypes.CDLL(str(made))
         self.bad_setting, self.size = getattr(self.c, f"{name}_bad_setting"), getattr(self.c, f"{name}_size")

@@ -29,12 +29,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     unit = actions.add_parser("fmu", help=_UNIT, description=f"{_UNIT[:1].upper()}{_UNIT[1:]}.")
     unit.add_argument("--fmi", type=int, choices=(2, 3), default=2, help="version of FMI (default: 2)")
-    unit.add_argument(
-        "--interface",
-        choices=("loop", "plant"),
-        default="loop",
-        help="the closed loop, or the plant alone under a command and the motion of its ankle (default: loop)",
-    )
+    for shown in (library, unit):
+        shown.add_argument(
+            "--interface",
+            choices=("loop", "plant"),
+            default="loop",
+            help="the closed loop, or the plant alone under a command and the motion of its ankle (default: loop)",
+        )
     unit.add_argument(
         "--platforms",
         metavar="LIST",
@@ -86,9 +87,11 @@ def run(parsed: argparse.Namespace) -> int:
 
 def _library(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
     from ppafo.exports.c_library import c_library
+    from ppafo.exports.c_library.plant import plant_library
     from ppafo.loading import load_scenario
 
-    contents = c_library(load_scenario(parsed.scenario, parsed.overrides))
+    files_of = {"loop": c_library, "plant": plant_library}[parsed.interface]
+    contents = files_of(load_scenario(parsed.scenario, parsed.overrides))
     return contents, f"make -C {shlex.quote(str(parsed.out))} check"
 
 

@@ -3,10 +3,12 @@
 import re
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Any, final
+from typing import Any, TypeAlias, final
 
+from ppafo.engine.pieces import Phases, RarePhase
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
+from ppafo.engine.run_rows import RunRows
 from ppafo.engine.source_text import Collector, woven
 
 LANES = 32
@@ -86,6 +88,24 @@ class LaneRows:
         lines = woven(lines, self.needs)
         words = {word for line in lines for word in re.findall(r"\w+", line)}
         return over_lanes([*[self.load(row) for row in self.program.effect_rows if row in words], *lines])
+
+    def over_phases(self, prelude: list[str], all_phases: Phases) -> list[str]:
+        """Each phase in a loop of its own: loops this short let the processor work on several lanes at once.
+
+        It looks some hundred instructions ahead, and one lane's division or root waits for the one before.
+        """
+        lines: list[str] = []
+        for phase in all_phases:
+            if isinstance(phase, RarePhase):
+                loop = self.over_lanes([*prelude, *phase.lines])
+                lines += [*count_lanes("wanting", f"{phase.cell} > 0.0"), "if wanting > 0:", *indent(loop)]
+            else:
+                lines += self.over_lanes([*prelude, *phase])
+        return lines
+
+
+Rows: TypeAlias = LaneRows | RunRows
+"""Where the numbers of a step are: in the rows of a block of lanes, or under the names of a single run."""
 
 
 def _row_numbers(groups: dict[str, type], first: int) -> dict[str, int]:

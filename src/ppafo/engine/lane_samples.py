@@ -4,10 +4,11 @@ Meters and traces stand where nothing is recorded. Their samples are the ones th
 get the course of the reference too, which is looked at once before the first sample and followed from there.
 """
 
-from ppafo.engine.lane_rows import LaneRows, indent
+from ppafo.engine.lane_rows import LaneRows, Rows, indent
 from ppafo.engine.led_leg import GAIT_SHANK
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, leaves
+from ppafo.engine.run_rows import RunRows
 from ppafo.engine.scheme.actuators import seen_with_torque, torque_at
 from ppafo.engine.scheme.motion import SAME_INSTANT
 from ppafo.engine.scheme.pneumatics import held_pressures
@@ -33,7 +34,7 @@ READINGS = {
 """Sensors of a walk, as their faults are named, and what they read."""
 
 
-def control_loop(rows: LaneRows) -> list[str]:
+def control_loop(rows: Rows) -> list[str]:
     """Sense and control, at every sample; nothing where the caller sets the command."""
     controller = rows.program.controller
     if controller is None:
@@ -53,7 +54,7 @@ def control_loop(rows: LaneRows) -> list[str]:
     return ["if step_index % steps_per_sample == 0:", *indent([*places(rows), *rows.over_lanes(lines)])]
 
 
-def sampled_with_faults(rows: LaneRows, lines: list[str]) -> list[str]:
+def sampled_with_faults(rows: Rows, lines: list[str]) -> list[str]:
     """The lines of a sample where the controller may miss it or have no power, and where a valve may take it late."""
     add, before = rows.add, rows.program.controller
     assert before is not None, "a controller takes samples"
@@ -79,14 +80,14 @@ def sampled_with_faults(rows: LaneRows, lines: list[str]) -> list[str]:
     ]
 
 
-def places(rows: LaneRows) -> list[str]:
+def places(rows: Rows) -> list[str]:
     """Lines that find the number of the sample and where late signals lie, once for all lanes."""
     program = rows.program
     late = ["late = (step_index - signal_delay) % signal_history.shape[1]"] if program.late_signals else []
     return [*late, *([] if program.ideal_sensors else ["sample_index = step_index // steps_per_sample"])]
 
 
-def sense(rows: LaneRows) -> list[str]:
+def sense(rows: Rows) -> list[str]:
     """Lines that make the measurement ``seen``."""
     add = rows.add
     if rows.program.late_signals:
@@ -104,19 +105,19 @@ def sense(rows: LaneRows) -> list[str]:
     ]
 
 
-def torque_line(rows: LaneRows, angle: str) -> str:
+def torque_line(rows: Rows, angle: str) -> str:
     """Line that makes the torque of both pressures, at an angle where the actuator is no vane."""
     if rows.program.has_shape:
         return f"torque = {rows.add(torque_at)}(plant, {angle}, pressure_1, pressure_2)"
     return f"torque = {rows.add(actuator_torque)}(pressure_1, pressure_2, plant.torque_constant)"
 
 
-def current_readings(rows: LaneRows) -> list[str]:
+def current_readings(rows: Rows) -> list[str]:
     """Lines that make what the sensors show at the present."""
     return ["angle = state.angle", *present_pressures(rows), *as_shown(rows)]
 
 
-def as_shown(rows: LaneRows) -> list[str]:
+def as_shown(rows: Rows) -> list[str]:
     """Line that makes signals as the sensors show them, where an effect acts there."""
     if not any(shown_signals in effect.laws for effect in rows.program.effects):
         return []
@@ -124,19 +125,19 @@ def as_shown(rows: LaneRows) -> list[str]:
     return [f"{signals} = {rows.add(shown_signals)}({signals})"]
 
 
-def present_pressures(rows: LaneRows) -> list[str]:
+def present_pressures(rows: Rows) -> list[str]:
     """Lines that make both pressures of ``state``."""
     if rows.program.hands_chambers_on:
         return [rows.load("held"), f"pressure_1, pressure_2 = {rows.add(held_pressures)}(held, state)"]
     return [f"pressure_1, pressure_2 = {pressures_of(rows, 'state')}"]
 
 
-def pressures_of(rows: LaneRows, state: str) -> str:
+def pressures_of(rows: Rows, state: str) -> str:
     """Expression for both pressures of any state."""
     return f"{rows.add(chamber_pressures)}(plant, {state}.angle, {state}.mass_1, {state}.mass_2)"
 
 
-def sense_gait(rows: LaneRows) -> list[str]:
+def sense_gait(rows: Rows) -> list[str]:
     """Lines that make the measurement ``seen`` of a walking leg."""
     pressures = present_pressures(rows)
     if rows.program.ideal_sensors:
@@ -158,7 +159,7 @@ def sense_gait(rows: LaneRows) -> list[str]:
     ]
 
 
-def late_readings(rows: LaneRows) -> list[str]:
+def late_readings(rows: Rows) -> list[str]:
     """Lines that keep the readings of a walk, and hand the controller those of a sensor as late as its fault says."""
     lines = ["slots = signal_history.shape[1]"]
     for row, (sensor, reading) in enumerate(READINGS.items()):
@@ -169,7 +170,7 @@ def late_readings(rows: LaneRows) -> list[str]:
     return [*lines, f"seen = {rows.add(late_measurement)}({given}, plant.torque_constant)"]
 
 
-def signals_before_start(rows: LaneRows) -> list[str]:
+def signals_before_start(rows: Rows) -> list[str]:
     """Fills the late signals with those at the start, which sensors show until the first have come."""
     if not rows.program.late_signals:
         return []
@@ -182,7 +183,7 @@ def signals_before_start(rows: LaneRows) -> list[str]:
     ]
 
 
-def sense_end(rows: LaneRows) -> list[str]:
+def sense_end(rows: Rows) -> list[str]:
     """What late sensors look at in a step or part, at its end, with the states that effects have then.
 
     A signal that is late by a fraction of a step is looked at by that much before its end, at ``look_at`` [s].
@@ -205,7 +206,7 @@ def look() -> list[str]:
     ]
 
 
-def remember_commands(rows: LaneRows) -> list[str]:
+def remember_commands(rows: Rows) -> list[str]:
     """Keeps the command of every step, where the valve gets it late."""
     if not rows.program.late_commands:
         return []
@@ -241,15 +242,30 @@ TRUE_MASSES = {name: f"masses.{name}" for name in ("mass_1", "mass_2")}
 """Where it has those that a recording has otherwise of gas with an energy balance, or that is not ideal."""
 
 
-def measure_sample(rows: LaneRows, moment: str) -> list[str]:
+def measure_sample(rows: Rows, moment: str) -> list[str]:
     """Meters and traces of sample ``next_record`` at ``moment``, counted in steps."""
-    return [*_meter_lines(rows, moment), *_trace_lines(rows, moment)]
+    if not isinstance(rows, RunRows):
+        return [*_meter_lines(rows, moment), *_trace_lines(rows, moment)]
+    begin, update = _meter_updates(rows)
+    paths = _traced_paths(rows.program)
+    metered = [
+        "if next_record == 0:",
+        *indent([*course_lines(rows), *rows.over_lanes([*follow_lines(rows), *begin])]),
+        "else:",
+        *indent(rows.over_lanes([*follow_lines(rows), *update])),
+    ]
+    shown = [paths.get(name, name) for name in rows.program.traced]
+    return [
+        *rows.over_lanes(sample_lines(rows, moment)),
+        *(metered if rows.program.meters else []),
+        "samples.before = samples.last",
+        *rows.over_lanes([f"samples.last = {rows.outputs}(0.0, {', '.join(shown)})"]),
+    ]
 
 
-def _meter_lines(rows: LaneRows, moment: str) -> list[str]:
+def _meter_updates(rows: Rows) -> tuple[list[str], list[str]]:
+    """Lines that begin the meters with the first sample, and those that take a further one."""
     program, add = rows.program, rows.add
-    if not program.meters:
-        return []
     groups = program.meter_groups
     moving = {group: kind for group, kind in groups.items() if not (program.is_held and kind.of_motion)}
     begin = [f"{group} = {add(kind.start)}(course, sample)" for group, kind in groups.items()]
@@ -257,6 +273,13 @@ def _meter_lines(rows: LaneRows, moment: str) -> list[str]:
     update = [rows.load(group) for group in moving]
     update += [f"{group} = {add(kind.update)}({group}, course, sample)" for group, kind in moving.items()]
     update += [line for group in moving for line in rows.store(group)]
+    return begin, update
+
+
+def _meter_lines(rows: LaneRows, moment: str) -> list[str]:
+    if not rows.program.meters:
+        return []
+    begin, update = _meter_updates(rows)
     lines = [*sample_lines(rows, moment), *follow_lines(rows)]
     return [
         "if next_record == 0:",
@@ -266,7 +289,7 @@ def _meter_lines(rows: LaneRows, moment: str) -> list[str]:
     ]
 
 
-def sample_lines(rows: LaneRows, moment: str) -> list[str]:
+def sample_lines(rows: Rows, moment: str) -> list[str]:
     """Lines that make the sample of a lane."""
     add, program = rows.add, rows.program
     has_reference = program.has_reference and not program.walks
@@ -316,7 +339,7 @@ def _row(name: str, values: dict[str, str]) -> str:
     return f"{name}({', '.join(f'{field}={value}' for field, value in values.items())})"
 
 
-def _stride_values(rows: LaneRows) -> dict[str, str]:
+def _stride_values(rows: Rows) -> dict[str, str]:
     """Where a walk is in its stride."""
     totals = ("strides", "push_off_work", "slap_rates", "clearances", "toe_landings")
     return {
@@ -328,7 +351,7 @@ def _stride_values(rows: LaneRows) -> dict[str, str]:
     }
 
 
-def _of_state(rows: LaneRows, path: str) -> str:
+def _of_state(rows: Rows, path: str) -> str:
     """A number of the state, 0 where this program has none."""
     return path if path in rows.state_at else "0.0"
 
@@ -344,21 +367,26 @@ def walk_traces(program: Program) -> dict[str, str]:
     return {name: path for name, path in found.items() if path}
 
 
+def _traced_paths(program: Program) -> dict[str, str]:
+    """Where a sample has channels that are no number of the state itself."""
+    return TRACED | walk_traces(program) | (TRUE_MASSES if program.has_true_masses else {})
+
+
 def _trace_lines(rows: LaneRows, moment: str) -> list[str]:
-    traced = rows.program.traced
-    if not traced:
+    if not rows.program.traced:
         return []
     # A trace with less room than samples keeps the last ones.
     place = "next_record // trace_every % trace.shape[0]"
-    paths = TRACED | walk_traces(rows.program) | (TRUE_MASSES if rows.program.has_true_masses else {})
-    keep = [f"trace[{place}, {row}, lane] = {paths.get(name, name)}" for row, name in enumerate(traced)]
+    paths = _traced_paths(rows.program)
+    traced = enumerate(rows.program.traced)
+    keep = [f"trace[{place}, {row}, lane] = {paths.get(name, name)}" for row, name in traced]
     return [
         "if next_record % trace_every == 0:",
         *indent(rows.over_lanes([*sample_lines(rows, moment), *keep])),
     ]
 
 
-def course_lines(rows: LaneRows) -> list[str]:
+def course_lines(rows: Rows) -> list[str]:
     """Lines that write the course of the reference into its rows, before the first sample.
 
     A monotone reference is largest at one of its ends, and where its hold starts shows on the way. Any other one is
@@ -393,7 +421,7 @@ def course_lines(rows: LaneRows) -> list[str]:
     ]
 
 
-def follow_lines(rows: LaneRows) -> list[str]:
+def follow_lines(rows: Rows) -> list[str]:
     """Lines that load the course, and follow it where its hold is not known ahead."""
     if not rows.program.follows_reference:
         return ["course = ()"]
@@ -406,5 +434,5 @@ def follow_lines(rows: LaneRows) -> list[str]:
     ]
 
 
-def _value(rows: LaneRows, number: str) -> str:
+def _value(rows: Rows, number: str) -> str:
     return f"{rows.add(rows.program.reference.value)}(reference, {number} * interval * timing.step)[0]"

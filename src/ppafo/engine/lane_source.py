@@ -1,9 +1,10 @@
 """Writes the source of the lane loop of one program: loads, calls and stores, with the rows as literals."""
 
-from ppafo.engine.lane_rows import VECTOR, LaneRows, indent
+from ppafo.engine.lane_rows import VECTOR, LaneRows, Rows, indent
 from ppafo.engine.lane_samples import control_loop, measure_sample, remember_commands, signals_before_start
 from ppafo.engine.lane_step import find_begin, over_rows, plant_loop
 from ppafo.engine.program import Program, link_program
+from ppafo.engine.run_rows import RunRows
 from ppafo.engine.source_text import Collector, SourceCollector
 
 HEADER = '''"""Generated from the functions of ppafo; their hash is in the file name. Not to be edited."""
@@ -92,7 +93,7 @@ def lane_loop(program: Program, collector: Collector, name: str, lanes: int = 0)
     return "\n".join(body)
 
 
-def all_steps(rows: LaneRows) -> list[str]:
+def all_steps(rows: Rows) -> list[str]:
     """The loop over steps, and the sample at the end of the run.
 
     Samples are ``interval`` steps apart, the first at 0 and the last with number ``last_record``. Most programs meet
@@ -112,7 +113,7 @@ def all_steps(rows: LaneRows) -> list[str]:
     ]
 
 
-def between_samples(rows: LaneRows) -> list[str]:
+def between_samples(rows: Rows) -> list[str]:
     """A step in which samples are due anywhere."""
     return [
         "reached = 0.0",
@@ -124,10 +125,10 @@ def between_samples(rows: LaneRows) -> list[str]:
     ]
 
 
-def at_sample(rows: LaneRows, moment: str) -> list[str]:
+def at_sample(rows: Rows, moment: str) -> list[str]:
     """What is done at a sample, if one is due at ``moment``, counted in steps."""
     is_metered = rows.program.is_metered
-    take = measure_sample(rows, moment) if is_metered else record_sample(rows)
+    take = measure_sample(rows, moment) if is_metered or isinstance(rows, RunRows) else record_sample(rows)
     # A program without meters takes no more samples than there is room for.
     last = "last_record" if is_metered else "record.shape[0] - 1"
     return [

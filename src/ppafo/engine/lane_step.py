@@ -13,11 +13,12 @@ end, and the state, unless its error refuses it.
 import re
 from typing import get_type_hints
 
-from ppafo.engine.lane_rows import HANDED, LaneRows, count_lanes, indent
+from ppafo.engine.lane_rows import HANDED, LaneRows, Rows, count_lanes, indent
 from ppafo.engine.lane_samples import present_pressures, pressures_of, sense_end
 from ppafo.engine.led_leg import torque_lines
-from ppafo.engine.pieces import Phases, RarePhase
+from ppafo.engine.pieces import Phases
 from ppafo.engine.rows import leaf_paths
+from ppafo.engine.run_rows import RunRows
 from ppafo.engine.scheme import motion, pneumatics
 from ppafo.engine.source_text import woven
 from ppafo.model import plant_faults
@@ -32,7 +33,7 @@ LARGEST = 1.0e300
 """A state beyond this, or one that is no number, is a failure."""
 
 
-def find_begin(rows: LaneRows) -> list[str]:
+def find_begin(rows: Rows) -> list[str]:
     """Finds what a step is handed by the one before, where there was none; of a held vane it lasts for all steps."""
     if not rows.program.hands_chambers_on:
         return []
@@ -41,29 +42,14 @@ def find_begin(rows: LaneRows) -> list[str]:
     return rows.over_lanes([*lines, *([] if rows.program.leg is None else rows.program.leg.find(rows))])
 
 
-def plant_loop(rows: LaneRows) -> list[str]:
+def plant_loop(rows: Rows) -> list[str]:
     """Valve, gas and vane up to ``goal`` [-], a share of the step; 1 for programs that are not parted."""
     if rows.program.is_parted:
         return step_in_parts(rows)
-    return over_phases(rows, [*opening(rows), *command_at_valve(rows), "length = timing.step"], phases(rows))
+    return rows.over_phases([*opening(rows), *command_at_valve(rows), "length = timing.step"], phases(rows))
 
 
-def over_phases(rows: LaneRows, prelude: list[str], all_phases: Phases) -> list[str]:
-    """Each phase in a loop of its own: loops this short let the processor work on several lanes at once.
-
-    It looks some hundred instructions ahead, and one lane's division or root waits for the one before.
-    """
-    lines: list[str] = []
-    for phase in all_phases:
-        if isinstance(phase, RarePhase):
-            loop = rows.over_lanes([*prelude, *phase.lines])
-            lines += [*count_lanes("wanting", f"{phase.cell} > 0.0"), "if wanting > 0:", *indent(loop)]
-        else:
-            lines += rows.over_lanes([*prelude, *phase])
-    return lines
-
-
-def opening(rows: LaneRows) -> list[str]:
+def opening(rows: Rows) -> list[str]:
     """Lines that load what a step needs."""
     names = ["timing", "plant", "valve", "result", "state", "valve_state"]
     for piece in (rows.program.gas, rows.program.leg, rows.program.feed):
@@ -75,19 +61,19 @@ def opening(rows: LaneRows) -> list[str]:
     return [*[rows.load(name) for name in names], time_of_step(rows), *leaks, "command = result.command"]
 
 
-def command_at_valve(rows: LaneRows) -> list[str]:
+def command_at_valve(rows: Rows) -> list[str]:
     """Line that makes the command that the valve follows, where an effect stands between."""
     is_other = any(at_valve in effect.laws for effect in rows.program.effects)
     return [f"command = {rows.add(at_valve)}(command)"] if is_other else []
 
 
-def time_of_step(rows: LaneRows) -> str:
+def time_of_step(rows: Rows) -> str:
     """Line that finds the time [s] at the begin of a step, from the start of the run."""
     step = "(step_index - start.step)" if rows.program.starts_apart else "step_index"
     return f"time = {step} * timing.step"
 
 
-def phases(rows: LaneRows) -> Phases:
+def phases(rows: Rows) -> Phases:
     """Both stages of the gas over ``length`` [s] from ``time`` [s], what leads to them, and the state at the end."""
     program = rows.program
     is_free = program.angle is None
@@ -104,7 +90,7 @@ def phases(rows: LaneRows) -> Phases:
     return [*before, [*feed(rows), *rows.keep("change"), *error], *reached, [*loaded, *finish(rows)]]
 
 
-def open_valve(rows: LaneRows) -> list[str]:
+def open_valve(rows: Rows) -> list[str]:
     """The valve, and the flows with which the step begins."""
     valve, feed, add = rows.program.valve, rows.program.feed, rows.add
     after = "next_valve" if rows.program.is_parted else "valve_state"
@@ -120,7 +106,7 @@ def open_valve(rows: LaneRows) -> list[str]:
     ]
 
 
-def connect(rows: LaneRows, *fed_from: str) -> list[str]:
+def connect(rows: Rows, *fed_from: str) -> list[str]:
     """The ports of both chambers; where lines feed them, at the pressures of a state of these."""
     feed = rows.program.feed
     source = "plant" if feed is None else feed.source(rows, *fed_from)
@@ -132,7 +118,7 @@ def connect(rows: LaneRows, *fed_from: str) -> list[str]:
     return [*lines, f"port_1, port_2 = {failed}(plant, plant_faults, shut_off, unpowered, port_1, port_2, time)"]
 
 
-def leak_now(rows: LaneRows) -> list[str]:
+def leak_now(rows: Rows) -> list[str]:
     """The plant with the leak that it has at the pressures of a stage, where that is not always the same.
 
     A valve that joins the chambers makes the leak between them as wide as it stands open.
@@ -146,7 +132,7 @@ def leak_now(rows: LaneRows) -> list[str]:
     return lines
 
 
-def lead(rows: LaneRows) -> list[str]:
+def lead(rows: Rows) -> list[str]:
     """Where the vane would be at the end of the step, ``next_angle``, and what else its motion needs then."""
     program, add = rows.program, rows.add
     if program.leg is not None:
@@ -162,7 +148,7 @@ def lead(rows: LaneRows) -> list[str]:
     ]
 
 
-def pass_gas(rows: LaneRows) -> list[str]:
+def pass_gas(rows: Rows) -> list[str]:
     """The flows of the second stage, at the pressures to which the first one leads."""
     program, add = rows.program, rows.add
     ends = program.gas.ends(rows, program.chambers)
@@ -180,7 +166,7 @@ def pass_gas(rows: LaneRows) -> list[str]:
     ]
 
 
-def states_ahead(rows: LaneRows, lines: list[str]) -> list[str]:
+def states_ahead(rows: Rows, lines: list[str]) -> list[str]:
     """Lines that predict, for the end of the first stage, the states that laws called in some lines ask for.
 
     Without them the flows of the second stage would have the states of the begin, and the order would fall to one.
@@ -197,7 +183,7 @@ def states_ahead(rows: LaneRows, lines: list[str]) -> list[str]:
     return [*begun_moment(rows), *predicted]
 
 
-def feed(rows: LaneRows) -> list[str]:
+def feed(rows: Rows) -> list[str]:
     """The second stage: the gas of the step, and in parts that may be refused the error of the gas."""
     program, add = rows.program, rows.add
     second = program.gas.second(rows, program.chambers)
@@ -214,7 +200,7 @@ def feed(rows: LaneRows) -> list[str]:
     return [*lines, f"gas_error = {error}" + (f" + {second.shifted}" if moves else "")]
 
 
-def feed_lines(rows: LaneRows) -> list[str]:
+def feed_lines(rows: Rows) -> list[str]:
     """Lines that bring what feeds the chambers to the end of the step, kept apart where it may be refused."""
     feed = rows.program.feed
     if feed is None:
@@ -225,7 +211,7 @@ def feed_lines(rows: LaneRows) -> list[str]:
     return [f"{state} = {feed.end(rows)}", *rows.store(state)]
 
 
-def finish(rows: LaneRows) -> list[str]:
+def finish(rows: Rows) -> list[str]:
     """The state at the end of a step or part, unless the part is refused; and the first time at which a run failed."""
     program, add = rows.program, rows.add
     fed = program.feed.stored.values() if program.feed is not None else ()
@@ -253,7 +239,7 @@ def finish(rows: LaneRows) -> list[str]:
     ]
 
 
-def end_motion(rows: LaneRows) -> list[str]:
+def end_motion(rows: Rows) -> list[str]:
     """Lines that lead to the state ``after`` the step, and in parts to the ``error`` of the motion."""
     program, add = rows.program, rows.add
     if program.leg is not None:
@@ -268,7 +254,7 @@ def end_motion(rows: LaneRows) -> list[str]:
     return [f"after = {add(motion.with_motion)}(fed, begun.next_angle, begun.next_rate)", "error = 0.0"]
 
 
-def advance_states(rows: LaneRows) -> list[str]:
+def advance_states(rows: Rows) -> list[str]:
     """Lines that bring the states of effects to the end of a step or part: ``NAME_state_after``."""
     stated = rows.program.stated
     if not stated:
@@ -289,7 +275,7 @@ def advance_states(rows: LaneRows) -> list[str]:
     return lines
 
 
-def state_errors(rows: LaneRows) -> list[str]:
+def state_errors(rows: Rows) -> list[str]:
     """Expressions of the errors of the states of effects in a part over what is allowed [-]."""
     found = []
     for name, kind in rows.program.stated.items():
@@ -301,20 +287,20 @@ def state_errors(rows: LaneRows) -> list[str]:
     return found
 
 
-def positive(rows: LaneRows) -> str:
+def positive(rows: Rows) -> str:
     """Condition that no mass is lost; false for what is no number."""
     feed = rows.program.feed
     names = masses_after(rows, *([] if feed is None else feed.stored.values()))
     return " and ".join(f"{name} > 0.0" for name in names)
 
 
-def masses_after(rows: LaneRows, *others: str) -> list[str]:
+def masses_after(rows: Rows, *others: str) -> list[str]:
     """Masses at the end of a step that must be above 0: of the gas, and of some other rows."""
     groups = ("after", *rows.program.gas.stored.values(), *others)
     return [f"{group}.mass_{number}" for group in groups for number in (1, 2)]
 
 
-def store_all(rows: LaneRows, flag: str) -> list[str]:
+def store_all(rows: Rows, flag: str) -> list[str]:
     """Lines that write the new state, where ``flag`` names a condition only under it."""
     lines = rows.store("state", "after", flag)
     for piece in (rows.program.gas, rows.program.leg):
@@ -329,7 +315,7 @@ def store_all(rows: LaneRows, flag: str) -> list[str]:
     return lines
 
 
-def judge(rows: LaneRows, flag: str = "") -> list[str]:
+def judge(rows: Rows, flag: str = "") -> list[str]:
     """The first time at which a run left what is possible."""
     gas = ", ".join(masses_after(rows))
     waits = f"not {flag} or " if flag else ""
@@ -341,13 +327,13 @@ def judge(rows: LaneRows, flag: str = "") -> list[str]:
     ]
 
 
-def states_are_possible(rows: LaneRows) -> str:
+def states_are_possible(rows: Rows) -> str:
     """Further conditions of a run that did not fail."""
     paths = (path for name, row in rows.program.effect_states.items() for path in leaf_paths(row, f"{name}_after"))
     return "".join(f" and abs({path}) < {LARGEST!r}" for path in paths)
 
 
-def begun_moment(rows: LaneRows) -> list[str]:
+def begun_moment(rows: Rows) -> list[str]:
     """Lines that make the moment ``now`` at the begin of a step, with the flows of its first stage."""
     first = rows.program.gas.first(rows, rows.program.chambers)
     return [
@@ -358,7 +344,7 @@ def begun_moment(rows: LaneRows) -> list[str]:
     ]
 
 
-def moment(rows: LaneRows, name: str, state: str) -> list[str]:
+def moment(rows: Rows, name: str, state: str) -> list[str]:
     """Lines that make a moment of the plant in some state, with the flows ``supplied`` and ``vented``."""
     given = f"{state}.angle, {state}.angular_velocity, pressure_1, pressure_2, supplied, vented, command"
     return [
@@ -367,7 +353,7 @@ def moment(rows: LaneRows, name: str, state: str) -> list[str]:
     ]
 
 
-def _slopes(rows: LaneRows, name: str, kind: State) -> str:
+def _slopes(rows: Rows, name: str, kind: State) -> str:
     return f"{name}_state_slopes = {rows.add(kind.slopes)}({name}, {name}_state, now)"
 
 
@@ -377,7 +363,7 @@ def _with_slopes(name: str, kind: State) -> list[tuple[str, str]]:
     return [(path, path.replace(f"{name}_state", f"{name}_state_slopes", 1)) for path in paths]
 
 
-def step_in_parts(rows: LaneRows) -> list[str]:
+def step_in_parts(rows: Rows) -> list[str]:
     """As many parts as the lane with the most of them needs; places of late commands are the same for all lanes."""
     places = []
     if rows.program.late_commands:
@@ -390,18 +376,24 @@ def step_in_parts(rows: LaneRows) -> list[str]:
         *places,
         f"for part in range({MAXIMUM_PARTS}):",
         *indent(rows.over_lanes([*part_opening(rows), *measure(rows)])),
-        *indent(put_aside(rows)),
-        *indent(over_phases(rows, inside, phases(rows))),
-        *indent(put_back(rows)),
-        *indent(count_lanes("waiting", f"{rows.remaining} > 0.0")),
-        "    if waiting == 0:",
+        *indent([] if isinstance(rows, RunRows) else put_aside(rows)),
+        *indent(rows.over_phases(inside, phases(rows))),
+        *indent(none_left(rows)),
         "        break",
         "else:",
         *indent(rows.over_lanes(give_up(rows))),
     ]
 
 
-def part_opening(rows: LaneRows) -> list[str]:
+def none_left(rows: Rows) -> list[str]:
+    """Lines that give lanes that waited their state again, and ask whether any has something left of its step."""
+    left = f"{rows.remaining} > 0.0"
+    if isinstance(rows, RunRows):
+        return [f"if not {left}:"]
+    return [*put_back(rows), *count_lanes("waiting", left), "if waiting == 0:"]
+
+
+def part_opening(rows: Rows) -> list[str]:
     """Lines that load what a part needs, and the command that the valve has in it."""
     lines = [*opening(rows), rows.load("pace"), f"before = {rows.before}", "time += before"]
     if rows.program.late_commands:
@@ -415,7 +407,7 @@ def part_opening(rows: LaneRows) -> list[str]:
     return [*lines, *command_at_valve(rows)]
 
 
-def measure(rows: LaneRows) -> list[str]:
+def measure(rows: Rows) -> list[str]:
     """Lines that find the length of a part; where the vane is free, until it meets a stop."""
     program, add = rows.program, rows.add
     lines = ["remaining = max(goal * timing.step - before, 0.0)", "until = remaining"]
@@ -471,7 +463,7 @@ def handed_aside(rows: LaneRows) -> dict[str, str]:
     return {path: f"x[{first + place}, lane]" for place, path in enumerate(paths)}
 
 
-def add_up(rows: LaneRows) -> list[str]:
+def add_up(rows: Rows) -> list[str]:
     """Lines that count the time of a part that is taken; the end of the last one is the goal to the last bit."""
     return [
         f"arrives = length >= {rows.remaining} and taken or {rows.remaining} == 0.0",
@@ -480,7 +472,7 @@ def add_up(rows: LaneRows) -> list[str]:
     ]
 
 
-def give_up(rows: LaneRows) -> list[str]:
+def give_up(rows: Rows) -> list[str]:
     """Lines that end a run whose step is not done after ``MAXIMUM_PARTS``: it failed where it is, and hurries on."""
     failure, cause = rows.cells["result.failure_time"], rows.cells["result.too_many_parts"]
     return [

@@ -6,6 +6,7 @@ are exact, unless the walk was told to take others. Built as ``FLAGS`` say, it g
 """
 
 import inspect
+import itertools
 import math
 import re
 import textwrap
@@ -30,6 +31,7 @@ from ppafo.translation.typed import (
     Items,
     Module,
     Row,
+    Shared,
     Statement,
     Term,
     Type,
@@ -52,6 +54,18 @@ _RESERVED = frozenset(
     )
     for word in line.split()
 )
+_OF_HEADERS = frozenset(
+    word
+    for line in (
+        "abs accept access acos acosh asin asinh atan atan2 atanh bind cbrt ceil connect copysign cos cosh erf erfc",
+        "exp2 expm1 fdim floor fma fmax fmin fmod frexp hypot ilogb index isnan isinf j0 j1 jn ldexp lgamma listen",
+        "div link llrint llround log10 log1p log2 logb lrint lround modf nan nearbyint nextafter pause pipe",
+        "raise read recv remainder remove remquo rename rindex rint round scalbln scalbn select send shutdown signal",
+        "sin sinh sleep socket sync system tan tanh tgamma time trunc unit unlink wait write y0 y1 yn",
+    )
+    for word in line.split()
+)
+"""Functions of headers, and names of the files around, that no function of a module may have."""
 _MACRO = re.compile(
     r"(_[A-Z_]|(PPAFO|ppafo|DBL|FLT|LDBL|FP|MATH|M|INT|UINT|INTMAX|UINTMAX|SIZE|PTRDIFF|WCHAR|WINT|SIG|INT\d+|UINT\d+)_)"
 )
@@ -80,6 +94,11 @@ def c_name(name: str, others: Collection[str] = (), outer: Collection[str] = ())
     return found
 
 
+def is_free(name: str) -> bool:
+    """True for a name that neither C nor its headers have."""
+    return c_name(name) == name and name not in _OF_HEADERS
+
+
 def member_name(kind: Row, name: str) -> str:
     """The member of a struct for a field of a row."""
     return c_name(name, [own for own, _ in kind.fields])
@@ -89,12 +108,15 @@ def member_name(kind: Row, name: str) -> str:
 class CTerms:
     """Writes terms; ``type_name`` gives the name of a type in C, ``name`` that of a local name.
 
-    ``places`` has names for the first places of some arrays.
+    ``places`` has names for the first places of some arrays, ``functions`` other names of functions; ``made`` is told
+    of every row that is made where no name is declared.
     """
 
     type_name: Callable[[Type], str]
     name: Callable[[str], str]
     places: Mapping[str, Sequence[str]]
+    functions: Mapping[str, str]
+    made: Callable[[Type], None]
 
     def term(self, item: Term, least: int = 0) -> str:
         """A term as text, in brackets where what is around it binds more than ``least``."""
@@ -156,9 +178,11 @@ class CTerms:
         return self.name(item.detail), _ATOM
 
     def _of_field(self, item: Term) -> tuple[str, int]:
-        kind = item.parts[0].type
+        kind, sign = item.parts[0].type, "."
+        if isinstance(kind, Shared):
+            kind, sign = kind.row, "->"
         assert isinstance(kind, Row)
-        return f"{self.term(item.parts[0], _ATOM)}.{member_name(kind, item.detail)}", _ATOM
+        return f"{self.term(item.parts[0], _ATOM)}{sign}{member_name(kind, item.detail)}", _ATOM
 
     def _of_item(self, item: Term) -> tuple[str, int]:
         owner = self.term(item.parts[0], _ATOM)
@@ -196,10 +220,20 @@ class CTerms:
 
     def _of_build(self, item: Term) -> tuple[str, int]:
         name = self.type_name(item.type)
+        self.made(item.type)
         return f"make_{name}({', '.join(self.term(part) for part in item.parts if not is_empty(part.type))})", _ATOM
 
     def _of_call(self, item: Term) -> tuple[str, int]:
-        return f"{item.detail}({', '.join(self.term(part) for part in item.parts)})", _ATOM
+        name = self.functions.get(item.detail, item.detail)
+        return f"{name}({', '.join(self.term(part) for part in item.parts)})", _ATOM
+
+    def listed(self, item: Term) -> str:
+        """A row or tuple as what a declaration begins with: its numbers in braces, those of rows in it likewise."""
+        if item.kind != "build":
+            return self.term(item)
+        text = ", ".join(self.listed(part) for part in item.parts if not is_empty(part.type))
+        is_array = isinstance(item.type, Items) and item.type.is_uniform
+        return f"{{{{{text}}}}}" if is_array else f"{{{text}}}"
 
     def _of_choice(self, item: Term) -> tuple[str, int]:
         test, yes, no = (self.term(part, _CHOICE + 1) for part in item.parts)
@@ -266,14 +300,28 @@ def documents_of(collector: SourceCollector) -> dict[str, str]:
     return {name: inspect.getdoc(item) or "" for name, item in collector.owners.items()}
 
 
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What makes a translation unit one for people: short names, and nothing that is not used.
+
+    ``names`` are the short ones by those of the module, where no two are the same; ``declared`` are structs that the
+    file around it declares, by their rows; ``around`` is that file. Functions are plain static ones.
+    """
+
+    names: Mapping[str, str]
+    declared: Mapping[str, str]
+    around: str
+
+
 def c_source(
     module: Module,
     documents: Mapping[str, str],
     title: str,
     places: Mapping[str, Sequence[str]] | None = None,
     prelude: str = "prelude.h",
+    reading: Reading | None = None,
 ) -> str:
-    """A translation unit with all functions of a module.
+    """A translation unit with all functions of a module; one for ``reading`` is shorter.
 
     ``documents`` has the docstrings of rows and functions; ``places`` has names for the first places of some arrays,
     which the file around it defines, ``x`` for those of all functions, ``advance.x`` for that of one. ``prelude`` is
@@ -281,17 +329,47 @@ def c_source(
     """
     # What returns nothing but empty rows is never called: an empty value is not written.
     functions = [item for item in module.functions if item.returns is None or not is_empty(item.returns)]
-    writer = _Writer(documents, {item.name for item in functions}, places or {})
+    names = {} if reading is None else _short_names(functions, reading)
+    writer = _Writer(documents, {names.get(item.name, item.name) for item in functions}, places or {}, names, reading)
     before = files("ppafo.translation").joinpath(prelude).read_text(encoding="utf-8")
     bodies = [writer.function(item) for item in functions]
     # Now all structs have their names, which no local name may hide: what has one is written again.
-    structs = {*writer.names.values(), *(f"make_{name}" for name in writer.names.values())}
-    writer.outer |= structs
+    names_of_structs = {*writer.names.values(), *(f"make_{name}" for name in writer.names.values())}
+    writer.outer |= names_of_structs
     for place, item in enumerate(functions):
-        if writer.locals[item.name] & structs:
+        if writer.locals[item.name] & names_of_structs:
             bodies[place] = writer.function(item)
     parts = [_PART] if any(f"{PART}(" in body for body in bodies) else []
-    return "\n".join([_comment(title), before, *parts, *writer.structs, *bodies])
+    structs = [text for kind in writer.structs for text in writer.written_struct(kind)]
+    if reading is not None:
+        own = "\n".join([*parts, *structs, *bodies])
+        before = before.replace("#if !defined(PPAFO_INLINE)\n", "", 1).replace("#endif\n", "", 1)
+        before = _prelude_for(before, own + reading.around)
+        return "\n".join([_comment(title), before, own]).replace("PPAFO_INLINE", "static")
+    return "\n".join([_comment(title), before, *parts, *structs, *bodies])
+
+
+def _short_names(functions: Sequence[Function], reading: Reading) -> dict[str, str]:
+    """Short names of functions in C by their own, with the number of a function for further types."""
+    found: dict[str, str] = {}
+    for item in functions:
+        found[item.name] = f"{reading.names.get(item.source, item.source)}{item.name.removeprefix(item.source)}"
+    return found
+
+
+_DEFINES = re.compile(r"(?:^|\s|\*)(ppafo_\w+)\(|\} (ppafo_\w+);|#define (PPAFO_\w+)")
+
+
+def _prelude_for(prelude: str, used: str) -> str:
+    """The parts of a prelude that something after them uses."""
+    kept: list[str] = []
+    for part in reversed(prelude.split("\n\n")):
+        head = part.split("{")[0] if "PPAFO_INLINE" in part else part
+        defined = {name for found in _DEFINES.finditer(head) for name in found.groups() if name}
+        words = set(re.findall(r"\w+", "\n".join([*kept, used])))
+        if not defined or words & (defined - {"PPAFO_INLINE"}):
+            kept.append(part)
+    return "\n\n".join(kept[::-1])
 
 
 def _comment(text: str, further: Iterable[str] = ()) -> str:
@@ -309,7 +387,10 @@ class _Writer:
     documents: Mapping[str, str]
     outer: set[str]
     places: Mapping[str, Sequence[str]]
-    structs: list[str] = field(default_factory=list)
+    functions: Mapping[str, str]
+    reading: Reading | None = None
+    structs: list[Type] = field(default_factory=list)
+    made: set[Type] = field(default_factory=set)
     names: dict[Type, str] = field(default_factory=dict)
     locals: dict[str, set[str]] = field(default_factory=dict)
     owner: str = ""
@@ -328,6 +409,10 @@ class _Writer:
             return _SCALARS[kind.name]
         if isinstance(kind, Array):
             return "ppafo_array"
+        if isinstance(kind, Shared):
+            return f"{self.type_name(kind.row)} *"
+        if self.reading is not None and isinstance(kind, Row) and kind.name in self.reading.declared:
+            return self.reading.declared[kind.name]
         if kind not in self.names:
             wanted = own = self.struct_name(kind)
             number = 1
@@ -335,17 +420,20 @@ class _Writer:
                 number += 1
                 own = f"{wanted}_{number}"
             self.names[kind] = own
-            self.structs.append(self.struct(kind, self.names[kind]))
+            for inner in _inside(kind):
+                self.type_name(inner)
+            self.structs.append(kind)
         return self.names[kind]
 
     def struct_name(self, kind: Type) -> str:
         """What a struct would be called if no other were."""
         if isinstance(kind, Row):
-            return kind.name
+            return kind.name if self.reading is None else self.reading.names.get(kind.name, kind.name)
         assert isinstance(kind, Items)
         if kind.is_uniform:
             return f"{self.type_name(kind.types[0]).removesuffix('_t')}s_{len(kind.types)}"
-        return f"{self.owner}_result"
+        owner = self.owner if self.reading is None else self.reading.names.get(self.owner, self.owner)
+        return f"{owner}_result"
 
     def members(self, kind: Type) -> list[tuple[str, Type]]:
         """Members of a struct that hold something, by their names in C."""
@@ -354,11 +442,12 @@ class _Writer:
         assert isinstance(kind, Items)
         return [(f"item_{place}", inner) for place, inner in enumerate(kind.types) if not is_empty(inner)]
 
-    def struct(self, kind: Type, name: str) -> str:
-        """A struct, and the function that makes one."""
+    def written_struct(self, kind: Type) -> list[str]:
+        """A struct, and the function that makes one; where people read, only one that is called."""
+        name = self.names[kind]
         if isinstance(kind, Items) and kind.is_uniform:
             inner, count = self.type_name(kind.types[0]), len(kind.types)
-            members = [("", f"{inner} item[{count}]")]
+            members = [("", f"{inner}{TIED}item[{count}]")]
             given = [f"{inner}{TIED}item_{place}" for place in range(count)]
             made, fill = "made", [f"made.item[{place}] = item_{place};" for place in range(count)]
         else:
@@ -372,7 +461,16 @@ class _Writer:
         declared = [f"    {text};".replace(TIED, " ") for _, text in members]
         head = _wrapped(f"PPAFO_INLINE {name} make_{name}({', '.join(given)})")
         body = ["{", f"    {name} {made};", *(f"    {line}" for line in fill), f"    return {made};", "}", ""]
-        return "\n".join([*([said] if said else []), "typedef struct {", *declared, f"}} {name};", "", *head, *body])
+        if self.reading is not None:
+            declared = _together(text for _, text in members)
+        struct = [*([said] if said else []), "typedef struct {", *declared, f"}} {name};", ""]
+        if self.reading is not None:
+            listed = ", ".join(item.rpartition(TIED)[2] for item in given)
+            both = "{{{}}}" if isinstance(kind, Items) and kind.is_uniform else "{{}}"
+            begin = _wrapped(f"    const {name} {made} = {both.replace('{}', listed)};", " " * 8)
+            body = ["{", *begin, f"    return {made};", "}", ""]
+            return [*struct, *([*head, *body] if kind in self.made else [])]
+        return ["\n".join([*struct, *head, *body])]
 
     def function(self, item: Function) -> str:
         """One function with its comment."""
@@ -381,12 +479,18 @@ class _Writer:
         body = writer.text()
         self.locals[item.name] = writer.used
         returns = "void" if item.returns is None else self.type_name(item.returns)
-        given = ", ".join(f"{self.type_name(kind)}{TIED}{writer.name(name)}" for name, kind in item.parameters)
-        linkage = f"{'PPAFO_ENTRY' if item.is_entry else 'PPAFO_INLINE'} {returns}"
-        head = _wrapped(f"{linkage} {item.name}({given or 'void'})")
+        changed = writer.scopes.changes.get(id(item.body), {})
+        given = ", ".join(
+            f"{'const ' if isinstance(kind, Shared) and name not in changed else ''}{self.type_name(kind)}"
+            f"{'' if isinstance(kind, Shared) else TIED}{writer.name(name)}"
+            for name, kind in item.parameters
+        )
+        is_shown = item.is_entry and self.reading is None
+        linkage = f"{'PPAFO_ENTRY' if is_shown else 'PPAFO_INLINE'} {returns}"
+        head = _wrapped(f"{linkage} {self.functions.get(item.name, item.name)}({given or 'void'})")
         bound = [f"Here {text}." for text in item.bound]
         said = _comment(self.documents.get(item.source, ""), bound)
-        prototype = [*head[:-1], f"{head[-1]};", ""] if item.is_entry else []
+        prototype = [*head[:-1], f"{head[-1]};", ""] if is_shown else []
         return "\n".join([*prototype, *([said] if said else []), *head, "{", *body, "}", ""])
 
 
@@ -395,7 +499,9 @@ class _Body:
 
     def __init__(self, writer: _Writer, item: Function, scopes: Scopes) -> None:
         self.writer = writer
-        self.terms = CTerms(writer.type_name, self.name, writer.places_in(item.source))
+        self.terms = CTerms(
+            writer.type_name, self.name, writer.places_in(item.source), writer.functions, writer.made.add
+        )
         self.item = item
         self.scopes = scopes
         self.kinds: dict[str, Type] = dict(item.parameters) | scopes.types
@@ -436,21 +542,38 @@ class _Body:
         if item.name in self.scopes.read and not is_empty(item.value.type):
             starts = self.scopes.first.get(id(item), "")
             declared = f"{starts}{self.writer.type_name(item.value.type)} " if starts else ""
-            yield from self.line(
-                f"{declared.replace('let ', '')}{self.name(item.name)} = {self.terms.term(item.value)};", level
-            )
+            is_listed = starts and self.writer.reading is not None
+            value = self.terms.listed(item.value) if is_listed else self.terms.term(item.value)
+            yield from self.line(f"{declared.replace('let ', '')}{self.name(item.name)} = {value};", level)
+
+    def write_note(self, item: typed.Note, level: int) -> Iterator[str]:
+        yield from self.line(_comment(item.text), level)
 
     def write_reserve(self, item: typed.Reserve, level: int) -> Iterator[str]:
         extents = "".join(f"[{extent}]" for extent in item.type.shape)
         yield from self.line(f"PPAFO_ALIGNED double {self.name(item.name)}{extents};", level)
 
     def write_store(self, item: typed.Store, level: int) -> Iterator[str]:
+        value = item.value
+        is_read = self.writer.reading is not None and not value.reads & item.element.reads
+        if is_read and value.kind == "build" and isinstance(value.type, Row):
+            for (name, kind), part in zip(value.type.fields, value.parts, strict=True):
+                if not is_empty(kind):
+                    yield from self.write_store(typed.Store(Term("field", kind, (item.element,), name), part), level)
+            return
         yield from self.line(f"{self.terms.term(item.element)} = {self.terms.term(item.value)};", level)
 
     def write_perform(self, item: typed.Perform, level: int) -> Iterator[str]:
-        yield from self.line(f"{item.function}({', '.join(map(self.terms.term, item.given))});", level)
+        name = self.writer.functions.get(item.function, item.function)
+        yield from self.line(f"{name}({', '.join(map(self.terms.term, item.given))});", level)
 
     def write_return(self, item: typed.Return, level: int) -> Iterator[str]:
+        if item.value.kind == "build" and self.writer.reading is not None:
+            made = c_name("made", self.kinds, {*self.writer.outer, *map(self.name, self.kinds)})
+            kind = self.writer.type_name(item.value.type)
+            yield from self.line(f"const {kind} {made} = {self.terms.listed(item.value)};", level)
+            yield from self.line(f"return {made};", level)
+            return
         yield from self.line(f"return {self.terms.term(item.value)};", level)
 
     def write_leave(self, item: typed.Leave, level: int) -> Iterator[str]:
@@ -490,6 +613,22 @@ class _Body:
             yield from self.line(f"{name} = {counter};", level + 1)
         yield from self.block(item.body, level + 1)
         yield from self.line("}", level)
+
+
+def _together(members: Iterable[str]) -> list[str]:
+    """Members of a struct, those of one type that follow each other in one declaration."""
+    lines: list[str] = []
+    for kind, group in itertools.groupby((text.split(TIED) for text in members), key=lambda pair: pair[0]):
+        lines += _wrapped(f"    {kind} {', '.join(pair[1] for pair in group)};", " " * 8)
+    return lines
+
+
+def _inside(kind: Type) -> list[Type]:
+    """Types of what a row or tuple is made of that are no numbers."""
+    if isinstance(kind, Row):
+        kind = Items(tuple(item for _, item in kind.fields))
+    inner = kind.types if isinstance(kind, Items) else ()
+    return [item for item in inner if not isinstance(item, typed.Scalar) and not is_empty(item)]
 
 
 def _wrapped(line: str, further: str = "    ") -> list[str]:

@@ -43,6 +43,8 @@ class Scopes:
             if made:
                 self.types[made[0]] = made[1]
                 changes[made[0]] = changes.get(made[0], 0) + 1
+            for name in _set_in(statement):
+                changes[name] = changes.get(name, 0) + 1
             for inner in _blocks(statement):
                 names, inner_changes = self.look(inner)
                 within |= names
@@ -163,6 +165,12 @@ def _made(statement: Statement) -> tuple[str, Type] | None:
     if isinstance(statement, typed.Reserve):
         return statement.name, statement.type
     return (statement.name, typed.INT) if isinstance(statement, typed.Count) else None
+
+
+def _set_in(statement: Statement) -> frozenset[str]:
+    """The name of a row of which a statement sets a field."""
+    is_field = isinstance(statement, typed.Store) and statement.element.kind != "element"
+    return statement.element.reads if isinstance(statement, typed.Store) and is_field else frozenset()
 
 
 def _blocks(statement: Statement) -> list[Block]:

@@ -52,7 +52,14 @@ class Handed:
     name: str
 
 
-Type: TypeAlias = Scalar | Row | Items | Array | Handed
+@dataclass(frozen=True, slots=True)
+class Shared:
+    """A row that is handed over by its place: what a function writes into it is seen outside."""
+
+    row: Row
+
+
+Type: TypeAlias = Scalar | Row | Items | Array | Handed | Shared
 
 
 _NONE: frozenset[str] = frozenset()
@@ -158,7 +165,14 @@ class Perform:
     given: tuple[Term, ...]
 
 
-Statement: TypeAlias = Assign | Reserve | Store | If | Count | While | Leave | Return | Perform
+@dataclass(frozen=True, slots=True)
+class Note:
+    """What a text that is written for translation says of the lines behind it."""
+
+    text: str
+
+
+Statement: TypeAlias = Note | Assign | Reserve | Store | If | Count | While | Leave | Return | Perform
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,9 +264,10 @@ def parts_of(term: Term, kind: Type) -> list[tuple[Term, Type]]:
 
 def field_of(term: Term, name: str) -> Term:
     """A field of a row."""
-    assert isinstance(term.type, Row)
-    place = [own for own, _ in term.type.fields].index(name)
-    return term.parts[place] if term.kind == "build" else Term("field", term.type.fields[place][1], (term,), name)
+    row = term.type.row if isinstance(term.type, Shared) else term.type
+    assert isinstance(row, Row)
+    place = [own for own, _ in row.fields].index(name)
+    return term.parts[place] if term.kind == "build" else Term("field", row.fields[place][1], (term,), name)
 
 
 def item_of(term: Term, place: int) -> Term:

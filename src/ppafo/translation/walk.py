@@ -29,6 +29,7 @@ from ppafo.translation.typed import (
     Module,
     Row,
     Scalar,
+    Shared,
     Statement,
     Term,
     Type,
@@ -131,7 +132,8 @@ class Expressions:
         if isinstance(node.value, ast.Name) and node.value.id == "math" and node.attr in CONSTANTS:
             return Term("number", FLOAT, (), CONSTANTS[node.attr])
         owner = self.term(node.value)
-        if not isinstance(owner.type, Row) or node.attr not in dict(owner.type.fields):
+        row = owner.type.row if isinstance(owner.type, Shared) else owner.type
+        if not isinstance(row, Row) or node.attr not in dict(row.fields):
             raise self.refused(node, f"'{ast.unparse(node)}' is no field")
         return typed.field_of(owner, node.attr)
 
@@ -471,6 +473,7 @@ class _FunctionWalk:
             module.found[definition.name] = Names.of(definition)
         found = module.found[definition.name]
         self.names, self.read = found.every, found.read
+        self.given = {item.arg for item in definition.args.args}
         self.made: set[str] = set()
         self.values = Expressions(
             self.types,
@@ -530,7 +533,7 @@ class _FunctionWalk:
 
     def do_expr(self, node: ast.Expr) -> list[Statement]:
         if isinstance(node.value, ast.Constant):
-            return []
+            return [typed.Note(node.value.value)] if isinstance(node.value.value, str) else []
         name = self.values.name_called(node.value) if isinstance(node.value, ast.Call) else ""
         if not isinstance(node.value, ast.Call) or name not in self.module.definitions:
             raise self.refused(node, f"'{ast.unparse(node)}' is no statement of the subset")
@@ -645,6 +648,8 @@ class _FunctionWalk:
         """A name or an element of an array gets a value."""
         if isinstance(target, ast.Name):
             return [self.assign(target.id, value, node)]
+        if isinstance(target, ast.Attribute):
+            return [self.set_field(target, value)]
         element = self.values.term(target) if isinstance(target, ast.Subscript) else value
         if not isinstance(target, ast.Subscript) or element.kind != "element" or not isinstance(value.type, Scalar):
             raise self.refused(node, f"'{ast.unparse(target)}' on the left")
@@ -652,6 +657,21 @@ class _FunctionWalk:
         if isinstance(owner, Array) and not owner.shape:
             self.writes = node
         return [typed.Store(element, converted(value, FLOAT))]
+
+    def set_field(self, target: ast.Attribute, value: Term) -> Statement:
+        """A field of a row gets a value, in a text that is written for translation: Python's rows do not change."""
+        element = self.values.term(ast.copy_location(ast.Attribute(target.value, target.attr, ast.Load()), target))
+        owner = element
+        while owner.kind in ("field", "item"):
+            owner = owner.parts[0]
+        is_shared = isinstance(owner.type, Shared)
+        if owner.kind != "name" or element is owner or (owner.detail in self.given and not is_shared):
+            raise self.refused(target, f"'{ast.unparse(target)}' on the left")
+        if joined(element.type, value.type) != element.type:
+            raise self.refused(target, f"'{ast.unparse(target)}' gets a value of another form")
+        if is_shared:
+            self.writes = target
+        return typed.Store(element, converted(value, element.type))
 
     def reserve(self, name: str, node: ast.Call) -> Statement:
         """A local array, whose shape is a literal."""

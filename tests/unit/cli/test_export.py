@@ -38,7 +38,7 @@ def test_the_commands_of_the_page_write_libraries(
         "torque_task_proportional.h",
     ]
     assert all((tmp_path / "out" / "c" / file).stat().st_size > 0 for file in files)
-    assert "settings->valve_area = 1.26e-05;" in (tmp_path / "out" / "wide" / "step_response.c").read_text()
+    assert '{"valve_area", 1.26e-05,' in (tmp_path / "out" / "wide" / "step_response.c").read_text()
 
 
 def test_the_commands_of_the_page_write_units(

@@ -1,7 +1,6 @@
 """The text of a lane loop says no more than what is needed."""
 
 from ppafo.engine.lane_rows import FIRST_CACHE, LANES, VECTOR, LaneRows, lanes_of, over_lanes
-from ppafo.engine.lane_step import over_phases
 from ppafo.engine.pieces import RarePhase
 from ppafo.engine.source_text import SourceCollector
 from ppafo.simulation.loading import load_scenario
@@ -50,7 +49,7 @@ def test_blocks_are_as_large_as_the_first_cache_allows_and_never_less_than_a_vec
 
 def test_a_rare_phase_is_passed_over_where_no_lane_needs_it() -> None:
     rows = LaneRows(plan_run(load_scenario("step-response")).program, SourceCollector(""))
-    text = "\n".join(over_phases(rows, [], [["x[1, lane] = 1.0"], RarePhase(["x[2, lane] = 3.0"], "x[0, lane]")]))
+    text = "\n".join(rows.over_phases([], [["x[1, lane] = 1.0"], RarePhase(["x[2, lane] = 3.0"], "x[0, lane]")]))
     for needed, left in (([0.0, 0.0], [2.0, 2.0]), ([0.0, 1.0], [3.0, 3.0])):
         cells = {(row, lane): value for lane, first in enumerate(needed) for row, value in enumerate((first, 0.0, 2.0))}
         exec(text, {"x": cells, "width": 2})

@@ -334,15 +334,12 @@ def built(scenario: Scenario, folder: Path) -> ctypes.CDLL:
     for name, content in c_library(scenario).items():
         (folder / name).write_bytes(content)
     source = folder / f"{c_identifier(scenario.name)}.c"
-    return ctypes.CDLL(str(shared_library(source, "-O0", "-ffp-contract=off", "-DPPAFO_ENTRY=extern", "-w")))
+    return ctypes.CDLL(str(shared_library(source, "-O0", "-ffp-contract=off", "-Dstatic=", "-Wl,-Bsymbolic", "-w")))
 
 
-class Handed(ctypes.Structure):
-    _fields_ = (("values", ctypes.POINTER(ctypes.c_double)), ("extent", ctypes.c_int64 * 3))
-
-
-def handed(values: Any) -> Handed:
-    return Handed(values.ctypes.data_as(ctypes.POINTER(ctypes.c_double)), (ctypes.c_int64 * 3)(values.size, 0, 0))
+def handed(values: Any) -> Any:
+    """Numbers where C has a struct of them."""
+    return values.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
 
 
 def drawn(scenario: Scenario) -> tuple[dict[str, Any], Scenario]:

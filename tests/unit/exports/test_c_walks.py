@@ -80,19 +80,16 @@ def written(walked: Scenario, folder: Path) -> str:
 def built(walked: Scenario, folder: Path) -> ctypes.CDLL:
     """The library of a walk, with the function from settings to numbers to be called from outside.
 
-    Its own calls stay inside of it: the C library of GNU has an ``advance`` too.
+    Its own calls stay inside of it: other libraries have functions of these names too.
     """
     source = folder / f"{written(walked, folder)}.c"
-    flags = ("-O0", "-ffp-contract=off", "-DPPAFO_ENTRY=extern", "-Wl,-Bsymbolic", "-w")
+    flags = ("-O0", "-ffp-contract=off", "-Dstatic=", "-Wl,-Bsymbolic", "-w")
     return ctypes.CDLL(str(shared_library(source, *flags)))
 
 
-class Handed(ctypes.Structure):
-    _fields_ = (("values", ctypes.POINTER(ctypes.c_double)), ("extent", ctypes.c_int64 * 3))
-
-
-def handed(values: Any) -> Handed:
-    return Handed(values.ctypes.data_as(ctypes.POINTER(ctypes.c_double)), (ctypes.c_int64 * 3)(values.size, 0, 0))
+def handed(values: Any) -> Any:
+    """Numbers where C has a struct of them."""
+    return values.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
 
 
 def drawn(settings: tuple[Setting, ...], draw: np.random.Generator) -> Values:

@@ -28,13 +28,6 @@ from ppafo.simulation.scenario import Control, Scenario, Sensors, worn_kind
 if TYPE_CHECKING:
     from ppafo.simulation.scenario import Scenario
 
-_ARRAYS = {
-    "given": "SETTINGS",
-    "prepared->parameters": "PARAMETERS",
-    "prepared->states": "STATES",
-    "prepared->counts": "COUNTS",
-}
-"""What the function from settings to the numbers of a run is handed, and how many there are of each."""
 _FLAWS = (
     *("sensors_angle_noise", "sensors_pressure_noise", "sensors_angle_resolution", "sensors_pressure_resolution"),
     *("sensors_angle_bandwidth", "sensors_pressure_bandwidth"),
@@ -73,18 +66,17 @@ def scenario_library(scenario: Scenario) -> Library:
         ),
     ]
     # Another program where samples lie between steps and did not, or the other way round.
-    interval = "prepared->counts[COUNT_INTERVAL]"
+    interval = "prepared->counts.interval"
     return Library(
         title=scenario.name,
         description=" ".join(scenario.description.split()),
         program=program,
         settings=settings,
         relations=relations_of(scenario),
-        preparation=_preparing(settings),
         switches=_switches(scenario.device, of_sensors),
         other_program=(f"({interval} != (double)(int64_t){interval}) != {_truth(program.program.samples_inside)}",),
         words=words_of(scenario, links),
-        further=lambda collector: preparation_of(scenario, program.program, collector),
+        further=lambda collector, boundary: preparation_of(scenario, program.program, collector, boundary),
         following=_following(settings, links),
         links=links,
     )
@@ -132,11 +124,10 @@ def walk_library(configuration: "Scenario") -> Library:
         program=program,
         settings=settings,
         relations=relations_of_walk(configuration),
-        preparation=_preparing(settings),
         switches=_switches(configuration.device, of_readings),
-        other_program=(f"(prepared->counts[COUNT_SIGNAL_DELAY] > 0.0) != {_truth(program.program.late_readings)}",),
+        other_program=(f"(prepared->counts.signal_delay > 0.0) != {_truth(program.program.late_readings)}",),
         words=words_of_walk(configuration, links, failing),
-        further=lambda collector: preparation_of_walk(configuration, program.program, collector),
+        further=lambda collector, boundary: preparation_of_walk(configuration, program.program, collector, boundary),
         following=_following(settings, links),
         links=links,
         defaults=frozenset(c_identifier(path) for path in links if not path.startswith("supply.")),
@@ -145,14 +136,7 @@ def walk_library(configuration: "Scenario") -> Library:
 
 def _following(settings: Sequence[Setting], links: Graph) -> Further | None:
     """What writes the function that lets settings follow others, None where none does."""
-    return (lambda collector: following_text(settings, links, collector)) if links else None
-
-
-def _preparing(settings: Sequence[Setting]) -> tuple[str, ...]:
-    """Lines of C that hand the settings over to the function that makes the numbers of a run of them."""
-    given = [f"given[SETTING_{item.name.upper()}] = settings->{item.name};" for item in settings]
-    arrays = ", ".join(f"array_of({name}, {count}, 0, 0)" for name, count in _ARRAYS.items())
-    return ("double given[SETTINGS];", *given, f"prepare({arrays});")
+    return (lambda collector, boundary: following_text(settings, links, collector, boundary)) if links else None
 
 
 def _switches(device: Device, others: Iterable[tuple[Sequence[str], bool]]) -> tuple[Switch, ...]:

@@ -14,7 +14,8 @@ from ppafo.engine.lanes import SIGNAL_ROWS
 from ppafo.engine.run import NEVER_FAILED
 from ppafo.engine.source_text import Collector
 from ppafo.exports import filled, licence, template
-from ppafo.exports.c_library.program import COUNTS, IN_PARTS, WHOLE, ExportedProgram, Further, c_text
+from ppafo.exports.c_library.boundary import Boundary
+from ppafo.exports.c_library.program import ExportedProgram, Further, c_text_of_run
 from ppafo.metrics import METRICS
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
@@ -57,24 +58,10 @@ OUTPUTS = {
     "gait_fraction": ("-", "time in the stride that the controller goes by, in turns"),
 }
 """Unit and meaning of what can be read at each sample."""
-_ALONE = """#if !defined(PPAFO_ENTRY)
-#define PPAFO_ENTRY static
-#endif
-/* Loops over lanes have one turn here, and an array of one lane may begin anywhere. */
-#define PPAFO_SIDE_BY_SIDE
-#define PPAFO_ALIGNED
-
-"""
-"""What the functions are told that stand in the file of a library."""
 UNITS = {"1": "-", "Pa_a": "Pa, absolute", "Pa_d": "Pa, a difference"}
 _SIGNS = {"below": "<", "at most": "<=", "at least": ">=", "above": ">"}
-_FILES = {
-    "interface.h": "{name}.h",
-    "main.c": "main.c",
-    "Makefile": "Makefile",
-    "CMakeLists.txt": "CMakeLists.txt",
-    "README.md": "README.md",
-}
+_FILES = {"Makefile": "Makefile", "CMakeLists.txt": "CMakeLists.txt"}
+"""Templates of files that every library has, and what they are called in it."""
 
 
 _OWN_FILES = {"main", "unit", "plugin", "fmi2", "fmi3", "makefile", "readme", "license"}
@@ -124,13 +111,33 @@ class Switch:
 
 
 @dataclass(frozen=True, slots=True)
+class Surface:
+    """How a library is called: templates of header, example, page and of the end of the source; ``words`` fill them.
+
+    The settings ``as_step`` are ``step`` whatever they are.
+    """
+
+    header: str
+    main: str
+    page: str
+    source: str
+    words: Mapping[str, str] = field(default_factory=dict)
+    step: str = ""
+    as_step: tuple[str, ...] = ()
+
+
+LOOP = Surface("interface.h", "main.c", "README.md", "loop.c")
+"""The closed loop, which goes from sample to sample."""
+
+
+@dataclass(frozen=True, slots=True)
 class Library:
     """What is to be written.
 
-    ``further`` adds the function that makes the numbers of a run from the settings, ``preparation`` has the lines of C
-    around it. ``switches`` choose the program, ``other_program`` has further conditions in C under which another would
-    be needed. ``following`` adds the function that lets settings follow others, None where none does, and ``defaults``
-    names those whose default does so, which has no range; ``links`` say what follows what. ``words`` fill the page.
+    ``further`` adds the function that makes the numbers of a run from the settings. ``switches`` choose the program,
+    ``other_program`` has further conditions in C under which another would be needed. ``following`` adds the function
+    that lets settings follow others, None where none does, and ``defaults`` names those whose default does so, which
+    has no range; ``links`` say what follows what. ``words`` fill the page. ``surface`` is how it is called.
     """
 
     title: str
@@ -138,7 +145,6 @@ class Library:
     program: ExportedProgram
     settings: tuple[Setting, ...]
     relations: tuple[Relation, ...]
-    preparation: tuple[str, ...]
     switches: tuple[Switch, ...]
     other_program: tuple[str, ...]
     words: Mapping[str, str]
@@ -146,6 +152,7 @@ class Library:
     following: Further | None = None
     defaults: frozenset[str] = frozenset()
     links: Graph = field(default_factory=dict)
+    surface: Surface = LOOP
 
     @property
     def name(self) -> str:
@@ -164,67 +171,58 @@ def library_files(library: Library) -> dict[str, bytes]:
     """All files of a library by name."""
     name, program = library.name, library.program
     words = _words(library, name)
-    texts = {
-        target.format(name=name): filled(template("c_library", source), words) for source, target in _FILES.items()
-    }
+    surface = library.surface
+    sources = {surface.header: f"{name}.h", surface.main: "main.c", surface.page: "README.md", **_FILES}
+    texts = {target: filled(template("c_library", source), words) for source, target in sources.items()}
     texts["LICENSE"] = licence()
-    head = f'#include "{name}.h"\n\n#include <string.h>\n\n{_ALONE}'
+    head = f'#include "{name}.h"\n\n#include <string.h>\n\n'
     title = f"{library.title}: the functions of ppafo {__version__} that a run is made of. Not to be edited."
     written = [add for add in (library.further, library.following) if add is not None]
 
-    def further(collector: Collector) -> str:
-        return "\n\n".join(add(collector) for add in written)
+    def further(collector: Collector, boundary: Boundary) -> str:
+        return "\n\n".join(add(collector, boundary) for add in written)
 
-    functions = c_text(program, title, [item.name for item in library.settings], further if written else None)
-    texts[f"{name}.c"] = f"{head}{functions}\n{filled(template('c_library', 'interface.c'), words)}"
+    settings = [item.name for item in library.settings]
+    interface = "".join(filled(template("c_library", file), words) for file in ("interface.c", surface.source))
+    functions = c_text_of_run(program, title, name, settings, further if written else None, interface)
+    texts[f"{name}.c"] = f"{head}{functions}\n{interface}"
     return {file: text.encode() for file, text in sorted(texts.items())}
 
 
-def run_words(library: Library, settings_type: str) -> dict[str, str]:
-    """Marks of every template in which a run of a library is made of its settings, a struct of that type."""
+def run_words(library: Library) -> dict[str, str]:
+    """Marks of every template in which a run of a library is made of its settings."""
     program = library.program
-    words = {
+    return {
         "never": repr(NEVER_FAILED),
         "same_moment": repr(SAME_MOMENT),
         "signal_rows": str(SIGNAL_ROWS),
-        "state_count": str(len(program.state_places)),
-        "parameter_count": str(len(program.parameter_places)),
-        "count_count": str(len(COUNTS)),
         "output_count": str(len(program.outputs)),
         "metric_count": str(len(program.metrics)),
         "setting_count": str(len(library.settings)),
-        "prepare": "\n".join(f"    {line}" for line in library.preparation),
         "other_program": other_program_of(library),
-        "settings_type": settings_type,
     }
-    return {**words, "prepared_run": filled(template("c_library", "prepared_run.c"), words)}
 
 
 def _words(library: Library, name: str) -> dict[str, str]:
     program = library.program
     outputs = ["time", *program.outputs]
     return {
-        **run_words(library, f"{name}_settings"),
+        **run_words(library),
         "name": name,
         "NAME": name.upper(),
         "title": library.title,
         "description": "\n * ".join(textwrap.wrap(_in_comment(library.description), 110)),
         "version": __version__,
-        "advance": _advance(program),
-        "follow": "" if library.following is None else f"    follow({', '.join(map(_all_of, ('before', 'all')))});",
+        "in_parts": in_parts(program),
+        "first": "".join(f"    before.{item} = before.{library.surface.step};\n" for item in library.surface.as_step),
+        "follow": "" if library.following is None else "    follow(&before, &all);",
         "settings": _members((item.name, item.quantity.unit, _said(item.quantity)) for item in library.settings),
         "outputs": _members((("time", "s", "since the start"), *((item, *OUTPUTS[item]) for item in program.outputs))),
         "metrics": _members((kind.name, kind.unit, kind.summary) for kind in program.metrics),
-        "defaults": "\n".join(f"    settings->{item.name} = {item.value!r};" for item in library.settings),
-        "ranges": "\n".join(
+        "table": "\n".join(_line_of_table(item, item.name in library.defaults) for item in library.settings),
+        "relations": "\n".join(
             f'    if (!({holds})) {{\n        return "{name}";\n    }}'
-            for holds, name in conditions_of(library, "chosen")
-        ),
-        "read_outputs": "\n".join(
-            f"    outputs->{item} = values[{place}];" for place, item in enumerate(program.outputs)
-        ),
-        "read_metrics": "\n".join(
-            f"    given->{kind.name} = found[METRIC_{kind.name.upper()}];" for kind in program.metrics
+            for holds, name in map(_related, library.relations)
         ),
         "csv_head": ",".join(outputs),
         "csv_form": ",".join(["%.17g"] * len(outputs)),
@@ -237,22 +235,18 @@ def _words(library: Library, name: str) -> dict[str, str]:
             f"{item.name} = {item.value!r};" for item in library.settings if item.name == "supply_pressure"
         ),
         **library.words,
+        **library.surface.words,
     }
 
 
-def _all_of(settings: str) -> str:
-    """Settings as an array in C."""
-    return f"array_of((double *)&{settings}, SETTINGS, 0, 0)"
-
-
-def _advance(program: ExportedProgram) -> str:
-    """The lane loop of a run in C."""
-    return f"(run->needs_parts == 1 ? {IN_PARTS} : {WHOLE})" if program.chooses_parts else WHOLE
+def in_parts(program: ExportedProgram) -> str:
+    """The last argument of the loop of a run in C, where it has both kinds of steps."""
+    return ", run->needs_parts" if program.chooses_parts else ""
 
 
 def steps_source(library: Library) -> str:
     """The function that does some steps of a run and takes a sample, for what stands behind the source of a library."""
-    words = {"name": library.name, "signal_rows": str(SIGNAL_ROWS), "advance": _advance(library.program)}
+    words = {"name": library.name, "signal_rows": str(SIGNAL_ROWS), "in_parts": in_parts(library.program)}
     return filled(template("c_library", "steps.c"), words)
 
 
@@ -288,13 +282,9 @@ def other_program_of(library: Library) -> str:
     return "".join(f"\n        || {item}" for item in (*switched, *library.other_program))
 
 
-def conditions_of(library: Library, given: str = "settings") -> list[tuple[str, str]]:
-    """What settings must keep, as text in C, with the setting that is named where it is not kept, as by no number.
-
-    ``given`` is what C calls them before they follow others.
-    """
-    ranges = [_range(item, given if item.name in library.defaults else "settings") for item in library.settings]
-    return [*ranges, *map(_related, library.relations)]
+def conditions_of(library: Library) -> list[tuple[str, str]]:
+    """What settings must keep, as text in C, with the setting that is named where it is not kept, as by no number."""
+    return [*map(_range, library.settings), *map(_related, library.relations)]
 
 
 def _related(item: Relation) -> tuple[str, str]:
@@ -305,13 +295,22 @@ def _related(item: Relation) -> tuple[str, str]:
     return f"settings->{item.name} {_SIGNS[item.relation]} {other}", item.name
 
 
-def _range(item: Setting, settings: str) -> tuple[str, str]:
+def _range(item: Setting) -> tuple[str, str]:
     """That a setting is a number that the declaration allows."""
-    quantity, value = item.quantity, f"{settings}->{item.name}"
-    sign = ">=" if quantity.minimum_allowed else ">"
-    low = max(quantity.minimum, -sys.float_info.max)
-    high = min(quantity.maximum, sys.float_info.max)
+    value, sign = f"settings->{item.name}", ">=" if item.quantity.minimum_allowed else ">"
+    low, high = _limits(item.quantity)
     return f"{value} {sign} {low!r} && {value} <= {high!r}", item.name
+
+
+def _line_of_table(item: Setting, is_as_chosen: bool) -> str:
+    """A setting with its default and its range, as C begins a struct of them."""
+    low, high = _limits(item.quantity)
+    marks = ", ".join("true" if mark else "false" for mark in (item.quantity.minimum_allowed, is_as_chosen))
+    return f'    {{"{item.name}", {item.value!r}, {low!r}, {high!r}, {marks}}},'
+
+
+def _limits(quantity: Quantity) -> tuple[float, float]:
+    return max(quantity.minimum, -sys.float_info.max), min(quantity.maximum, sys.float_info.max)
 
 
 _METRICS_OF_SCENARIO = """\

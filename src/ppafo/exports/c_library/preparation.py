@@ -13,6 +13,7 @@ from ppafo.engine.rows import leaf_paths, numbers, row_expression
 from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
 from ppafo.engine.scheme.motion import Pace
 from ppafo.engine.source_text import Collector, woven
+from ppafo.exports.c_library.boundary import Boundary
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
 from ppafo.exports.c_library.program import COUNTS
 from ppafo.model.actuators.kind import Range, mean_growth
@@ -54,31 +55,32 @@ from ppafo.simulation.plan import (
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, Scenario
 from ppafo.units import parse_quantity
 
-ENTRY = '@njit("void(float64[::1], float64[::1], float64[::1], float64[::1])")'
 FLAWS = ("angle_noise", "pressure_noise", "angle_resolution", "pressure_resolution")
 """Settings of noise and rounding, in the order of ``SensorParameters``."""
 
 
-FOLLOWING = '@njit("void(float64[::1], float64[::1])")'
-
-
-def following_text(settings: Sequence[Setting], links: Graph, collector: Collector) -> str:
+def following_text(settings: Sequence[Setting], links: Graph, collector: Collector, boundary: Boundary) -> str:
     """The composed function ``follow``: settings that still have their default follow others; see ``Graph``."""
     places = {item.path: place for place, item in enumerate(settings)}
+
+    def cell(array: str, path: str) -> str:
+        return boundary.cell(array, places[path], c_identifier(path))
+
     used = {source for found in links.values() for link in found for source in link.sources}
     rows: list[str] = []
-    lines = [f"{c_identifier(path)} = settings[{places[path]}]" for path in places if path in used - set(links)]
+    lines = [f"{c_identifier(path)} = {cell('settings', path)}" for path in places if path in used - set(links)]
     for path, found in links.items():
-        name, own = c_identifier(path), f"settings[{places[path]}]"
+        name, own = c_identifier(path), cell("settings", path)
         text = own
         for link in reversed(found):
             number = " + ".join([*(_term(term, rows, collector) for term in link.terms), repr(link.gap)])
-            source = places[link.sources[0]]
-            is_set = f"settings[{source}] != {settings[source].value!r}"
+            source = link.sources[0]
+            is_set = f"{cell('settings', source)} != {settings[places[source]].value!r}"
             text = f"(({number}) if {is_set} else {text})" if link.when_set else f"({number})"
         lines.append(f"{name} = {text} if {own} == {settings[places[path]].value!r} else {own}")
-        lines.append(f"followed[{places[path]}] = {name}")
-    return "\n".join([*rows, FOLLOWING, "def follow(settings, followed):", *indent(lines)])
+        lines.append(f"{cell('followed', path)} = {name}")
+    head = boundary.head("follow", dict.fromkeys(("settings", "followed"), "float64[::1]"))
+    return "\n".join([*rows, head, *indent(lines)])
 
 
 def _term(term: Term, rows: list[str], collector: Collector) -> str:
@@ -103,16 +105,14 @@ class Writing:
         self.needs = collector.needs
         self.rows: dict[str, list[str]] = {}
 
-    def text(self, settings: Iterable[Setting], lines: Iterable[str]) -> str:
+    def text(self, settings: Iterable[Setting], lines: Iterable[str], boundary: Boundary) -> str:
         """The composed function ``prepare`` of some lines, and the rows that only it has.
 
         The lines must name every group of rows of the program, ``counts_of_steps``, delays and ``needs_parts``.
         """
-        body = [f"{item.name} = settings[{place}]" for place, item in enumerate(settings)]
-        body += lines
-        for array, rows in {"parameters": self.program.parameter_rows(), "states": self._initial_rows()}.items():
-            paths = [path for name, row in rows.items() for path in leaf_paths(row, name)]
-            body += [f"{array}[{place}] = {path}" for place, path in enumerate(paths)]
+        body = [*boundary.named("settings", [item.name for item in settings], list(lines))]
+        body += boundary.given("parameters", self.program.parameter_rows())
+        body += boundary.given("states", self._initial_rows())
         counted = {
             "interval": "counts_of_steps.record_every",
             "steps": "counts_of_steps.step_count",
@@ -121,11 +121,10 @@ class Writing:
             "command_delay": "command_steps",
             "needs_parts": "1.0 if needs_parts else 0.0",
         }
-        body += [f"counts[{place}] = {counted[name]}" for place, name in enumerate(COUNTS)]
+        body += [f"{boundary.cell('counts', place, name)} = {counted[name]}" for place, name in enumerate(COUNTS)]
         own = [f"{name} = namedtuple({name!r}, {fields!r})" for name, fields in self.rows.items()]
-        return "\n".join(
-            [*own, ENTRY, "def prepare(settings, parameters, states, counts):", *indent(woven(body, self.needs))]
-        )
+        head = boundary.head("prepare", dict.fromkeys(("settings", "parameters", "states", "counts"), "float64[::1]"))
+        return "\n".join([*own, head, *indent(woven(body, self.needs))])
 
     def _initial_rows(self) -> dict[str, type]:
         """State rows that a run begins with; those of meters begin with the first sample."""
@@ -343,7 +342,7 @@ def used_numbers(device: Device, declared: Mapping[str, Quantity]) -> dict[str, 
     return {path: item for path, item in declared.items() if path not in unused}
 
 
-def preparation_of(scenario: Scenario, program: Program, collector: Collector) -> str:
+def preparation_of(scenario: Scenario, program: Program, collector: Collector, boundary: Boundary) -> str:
     """The composed function ``prepare`` of a scenario, once everything it calls is gathered."""
     writing = Writing(scenario.device, scenario.supply_lines, program, collector)
     leg = scenario.motion.leg if isinstance(scenario.motion, FreeMotion) else None
@@ -356,7 +355,7 @@ def preparation_of(scenario: Scenario, program: Program, collector: Collector) -
         *_pieces(scenario, writing),
         *_start(scenario, writing),
     ]
-    return writing.text(settings_of(scenario), lines)
+    return writing.text(settings_of(scenario), lines, boundary)
 
 
 def _steps(scenario: Scenario, writing: Writing) -> Iterator[str]:

@@ -6,8 +6,11 @@ What prepares and judges runs takes settings by their names as text, and numbers
 
 import ast
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
+from importlib.resources import files
 from types import FunctionType
 from typing import Any
 
@@ -18,8 +21,10 @@ from ppafo.engine.lane_samples import REQUEST, TRACED, walk_traces
 from ppafo.engine.lane_source import HEADER, INLINE, lane_loop
 from ppafo.engine.outline import Outline
 from ppafo.engine.program import Program, link_program
-from ppafo.engine.rows import leaf_paths, row_expression
+from ppafo.engine.rows import leaf_paths
+from ppafo.engine.run_source import LOOP_ARRAYS, LOOP_NUMBERS, run_loop
 from ppafo.engine.source_text import Collector, SourceCollector, woven
+from ppafo.exports.c_library.boundary import Arrays, Boundary, Structs, struct_of, struct_of_numbers
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import WALK, MetricKind, Readings
 from ppafo.model.columns import over_runs
@@ -31,6 +36,7 @@ from ppafo.simulation.ensemble.running import (
     thermal_totals,
     totals,
 )
+from ppafo.translation.typed import FLOAT, INT, Array, Row, Shared, Type
 
 
 def for_one_run(function: FunctionType, tree: ast.FunctionDef) -> ast.FunctionDef:
@@ -90,14 +96,18 @@ COUNTS = ("interval", "steps", "steps_per_sample", "signal_delay", "command_dela
 
 The last one is 1 where the error decides about the parts of a step, else 0.
 """
-Further = Callable[[Collector], str]
+Further = Callable[[Collector, Boundary], str]
 """Writes a further composed function, once it has gathered what that calls."""
+LOOP_TYPES: tuple[Type, ...] = (
+    *map(Array, LOOP_ARRAYS.values()),
+    *(FLOAT if kind == "float64" else INT for kind in LOOP_NUMBERS.values()),
+)
+"""Types of what the loop of a run takes beside its states and parameters."""
 WHOLE, IN_PARTS = "advance", "advance_in_parts"
 """Names of the lane loops in C: of whole steps or of the one there is, and of steps in parts where there are both."""
 TOGETHER = "_together"
 """Stands behind the name of a lane loop of several runs at once."""
 _STEPS = {WHOLE: "AT_STEP", IN_PARTS: "AT_PARTED"}
-METRICS_ENTRY = '@njit("void(float64[::1], float64[::1], float64[::1], int64, float64[::1])")'
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,12 +173,89 @@ def places_of(groups: Mapping[str, type]) -> dict[str, str]:
     return {path: f"AT_{re.sub(r'[^A-Za-z0-9]+', '_', path).strip('_').upper()}" for path in paths}
 
 
-def c_text(
-    item: ExportedProgram, title: str, settings: Sequence[str], further: Further | None = None, together: int = 0
+def c_text_of_run(
+    item: ExportedProgram, title: str, name: str, settings: Sequence[str], further: Further | None, around: str
 ) -> str:
+    """All functions of an exported program in C for people: of a single run, without lanes, between structs.
+
+    ``name`` begins the names of the structs of settings and metrics, which the file ``around`` it declares; ``further``
+    may add a function that takes ``settings``.
+    """
+    from ppafo.translation.c99 import Reading, c_source, documents_of
+    from ppafo.translation.walk import walk_module
+
+    collector = SourceCollector(INLINE, for_one_run)
+    program, structs = item.program, Structs()
+    link_program(program, collector)
+    entries = [metrics_entry(item, collector, structs)] if item.metrics else []
+    entries += [] if further is None else [further(collector, structs)]
+    loop = run_loop(item.loops[WHOLE], collector, f"{name}_outputs", item.loops.get(IN_PARTS))
+    composed = "\n\n".join([HEADER, collector.text(), loop, *entries, ""])
+    states = struct_of("run_states", program.state_rows(), collector.add)
+    parameters = struct_of("run_parameters", program.parameter_rows(), collector.add)
+    given = struct_of_numbers(f"{name}_settings", settings)
+    outputs = struct_of_numbers(f"{name}_outputs", ["time", *item.outputs])
+    samples = Shared(Row("run_samples", (("last", outputs.row), ("before", outputs.row))))
+    found = struct_of_numbers(f"{name}_metrics", [kind.name for kind in item.metrics])
+    types: dict[str, tuple[Type, ...]] = {
+        WHOLE: (states, parameters, samples, *LOOP_TYPES, *([INT] if item.chooses_parts else [])),
+        "metrics": (states, states, parameters, INT, found),
+        "prepare": (given, parameters, states, struct_of_numbers("run_counts", COUNTS)),
+        "follow": (given, given),
+    }
+    documents = documents_of(collector) | _DOCUMENTS
+    return c_source(
+        walk_module(composed, types),
+        documents,
+        title,
+        reading=Reading(_short(collector), {kind.row.name: kind.row.name for kind in (given, outputs, found)}, around),
+    )
+
+
+_DOCUMENTS = {
+    "Readings": Readings.__doc__ or "",
+    "run_states": "What changes in a run, group by group.",
+    "run_parameters": "What a run is made of and does not change.",
+    "run_counts": "Numbers of the steps; times in steps of the engine.",
+    "advance": "Take a run some steps further, with the samples that are due.",
+    "run_samples": "The last sample, and the one before.",
+    "metrics": "The metrics of a run, from its first and its last states.",
+    "prepare": "From the settings, in SI units, to the numbers of a run.",
+    "follow": "Let settings that still have their default follow others.",
+}
+
+
+def _short(collector: SourceCollector) -> dict[str, str]:
+    """Short names for the functions and rows of a module: their own, where no other has it and C leaves it free."""
+    from ppafo.translation.c99 import is_free
+
+    own = {name: name_of(item) for name, item in collector.owners.items()}
+    counts = Counter(own.values())
+    taken = _names_around()
+    return {name: short for name, short in own.items() if counts[short] == 1 and short not in taken and is_free(short)}
+
+
+@cache
+def _names_around() -> frozenset[str]:
+    """Names of functions in the files around a library, of which some take its source in, and of its own entries."""
+    folders = [files("ppafo.exports").joinpath(folder, "templates") for folder in ("c_library", "fmu", "mujoco")]
+    sources = [item for folder in folders for item in folder.iterdir() if item.name.endswith(".c")]
+    found = (_FUNCTION.findall(item.read_text(encoding="utf-8")) for item in sources)
+    return frozenset(("advance", "metrics", "prepare", "follow")).union(*found)
+
+
+_FUNCTION = re.compile(r"^(?:static )?[\w ]+\b\*?(\w+)\(", re.MULTILINE)
+
+
+def name_of(item: Any) -> str:
+    """The name of a function or row of Python as one of C."""
+    return re.sub(r"\W", "_", str(item.__qualname__)).strip("_")
+
+
+def c_text(item: ExportedProgram, title: str, settings: Sequence[str], further: Further | None, together: int) -> str:
     """All functions of an exported program in C; ``further`` may add one that takes ``settings``, which are named.
 
-    With ``together`` each lane loop stands there once more, with ``TOGETHER`` after its name, for so many runs at once.
+    Each lane loop stands there for one run and, with ``TOGETHER`` after its name, for so many runs at once.
     """
     from ppafo.translation.c99 import c_source, documents_of
     from ppafo.translation.walk import walk_module
@@ -217,10 +304,10 @@ def outline_of(item: ExportedProgram, settings: Sequence[str], further: Further 
 
 def _composed_text(item: ExportedProgram, collector: Collector, further: Further | None, together: int) -> str:
     link_program(item.program, collector)
-    entries = [metrics_entry(item, collector), *([] if further is None else [further(collector)])]
+    arrays = Arrays()
+    entries = [metrics_entry(item, collector, arrays), *([] if further is None else [further(collector, arrays)])]
     loops = [lane_loop(program, collector, name, lanes=1) for name, program in item.loops.items()]
-    if together:
-        loops += [lane_loop(program, collector, name + TOGETHER, together) for name, program in item.loops.items()]
+    loops += [lane_loop(program, collector, name + TOGETHER, together) for name, program in item.loops.items()]
     return "\n\n".join([HEADER, collector.text(), *loops, *entries, ""])
 
 
@@ -242,7 +329,7 @@ def _enumeration(said: str, names: Sequence[str], first: int = 0) -> str:
     return f"/* {said} */\nenum {{\n{lines}\n}};\n"
 
 
-def metrics_entry(item: ExportedProgram, collector: Collector) -> str:
+def metrics_entry(item: ExportedProgram, collector: Collector, boundary: Boundary) -> str:
     """The metrics of a run, from its first and its last states."""
     program, groups = item.program, item.program.state_rows()
     names = [kind.name for kind in program.meters]
@@ -253,23 +340,29 @@ def metrics_entry(item: ExportedProgram, collector: Collector) -> str:
     further = ", plant, thermal" if program.is_thermal else ""
     parameters = program.parameter_rows()
     given = ("plant", *program.gas.parameters, *(effect.name for effect in program.effects))
-    lines = [f"{name} = {_loaded(name, parameters, 'parameters', collector)}" for name in given]
-    lines += [f"{name} = {_loaded(name, groups, 'states', collector)}" for name in program.effect_states]
+    lines = [f"{name} = {boundary.taken('parameters', name, parameters, collector.add)}" for name in given]
+    lines += [f"{name} = {boundary.taken('states', name, groups, collector.add)}" for name in program.effect_states]
     add = collector.add
     for array in ("first", "states"):
-        state = _loaded("state", groups, array, collector)
-        masses = f", {_loaded('masses', groups, array, collector)}" if program.has_true_masses else ""
+        state = boundary.taken(array, "state", groups, collector.add)
+        masses = f", {boundary.taken(array, 'masses', groups, collector.add)}" if program.has_true_masses else ""
         lines.append(f"{array}_total = {add(make)}({state}{masses}{further})")
     gains = ", ".join(f"{name}=states_total.{name} - first_total.{name}" for name in kind._fields)
     meters = ", ".join(
-        f"{name}={_loaded(group, groups, 'states', collector)}"
+        f"{name}={boundary.taken('states', group, groups, collector.add)}"
         for name, group in zip(names, program.meter_groups, strict=True)
     )
-    course = _loaded("course", groups, "states", collector)
+    course = boundary.taken("states", "course", groups, collector.add)
     lines += [
         f"readings = Readings(meters=Meters({meters}), course={course}, samples=samples, gains={add(kind)}({gains}))",
-        *(f"found[{place}] = {add(metric.read)}(readings)" for place, metric in enumerate(item.metrics)),
+        *(
+            f"{boundary.cell('found', place, metric.name)} = {add(metric.read)}(readings)"
+            for place, metric in enumerate(item.metrics)
+        ),
     ]
+    numbers = "float64[::1]"
+    parameters_of_metrics = dict.fromkeys(("first", "states", "parameters"), numbers)
+    parameters_of_metrics |= {"samples": "int64", "found": numbers}
     rows = [
         f"Meters = namedtuple('Meters', {names!r})",
         "Readings = namedtuple('Readings', ['meters', 'course', 'samples', 'gains'])",
@@ -277,15 +370,7 @@ def metrics_entry(item: ExportedProgram, collector: Collector) -> str:
     return "\n".join(
         [
             *rows,
-            METRICS_ENTRY,
-            "def metrics(first, states, parameters, samples, found):",
+            boundary.head("metrics", parameters_of_metrics),
             *indent(woven(lines, collector.needs)),
         ]
     )
-
-
-def _loaded(group: str, groups: Mapping[str, type], array: str, collector: Collector) -> str:
-    """The NamedTuple of a group of rows, from an array of all of them."""
-    paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
-    cells = {path: f"{array}[{place}]" for place, path in enumerate(paths)}
-    return row_expression(groups[group], group, cells, collector.add)

@@ -10,6 +10,7 @@ from ppafo.control.walking.catalog import walking_controllers
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import Collector
 from ppafo.errors import ScenarioError
+from ppafo.exports.c_library.boundary import Boundary
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
 from ppafo.exports.c_library.preparation import SAID, Writing, declared_settings
 from ppafo.model.declaration import Quantity
@@ -164,7 +165,7 @@ def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:
     )
 
 
-def preparation_of_walk(configuration: Scenario, program: Program, collector: Collector) -> str:
+def preparation_of_walk(configuration: Scenario, program: Program, collector: Collector, boundary: Boundary) -> str:
     """The composed function ``prepare`` of a walk, once everything it calls is gathered."""
     writing = Writing(configuration.device, configuration.supply_lines, program, collector)
     lines = [
@@ -177,7 +178,7 @@ def preparation_of_walk(configuration: Scenario, program: Program, collector: Co
         *_pieces(configuration, writing),
         *_start(configuration, writing),
     ]
-    return writing.text(settings_of_walk(configuration), lines)
+    return writing.text(settings_of_walk(configuration), lines, boundary)
 
 
 def _leg(configuration: Scenario, writing: Writing) -> Iterator[str]:

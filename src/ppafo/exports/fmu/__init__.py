@@ -14,19 +14,16 @@ import sys
 import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 
-from ppafo.control.catalog import PROFILES
-from ppafo.control.controllers import switching
 from ppafo.errors import ProgramError, ScenarioError, nearest_name
 from ppafo.exports import filled, licence, template
-from ppafo.exports.c_library import commanded, library_of
-from ppafo.exports.c_library.files import library_files, steps_source
-from ppafo.exports.c_library.walk_preparation import check_can_leave
+from ppafo.exports.c_library import library_of
+from ppafo.exports.c_library.files import library_files
+from ppafo.exports.c_library.plant import follow_lines, plant_of, surfaced
 from ppafo.exports.fmu.description import (
-    Input,
     Interface,
     build_description_of_fmi3,
     change_of,
@@ -34,22 +31,9 @@ from ppafo.exports.fmu.description import (
     description_of_fmi3,
     variability_of,
 )
-from ppafo.model.valves.kind import VENT
-from ppafo.simulation.plan import outside_torque, profile_parameters, step_counts
-from ppafo.simulation.scenario import (
-    Control,
-    FreeMotion,
-    PrescribedMotion,
-    ProfileChoice,
-    Scenario,
-    Sensors,
-    worn_kind,
-)
+from ppafo.simulation.scenario import Scenario
 from ppafo.translation.native import asked, complaint
 from ppafo.version import __version__
-from ppafo.walking.declaration import FORCES
-from ppafo.walking.motion import walk_of
-from ppafo.walking.preparation import FaultSettings
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv")
 _ANOTHER = "install gcc, clang or 'pip install ppafo[native]' anew"
@@ -271,107 +255,35 @@ def _archive(contents: Mapping[str, bytes]) -> bytes:
     return target.getvalue()
 
 
-COMMAND = Input("command", "-", "command to the valve, clipped to -1 to 1; above 0 feeds chamber 1", 0.0, -1.0, 1.0)
-WALKING_COMMAND = Input(
-    "command",
-    "-",
-    "command to the valve, clipped to -1 to 2; above 0 feeds chamber 1, above 1.5 vents both",
-    VENT,
-    -1.0,
-    VENT,
-)
 PLANT_TIME = (
     "Inputs are taken at the beginning of a communication step. It is a multiple of <code>run.step</code>; the engine "
     "divides it further where its error asks for that. {motion} There is no end."
 )
-LED = "From there on the angle goes on with the angular velocity that is given; the next step begins at the next angle."
-FREE = "The external torque is constant until the next one."
-ON_LEG = "The leg walks on by its gait."
 PLANT_TUNING = "They are taken at the next communication step."
-
-_FOLLOW_ANGLE = """\
-    settings->motion_profile_start_level = inputs[1];
-    settings->motion_profile_level = inputs[1] + inputs[2] * 0.0078125;
-    settings->motion_profile_ramp_start = 0.0;
-    settings->motion_profile_ramp_time = 0.0078125; /* short: a fast ankle stays in the range of a level */"""
-_LEAD_ANGLE = """\
-    rows[PARAMETER_PATH_START_LEVEL] = inputs[1];
-    rows[PARAMETER_PATH_LEVEL] = inputs[1] + inputs[2] * (2.0 * length);
-    rows[PARAMETER_PATH_RAMP_START] = time;
-    rows[PARAMETER_PATH_RAMP_TIME] = 2.0 * length;"""
 
 
 def plant_alone(item: Scenario) -> Interface:
     """The plant; a free vane takes an external torque, one whose angle is prescribed takes angle and rate.
 
-    That of a walk is the device on its walking leg, which takes the command alone.
+    That of a walk is the device on its walking leg, which takes the command alone. It is that of ``export c``.
     """
-    chosen = _led_vane(item) if worn_kind(item) is None else _commanded_walk(item)
-    library, motion = library_of(chosen), chosen.motion
-    command, unseen, highest = COMMAND, {"command", "reference"}, 1.0
-    further: tuple[Input, ...] = ()
-    if isinstance(motion, PrescribedMotion):
-        said, follow, lead = LED, _FOLLOW_ANGLE, _LEAD_ANGLE
-        angle = motion.profile.settings["start_level"]
-        further = (
-            Input("angle", "rad", "angle of the ankle, 90 deg neutral, growing in plantarflexion", angle),
-            Input("angular_velocity", "rad/s", "its rate", 0.0),
-        )
-        unseen |= {"angle", "angular_velocity"}
-    elif isinstance(motion, FreeMotion):
-        # T_ex of a vane alone, or T_2 of the ankle of a leg, which is opposed.
-        torque = "motion_external_torque = inputs[1]" if motion.leg is None else "motion_ankle_torque = -inputs[1]"
-        said, follow = FREE, f"    settings->{torque};"
-        lead = "    rows[PARAMETER_PLANT_EXTERNAL_TORQUE] = inputs[1];"
-        joint = "T_ex on the joint" if motion.leg is None else "on the ankle of the leg, -T_2"
-        words = f"torque {joint}, above 0 works against plantarflexion"
-        further = (Input("external_torque", "N m", words, outside_torque(motion)),)
-    else:
-        command, highest = WALKING_COMMAND, VENT
-        said, follow, lead = ON_LEG, "", ""
-    hidden = {"run.duration", "run.output_interval", "controller.period", "controller.command"}
-    unused = ("sensors.", "motion.profile.", "motion.external_torque", "motion.ankle_torque")
+    alone = surfaced(plant_of(item))
+    library = alone.library
+    given = ", ".join(f"inputs[{place}]" for place in range(len(alone.inputs)))
+    numbers = {name.name: f"inputs[{place}]" for place, name in enumerate(alone.inputs)}
     return Interface(
-        name=chosen.name,
+        name=library.title,
         library=library,
         template="plant.c",
-        time=PLANT_TIME.format(motion=said),
+        time=PLANT_TIME.format(motion=alone.motion),
         tuning=PLANT_TUNING,
-        step=chosen.time_step,
+        step=alone.step,
         duration=item.duration,
-        outputs=tuple(name for name in library.program.outputs if name not in unseen),
+        outputs=library.program.outputs,
         shows_metrics=False,
         is_step_fixed=True,
         clock=None,
-        hidden=frozenset(hidden | {item.path for item in library.settings if item.path.startswith(unused)}),
-        inputs=(command, *further),
-        words={"steps": steps_source(library), "highest": repr(highest), "follow": follow, "lead": lead},
-    )
-
-
-def _led_vane(scenario: Scenario) -> Scenario:
-    """The scenario under a command; an ankle is led from outside, from where the scenario has it at the start."""
-    motion = scenario.motion
-    if isinstance(motion, PrescribedMotion):
-        found: tuple[float, float, float] = PROFILES[motion.profile.kind].value(profile_parameters(motion.profile), 0.0)
-        settings = {"start_level": found[0], "level": found[0], "ramp_start": 0.0, "ramp_time": 2.0}
-        motion = PrescribedMotion(ProfileChoice("ramp_hold", settings))
-    return replace(commanded(scenario), motion=motion)
-
-
-def _commanded_walk(walk: Scenario) -> Scenario:
-    """The walk with a command that is handed in at every step, and sensors that nobody looks at."""
-    check_can_leave(walk)
-    step = step_counts(1.0, walk.time_step, 1.0, walk.control.period).step
-    motion = walk_of(walk)
-    # The forces under the foot are among the outputs.
-    forces = dict.fromkeys(FORCES, 0.0) | {"force_bandwidth": motion.forces["force_bandwidth"]}
-    return replace(
-        walk,
-        name=f"{walk.name}-plant",
-        description=f"The plant alone of this walk, on its leg: {walk.description}",
-        control=Control(switching.CONSTANT.name, {"command": 0.0}, step),
-        time_step=step,
-        sensors=Sensors(),
-        motion=replace(motion, forces=forces, faults={sensor: FaultSettings() for sensor in motion.faults}),
+        hidden=alone.hidden,
+        inputs=alone.inputs,
+        words={"inputs": given, "follow": follow_lines(alone, "settings", numbers)},
     )

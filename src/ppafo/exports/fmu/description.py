@@ -6,6 +6,7 @@ from typing import Any
 from xml.etree import ElementTree as Xml
 
 from ppafo.exports.c_library.files import OUTPUTS, Library, Setting
+from ppafo.exports.c_library.plant import Input
 from ppafo.units import base_value, dimension
 from ppafo.version import __version__
 
@@ -33,18 +34,6 @@ class Variable:
     causality: str
     variability: str
     start: float | None = None
-    minimum: float | None = None
-    maximum: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Input:
-    """What a unit is given at each step: name, unit, meaning, first value and limits, None for none."""
-
-    name: str
-    unit: str
-    summary: str
-    start: float
     minimum: float | None = None
     maximum: float | None = None
 

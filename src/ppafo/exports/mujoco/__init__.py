@@ -145,7 +145,7 @@ def plugin_library(scenario: Scenario) -> Library:
         library,
         title=scenario.name,
         program=ExportedProgram(program, tuple(kind for kind in library.program.metrics if not kind.meters)),
-        further=lambda collector: preparation_of(chosen, program, collector),
+        further=lambda collector, boundary: preparation_of(chosen, program, collector, boundary),
     )
 
 

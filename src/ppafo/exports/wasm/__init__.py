@@ -82,8 +82,16 @@ from ppafo.engine.outline import file_hash
 from ppafo.errors import PpafoError, ProgramError
 from ppafo.exports import filled, template
 from ppafo.exports.c_library import library_of
-from ppafo.exports.c_library.files import OUTPUTS, Library, Setting, c_identifier, conditions_of, run_words
-from ppafo.exports.c_library.program import IN_PARTS, TOGETHER, WHOLE, ExportedProgram, c_text, outline_of
+from ppafo.exports.c_library.files import (
+    OUTPUTS,
+    Library,
+    Setting,
+    c_identifier,
+    conditions_of,
+    other_program_of,
+    run_words,
+)
+from ppafo.exports.c_library.program import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, c_text, outline_of
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, Term, itself
@@ -321,6 +329,7 @@ _RULES_OF_TIMES = (
 _COMMENT = re.compile(r"\s*/\*.*?\*/\s*", re.DOTALL)
 _INSIDE = re.compile(r"(?:PPAFO_INLINE\s[\w\s*]*?\b|^\} )(\w+)(?=[(;])", re.MULTILINE)
 """Declarations of functions and types that are not visible outside a module."""
+_COUNT = re.compile(r"counts\.(\w+)")
 _HOW_TO_INSTALL = "pip install 'ppafo[workbench]'"
 
 
@@ -357,7 +366,8 @@ def _unit(library: Library, functions: str) -> str:
     program, names = library.program, [item.name for item in library.settings]
     refused = "    if (!({})) {{\n        return SETTING_{};\n    }}"
     words = {
-        **run_words(library, "run_settings"),
+        **run_words(library),
+        **_array_words(library),
         "functions": functions,
         "lanes": str(LANES),
         "go_on": _chosen_loop(program, ""),
@@ -366,6 +376,33 @@ def _unit(library: Library, functions: str) -> str:
         "conditions": "\n".join(refused.format(holds, name.upper()) for holds, name in _conditions(library)),
     }
     return filled(template("wasm", "module.c"), words)
+
+
+_ARRAYS = {
+    "given": "SETTINGS",
+    "prepared->parameters": "PARAMETERS",
+    "prepared->states": "STATES",
+    "prepared->counts": "COUNTS",
+}
+"""What the function from settings to the numbers of a run is handed, and how many there are of each."""
+
+
+def _array_words(library: Library) -> dict[str, str]:
+    """Marks of what makes arrays of the numbers of a run from its settings."""
+    program = library.program
+    given = [f"given[SETTING_{item.name.upper()}] = settings->{item.name};" for item in library.settings]
+    arrays = ", ".join(f"array_of({name}, {count}, 0, 0)" for name, count in _ARRAYS.items())
+    lines = ("double given[SETTINGS];", *given, f"prepare({arrays});")
+    words = {
+        **run_words(library),
+        "settings_type": "run_settings",
+        "state_count": str(len(program.state_places)),
+        "parameter_count": str(len(program.parameter_places)),
+        "count_count": str(len(COUNTS)),
+        "prepare": "\n".join(f"    {line}" for line in lines),
+        "other_program": _COUNT.sub(lambda found: f"counts[COUNT_{found[1].upper()}]", other_program_of(library)),
+    }
+    return {**words, "prepared_run": filled(template("wasm", "prepared_run.c"), words)}
 
 
 def _conditions(library: Library) -> list[tuple[str, str]]:

@@ -5,18 +5,12 @@ static bool advance_steps(@name@_run *run, int64_t steps)
     const int64_t slots = run->signal_delay + 2;
     const int64_t until = run->steps_done + steps;
     const int64_t sample = run->steps_done > 0 || steps > 0 ? 1 : 0;
-    bool is_finite = true;
-    int place;
-    @advance@(array_of(run->states, STATES, 1, 0), array_of(run->parameters, PARAMETERS, 1, 0),
-        array_of(history, @signal_rows@, slots, 1),
-        array_of(history + @signal_rows@ * slots, run->command_delay + 2, 1, 0), array_of(history, 0, STATES, 1),
-        array_of(run->samples[0], 2, OUTPUTS, 1), run->steps_done, steps, until, run->steps_per_sample,
-        sample > 0 ? (double)until : 1.0, sample, sample, 1, run->signal_delay, run->command_delay);
+    advance(&run->states, &run->parameters, &run->samples, array_of(history, @signal_rows@, slots, 1),
+        array_of(history + @signal_rows@ * slots, run->command_delay + 2, 1, 0), run->steps_done, steps, until,
+        run->steps_per_sample, sample > 0 ? (double)until : 1.0, sample, sample, run->signal_delay,
+        run->command_delay@in_parts@);
     run->steps_done = until;
     run->samples_taken = sample + 1;
     run->samples_shown = sample + 1;
-    for (place = 0; place < STATES; ++place) {
-        is_finite = is_finite && run->states[place] - run->states[place] == 0.0;
-    }
-    return is_finite && run->states[AT_RESULT_FAILURE_TIME] == NEVER_FAILED;
+    return is_finite(&run->states) && run->states.result.failure_time == NEVER_FAILED;
 }

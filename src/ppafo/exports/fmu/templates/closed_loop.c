@@ -5,6 +5,14 @@ static void follow_inputs(unit *item)
     (void)item;
 }
 
+static bool get_metric(unit *item, uint32_t number, double *value)
+{
+    @name@_metrics found;
+    @name@_read_metrics(item->run, &found);
+    *value = ((const double *)&found)[number];
+    return true;
+}
+
 static bool go_to_sample(unit *item, int64_t sample)
 {
     while (item->run->samples_shown <= sample) {
@@ -30,7 +38,7 @@ static bool take_first_sample(unit *item)
  * that adds up its steps comes a little early. */
 static bool go_to(unit *item, double time)
 {
-    const double period = item->run->parameters[PARAMETER_TIMING_PERIOD];
+    const double period = item->run->parameters.timing.period;
     if (!(time >= item->now.time - 1.0e-3 * time_of(item->run, 1) && time < 1.0e15 * time_of(item->run, 1))) {
         return refuse(item, "time %g s cannot be reached from %g s", time, item->now.time);
     }

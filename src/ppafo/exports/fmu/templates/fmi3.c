@@ -59,7 +59,7 @@ static void hold_what_is_shown(unit *item)
 /* When the controller decides, counted from 0, since the start. */
 static double time_of_tick(const unit *item, int64_t tick)
 {
-    return (double)tick * item->run->parameters[PARAMETER_TIMING_PERIOD];
+    return (double)tick * item->run->parameters.timing.period;
 }
 
 const char *fmi3GetVersion(void)

@@ -6,21 +6,20 @@ static void follow_inputs(unit *item)
     @name@_settings *settings = &item->now.settings;
     const double *inputs = item->now.inputs;
     (void)inputs;
-    settings->controller_period = settings->run_step;
-    settings->run_output_interval = settings->run_step;
 @follow@
 }
 
-/* The inputs as numbers of the run, from a time on, for a length of time. */
-static void lead(unit *item, double time, double length)
+static void lead_unit(unit *item, double time, double length)
 {
-    double *rows = item->run->parameters;
     const double *inputs = item->now.inputs;
-    const double command = inputs[0] < -1.0 ? -1.0 : inputs[0];
-    (void)time;
-    (void)length;
-    rows[PARAMETER_CONTROLLER_COMMAND] = command > @highest@ ? @highest@ : command;
-@lead@
+    lead(item->run, @inputs@, time, length);
+}
+
+static bool get_metric(unit *item, uint32_t number, double *value)
+{
+    (void)number;
+    (void)value;
+    return refuse(item, "the plant alone has no metrics");
 }
 
 static bool are_inputs_numbers(unit *item)
@@ -34,7 +33,6 @@ static bool are_inputs_numbers(unit *item)
     return true;
 }
 
-@steps@
 /* The same of a unit, which says why it cannot go on. */
 static bool do_steps(unit *item, int64_t steps)
 {
@@ -50,14 +48,14 @@ static bool take_first_sample(unit *item)
     if (!are_inputs_numbers(item)) {
         return false;
     }
-    lead(item, 0.0, 1.0);
+    lead_unit(item, 0.0, 1.0);
     return do_steps(item, 0);
 }
 
 /* Go on to a time since the start that is a whole number of run.step, to a thousandth; the engine may divide these. */
 static bool go_to(unit *item, double time)
 {
-    const double step = item->run->parameters[PARAMETER_TIMING_PERIOD];
+    const double step = item->run->parameters.timing.period;
     const int64_t parts = item->run->steps_per_sample;
     const double wanted = time / step;
     const double done = (double)(item->run->steps_done / parts);
@@ -74,7 +72,7 @@ static bool go_to(unit *item, double time)
         return false;
     }
     if (until * parts > item->run->steps_done) {
-        lead(item, done * step, ((double)until - done) * step);
+        lead_unit(item, done * step, ((double)until - done) * step);
         if (!do_steps(item, until * parts - item->run->steps_done)) {
             return false;
         }

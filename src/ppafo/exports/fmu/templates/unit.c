@@ -50,6 +50,7 @@ typedef struct {
 /* What differs between the closed loop and the plant alone. */
 static void follow_inputs(unit *item);
 static bool take_first_sample(unit *item);
+static bool get_metric(unit *item, uint32_t number, double *value);
 
 static bool refuse(unit *item, const char *form, ...)
 {
@@ -132,7 +133,7 @@ static bool begin(unit *item)
     if (item->run == NULL) {
         return refuse(item, "no memory");
     }
-    (void)@name@_initialise(item->run, &item->now.settings);
+    (void)begin_run(item->run, &item->now.settings);
     item->now.run_bytes = (int64_t)size;
     item->now.ticks = 0;
     item->now.is_tick = 1;
@@ -144,9 +145,9 @@ static bool begin(unit *item)
 /* True where the steps of a run, and delays in them, stay as they are. */
 static bool keeps_steps(const @name@_run *run, const prepared_run *prepared)
 {
-    return run->steps_per_sample == (int64_t)prepared->counts[COUNT_STEPS_PER_SAMPLE]
-        && run->signal_delay == (int64_t)prepared->counts[COUNT_SIGNAL_DELAY]
-        && run->command_delay == (int64_t)prepared->counts[COUNT_COMMAND_DELAY];
+    return run->steps_per_sample == (int64_t)prepared->counts.steps_per_sample
+        && run->signal_delay == (int64_t)prepared->counts.signal_delay
+        && run->command_delay == (int64_t)prepared->counts.command_delay;
 }
 
 /* Let the run know of parameters that were changed under way. */
@@ -159,8 +160,8 @@ static bool renew(unit *item)
     if (!keeps_steps(item->run, &prepared)) {
         return refuse(item, "these parameters ask for other steps of the engine: set them before the start");
     }
-    memcpy(item->run->parameters, prepared.parameters, sizeof(prepared.parameters));
-    item->run->needs_parts = prepared.counts[COUNT_NEEDS_PARTS] != 0.0 ? 1 : 0;
+    item->run->parameters = prepared.parameters;
+    item->run->needs_parts = prepared.counts.needs_parts != 0.0 ? 1 : 0;
     item->now.is_stale = 0;
     return true;
 }
@@ -198,9 +199,7 @@ static bool get_value(unit *item, uint32_t variable, double *value)
         @name@_read_outputs(item->run, &outputs);
         *value = ((const double *)&outputs)[variable - FIRST_OUTPUT + 1];
     } else {
-        @name@_metrics found;
-        @name@_read_metrics(item->run, &found);
-        *value = ((const double *)&found)[variable - FIRST_METRIC];
+        return get_metric(item, variable - FIRST_METRIC, value);
     }
     return true;
 }

@@ -219,31 +219,30 @@ static const char *find_joint(const mjModel *m, int instance, device *item, char
 static void store(const device *item, double *state, double angle)
 {
     const @name@_run *run = item->run;
-    const int64_t sample = run->samples_shown - 1;
-    state[AT_BEFORE] = run->steps_done > 0 ? state[AT_TORQUE] : run->samples[0][AT_TORQUE];
-    memcpy(state, run->samples[sample % 2], sizeof(run->samples[0]));
+    state[AT_BEFORE] = run->steps_done > 0 ? state[AT_TORQUE] : run->samples.last.torque;
+    memcpy(state, (const double *)&run->samples.last + 1, OUTPUTS * sizeof(double)); /* without the time */
     state[AT_STEPS_DONE] = (double)run->steps_done;
     state[AT_STEP] = item->settings.run_step;
     state[AT_ANGLE] = angle;
-    memcpy(state + AT_RUN, run->states, sizeof(run->states));
+    memcpy(state + AT_RUN, &run->states, sizeof(run->states));
     memcpy(state + AT_HISTORY, run + 1, (size_t)run->bytes - sizeof(*run));
 }
 
 static void restore(const device *item, const double *state)
 {
     item->run->steps_done = (int64_t)state[AT_STEPS_DONE];
-    memcpy(item->run->states, state + AT_RUN, sizeof(item->run->states));
+    memcpy(&item->run->states, state + AT_RUN, sizeof(item->run->states));
     memcpy(item->run + 1, state + AT_HISTORY, (size_t)item->run->bytes - sizeof(*item->run));
 }
 
 /* The vane on a straight line from a time on, under a command. */
 static void lead(const device *item, double command, double time, double angle, double rate)
 {
-    double *rows = item->run->parameters;
-    rows[PARAMETER_CONTROLLER_COMMAND] = command < -1.0 ? -1.0 : (command > 1.0 ? 1.0 : command);
-    rows[PARAMETER_PATH_START] = time;
-    rows[PARAMETER_PATH_LEVEL] = angle;
-    rows[PARAMETER_PATH_RATE] = rate;
+    run_parameters *parameters = &item->run->parameters;
+    parameters->controller.command = command < -1.0 ? -1.0 : (command > 1.0 ? 1.0 : command);
+    parameters->path.start = time;
+    parameters->path.level = angle;
+    parameters->path.rate = rate;
 }
 
 /* A run at its start, the vane at rest at an angle. */
@@ -421,8 +420,8 @@ static void advance_device(const mjModel *m, mjData *d, int instance)
     } else {
         restore(item, state);
     }
-    now = state[AT_STEPS_DONE] * item->run->parameters[PARAMETER_TIMING_PERIOD];
-    then = (state[AT_STEPS_DONE] + (double)item->parts) * item->run->parameters[PARAMETER_TIMING_PERIOD];
+    now = state[AT_STEPS_DONE] * item->run->parameters.timing.period;
+    then = (state[AT_STEPS_DONE] + (double)item->parts) * item->run->parameters.timing.period;
     lead(item, command_of(m, d, item), now, start, (end - start) / (then - now));
     if (!advance_steps(item->run, item->parts)) {
         of_mujoco.error("%s: the simulation diverged at %g s: try a smaller timestep, and check volumes and areas",

@@ -1,0 +1,111 @@
+"""What lies between the functions of an export and what calls them: structs by name, or arrays of all numbers.
+
+A library that people read hands over structs. Where runs go on side by side, as in a page, numbers lie in arrays with a
+row for each; the composed functions are the same but for their first and last lines.
+"""
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Protocol
+
+from ppafo.engine.rows import is_number, leaf_paths, members, row_expression
+from ppafo.engine.source_text import is_row
+from ppafo.translation.typed import FLOAT, Items, Row, Shared, Type
+
+NameOf = Callable[[type], str]
+
+
+class Boundary(Protocol):
+    """Writes how functions take numbers from what they are handed, and give them back; ``array`` is a parameter."""
+
+    def cell(self, array: str, place: int, name: str) -> str:
+        """One number of many, by its place and its name."""
+
+    def named(self, array: str, names: Sequence[str], body: Sequence[str]) -> list[str]:
+        """Lines in which numbers go by their own names."""
+
+    def taken(self, array: str, group: str, groups: Mapping[str, type], name_of: NameOf) -> str:
+        """Expression for one of several groups of rows."""
+
+    def given(self, array: str, groups: Mapping[str, type]) -> list[str]:
+        """Lines that hand back groups of rows, which have their names."""
+
+    def head(self, name: str, parameters: Mapping[str, str]) -> str:
+        """The first lines of a function; ``parameters`` are those that it has, with their types as arrays."""
+
+
+class Arrays:
+    """Arrays of all numbers, one after another."""
+
+    def cell(self, array: str, place: int, name: str) -> str:  # noqa: ARG002
+        """One number of many, by its place."""
+        return f"{array}[{place}]"
+
+    def named(self, array: str, names: Sequence[str], body: Sequence[str]) -> list[str]:
+        """Lines behind those that give the numbers their names."""
+        return [*(f"{name} = {array}[{place}]" for place, name in enumerate(names)), *body]
+
+    def taken(self, array: str, group: str, groups: Mapping[str, type], name_of: NameOf) -> str:
+        """The row of a group, from the numbers of all."""
+        cells = {path: f"{array}[{place}]" for place, path in enumerate(_paths(groups))}
+        return row_expression(groups[group], group, cells, name_of)
+
+    def given(self, array: str, groups: Mapping[str, type]) -> list[str]:
+        """Lines that write the numbers of groups one by one."""
+        return [f"{array}[{place}] = {path}" for place, path in enumerate(_paths(groups))]
+
+    def head(self, name: str, parameters: Mapping[str, str]) -> str:
+        """The function, with its types."""
+        return f'@njit("void({", ".join(parameters.values())})")\ndef {name}({", ".join(parameters)}):'
+
+
+class Structs:
+    """Structs of groups of numbers, or of numbers."""
+
+    def cell(self, array: str, place: int, name: str) -> str:  # noqa: ARG002
+        """One number of many, by its name."""
+        return f"{array}.{name}"
+
+    def named(self, array: str, names: Sequence[str], body: Sequence[str]) -> list[str]:
+        """Lines with what the numbers are in before their names; names of arguments stay as they are."""
+        words = re.compile(rf"(?<![.\w])({'|'.join(names)})\b(?!=|\()")
+        return [words.sub(rf"{array}.\1", line) for line in body]
+
+    def taken(self, array: str, group: str, groups: Mapping[str, type], name_of: NameOf) -> str:  # noqa: ARG002
+        """The row of a group."""
+        return f"{array}.{group}" if leaf_paths(groups[group], group) else "()"
+
+    def given(self, array: str, groups: Mapping[str, type]) -> list[str]:
+        """Lines that write groups."""
+        return [f"{array}.{name} = {name}" for name, row in groups.items() if leaf_paths(row, name)]
+
+    def head(self, name: str, parameters: Mapping[str, str]) -> str:
+        """The function, whose types are stated where it is translated."""
+        return f"def {name}({', '.join(parameters)}):"
+
+
+def _paths(groups: Mapping[str, type]) -> list[str]:
+    return [path for name, row in groups.items() for path in leaf_paths(row, name)]
+
+
+def struct_of(name: str, groups: Mapping[str, type], name_of: NameOf) -> Shared:
+    """A struct of groups of rows, without those that hold no number."""
+    found = ((group, type_of(row, name_of)) for group, row in groups.items() if leaf_paths(row, group))
+    return Shared(Row(name, tuple(found)))
+
+
+def struct_of_numbers(name: str, names: Iterable[str]) -> Shared:
+    """A struct of numbers."""
+    return Shared(Row(name, tuple((item, FLOAT) for item in names)))
+
+
+def type_of(row: object, name_of: NameOf) -> Type:
+    """The type that a NamedTuple, a tuple of a fixed length or a float has in another language."""
+    if is_number(row):
+        return FLOAT
+    inner = tuple((way.lstrip("."), type_of(kind, name_of)) for way, kind in members(row))
+    # One that holds nothing is an empty tuple, as where rows are put together.
+    if inner and is_row(row):
+        assert isinstance(row, type)
+        return Row(name_of(row), inner)
+    return Items(tuple(kind for _, kind in inner))

@@ -1,0 +1,206 @@
+"""The plant of a scenario or a walk alone: what drives it from step to step comes from outside."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from ppafo.control.catalog import PROFILES
+from ppafo.control.controllers import switching
+from ppafo.exports.c_library import commanded, library_of
+from ppafo.exports.c_library.files import Library, Surface, c_identifier, in_parts, library_files
+from ppafo.exports.c_library.program import ExportedProgram
+from ppafo.exports.c_library.walk_preparation import check_can_leave
+from ppafo.model.valves.kind import VENT
+from ppafo.simulation.plan import outside_torque, profile_parameters, step_counts
+from ppafo.simulation.scenario import (
+    Control,
+    FreeMotion,
+    PrescribedMotion,
+    ProfileChoice,
+    Scenario,
+    Sensors,
+    worn_kind,
+)
+from ppafo.walking.declaration import FORCES
+from ppafo.walking.motion import walk_of
+from ppafo.walking.preparation import FaultSettings
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """What a plant is given at each step: name, unit, meaning, first value and limits, None for none."""
+
+    name: str
+    unit: str
+    summary: str
+    start: float
+    minimum: float | None = None
+    maximum: float | None = None
+
+
+COMMAND = Input("command", "-", "command to the valve, clipped to -1 to 1; above 0 feeds chamber 1", 0.0, -1.0, 1.0)
+WALKING_COMMAND = Input(
+    "command",
+    "-",
+    "command to the valve, clipped to -1 to 2; above 0 feeds chamber 1, above 1.5 vents both",
+    VENT,
+    -1.0,
+    VENT,
+)
+LED = "From there on the angle goes on with the angular velocity that is given; the next step begins at the next angle."
+FREE = "The external torque is constant until the next one."
+ON_LEG = "The leg walks on by its gait."
+
+
+@dataclass(frozen=True, slots=True)
+class PlantAlone:
+    """A plant that is driven from outside: its library, inputs, and how the joint moves between them, in words.
+
+    ``first`` are settings of a run that inputs decide, ``lead`` its parameters, both as C with the names of inputs;
+    ``hidden`` are the settings that count for nothing. ``step`` [s] is that of the engine and of the inputs.
+    """
+
+    library: Library
+    inputs: tuple[Input, ...]
+    motion: str
+    first: tuple[tuple[str, str], ...]
+    lead: tuple[tuple[str, str], ...]
+    highest: float
+    hidden: frozenset[str]
+    step: float
+
+
+_FIRST_ANGLE = (
+    ("motion_profile_start_level", "angle"),
+    ("motion_profile_level", "angle + angular_velocity * 0.0078125"),
+    ("motion_profile_ramp_start", "0.0"),
+    # Short: a fast ankle stays in the range of a level.
+    ("motion_profile_ramp_time", "0.0078125"),
+)
+_LEAD_ANGLE = (
+    ("path.start_level", "angle"),
+    ("path.level", "angle + angular_velocity * (2.0 * length)"),
+    ("path.ramp_start", "time"),
+    ("path.ramp_time", "2.0 * length"),
+)
+
+
+def plant_of(item: Scenario) -> PlantAlone:
+    """The plant; a free vane takes an external torque, one whose angle is prescribed takes angle and rate.
+
+    That of a walk is the device on its walking leg, which takes the command alone.
+    """
+    chosen = _led_vane(item) if worn_kind(item) is None else _commanded_walk(item)
+    library, motion = library_of(chosen), chosen.motion
+    command, unseen, highest = COMMAND, {"command", "reference"}, 1.0
+    further: tuple[Input, ...] = ()
+    first: tuple[tuple[str, str], ...] = ()
+    lead: tuple[tuple[str, str], ...] = ()
+    if isinstance(motion, PrescribedMotion):
+        said, first, lead = LED, _FIRST_ANGLE, _LEAD_ANGLE
+        angle = motion.profile.settings["start_level"]
+        further = (
+            Input("angle", "rad", "angle of the ankle, 90 deg neutral, growing in plantarflexion", angle),
+            Input("angular_velocity", "rad/s", "its rate", 0.0),
+        )
+        unseen |= {"angle", "angular_velocity"}
+    elif isinstance(motion, FreeMotion):
+        # T_ex of a vane alone, or T_2 of the ankle of a leg, which is opposed.
+        is_alone = motion.leg is None
+        said = FREE
+        first = (
+            (("motion_external_torque", "external_torque"),)
+            if is_alone
+            else (("motion_ankle_torque", "-external_torque"),)
+        )
+        lead = (("plant.external_torque", "external_torque"),)
+        joint = "T_ex on the joint" if is_alone else "on the ankle of the leg, -T_2"
+        words = f"torque {joint}, above 0 works against plantarflexion"
+        further = (Input("external_torque", "N m", words, outside_torque(motion)),)
+    else:
+        said, command, highest = ON_LEG, WALKING_COMMAND, VENT
+    unused = ("sensors.", "motion.profile.", "motion.external_torque", "motion.ankle_torque")
+    hidden = {"run.duration", "run.output_interval", "controller.period", "controller.command"}
+    outputs = tuple(name for name in library.program.outputs if name not in unseen)
+    program = replace(library.program.program, meters=(), traced=outputs)
+    return PlantAlone(
+        library=replace(library, program=ExportedProgram(program, ())),
+        inputs=(command, *further),
+        motion=said,
+        first=(("controller_period", "@.run_step"), ("run_output_interval", "@.run_step"), *first),
+        lead=lead,
+        highest=highest,
+        hidden=frozenset(hidden | {item.path for item in library.settings if item.path.startswith(unused)}),
+        step=chosen.time_step,
+    )
+
+
+def plant_library(item: Scenario) -> dict[str, bytes]:
+    """Files of the plant in C by name: ``NAME_step(run, command, ...)`` goes on by one step under its inputs."""
+    return library_files(surfaced(plant_of(item)).library)
+
+
+def surfaced(alone: PlantAlone) -> PlantAlone:
+    """A plant whose library is called with its inputs."""
+    names = [item.name for item in alone.inputs]
+    says = [f"{item.name}, {item.summary} [{item.unit}]" for item in alone.inputs]
+    words = {
+        "arguments": ", ".join(f"double {name}" for name in names),
+        "inputs": ", ".join(names),
+        "first_inputs": ", ".join(repr(0.5 if item.name == "command" else item.start) for item in alone.inputs),
+        "are_numbers": " && ".join(f"{name} - {name} == 0.0" for name in names),
+        "said_inputs": ";\n".join(f" * {line}" for line in says) + ".",
+        "listed_inputs": "\n".join(f"- `{item.name}` [{item.unit}]: {item.summary}." for item in alone.inputs),
+        "motion": alone.motion,
+        "highest": repr(alone.highest),
+        "lead": "\n".join(f"    parameters->{place} = {value};" for place, value in alone.lead),
+        "follow_inputs": follow_lines(alone, "first", {name: name for name in names}),
+        "hidden": ", ".join(f"`{c_identifier(path)}`" for path in sorted(alone.hidden)),
+        "step": f"{alone.step:g}",
+        "in_parts": in_parts(alone.library.program),
+    }
+    surface = Surface(
+        "plant.h",
+        "plant_main.c",
+        "plant_README.md",
+        "plant.c",
+        words,
+        "run_step",
+        ("controller_period", "run_output_interval"),
+    )
+    return replace(alone, library=replace(alone.library, surface=surface))
+
+
+def follow_lines(alone: PlantAlone, settings: str, inputs: Mapping[str, str]) -> str:
+    """Lines of C that give settings what inputs decide, of which each is called something."""
+    words = re.compile(rf"\b({'|'.join(inputs)})\b")
+    lines = [(place, words.sub(lambda found: inputs[found[1]], value)) for place, value in alone.first]
+    return "\n".join(f"    {settings}->{place} = {value.replace('@.', f'{settings}->')};" for place, value in lines)
+
+
+def _led_vane(scenario: Scenario) -> Scenario:
+    """The scenario under a command; an ankle is led from outside, from where the scenario has it at the start."""
+    motion = scenario.motion
+    if isinstance(motion, PrescribedMotion):
+        found: tuple[float, float, float] = PROFILES[motion.profile.kind].value(profile_parameters(motion.profile), 0.0)
+        settings = {"start_level": found[0], "level": found[0], "ramp_start": 0.0, "ramp_time": 2.0}
+        motion = PrescribedMotion(ProfileChoice("ramp_hold", settings))
+    return replace(commanded(scenario), motion=motion)
+
+
+def _commanded_walk(walk: Scenario) -> Scenario:
+    """The walk with a command that is handed in at every step, and sensors that nobody looks at."""
+    check_can_leave(walk)
+    step = step_counts(1.0, walk.time_step, 1.0, walk.control.period).step
+    motion = walk_of(walk)
+    # The forces under the foot are among the outputs.
+    forces = dict.fromkeys(FORCES, 0.0) | {"force_bandwidth": motion.forces["force_bandwidth"]}
+    return replace(
+        walk,
+        name=f"{walk.name}-plant",
+        description=f"The plant alone of this walk, on its leg: {walk.description}",
+        control=Control(switching.CONSTANT.name, {"command": 0.0}, step),
+        time_step=step,
+        sensors=Sensors(),
+        motion=replace(motion, forces=forces, faults={sensor: FaultSettings() for sensor in motion.faults}),
+    )

@@ -1,0 +1,64 @@
+
+/* ---- The plant alone, from step to step. ---- */
+
+/* Do some steps under parameters as they stand, then take a sample; false where the run left what is possible. */
+static bool advance_steps(@name@_run *run, int64_t steps)
+{
+    double *history = (double *)(run + 1);
+    const int64_t slots = run->signal_delay + 2;
+    const int64_t until = run->steps_done + steps;
+    const int64_t sample = run->steps_done > 0 || steps > 0 ? 1 : 0;
+    advance(&run->states, &run->parameters, &run->samples, array_of(history, @signal_rows@, slots, 1),
+        array_of(history + @signal_rows@ * slots, run->command_delay + 2, 1, 0), run->steps_done, steps, until,
+        run->steps_per_sample, sample > 0 ? (double)until : 1.0, sample, sample, run->signal_delay,
+        run->command_delay@in_parts@);
+    run->steps_done = until;
+    run->samples_taken = sample + 1;
+    run->samples_shown = sample + 1;
+    return is_finite(&run->states) && run->states.result.failure_time == NEVER_FAILED;
+}
+
+/* What the inputs are from a time on, for a length of time [s]; an angle that is led goes on with its rate. */
+static void lead(@name@_run *run, @arguments@, double time, double length)
+{
+    run_parameters *parameters = &run->parameters;
+    const double lowest = command < -1.0 ? -1.0 : command;
+    (void)time;
+    (void)length;
+    parameters->controller.command = lowest > @highest@ ? @highest@ : lowest;
+@lead@
+}
+
+@name@_status @name@_initialise(@name@_run *run, const @name@_settings *settings, @arguments@)
+{
+    @name@_settings chosen = *settings;
+    @name@_settings *first = &chosen;
+    @name@_status status;
+    (void)first;
+@follow_inputs@
+    status = begin_run(run, &chosen);
+    if (status != @NAME@_GOING_ON) {
+        return status;
+    }
+    lead(run, @inputs@, 0.0, 1.0);
+    return advance_steps(run, 0) ? @NAME@_GOING_ON : @NAME@_FAILED;
+}
+
+@name@_status @name@_step(@name@_run *run, @arguments@)
+{
+    const double step = run->parameters.timing.step;
+    if (!(@are_numbers@)) {
+        return @NAME@_BAD_INPUT;
+    }
+    lead(run, @inputs@, (double)run->steps_done * step, (double)run->steps_per_sample * step);
+    if (!advance_steps(run, run->steps_per_sample)) {
+        return run->states.result.too_many_parts != 0.0 ? @NAME@_TOO_MANY_PARTS : @NAME@_FAILED;
+    }
+    return @NAME@_GOING_ON;
+}
+
+void @name@_read_outputs(const @name@_run *run, @name@_outputs *outputs)
+{
+    *outputs = run->samples.last;
+    outputs->time = (double)run->steps_done * run->parameters.timing.step;
+}

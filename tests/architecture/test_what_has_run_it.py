@@ -1,0 +1,40 @@
+"""The page on what has run each export: its tests exist, its versions are those that are locked, none is missing."""
+
+import argparse
+import re
+from pathlib import Path
+
+import pytest
+
+from ppafo.cli import export
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "what-has-run-it.md").read_text(encoding="utf-8")
+TESTS = re.findall(r"`(tests/[\w/]+\.py)::(\w+)`", PAGE)
+LOCKED = {name: name.lower() for name in ("FMPy", "MuJoCo", "OpenSim", "Gymnasium", "Playwright")}
+
+
+def test_every_row_of_the_table_names_a_test() -> None:
+    rows = [line for line in PAGE.splitlines() if line.startswith("| ") and "---" not in line][1:]
+    assert len(rows) >= 9
+    assert [row for row in rows if "::" not in row] == []
+
+
+@pytest.mark.parametrize(("file", "name"), TESTS)
+def test_a_test_that_the_page_names_exists(file: str, name: str) -> None:
+    assert f"\ndef {name}(" in (ROOT / file).read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(("said", "package"), LOCKED.items())
+def test_a_version_that_the_page_names_is_the_one_that_the_tests_have(said: str, package: str) -> None:
+    locks = "".join((ROOT / f"requirements-{name}.lock").read_text(encoding="utf-8") for name in ("dev", "opensim"))
+    locked = re.search(rf"^{package}==([\d.]+)", locks, re.MULTILINE)
+    assert locked is not None
+    assert set(re.findall(rf"{said} (\d[\d.]*\d)", PAGE)) == {locked[1]}
+
+
+def test_every_export_is_on_the_page() -> None:
+    parser = argparse.ArgumentParser()
+    export.add_arguments(parser)
+    (actions,) = (item for item in parser._actions if isinstance(item, argparse._SubParsersAction))
+    assert [name for name in actions.choices if f"ppafo export {name}" not in PAGE] == []

@@ -1,0 +1,142 @@
+"""The plant alone in C: driven step by step from outside it moves as in Python, and people can read it."""
+
+import ctypes
+import re
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.exports.c_library import c_library
+from ppafo.exports.c_library.plant import plant_library
+from ppafo.exports.fmu import FLAGS
+from ppafo.running import simulate
+from ppafo.simulation.loading import load_scenario
+
+FREE = (
+    "torque-task-proportional",
+    ("motion.kind=free", "run.duration=0.3 s", "reference.ramp_time=0.1 s", "motion.external_torque=3 N m"),
+)
+MOVED = ("torque-task-moving-ankle", ("run.duration=0.3 s",))
+STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-fsanitize=address,undefined", "-static-libasan")
+
+
+def built(folder: Path, name: str, overrides: tuple[str, ...]) -> tuple[ctypes.CDLL, str, list[str]]:
+    """A plant as a shared library, its name in C, and its outputs."""
+    own = f"{name.replace('-', '_')}_plant"
+    for file, content in plant_library(load_scenario(name, overrides)).items():
+        (folder / file).write_bytes(content)
+    line = ["cc", *FLAGS, "-shared", "-fPIC", f"{own}.c", "-o", "plant.so", "-lm"]
+    subprocess.run(line, cwd=folder, check=True)
+    header = (folder / f"{own}.h").read_text(encoding="utf-8")
+    outputs = re.search(r"/\* The plant at one time. \*/\ntypedef struct \{\n(.*?)\}", header, re.DOTALL)
+    assert outputs is not None
+    return ctypes.CDLL(str(folder / "plant.so")), own, re.findall(r"double (\w+);", outputs[1])
+
+
+class Run:
+    """A run of a plant in C."""
+
+    def __init__(self, folder: Path, scenario: tuple[str, tuple[str, ...]], inputs: int) -> None:
+        self.library, self.own, self.outputs = built(folder, *scenario)
+        self.numbers = (ctypes.c_double * len(self.outputs))()
+        settings = (ctypes.c_double * 200)()
+        self.call("defaults")(settings)
+        size = self.call("size")
+        size.restype, size.argtypes = ctypes.c_size_t, [ctypes.c_void_p]
+        self.memory = (ctypes.c_double * (size(settings) // 8 + 1))()
+        self.given = [ctypes.c_double] * inputs
+        self.call("initialise").argtypes = [ctypes.c_void_p, ctypes.c_void_p, *self.given]
+        self.call("step").argtypes = [ctypes.c_void_p, *self.given]
+        self.settings = settings
+
+    def call(self, name: str) -> ctypes._CFuncPtr:
+        """One of its functions."""
+        return getattr(self.library, f"{self.own}_{name}")
+
+    def seen(self) -> dict[str, float]:
+        """Its outputs now."""
+        self.call("read_outputs")(self.memory, self.numbers)
+        return dict(zip(self.outputs, self.numbers, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("scenario", "channels", "seen", "allowed"),
+    [
+        (FREE, ("command",), ("angle", "angular_velocity", "pressure_1", "torque", "supplied_mass"), 0.0),
+        (MOVED, ("command", "angle", "angular_velocity"), ("torque",), 1e-4),
+    ],
+)
+def test_under_the_commands_of_a_closed_loop_the_plant_in_c_moves_as_it_did(
+    scenario: tuple[str, tuple[str, ...]],
+    channels: tuple[str, ...],
+    seen: tuple[str, ...],
+    allowed: float,
+    tmp_path: Path,
+) -> None:
+    recording = simulate(*scenario).recording
+    assert np.ptp(recording["angle"]) > 0.1
+    constant = (3.0,) if "external_torque" in plant_header(scenario) else ()
+    run = Run(tmp_path, scenario, len(channels) + len(constant))
+    largest = 0.0
+    for number in range(len(recording)):
+        given = [float(recording[name][max(number - 1, 0)]) for name in channels]
+        ended = (
+            run.call("step")(run.memory, *given, *constant)
+            if number
+            else run.call("initialise")(run.memory, run.settings, *given, *constant)
+        )
+        assert ended == 0
+        found = run.seen()
+        assert found["time"] == pytest.approx(number * 1e-3, abs=1e-12)
+        largest = max(largest, *(abs(found[name] - float(recording[name][number])) for name in seen))
+    assert largest <= allowed
+
+
+def plant_header(scenario: tuple[str, tuple[str, ...]]) -> str:
+    """The part of the header of a plant that declares its step."""
+    (header,) = (
+        content.decode() for file, content in plant_library(load_scenario(*scenario)).items() if file.endswith(".h")
+    )
+    return header[header.index("_step(") :]
+
+
+def test_an_input_that_is_no_number_leaves_the_run_as_it_was(tmp_path: Path) -> None:
+    run = Run(tmp_path, MOVED, 3)
+    assert run.call("initialise")(run.memory, run.settings, 0.5, 1.5, 0.0) == 0
+    before = bytes(run.memory)
+    assert run.call("step")(run.memory, float("nan"), 1.5, 0.0) == 1
+    assert bytes(run.memory) == before
+    assert run.call("step")(run.memory, 0.5, 1.5, 0.0) == 0
+    assert bytes(run.memory) != before
+
+
+@pytest.mark.parametrize("shape", ["loop", "plant"])
+def test_the_c_of_a_run_is_short_and_has_neither_lanes_nor_groups_that_are_packed_again(shape: str) -> None:
+    files_of = {"loop": c_library, "plant": plant_library}[shape]
+    contents = files_of(load_scenario("torque-task-proportional"))
+    (text,) = (content.decode() for file, content in contents.items() if file.endswith(".c") and file != "main.c")
+    assert text.count("\n") < {"loop": 2300, "plant": 1750}[shape]
+    assert not re.search(r"\blane\b|\[0\]\[|PPAFO_|make_PlantParameters|AT_[A-Z]+_", text)
+    assert text.count("for (int64_t step_index") == 1
+    functions = set(re.findall(r"^static [\w ]+?\b\*?(\w+)\(", text, re.MULTILINE))
+    assert functions
+    unused = [name for name in functions if len(re.findall(rf"\b{name}\b", text)) < 2]
+    assert unused == []
+
+
+@pytest.mark.parametrize("name", ["torque-task-proportional", "proportional"])
+def test_the_plant_in_c_has_no_warning_and_its_example_no_fault(name: str, tmp_path: Path) -> None:
+    from ppafo.loading import load_scenario as any_scenario
+
+    for file, content in plant_library(any_scenario(name)).items():
+        (tmp_path / file).write_bytes(content)
+    own = f"{name.replace('-', '_')}_plant"
+    line = ["gcc", "-std=c99", "-O1", "-ffp-contract=off", *STRICT, f"{own}.c", "main.c", "-o", "example", "-lm"]
+    subprocess.run(line, cwd=tmp_path, check=True)
+    done = subprocess.run([tmp_path / "example"], capture_output=True, text=True, check=True)
+    lines = done.stdout.splitlines()
+    assert len(lines) > 100
+    torque = lines[0].split(",").index("torque")
+    assert float(lines[-1].split(",")[torque]) > 1.0
