@@ -16,6 +16,7 @@ from ppafo.exports.wasm import WasmModule, module_of
 from ppafo.live.opening import computed_opening, first_settings, opening_like, opening_of
 from ppafo.live.page import block_of, check_start, packed_once, page_of, policy_of_block, values_of_changes
 from ppafo.live.still import still_of
+from ppafo.live.words import label_of, words
 from ppafo.loading import load_scenario
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.simulation.declaration import OF_A_VANE, PRESSURE_WORDS
@@ -63,12 +64,6 @@ class Simulated:
     scenario: Scenario
     module: WasmModule
     label: str
-
-
-@cache
-def words() -> dict[str, Any]:
-    """Return names, sliders and questions: ``words.toml``."""
-    return tomllib.loads(files("ppafo.live").joinpath("words.toml").read_text(encoding="utf-8"))
 
 
 def program_content(item: Simulated, module: str, intervals: Mapping[str, Interval]) -> dict[str, Any]:
@@ -202,12 +197,9 @@ def _setting(entry: Mapping[str, Any], gauge: Mapping[str, str], intervals: Mapp
         interval is not None and not interval[0] <= entry["value"] <= interval[1]
     )
     is_initial = key in ("initial.pressure_1", "initial.pressure_2")
-    # ``sensors.angle_noise`` is the angle noise of the sensors.
-    said = entry["name"].replace("_", " ")
-    prefix = {"sensors": "Sensors: ", "supply_line": "Line: "}.get(entry["group"].partition(".")[0], "")
     return {
         "key": key,
-        "label": words()["labels"].get(key, f"{prefix}{said}" if prefix else said[:1].upper() + said[1:]),
+        "label": label_of(key),
         "unit": _bare(entry["unit"]),
         "shown": _typed(_bare(entry["display"]["unit"]), entry["unit"]),
         "low": entry["minimum"],

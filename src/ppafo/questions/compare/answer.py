@@ -279,16 +279,21 @@ def _draw_pareto(axes: "Axes", comparison: Comparison, task: str) -> None:
         if case.outcomes is not None:
             gas = _in_display_unit(case.outcomes.metrics[_GAS][:_MAXIMUM_DOTS], _GAS)
             error = _in_display_unit(case.outcomes.metrics[_ERROR][:_MAXIMUM_DOTS], _ERROR)
-            axes.plot(gas, error, ".", color=colour, alpha=0.18, markersize=4, markeredgewidth=0)
+            axes.plot(gas, error, ".", color=colour, alpha=0.35, markersize=4, markeredgewidth=0)
         axes.plot(*points[number], mark, color=colour, markersize=8, markeredgecolor="white", label=case.configuration)
     front = points[pareto_front(points)]
     front = front[np.argsort(front[:, 0])]
     axes.plot(front[:, 0], front[:, 1], "-", color=GREY, linewidth=1.0, zorder=1)
     axes.set_xlabel(metric_title(_GAS))
     axes.set_ylabel(metric_title(_ERROR))
-    axes.set_title(f"Task: {task}")
+    axes.set_title(_task_title(comparison, task))
     axes.margins(0.08)
-    label_lines(axes)
+    # In the panel, where there is room: names beside the title ran over it.
+    axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none")
+
+
+def _task_title(comparison: Comparison, task: str) -> str:
+    return f"Task: {task}" if len(list(comparison.tasks)) > 1 else ""
 
 
 def _point(case: Case) -> tuple[float, float]:
@@ -303,6 +308,7 @@ def _in_display_unit(values: Floats, name: str) -> Floats:
 def _draw_change(axes: "Axes", comparison: Comparison, task: str, metric: str) -> None:
     cases = {case.configuration: case for case in comparison.of_task(task)}
     baseline = cases[comparison.baseline]
+    ends: list[float] = []
     for number, name in enumerate(comparison.configurations):
         own, first = cases[name].outcomes, baseline.outcomes
         if name == comparison.baseline or own is None or first is None:
@@ -312,14 +318,24 @@ def _draw_change(axes: "Axes", comparison: Comparison, task: str, metric: str) -
         if change.size == 0:
             continue
         reach = np.percentile(change, _SHOWN)
-        axes.hist(change, bins=_BINS, range=(reach[0], reach[1]), color=colour, alpha=0.55, label=name)
+        bins = min(_BINS, max(8, round(1.5 * change.size**0.5)))
+        axes.hist(change, bins=bins, range=(reach[0], reach[1]), color=colour, alpha=0.55, label=name)
+        ends += reach.tolist()
         if metric in baseline.metrics and metric in cases[name].metrics:
             nominal = _change(np.array([baseline.metrics[metric].value]), np.array([cases[name].metrics[metric].value]))
             for value in nominal:
-                axes.axvline(value, color=colour, linestyle="--", linewidth=1.2)
-    axes.axvline(0.0, color=BLACK, linewidth=0.8)
-    axes.set_xlabel(f"{metric_words(metric)} against {comparison.baseline} (%)")
-    axes.set_title(f"Task: {task}" if metric == _ERROR else "")
+                axes.axvline(value, color=colour, linestyle="--", linewidth=1.2, label="as declared")
+            ends += nominal.tolist()
+    if ends:
+        # Zero is drawn where it is near: far from all changes it would squeeze them into a few pixels.
+        low, high = min(ends), max(ends)
+        span = high - low or 1.0
+        axes.set_xlim(low - 0.08 * span, high + 0.08 * span)
+        if low - 0.5 * span <= 0.0 <= high + 0.5 * span:
+            axes.axvline(0.0, color=BLACK, linewidth=0.8)
+            axes.set_xlim(min(low, 0.0) - 0.08 * span, max(high, 0.0) + 0.08 * span)
+    axes.set_xlabel(f"{metric_words(metric)}, change from {comparison.baseline} (%)")
+    axes.set_title(_task_title(comparison, task) if metric == _ERROR else "")
     if metric == _GAS:
         label_lines(axes)
 

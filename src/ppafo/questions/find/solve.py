@@ -20,8 +20,19 @@ from ppafo.answers.display_units import (
     quantity_of_unit,
     quantity_text,
 )
-from ppafo.answers.style import BLACK, BLUE, GREEN, VERMILION, Margins, figure_of_panels, house_style, mark_kind
+from ppafo.answers.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    VERMILION,
+    Margins,
+    figure_of_panels,
+    house_style,
+    label_lines,
+    mark_kind,
+)
 from ppafo.errors import ScenarioError, StudyError, UnitError, one_line, refused_as
+from ppafo.live.words import label_of
 from ppafo.loading import scenario_or_load
 from ppafo.progress import Report
 from ppafo.questions.question import Solved
@@ -245,7 +256,7 @@ def _range(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
 
 
 _SIZE = (7.0, 3.8)
-_MARGINS = Margins(left=0.85, right=0.25, top=0.4, bottom=0.55, row_gap=0.0)
+_MARGINS = Margins(left=0.85, right=0.25, top=0.6, bottom=0.55, row_gap=0.0)
 _CAPTION = "The metric over the value; dashed: the limit; shaded: where the condition is met."
 
 
@@ -329,20 +340,23 @@ def stretches(found: Found) -> list[tuple[float, float]]:
 def find_figure(found: Found) -> "matplotlib.figure.Figure":
     """Return the metric over the value, with the limit and the value that was found."""
     quantity, metric = quantity_of_unit(found.path.quantity.unit), metric_quantity(found.condition.metric)
+    name, unit = label_of(found.path.path), axis_unit(quantity) if quantity else found.path.quantity.unit
     with house_style():
         figure, ((axes,),) = figure_of_panels(_SIZE, _MARGINS, 1)
         values = display_values(found.values, quantity)
         axes.plot(values, display_values(found.metrics, metric), color=BLUE)
         axes.plot(values[found.grid], display_values(found.metrics[found.grid], metric), "o", color=BLUE, markersize=3)
-        axes.axhline(display_value(found.condition.limit, metric), color=BLACK, linestyle="--", linewidth=1.0)
-        for low, high in stretches(found):
-            axes.axvspan(
-                display_value(low, quantity), display_value(high, quantity), color=GREEN, alpha=0.12, linewidth=0
-            )
+        limit = display_value(found.condition.limit, metric)
+        axes.axhline(limit, color=BLACK, linestyle="--", linewidth=1.0, label="limit")
+        for number, (low, high) in enumerate(stretches(found)):
+            label = "" if number else "condition met"
+            ends = display_value(low, quantity), display_value(high, quantity)
+            axes.axvspan(*ends, color=GREEN, alpha=0.12, linewidth=0, label=label)
         if found.value is not None:
-            axes.axvline(display_value(found.value, quantity), color=VERMILION, linewidth=1.4)
-        unit = axis_unit(quantity) if quantity else found.path.quantity.unit
-        axes.set_xlabel(f"{found.path.path} ({unit})" if unit else found.path.path)
+            value = display_value(found.value, quantity)
+            axes.axvline(value, color=VERMILION, linewidth=1.4, label=f"found: {value:.4g} {unit}".rstrip())
+        axes.set_xlabel(f"{name} ({unit})" if unit else name)
+        label_lines(axes)
         axes.set_ylabel(metric_title(found.condition.metric))
         mark_kind(figure, "simulated")
         return figure

@@ -78,7 +78,7 @@ class Method:
 
 def _check_salib() -> None:
     if importlib.util.find_spec("SALib") is None:
-        raise StudyError("sensitivity needs SALib, which is not installed: pip install 'ppafo[studies]'")
+        raise StudyError("the method morris needs SALib, which is not installed: pip install 'ppafo[studies]'")
 
 
 def _problem(dimensions: int) -> dict[str, Any]:
@@ -90,15 +90,19 @@ def _sobol_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
     """Return fractions in (0, 1) for a power of 2 of blocks; block b is of scramble b % SCRAMBLES."""
     if blocks & (blocks - 1):
         raise StudyError(f"samples = {blocks}: Sobol indices need a power of 2, such as {1 << blocks.bit_length()}")
-    _check_salib()
-    from SALib.sample import sobol
+    from scipy.stats import qmc
 
     dimensions, each = len(uncertainty.drawn), blocks // SCRAMBLES
     design = np.empty((each, SCRAMBLES, dimensions + 2, dimensions))
+    exchanged = np.arange(dimensions)
     for number in range(SCRAMBLES):
         own = replicate_seed(seed, number) % 2**32
-        fractions = sobol.sample(_problem(dimensions), each, calc_second_order=False, seed=own)
-        design[:, number] = fractions.reshape(each, dimensions + 2, dimensions)
+        # Saltelli (2002): a point A, its copies in which value i is that of B, and B. `seed`, not `rng`: the points of
+        # SALib, from which earlier studies were made.
+        points = qmc.Sobol(2 * dimensions, scramble=True, seed=own).random(each)
+        design[:, number] = points[:, None, :dimensions]
+        design[:, number, -1] = points[:, dimensions:]
+        design[:, number, 1 + exchanged, exchanged] = points[:, dimensions:]
     return np.clip(design.reshape(-1, dimensions), _SMALLEST, 1.0 - _SMALLEST)
 
 
@@ -142,7 +146,7 @@ SOBOL = Method(
 )
 """Fractions of the variance: first-order (each value alone) and total (with all its interactions).
 
-Saltelli's design as SALib makes it, on independent scrambles of the Sobol sequence; estimators of Saltelli et al.
+Saltelli's design, that of SALib, on independent scrambles of the Sobol sequence; estimators of Saltelli et al.
 (2010) and Jansen (1999). The bands come from the spread between the scrambles, because the points of one sequence
 are not independent and resampling them gives bands that are several times too wide.
 """

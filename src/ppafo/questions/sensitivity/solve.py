@@ -15,9 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.display_units import axis_unit, change_text, display_difference, display_unit, metric_quantity
+from ppafo.answers.display_units import (
+    axis_unit,
+    change_text,
+    display_difference,
+    display_unit,
+    metric_quantity,
+    metric_words,
+)
 from ppafo.answers.style import BLUE, COLOURS, ORANGE, Margins, figure_of_free_panels, house_style, mark_kind
 from ppafo.errors import StudyError, nearest_name
+from ppafo.live.words import label_of
 from ppafo.progress import Report
 from ppafo.questions.question import Solved
 from ppafo.questions.sensitivity.methods import METHODS, TAIL, Evaluated, Indices, Method
@@ -256,7 +264,8 @@ _TITLES = {
 
 def sensitivity_figure(found: Sensitivity) -> "matplotlib.figure.Figure":
     """Return the figure; the left names are those of the uncertain values."""
-    names = 0.25 + _LETTER * max(len(path) for path in found.paths)
+    labels = [label_of(path) for path in found.paths]
+    names = 0.25 + _LETTER * max(len(label) for label in labels)
     margins = Margins(left=names, right=0.2, top=0.55, bottom=0.55, row_gap=0.95, column_gap=0.75)
     panel = max(2.0, _LINE * len(found.paths))
     rows = len(found.metrics)
@@ -281,13 +290,14 @@ def sensitivity_figure(found: Sensitivity) -> "matplotlib.figure.Figure":
                     elinewidth=1.4,
                     label=_TITLES[name].removesuffix(" of effect"),
                 )
-            bars.set_yticks(places, [found.paths[row] for row in order])
+            bars.set_yticks(places, [labels[row] for row in order])
             for label, colour in zip(reversed(bars.get_yticklabels()), COLOURS[:_MAXIMUM_LINES], strict=False):
                 label.set_color(colour)
             bars.axvline(0.0, color="#9a9a9a", linewidth=0.8)
             bars.set_xlabel(_unit(found, metric))
-            bars.set_title(metric.metric)
-            bars.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1, handlelength=1.0)
+            bars.set_title(metric_words(metric.metric))
+            # The lower right is free: the smallest indices are there.
+            bars.legend(loc="lower right", handlelength=1.0)
             _draw_settling(course, found, metric)
         mark_kind(figure, "simulated")
         return figure

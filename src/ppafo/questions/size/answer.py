@@ -183,8 +183,9 @@ def sizing_figure(sizing: Sizing) -> "matplotlib.figure.Figure":
         axes.set_xlabel("Time (s)")
         axes.margins(x=0.0)
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1, handlelength=1.6)
-        _errors(figure.add_subplot(grid[1, 0]), sizing)
-        _gas(figure.add_subplot(grid[1, 1]), sizing)
+        errors = figure.add_subplot(grid[1, 0])
+        _errors(errors, sizing)
+        _gas(figure.add_subplot(grid[1, 1], sharex=errors), sizing)
         mark_kind(figure, "simulated")
     return figure
 
@@ -218,7 +219,8 @@ def _gas(axes: "Axes", sizing: Sizing) -> None:
             markersize=4,
         )
         _mark(axes, item, display_value(item.gas, "gas mass"), colour)
-    axes.set_ylim(bottom=0.0)
+    # Valves differ by some per cent: an axis from 0 would lay their curves on each other.
+    axes.margins(y=0.15)
     axes.set_title("$\\bf{C}$   Gas per repetition (g) within the limit", pad=8)
     axes.set_xlabel(f"Supply pressure ({axis_unit('pressure')})")
     if not any(item.works for item in sizing.valves):

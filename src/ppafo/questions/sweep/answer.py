@@ -22,6 +22,7 @@ from ppafo.answers.display_units import (
 from ppafo.answers.style import BLUE, GREEN, GREY, ORANGE, VERMILION, house_style, mark_kind
 from ppafo.answers.writing import files_of
 from ppafo.errors import DataError, StudyError, nearest_name
+from ppafo.live.words import label_of
 from ppafo.questions.question import Solved
 from ppafo.questions.sweep.manifest import RUNS_FOLDER, TRAJECTORIES_FOLDER, chunk_file
 from ppafo.signals.recording import CHANNELS
@@ -156,6 +157,8 @@ _OPACITIES = (0.18, 0.32, 0.45)
 MAXIMUM_DRAWN = 4_000_000
 """Runs from which a figure is drawn, spread evenly over all; the numbers beside it are from all of them."""
 _GRIDDED = ("grid", "list")
+_NAMED = 3
+"""Varied values that a title names."""
 
 
 def study_figure(results: StudyResults) -> "matplotlib.figure.Figure":
@@ -165,7 +168,10 @@ def study_figure(results: StudyResults) -> "matplotlib.figure.Figure":
     metrics = list(results.document["metrics"])[:MOST_METRICS]
     bands = list(results.document["study"]["outputs"].get("bands", ()))
     names = results.configurations[:MOST_CONFIGURATIONS]
-    is_mapped = len(_grid_paths(results)) == 2
+    device = [path for path in results.varied if path != NOISE]
+    is_grid = len(_grid_paths(results)) == 2
+    # Two values that vary are the axes of every panel: as a map where they are a grid, else as points.
+    is_mapped = is_grid or len(device) == 2
     panels = [(metric, name) for metric in metrics for name in (names if is_mapped else ("",))]
     count = max(1, len(panels) + len(bands))
     columns = 2 if count == 4 else min(_COLUMNS, count)
@@ -174,14 +180,25 @@ def study_figure(results: StudyResults) -> "matplotlib.figure.Figure":
         figure = matplotlib.figure.Figure(figsize=(_PANEL[0] * columns + 0.3, _PANEL[1] * rows + 0.7), layout=_layout())
         grid = figure.subplots(rows, columns, squeeze=False)
         places = list(grid.flat)
-        _draw_metrics(places, panels, results, is_mapped)
+        draw = _draw_map if is_grid else _draw_points if is_mapped else None
+        for axes, (metric, name) in zip(places, panels, strict=False):
+            if draw is not None:
+                draw(axes, results, name, metric)
+            elif len(device) == 1:
+                _draw_over(axes, results, device[0], metric)
+            else:
+                _draw_histogram(axes, results, metric)
         for axes, channel in zip(places[len(panels) :], bands, strict=False):
             _draw_bands(axes, results, channel, dict(zip(names, COLOURS, strict=False)))
         for axes in places[len(panels) + len(bands) :]:
             axes.set_axis_off()
         from matplotlib.lines import Line2D
 
-        figure.suptitle(f"{results.name}, {results.summary['completed']:,} runs", x=0.01, ha="left", fontsize=11)
+        title = f"{results.name}, {results.summary['completed']:,} runs"
+        if not is_mapped and len(device) > 1:
+            title += f" over {len(device)} values: {', '.join(label_of(path) for path in device[:_NAMED])}"
+            title += f" and {len(device) - _NAMED} more" if len(device) > _NAMED else ""
+        figure.suptitle(title, x=0.01, ha="left", fontsize=11, wrap=True)
         if not is_mapped and len(names) > 1:
             handles = [Line2D([], [], color=colour) for colour in COLOURS[: len(names)]]
             figure.legend(handles, names, loc="outside lower center", ncols=len(names))
@@ -193,17 +210,6 @@ def _layout() -> "ConstrainedLayoutEngine":
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     return ConstrainedLayoutEngine(w_pad=0.12, h_pad=0.08)
-
-
-def _draw_metrics(places: "list[Axes]", panels: list[tuple[str, str]], results: StudyResults, is_mapped: bool) -> None:
-    device = [path for path in results.varied if path != NOISE]
-    for axes, (metric, name) in zip(places, panels, strict=False):
-        if is_mapped:
-            _draw_map(axes, results, name, metric)
-        elif len(device) == 1:
-            _draw_over(axes, results, device[0], metric)
-        else:
-            _draw_histogram(axes, results, metric)
 
 
 def _draw_histogram(axes: "Axes", results: StudyResults, metric: str) -> None:
@@ -271,6 +277,25 @@ def _draw_map(axes: "Axes", results: StudyResults, name: str, metric: str) -> No
     axes.set_title(label if len(results.configurations) == 1 else f"{label}, {name}")
 
 
+def _draw_points(axes: "Axes", results: StudyResults, name: str, metric: str) -> None:
+    """Draw a metric as the colour of points over the two values that were drawn, for one configuration."""
+    across, upward = (path for path in results.varied if path != NOISE)
+    columns = [
+        results.thin(path, _MAXIMUM_POINTS * len(results.configurations))[name] for path in (across, upward, metric)
+    ]
+    (x_label, x), (y_label, y) = (
+        _path_for_display(results, path, column) for path, column in zip((across, upward), columns, strict=False)
+    )
+    points = axes.scatter(
+        x, y, c=_metric_values(metric, columns[2]), s=9, linewidths=0, cmap="cividis", rasterized=True
+    )
+    axes.figure.colorbar(points, ax=axes, pad=0.02)
+    axes.set_xlabel(x_label)
+    axes.set_ylabel(y_label)
+    label = metric_title(metric)
+    axes.set_title(label if len(results.configurations) == 1 else f"{label}, {name}")
+
+
 def _grid_paths(results: StudyResults) -> list[str]:
     return [item["path"] for item in results.document["study"].get("vary", ()) if item["kind"] in _GRIDDED]
 
@@ -320,7 +345,7 @@ def _path_for_display(results: StudyResults, path: str, values: Floats) -> tuple
     """Return label and values of a varied path [SI] in the units of the field."""
     unit = results.document["varied"][path]["unit"]
     quantity = quantity_of_unit(unit)
-    return _axis_label(path.replace(".", " ").replace("_", " "), quantity, unit), display_values(values, quantity)
+    return _axis_label(label_of(path), quantity, unit), display_values(values, quantity)
 
 
 def _axis_label(name: str, quantity: str, unit: str) -> str:

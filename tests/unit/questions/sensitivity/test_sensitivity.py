@@ -3,6 +3,7 @@
 import importlib.util
 import itertools
 import math
+import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,13 +11,12 @@ import numpy as np
 import pytest
 
 from ppafo.errors import StudyError
-from ppafo.questions.sensitivity.methods import METHODS
+from ppafo.questions.sensitivity.methods import METHODS, SCRAMBLES
 from ppafo.questions.sensitivity.solve import Settings, analyse, remarks, sensitivity
 from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround, OneOf, UniformBetween
-from ppafo.studies.draws import Model, Outcomes, Uncertainty
+from ppafo.studies.draws import Model, Outcomes, Uncertainty, replicate_seed
 from ppafo.studies.study import Drawn
 
-pytestmark = pytest.mark.skipif(not importlib.util.find_spec("SALib"), reason="needs the extra 'studies'")
 METRIC = "rms_error"
 A, B = 7.0, 0.1
 ANGLES = Uncertainty(tuple(Drawn(name, UniformBetween(-math.pi, math.pi)) for name in ("x1", "x2", "x3")))
@@ -261,7 +261,23 @@ def test_a_missing_library_is_said_with_its_remedy(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(importlib.util, "find_spec", without)
     with pytest.raises(StudyError, match=r"needs SALib, which is not installed: pip install 'ppafo\[studies\]'"):
-        analyse(ishigami, ANGLES, [METRIC], METHODS["sobol"], Settings(64))
+        analyse(ishigami, ANGLES, [METRIC], METHODS["morris"], Settings(64))
+
+
+def test_the_default_method_needs_no_extra_and_has_the_points_of_salib(monkeypatch: pytest.MonkeyPatch) -> None:
+    sobol = pytest.importorskip("SALib.sample.sobol")
+    dimensions, each = len(ANGLES.drawn), 8
+    design = METHODS["sobol"].design(ANGLES, SCRAMBLES * each, 7).reshape(each, SCRAMBLES, -1, dimensions)
+    problem = {"num_vars": dimensions, "names": list("abc"), "bounds": [[0.0, 1.0]] * dimensions}
+    for number in range(SCRAMBLES):
+        own = replicate_seed(7, number) % 2**32
+        points = sobol.sample(problem, each, calc_second_order=False, seed=own).reshape(each, -1, dimensions)
+        assert (design[:, number] == points).all()
+    real = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *rest: None if name == "SALib" else real(name, *rest))
+    for name in [name for name in sys.modules if name.startswith("SALib")]:
+        monkeypatch.setitem(sys.modules, name, None)
+    assert analyse(ishigami, ANGLES, [METRIC], METHODS["sobol"], Settings(64)).metrics
 
 
 STUDY = "torque-task-uncertainty"

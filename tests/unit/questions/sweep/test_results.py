@@ -206,6 +206,15 @@ def test_there_is_a_panel_for_everything_that_was_asked(document: dict[str, Any]
     assert any("simulated" in text.get_text() for text in figure.texts)
 
 
+def test_two_values_that_were_drawn_are_the_axes_of_each_panel() -> None:
+    figure = study_figure(sweep(study(DRAWN, LEAK, metrics=["gas_supplied"])))
+    assert (figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()) == (
+        "Supply pressure (psig)",
+        "Leak area (mm$^2$)",
+    )
+    assert figure.axes[0].get_title(loc="left") == "Gas supplied (g)"
+
+
 def test_a_map_shows_the_mean_over_the_draws_where_it_belongs() -> None:
     results = sweep(study(AXIS, OTHER, DRAWN, metrics=["gas_supplied"]))
     figure = results.plot()
