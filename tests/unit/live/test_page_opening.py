@@ -11,11 +11,12 @@ import pytest
 from ppafo.answers.style import PAGE_COLOURS
 from ppafo.live import page as pages
 from ppafo.live.opening import LEAST_CHANGE, MOST_FIRST
-from ppafo.live.words import words, workbench
-from ppafo.live.workbench import DEFAULT, declared_workbenches, openings_of
+from ppafo.live.words import words
+from ppafo.live.workbench import DEFAULT, declared_workbenches, openings_of, workbench
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
-from ppafo.questions.endurance.draw import Schedule, draw_of_numbers
+from ppafo.questions.endurance.draw import draw_of_numbers
 from ppafo.questions.endurance.solve import follow_bottle
+from ppafo.walking.bottle import Schedule
 from scripts.live_page import missing, opened
 from scripts.page_tables import FLOWS
 
