@@ -12,11 +12,15 @@ from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import axis_unit, display_value, display_values, quantity_text
 from ppafo.answers.style import ACTUAL, BLACK, BLUE, GREEN, GREY, ORANGE, REFERENCE, VERMILION, house_style, mark_kind
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.errors import StudyError
+from ppafo.errors import ParameterError, StudyError
+from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle, scaled_entries
 from ppafo.parameters.chamber_volumes import ChamberVolumes, other_readings
 from ppafo.parameters.device import Actuator
 from ppafo.parameters.parts import Part
 from ppafo.progress import Progress, Report, report_nothing
+from ppafo.questions.endurance.discharge import TIME_IS_UP
+from ppafo.questions.endurance.draw import draw_of_numbers
+from ppafo.questions.endurance.solve import follow_bottle
 from ppafo.questions.parts.solve import doubts_data, doubts_sections, titles_section
 from ppafo.questions.question import Solved
 from ppafo.questions.size.problem import SizingProblem, load_sizing
@@ -38,6 +42,7 @@ from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.version import __version__
+from ppafo.walking.bottle import Schedule
 
 if TYPE_CHECKING:
     import matplotlib.figure
@@ -354,10 +359,12 @@ def suggestion_sentence(sizing: Sizing) -> str:
             return "no suggestion: valves keep the limit, but no bottle is large enough for the use"
         return "no suggestion: no valve keeps the error limit at any of the pressures"
     bottle = "" if item.bottle is None else f" and {item.bottle.name}"
+    cut = 0.0 if item.margins is None else -item.margins.torque
+    peak = f", with {100.0 * cut:.0f} % of the peak cut off" if cut > 0.0 else ""
     return (
-        f"suggested: {item.valve.name} at {quantity_text(item.pressure, 'pressure')}{bottle}, the lightest that meets "
-        f"all requirements, {quantity_text(item.mass or 0.0, 'part mass', '.0f')}; a lower pressure is prevented by "
-        f"{LIMITS[item.limit]}"
+        f"suggested: {item.valve.name} at {quantity_text(item.pressure, 'pressure')}{bottle}, the lightest that lasts "
+        f"and keeps the error limit{peak}, {quantity_text(item.mass or 0.0, 'part mass', '.0f')}; a lower pressure is "
+        f"prevented by {LIMITS[item.limit]}"
     )
 
 
@@ -533,14 +540,16 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
     pressure, error, gas = (float(series[place]) for series in (tried.pressure, tried.trial.error, tried.trial.gas))
     gains = int(tried.trial.gains[place])
     works = tried.first is not None
-    bottle = _bottle(problem, gas) if works else None
+    bottle, is_cold = _lasting_bottle(problem, gas, pressure) if works else (None, False)
     said = []
     if tried.fails_above is not None:
         said.append(f"at {quantity_text(tried.fails_above, 'pressure')} the error limit is exceeded again")
     if highest_pressure(problem, valve) < problem.highest_pressure and tried.first is None:
         highest = quantity_text(highest_pressure(problem, valve), "pressure")
         said.append(f"not tried above {highest}, the rated pressure of its parts")
-    if tried.first is not None and bottle is None:
+    if is_cold:
+        said.append("a lighter bottle has gas enough and ends before, as it is too cold")
+    if tried.first is not None and bottle is None and _bottle(problem, gas) is None:
         largest = max(problem.bottles, key=lambda item: item.values["content"])
         lasts = largest.values["content"] / _gas_in_all(problem, gas)
         said.append(f"no bottle is large enough: {largest.name} lasts for {100 * lasts:.0f} % of the use")
@@ -582,6 +591,36 @@ def _gas_in_all(problem: SizingProblem, gas: float) -> float:
 
 def _bottle(problem: SizingProblem, gas: float) -> Part | None:
     return smallest_bottle(problem.bottles, _gas_in_all(problem, gas))
+
+
+def _lasting_bottle(problem: SizingProblem, gas: float, pressure: float) -> tuple[Part | None, bool]:
+    """Return the lightest bottle that lasts, mass and heat together, and whether a lighter one only has the gas.
+
+    The profile is repeated without a rest, ``gas`` [kg] each time, behind a regulator set to the ``pressure`` [Pa].
+    """
+    enough = [bottle for bottle in problem.bottles if bottle.values["content"] >= _gas_in_all(problem, gas)]
+    if gas <= 0.0:
+        return (min(enough, key=lambda bottle: bottle.full_mass, default=None), False)
+    period, paper = problem.profile.period, load_bottle(PAPER_BOTTLE)
+    needed = problem.repetitions * period
+    # A second more than the use, so that a bottle that lasts is one whose time is up.
+    schedule = Schedule(needed + 1.0, 0.0, max(needed, 1.0))
+    for place, part in enumerate(sorted(enough, key=lambda bottle: bottle.full_mass)):
+        scaled = scaled_entries(part, paper.entries)
+        changes = [
+            f"{path}={scaled[path].value} {scaled[path].unit}"
+            for path in scaled
+            if scaled[path] != paper.entries.get(path)
+        ]
+        full = load_bottle(PAPER_BOTTLE, [*changes, f"regulator.set_pressure={pressure} Pa_a"])
+        draw = draw_of_numbers(gas, period, None)
+        try:
+            ended = follow_bottle(full, draw, schedule).discharge.ending.kind
+        except ParameterError:
+            continue
+        if ended == TIME_IS_UP:
+            return part, place > 0
+    return None, bool(enough)
 
 
 def _mass(problem: SizingProblem, valve: Part, bottle: Part) -> float:

@@ -43,6 +43,8 @@ WIDER = (2.0, 4.0, 16.0)
 """How much larger openings are tried to see whether the flow limits."""
 NEAR_CEILING = 1.2
 """A lowest gauge pressure of at most this many times the one that the torque ceiling alone demands is owed to it."""
+LEAST_PEAK = 0.7
+"""Share of the peak that a pressure has to hold: an RMS error over a stride that is mostly zero lets half of it go."""
 MORE_PRESSURE = 1.1
 """Times the gauge pressure at which the margin of the flow is looked for."""
 OPENINGS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.25, 0.2, 0.15, 0.1, 0.05)
@@ -189,7 +191,8 @@ def try_pressures(trials: Trials, valve: Part) -> Pressures:
 
 def _pressures(trials: Trials, valve: Part, pressure: Floats) -> Pressures:
     trial = trials.best(valve, pressure)
-    works = trial.error <= trials.problem.largest_error
+    problem = trials.problem
+    works = (trial.error <= problem.largest_error) & (pressure >= peak_pressure(problem))
     return Pressures(pressure, trial, works)
 
 
@@ -229,9 +232,17 @@ def ceiling_pressure(problem: SizingProblem) -> float:
 
     atmosphere = problem.scenario.device.supply.atmospheric_pressure
     whole = atmosphere + problem.profile.largest / problem.torque_constant
+    least = peak_pressure(problem)
     if cut_error(problem, atmosphere) <= problem.largest_error:
-        return atmosphere
-    return float(brentq(lambda pressure: cut_error(problem, pressure) - problem.largest_error, atmosphere, whole))
+        return least
+    cut = float(brentq(lambda pressure: cut_error(problem, pressure) - problem.largest_error, atmosphere, whole))
+    return max(cut, least)
+
+
+def peak_pressure(problem: SizingProblem) -> float:
+    """Return the pressure [Pa absolute] that holds the least share of the peak; equation (2)."""
+    atmosphere = problem.scenario.device.supply.atmospheric_pressure
+    return atmosphere + LEAST_PEAK * problem.profile.largest / problem.torque_constant
 
 
 def cut_error(problem: SizingProblem, pressure: float) -> float:

@@ -15,7 +15,7 @@ from ppafo.control.profiles import KNOTS
 from ppafo.errors import PpafoError
 from ppafo.parameters.parts import load_catalogue
 from ppafo.questions.size import search
-from ppafo.questions.size.answer import Sizing, size, smallest_bottle
+from ppafo.questions.size.answer import Sizing, _lasting_bottle, size, smallest_bottle, suggestion_sentence
 from ppafo.questions.size.problem import choose_knots, json_schema, load_sizing
 from ppafo.questions.size.search import Floats, Trials, ceiling, ceiling_pressure, cut_error
 from ppafo.signals import Channel, Recording
@@ -299,3 +299,32 @@ def test_a_limit_is_kept_in_every_noise_stream_and_the_seed_of_the_scenario_deci
     assert found[0].gas == pytest.approx(np.full(3, 2.0 * streams.mean() / problem.simulated))
     assert np.array_equal(found[0].error, found[1].error)
     assert Trials(problem).seeds.size == 0
+
+
+def test_a_pressure_that_cuts_half_of_the_peak_is_not_suggested(tmp_path: Path) -> None:
+    zeros = ", ".join(['"0 N m"'] * 2)
+    (tmp_path / "brief.toml").write_text(
+        'schema_version = 1\nname = "brief"\nscenario = "torque-task-proportional"\n'
+        '[profile]\ntime = ["0 s", "0.1 s", "0.2 s", "0.3 s", "1.1 s"]\n'
+        f'torque = ["0 N m", "2.5 N m", "5 N m", {zeros}]\n'
+        '[use]\nrepetitions = 10\n[limits]\nrms_error = "1.5 N m"\n[parts]\nvalves = ["festo-mpye-5-1-8-hf-010-b"]\n'
+        'bottles = ["pipeline-jacpac-9oz"]\n[pressure]\nlowest = "15 psi_g"\nhighest = "100 psi_g"\n'
+    )
+    sizing = size(tmp_path / "brief.toml")
+    assert isinstance(sizing, Sizing)
+    assert sizing.choice is not None
+    assert sizing.choice.margins is not None
+    assert sizing.choice.margins.torque >= -0.3
+    assert "% of the peak cut off" in suggestion_sentence(sizing)
+    assert "meets all" not in suggestion_sentence(sizing)
+
+
+def test_a_bottle_with_gas_enough_that_gets_too_cold_is_not_suggested() -> None:
+    problem = dataclasses.replace(load_sizing("push-off"), repetitions=500.0)
+    parts = load_catalogue().groups["bottles"]
+    bottles = tuple(parts[name] for name in ("pipeline-jacpac-9oz", "co2-20oz"))
+    gas, pressure = 0.45e-3, 101325.0 + 50.0 * 6894.757
+    bottle, is_cold = _lasting_bottle(dataclasses.replace(problem, bottles=bottles), gas, pressure)
+    assert smallest_bottle(bottles, gas * 500.0 * 1.1) is bottles[0], "its gas alone would do"
+    assert bottle is bottles[1]
+    assert is_cold
