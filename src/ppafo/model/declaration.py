@@ -55,3 +55,8 @@ class Quantity:
     maximum: float = math.inf
     minimum_allowed: bool = True
     follows: tuple[str, ...] = ()
+
+
+def range_rule(quantity: Quantity, limits: str) -> str:
+    """Return what a value out of range must be, such as "must be at least 0 m^2 (open area)"."""
+    return f"must be {limits}" + (f" ({quantity.summary})" if quantity.summary else "")

@@ -12,7 +12,7 @@ from ppafo.model.actuators.kind import Range
 from ppafo.model.actuators.table import Table
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.model.columns import Problem, at, larger
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Quantity, range_rule
 from ppafo.model.effects.kind import SECTION
 from ppafo.model.gas import SPECIES
 from ppafo.parameters import declaration
@@ -181,7 +181,7 @@ def _check_range(given: str, value: float, quantity: Quantity) -> None:
     lower = f"{'at least' if quantity.minimum_allowed else 'more than'} {quantity.minimum:g}"
     upper = f" and at most {quantity.maximum:g}" if math.isfinite(quantity.maximum) else ""
     unit = f" {quantity.unit}".rstrip()
-    raise ParameterError(f"{given}: {quantity.summary} must be {lower}{upper}{unit}")
+    raise ParameterError(f"{given}: {range_rule(quantity, f'{lower}{upper}{unit}')}")
 
 
 def _section(read: Callable[[str], float], section: str, members: Iterable[Quantity]) -> dict[str, float]:

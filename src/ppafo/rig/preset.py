@@ -22,7 +22,7 @@ from ppafo.documents.models import StrictTable, make_schema, quote, table
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, refused_as
 from ppafo.model.catalog import VALVES
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Quantity, range_rule
 from ppafo.model.effects.kind import SECTION, Effect
 from ppafo.model.effects.seal_friction import SealFriction
 from ppafo.model.effects.second_virial import SECOND_VIRIAL
@@ -193,7 +193,7 @@ class Preset:
             raise ParameterError(f"preset '{self.name}' has no value '{path}'{nearest_name(path, PATHS)}")
         if not (math.isfinite(value) and is_within(value, quantity)):
             limits = f"from {quantity.minimum:g} to {quantity.maximum:g} {quantity.unit}".rstrip()
-            raise ParameterError(f"preset '{self.name}': {path} = {value:g}: {quantity.summary} must be {limits}")
+            raise ParameterError(f"preset '{self.name}': {path} = {value:g}: {range_rule(quantity, limits)}")
         return replace(self, values={**self.values, path: value}, reasons={**self.reasons, path: reason})
 
 

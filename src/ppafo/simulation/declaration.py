@@ -20,7 +20,7 @@ from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
 from ppafo.documents.models import quote
 from ppafo.errors import KindError, ScenarioError, UnitError, nearest_name, one_line, refused_as
 from ppafo.kinds import Kinds
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Quantity, range_rule
 from ppafo.model.effects.bandwidth import EFFECT as BANDWIDTH
 from ppafo.parameters.declaration import is_within
 from ppafo.parameters.parameter_set import Entry
@@ -322,7 +322,7 @@ class Reading:
             return quantity.default
         result = self._in_si(path, value, quantity, atmosphere)
         if not is_within(result, quantity):
-            raise self.refusal(path, f"{quantity.summary or quantity.name} must be {limits(quantity, atmosphere)}")
+            raise self.refusal(path, range_rule(quantity, limits(quantity, atmosphere)))
         return result
 
     def section(self, section: str, quantities: tuple[Quantity, ...]) -> dict[str, float]:

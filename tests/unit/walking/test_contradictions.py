@@ -48,7 +48,7 @@ ON_A_PROPORTIONAL_VALVE = {
 }
 PROFILE = {
     "controller.peak_time=0.9; controller.fall_time=0.2": "the torque would end after the stride",
-    "controller.peak_time=0.95": "must be at least 0.1 and at most 0.9$",
+    "controller.peak_time=0.95": "must be at least 0.1 and at most 0.9 .phase of the peak",
     "controller.rise_time=0.6": "the torque would rise before the heel strike: controller.peak_time is 0.53",
     "controller.peak_time=0.3": "the peak would be over before the push-off: controller.push_off_start is 0.4",
 }

@@ -20,7 +20,7 @@ from ppafo.documents.models import NAME, make_schema, optional, read_model, tabl
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, refused_as
 from ppafo.model.cold_gas import ColdSupply, Passage
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Quantity, range_rule
 from ppafo.model.gas import SPECIES
 from ppafo.model.source import (
     BottleWall,
@@ -364,7 +364,7 @@ def _in_si(path: str, entry: Entry, file: str) -> float:
     if not (math.isfinite(value) and is_within(value, quantity)):
         lower = f"{'at least' if quantity.minimum_allowed else 'more than'} {quantity.minimum:g}"
         upper = f" and at most {quantity.maximum:g}" if math.isfinite(quantity.maximum) else ""
-        raise ParameterError(f"{given}: {quantity.summary} must be {lower}{upper} {quantity.unit}".rstrip())
+        raise ParameterError(f"{given}: {range_rule(quantity, f'{lower}{upper} {quantity.unit}'.rstrip())}")
     return value
 
 

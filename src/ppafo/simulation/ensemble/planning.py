@@ -13,7 +13,7 @@ from ppafo.engine.lanes import Batch, Floats
 from ppafo.engine.run import Members, batches_of
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Quantity, range_rule
 from ppafo.parameters.building import actuator_problem, beyond_pressures, consistency, growth_and_problem
 from ppafo.parameters.device import VANE
 from ppafo.parameters.plant import switches_of
@@ -105,7 +105,7 @@ def _out_of_range(columns: Columns, path: str) -> Problem:
             return f"{given}: is not a finite number"
         if path in _WHOLE and values[run] != np.floor(values[run]):
             return f"{given}: must be a whole number"
-        return f"{given}: {quantity.summary or quantity.name} must be {limits(quantity, STANDARD_ATMOSPHERE)}"
+        return f"{given}: {range_rule(quantity, limits(quantity, STANDARD_ATMOSPHERE))}"
 
     is_good = _within(values, quantity)
     return ~(is_good & (values == np.floor(values)) if path in _WHOLE else is_good), line
