@@ -15,7 +15,7 @@ from ppafo.engine.scheme.pneumatics import held_pressures
 from ppafo.model.gait import foot_in_gait
 from ppafo.model.places import shown_signals
 from ppafo.model.plant import actuator_torque, chamber_pressures
-from ppafo.model.plant_faults import is_dark, is_due, next_unpowered, runs_at
+from ppafo.model.plant_faults import is_dark, is_due, is_silenced, next_unpowered, runs_at
 from ppafo.model.sensors import GaitMeasurement, Measurement, late_measurement, measure, measure_gait, samples_late
 from ppafo.model.valves.kind import VENT
 from ppafo.signals.meter import SAME_LEVEL, FootSample, Sample, StrideSample, advance_course, is_away
@@ -63,20 +63,21 @@ def sampled_with_faults(rows: Rows, lines: list[str]) -> list[str]:
     called = [line.replace("command, controller_state =", "ordered, after_state =") for line in kept[:-1]]
     level = "after_state.safety.level" if f"controller_state.{LEVEL}" in stored else "0.0"
     return [
-        *[rows.load(group) for group in ("result", "plant_faults", "unpowered", "sensors")],
+        *[rows.load(group) for group in ("result", "plant_faults", "shut_off", "unpowered", "sensors")],
         "now = step_index * timing.step",
         f"dark = {add(is_dark)}(plant_faults, now)",
         f"runs = {add(runs_at)}(plant_faults, now, timing.period, int(sensors.seed), step_index // steps_per_sample)",
         *called,
         f"takes = {add(is_due)}(plant_faults.slow_time, plant_faults.slow_delay, now, timing.period)",
-        f"{rows.cells['result.command']} = {VENT!r} if dark else (ordered if runs & takes else result.command)",
+        f"unpowered = {add(next_unpowered)}(shut_off, unpowered, runs, {level} >= {STOPPED!r}, dark, timing.period)",
+        *rows.store("unpowered"),
+        f"vents = dark | {add(is_silenced)}(shut_off, unpowered)",
+        f"{rows.cells['result.command']} = {VENT!r} if vents else (ordered if runs & takes else result.command)",
         *[
             f"{rows.cells[path]} = {float(first)!r} if dark else "
             f"({path.replace('controller_state', 'after_state', 1)} if runs else {path})"
             for path, first in stored.items()
         ],
-        f"unpowered = {add(next_unpowered)}(unpowered, {level} >= {STOPPED!r}, dark, timing.period)",
-        *rows.store("unpowered"),
     ]
 
 

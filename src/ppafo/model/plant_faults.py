@@ -58,22 +58,31 @@ SOUND = PlantFaults(ChamberFaults(), ChamberFaults())
 
 
 class ShutOff(NamedTuple):
-    """Shut-off valve, normally closed 3/2: conductance [kg/(s Pa)], 0 where none is fitted, and delay [s]."""
+    """Shut-off valve, normally closed 3/2: conductance [kg/(s Pa)], 0 where none is fitted, and delay [s].
+
+    Its watchdog takes its power away, and all that of the other valves, where the controller is silent for longer than
+    ``silence`` [s]; ``NEVER`` where there is none.
+    """
 
     conductance: float
     delay: float
+    silence: float
 
 
-NOT_FITTED = ShutOff(0.0, 0.0)
+NOT_FITTED = ShutOff(0.0, 0.0, NEVER)
 
 
 class Unpowered(NamedTuple):
-    """For how long [s] the controller has left the shut-off valve without power: since it has stopped, or is dark."""
+    """For how long [s] the shut-off valve has had no power, and for how long the controller has been silent.
+
+    It has none since the controller has stopped, is dark, or was silent for longer than the watchdog allows, for good.
+    """
 
     since: float
+    silent: float
 
 
-POWERED = Unpowered(0.0)
+POWERED = Unpowered(0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,6 +207,14 @@ SHUT_OFF = (
     Quantity("area", "m^2", "area of the shut-off valve, 0 where none is fitted", 0.0, 0.0, 1.0e-3),
     Quantity("discharge_coefficient", "1", "its discharge coefficient", 0.7, 0.01, 1.0),
     Quantity("delay", "s", "time from the alarm to a vented line", 0.02, 0.0, 1.0),
+    Quantity(
+        "silence",
+        "s",
+        "its watchdog lets it shut, for good, where the controller is silent for longer",
+        0.01,
+        0.0,
+        1.0e9,
+    ),
     Quantity("mass", "kg", "its mass", 0.06, 0.0, 1.0),
     Quantity("power", "W", "what holds it open, as long as the device helps", 0.5, 0.0, 100.0),
 )
@@ -365,7 +382,19 @@ def runs_at(faults: PlantFaults, time: float, period: float, seed: int, sample: 
     return is_due(faults.late_time, faults.late_delay, time, period) & (not missed)
 
 
-def next_unpowered(closed: Unpowered, stopped: bool, dark: bool, period: float) -> Unpowered:
-    """For how long the shut-off valve has had no power after a sample [s]; without power at all it shuts at once."""
-    since = closed.since + period if stopped else 0.0
-    return Unpowered(NEVER if dark else since)
+def is_silenced(shut_off: ShutOff, closed: Unpowered) -> bool:
+    """True where the watchdog has taken the power of all valves away."""
+    return closed.silent > shut_off.silence
+
+
+def next_unpowered(
+    shut_off: ShutOff, closed: Unpowered, runs: bool, stopped: bool, dark: bool, period: float
+) -> Unpowered:
+    """The shut-off valve after a sample [s] at which the controller runs or not; without power it shuts at once.
+
+    A watchdog that has acted stays: what the controller would do when it comes back is not known.
+    """
+    silenced = is_silenced(shut_off, closed)
+    silent = closed.silent if silenced else (0.0 if runs | dark else closed.silent + period)
+    since = closed.since + period if stopped | (silent > shut_off.silence) else 0.0
+    return Unpowered(NEVER if dark else since, silent)

@@ -18,6 +18,7 @@ from ppafo.model import contact as ground
 from ppafo.simulation.declaration import PLAIN, WRITTEN_UNITS
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import from_si
+from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of
 
 EVENTS = ("heel strike", "toes on", "heel off", "toes off")
@@ -37,6 +38,12 @@ EVENT_ROW, FRACTION_ROW = "clock.event", "clock.fraction"
 PHASE_ROW = "controller_state.phase.phase"
 SAFE_ROW = "controller_state.safety.level"
 """Where event-based controllers keep the phase that they see, and whether they help, pause or have stopped."""
+
+SILENT_ROW = "unpowered.silent"
+"""For how long the controller has been silent, where a shut-off valve has a watchdog."""
+
+SILENT = Sign("silent_controller", "the controller takes no samples: the watchdog has shut the supply off", (), ())
+"""What a watchdog sees, which no controller can."""
 
 VENTINGS_ROW = "controller_state.safety.ventings"
 """And how often they gave less help: lifted only, paused or stopped."""
@@ -167,18 +174,28 @@ class SafetyEvent:
 
 def safety_events(configuration: Scenario, time: Floats, record: Mapping[str, Floats]) -> tuple[SafetyEvent, ...]:
     """Return the events of a walk in their order, from its rows (samples,) by path at these times [s]."""
+    watchdog = _silenced(configuration, time, record)
     if SAFE_ROW not in record:
-        return ()
+        return watchdog
     level, ventings = record[SAFE_ROW], record[VENTINGS_ROW]
     vents = np.diff(ventings, prepend=0.0) > 0.0
     helps = np.diff(level, prepend=HELPS) < 0.0
     places = np.flatnonzero(vents | helps).tolist()
-    return tuple(
+    found = tuple(
         _venting(configuration, float(time[place]), float(level[place]), record, place)
         if vents[place] and level[place] > HELPS
         else SafetyEvent(float(time[place]), float(level[place]))
         for place in places
     )
+    return (*(event for event in found if not watchdog or event.time < watchdog[0].time), *watchdog)
+
+
+def _silenced(configuration: Scenario, time: Floats, record: Mapping[str, Floats]) -> tuple[SafetyEvent, ...]:
+    """The event of the watchdog of a shut-off valve, where it has acted."""
+    if SILENT_ROW not in record or not walk_of(configuration).shut_off:
+        return ()
+    silent = np.flatnonzero(record[SILENT_ROW] > walk_of(configuration).shut_off["silence"])
+    return (SafetyEvent(float(time[silent[0]]), STOPPED, SILENT),) if silent.size else ()
 
 
 def _venting(

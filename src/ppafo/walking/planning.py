@@ -198,7 +198,7 @@ def _shut_off(settings: Mapping[str, Any], device: Device) -> ShutOff:
         return NOT_FITTED
     gas = device.gas.heat_capacity_ratio, device.gas.specific_gas_constant, device.gas.temperature
     conductance = over_runs(area_conductance, settings["area"], settings["discharge_coefficient"], *gas)
-    return ShutOff(conductance, settings["delay"])
+    return ShutOff(conductance, settings["delay"], settings["silence"])
 
 
 def sensor_settings(scenario: Scenario) -> SensorSettings:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from ppafo.control.walking.signs import STOPPED
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.run import batch_of
@@ -88,6 +89,19 @@ def test_a_fault_that_a_part_does_not_have_and_a_regulator_behind_lines_are_refu
         load_walk("solenoid-regulators", ["faults.regulator_1.kind=high", "faults.regulator_1.time=1 s"])
     with pytest.raises(ScenarioError, match=r"shut_off\.area"):
         load_walk("solenoid", ["shut_off.delay=10 ms"])
+
+
+def test_a_controller_that_is_silent_for_too_long_is_shut_off_by_the_watchdog_and_a_shorter_silence_is_not() -> None:
+    late = ("faults.controller.kind=late", "faults.controller.time=3.2 s", SHUT_OFF)
+    patient, watched = (walk("solenoid", 0.12, (*late, *more)) for more in (("shut_off.silence=1 s",), ()))
+    seen = [[(event.time, event.sign.name) for event in found.events if event.sign] for found in (patient, watched)]
+    assert seen[1] == [(pytest.approx(3.21, abs=2e-3), "silent_controller")]
+    assert watched.events[-1].level == STOPPED
+    assert "silent_controller" not in [name for _, name in seen[0]]
+    time, commands = watched.recording.time, [found.recording["command"] for found in (patient, watched)]
+    # It sends no command any more, and what is left is the pinch of vented chambers.
+    assert [np.unique(command[time > 3.22]).size for command in commands] == [2, 1]
+    assert np.abs(watched.recording["torque"][time > 3.21 + 0.5]).max() < 1.0
 
 
 def test_without_a_fault_and_a_shut_off_valve_there_is_nothing_that_fails() -> None:
