@@ -30,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from benchmarks.intervals.planted import NOISE
 from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.identification.trajectory import Experiment, FreeParameter, Search, TrajectoryFit, TrajectoryProblem, fit
-from ppafo.identification.trajectory.directions import HEAT
+from ppafo.identification.trajectory.directions.heat import HEAT
 from ppafo.identification.trajectory.fitting import residuals_of
 from ppafo.identification.trajectory.next_experiment import (
     NextExperiments,
@@ -89,7 +89,7 @@ def reached(
 ) -> tuple[dict[str, tuple[float, float]], float]:
     """Estimate and half width of each number in coordinates, and the standard errors of the planted effect."""
     effects = harmful_sizes(present)
-    on = effects[planted].direction.settings(effects[planted].size)
+    on = effects[planted].direction.settings(effects[planted].size, problem.experiments[0].scenario)
     with_it = [replace(one, scenario=with_numbers(one.scenario, on)) for one in problem.experiments]
     found = optimum(residuals_of(replace(problem, experiments=tuple(with_it))), problem.search)
     residuals, ranges, point = found.residuals, found.residuals.ranges, found.point
@@ -154,7 +154,7 @@ def truth_of(
     effects = harmful_sizes(present)
     base = scenarios["there"]
     truth = {path: number_at(base, path) * math.exp(random.uniform(-0.15, 0.15)) for path in PARAMETERS}
-    on = effects[planted].direction.settings(effects[planted].size)
+    on = effects[planted].direction.settings(effects[planted].size, base)
     problem = problem_of(scenarios, tolerances, random, {**truth, **on})
     first = fit(_of_first(problem, tolerances))
     promises = promised_by(first, tolerances, design.chosen, effects, load_scenario)

@@ -35,17 +35,30 @@ def fitted(extra: Extra, directions: bool = True, noise: str = "white", seed: in
 
 
 @pytest.mark.parametrize(
-    ("extra", "words"),
+    ("extra", "words", "low", "high"),
     [
-        (Extra(leak_opens=1.0e4), "the leak seems to open at"),
-        (Extra(heat=6000.0), "the gas seems to warm and cool"),
-        (Extra(stribeck=0.3), "friction near standstill seems to be higher"),
+        (Extra(leak_opens=1.0e4), "the leak seems to open at", 3.0e3, 1.3e4),
+        (Extra(heat=60.0), "the gas seems to warm and cool", 1.0 / 64.0, 1.0 / 56.0),
+        (Extra(stribeck=0.3), "friction near standstill seems to be higher", 0.1, 0.4),
+        pytest.param(Extra(heat=6e3), "the gas seems to warm and cool", 1.5e-4, 1.9e-4, marks=pytest.mark.long),
+        pytest.param(Extra(line=4e-6), "lines of 3.", 3.0e-6, 4.5e-6, marks=pytest.mark.long),
+        pytest.param(Extra(virial=-4.04e-8), "the gas seems not to be ideal", 0.7, 0.9, marks=pytest.mark.long),
     ],
 )
-def test_an_effect_that_the_model_lacks_is_named(extra: Extra, words: str) -> None:
+def test_an_effect_that_the_model_lacks_is_named_with_the_size_of_a_fit_with_it(
+    extra: Extra, words: str, low: float, high: float
+) -> None:
     found = fitted(extra)
     assert found.misfit.startswith(words)
-    assert {estimate.verdict for estimate in found.estimates} == {"holds for this model only"}
+    assert found.doubt is not None
+    first = found.doubt.shown[0]
+    assert first.refit is not None
+    assert first.explains
+    assert low < first.refit.size < high
+    assert not any(one.is_identified for one in found.estimates)
+    held = [one for one in found.estimates if one.verdict == "holds for this model only"]
+    assert held
+    assert all("Fitted with " in one.explanation for one in held)
 
 
 def test_friction_that_grows_unseen_is_in_the_condition_and_the_truth_in_the_interval_beside() -> None:

@@ -14,16 +14,10 @@ import numpy as np
 from ppafo.errors import PpafoError
 from ppafo.identification.noise.choice import sensor_noise
 from ppafo.identification.noise.sensor_noise import Course, SensorNoise, course_of
-from ppafo.identification.trajectory.directions import (
-    EFFECT_DIRECTIONS,
-    HEAT,
-    LARGEST_ZERO,
-    as_it_is,
-    changes_with,
-    size_of_angle,
-    size_of_pressure,
-    with_heat,
-)
+from ppafo.identification.trajectory.directions.catalogue import EFFECT_DIRECTIONS
+from ppafo.identification.trajectory.directions.changes import as_it_is, changes_with, with_heat
+from ppafo.identification.trajectory.directions.heat import HEAT
+from ppafo.identification.trajectory.directions.zero import LARGEST_ZERO, size_of_angle, size_of_pressure
 from ppafo.identification.trajectory.problem import (
     Experiment,
     broken_rule,

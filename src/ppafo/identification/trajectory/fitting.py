@@ -9,7 +9,8 @@ import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.estimate import Estimate
-from ppafo.identification.trajectory.directions import LARGEST_DRIFT, Doubt, doubt_of
+from ppafo.identification.trajectory.directions.gain_drift import LARGEST_DRIFT
+from ppafo.identification.trajectory.doubt import Doubt, doubt_of
 from ppafo.identification.trajectory.information import autocorrelation, correlation
 from ppafo.identification.trajectory.problem import (
     Experiment,
@@ -285,7 +286,7 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     doubt = None
     if problem.search.directions:
         report(Progress("trajectory fit: what the model may lack"))
-        doubt = doubt_of(whole, uncertainty.low, uncertainty.high)
+        doubt = doubt_of(whole, uncertainty.low, uncertainty.high, uncertainty.misfit.is_found)
     reasons = (
         "" if doubt is None else doubt.misfit,
         reason_of_misfit(uncertainty.misfit, channels, uncertainty.sensors),
@@ -312,6 +313,7 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         search=problem.search,
         conditions=() if doubt is None else doubt.conditions,
         beside=None if doubt is None else (doubt.low, doubt.high),
+        with_effect=None if doubt is None else doubt.with_effect,
     )
     slopes = np.array([item.slope(float(z)) for item, z in zip(ranges, centre, strict=True)])
     scenarios = tuple(with_numbers(item.scenario, numbers_in(item.label, ranges, centre)) for item in prepared)

@@ -13,15 +13,10 @@ import numpy as np
 
 from ppafo.errors import PpafoError
 from ppafo.identification.estimate import interval_factor
-from ppafo.identification.trajectory.directions import (
-    EFFECT_DIRECTIONS,
-    HEAT,
-    Direction,
-    as_it_is,
-    can_have,
-    changes_with,
-    with_heat,
-)
+from ppafo.identification.trajectory.directions.catalogue import EFFECT_DIRECTIONS
+from ppafo.identification.trajectory.directions.changes import as_it_is, can_have, changes_with, with_heat
+from ppafo.identification.trajectory.directions.heat import HEAT
+from ppafo.identification.trajectory.directions.kind import Direction
 from ppafo.identification.trajectory.fitting import TrajectoryFit
 from ppafo.identification.trajectory.information import covariance
 from ppafo.identification.trajectory.problem import (
@@ -114,10 +109,6 @@ class NextExperiments:
     dropped: int
 
 
-_POWERS = {"line_resistance": 2.0}
-"""By how much more than its size an effect changes the channels: a line by the square of the flow over its area."""
-
-
 @dataclass(frozen=True, slots=True)
 class Sized:
     """An effect of the device and the smallest size of it that would do harm."""
@@ -128,7 +119,7 @@ class Sized:
     @property
     def quarter(self) -> float:
         """What a quarter of the size changes over what the whole does [-], if nothing bends."""
-        return float(QUARTER ** _POWERS.get(self.direction.name, 1.0))
+        return float(QUARTER**self.direction.growth)
 
     @property
     def in_words(self) -> str:

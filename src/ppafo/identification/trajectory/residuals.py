@@ -213,10 +213,10 @@ def _steps_between_samples(samples: Samples, step: float) -> float:
 
 def numbers_in(label: str, ranges: Sequence[Range], point: Floats) -> dict[str, float]:
     """Return the numbers in SI units, by path, that a point of coordinates gives to the experiment with a label."""
-    return {path: float(column[0]) for path, column in _columns_in(label, ranges, point[None, :]).items()}
+    return {path: float(column[0]) for path, column in columns_in(label, ranges, point[None, :]).items()}
 
 
-def _columns_in(label: str, ranges: Sequence[Range], points: Floats) -> dict[str, Floats]:
+def columns_in(label: str, ranges: Sequence[Range], points: Floats) -> dict[str, Floats]:
     """Return the same as columns, one number for each of many points (points, coordinates)."""
     acting = [pair for pair in zip(ranges, points.T, strict=True) if pair[0].acts_in(label)]
     return {item.path: np.array([item.number(z) for z in column.tolist()]) for item, column in acting}
@@ -231,7 +231,7 @@ def trajectories(
     """
 
     def one(prepared: PreparedExperiment) -> dict[str, Floats]:
-        return signals_at(prepared, _columns_in(prepared.label, ranges, points), len(points))
+        return signals_at(prepared, columns_in(prepared.label, ranges, points), len(points))
 
     workers = min(len(experiments), os.cpu_count() or 1)
     if workers == 1:

@@ -269,7 +269,8 @@ class Evidence:
 
     ``interval`` has the ends of the intervals, ``beside`` those with effects that nothing shows, and ``conditions``
     says for each parameter which of these must not be, empty for none. ``misfit`` says why the model is wrong, empty
-    where it is not; ``alone`` names for each parameter the only channel that speaks of it, empty where several do.
+    where it is not, and ``with_effect`` has the effect that would make it right, with the coordinates
+    then; ``alone`` names for each parameter the only channel that speaks of it, empty where several do.
     """
 
     ranges: tuple[Range, ...]
@@ -289,6 +290,7 @@ class Evidence:
     search: Search
     conditions: tuple[str, ...] = ()
     beside: tuple[Floats, Floats] | None = None
+    with_effect: tuple[str, Floats] | None = None
 
 
 def estimate_of(evidence: Evidence, index: int) -> Estimate:
@@ -315,6 +317,10 @@ def estimate_of(evidence: Evidence, index: int) -> Estimate:
         explanation += (
             " These recordings cannot show whether that is so; if not, the interval is the one behind 'else'."
         )
+    if evidence.with_effect is not None and verdict == "holds for this model only":
+        effect, points = evidence.with_effect
+        fitted = f"{item.number(float(points[index])):.6g} {item.unit}".removesuffix(" -").removesuffix(" 1")
+        explanation += f" Fitted with {effect} it is {fitted}."
     return Estimate(
         path=item.name,
         value=item.number(at),

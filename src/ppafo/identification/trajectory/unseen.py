@@ -4,7 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ppafo.identification.trajectory.directions import EFFECT_DIRECTIONS, Doubt, Finding, can_have
+from ppafo.identification.trajectory.directions.catalogue import EFFECT_DIRECTIONS
+from ppafo.identification.trajectory.directions.changes import can_have
+from ppafo.identification.trajectory.doubt import Doubt, Finding, title_of
 from ppafo.identification.trajectory.problem import Range, is_nuisance
 from ppafo.identification.trajectory.residuals import Floats
 from ppafo.simulation.scenario import Scenario
@@ -14,21 +16,6 @@ VISIBLE = 2.0
 _NOTABLE = 0.5
 """Share of half an interval below which a shift is not worth a line."""
 
-_NAMES = {
-    "leak_opening": "a leak that opens at a pressure",
-    "seal_friction": "friction that grows with the pressure between the chambers",
-    "stribeck": "friction that is higher near standstill (Stribeck)",
-    "spool_play": "play of the spool",
-    "line_resistance": "a narrow line between valve and chambers",
-    "heat": "heat between gas and walls",
-    "delay": "a clock that is off",
-}
-
-
-def name_of(effect: str) -> str:
-    """Return what an effect is called in a sentence."""
-    return _NAMES.get(effect, effect.replace("_", " "))
-
 
 def unseen_in_words(
     doubt: Doubt, ranges: Sequence[Range], point: Floats, half_widths: Floats, scenarios: Sequence[Scenario]
@@ -37,7 +24,7 @@ def unseen_in_words(
 
     ``point`` and ``half_widths`` of the intervals are in coordinates. An effect that shows is not among them.
     """
-    shown = {one.column.name for one in doubt.shown}
+    shown = {one.finding.column.name for one in doubt.shown}
     found = {one.column.name for one in doubt.findings}
     invisible = [
         one.name
@@ -53,7 +40,7 @@ def unseen_in_words(
             continue
         sentence = _shift_in_words(one, ranges, point, half_widths)
         open_ones += [sentence] if sentence else []
-    return (*(f"{name_of(name)}: invisible in these recordings" for name in invisible), *open_ones)
+    return (*(f"{title_of(name)}: invisible in these recordings" for name in invisible), *open_ones)
 
 
 def _shift_in_words(one: Finding, ranges: Sequence[Range], point: Floats, half_widths: Floats) -> str:
@@ -70,6 +57,6 @@ def _shift_in_words(one: Finding, ranges: Sequence[Range], point: Floats, half_w
     shift = abs(float(one.shifts[most]) * item.slope(float(point[most]))) * size
     unit = f" {item.unit}" if item.unit not in ("", "-", "1") else ""
     return (
-        f"{name_of(one.column.name)}: up to {one.column.size_in_words(size)} would shift {item.name} by "
+        f"{title_of(one.column.name)}: up to {one.column.size_in_words(size)} would shift {item.name} by "
         f"{shift:.2g}{unit}, {max(shares):.2g} times half its interval"
     )

@@ -7,8 +7,8 @@ import numpy as np
 
 from ppafo.answers import Column, Section, Table
 from ppafo.answers.style import BLUE, GREY, VERMILION, house_style
+from ppafo.identification.trajectory.doubt import title_of
 from ppafo.identification.trajectory.next_experiment import NextExperiments
-from ppafo.identification.trajectory.unseen import name_of
 from ppafo.units import percentage
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def plan_section(plan: Plan) -> Section:
     head = ("", "now", f"with {'it' if number == 1 else f'these {number}'}", "three at random")
     widths = [(one.name, *(_share(value) for value in (one.now, one.after, one.at_random))) for one in found.widths]
     seen = [
-        (f"{name_of(one.name)}, {one.size}", *(f"{value:.1f} SE" for value in (one.now, one.after, one.at_random)))
+        (f"{title_of(one.name)}, {one.size}", *(f"{value:.1f} SE" for value in (one.now, one.after, one.at_random)))
         for one in found.visibility
     ]
     return Section(
@@ -111,7 +111,7 @@ def plan_figure(plan: Plan) -> "matplotlib.figure.Figure":
             (left, found.widths, 100.0, "Half width of the interval (%)"),
             (right, found.visibility, 1.0, "Visibility of an effect (standard errors)"),
         ):
-            names = [one.name if axes is left else name_of(one.name).split(" (")[0] for one in promises]
+            names = [one.name if axes is left else title_of(one.name).split(" (")[0] for one in promises]
             places = np.arange(len(promises))
             for label, colour, marker, values in (
                 ("now", GREY, "o", [one.now for one in promises]),
