@@ -10,8 +10,8 @@ bench (1 psi, 2 %, 0.3 deg, 0.15 psi, 0.3 %), and fitted: what the frozen experi
 down. Then these are recorded too, the numbers are fitted with the effect to all five, and one further step is taken
 along numbers and all effects together. Printed: promised over reached, as the median over the truths (and the
 furthest), of the half widths and of the standard errors of the planted effect, the same with the promise of the frozen
-design in the place of the device's own, and the percentage of the 95 % intervals that hold. Truths to which the design
-can promise nothing, as an experiment is rough or bends at their numbers, are counted as left out. Effects take turns;
+design in the place of the device's own, and the percentage of the 95 % intervals that hold. Truths at which one of the
+frozen experiments cannot be run are counted as left out. Effects take turns;
 after --minutes of processor time no further truth is begun.
 """
 

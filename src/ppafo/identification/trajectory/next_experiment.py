@@ -257,11 +257,11 @@ def promised_by(
 ) -> tuple[Floats, Floats] | None:
     """Return what given experiments promise to a fit: half widths and visibilities of the effects, as in a ``Promise``.
 
-    None where one of them cannot be relied upon at the numbers of this fit.
+    They are not left out for being rough or bent at the numbers of this fit. None where one cannot be run.
     """
     design = _design_of(fit, tolerances, tuple(effects), load)
     points = _points(fit, DRAWS if len(proposals) > 1 else 1)
-    grams = [[_gram(design, one, point) for point in points] for one in proposals]
+    grams = [[_gram(design, one, point, is_bent_left_out=False) for point in points] for one in proposals]
     known = [[one for one in own if one is not None] for own in grams]
     if any(len(own) < len(points) for own in known):
         return None
@@ -368,7 +368,7 @@ def effect_changes(prepared: PreparedExperiment, effects: Sequence[Sized], share
     return found
 
 
-def _gram(design: _Design, proposal: Proposal, point: Floats) -> Floats | None:
+def _gram(design: _Design, proposal: Proposal, point: Floats, is_bent_left_out: bool = True) -> Floats | None:
     """Return the Gram matrix of a candidate, None where it cannot be run, is rough, or bends too much."""
     ranges = design.fit.optimum.residuals.ranges
     numbers = numbers_in("", ranges, point)
@@ -392,13 +392,14 @@ def _gram(design: _Design, proposal: Proposal, point: Floats) -> Floats | None:
     whiten = _whitener(design.fit.uncertainty.sensors, prepared)
     count = len(acting)
     above, below, centre = near.values[:, :count], near.values[:, count:-1], near.values[:, -1:]
-    if _bends(whiten(above - centre), whiten(centre - below), np.array([not item.is_tolerance for item in acting])):
+    counts = np.array([is_bent_left_out and not item.is_tolerance for item in acting])
+    if _bends(whiten(above - centre), whiten(centre - below), counts):
         return None
     little, whole = effect_changes(prepared, design.effects, (QUARTER, 1.0))
     if not (np.isfinite(little).all() and np.isfinite(whole).all()):
         return None
     shares = np.array([one.quarter for one in design.effects])
-    if _bends(whiten(little) / shares, whiten(whole), np.ones(len(design.effects), dtype=np.bool_)):
+    if _bends(whiten(little) / shares, whiten(whole), np.full(len(design.effects), is_bent_left_out)):
         return None
     return _over_kept(design, acting, whiten(near.jacobian_of_data()), whiten(whole))
 

@@ -1,6 +1,8 @@
 """The next experiments as people use them: what they promise, a bench file and requests to the virtual rig."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,23 +11,62 @@ from ppafo.answers import Column, Section, Table
 from ppafo.answers.style import BLUE, GREY, VERMILION, house_style
 from ppafo.identification.trajectory.doubt import title_of
 from ppafo.identification.trajectory.next_experiment import NextExperiments
+from ppafo.rig.experiments import RIG_FILE
+from ppafo.storage.result_folder import read_json
 from ppafo.units import percentage
 
 if TYPE_CHECKING:
     import matplotlib.figure
 
 PLAN_FIGURE = "next-experiments"
+_OF_THE_DEVICE = (
+    "gas.",
+    "actuator.",
+    "friction.",
+    "foot_plate.",
+    "valve.",
+    "valves.",
+    "flow.",
+    "effects.",
+    "rig.valve.",
+)
+"""Sections of changes that are of the device; all others are of the experiment."""
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """The next experiments, the problem file that they belong to, the new set, its valve, and the sample rate."""
+    """The next experiments, the problem file that they belong to, the new set, its valve, and the sample rate.
+
+    ``planted`` is the device on which the virtual rig made the earlier recordings, a set and its changes, where it did.
+    """
 
     following: NextExperiments
     problem_file: str
     set_file: str
     valve: str | None
     rate: str
+    planted: "PlantedDevice | None" = None
+
+
+@dataclass(frozen=True, slots=True)
+class PlantedDevice:
+    """The device of a synthetic recording: its set, and what was changed in it."""
+
+    parameter_set: str
+    overrides: tuple[str, ...]
+
+
+def planted_device(recordings: Iterable[Path]) -> PlantedDevice | None:
+    """Return the device that the virtual rig recorded all of these on, as its file beside them says; else None."""
+    found = set()
+    for recording in recordings:
+        notes = recording.parent / RIG_FILE
+        made = read_json(notes).get("recordings", {}).get(recording.name) if notes.is_file() else None
+        if made is None:
+            return None
+        changes = tuple(item for item in made["overrides"] if item.startswith(_OF_THE_DEVICE))
+        found.add(PlantedDevice(made["parameter_set"], changes))
+    return found.pop() if len(found) == 1 else None
 
 
 def plan_section(plan: Plan) -> Section:
@@ -83,17 +124,29 @@ def _quoted(text: str) -> str:
 
 
 def rig_requests(plan: Plan) -> str:
-    """Return the commands with which the virtual rig records what was chosen: synthetic, on the set that was found."""
+    """Return the commands with which the virtual rig records what was chosen, all of it synthetic.
+
+    It does so on the device of earlier synthetic recordings: two devices that differ by what a first fit leaves open
+    would be a misfit of what the next experiments show. Else it takes the set that was found.
+    """
     lines = [
-        "# The virtual rig in place of the bench, on the device as it was identified: what it records is synthetic.",
-        "# Where earlier recordings are synthetic, too, name their device and its --set in the place of this one.",
+        f"# Run this in the folder of {plan.problem_file}: bash identified/next-rig.sh, if that is where it is.",
+        "# The virtual rig in place of the bench: what it records is synthetic.",
     ]
+    if plan.planted is None:
+        lines.append("# The device is the one that was identified. It is not quite that of earlier recordings.")
+        device, changes_of_device = f'"$(dirname "$0")/{plan.set_file}"', ""
+    else:
+        lines.append("# The device is that of the earlier recordings, as their rig.json says.")
+        device = plan.planted.parameter_set
+        changes_of_device = "".join(f' --set "{item}"' for item in plan.planted.overrides)
     valve = "" if plan.valve is None else f" --valve {plan.valve}"
     for number, one in enumerate(plan.following.chosen, start=1):
         changes = " ".join(f'--set "{item}"' for item in one.overrides)
         lines.append(
-            f"ppafo rig record {one.rig_experiment} --preset ideal-laboratory --device {plan.set_file}{valve} "
-            f'--seed {number} --set "rig.sampling.rate={plan.rate}" {changes} --out {one.label}'
+            f"ppafo rig record {one.rig_experiment} --preset ideal-laboratory --device {device}{valve} "
+            f'--seed {100 + number} --set "rig.sampling.rate={plan.rate}"{changes_of_device} {changes} '
+            f"--out {one.label}"
         )
     return "\n".join(lines) + "\n"
 

@@ -25,7 +25,7 @@ from ppafo.parameters.loading import load_parameter_set
 from ppafo.parameters.parameter_set import ParameterSet, apply_overrides, atmospheric_pressure, chosen_valve
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.identify.answer import Beforehand, Identification, _bench_estimates
-from ppafo.questions.identify.plan import Plan
+from ppafo.questions.identify.plan import Plan, planted_device
 from ppafo.storage.foreign import read_foreign
 from ppafo.storage.result_folder import read_recording
 
@@ -108,7 +108,9 @@ def solve_problem(
     named = replace(new_set, parameter_set=_name_set(new_set, problem))
     plan = None
     if fitted is not None and fitted.following is not None:
-        plan = Plan(fitted.following, file, f"{problem.name}.toml", problem.device.valve, _rate(can))
+        earlier = () if problem.trajectory is None else problem.trajectory.experiments
+        planted = planted_device(folder / one.recording for one in earlier)
+        plan = Plan(fitted.following, file, f"{problem.name}.toml", problem.device.valve, _rate(can), planted)
     return Identification(problem.name, beforehand, tuple(results), fitted, before, named, plan)
 
 

@@ -3,6 +3,7 @@
 import math
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,15 @@ from ppafo.identification.trajectory.next_experiment import (
     promised_by,
 )
 from ppafo.identification.trajectory.tolerances import Ability, tolerances_of
-from ppafo.questions.identify.plan import Plan, bench_file, plan_figure, plan_section, rig_requests
+from ppafo.questions.identify.plan import (
+    Plan,
+    PlantedDevice,
+    bench_file,
+    plan_figure,
+    plan_section,
+    planted_device,
+    rig_requests,
+)
 from ppafo.questions.identify.solve import identify
 from ppafo.rig.experiments import record, write_rig_recording
 from ppafo.simulation.loading import load_scenario
@@ -83,6 +92,23 @@ def test_the_bench_file_is_the_end_of_a_problem() -> None:
     assert [one["recording"] for one in found] == ["next-1/step-response.csv", "next-2/torque-task.csv"]
     assert found[0]["overrides"] == ["motion.kind=free", "controller.command=0.3"]
     assert [one.get("inputs") for one in found] == [None, ["command"]]
+
+
+def test_the_rig_records_on_the_device_of_earlier_recordings_and_else_on_the_set_beside_the_requests(
+    tmp_path: Path,
+) -> None:
+    """Two devices that differ by what a first fit leaves open are a misfit of what the next experiments show."""
+    assert '--device "$(dirname "$0")/fitted.toml"' in rig_requests(PLAN)
+    changes = ("motion.kind=free", "run.duration=0.1 s", "foot_plate.inertia=10 g m^2")
+    write_rig_recording(tmp_path / "there", record("step-response", "ideal-laboratory", 1, overrides=changes))
+    recording = tmp_path / "there" / "step-response.csv"
+    planted = planted_device([recording])
+    assert planted == PlantedDevice("ppafo2011", ("foot_plate.inertia=10 g m^2",))
+    first = rig_requests(replace(PLAN, planted=planted)).splitlines()[3]
+    assert "--device ppafo2011 " in first
+    assert '--set "foot_plate.inertia=10 g m^2"' in first
+    (tmp_path / "measured.csv").write_text("time [s],angle [rad]\n")
+    assert planted_device([recording, tmp_path / "measured.csv"]) is None
 
 
 def test_the_section_and_the_figure_show_now_chosen_and_at_random() -> None:
