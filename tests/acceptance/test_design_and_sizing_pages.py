@@ -20,16 +20,21 @@ def blocks(page: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
 
 
+@pytest.mark.parametrize(("place", "written"), [(0, "out/wearer/bottle.png"), (2, "out/size/suggested.csv")])
 def test_the_sizing_of_the_page_prints_what_the_page_shows(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    place: int,
+    written: str,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(shlex.split(blocks("size-a-device.md", "sh")[0])[1:]) == 0
+    assert main(shlex.split(blocks("size-a-device.md", "sh")[place])[1:]) == 0
     printed = capsys.readouterr().out.splitlines()
-    shown = blocks("size-a-device.md", "text")[0].splitlines()
+    shown = blocks("size-a-device.md", "text")[place].splitlines()
     assert len(shown) > 6
     assert [line for line in shown if line and line not in printed] == []
-    assert (tmp_path / "out" / "size" / "suggested.csv").exists()
+    assert (tmp_path / written).exists()
 
 
 def test_the_file_and_the_python_of_the_page_on_sizing_run(
