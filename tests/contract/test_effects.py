@@ -2,7 +2,6 @@
 
 import ctypes
 import importlib.util
-import re
 import shutil
 import sys
 from collections.abc import Iterator, Sequence
@@ -20,6 +19,7 @@ from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.exports.c_library import c_library, library_of
 from ppafo.exports.c_library.files import c_identifier
+from ppafo.exports.c_library.program import COUNTS
 from ppafo.exports.fmu import closed_loop, functional_unit, host_platform
 from ppafo.exports.wasm import module_of
 from ppafo.identification.trajectory.problem import declaration_of
@@ -165,12 +165,12 @@ def test_an_exported_library_makes_the_numbers_of_a_run_that_python_makes(name: 
     for file, content in c_library(walked).items():
         (tmp_path / file).write_bytes(content)
     source = tmp_path / f"{c_identifier(walked.name)}.c"
-    built = ctypes.CDLL(str(shared_library(source, "-O0", "-ffp-contract=off", "-DPPAFO_ENTRY=extern", "-w")))
+    built = ctypes.CDLL(str(shared_library(source, "-O0", "-ffp-contract=off", "-Dstatic=", "-Wl,-Bsymbolic", "-w")))
     batch = batch_of(plan_walk(walked) if is_walk else plan_run(walked))
     settings = np.array([item.value for item in library.settings])
     # An exported walk has the states of a meter too, which a run in Python does without.
-    sizes = dict(re.findall(r"^    (STATES|PARAMETERS|COUNTS) = (\d+)", source.read_text("utf-8"), re.MULTILINE))
-    found, states, counts = (np.zeros(int(sizes[name])) for name in ("PARAMETERS", "STATES", "COUNTS"))
+    found, states = np.zeros(len(batch.parameters)), np.zeros(2 * len(batch.states))
+    counts = np.zeros(len(COUNTS))
     built.prepare(*map(handed, (settings, found, states, counts)))
     assert found.tobytes() == batch.parameters[:, 0].tobytes()
     rows = row_numbers(batch.program.state_rows())
@@ -178,12 +178,9 @@ def test_an_exported_library_makes_the_numbers_of_a_run_that_python_makes(name: 
         assert batch.states[rows[path], 0] in states
 
 
-class Handed(ctypes.Structure):
-    _fields_ = (("values", ctypes.POINTER(ctypes.c_double)), ("extent", ctypes.c_int64 * 3))
-
-
-def handed(values: Any) -> Handed:
-    return Handed(values.ctypes.data_as(ctypes.POINTER(ctypes.c_double)), (ctypes.c_int64 * 3)(values.size, 0, 0))
+def handed(values: Any) -> Any:
+    """Numbers where C has a struct of them."""
+    return values.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
 
 
 @pytest.mark.skipif(
