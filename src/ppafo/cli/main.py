@@ -61,11 +61,17 @@ COMMANDS = (*(name for group in SUBCOMMANDS.values() for name in group), *QUESTI
 FIRST_STEPS = """\
 Model-based design of pneumatic powered orthoses. Start with one of these:
 
+see it
   ppafo simulate torque-task-proportional   the paper's torque task; add --out DIR for figures and a report
-  ppafo reproduce                           the paper's experiments against its printed numbers
   ppafo walk solenoid                       a minute of walking with the device
   ppafo workbench --out page.html           all of it with sliders, in a browser
-  ppafo new scenario mine                   a file of your own to start from; also for a device, a study, a walk
+the paper
+  ppafo reproduce                           its experiments against its printed numbers
+your device
+  ppafo new set mine                        a file to fill in; also for a scenario, a study, a walk
+  ppafo size --mass "75 kg" --minutes 20    from a wearer to valve, actuator and bottle
+  ppafo identify FILE                       from bench recordings to parameters with intervals
+learn
   ppafo examples                            the examples of the how-to pages, ready to run
 
 All commands: ppafo --help"""

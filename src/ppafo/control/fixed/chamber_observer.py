@@ -432,7 +432,7 @@ OF_OBSERVER = (
 
 _NO_GAS = ChamberCounts(content=0, carried=0, pressure=0, expected=0, passed=0, contrary=0, shown=0, least=0, volume=0)
 _AT_REST = CoilCounts(position=0, target=0, since=LONGEST, waits=0)
-OBSERVER_START = ObserverCounts(_NO_GAS, _NO_GAS, _AT_REST, _AT_REST, spool=0, joined=0)
+OBSERVER_START = ObserverCounts(plantar=_NO_GAS, dorsal=_NO_GAS, coil_1=_AT_REST, coil_2=_AT_REST, spool=0, joined=0)
 """Nothing seen yet, and all vents."""
 
 _CONTENT, _PRESSURE = (0, TOP), (0, TOP)

@@ -56,7 +56,7 @@ class _Panel(NamedTuple):
 
 
 _PANELS = (
-    _Panel(name="Vane angle", unit="deg", look=ACTUAL, inset=None),
+    _Panel(name="Vane angle", unit="deg", look=ACTUAL, inset=(0.12, 0.5, 0.29, 0.28)),
     _Panel(name="Pressure difference, $P_1 - P_2$", unit="psi", look=ACTUAL, inset=(0.69, 0.14, 0.29, 0.34)),
     _Panel(name="Chamber 1 (plantarflexion), $P_1$", unit="psig", look=CHAMBER_1, inset=(0.3, 0.12, 0.34, 0.34)),
     _Panel(name="Chamber 2 (dorsiflexion), $P_2$", unit="psig", look=CHAMBER_2, inset=(0.69, 0.3, 0.29, 0.4)),
@@ -136,9 +136,12 @@ def _enlarge(axes: "Axes", place: tuple[float, float, float, float]) -> None:
     """Show the first milliseconds of a panel enlarged, inside it."""
     inset = axes.inset_axes(place)
     for line in axes.lines:
-        inset.plot(*line.get_data(), color=line.get_color(), linewidth=line.get_linewidth(), zorder=line.get_zorder())
+        times, values = (np.asarray(data, dtype=np.float64) for data in line.get_data())
+        shown = times <= _ENLARGED
+        look = {"color": line.get_color(), "linewidth": line.get_linewidth(), "zorder": line.get_zorder()}
+        inset.plot(times[shown], values[shown], **look)
+    inset.margins(y=0.08)
     inset.set_xlim(-0.05 * _ENLARGED, _ENLARGED)
-    inset.autoscale_view(scalex=False)
     inset.tick_params(labelsize=7.0, length=2.0)
     inset.set_xticks([0.0, 0.5 * _ENLARGED, _ENLARGED])
     inset.locator_params(axis="y", nbins=3)
