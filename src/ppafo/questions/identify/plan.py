@@ -126,8 +126,8 @@ def _quoted(text: str) -> str:
 def rig_requests(plan: Plan) -> str:
     """Return the commands with which the virtual rig records what was chosen, all of it synthetic.
 
-    It does so on the device of earlier synthetic recordings: two devices that differ by what a first fit leaves open
-    would be a misfit of what the next experiments show. Else it takes the set that was found.
+    It does so on the device of earlier synthetic recordings, so that all of them are of one device. Else it takes the
+    set that was found.
     """
     lines = [
         f"# Run this in the folder of {plan.problem_file}: bash identified/next-rig.sh, if that is where it is.",

@@ -97,7 +97,7 @@ def test_the_bench_file_is_the_end_of_a_problem() -> None:
 def test_the_rig_records_on_the_device_of_earlier_recordings_and_else_on_the_set_beside_the_requests(
     tmp_path: Path,
 ) -> None:
-    """Two devices that differ by what a first fit leaves open are a misfit of what the next experiments show."""
+    """All recordings of a problem are of one device, as far as the rig knows it."""
     assert '--device "$(dirname "$0")/fitted.toml"' in rig_requests(PLAN)
     changes = ("motion.kind=free", "run.duration=0.1 s", "foot_plate.inertia=10 g m^2")
     write_rig_recording(tmp_path / "there", record("step-response", "ideal-laboratory", 1, overrides=changes))
