@@ -56,6 +56,7 @@ def test_a_number_that_is_not_that_of_the_command_is_found_and_named(
     assert page.read_text(encoding="utf-8") == PAGE.read_text(encoding="utf-8")
 
 
+@pytest.mark.thorough
 @pytest.mark.long
 @pytest.mark.parametrize("title", [title for title in PARTS if title not in (*AT_ONCE, *SEARCHED)])
 def test_a_section_is_what_the_command_writes(title: str) -> None:

@@ -15,6 +15,7 @@ PLANTED = two_step_responses(0.4)
 TIMES = np.arange(401, dtype=np.float64) * 1e-3
 UNITS = {"angle": "rad", "pressure_1": "Pa", "pressure_2": "Pa"}
 INERTIA, STATIC, FLOW = "foot_plate.inertia", "friction.static_torque", "valve.discharge_coefficient"
+THOROUGH = (pytest.mark.long, pytest.mark.thorough)
 PATHS = (FLOW, "actuator.leak.area", STATIC, "friction.viscous_damping", INERTIA)
 
 
@@ -41,8 +42,8 @@ def fitted(extra: Extra, directions: bool = True, noise: str = "white", seed: in
         (Extra(heat=60.0), "the gas seems to warm and cool", 1.0 / 64.0, 1.0 / 56.0),
         (Extra(stribeck=0.3), "friction near standstill seems to be higher", 0.1, 0.4),
         pytest.param(Extra(heat=6e3), "the gas seems to warm and cool", 1.5e-4, 1.9e-4, marks=pytest.mark.long),
-        pytest.param(Extra(line=4e-6), "lines of 3.", 3.0e-6, 4.5e-6, marks=pytest.mark.long),
-        pytest.param(Extra(virial=-4.04e-8), "the gas seems not to be ideal", 0.7, 0.9, marks=pytest.mark.long),
+        pytest.param(Extra(line=4e-6), "lines of 3.", 3.0e-6, 4.5e-6, marks=THOROUGH),
+        pytest.param(Extra(virial=-4.04e-8), "the gas seems not to be ideal", 0.7, 0.9, marks=THOROUGH),
     ],
 )
 def test_an_effect_that_the_model_lacks_is_named_with_the_size_of_a_fit_with_it(

@@ -68,7 +68,7 @@ _OWN_FILES = {"main", "unit", "plugin", "fmi2", "fmi3", "makefile", "readme", "l
 _OWN_TARGETS = {"all", "check", "clean", "test"}
 _OF_BOARDS = {"board", "board_simulated", "start_cortex"}
 _OF_CMAKE = {"help", "install", "package", "m"}
-_WITH_ANOTHER_END = {"prepare", "prepared", "is", "ppafo_whole", "at_result", "at_step_aside_result"}
+_WITH_ANOTHER_END = {"prepare", "prepared", "is", "begin", "ppafo_whole", "at_result", "at_step_aside_result"}
 """Names that become another function or type with ``_run``, ``_size`` or ``_TOO_MANY_PARTS`` behind them."""
 _OF_WINDOWS = {"con", "aux", "nul", "prn"}
 _HEADERS_1 = {"assert", "complex", "ctype", "errno", "fenv", "float", "inttypes", "iso646", "limits", "locale", "math"}

@@ -38,6 +38,8 @@ _OF_SIZE = 0.03
 """The same of a size, as a fraction of it."""
 _ROUNDS = 3
 _TURNS = 8
+_STARTS = 3
+"""Sizes of an effect from which a fit with it is searched at most."""
 _FRACTIONS = (1.0, 0.5, 0.2, 0.05)
 """Of a step that is tried, the longest that lowers the misfit most."""
 _SETTLED = 0.1
@@ -142,18 +144,34 @@ def refit_with(
     """Return the fit with an effect of the device; None where no run succeeds with it.
 
     It is searched from the best of the sizes of its direction and ``start``, for a line through a curve may point the
-    wrong way, and under white noise: flexible noise has taken up what the effect would explain. ``starts`` are the
-    slopes of starts that were read off a recording, ``without`` is the likelihood without the effect.
+    wrong way, and under white noise: flexible noise has taken up what the effect would explain. Where that explains
+    too little it is searched from the next best. ``starts`` are the slopes of starts that were read off a recording,
+    ``without`` is the likelihood without the effect.
     """
     runs = _Runs.of(found, direction)
-    first, kept = found.optimum.point, len(found.optimum.point)
-    hum, precision, pull_at = found.model.slopes[:, kept:], found.model.precision, found.model.pull
-    low, high = coordinate_bounds(found.optimum.residuals.ranges)
+    first = found.optimum.point
     ends = _SMALLEST * direction.sizes[0], _LARGEST * direction.largest
     sizes = np.array([min(max(start, ends[0]), ends[1]), *direction.sizes])
     values = runs.residuals(np.repeat(first[None, :], len(sizes), axis=0), sizes)
     costs = _squares(values, np.hstack([found.model.slopes, starts]))
-    point, size = first, float(sizes[int(np.argmin(costs))])
+    best: Refit | None = None
+    for place in np.argsort(costs, kind="stable")[:_STARTS]:
+        tried = _refit_from(found, starts, runs, float(sizes[place]), ends, without)
+        if tried is not None and (best is None or tried.gain > best.gain):
+            best = tried
+        if best is not None and best.explains:
+            break
+    return best
+
+
+def _refit_from(
+    found: WhitenedFit, starts: Floats, runs: "_Runs", size: float, ends: tuple[float, float], without: Likelihood
+) -> Refit | None:
+    """Return the fit with an effect, searched from one size of it, which stays between two ``ends``."""
+    first, kept = found.optimum.point, len(found.optimum.point)
+    hum, precision, pull_at = found.model.slopes[:, kept:], found.model.precision, found.model.pull
+    low, high = coordinate_bounds(found.optimum.residuals.ranges)
+    point = first
     white = [SensorNoise(from_reflections(np.zeros(0)), np.ones(len(one.places))) for one in found.sensors]
     even = [[np.ones(place.stop - place.start) for place in one.places] for one in found.sensors]
     for turn in range(_TURNS):

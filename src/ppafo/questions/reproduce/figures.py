@@ -138,8 +138,8 @@ def _enlarge(axes: "Axes", place: tuple[float, float, float, float]) -> None:
     for line in axes.lines:
         times, values = (np.asarray(data, dtype=np.float64) for data in line.get_data())
         shown = times <= _ENLARGED
-        look = {"color": line.get_color(), "linewidth": line.get_linewidth(), "zorder": line.get_zorder()}
-        inset.plot(times[shown], values[shown], **look)
+        (copied,) = inset.plot(times[shown], values[shown], color=line.get_color(), zorder=line.get_zorder())
+        copied.set_linewidth(line.get_linewidth())
     inset.margins(y=0.08)
     inset.set_xlim(-0.05 * _ENLARGED, _ENLARGED)
     inset.tick_params(labelsize=7.0, length=2.0)

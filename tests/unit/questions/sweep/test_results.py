@@ -187,14 +187,14 @@ BOTH = ("proportional", "solenoid")
 @pytest.mark.parametrize(
     ("document", "panels"),
     [
-        (study(DRAWN), ["supply pressure (psig)"] * 2),
-        (study(DRAWN, LEAK, names=BOTH, bands=["torque"]), ["RMS error (N m)", "Switchings", "time (s)"]),
-        (study(AXIS), ["reference level (N m)"] * 2),
-        (study(AXIS, OTHER), ["reference level (N m)"] * 2),
-        (study(AXIS, OTHER | {"spacing": "logarithmic"}, DRAWN, names=BOTH), ["reference level (N m)"] * 4),
+        (study(DRAWN), ["Supply pressure (psig)"] * 2),
+        (study(DRAWN, LEAK, names=BOTH, bands=["torque"]), ["Supply pressure (psig)"] * 4 + ["time (s)"]),
+        (study(AXIS), ["Torque to hold (N m)"] * 2),
+        (study(AXIS, OTHER), ["Torque to hold (N m)"] * 2),
+        (study(AXIS, OTHER | {"spacing": "logarithmic"}, DRAWN, names=BOTH), ["Torque to hold (N m)"] * 4),
         (study(DRAWN, metrics=[], bands=["command"]), ["time (s)"]),
         (study(DRAWN, metrics=[], trajectories=["command"]), []),
-        (study(NOBODY), ["actuator angle min (deg)"] * 2),
+        (study(NOBODY), ["Lower stop (deg)"] * 2),
         (study(names=BOTH), ["RMS error (N m)", "Switchings"]),
     ],
 )
