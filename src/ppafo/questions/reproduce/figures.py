@@ -56,7 +56,7 @@ class _Panel(NamedTuple):
 
 
 _PANELS = (
-    _Panel(name="Vane angle", unit="deg", look=ACTUAL, inset=(0.12, 0.5, 0.29, 0.28)),
+    _Panel(name="Vane angle", unit="deg", look=ACTUAL, inset=(0.66, 0.26, 0.31, 0.34)),
     _Panel(name="Pressure difference, $P_1 - P_2$", unit="psi", look=ACTUAL, inset=(0.69, 0.14, 0.29, 0.34)),
     _Panel(name="Chamber 1 (plantarflexion), $P_1$", unit="psig", look=CHAMBER_1, inset=(0.3, 0.12, 0.34, 0.34)),
     _Panel(name="Chamber 2 (dorsiflexion), $P_2$", unit="psig", look=CHAMBER_2, inset=(0.69, 0.3, 0.29, 0.4)),
