@@ -69,7 +69,7 @@ the paper
   ppafo reproduce                           its experiments against its printed numbers
 your device
   ppafo new set mine                        a file to fill in; also for a scenario, a study, a walk
-  ppafo size --mass "75 kg" --minutes 20    from a wearer to valve, actuator and bottle
+  ppafo size push-off                       from a torque profile to valve, pressure and bottle; also from a wearer
   ppafo identify FILE                       from bench recordings to parameters with intervals
 learn
   ppafo examples                            the examples of the how-to pages, ready to run

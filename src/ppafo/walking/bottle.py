@@ -394,7 +394,7 @@ def lasting_text(seconds: float, others: Iterable[float | None]) -> str:
     """Return how long a bottle lasts in minutes, with the interval that the other readings of its chambers span [s]."""
     known = [seconds, *(time for time in others if time is not None)]
     low, high = minutes_text(min(known)).removesuffix(" min"), minutes_text(max(known))
-    return f"{minutes_text(seconds)}{f' ({low} to {high} by what is not known of the chambers)' * (len(known) > 1)}"
+    return f"{minutes_text(seconds)}{f' ({low} to {high} depending on the volume of the chambers)' * (len(known) > 1)}"
 
 
 def minutes_text(seconds: float) -> str:

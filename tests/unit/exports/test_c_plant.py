@@ -112,6 +112,16 @@ def test_an_input_that_is_no_number_leaves_the_run_as_it_was(tmp_path: Path) -> 
     assert bytes(run.memory) != before
 
 
+@pytest.mark.parametrize(("angle", "rate"), [(-3.43, 0.0), (90.0, 0.0), (0.2, 0.0), (2.3, 1.0e3), (1.5, float("inf"))])
+def test_an_angle_at_which_a_chamber_has_no_volume_is_refused(angle: float, rate: float, tmp_path: Path) -> None:
+    run = Run(tmp_path, MOVED, 3)
+    assert run.call("initialise")(run.memory, run.settings, 0.5, angle, rate) == 1
+    assert run.call("initialise")(run.memory, run.settings, 0.5, 1.5, 0.0) == 0
+    before = bytes(run.memory)
+    assert run.call("step")(run.memory, 0.5, angle, rate) == 1
+    assert bytes(run.memory) == before
+
+
 @pytest.mark.parametrize("shape", ["loop", "plant"])
 def test_the_c_of_a_run_is_short_and_has_neither_lanes_nor_groups_that_are_packed_again(shape: str) -> None:
     files_of = {"loop": c_library, "plant": plant_library}[shape]

@@ -140,6 +140,19 @@ def plant_library(item: Scenario) -> dict[str, bytes]:
     return library_files(surfaced(plant_of(item)).library)
 
 
+def _room(alone: PlantAlone, names: list[str]) -> list[str]:
+    """Return conditions in C that both chambers of a led vane have gas in them, now and at the end of the step."""
+    if "angle" not in names or alone.library.program.program.has_shape:
+        return []
+    plant = "run->parameters.plant"
+    low = f"{plant}.angle_min - {plant}.dead_volume_1 / {plant}.volume_per_angle"
+    high = f"{plant}.angle_max + {plant}.dead_volume_2 / {plant}.volume_per_angle"
+    ends = ["angle"]
+    if "angular_velocity" in names:
+        ends.append("angle + angular_velocity * run->parameters.timing.step")
+    return [f"({low} < {end} && {end} < {high})" for end in ends]
+
+
 def surfaced(alone: PlantAlone) -> PlantAlone:
     """A plant whose library is called with its inputs."""
     names = [item.name for item in alone.inputs]
@@ -148,7 +161,7 @@ def surfaced(alone: PlantAlone) -> PlantAlone:
         "arguments": ", ".join(f"double {name}" for name in names),
         "inputs": ", ".join(names),
         "first_inputs": ", ".join(repr(0.5 if item.name == "command" else item.start) for item in alone.inputs),
-        "are_numbers": " && ".join(f"{name} - {name} == 0.0" for name in names),
+        "are_numbers": " && ".join([*(f"{name} - {name} == 0.0" for name in names), *_room(alone, names)]),
         "said_inputs": ";\n".join(f" * {line}" for line in says) + ".",
         "listed_inputs": "\n".join(f"- `{item.name}` [{item.unit}]: {item.summary}." for item in alone.inputs),
         "motion": alone.motion,

@@ -144,7 +144,7 @@ def answer_of(found: DeviceSpread) -> Answer:
         if missing:
             remarks.append(f"{one.path}: no value of its own: {', '.join(missing)}; the mean is that of the others")
         if weak:
-            remarks.append(f"{one.path}: not identified but weak, or for the model only: {', '.join(weak)}")
+            remarks.append(f"{one.path}: weak, or valid for its model only: {', '.join(weak)}")
     caption = "Each device with its 95 % interval, the mean with its interval, and where the next device lies."
     return Answer(
         name="devices",
@@ -215,7 +215,7 @@ def _sentence(found: DeviceSpread, one: PooledNumber) -> str:
     if not one.apart:
         return text
     names = ", ".join(one.apart)
-    return f"{text}; the others do not expect {names}, so look at {'it' if len(one.apart) == 1 else 'them'} first"
+    return f"{text}; {names} {'is an outlier: check it' if len(one.apart) == 1 else 'are outliers: check them'} first"
 
 
 def _data(found: DeviceSpread) -> dict[str, Any]:

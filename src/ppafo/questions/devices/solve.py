@@ -47,14 +47,14 @@ def pool_devices(
             raise IdentificationError(f"{other}: the same device is named twice")
     if len(paths) < LEAST_DEVICES:
         raise IdentificationError(
-            f"{len(paths)} devices do not show how their kind spreads; at least {LEAST_DEVICES} do"
+            f"at least {LEAST_DEVICES} devices are needed to see how their kind spreads; {len(paths)} given"
         )
     known = _sets_of(paths, problem, progress)
     sets = [one for one, _ in known]
     names = _names(paths)
     own = dict(zip(names, (_own_values(one) for one in sets), strict=True))
-    inherited = _drop_inherited(own)
     _refuse_shared_recordings(own)
+    inherited = _drop_inherited(own)
     counts = Counter(path for one in own.values() for path in one)
     pooled = tuple(
         _pool(path, own, dict(zip(names, sets, strict=True)), confidence)
@@ -63,7 +63,7 @@ def pool_devices(
     )
     if not pooled:
         found = "; ".join(f"{name}: {', '.join(one) or 'none'}" for name, one in own.items())
-        raise IdentificationError(f"no number was identified of {LEAST_DEVICES} devices or more ({found})")
+        raise IdentificationError(f"no parameter was identified on at least {LEAST_DEVICES} devices ({found})")
     fewer = tuple(path for path, count in counts.items() if count < LEAST_DEVICES)
     kind = kind_of_all([kind for _, kind in known])
     return DeviceSpread(tuple(names), pooled, fewer, inherited, confidence, sets[0], kind)

@@ -65,12 +65,12 @@ def electrical_of(
     return Electrical(powers, cell, max(1, math.ceil(needed)))
 
 
-def electrical_sentences(found: Electrical, seconds: float) -> list[str]:
-    """Return powers, and mass and minutes of the battery, against the time [s] that is wanted."""
+def electrical_sentences(found: Electrical) -> list[str]:
+    """Return powers, and mass and minutes of the battery."""
     parts = ", ".join(f"{name} {1000.0 * power:.3g} mW" for name, power in found.powers.items())
     return [
         f"electrical power: {found.power:.3g} W ({parts})",
         f"battery: {found.cells} x {found.cell.title}, {1000.0 * found.mass:.0f} g, "
-        f"{found.lasts / 60.0:.0f} min of {seconds / 60.0:.3g} min; "
+        f"runs {found.lasts / 60.0:.0f} min; "
         f"{100.0 * USABLE:.0f} % of its energy is counted",
     ]

@@ -4,6 +4,7 @@ Every pair of valve and actuator walks a few strides; those with the torque walk
 lasts. That walk, whole, is the suggestion; where none does, walks say what would have to be given up.
 """
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -262,22 +263,30 @@ def _instead(wish: Wish, tried: list[Tried], strong: list[Tried], bottles: list[
         )
     else:
         best = max(tried, key=lambda one: one.torque)
-        yield f"less torque: {quantity_text(best.torque, 'torque')} at this pressure with {_named(best)}"
-        found = next(_more_pressure(wish, tried), None)
+        yield f"less torque: {_held(best)} at this pressure with {_named(best)}{_lasting(best, largest, wish.seconds)}"
+        found = next(_more_pressure(wish, tried, largest), None)
         if found is not None:
             yield found
     weaker = sorted((one for one in tried if one.torque < wish.torque), key=lambda one: -one.torque)
     usable = _USED * largest.values["content"]
     for one in [one for one in weaker if usable >= one.flow * wish.seconds][:3]:
         if _lasts(one, largest, wish.seconds):
-            yield (
-                f"less torque: {quantity_text(one.torque, 'torque')} for {wish.seconds / 60.0:.3g} min with "
-                f"{_named(one)} on {largest.name}"
-            )
+            yield (f"less torque: {_held(one)} for {wish.seconds / 60.0:.3g} min with {_named(one)} on {largest.name}")
             break
 
 
-def _more_pressure(wish: Wish, tried: list[Tried]) -> Iterator[str]:
+def _held(one: Tried) -> str:
+    """Return the torque of a pair, rounded down: who requests that much gets it."""
+    return quantity_text(math.floor(100.0 * one.torque) / 100.0, "torque")
+
+
+def _lasting(one: Tried, bottle: Part, seconds: float) -> str:
+    """Return for how long a pair walks on a bottle, where that is less than requested."""
+    lasts = _life(one, bottle, seconds)
+    return "" if lasts >= seconds else f", for {lasts / 60.0:.3g} min on {bottle.name}, the largest bottle"
+
+
+def _more_pressure(wish: Wish, tried: list[Tried], bottle: Part) -> Iterator[str]:
     """Yield at which higher pressures the strongest pair of a kind of valve has the torque, the lowest first."""
     strongest = [
         max((one for one in tried if one.valve.kind == kind), key=lambda one: one.torque)
@@ -290,7 +299,8 @@ def _more_pressure(wish: Wish, tried: list[Tried]) -> Iterator[str]:
                 continue
             for again in _few_strides(higher, one.valve, one.actuator):
                 if again.torque >= wish.torque:
-                    yield f"more pressure: {quantity_text(higher.pressure, 'pressure')} with {_named(one)}"
+                    lasting = _lasting(again, bottle, wish.seconds)
+                    yield f"more pressure: {quantity_text(higher.pressure, 'pressure')} with {_named(one)}{lasting}"
 
 
 def _named(one: Tried) -> str:
@@ -361,7 +371,7 @@ def _sections(wish: Wish, device: Device) -> tuple[Section, ...]:
         ("mass", quantity_text(sum(device.masses.values()), "part mass", ".0f")),
     )  # fmt: skip
     remarks = [
-        *electrical_sentences(device.electrical, wish.seconds),
+        *electrical_sentences(device.electrical),
         who_walks(walk_of(walked.scenario).wearer, walk_of(walked.scenario).gait, "as requested"),
         f"again: {device.command}",
     ]

@@ -95,7 +95,7 @@ def test_values_that_some_devices_lack_or_that_are_weak_are_named(tmp_path: Path
     assert section.remarks == (
         "remark: foot_plate.inertia: fewer than three devices have a value of their own: no spread",
         "remark: actuator.leak.area: no value of its own: d; the mean is that of the others",
-        "remark: actuator.leak.area: not identified but weak, or for the model only: b",
+        "remark: actuator.leak.area: weak, or valid for its model only: b",
     )
 
 
@@ -109,10 +109,10 @@ def test_bad_devices_are_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     for words, said in (
         ([*sets, sets[0]], "the same device is named twice"),
-        (sets[:2], "2 devices do not show how their kind spreads"),
+        (sets[:2], "at least 3 devices are needed"),
         ([*sets, str(copied)], "was identified from a recording of d0"),
         ([*sets[:2], str(tmp_path / "empty")], "the folder has no parameter set"),
-        (["ppafo2011", "ppafo2011-fitted", "ppafo2011-consistent"], "no number was identified of 3 devices or more"),
+        (["ppafo2011", "ppafo2011-fitted", "ppafo2011-consistent"], "no parameter was identified on at least 3"),
     ):
         with pytest.raises(PpafoError, match=said) as caught:
             ppafo.pool_devices(words)

@@ -26,8 +26,8 @@ extern "C" {
 typedef enum {
     @NAME@_GOING_ON,       /* a sample can be read */
     @NAME@_FINISHED,       /* there is no further sample; the metrics are those of the whole run */
-    @NAME@_FAILED,         /* left what is possible: try a smaller step; check inertia, volumes and areas */
-    @NAME@_TOO_MANY_PARTS, /* as before: a step was cut into 100,000 parts and was still not done */
+    @NAME@_FAILED,         /* the state became unphysical: try a smaller step; check inertia, volumes and areas */
+    @NAME@_TOO_MANY_PARTS, /* the run failed: a step was cut into 100,000 parts and was still not done */
     @NAME@_BAD_SETTING,    /* @name@_bad_setting says which */
     @NAME@_OTHER_PROGRAM   /* the settings need functions that are not here, see README.md */
 } @name@_status;

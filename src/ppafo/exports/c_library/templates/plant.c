@@ -37,8 +37,14 @@ static void lead(@name@_run *run, @arguments@, double time, double length)
     (void)first;
 @follow_inputs@
     status = begin_run(run, &chosen);
+    if (status == @NAME@_BAD_SETTING && @name@_bad_setting(settings) == NULL) {
+        return @NAME@_BAD_INPUT; /* what the inputs decide is out of range */
+    }
     if (status != @NAME@_GOING_ON) {
         return status;
+    }
+    if (!(@are_numbers@)) {
+        return @NAME@_BAD_INPUT;
     }
     lead(run, @inputs@, 0.0, 1.0);
     return advance_steps(run, 0) ? @NAME@_GOING_ON : @NAME@_FAILED;

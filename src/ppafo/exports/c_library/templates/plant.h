@@ -24,9 +24,9 @@ extern "C" {
 /* How a step ended. */
 typedef enum {
     @NAME@_GOING_ON,       /* the outputs can be read */
-    @NAME@_BAD_INPUT,      /* an input is no finite number; the run is as it was */
-    @NAME@_FAILED,         /* left what is possible: try a smaller step; check inertia, volumes and areas */
-    @NAME@_TOO_MANY_PARTS, /* as before: a step was cut into 100,000 parts and was still not done */
+    @NAME@_BAD_INPUT,      /* an input is no finite number, or a chamber has no volume at the angle; the run is as it was */
+    @NAME@_FAILED,         /* the state became unphysical: try a smaller step; check inertia, volumes and areas */
+    @NAME@_TOO_MANY_PARTS, /* the run failed: a step was cut into 100,000 parts and was still not done */
     @NAME@_BAD_SETTING,    /* @name@_bad_setting says which */
     @NAME@_OTHER_PROGRAM   /* the settings need functions that are not here, see README.md */
 } @name@_status;
