@@ -18,7 +18,11 @@ def test_without_a_command_it_says_where_to_start(capsys: pytest.CaptureFixture[
     assert main([]) == 2
     said = capsys.readouterr().err
     first = re.findall(r"^  ppafo (\w+) ", said, re.MULTILINE)
-    assert {"simulate", "reproduce", "walk", "workbench", "new", "examples"} == set(first) <= set(COMMANDS)
+    assert (
+        {"simulate", "reproduce", "walk", "workbench", "new", "size", "identify", "examples"}
+        == set(first)
+        <= set(COMMANDS)
+    )
     assert "All commands: ppafo --help" in said
 
 
