@@ -8,7 +8,7 @@ import ppafo
 from ppafo.storage import write_csv
 from scripts.planted_disagreements import PLANTED, SUPPLY, recorded
 
-pytestmark = pytest.mark.long
+pytestmark = [pytest.mark.long, pytest.mark.thorough]
 
 RIGHT = "ppafo2011:actuator.leak.area=0.9 mm^2"
 

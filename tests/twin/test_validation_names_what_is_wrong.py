@@ -5,7 +5,7 @@ import pytest
 from ppafo.questions.validate.solve import in_words, verdict
 from scripts.planted_disagreements import PLANTED, Planted, said_of
 
-pytestmark = pytest.mark.long
+pytestmark = [pytest.mark.long, pytest.mark.thorough]
 
 
 @pytest.mark.parametrize("planted", PLANTED, ids=lambda one: one.title)

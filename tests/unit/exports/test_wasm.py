@@ -38,6 +38,8 @@ def test_a_module_gives_the_bits_of_python(name: str) -> None:
 
 
 @needs_node
+@pytest.mark.long
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", list_walks())
 def test_a_module_gives_the_bits_of_a_walk_in_python(name: str) -> None:
     module = module_of(load_walk(name))
