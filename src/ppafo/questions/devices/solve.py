@@ -15,7 +15,7 @@ from ppafo.identification.problem import ProblemFile, load_problem
 from ppafo.parameters.loading import load_parameter_set
 from ppafo.parameters.parameter_set import CONFIDENCE, Entry, ParameterSet, atmospheric_pressure
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.questions.devices.answer import DeviceSpread, DeviceValue, PooledNumber
+from ppafo.questions.devices.answer import NEXT, DeviceSpread, DeviceValue, PooledNumber
 from ppafo.questions.identify.answer import kind_of_all
 from ppafo.questions.identify.solve import solve_problem
 from ppafo.signals import RecordingKind
@@ -51,6 +51,9 @@ def pool_devices(
         )
     known = _sets_of(paths, problem, progress)
     sets = [one for one, _ in known]
+    for path, parameter_set in zip(paths, sets, strict=True):
+        if parameter_set.name == NEXT:
+            raise IdentificationError(f"{path}: is what this command made of other devices, and no device itself")
     names = _names(paths)
     own = dict(zip(names, (_own_values(one) for one in sets), strict=True))
     _refuse_shared_recordings(own)

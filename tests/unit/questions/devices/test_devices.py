@@ -167,3 +167,13 @@ def test_recorded_valves_are_identified_and_pooled_and_the_next_ones_lie_in_the_
     (again,) = json.loads(capsys.readouterr().out)["numbers"]
     # A set has one half width, a little wider than either side of an interval that is not even.
     assert again["mean"] == pytest.approx(number["mean"], rel=1e-9)
+
+
+def test_what_was_made_of_other_devices_is_no_device(tmp_path: Path) -> None:
+    sets = [write_set(tmp_path, name, actuator__leak__area=(value, 0.001, "mm^2")) for name, value in LEAKS.items()]
+    ppafo.pool_devices(sets).save(tmp_path / "found")
+    with pytest.raises(PpafoError, match="is what this command made of other devices"):
+        ppafo.pool_devices([*sets, str(tmp_path / "found" / "next-device.toml")])
+
+
+LEAKS = {"a": 0.02, "b": 0.021, "c": 0.024}
