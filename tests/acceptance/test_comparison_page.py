@@ -94,5 +94,9 @@ def test_the_ranges_of_the_readme_and_of_the_table_of_claims_are_those_of_make_r
 def test_the_readme_says_what_a_builder_must_know_as_a_range() -> None:
     walks = FINDINGS["walks"]()
     told = " ".join(README.split())
-    for text in (f"peaks at {walks['peak']} N m", f"{walks['share']} % of a healthy", f"in {walks['minutes']} minutes"):
+    for text in (
+        f"peaks at {walks['peak']} N m",
+        f"{walks['share']} % of a healthy",
+        f"lasts {walks['minutes']} minutes",
+    ):
         assert text in told

@@ -148,7 +148,8 @@ def scopes_of(function: Function) -> Scopes:
     """Where each local name of a function is declared."""
     found = Scopes()
     found.look(function.body)
-    for name in found.types.keys() - {name for name, _ in function.parameters}:
+    # In order of names: that of a set is another one in each process, and an export is to have the same text in all.
+    for name in sorted(found.types.keys() - {name for name, _ in function.parameters}):
         found.place(name, function.body)
     return found
 

@@ -1,8 +1,10 @@
 """The plant alone in C: driven step by step from outside it moves as in Python, and people can read it."""
 
 import ctypes
+import os
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -134,6 +136,29 @@ def test_the_c_of_a_run_is_short_and_has_neither_lanes_nor_groups_that_are_packe
     assert functions
     unused = [name for name in functions if len(re.findall(rf"\b{name}\b", text)) < 2]
     assert unused == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "module", ["ppafo.exports.c_library import c_library", "ppafo.exports.c_library.plant import plant_library"]
+)
+def test_the_c_of_a_run_is_the_same_in_every_process(module: str) -> None:
+    code = (
+        f"import hashlib\nfrom {module} as made\nfrom ppafo.simulation.loading import load_scenario\n"
+        "files = made(load_scenario('step-response'))\n"
+        "print(hashlib.sha256(b''.join(files[name] for name in sorted(files))).hexdigest())"
+    )
+    found = {
+        subprocess.run(
+            [sys.executable, "-c", code],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for seed in ("1", "2", "3")
+    }
+    assert len(found) == 1
 
 
 @pytest.mark.parametrize("name", ["torque-task-proportional", "proportional"])

@@ -214,6 +214,8 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "description": "\n * ".join(textwrap.wrap(_in_comment(library.description), 110)),
         "version": __version__,
         "in_parts": in_parts(program),
+        "run": filled(template("c_library", "run.h"), {"name": name}),
+        "steps": steps_source(library),
         "first": "".join(f"    before.{item} = before.{library.surface.step};\n" for item in library.surface.as_step),
         "follow": "" if library.following is None else "    follow(&before, &all);",
         "settings": _members((item.name, item.quantity.unit, _said(item.quantity)) for item in library.settings),

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from ppafo.control.catalog import PROFILES
 from ppafo.control.controllers import switching
 from ppafo.exports.c_library import commanded, library_of
-from ppafo.exports.c_library.files import Library, Surface, c_identifier, in_parts, library_files
+from ppafo.exports.c_library.files import Library, Surface, c_identifier, library_files
 from ppafo.exports.c_library.program import ExportedProgram
 from ppafo.exports.c_library.walk_preparation import check_can_leave
 from ppafo.model.valves.kind import VENT
@@ -170,7 +170,6 @@ def surfaced(alone: PlantAlone) -> PlantAlone:
         "follow_inputs": follow_lines(alone, "first", {name: name for name in names}),
         "hidden": ", ".join(f"`{c_identifier(path)}`" for path in sorted(alone.hidden)),
         "step": f"{alone.step:g}",
-        "in_parts": in_parts(alone.library.program),
     }
     surface = Surface(
         "plant.h",
@@ -202,7 +201,7 @@ def _led_vane(scenario: Scenario) -> Scenario:
 
 
 def _commanded_walk(walk: Scenario) -> Scenario:
-    """The walk with a command that is handed in at every step, and sensors that nobody looks at."""
+    """The walk with a command that is handed in at every step, and sensors that nothing reads."""
     check_can_leave(walk)
     step = step_counts(1.0, walk.time_step, 1.0, walk.control.period).step
     motion = walk_of(walk)

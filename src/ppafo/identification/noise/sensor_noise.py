@@ -133,7 +133,7 @@ class SensorNoise:
 def without_common_stamps(rows: Floats, places: Sequence[Sequence[slice]], noises: Sequence[SensorNoise]) -> None:
     """Take from whitened columns (samples, columns) what channels share because a sample of all was early or late.
 
-    Each channel in turn tells how late a sample was, in standard deviations, and the next is freed of it.
+    Each channel in turn shows how late a sample was, in standard deviations, and the next is freed of it.
     """
     late = [(parts, noise) for parts, noise in zip(places, noises, strict=True) if noise.jitter > 0.0]
     if len(late) < 2:

@@ -11,22 +11,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ppafo.identification.estimate import limit_for
 from ppafo.identification.noise.choice import sensor_noise
 from ppafo.identification.noise.sensor_noise import SensorNoise
 from ppafo.identification.noise.shapes import Drift, from_reflections, reflections_of
 from ppafo.identification.trajectory.directions.catalogue import EFFECT_DIRECTIONS, EVERY_DIRECTION
 from ppafo.identification.trajectory.directions.changes import (
-    as_it_is,
     can_have,
-    changes_with,
+    changes_by_size,
     fitted_experiment,
     stacked,
-    with_heat,
 )
 from ppafo.identification.trajectory.directions.delay import delay_columns
 from ppafo.identification.trajectory.directions.gain_drift import drift_column
-from ppafo.identification.trajectory.directions.heat import HEAT
-from ppafo.identification.trajectory.directions.kind import Column, Direction
+from ppafo.identification.trajectory.directions.kind import Column
 from ppafo.identification.trajectory.directions.zero import zero_columns
 from ppafo.identification.trajectory.information import inverse_with_root
 from ppafo.identification.trajectory.posterior import whiten
@@ -162,7 +160,7 @@ def doubt_of(found: WhitenedFit, low: Floats, high: Floats, is_misfit: bool) -> 
     starts = _slopes_of_starts(residuals, point)
     every = _findings(found, starts, columns, [column for sizes in of_model for column in sizes[1:]])
     findings, at_other_sizes = every[: len(columns)], every[len(columns) :]
-    limit = _quantile(ALARM / max(1, len(findings)))
+    limit = limit_for(ALARM / max(1, len(findings)))
     alarms, of_device = [], {one.name for one in EVERY_DIRECTION}
     for one in findings:
         is_tried = is_misfit and one.column.name in of_device
@@ -203,12 +201,6 @@ def _winners(found: WhitenedFit, starts: Floats, alarms: Sequence[Finding], limi
     return tuple(sorted(winners, key=lambda one: (not one.explains, -one.gain)))
 
 
-def _quantile(chance: float) -> float:
-    from scipy.special import ndtri
-
-    return float(-ndtri(0.5 * chance))
-
-
 def _of_model(found: WhitenedFit) -> list[list[Column]]:
     """Return the directions of the device, by runs with a little of each effect: at the size that is clear, then more.
 
@@ -218,18 +210,18 @@ def _of_model(found: WhitenedFit) -> list[list[Column]]:
     residuals, point = found.optimum.residuals, found.optimum.point
     find_effects(path for direction in EFFECT_DIRECTIONS for path in direction.neutral)
     fitted = [fitted_experiment(one, residuals, point) for one in residuals.experiments]
-    made = []
     effects = [one for one in EFFECT_DIRECTIONS if any(can_have(item.scenario, one) for item in fitted)]
-    for together, prepare in ((effects, as_it_is), ((HEAT,), with_heat)):
-        sizes = [(direction, size) for direction in together for size in direction.sizes]
-        parts = [changes_with(one, sizes, prepare) for one in fitted]
-        changes = list(np.concatenate(parts).T)
-        for direction in together:
-            found_at = [(size, change) for (one, size), change in zip(sizes, changes, strict=True) if one is direction]
-            tried = [(size, change) for size, change in found_at if np.isfinite(change).all()]
-            clear = _clear_size(found, tried)
-            if clear is not None:
-                made.append([_column(direction, change / size) for size, change in tried[clear:]])
+    made = []
+    for direction, tried in changes_by_size(fitted, effects):
+        clear = _clear_size(found, tried)
+        if clear is not None:
+            texts = direction.seems, direction.unless, direction.size_in_words
+            made.append(
+                [
+                    Column(direction.name, *texts, 0.0, direction.largest, change / size)
+                    for size, change in tried[clear:]
+                ]
+            )
     return made
 
 
@@ -262,11 +254,6 @@ def _slopes_of_starts(residuals: Residuals, point: Floats) -> Floats:
         first += count
     finite = [column for column in columns if np.isfinite(column).all() and column.any()]
     return np.column_stack(finite) if finite else np.zeros((total, 0))
-
-
-def _column(direction: Direction, change: Floats) -> Column:
-    texts = direction.seems, direction.unless, direction.size_in_words
-    return Column(direction.name, *texts, 0.0, direction.largest, change)
 
 
 def _clear_size(found: WhitenedFit, changes: Sequence[tuple[float, Floats]]) -> int | None:

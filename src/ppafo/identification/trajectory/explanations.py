@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ppafo.errors import PpafoError
+from ppafo.identification.estimate import limit_for
 from ppafo.identification.noise.choice import sensor_noise
 from ppafo.identification.noise.sensor_noise import Course, SensorNoise, course_of
 from ppafo.identification.trajectory.directions.catalogue import EFFECT_DIRECTIONS
-from ppafo.identification.trajectory.directions.changes import as_it_is, changes_with, with_heat
-from ppafo.identification.trajectory.directions.heat import HEAT
+from ppafo.identification.trajectory.directions.changes import changes_by_size
 from ppafo.identification.trajectory.directions.zero import LARGEST_ZERO, size_of_angle, size_of_pressure
 from ppafo.identification.trajectory.problem import (
     Experiment,
@@ -117,7 +117,7 @@ def explanations_of(experiments: Sequence[Experiment], delays: Sequence[float]) 
     left = base.left
     noises = whole.noises(left)
     if all(one.shape.order == 0 and not one.grows and float(one.levels.max()) < _JUST_NOISE for one in noises):
-        return Explanations((), _limit(1), 0)
+        return Explanations((), limit_for(ALARM) ** 2, 0)
     tried = [
         *_mistakes(experiments, delays, float(left @ left)),
         *_faults_of_channels(whole, base),
@@ -125,7 +125,7 @@ def explanations_of(experiments: Sequence[Experiment], delays: Sequence[float]) 
         *_effects(whole, base),
     ]
     tried.sort(key=lambda one: float(one.left @ one.left))
-    limit, without = _limit(len(tried)), _likelihood(noises)
+    limit, without = limit_for(ALARM / max(1, len(tried))) ** 2, _likelihood(noises)
     found: list[tuple[Explanation, Floats]] = []
     for one in [one for one in tried if one.is_news][:_COMPARED]:
         same = [place for place, (_, other) in enumerate(found) if float(np.std(one.left - other)) < _SAME]
@@ -137,12 +137,6 @@ def explanations_of(experiments: Sequence[Experiment], delays: Sequence[float]) 
         if gain > limit:
             found.append((Explanation(one.name, one.in_words, gain, one.numbers), one.left))
     return Explanations(tuple(sorted((one for one, _ in found), key=lambda one: -one.gain)), limit, len(tried))
-
-
-def _limit(count: int) -> float:
-    from scipy.special import ndtri
-
-    return float(ndtri(0.5 * ALARM / max(1, count))) ** 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -530,21 +524,13 @@ def _followed(one: PreparedExperiment) -> tuple[str, ...]:
 def _effects(whole: _Whole, base: _Base) -> Iterator[_Tried]:
     """Each effect of the catalogue of directions at the size that leaves least, in straight lines between sizes."""
     find_effects(path for direction in EFFECT_DIRECTIONS for path in direction.neutral)
-    for directions, prepare_scenario in ((EFFECT_DIRECTIONS, as_it_is), ((HEAT,), with_heat)):
-        sizes = [(direction, size) for direction in directions for size in direction.sizes]
-        changes = np.concatenate([changes_with(one, sizes, prepare_scenario) for one in whole.prepared])
-        for direction in directions:
-            own = [(0.0, np.zeros(len(base.raw)))]
-            own += [
-                (size, base.freed(change))
-                for (one, size), change in zip(sizes, changes.T, strict=True)
-                if one is direction
-            ]
-            found = _best_between(base.left, [pair for pair in own if np.isfinite(pair[1]).all()])
-            if found is not None:
-                size, left = found
-                words = direction.seems.format(size=direction.size_in_words(size))
-                yield _Tried(direction.name, words, left, {})
+    for direction, changes in changes_by_size(whole.prepared, EFFECT_DIRECTIONS):
+        own = [(0.0, np.zeros(len(base.raw)))] + [(size, base.freed(change)) for size, change in changes]
+        found = _best_between(base.left, own)
+        if found is not None:
+            size, left = found
+            words = direction.seems.format(size=direction.size_in_words(size))
+            yield _Tried(direction.name, words, left, {})
 
 
 def _best_between(base: Floats, known: Sequence[tuple[float, Floats]]) -> tuple[float, Floats] | None:

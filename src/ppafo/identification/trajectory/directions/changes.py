@@ -1,6 +1,6 @@
 """What a little of an effect changes: runs of a program in which effects act, beside one in which they are not felt."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -47,6 +47,24 @@ def fitted_experiment(prepared: PreparedExperiment, residuals: Residuals, point:
 def stacked(prepared: PreparedExperiment, signals: Mapping[str, Floats]) -> Floats:
     """Return the channels over their noise, one below the other (samples, runs)."""
     return np.concatenate([signals[channel.name] / channel.noise for channel in prepared.channels])
+
+
+def changes_by_size(
+    prepared: Sequence[PreparedExperiment], effects: Sequence[Direction]
+) -> Iterator[tuple[Direction, list[tuple[float, Floats]]]]:
+    """Yield each effect, and heat, with the sizes at which all runs succeed and the changes (samples,) there."""
+    for directions, prepare in ((effects, as_it_is), ((HEAT,), with_heat)):
+        sizes = [(direction, size) for direction in directions for size in direction.sizes]
+        changes = np.concatenate([changes_with(one, sizes, prepare) for one in prepared]).T
+        for direction in directions:
+            yield (
+                direction,
+                [
+                    (size, change)
+                    for (one, size), change in zip(sizes, changes, strict=True)
+                    if one is direction and np.isfinite(change).all()
+                ],
+            )
 
 
 def changes_with(
