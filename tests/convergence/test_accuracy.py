@@ -16,6 +16,7 @@ LARGEST_PRESSURE = 1.0e-3
 LARGEST_RMS = 1.0e-4
 SEEDS = range(200)
 SEEDS_PER_TEST = 25
+THOROUGH = (pytest.mark.long, pytest.mark.thorough)
 
 
 def assert_within_limits(agreement: Agreement, what: str) -> None:
@@ -64,7 +65,13 @@ def test_several_switchings_inside_one_step_are_within_the_limits(
     assert_within_limits(agreement, f"{interval} {opening} {closing} {rate}")
 
 
-@pytest.mark.parametrize("first", range(0, len(SEEDS), SEEDS_PER_TEST))
+@pytest.mark.parametrize(
+    "first",
+    [
+        first if first < 3 * SEEDS_PER_TEST else pytest.param(first, marks=THOROUGH)
+        for first in range(0, len(SEEDS), SEEDS_PER_TEST)
+    ],
+)
 def test_random_devices_are_within_the_limits(draws: ModuleType, first: int) -> None:
     for seed in SEEDS[first : first + SEEDS_PER_TEST]:
         assert_within_limits(compare_with_reference(plan_run(draws.random_scenario(seed))), f"seed {seed}")
