@@ -1,6 +1,7 @@
 """The plant in continuous time with the exact flow functions, and the module of it that CVODE and others integrate."""
 
 import math
+import re
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -257,19 +258,36 @@ def right_hand_side_source(program: Program) -> str:
     for name, row in parameter_groups(program).items():
         for path in leaf_paths(row, name):
             cells[path] = f"parameters[{len(cells)}]"
-    valve_paths = leaf_paths(program.valve.state, "valve_state")
-    cells |= {path: f"y[{unknowns_before_valve(program) + number}]" for number, path in enumerate(valve_paths)}
-    states = program.effect_states
-    state_paths = [path for name, row in states.items() for path in leaf_paths(row, name)]
-    cells |= {path: f"y[{gas_unknowns(program) + number}]" for number, path in enumerate(state_paths)}
-    groups = parameter_groups(program) | {"valve_state": program.valve.state} | states
-    lines = [f"{name} = {row_expression(row, name, cells, add)}" for name, row in groups.items()]
-    lines += [f"openings = {add(program.valve.instant)}(valve, valve_state, command)"]
+    lines = [f"{name} = {row_expression(row, name, cells, add)}" for name, row in parameter_groups(program).items()]
     if program.angle is None:
         lines += ["angle = y[0]", "rate = y[1] if way != 0.0 else 0.0"]
     else:
         lines += [f"angle, rate, _ = {add(program.angle.value)}(path, t)"]
-    lines += [
+    lines += [*state_lines(program, add), *slope_lines(program, add)]
+    fill = entry_text(
+        "fill", dict.fromkeys(ARRAYS, ARRAY) | dict.fromkeys(NUMBERS, FLOAT), woven(lines, collector.needs)
+    )
+    return "\n\n\n".join([HEADER, collector.text(), fill])
+
+
+def state_cells(program: Program) -> dict[str, str]:
+    """Where among the unknowns ``y`` the states of effects and of the valve are, by path."""
+    rows = program.effect_states | {"valve_state": program.valve.state}
+    paths = [path for name, row in rows.items() for path in leaf_paths(row, name)]
+    return {path: f"y[{place}]" for place, path in enumerate(paths, gas_unknowns(program))}
+
+
+def state_lines(program: Program, add: Callable[..., str]) -> list[str]:
+    """Lines that make the states of effects and of the valve from the unknowns ``y``."""
+    cells = state_cells(program)
+    rows = {"valve_state": program.valve.state} | program.effect_states
+    return [f"{name} = {row_expression(row, name, cells, add)}" for name, row in rows.items()]
+
+
+def slope_lines(program: Program, add: Callable[..., str]) -> list[str]:
+    """Lines from parameters, ``angle``, ``rate`` and states at a time ``t`` to the ``slopes`` of the unknowns ``y``."""
+    lines = [
+        f"openings = {add(program.valve.instant)}(valve, valve_state, command)",
         f"pressure_1, pressure_2 = {add(chamber_pressures)}(plant, angle, y[2], y[3])",
         *gas_lines(program, add),
         "slopes[4] = gas.supplied",
@@ -281,24 +299,19 @@ def right_hand_side_source(program: Program) -> str:
         lines += [*torque_lines(program, add, "t", "y[0]"), f"slopes[0], slopes[1] = {moved}"]
     else:
         lines += ["slopes[0] = 0.0", "slopes[1] = 0.0"]
-    lines += [f"moves = {add(program.valve.rates)}(valve, valve_state, command)"]
-    lines += [
-        f"slopes[{unknowns_before_valve(program) + number}] = {path.replace('valve_state', 'moves', 1)}"
-        for number, path in enumerate(valve_paths)
-    ]
+    lines += [f"valve_state_moves = {add(program.valve.rates)}(valve, valve_state, command)"]
     if program.stated:
         seen = "angle, rate, pressure_1, pressure_2, gas.supplied, gas.vented, command"
         lines.append(f"now = {add(Moment)}({seen})")
     for name, kind in program.stated.items():
         lines.append(f"{name}_state_moves = {add(kind.slopes)}({name}, {name}_state, now)")
-    lines += [
-        f"slopes[{place}] = {path.replace('.', '_moves.', 1)}"
-        for place, path in enumerate(state_paths, gas_unknowns(program))
-    ]
-    fill = entry_text(
-        "fill", dict.fromkeys(ARRAYS, ARRAY) | dict.fromkeys(NUMBERS, FLOAT), woven(lines, collector.needs)
-    )
-    return "\n\n\n".join([HEADER, collector.text(), fill])
+    lines += [f"{cell.replace('y', 'slopes', 1)} = {_moves(path)}" for path, cell in state_cells(program).items()]
+    return lines
+
+
+def _moves(path: str) -> str:
+    """The rate of a state by its path."""
+    return re.sub(r"^\w+", lambda name: f"{name[0]}_moves", path)
 
 
 def gas_lines(program: Program, add: Callable[..., str]) -> list[str]:

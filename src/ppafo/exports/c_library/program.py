@@ -36,7 +36,7 @@ from ppafo.simulation.ensemble.running import (
     thermal_totals,
     totals,
 )
-from ppafo.translation.typed import FLOAT, INT, Array, Row, Shared, Type
+from ppafo.translation.typed import FLOAT, INT, LIBRARY, Array, Row, Shared, Type
 
 
 def for_one_run(function: FunctionType, tree: ast.FunctionDef) -> ast.FunctionDef:
@@ -98,6 +98,21 @@ The last one is 1 where the error decides about the parts of a step, else 0.
 """
 Further = Callable[[Collector, Boundary], str]
 """Writes a further composed function, once it has gathered what that calls."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A further function of a library: its name, what it ``takes``, what it does, and what writes it.
+
+    It takes ``parameters`` of a run, ``settings``, ``numbers`` (an array) and a ``number``, in its order.
+    """
+
+    name: str
+    takes: tuple[str, ...]
+    said: str
+    write: Further
+
+
 LOOP_TYPES: tuple[Type, ...] = (
     *map(Array, LOOP_ARRAYS.values()),
     *(FLOAT if kind == "float64" else INT for kind in LOOP_NUMBERS.values()),
@@ -174,12 +189,18 @@ def places_of(groups: Mapping[str, type]) -> dict[str, str]:
 
 
 def c_text_of_run(
-    item: ExportedProgram, title: str, name: str, settings: Sequence[str], further: Further | None, around: str
+    item: ExportedProgram,
+    title: str,
+    name: str,
+    settings: Sequence[str],
+    further: Further | None,
+    around: str,
+    others: Sequence[Entry] = (),
 ) -> str:
     """All functions of an exported program in C for people: of a single run, without lanes, between structs.
 
     ``name`` begins the names of the structs of settings and metrics, which the file ``around`` it declares; ``further``
-    may add a function that takes ``settings``.
+    may add a function that takes ``settings``, and ``others`` follow.
     """
     from ppafo.translation.c99 import Reading, c_source, documents_of
     from ppafo.translation.walk import walk_module
@@ -189,6 +210,7 @@ def c_text_of_run(
     link_program(program, collector)
     entries = [metrics_entry(item, collector, structs)] if item.metrics else []
     entries += [] if further is None else [further(collector, structs)]
+    entries += [other.write(collector, structs) for other in others]
     loop = run_loop(item.loops[WHOLE], collector, f"{name}_outputs", item.loops.get(IN_PARTS))
     composed = "\n\n".join([HEADER, collector.text(), loop, *entries, ""])
     states = struct_of("run_states", program.state_rows(), collector.add)
@@ -203,9 +225,12 @@ def c_text_of_run(
         "prepare": (given, parameters, states, struct_of_numbers("run_counts", COUNTS)),
         "follow": (given, given),
     }
-    documents = documents_of(collector) | _DOCUMENTS
+    taken: dict[str, Type] = {"parameters": parameters, "settings": given, "numbers": Array(1), "number": FLOAT}
+    types |= {other.name: tuple(taken[word] for word in other.takes) for other in others}
+    documents = documents_of(collector) | _DOCUMENTS | {other.name: other.said for other in others}
     return c_source(
-        walk_module(composed, types),
+        # Functions of the C library have last bits of their own: a run must not call any.
+        walk_module(composed, types, LIBRARY if others else frozenset()),
         documents,
         title,
         reading=Reading(_short(collector), {kind.row.name: kind.row.name for kind in (given, outputs, found)}, around),

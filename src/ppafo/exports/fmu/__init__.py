@@ -1,7 +1,7 @@
-"""A scenario or a walk as a functional mock-up unit for co-simulation: sources inside, no Python at run time.
+"""A scenario or a walk as a functional mock-up unit: sources inside, no Python at run time.
 
 The unit holds the closed loop, or the plant alone: valve, gas and supply under a command, on a vane that is free or
-moved.
+moved. It is for co-simulation; a plant on a fixture may be for model exchange.
 """
 
 import hashlib
@@ -14,7 +14,7 @@ import sys
 import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 
@@ -31,6 +31,7 @@ from ppafo.exports.fmu.description import (
     description_of_fmi3,
     variability_of,
 )
+from ppafo.exports.fmu.exchange import continuous_states, exchange_words, with_entries
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.native import asked, complaint
 from ppafo.version import __version__
@@ -61,7 +62,7 @@ PLATFORMS = {
     "darwin64": Platform("darwin64", "x86_64-darwin", "x86_64-macos", ".dylib", "not run"),
     "darwin-aarch64": Platform(None, "aarch64-darwin", "aarch64-macos", ".dylib", "not run"),
 }
-"""Platforms by the name under which they are asked for."""
+"""Platforms by the names under which they are requested."""
 
 
 def host_platform() -> str | None:
@@ -137,6 +138,8 @@ _LOOP_TUNING = (
 def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) -> dict[str, bytes]:
     """A unit by the name of its file. ProgramError for what cannot be translated or built."""
     chosen = {name: _platform(name, fmi) for name in platforms}
+    if interface.states and fmi != 2:
+        raise ScenarioError("model exchange is written as FMI 2.0: leave --fmi 3 out")
     identifier = interface.library.name
     sources = _sources(interface, fmi)
     token = hashlib.sha256(b"".join(sources.values())).hexdigest()[:32]
@@ -164,7 +167,7 @@ def closed_loop(item: Scenario) -> Interface:
     return Interface(
         name=item.name,
         library=library,
-        template="closed_loop.c",
+        templates=("closed_loop.c",),
         time=_LOOP_TIME,
         tuning=_LOOP_TUNING,
         step=times["run.output_interval"],
@@ -207,15 +210,19 @@ def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
         "output_changes": "".join(variability_of(name)[0] for name in library.program.outputs),
         "token": "@token@",
         "has_clock": "true" if interface.clock else "false",
+        "kind": interface.kind,
+        "fmi_type": "fmi2ModelExchange" if interface.states else "fmi2CoSimulation",
+        "fields": "",
         **interface.words,
     }
-    unit = "\n".join(filled(template("fmu", file), words) for file in ("unit.c", interface.template))
+    unit = "\n".join(filled(template("fmu", file), words) for file in ("unit.c", *interface.templates))
+    calls = {3: ["fmi3.c"], 2: ["fmi2.c", "fmi2_exchange.c" if interface.states else "fmi2_steps.c"]}
     headers = files("ppafo.exports.fmu").joinpath("headers")
     return {
         f"{name}.h": written[f"{name}.h"],
         f"{name}.c": written[f"{name}.c"],
         "unit.c": unit.encode(),
-        f"fmi{fmi}.c": filled(template("fmu", f"fmi{fmi}.c"), words).encode(),
+        f"fmi{fmi}.c": "".join(filled(template("fmu", file), words) for file in calls[fmi]).encode(),
         **{file: headers.joinpath(file).read_bytes() for file in _HEADERS[fmi]},
     }
 
@@ -274,7 +281,7 @@ def plant_alone(item: Scenario) -> Interface:
     return Interface(
         name=library.title,
         library=library,
-        template="plant.c",
+        templates=("plant_inputs.c", "plant.c"),
         time=PLANT_TIME.format(motion=alone.motion),
         tuning=PLANT_TUNING,
         step=alone.step,
@@ -286,4 +293,30 @@ def plant_alone(item: Scenario) -> Interface:
         hidden=alone.hidden,
         inputs=alone.inputs,
         words={"inputs": given, "follow": follow_lines(alone, "settings", numbers)},
+    )
+
+
+EXCHANGE_TIME = (
+    "The tool integrates the states. The command is discrete: it changes in events, as that of a sampled controller "
+    "does. Dead times, solenoids, and stick, slip and stops of a free vane are events, which the unit announces."
+)
+EXCHANGE_TUNING = "They are taken in the next event."
+
+
+def plant_in_time(item: Scenario) -> Interface:
+    """The plant of a scenario for model exchange: states, slopes and events. ProgramError where it has no slopes."""
+    led = plant_alone(item)
+    alone = with_entries(surfaced(plant_of(item)), item.device)
+    program = alone.library.program.program
+    return replace(
+        led,
+        library=alone.library,
+        templates=("plant_inputs.c", "exchange.c"),
+        time=EXCHANGE_TIME,
+        tuning=EXCHANGE_TUNING,
+        is_step_fixed=False,
+        hidden=alone.hidden | {"run.step"},
+        words=led.words | exchange_words(alone),
+        states=continuous_states(program),
+        indicators=2 if program.angle is None else 0,
     )

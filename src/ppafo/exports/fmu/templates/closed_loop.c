@@ -13,6 +13,20 @@ static bool get_metric(unit *item, uint32_t number, double *value)
     return true;
 }
 
+static bool get_further(unit *item, uint32_t number, double *value)
+{
+    (void)number;
+    (void)value;
+    return refuse(item, "there is no such variable");
+}
+
+/* The outputs are those of the last sample. */
+static bool bring_up(unit *item)
+{
+    (void)item;
+    return true;
+}
+
 static bool go_to_sample(unit *item, int64_t sample)
 {
     while (item->run->samples_shown <= sample) {

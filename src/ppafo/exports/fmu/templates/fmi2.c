@@ -1,4 +1,4 @@
-/* @title@ as a functional mock-up unit of FMI 2.0 for co-simulation: this is the one file to compile.
+/* @title@ as a functional mock-up unit of FMI 2.0 for @kind@: this is the one file to compile.
  *
  * Written by ppafo @version@. Needed flags: -ffp-contract=off; never -ffast-math.
  */
@@ -59,10 +59,10 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String token, 
     (void)resources;
     (void)visible;
     (void)logging;
-    if (name == NULL || token == NULL || strcmp(token, "@token@") != 0 || type != fmi2CoSimulation) {
+    if (name == NULL || token == NULL || strcmp(token, "@token@") != 0 || type != @fmi_type@) {
         if (functions != NULL && functions->logger != NULL) {
             functions->logger(functions->componentEnvironment, name, fmi2Error, "logStatusError",
-                "this unit is for co-simulation, and its GUID is @token@");
+                "this unit is for @kind@, and its GUID is @token@");
         }
         return NULL;
     }
@@ -168,16 +168,6 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference references[], s
     return fmi2OK;
 }
 
-fmi2Status fmi2DoStep(fmi2Component c, fmi2Real current, fmi2Real length, fmi2Boolean keeps_no_state)
-{
-    instance *given = (instance *)c;
-    (void)keeps_no_state;
-    if (!is_in(given, UNIT_RUNNING, UNIT_RUNNING)) {
-        return report(given);
-    }
-    return done(given, go_to(&given->item, current + length - given->item.now.start));
-}
-
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
     instance *given = (instance *)c;
@@ -217,7 +207,7 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
     return done(given, state_from(&given->item, bytes, size, state));
 }
 
-/* What this unit has not: other types of variables, derivatives, steps that are still under way. */
+/* What this unit has not: other types of variables, directional derivatives. */
 static fmi2Status none(instance *given, size_t count)
 {
     return done(given, count == 0 || refuse(&given->item, "this unit has no such variables or derivatives"));
@@ -274,67 +264,4 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
     (void)seed;
     (void)values;
     return none((instance *)c, unknown_count);
-}
-
-fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference references[], size_t count,
-    const fmi2Integer orders[], const fmi2Real values[])
-{
-    (void)references;
-    (void)orders;
-    (void)values;
-    return none((instance *)c, count);
-}
-
-fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference references[], size_t count,
-    const fmi2Integer orders[], fmi2Real values[])
-{
-    (void)references;
-    (void)orders;
-    (void)values;
-    return none((instance *)c, count);
-}
-
-fmi2Status fmi2CancelStep(fmi2Component c)
-{
-    return none((instance *)c, 1);
-}
-
-fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value)
-{
-    (void)c;
-    (void)kind;
-    (void)value;
-    return fmi2Discard;
-}
-
-fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
-{
-    (void)c;
-    (void)kind;
-    (void)value;
-    return fmi2Discard;
-}
-
-fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value)
-{
-    (void)c;
-    (void)kind;
-    (void)value;
-    return fmi2Discard;
-}
-
-fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value)
-{
-    (void)c;
-    (void)kind;
-    (void)value;
-    return fmi2Discard;
-}
-
-fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value)
-{
-    (void)c;
-    (void)kind;
-    (void)value;
-    return fmi2Discard;
 }

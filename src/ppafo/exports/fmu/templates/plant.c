@@ -1,39 +1,20 @@
 /* ---- The plant alone: it goes on by steps of the engine, under inputs that are constant from one point to the next. ---- */
 
-/* Settings at the start that the inputs have. */
-static void follow_inputs(unit *item)
-{
-    @name@_settings *settings = &item->now.settings;
-    const double *inputs = item->now.inputs;
-    (void)inputs;
-@follow@
-}
-
-static void lead_unit(unit *item, double time, double length)
-{
-    const double *inputs = item->now.inputs;
-    lead(item->run, @inputs@, time, length);
-}
-
-static bool get_metric(unit *item, uint32_t number, double *value)
+static bool get_further(unit *item, uint32_t number, double *value)
 {
     (void)number;
     (void)value;
-    return refuse(item, "the plant alone has no metrics");
+    return refuse(item, "there is no such variable");
 }
 
-static bool are_inputs_numbers(unit *item)
+/* The outputs are those of the last step. */
+static bool bring_up(unit *item)
 {
-    int place;
-    for (place = 0; place < INPUTS; ++place) {
-        if (item->now.inputs[place] - item->now.inputs[place] != 0.0) {
-            return refuse(item, "an input is no finite number");
-        }
-    }
+    (void)item;
     return true;
 }
 
-/* The same of a unit, which says why it cannot go on. */
+/* Do steps; where that fails the unit says why. */
 static bool do_steps(unit *item, int64_t steps)
 {
     if (!advance_steps(item->run, steps)) {
