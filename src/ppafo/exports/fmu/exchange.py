@@ -64,8 +64,8 @@ def continuous_states(program: Program) -> tuple[ContinuousState, ...]:
         if place >= unknowns_before_valve(program) and program.valve.shift is None:
             break
         owner, rest = path.replace("_state.", ".", 1).split(".", 1)
-        said = f"{rest} of {owner}".replace("_", " ")
-        found.append(ContinuousState(f"state.{owner}.{rest}", "", said, 1.0, place))
+        summary = f"{rest} of {owner}".replace("_", " ")
+        found.append(ContinuousState(f"state.{owner}.{rest}", "", summary, 1.0, place))
     return tuple(found if program.angle is None else found[2:])
 
 
