@@ -55,6 +55,8 @@ def test_an_effect_that_the_model_lacks_is_named_with_the_size_of_a_fit_with_it(
     first = found.doubt.shown[0]
     assert first.refit is not None
     assert first.explains
+    # A line has a resistance too, which that of the catalogue has not.
+    assert first.refit.is_all == (extra.line == 0.0)
     assert low < first.refit.size < high
     assert not any(one.is_identified for one in found.estimates)
     held = [one for one in found.estimates if one.verdict == "holds for this model only"]

@@ -28,7 +28,7 @@ from ppafo.identification.trajectory.directions.kind import Column
 from ppafo.identification.trajectory.directions.zero import zero_columns
 from ppafo.identification.trajectory.information import inverse_with_root
 from ppafo.identification.trajectory.posterior import whiten
-from ppafo.identification.trajectory.refit import Refit, likelihood_with, refit_with
+from ppafo.identification.trajectory.refit import Refit, likelihood_with, refit_from_afar, refit_with
 from ppafo.identification.trajectory.residuals import Floats, Residuals, signals_at
 from ppafo.identification.trajectory.search import WhitenedFit
 from ppafo.model.catalog import find_effects
@@ -124,7 +124,8 @@ class Doubt:
         first = self.shown[0] if self.shown else None
         if first is None or first.refit is None or not first.explains:
             return None
-        return first.title, first.refit.point
+        rest = "" if first.refit.is_all else ", which leaves more than white noise,"
+        return f"{first.title}{rest}", first.refit.point
 
     @property
     def misfit(self) -> str:
@@ -183,19 +184,23 @@ def _winners(found: WhitenedFit, starts: Floats, alarms: Sequence[Finding], limi
         return ()
     without, by_name = likelihood_with(found, found.model, starts), {one.name: one for one in EVERY_DIRECTION}
 
-    def shown(one: Finding) -> Shown:
+    def shown(one: Finding, refit: Refit | None) -> Shown:
         linear = likelihood_with(found, found.model, np.column_stack([starts, one.column.change]))
         gain, explains = linear.value - without.value - 2.0, linear.explains_beside(without)
-        direction = by_name.get(one.column.name)
-        if direction is None:
+        if one.column.name not in by_name:
             return Shown(one, gain, None, is_possible=True, explains=explains)
-        refit = refit_with(found, starts, direction, one.size, without)
         if refit is not None and refit.gain > limit:
             return Shown(one, refit.gain, refit, is_possible=True, explains=refit.explains)
         is_possible = one.column.low <= one.size
         return Shown(one, -math.inf if is_possible else gain, None, is_possible, explains=False)
 
-    every = [shown(one) for one in alarms]
+    device = {one.column.name: one for one in alarms if one.column.name in by_name}
+    refits = {name: refit_with(found, starts, by_name[name], one.size, without) for name, one in device.items()}
+    if not any(one is not None and one.is_all for one in refits.values()):
+        for name, near in refits.items():
+            far = refit_from_afar(found, starts, by_name[name], without)
+            refits[name] = far if near is None or (far is not None and far.gain > near.gain) else near
+    every = [shown(one, refits.get(one.column.name)) for one in alarms]
     winners = [one for one in every if one.gain > limit]
     winners = [one for one in winners if one.is_possible] or winners
     return tuple(sorted(winners, key=lambda one: (not one.explains, -one.gain)))

@@ -9,7 +9,6 @@ import numpy as np
 from ppafo.identification.noise.choice import sensor_noise
 from ppafo.identification.noise.heavy_tails import sample_weights
 from ppafo.identification.noise.sensor_noise import SensorNoise
-from ppafo.identification.noise.shapes import from_reflections
 from ppafo.identification.trajectory.directions.catalogue import EFFECT_DIRECTIONS
 from ppafo.identification.trajectory.directions.changes import (
     can_have,
@@ -21,15 +20,18 @@ from ppafo.identification.trajectory.directions.heat import HEAT
 from ppafo.identification.trajectory.directions.kind import Direction
 from ppafo.identification.trajectory.information import inverse_with_root, solution
 from ppafo.identification.trajectory.posterior import LinearModel, whiten
+from ppafo.identification.trajectory.problem import Search, with_numbers
 from ppafo.identification.trajectory.residuals import (
+    FIRST_STEP,
     Floats,
     Mask,
     PreparedExperiment,
+    Residuals,
     columns_in,
     coordinate_bounds,
     signals_at,
 )
-from ppafo.identification.trajectory.search import WhitenedFit
+from ppafo.identification.trajectory.search import WhitenedFit, descend
 from ppafo.simulation.numbers import number_at
 
 _STEP = 6.0e-4
@@ -37,13 +39,17 @@ _STEP = 6.0e-4
 _OF_SIZE = 0.03
 """The same of a size, as a fraction of it."""
 _ROUNDS = 3
-_TURNS = 8
-_STARTS = 3
-"""Sizes of an effect from which a fit with it is searched at most."""
-_FRACTIONS = (1.0, 0.5, 0.2, 0.05)
-"""Of a step that is tried, the longest that lowers the misfit most."""
-_SETTLED = 0.1
-"""Standard errors by which a step moves the size when it is the last."""
+_TURNS = 25
+_STARTS = 2
+"""Sizes of an effect from which a fit with it is searched from afar at most."""
+_DAMPINGS = (0.0, 1.0e-3, 1.0e-2, 0.1, 1.0, 10.0, 100.0)
+"""Of the steps that are tried (Levenberg and Marquardt), in shares of the information of each number."""
+_SETTLED = 0.3
+"""Fall of the squares [-] below which a search is at its end: no number moves by a notable part of its error."""
+_SLOW, _PATIENCE = 0.02, 3
+"""Fraction of what is left by which a step must lower it, and how many in a row may not."""
+_QUICK, _NEAR = Search(), 1.0e-4
+"""Of a search with the size held, that only comes near."""
 _SMALLEST, _LARGEST = 0.1, 3.0
 """Size that a search may end at, over the least and the largest of its direction."""
 _REST = 0.1
@@ -78,7 +84,8 @@ class Refit:
     """What a fit with one effect found: ``point`` and standard ``errors`` of all coordinates with it.
 
     ``size`` and its ``error`` are in the SI unit of the effect; ``gain`` [-] is by how much twice the logarithm of the
-    likelihood rises, less 2 for the number that is new. ``explains`` says whether hardly more than white noise is left.
+    likelihood rises, less 2 for the number that is new. ``explains`` says whether hardly more than white noise is left,
+    or little of what is left without it; ``is_all`` whether no more is left than white noise leaves.
     """
 
     size: float
@@ -87,6 +94,7 @@ class Refit:
     errors: Floats
     gain: float
     explains: bool
+    is_all: bool
 
 
 def likelihood_with(found: WhitenedFit, model: LinearModel, more: Floats) -> Likelihood:
@@ -141,75 +149,120 @@ def _excess(whole: LinearModel) -> float:
 def refit_with(
     found: WhitenedFit, starts: Floats, direction: Direction, start: float, without: Likelihood
 ) -> Refit | None:
-    """Return the fit with an effect of the device; None where no run succeeds with it.
+    """Return the fit with an effect of the device, searched from the fit without it; None where no run succeeds.
 
-    It is searched from the best of the sizes of its direction and ``start``, for a line through a curve may point the
-    wrong way, and under white noise: flexible noise has taken up what the effect would explain. Where that explains
-    too little it is searched from the next best. ``starts`` are the slopes of starts that were read off a recording,
-    ``without`` is the likelihood without the effect.
+    It begins at the best of the sizes of its direction and ``start``, for a line through a curve may point the wrong
+    way, and under white noise: flexible noise has taken up what the effect would explain. ``starts`` are the slopes of
+    starts that were read off a recording, ``without`` is the likelihood without the effect.
     """
-    runs = _Runs.of(found, direction)
-    first = found.optimum.point
-    ends = _SMALLEST * direction.sizes[0], _LARGEST * direction.largest
-    sizes = np.array([min(max(start, ends[0]), ends[1]), *direction.sizes])
+    runs, first = _Runs.of(found, direction), found.optimum.point
+    low, high = _ends(direction)
+    sizes = np.array([min(max(start, low), high), *direction.sizes])
     values = runs.residuals(np.repeat(first[None, :], len(sizes), axis=0), sizes)
-    costs = _squares(values, np.hstack([found.model.slopes, starts]))
+    place = int(np.argmin(_squares(values, np.hstack([found.model.slopes, starts]))))
+    return _refit_from(found, starts, runs, first, float(sizes[place]), without)
+
+
+def refit_from_afar(found: WhitenedFit, starts: Floats, direction: Direction, without: Likelihood) -> Refit | None:
+    """Return the same, searched from where the fit itself began; None where no run succeeds.
+
+    Numbers that were fitted without a large effect may be at their bounds, from where the way is long and bent. So all
+    numbers are first fitted with each size held, and the best of these begin.
+    """
+    runs, held = _Runs.of(found, direction), []
+    for size in direction.sizes:
+        fitted = runs.with_size(size)
+        if np.isfinite(fitted.of_data(fitted.start[None, :])).all():
+            steps = np.diag(np.full(len(fitted.start), FIRST_STEP))
+            ended = descend(fitted, fitted.start, steps, _QUICK, _NEAR)
+            held.append((ended.cost, ended.point, size))
     best: Refit | None = None
-    for place in np.argsort(costs, kind="stable")[:_STARTS]:
-        tried = _refit_from(found, starts, runs, float(sizes[place]), ends, without)
+    for _, point, size in sorted(held, key=lambda one: one[0])[:_STARTS]:
+        tried = _refit_from(found, starts, runs, point, size, without)
         if tried is not None and (best is None or tried.gain > best.gain):
             best = tried
-        if best is not None and best.explains:
+        if best is not None and best.is_all:
             break
     return best
 
 
+def _ends(direction: Direction) -> tuple[float, float]:
+    """Return the sizes between which a search stays."""
+    return _SMALLEST * direction.sizes[0], _LARGEST * direction.largest
+
+
 def _refit_from(
-    found: WhitenedFit, starts: Floats, runs: "_Runs", size: float, ends: tuple[float, float], without: Likelihood
+    found: WhitenedFit, starts: Floats, runs: "_Runs", begin: Floats, size: float, without: Likelihood
 ) -> Refit | None:
-    """Return the fit with an effect, searched from one size of it, which stays between two ``ends``."""
+    """Return the fit with an effect, searched from a point and one size of it.
+
+    The coordinates are those of the fit and the logarithm of the size, which spans decades.
+    """
     first, kept = found.optimum.point, len(found.optimum.point)
     hum, precision, pull_at = found.model.slopes[:, kept:], found.model.precision, found.model.pull
+    free, width = np.hstack([hum, starts]), len(pull_at)
     low, high = coordinate_bounds(found.optimum.residuals.ranges)
-    point = first
-    white = [SensorNoise(from_reflections(np.zeros(0)), np.ones(len(one.places))) for one in found.sensors]
-    even = [[np.ones(place.stop - place.start) for place in one.places] for one in found.sensors]
+    low, high = (np.append(bound, math.log(end)) for bound, end in zip((low, high), _ends(runs.direction), strict=True))
+    expected = float(len(found.model.residuals))
+    at, slow = np.append(begin, math.log(size)), 0
     for turn in range(_TURNS):
-        near = _around(runs, point, size)
+        near = _around(runs, at[:kept], math.exp(at[kept]))
         if near is None:
             return None
         left, slopes, of_size = near
-        shift = point - first
+        shift = at[:kept] - first
         pull = pull_at.copy()
         pull[:kept] += precision[:kept, :kept] @ shift
-        model = replace(found.model, columns=np.hstack([slopes, hum, left[:, None]]), pull=pull)
-        more = np.column_stack([of_size, starts])
-        whole = replace(model, columns=np.hstack([model.slopes, more, left[:, None]]))
-        move, covariance = _least(whole, white, even)
-        step = float(np.clip(size + move[len(pull)], *ends)) - size
-        is_last = abs(step) < _SETTLED * math.sqrt(max(float(covariance[len(pull), len(pull)]), 0.0))
-        if turn < _TURNS - 1 and not is_last:
-            reached = np.clip(point + move[:kept], low, high)
-            moves = [(point + share * (reached - point), size + share * step) for share in _FRACTIONS]
-            values = runs.residuals(np.array([one for one, _ in moves]), np.array([one for _, one in moves]))
-            costs = _squares(np.column_stack([values, left]), np.hstack([hum, starts]))
-            best = int(np.argmin(costs))
-            if best < len(moves):
-                point, size = moves[best]
+        if turn < _TURNS - 1 and slow < _PATIENCE:
+            moving = np.column_stack([slopes, of_size])
+            moves = _damped_steps(moving, free, left, pull[:kept], precision[:kept, :kept])
+            tried = np.clip(at + moves, low, high)
+            values = runs.residuals(tried[:, :kept], np.exp(tried[:, kept]))
+            shifts = np.vstack([tried[:, :kept] - first, shift])
+            of_priors = shifts @ (2.0 * pull_at[:kept]) + np.einsum(
+                "ij,jk,ik->i", shifts, precision[:kept, :kept], shifts
+            )
+            costs = np.array(_squares(np.column_stack([values, left]), free)) + of_priors
+            best = int(np.argmin(costs[:-1]))
+            fall = float(costs[-1] - costs[best])
+            if fall > _SETTLED:
+                slow = slow + 1 if fall < _SLOW * max(float(costs[-1]) - expected, 0.0) else 0
+                at = tried[best]
                 continue
-        likely = likelihood_with(found, model, more)
+        model = replace(found.model, columns=np.hstack([slopes, hum, left[:, None]]), pull=pull)
+        likely = likelihood_with(found, model, np.column_stack([of_size, starts]))
+        excess = _squares(left[:, None], free)[0] - expected
         # The priors were given for the first point: what they have lost since then is part of the likelihood.
-        of_priors = float(shift @ (2.0 * pull_at[:kept] + precision[:kept, :kept] @ shift))
+        of_priors_here = float(shift @ (2.0 * pull_at[:kept] + precision[:kept, :kept] @ shift))
         deviations = np.sqrt(np.maximum(np.diag(likely.covariance), 0.0))
+        reached = np.clip(at + np.append(likely.move[:kept], likely.move[width]), low, high)
         return Refit(
-            size=float(np.clip(size + likely.move[len(pull)], *ends)),
-            error=float(deviations[len(pull)]),
-            point=np.clip(point + likely.move[:kept], low, high),
+            size=math.exp(reached[kept]),
+            error=math.exp(reached[kept]) * float(deviations[width]),
+            point=reached[:kept],
             errors=deviations[:kept],
-            gain=likely.value - of_priors - without.value - 2.0,
-            explains=likely.explains_beside(without),
+            gain=likely.value - of_priors_here - without.value - 2.0,
+            explains=replace(likely, excess=excess).explains_beside(without),
+            is_all=excess < _OF_CHANCE * math.sqrt(2.0 * likely.samples),
         )
     raise AssertionError("the last turn returns")
+
+
+def _damped_steps(moving: Floats, free: Floats, left: Floats, pull: Floats, precision: Floats) -> Floats:
+    """Return the steps (dampings, coordinates) of Levenberg and Marquardt along columns, what is free taken out.
+
+    The last of ``moving`` (samples, coordinates) is the size, of which there is no prior; ``pull`` and ``precision``
+    are those of the others.
+    """
+    whole = np.column_stack([moving, left])
+    if free.shape[1]:
+        whole = whole - free @ np.linalg.lstsq(free, whole, rcond=1.0e-12)[0]
+    columns, count = whole[:, :-1], len(pull)
+    information, product = columns.T @ columns, columns.T @ whole[:, -1]
+    information[:count, :count] += precision
+    product[:count] += pull
+    own = np.diag(np.diag(information))
+    return np.array([-solution(information + damping * own, product) for damping in _DAMPINGS])
 
 
 def _squares(values: Floats, free: Floats) -> list[float]:
@@ -221,7 +274,7 @@ def _squares(values: Floats, free: Floats) -> list[float]:
 
 
 def _around(runs: "_Runs", point: Floats, size: float) -> tuple[Floats, Floats, Floats] | None:
-    """Return residuals [-] at a point and a size, their slopes over coordinates and size; None for a failed run."""
+    """Return residuals [-] at a point and a size, their slopes over coordinates and log size; None for a failed run."""
     count = len(point)
     steps = np.vstack([np.eye(count) * _STEP, -np.eye(count) * _STEP, np.zeros((3, count))])
     sizes = np.full(2 * count + 3, size)
@@ -230,7 +283,7 @@ def _around(runs: "_Runs", point: Floats, size: float) -> tuple[Floats, Floats, 
     if not np.isfinite(values).all():
         return None
     slopes = (values[:, :count] - values[:, count : 2 * count]) / (2.0 * _STEP)
-    of_size = (values[:, 2 * count] - values[:, 2 * count + 1]) / (2.0 * _OF_SIZE * size)
+    of_size = (values[:, 2 * count] - values[:, 2 * count + 1]) / (2.0 * _OF_SIZE)
     return values[:, -1], slopes, of_size
 
 
@@ -255,6 +308,14 @@ class _Runs:
                 scenario, effects = fitted.scenario, [it for it in EFFECT_DIRECTIONS if can_have(fitted.scenario, it)]
             made.append(one if scenario is None or direction not in effects else with_unfelt(fitted, scenario, effects))
         return cls(found, direction, tuple(made))
+
+    def with_size(self, size: float) -> Residuals:
+        """Return the residuals of the fit on a device that has the effect with a size."""
+        made = [
+            replace(one, scenario=with_numbers(one.scenario, self.direction.settings(size, one.scenario)))
+            for one in self.made
+        ]
+        return Residuals(tuple(made), self.found.optimum.residuals.ranges).quick()
 
     def residuals(self, points: Floats, sizes: Floats) -> Floats:
         """Return residuals [-] (samples, points) at points (points, coordinates) with sizes; NaN for a failure."""
