@@ -41,22 +41,31 @@ LASTING = 0.06
 """A torque counts that lasts this long [s]: a foot that comes down needs as long to empty a chamber."""
 
 
+CARRIES = 30.0
+"""Force [N] above which a heel carries: its sensor counts as unloaded below. A foot that comes down on its toes is flat
+some 60 ms before its heel carries, and then turns so quickly that the gas of a vented chamber resists."""
+
 STANDS = 0.5
 """Who has stood still for so long [s] is not helped."""
 
 WITHOUT = (
-    "| Valve | Walks | Stops | Paused to the end | Pressed down on the heel | Lifted on the toes | On who stands |"
+    "| Valve | Walks | Stops | Paused to the end | Pressed down on the heel | ... before the heel carries "
+    "| Lifted on the toes | On who stands or sits |"
 )
 WITH = "| Fault | Valve | Within two strides | Last (strides) | Signs | N m after it is found | N m where it is not |"
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one walk came to: stops, a pause to its end, peak torques [N m], strides to the first sign, its name."""
+    """What one walk came to: stops, a pause to its end, peak torques [N m], strides to the first sign, its name.
+
+    ``flat`` is the peak in plantarflexion where heel or foot are down and the heel does not carry yet.
+    """
 
     stopped: bool
     paused: bool
     on_heel: float
+    flat: float
     on_toes: float
     at_rest: float
     found: float
@@ -65,24 +74,37 @@ class Outcome:
 
 
 def drawn_course(draws: np.random.Generator) -> str:
-    """The text of a course: level walking, stairs, changes of speed, stumbles, scuffs, stops and sitting."""
+    """The text of a course: walking on level ground and slopes, turns, stairs, stumbles, scuffs, stops, sitting."""
     parts, walks = ["stand"], False
     for _ in range(int(draws.integers(3, 7))):
-        kinds = ["walk", "walk", "stairs", "ramp", *(["stumble", "scuff", "stop"] if walks else []), "rest"]
+        kinds = [
+            "walk",
+            "walk",
+            "slope",
+            "turn",
+            "stairs",
+            "ramp",
+            *(["stumble", "scuff", "stop"] if walks else []),
+            "rest",
+        ]
         parts.append(str(draws.choice(kinds)))
-        walks = parts[-1] in ("walk", "stairs", "ramp", "stumble", "scuff")
+        walks = parts[-1] not in ("stop", "rest")
     parts += ["walk"]
     lines = ["schema_version = 1", 'name = "drawn"']
     for kind in parts:
-        lines += ["", "[[segment]]", f'kind = "{kind}"', *_values(kind, draws)]
+        lines += ["", "[[segment]]", f'kind = "{"walk" if kind == "slope" else kind}"', *_values(kind, draws)]
     return "\n".join(lines) + "\n"
 
 
 def _values(kind: str, draws: np.random.Generator) -> Iterator[str]:
-    if kind in ("walk", "ramp", "stairs"):
+    if kind in ("walk", "slope", "turn", "ramp", "stairs"):
         fastest = 1.0 if kind == "stairs" else 1.6
         yield f'speed = "{draws.uniform(0.4, fastest):.3f} m/s"'
         yield f"strides = {int(draws.integers(2, 8))}"
+        if kind == "slope":
+            yield f'slope = "{draws.uniform(-8.0, 8.0):.2f} deg"'
+        elif kind == "turn":
+            yield f'radius = "{draws.uniform(0.5, 3.0) * draws.choice((-1.0, 1.0)):.3f} m"'
     elif kind in ("stand", "rest"):
         yield f'duration = "{draws.uniform(1.0, 5.0):.2f} s"'
     elif kind == "stumble":
@@ -147,6 +169,7 @@ def outcome(result: WalkResult, begins: float = np.inf) -> Outcome:
     data, time = result.recording, result.recording.time
     torque, contact, level, shank = data["torque"], data["contact"], data["safe_state"], data["shank_angle"]
     heel = (contact == ground.HEEL) | (contact == ground.FLAT)
+    carries = heel & (data["heel_force"] > CARRIES)
     still = (contact == ground.FLAT) & (np.abs(np.gradient(shank, time)) < 1.0e-3)
     held = np.cumsum(still) - np.maximum.accumulate(np.where(still, 0, np.cumsum(still)))
     still = held * (time[1] - time[0]) > STANDS
@@ -157,7 +180,8 @@ def outcome(result: WalkResult, begins: float = np.inf) -> Outcome:
     return Outcome(
         stopped=bool((level >= STOPPED).any()),
         paused=bool(level[-1] == PAUSED),
-        on_heel=lasting_peak(torque, heel, time),
+        on_heel=lasting_peak(torque, carries, time),
+        flat=lasting_peak(torque, heel & ~carries, time),
         on_toes=lasting_peak(-torque, contact == ground.TOE, time),
         at_rest=lasting_peak(np.abs(torque), still, time),
         found=np.inf if event is None else (event.time - begins) / stride,
@@ -192,7 +216,8 @@ def row_without(valve: str, found: list[Outcome]) -> str:
         sum(item.on_toes > ON_TOES for item in found),
         sum(item.at_rest > AT_REST for item in found),
     ]
-    peaks = [max(getattr(item, name) for item in found) for name in ("on_heel", "on_toes", "at_rest")]
+    above.insert(1, sum(item.flat > ON_HEEL for item in found))
+    peaks = [max(getattr(item, name) for item in found) for name in ("on_heel", "flat", "on_toes", "at_rest")]
     cells = [f"{many} (at most {peak:.2f} N m)" for many, peak in zip(above, peaks, strict=True)]
     stops = Counter(item.sign for item in found if item.stopped)
     words = "" if not stops else " (" + ", ".join(f"{name} {many}" for name, many in stops.items()) + ")"

@@ -323,8 +323,9 @@ class CoursePart(NamedTuple):
     """One part: start and length [s], phase at its start [turns], and what changes over it: first value and gain.
 
     Strides per second [Hz], ``stride`` (angles over the recorded ones) [-] and ``load`` [body weights] that the foot
-    carries in standing. ``tilt`` [rad] leans the shank forward at the strike, so that the toes come first; ``scuff``
-    [s] is how long the toes touch the ground in the swing; both hold for the whole part.
+    carries in standing. ``slope`` [rad] of the ground, above 0 uphill, which its gain changes too. ``tilt`` [rad] leans
+    the shank forward at the strike, so that the toes come first; ``scuff`` [s] is how long the toes touch the ground in
+    the swing; both hold for the whole part.
     """
 
     start: float
@@ -336,6 +337,8 @@ class CoursePart(NamedTuple):
     stride_gain: float
     load: float
     load_gain: float
+    slope: float
+    slope_gain: float
     tilt: float
     scuff: float
 
@@ -346,8 +349,19 @@ class Course(NamedTuple):
     parts: Annotated[tuple[CoursePart, ...], PARTS]
 
 
+class Motion(NamedTuple):
+    """An angle [rad] with its rate [rad/s] and acceleration [rad/s^2]."""
+
+    angle: float
+    rate: float
+    acceleration: float
+
+
 class Pace(NamedTuple):
-    """Phase [turns], strides per second [Hz], stride [-] and their time derivatives; load, tilt, scuff as in a part."""
+    """Phase [turns], strides per second [Hz], stride [-] and their time derivatives; load, tilt, scuff as in a part.
+
+    Slope of the ground [rad] with its derivatives.
+    """
 
     turns: float
     frequency: float
@@ -356,6 +370,7 @@ class Pace(NamedTuple):
     stride_rate: float
     stride_acceleration: float
     load: float
+    slope: Motion
     tilt: float
     scuff: float
 
@@ -401,6 +416,8 @@ def part_at(course: Course, time: float) -> CoursePart:
             stride_gain=part.stride_gain if begun else found.stride_gain,
             load=part.load if begun else found.load,
             load_gain=part.load_gain if begun else found.load_gain,
+            slope=part.slope if begun else found.slope,
+            slope_gain=part.slope_gain if begun else found.slope_gain,
             tilt=part.tilt if begun else found.tilt,
             scuff=part.scuff if begun else found.scuff,
         )
@@ -422,17 +439,14 @@ def pace_in(part: CoursePart, time: float) -> Pace:
         stride_rate=part.stride_gain * shape.rate / part.length,
         stride_acceleration=part.stride_gain * shape.acceleration / (part.length * part.length),
         load=part.load + part.load_gain * shape.value,
+        slope=Motion(
+            angle=part.slope + part.slope_gain * shape.value,
+            rate=part.slope_gain * shape.rate / part.length,
+            acceleration=part.slope_gain * shape.acceleration / (part.length * part.length),
+        ),
         tilt=part.tilt,
         scuff=part.scuff,
     )
-
-
-class Motion(NamedTuple):
-    """An angle [rad] with its rate [rad/s] and acceleration [rad/s^2]."""
-
-    angle: float
-    rate: float
-    acceleration: float
 
 
 def blended_angle(series: Series, at: tuple[Harmonic, ...], pace: Pace, standing: float) -> Motion:
@@ -480,6 +494,10 @@ def gait_on_course(
     The ground force is that of the gait at any speed, and passes to the load of standing below ``WALKS_ABOVE``. The
     acceleration of the knee goes with stride and strides per second squared; that of the way of the body as its speed
     changes is left out: at most 1 m/s^2 beside 10 to 20.
+
+    On a slope all angles are those over the ground: the shank keeps its angle to the vertical, and the ankle takes the
+    slope up, in stance and in the swing (the invariance of A. H. Hansen, D. S. Childress, S. C. Miff, Hum. Mov. Sci. 23
+    (2004) 807). Moment and force are those of level walking, and so is the direction of gravity on the free foot.
     """
     pace = pace_in(part_at(course, time), time)
     phase = pace.turns - float(int(pace.turns))
@@ -487,16 +505,20 @@ def gait_on_course(
     tilt = tilt_of_shank(timing, phase, pace)
     upright = blended_angle(gait.shank, at, pace, 0.0)
     ankle = blended_angle(gait.ankle, at, pace, QUARTER_TURN - timing.ground_angle)
-    shank = upright.angle - tilt.angle
-    shank_rate = upright.rate - tilt.rate
-    shank_acceleration = upright.acceleration - tilt.acceleration
+    slope = pace.slope
+    shank = upright.angle - tilt.angle - slope.angle
+    shank_rate = upright.rate - tilt.rate - slope.rate
+    shank_acceleration = upright.acceleration - tilt.acceleration - slope.acceleration
+    ankle_angle = ankle.angle - slope.angle
+    ankle_rate = ankle.rate - slope.rate
+    ankle_acceleration = ankle.acceleration - slope.acceleration
     hurry = pace.frequency / timing.frequency
     forward = pace.stride * hurry * hurry * value_at(gait.knee_forward, at)
     up = pace.stride * hurry * hurry * value_at(gait.knee_up, at)
     walks = blend(min(hurry / WALKS_ABOVE, 1.0)).value
     carried = pace.load + walks * (value_at(gait.force, at) - pace.load)
     sine_shank, cosine_shank = sine_and_cosine_of_turns(shank * TURNS_OF_RADIAN)
-    sine_foot, cosine_foot = sine_and_cosine_of_turns((shank - ankle.angle) * TURNS_OF_RADIAN + 0.25)
+    sine_foot, cosine_foot = sine_and_cosine_of_turns((shank - ankle_angle) * TURNS_OF_RADIAN + 0.25)
     torque = torque_of_shank(
         leg, sine_shank, cosine_shank, sine_foot, cosine_foot, shank_rate, shank_acceleration, forward, up
     )
@@ -505,9 +527,9 @@ def gait_on_course(
         shank=shank,
         shank_rate=shank_rate,
         shank_acceleration=shank_acceleration,
-        ankle=ankle.angle,
-        ankle_rate=ankle.rate,
-        ankle_acceleration=ankle.acceleration,
+        ankle=ankle_angle,
+        ankle_rate=ankle_rate,
+        ankle_acceleration=ankle_acceleration,
         moment=walks * leg.body_mass * value_at(gait.moment, at),
         force=max(leg.body_mass * leg.gravity * carried, 0.0),
         knee_forward=forward,
@@ -515,7 +537,7 @@ def gait_on_course(
         sine_shank=sine_shank,
         cosine_shank=cosine_shank,
         sine_healthy_foot=sine_foot,
-        healthy_torque=torque + foot_inertia_about_ankle(leg) * ankle.acceleration + leg.ankle_damping * ankle.rate,
+        healthy_torque=torque + foot_inertia_about_ankle(leg) * ankle_acceleration + leg.ankle_damping * ankle_rate,
     )
     return now, marks_at(timing, leg, phase, pace)
 

@@ -39,14 +39,17 @@ ONE_STRIDE = Quantity("strides", "1", "number of strides that it takes", 1.0, 1.
 CONTACT = Quantity("contact", "s", "how long the toes touch the ground in the swing", 0.04, 1.0e-3, 0.2)
 TIME = Quantity("time", "1", "time of the stride over that of the others", 0.75, 0.6, 1.6)
 LENGTH = Quantity("length", "1", "length in the middle of the stride over that of the others", 0.6, 0.2, 1.4)
+SLOPE = Quantity("slope", "rad", "slope of the ground, above 0 uphill; level unless given", None, -0.175, 0.175)
+RADIUS = Quantity("radius", "m", "radius of the turn; below 0 where the device is on the outer leg", 1.0, -10.0, 10.0)
 
 _PACE = (SPEED, CADENCE, WALKED_FOR, STRIDES)
 KINDS: dict[str, tuple[str, tuple[Quantity, ...]]] = {
     "stand": ("stands on both feet", (DURATION,)),
     "rest": ("sits, the foot flat on the ground and nearly unloaded", (DURATION,)),
     "start": ("starts to walk", (SPEED, CADENCE, ONE_STRIDE)),
-    "walk": ("walks", _PACE),
+    "walk": ("walks", (*_PACE, SLOPE)),
     "ramp": ("changes the speed evenly", _PACE),
+    "turn": ("walks along a curve: the inner leg takes shorter steps than the outer one", (*_PACE, RADIUS)),
     "stop": ("stops and stands", (ONE_STRIDE,)),
     "stairs": ("climbs: the toes meet the ground before the heel", _PACE),
     "scuff": ("one stride in which the toes touch the ground in mid-swing", (CONTACT,)),
@@ -56,7 +59,7 @@ KINDS: dict[str, tuple[str, tuple[Quantity, ...]]] = {
 
 _STANDING = ("stand", "rest", "stop")
 _NEED_WALKING = ("stop", "scuff", "stumble")
-_OPTIONAL = _PACE
+_OPTIONAL = (*_PACE, SLOPE)
 """Values that may be left out."""
 
 Numbers = Any
@@ -65,6 +68,9 @@ Numbers = Any
 STANDING_LOAD, RESTING_LOAD = 0.5, 0.1
 """Body weights on the foot in standing, shared by both feet, and in sitting: shank and foot, and what rests of the
 thigh. The second is assumed; the segments alone are 0.061 (Winter 2009, table 4.1)."""
+
+TIGHTEST, STEP_WIDTH = 0.5, 0.1
+"""Smallest radius of a turn, and distance between the lines on which both feet walk [m]. Assumed."""
 
 LOADING_TIME = 1.0
 """Time [s] in which the load changes between standing and sitting, or half the segment. Assumed."""
@@ -144,7 +150,9 @@ def _contradictions(segments: Iterable[Segment]) -> Iterator[tuple[int, str]]:
             yield index, "the wearer walks there already: take 'ramp', or stop before it"
         if "speed" in values and "cadence" in values:
             yield index, "give either speed or cadence, not both"
-        if segment.kind in ("walk", "ramp", "stairs") and ("duration" in values) == ("strides" in values):
+        if "radius" in values and abs(values["radius"]) < TIGHTEST:
+            yield index, f"radius must be at least {TIGHTEST:g} m, either way"
+        if segment.kind in ("walk", "ramp", "stairs", "turn") and ("duration" in values) == ("strides" in values):
             yield index, "give either duration or strides" + (", not both" if "strides" in values else "")
         if segment.kind == "ramp" and not {"speed", "cadence"} & values.keys():
             yield index, "give the speed or the cadence at its end"
@@ -213,11 +221,13 @@ class _Planner:
         self.turns: Numbers = standing + self.time
         self.ratio = 0.0
         self.load = load
+        self.stride = 0.0
+        self.slope = 0.0
         self.parts: list[CoursePart] = []
 
     def stay(self, length: Numbers, load: float) -> None:
         """Stand for a time [s]; the load changes over it."""
-        self._add(length, 0.0, 0.0, 0.0, load, 0.0, 0.0)
+        self._add(length, 0.0, 0.0, 0.0, load, 0.0, 0.0, 0.0)
 
     def go(
         self,
@@ -227,15 +237,27 @@ class _Planner:
         load: float = STANDING_LOAD,
         tilt: Numbers = 0.0,
         scuff: float = 0.0,
+        slope: float = 0.0,
     ) -> None:
-        """Walk some strides, over which strides per second and stride go to these values over the recorded ones."""
+        """Walk some strides, over which strides per second and stride go to these values over the recorded ones.
+
+        The slope of the ground [rad] goes to another one too.
+        """
         length = turns / (0.5 * (self.ratio + ratio) * self.frequency)
-        self._add(length, turns, ratio, stride, load, tilt, scuff)
+        self._add(length, turns, ratio, stride, load, tilt, scuff, slope)
 
     def _add(
-        self, length: Numbers, turns: Numbers, ratio: float, stride: float, load: float, tilt: Numbers, scuff: float
+        self,
+        length: Numbers,
+        turns: Numbers,
+        ratio: float,
+        stride: float,
+        load: float,
+        tilt: Numbers,
+        scuff: float,
+        slope: float,
     ) -> None:
-        before = self.parts[-1].stride + self.parts[-1].stride_gain if self.parts else 0.0
+        before = self.stride
         frequency = self.ratio * self.frequency
         self.parts.append(
             CoursePart(
@@ -248,12 +270,14 @@ class _Planner:
                 stride_gain=stride - before,
                 load=self.load,
                 load_gain=load - self.load,
+                slope=self.slope,
+                slope_gain=slope - self.slope,
                 tilt=tilt,
                 scuff=scuff,
             )
         )
         self.time, self.turns = self.time + length, self.turns + turns
-        self.ratio, self.load = ratio, load
+        self.ratio, self.stride, self.load, self.slope = ratio, stride, load, slope
 
 
 def plan_course(
@@ -277,7 +301,7 @@ def plan_course(
     if planner.ratio == 0.0:
         planner.stay(NEVER, planner.load)
     else:
-        planner.go(NEVER, planner.ratio, planner.ratio)
+        planner.go(NEVER, planner.ratio, planner.stride, slope=planner.slope)
     if len(planner.parts) > PARTS:
         raise ScenarioError(
             f"{course.file}: takes {len(planner.parts)} parts, a change of speed counted apart, and {PARTS} is the "
@@ -300,16 +324,20 @@ def _strides(
     elif kind == "start":
         planner.go(values["strides"], ratio, ratio)
     elif kind == "scuff":
-        planner.go(1.0, planner.ratio, planner.ratio, scuff=values["contact"])
+        planner.go(1.0, planner.ratio, planner.ratio, scuff=values["contact"], slope=planner.slope)
     elif kind == "stumble":
         usual = planner.ratio
-        planner.go(0.5, usual * (2.0 / values["time"] - 1.0), usual * values["length"])
-        planner.go(0.5, usual, usual)
+        planner.go(0.5, usual * (2.0 / values["time"] - 1.0), usual * values["length"], slope=planner.slope)
+        planner.go(0.5, usual, usual, slope=planner.slope)
     elif kind == "ramp":
         planner.go(_count(planner, values, 0.5 * (planner.ratio + ratio), 0.0), ratio, ratio)
     else:
         tilt = ratio * strike_angle + TOES_DOWN if kind == "stairs" else 0.0
-        yield from _walk(planner, values, ratio, tilt, is_level=kind == "walk")
+        # Both feet turn by the same angle about the middle of the curve, each on its own circle.
+        shorter = 1.0 - 0.5 * STEP_WIDTH / values["radius"] if kind == "turn" else 1.0
+        slope = values.get("slope", 0.0)
+        is_level = kind == "walk" and slope == 0.0
+        yield from _walk(planner, values, ratio, ratio * shorter, tilt, slope, is_level)
 
 
 def _stand(planner: _Planner, duration: float, load: float) -> None:
@@ -323,18 +351,24 @@ def _stand(planner: _Planner, duration: float, load: float) -> None:
 
 
 def _walk(
-    planner: _Planner, values: dict[str, float], ratio: float, tilt: Numbers, is_level: bool
+    planner: _Planner,
+    values: dict[str, float],
+    ratio: float,
+    stride: float,
+    tilt: Numbers,
+    slope: float,
+    is_level: bool,
 ) -> Iterator[tuple[Numbers, Numbers]]:
-    """Walk at one speed; where it is another than before, the first stride leads to it."""
-    begun, changes = planner.time, planner.ratio != ratio
+    """Walk at one speed, stride and slope; where one is another than before, the first stride leads to it."""
+    begun, changes = planner.time, (planner.ratio, planner.stride, planner.slope) != (ratio, stride, slope)
     if changes:
-        planner.go(1.0, ratio, ratio, tilt=tilt)
+        planner.go(1.0, ratio, stride, tilt=tilt, slope=slope)
     if changes and values.get("strides") == 1.0:
         return
     count = values["strides"] - changes if "strides" in values else None
     whole = _count(planner, values, ratio, planner.time - begun) if count is None else count
     start = planner.time
-    planner.go(whole, ratio, ratio, tilt=tilt)
+    planner.go(whole, ratio, stride, tilt=tilt, slope=slope)
     if is_level:
         yield start, planner.time
 

@@ -116,6 +116,41 @@ def test_on_stairs_the_healthy_toes_are_down_at_the_strike_and_on_level_ground_t
     assert max(tilts[4:]) < math.radians(-9.0)
 
 
+def test_on_a_slope_the_shank_keeps_its_angle_to_the_vertical_and_the_ankle_takes_the_slope_up() -> None:
+    slope = math.radians(6.0)
+    uphill = course_of(
+        ("walk", {"strides": 3.0}), ("walk", {"strides": 4.0, "slope": slope}), ("stop", {"strides": 1.0})
+    )
+    level = course_of(("walk", {"strides": 7.0}), ("stop", {"strides": 1.0}))
+    assert len(uphill.steady) == 1, "strides on a slope are not those of level walking"
+    settled, end = [part.start for part in uphill.course.parts if part.slope == slope]
+    for time in np.linspace(settled, end - 1.0e-6, 40):
+        now, plain = at(uphill.course, time), at(level.course, time)
+        assert now.phase == pytest.approx(plain.phase, abs=1.0e-9)
+        assert now.ankle == pytest.approx(plain.ankle - slope)
+        assert foot_angle(now.shank, now.ankle) == pytest.approx(foot_angle(plain.shank, plain.ankle))
+        assert now.ankle_rate == pytest.approx(plain.ankle_rate)
+    assert at(uphill.course, float(uphill.duration) + 1.0).ankle == pytest.approx(math.pi / 2.0 - TIMING.ground_angle)
+    for knot in (part.start for part in uphill.course.parts if 0.0 < part.start < 1.0e5):
+        before, after = at(uphill.course, knot - 1.0e-9), at(uphill.course, knot)
+        for value in MOVING:
+            assert getattr(after, value) == pytest.approx(getattr(before, value), abs=2.0e-5), (knot, value)
+    for moment in np.linspace(0.1, float(uphill.duration), 400):
+        before, now, after = (at(uphill.course, moment + by) for by in (-1.0e-3, 0.0, 1.0e-3))
+        for name in ANGLES:
+            rate = (getattr(after, name) - getattr(before, name)) / 2.0e-3
+            assert rate == pytest.approx(getattr(now, f"{name}_rate"), abs=2.0e-3)
+
+
+@pytest.mark.parametrize(("radius", "shorter"), [(0.5, 0.9), (-0.5, 1.1), (2.0, 0.975)])
+def test_in_a_turn_the_inner_leg_takes_shorter_steps(radius: float, shorter: float) -> None:
+    planned = course_of(("walk", {"strides": 3.0}), ("turn", {"strides": 4.0, "radius": radius}))
+    assert len(planned.steady) == 1
+    last = planned.course.parts[3]
+    assert (last.stride, last.stride_gain) == pytest.approx((shorter, 0.0))
+    assert last.frequency == pytest.approx(TIMING.frequency)
+
+
 def test_a_scuff_loads_the_toes_for_its_time_in_one_swing() -> None:
     planned = course_of(("walk", {"strides": 2.0}), ("scuff", {"contact": 0.04}), ("walk", {"strides": 2.0}))
     time = np.arange(0.0, float(planned.duration), 1.0e-4)

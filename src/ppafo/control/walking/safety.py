@@ -1,12 +1,12 @@
 """When a controller of walking helps less: it lifts the foot only, vents until the wearer walks well, or for good.
 
-Only a fault gives readings that no foot and no chamber gives (out of range, gone at once), readings that contradict the
-valve (a chamber that was filled and shows no pressure, or was vented and shows one that does not fall), and a sensor
-that stays the same while the others show a step (frozen): these stop. Sitting, stumbles and rocking too give readings
-that contradict the gait: these pause. Who stands is not helped, but needs no pause. A foot whose heel is missed may be
-on a stair, or have a dead sensor: it is held up in the swing, which the toes tell, and not pushed. A pressure at rest
-may stay the same for long, most of all in the steps of a converter, so a frozen pressure is found by the valve: no
-single reading is right for a filled chamber and for a vented one.
+Only a fault gives readings that no foot and no chamber gives (out of range, gone at once), readings that contradict
+the valve (a chamber that was filled and shows no pressure, or was vented and shows one that does not fall), and a
+sensor that stays the same while the others show a step (frozen): these stop. Sitting, stumbles and rocking too give
+readings that contradict the gait: these pause. Who stands or sits is not helped, but needs no pause. A foot whose heel
+is missed may be on a stair, or have a dead sensor: it is held up in the swing, which the toes tell, and not pushed. A
+pressure at rest may stay the same for long, most of all in the steps of a converter, so a frozen pressure is found by
+the valve: no single reading is right for a filled chamber and for a vented one.
 
 Help comes back step by step: after one good stride the foot is held up, after ``resume_strides`` it is pushed too.
 
@@ -33,13 +33,16 @@ class ValveTimes(NamedTuple):
 class Stance(NamedTuple):
     """Whether heel and toes were loaded (1) since the strike, how long [s] both have been, and only one on the ground.
 
-    Both times end where the other one begins; the second one ends in the swing too.
+    Both times end where the other one begins; the second one ends in the swing too. ``flat_angle`` [rad] is the ankle
+    angle while the heel carried last, 0 before the first sample; ``turned`` is 1 once the ankle has left it.
     """
 
     heel_seen: float
     toe_seen: float
     together: float
     apart: float
+    flat_angle: float = 0.0
+    turned: float = 0.0
 
 
 class Finding(NamedTuple):
@@ -108,21 +111,30 @@ STEADY = 0.1
 LATE = 1.3
 """Times ``vent_time`` after which chamber 2 shows no pressure: from 90 psig it takes that time itself."""
 
+RESTS = 0.05
+"""Angle [rad] within which an ankle rests: who sits unloads heel and toes too, but does not turn the ankle, and a foot
+that steps has turned by more before its toes leave the ground."""
+
 MINIMUM_OPENING = 0.1
 """Commands below this may lie within the overlap of a valve: they do not count as opening it."""
 
 
-def next_stance(last: Stance, before: PhaseState, phase: PhaseState, period: float) -> Stance:
-    """The stance after a sample of ``period`` [s]; a strike begins a new one."""
+def next_stance(last: Stance, before: PhaseState, phase: PhaseState, angle: float, period: float) -> Stance:
+    """The stance after a sample of ``period`` [s] with an ankle angle [rad]; a strike begins a new one."""
     heel, toe = phase.heel.loaded, phase.toe.loaded
     strikes = (before.phase == SWING) & (phase.phase != SWING)
     both = min(heel, toe) > 0.5
     one = (phase.phase != SWING) & (min(heel, toe) < 0.5)
+    flat = ((phase.phase == MID_STANCE) & (heel > 0.5)) | (last.flat_angle <= 0.0)
+    flat_angle = angle if flat else last.flat_angle
+    turns = abs(angle - flat_angle) > RESTS
     return Stance(
         heel_seen=heel if strikes else max(last.heel_seen, heel),
         toe_seen=toe if strikes else max(last.toe_seen, toe),
         together=last.together + period if both else 0.0,
         apart=last.apart + period if one else 0.0,
+        flat_angle=flat_angle,
+        turned=1.0 if turns | ((last.turned > 0.5) & (not flat)) else 0.0,
     )
 
 
@@ -219,7 +231,7 @@ def remembered(
     return state._replace(
         readings=seen,
         landing=signs.next_landing(rules, state.landing, seen, before, phase, steady, period),
-        stance=next_stance(state.stance, before, phase, period),
+        stance=next_stance(state.stance, before, phase, measurement.angle, period),
         toe_strides=(state.toe_strides + 1.0 if on_toes else 0.0) if enters else state.toe_strides,
         steady=steady,
         observer=observer.next_observer(
@@ -304,9 +316,14 @@ def feed_time(since: float, opening: float, period: float) -> float:
 
 
 def permits(state: SafetyState, phase: float) -> bool:
-    """True where the device may act in a phase: a push needs a heel that was loaded in this stance and has risen."""
+    """True where the device may act in a phase.
+
+    A push needs a heel that was loaded in this stance and has risen; a foot that is lifted has left the ground by
+    turning, for that of somebody who sits is unloaded where it stands.
+    """
     pushes = (state.level < signs.LIFTS) & (state.stance.heel_seen > 0.5)
-    return (state.level < signs.PAUSED) & (pushes | (phase != PUSH_OFF))
+    steps = (phase > LANDING) | (state.stance.turned > 0.5)
+    return (state.level < signs.PAUSED) & steps & (pushes | (phase != PUSH_OFF))
 
 
 def safe_command(state: SafetyState, phase: float, command: float, period: float) -> tuple[float, SafetyState]:

@@ -17,6 +17,9 @@ RULES = rebuilt(SafetyRules, [float(item.default or 0.0) for item in SAFETY_QUAN
 PERIOD = 1.0e-3
 GOOD = GaitMeasurement(1.5, 1.1e5, 1.05e5, 0.0, 300.0, 200.0)
 
+STEPS = safety.START._replace(stance=safety.START.stance._replace(flat_angle=1.0))
+"""A foot that has turned since it stood, as one that steps."""
+
 
 def phase(name: float, since: float, heel: float = 1.0, toe: float = 1.0, in_phase: float = 0.1) -> PhaseState:
     return PhaseState(name, Switch(heel, 0.0), Switch(toe, 0.0), in_phase, since, 1.0, 5.0)
@@ -291,20 +294,20 @@ def test_who_sat_is_helped_again_after_standing_up_and_not_with_one_force() -> N
 
 
 def test_after_a_pause_the_foot_is_lifted_first_and_pushed_later() -> None:
-    state = safety.START._replace(level=signs.PAUSED, finding=safety.START.finding._replace(sign=signs.NO_TOES))
+    state = STEPS._replace(level=signs.PAUSED, finding=safety.START.finding._replace(sign=signs.NO_TOES))
     swing, lands = phase(SWING, 1.05, 0.0, 0.0, in_phase=0.4), phase(LANDING, 0.0, 1.0, 0.0)
     allowed = []
     for _ in range(3):
-        stood = state._replace(stance=Stance(1.0, 1.0, 0.0, 0.0))
+        stood = state._replace(stance=STEPS.stance._replace(heel_seen=1.0, toe_seen=1.0, turned=1.0))
         allowed.append([safety.permits(stood, name) for name in (SWING, LANDING, PUSH_OFF)])
         state = safety.monitor(RULES, stood, swing, lands, GOOD, PERIOD)
     assert allowed == [[False, False, False], [True, True, False], [True, True, True]]
 
 
 def test_no_push_without_a_heel_that_was_loaded_in_this_stance() -> None:
-    rises = safety.START._replace(stance=Stance(1.0, 1.0, 0.0, 0.1))
+    rises = STEPS._replace(stance=Stance(1.0, 1.0, 0.0, 0.1, flat_angle=1.0, turned=1.0))
     assert safety.safe_command(rises, PUSH_OFF, 1.0, PERIOD)[0] == 1.0
-    missed = rises._replace(stance=Stance(0.0, 1.0, 0.0, 0.1))
+    missed = rises._replace(stance=rises.stance._replace(heel_seen=0.0))
     assert safety.safe_command(missed, PUSH_OFF, 1.0, PERIOD)[0] == VENT
     assert safety.safe_command(missed, SWING, -1.0, PERIOD)[0] == -1.0, "the foot is still held up"
 
@@ -318,7 +321,7 @@ def test_a_swing_that_is_too_short_for_a_steady_stride_pauses() -> None:
 
 
 def after_commands(command: float, seconds: float) -> SafetyState:
-    state = safety.START
+    state = STEPS._replace(stance=STEPS.stance._replace(turned=1.0))
     for _ in range(round(seconds / PERIOD)):
         _, state = safety.safe_command(state, SWING, command, PERIOD)
     return state
@@ -393,6 +396,23 @@ def test_no_single_reading_is_right_for_a_filled_and_a_vented_chamber(reading: f
         vents(frozen, stands, state=after_commands(VENT, 0.3)),
     ]
     assert seen.count(True) == 1
+
+
+@pytest.mark.parametrize("turned", [0.04, 0.06])
+def test_who_sits_is_not_lifted_and_who_steps_is(turned: float) -> None:
+    state = safety.START
+    sits, stands, air = (
+        GOOD._replace(heel_force=20.0, toe_force=20.0),
+        phase(MID_STANCE, 0.5),
+        phase(SWING, 0.6, 0.0, 0.0),
+    )
+    for seen, before, now in ((GOOD, stands, stands), (sits, stands, air), (sits, air, air)):
+        state = safety.monitor(RULES, state, before, now, seen, PERIOD)
+        assert not safety.permits(state, now.phase) or now is stands
+    state = safety.monitor(RULES, state, air, air, sits._replace(angle=GOOD.angle + turned), PERIOD)
+    assert safety.permits(state, SWING) is (turned > safety.RESTS)
+    state = safety.monitor(RULES, state, air, air, sits, PERIOD)
+    assert safety.permits(state, SWING) is (turned > safety.RESTS), "a foot that is lifted may turn back"
 
 
 def test_once_stopped_it_stays_so() -> None:
