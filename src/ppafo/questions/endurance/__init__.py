@@ -43,12 +43,11 @@ QUESTION = Question(
         Argument(
             ("--walk",),
             "walk",
-            "time of walking between two rests; default '10 min'",
+            "time of walking between two rests, with --rest; default '10 min'",
             "TIME",
             quantity("s"),
-            default=600.0,
         ),
-        Argument(("--rest",), "rest", "time of each rest; default '0 s' (no rest)", "TIME", quantity("s"), default=0.0),
+        Argument(("--rest",), "rest", "time of each rest; default '0 s' (no rest)", "TIME", quantity("s")),
         Argument(
             ("--longest",),
             "longest",

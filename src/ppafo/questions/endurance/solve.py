@@ -142,6 +142,7 @@ def _defaults(bottle: Bottle) -> dict[str, float]:
 
 GasUse = str | Path | Recording | WalkResult
 """A file, a result folder, the folder of a walk, or what was read or returned of them."""
+_BETWEEN_RESTS = 600.0
 _STEP_TIME = 1.1
 _LONGEST = 24.0 * 3600.0
 _FEW = 15.0
@@ -155,8 +156,8 @@ def endurance(
     step_time: float | None = None,
     peak_flow: float | None = None,
     bottle: str | Path | None = None,
-    walk: float = 600.0,
-    rest: float = 0.0,
+    walk: float | None = None,
+    rest: float | None = None,
     longest: float = _LONGEST,
     reuse: Iterable[str] = (),
     overrides: Iterable[str] = (),
@@ -165,15 +166,17 @@ def endurance(
 
     A walk, its result or its folder, walks on the bottle until that ends it; ``bottle`` is its own, or the paper's,
     unless given. Any other gas use is that of ``recordings``, or else ``gas_per_step`` [kg] every ``step_time`` [s]
-    (default 1.1 s) with at most ``peak_flow`` [kg/s] (the mean flow). ``walk`` [s] and ``rest`` [s] take turns, for at
-    most ``longest`` [s]. ``reuse`` are texts such as ``reservoir_volume=50 cm^3``, ``overrides`` such as
-    ``room.temperature=5 degC``.
+    (default 1.1 s) with at most ``peak_flow`` [kg/s] (the mean flow). ``walk`` [s], 10 min unless given, and ``rest``
+    [s] take turns, for at most ``longest`` [s]. ``reuse`` are texts such as ``reservoir_volume=50 cm^3``, and
+    ``overrides`` such as ``room.temperature=5 degC``.
     ParameterError or DataError for bad input, SimulationError where the solver fails.
     """
     given = (recordings,) if isinstance(recordings, str | Path | Recording | WalkResult) else tuple(recordings)
     if bool(given) == (gas_per_step is not None):
         raise ParameterError("give either a recording or --gas-per-step, for example --gas-per-step '0.3 g'")
-    schedule, changes = Schedule(walk, rest, longest), tuple(reuse)
+    if walk is not None and rest is None:
+        raise ParameterError("--walk: is the time between two rests: give --rest too, or --longest for the whole time")
+    schedule, changes = Schedule(_BETWEEN_RESTS if walk is None else walk, rest or 0.0, longest), tuple(reuse)
     chosen = _Bottle(bottle, tuple(overrides))
     if gas_per_step is not None:
         full = chosen.load()

@@ -26,13 +26,13 @@ from ppafo.questions.parts.solve import doubts_data, doubts_sections, titles_sec
 from ppafo.questions.question import Solved
 from ppafo.questions.size.electrical import Electrical, electrical_of, electrical_sentences
 from ppafo.version import __version__
-from ppafo.walking.bottle import WALKED, Schedule, lasting_text
+from ppafo.walking.bottle import WALKED, Schedule, lasting_text, minutes_text
 from ppafo.walking.figures.over_time import bottle_figure, peak_torques
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import LONGEST_MINUTES, walk_of
 from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import bottle_life, walk
-from ppafo.walking.wearer import SCALED_MASS, SHANK_SHARE, Build, paper_subject, segment_values, who_walks
+from ppafo.walking.wearer import SCALED_MASS, SHANK_SHARE, WEARER, Build, paper_subject, segment_values, who_walks
 
 WALKS = {"solenoid": "solenoid-regulators", "proportional": "proportional-regulators"}
 """The walk, with its controller, of each kind of valve."""
@@ -149,6 +149,11 @@ def size_for_wearer(wish: Wish, report: Report) -> WearerSizing:
 
 def _check(wish: Wish) -> None:
     low, high = STATURES
+    mass = next(item for item in WEARER if item.name == "body_mass")
+    if not mass.minimum <= wish.mass <= mass.maximum:
+        raise StudyError(
+            f"--mass: {wish.mass:g} kg: must be at least {mass.minimum:g} kg and at most {mass.maximum:g} kg"
+        )
     if not wish.pressure > STANDARD_ATMOSPHERE:
         raise StudyError("--pressure: must be above the atmosphere, for example '50 psi_g'")
     if not 0.0 < wish.torque < 100.0:
@@ -314,7 +319,7 @@ _HEAD = (
     Column("gas", "mass flow", ".3g"),
     Column("mass of both", "part mass"),
 )
-_CAPTION = "The walk of the suggestion on its bottle, for as long as was wanted, or until the bottle ended it."
+_CAPTION = "The walk of the suggestion on its bottle for the requested {wished}; the bottle lasts {lasts}."
 _READING = (
     "Every pair of valve and actuator of the catalogue walks a few strides at the pressure. Those whose mean stride "
     "reaches the torque walk on bottles, lightest first, until one lasts; that walk is shown. Dead volumes, friction "
@@ -355,6 +360,12 @@ def answer_of(sizing: WearerSizing) -> Answer:
     )
 
 
+def _short(wish: Wish, device: Device) -> str:
+    """Return how far the torque on the bottle is below the requested one, where it is; a walk ends at ``_KEPT``."""
+    share = device.torque / wish.torque
+    return f" ({100.0 * share:.0f} % of the request: pressure falls with the bottle)" if share < 1.0 else ""
+
+
 def _sections(wish: Wish, device: Device) -> tuple[Section, ...]:
     walked, supply = device.walked, device.walked.supply
     assert supply is not None, "it walked on a bottle"
@@ -365,7 +376,7 @@ def _sections(wish: Wish, device: Device) -> tuple[Section, ...]:
         ("controller", f"{walked.scenario.control.kind}, walk '{WALKS[device.tried.valve.kind]}'"),
         ("lasts", f"{lasting_text(device.life.discharge.walking_time, others)}, of {wish.seconds / 60.0:.4g} min"),
         ("then", device.life.discharge.ending.message),
-        ("peak torque", f"{quantity_text(device.torque, 'torque')} in the mean stride, "
+        ("peak torque", f"{quantity_text(device.torque, 'torque')} in the mean stride{_short(wish, device)}, "
          f"{quantity_text(float(peaks[-1]), 'torque')} in the last"),
         ("gas", f"{quantity_text(walked.metrics['gas'].value, 'gas mass')} a stride"),
         ("mass", quantity_text(sum(device.masses.values()), "part mass", ".0f")),
@@ -377,7 +388,9 @@ def _sections(wish: Wish, device: Device) -> tuple[Section, ...]:
     ]
     if not low <= wish.mass <= high:
         remarks.append(f"the gait is known of {low:.0f} to {high:.0f} kg: beyond, torque and gas are a guess")
-    figure = Figure("bottle", _CAPTION, lambda: bottle_figure(walked))
+    lasts = device.life.discharge.walking_time
+    caption = _CAPTION.format(wished=f"{wish.seconds / 60.0:.4g} min", lasts=minutes_text(lasts))
+    figure = Figure("bottle", caption, lambda: bottle_figure(walked))
     masses = tuple((name, quantity_text(mass, "part mass", ".0f")) for name, mass in device.masses.items())
     return (
         Section("The walk on its bottle", table=Table((), facts), remarks=tuple(remarks)),

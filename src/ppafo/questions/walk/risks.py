@@ -191,7 +191,7 @@ def answer_of(solved: Risks) -> Answer:
             _number(item.time_to_safe_state, ".2f"),
             f"{item.impulse:.2f}",
             f"{item.peak:.1f}",
-            f"{100.0 * item.toes:.1f}",
+            f"{round(100.0 * item.toes, 1) + 0.0:.1f}",
             item.what_is_left,
         )
         for item in solved.risks
@@ -220,7 +220,7 @@ def answer_of(solved: Risks) -> Answer:
             "risks": [{field: getattr(item, field) for field in Risk.__dataclass_fields__} for item in solved.risks],
         },
         files={"risks.csv": lambda: risks_csv(solved)},
-        command="walk",
+        command="walk --risks",
     )
 
 

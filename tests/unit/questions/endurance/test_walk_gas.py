@@ -293,6 +293,11 @@ def test_every_door_says_how_long_a_device_lasts_in_the_same_words(
     assert f"{made.discharge.walking_time / 60.0:.3g} min" == said[1].partition(" (")[0]
 
 
+def test_a_time_between_rests_without_a_rest_is_refused() -> None:
+    with pytest.raises(ParameterError, match="--walk: is the time between two rests: give --rest too"):
+        endurance(gas_per_step=3.0e-4, walk=60.0)
+
+
 def test_rests_warm_the_bottle_that_is_walked_on() -> None:
     without, rested = (endurance(solenoid(), overrides=SMALL, walk=10.0, rest=rest) for rest in (0.0, 120.0))
     assert isinstance(without, Endurance)

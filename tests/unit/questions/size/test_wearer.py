@@ -98,7 +98,10 @@ def test_what_is_missing_is_said_with_what_to_write(
     assert said in error
 
 
-@pytest.mark.parametrize("change", [{"pressure": 9.0e4}, {"torque": 0.0}, {"minutes": 90.0}, {"stature": 0.9}])
+@pytest.mark.parametrize(
+    "change",
+    [{"mass": 5.0}, {"mass": 400.0}, {"pressure": 9.0e4}, {"torque": 0.0}, {"minutes": 90.0}, {"stature": 0.9}],
+)
 def test_what_no_walk_can_be_asked_is_refused(change: dict[str, float]) -> None:
     wanted = {"mass": 70.0, "stature": 1.7, "torque": 2.0, "pressure": 4.5e5, "minutes": 5.0}
     with pytest.raises(StudyError, match=f"--{next(iter(change))}"):

@@ -1,11 +1,14 @@
 """The table of what can go wrong in a walk: every fault, its worst instant, and what the table says of itself."""
 
 import csv
+from pathlib import Path
 
 import pytest
 
+from ppafo.cli.main import main
 from ppafo.model.plant_faults import PLANT_FAULTS
 from ppafo.questions.walk.risks import SAYS, Risks, answer_of, risks_csv, risks_of_walk
+from ppafo.storage.result_folder import write_marked_folder
 from ppafo.walking.declaration import FAULTY
 from ppafo.walking.loading import load_walk
 
@@ -47,3 +50,10 @@ def test_the_table_says_that_it_is_a_simulation_in_every_form(safe: Risks) -> No
     head, *rows = risks_csv(safe).decode().splitlines()
     assert head.startswith("# simulated")
     assert len(list(csv.DictReader(rows))) == len(safe.risks)
+
+
+def test_a_walk_does_not_replace_a_table_of_risks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_marked_folder(tmp_path / "risks", {"risks.csv": b"kept"}, "walk --risks")
+    assert main(["walk", "solenoid", "--minutes", "0.1", "--out", str(tmp_path / "risks")]) == 2
+    assert "--out" in capsys.readouterr().err
+    assert (tmp_path / "risks" / "risks.csv").read_bytes() == b"kept"
