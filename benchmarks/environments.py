@@ -1,4 +1,4 @@
-"""``python -m benchmarks.environments``: steps of the environments in a second of one core, and resets.
+"""``python -m benchmarks.environments``: steps of many environments and of one in a second of one core, and resets.
 
 A step has the gas, the valve, delay, noise and steps of the sensors, observation and reward. The actions are drawn
 once: an agent's own time is not in it.
@@ -38,10 +38,19 @@ def run(arguments: argparse.Namespace) -> int:
     """Time all tasks and print a table."""
     if min(arguments.count, arguments.repetitions) < 1:
         raise SimulationError("--count and --repetitions are to be 1 or more")
-    found = {name: measure(name, arguments.count, arguments.repetitions) for name in ppafo.worlds.gym.TASKS}
-    head = f"{arguments.count} environments on one core of {describe_machine().processor}"
-    lines = [f"{name:<20} {rate:12,.0f} steps/s, reset {reset:.2f} s" for name, (rate, reset) in found.items()]
-    document = {name: {"steps_per_second": rate, "reset": reset} for name, (rate, reset) in found.items()}
+    found = {
+        name: (*measure(name, arguments.count, arguments.repetitions), measure_one(name, arguments.repetitions))
+        for name in ppafo.worlds.gym.TASKS
+    }
+    head = f"{arguments.count} environments, and one, on one core of {describe_machine().processor}"
+    lines = [
+        f"{name:<20} {rate:12,.0f} steps/s, reset {reset:.2f} s; one: {alone:10,.0f} steps/s"
+        for name, (rate, reset, alone) in found.items()
+    ]
+    document = {
+        name: {"steps_per_second": rate, "reset": reset, "steps_per_second_of_one": alone}
+        for name, (rate, reset, alone) in found.items()
+    }
     print_result("\n".join([head, *lines]), document, arguments.json)
     return EXIT_GOOD
 
@@ -59,6 +68,20 @@ def measure(name: str, count: int, repetitions: int) -> tuple[float, float]:
             env.step(actions)
         times.append(time.process_time() - began)
     return count * STEPS / min(times), reset
+
+
+def measure_one(name: str, repetitions: int) -> float:
+    """Return steps in a second of the processor of one environment, as ``gymnasium.make`` gives it."""
+    env: Any = gymnasium.make(name)
+    env.action_space.seed(1)
+    action, times = env.action_space.sample(), []
+    for _ in range(repetitions):
+        env.reset(seed=1)
+        began = time.process_time()
+        for _ in range(STEPS):
+            env.step(action)
+        times.append(time.process_time() - began)
+    return STEPS / min(times)
 
 
 if __name__ == "__main__":
