@@ -223,7 +223,7 @@ def _effects(parameter_set: ParameterSet, read: Callable[[str], float]) -> dict[
     return {
         name: {
             item.name: _given_or_default(parameter_set, read, EFFECTS[name].section, item)
-            for item in EFFECTS[name].quantities
+            for item in EFFECTS[name].quantities_in(_species(parameter_set))
         }
         for name in sorted(given)
     }

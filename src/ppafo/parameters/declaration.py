@@ -127,23 +127,25 @@ def members(section: str, actuator_kind: str) -> tuple[Quantity, ...]:
     return actuator_quantities(actuator_kind) if section == "actuator" else SECTIONS[section]
 
 
-def quantities(valve_kinds: Mapping[str, str], actuator_kind: str = VANE.name) -> Mapping[str, Quantity]:
-    """Return every number's declaration by dotted path, for a set with such valves, by name, and such an actuator."""
-    return _by_path(tuple(valve_kinds.items()), actuator_kind, device_effects())
+def quantities(
+    valve_kinds: Mapping[str, str], actuator_kind: str = VANE.name, species: str = ""
+) -> Mapping[str, Quantity]:
+    """Return every number's declaration by path, for a set with such valves, by name, such an actuator and a gas."""
+    return _by_path(tuple(valve_kinds.items()), actuator_kind, species, device_effects())
 
 
 @functools.lru_cache(maxsize=32)
 def _by_path(
-    valve_kinds: tuple[tuple[str, str], ...], actuator_kind: str, _effects: tuple[Effect, ...]
+    valve_kinds: tuple[tuple[str, str], ...], actuator_kind: str, species: str, _effects: tuple[Effect, ...]
 ) -> Mapping[str, Quantity]:
-    return MappingProxyType({quantity.name: quantity for quantity in _declare(valve_kinds, actuator_kind)})
+    return MappingProxyType({quantity.name: quantity for quantity in _declare(valve_kinds, actuator_kind, species)})
 
 
-def _declare(valve_kinds: Iterable[tuple[str, str]], actuator_kind: str) -> Iterator[Quantity]:
+def _declare(valve_kinds: Iterable[tuple[str, str]], actuator_kind: str, species: str) -> Iterator[Quantity]:
     for section in SECTIONS:
         yield from (_at(section, member) for member in members(section, actuator_kind))
     for effect in device_effects():
-        yield from (_at(effect.section, member) for member in effect.quantities)
+        yield from (_at(effect.section, member) for member in effect.quantities_in(species))
     for name, kind in valve_kinds:
         yield from (_at(f"valves.{name}", member) for member in ORIFICE + VALVES[kind].quantities)
         yield from (_at(f"reported.valves.{name}", member) for member in REPORTED_OF_A_VALVE)

@@ -125,7 +125,8 @@ class ParameterSet:
 
     def declarations(self) -> Mapping[str, Quantity]:
         """Return the declaration of every number that this set may hold, by path."""
-        return quantities(self.valve_kinds, self.actuator_kind)
+        species = self.texts.get(SPECIES_PATH)
+        return quantities(self.valve_kinds, self.actuator_kind, "" if species is None else species.value)
 
 
 def chosen_valve(parameter_set: ParameterSet, valve: str | None) -> str:
@@ -275,11 +276,14 @@ def apply_overrides(parameter_set: ParameterSet, overrides: Iterable[str], valve
     """Return the set with values replaced; each override is a text such as ``valve.area=12.6mm^2``.
 
     ``valve.X`` means the valve that is chosen (``valve``, else the set's default), ``valves.NAME.X`` one by name.
-    Naming another gas brings that gas's molar mass and heat capacity ratio; giving an orifice in the form of ISO 6358
-    drops its area and discharge coefficient, and the reverse. What follows a number (``links_of_set``) is set with it,
-    unless it is given too. ParameterError for an override that does not fit the set.
+    Naming another gas brings that gas's molar mass and heat capacity ratio, and a number of it that is given beside
+    counts in any order; giving an orifice in the form of ISO 6358 drops its area and discharge coefficient, and the
+    reverse. What follows a number (``links_of_set``) is set with it, unless it is given too. ParameterError for an
+    override that does not fit the set.
     """
-    chosen, orders = chosen_valve(parameter_set, valve), list(overrides)
+    chosen = chosen_valve(parameter_set, valve)
+    # A gas brings numbers, so it comes before those that are given.
+    orders = sorted(overrides, key=lambda override: override.partition("=")[0].strip() != SPECIES_PATH)
     atmosphere = atmospheric_pressure(parameter_set) if orders else None
     given = [override.partition("=")[0].strip() for override in orders]
     for number, override in enumerate(orders):

@@ -74,7 +74,8 @@ def device_numbers(device: Device) -> dict[str, Quantity]:
         for item in members(section, device.actuator.kind)
     }
     found |= {f"actuator.leak.{item.name}": item for item in ORIFICE}
-    found |= {f"{effect.section}.{item.name}": item for effect in device_effects() for item in effect.quantities}
+    effects, gas = device_effects(), device.gas.species
+    found |= {f"{effect.section}.{item.name}": item for effect in effects for item in effect.quantities_in(gas)}
     return found | {f"valve.{item.name}": item for item in (*ORIFICE, *VALVES[device.valve.kind].quantities)}
 
 

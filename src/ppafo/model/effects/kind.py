@@ -6,11 +6,12 @@ know an effect by this value alone; none of them names one.
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from ppafo.errors import ProgramError
 from ppafo.model.declaration import Quantity
+from ppafo.model.gas import SPECIES
 
 SECTION = "effects"
 """Section of a parameter set, and begin of the paths, that hold the settings of effects."""
@@ -72,6 +73,8 @@ class Effect:
 
     ``state`` says how the effect's own numbers change, which laws ask for as ``NAME_state``; None where it has none.
 
+    ``of_gas`` has for settings whose default is a property of the gas these defaults [SI] by species, for all species.
+
     ``source`` says where law and numbers are from, ``equation`` is its line of the equations; ``symbols`` are lines of
     the nomenclature: symbol, name in the code, unit, meaning.
     """
@@ -89,6 +92,7 @@ class Effect:
     state: State | None = None
     section_of_files: str = ""
     always: bool = False
+    of_gas: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def section(self) -> str:
@@ -110,9 +114,15 @@ class Effect:
         """Names of the rows that its laws may ask for."""
         return (self.name,) if self.state is None else (self.name, self.state_name)
 
-    def defaults(self) -> dict[str, float]:
-        """Settings [SI] of a device that says nothing of the effect."""
-        return {item.name: float(item.default or 0.0) for item in self.quantities}
+    def quantities_in(self, species: str) -> tuple[Quantity, ...]:
+        """Settings with the defaults that they have in a gas; those of the declaration in one that is unknown."""
+        return tuple(
+            replace(item, default=self.of_gas.get(item.name, {}).get(species, item.default)) for item in self.quantities
+        )
+
+    def defaults(self, species: str = "") -> dict[str, float]:
+        """Settings [SI] of a device with a gas that says nothing of the effect."""
+        return {item.name: float(item.default or 0.0) for item in self.quantities_in(species)}
 
     def is_on(self, settings: Mapping[str, Any]) -> Any:
         """Whether the effect is on with some settings; for arrays (runs,) among them an array of truth values."""
@@ -148,6 +158,11 @@ def _problems(effect: Effect) -> Iterator[str]:
         yield "is always on: it has no switch, and names the section of a parameter set that its settings have"
     if not effect.always:
         yield from _problems_of_switch(effect)
+    for name, defaults in effect.of_gas.items():
+        lacking = [species for species in SPECIES if species not in defaults]
+        if lacking or all(item.name != name for item in effect.quantities):
+            missing = f"has no default for {', '.join(lacking)}" if lacking else "is no quantity"
+            yield f"of_gas names '{name}', which {missing}"
     for place, law in effect.laws.items():
         given, taken = _parameters(place), [name for name in _parameters(law) if name not in effect.rows]
         if taken != given:

@@ -70,7 +70,7 @@ EFFECT = Effect(
         Quantity(
             "coefficient",
             "m^3/mol",
-            "second virial coefficient, by default of CO2 at 298 K",
+            "second virial coefficient, by default that of gas.species at 298 K",
             SECOND_VIRIAL["CO2"],
             -1.0e-3,
             1.0e-3,
@@ -79,6 +79,7 @@ EFFECT = Effect(
     parameters=SecondVirial,
     prepare=prepare,
     switch=("share",),
+    of_gas={"coefficient": SECOND_VIRIAL},
     laws={gas_density: compressed, ideal_density: expanded},
     source="J. H. Dymond and E. B. Smith, The Virial Coefficients of Pure Gases and Mixtures, 1980",
     equation="P = rho (R/M) T (1 + b rho), b = share B / M",

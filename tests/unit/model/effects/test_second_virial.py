@@ -1,10 +1,14 @@
 """Gas that is not ideal: density, pressure and energy agree, and so do the laws that the lanes call."""
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ppafo.model.effects.kind import effect_problem
 from ppafo.model.effects.second_virial import (
+    EFFECT,
     SECOND_VIRIAL,
     SecondVirial,
     compressed,
@@ -60,3 +64,13 @@ def test_energy_and_state_of_the_real_gas_agree(pressure: float, temperature: fl
 def test_every_gas_has_a_second_virial_coefficient_of_a_likely_size() -> None:
     assert set(SECOND_VIRIAL) == set(SPECIES)
     assert SECOND_VIRIAL["CO2"] < SECOND_VIRIAL["air"] < SECOND_VIRIAL["N2"] < 0.0 < SECOND_VIRIAL["He"]
+
+
+def test_default_of_a_gas_must_be_there_for_every_gas() -> None:
+    assert effect_problem(EFFECT) == ""
+    of_two = {"coefficient": {"CO2": -123.0e-6, "air": -7.4e-6}}
+    assert (
+        effect_problem(replace(EFFECT, of_gas=of_two)) == "of_gas names 'coefficient', which has no default for N2, He"
+    )
+    of_none = {"viscosity": SECOND_VIRIAL}
+    assert effect_problem(replace(EFFECT, of_gas=of_none)) == "of_gas names 'viscosity', which is no quantity"

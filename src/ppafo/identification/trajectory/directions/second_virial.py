@@ -5,6 +5,8 @@ from ppafo.model.catalog import ACTUATORS
 from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.simulation.scenario import Scenario
 
+_SHARE, _COEFFICIENT = (f"effects.second_virial.{name}" for name in ("share", "coefficient"))
+
 
 def _suits(scenario: Scenario) -> bool:
     """Return whether there are steps for gas that is not ideal: none with an energy balance, supply lines or shapes."""
@@ -19,7 +21,7 @@ DIRECTION = Direction(
     unless="the gas is ideal, or has a second virial coefficient of no more than {size}",
     size_in_words=lambda size: f"{1e6 * SECOND_VIRIAL['CO2'] * size:.2g} cm^3/mol",
     sizes=(0.02, 0.1, 0.5, 2.5),
-    settings=lambda size, _: {"effects.second_virial.share": size},
-    neutral={"effects.second_virial.share": TRACE},
+    settings=lambda size, _: {_SHARE: size, _COEFFICIENT: SECOND_VIRIAL["CO2"]},
+    neutral={_SHARE: TRACE, _COEFFICIENT: SECOND_VIRIAL["CO2"]},
     suits=_suits,
 )
