@@ -18,7 +18,8 @@ class ControllerKind:
 
     ``restart(state, requested, continues)`` is the state of a torque law while a task of a gait goes on (1) and where
     another one begins (0), at a requested torque [N m]; without it the law begins anew there. A law that
-    ``only_switches`` asks for full openings or none, so that it fits a pair of solenoid valves in walking.
+    ``only_switches`` asks for full openings or none, so that it fits a pair of solenoid valves in walking. One without
+    ``needs_reference`` never looks at the reference, so that a scenario may be without one.
     """
 
     name: str
@@ -30,6 +31,7 @@ class ControllerKind:
     update: Callable[..., Any]
     restart: Callable[..., Any] | None = None
     only_switches: bool = False
+    needs_reference: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.fixed.torque_laws import FIXED, FLOAT
 from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
 from ppafo.documents.models import first_problem, is_gap
@@ -261,7 +262,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         initial_pressure_1=_initial_pressure(reading, 0, device.supply),
         initial_pressure_2=_initial_pressure(reading, 1, device.supply),
         control=_control(reading, clock.period),
-        reference=read_profile(reading, "reference", TORQUE_LEVEL) if "reference" in document else _NOTHING_TO_FOLLOW,
+        reference=_reference(reading),
         sensors=_sensors(reading, clock),
         assumptions=(*read_assumptions(before, reading, hardware, request.overrides), *assumed_lines(reading)),
         origin=Origin(request.path, document["device"]["set"], hardware.valve, request.overrides, request.content),
@@ -345,6 +346,19 @@ def _links_at_start(reading: Reading) -> Graph:
         is_word = word.strip() in PRESSURE_WORDS
         found[path] = (_link_of_word(word),) if is_word else gauge_link(path, *split_quantity(word))
     return {path: links for path, links in found.items() if links}
+
+
+def _reference(reading: Reading) -> ProfileChoice:
+    """Return the torque that the controller follows; ScenarioError where it needs one and none is given."""
+    if "reference" in reading.document:
+        return read_profile(reading, "reference", TORQUE_LEVEL)
+    kind = kind_at(reading.document, "controller")
+    if CONTROLLERS[kind].needs_reference:
+        raise ScenarioError(
+            f"{reading.file}: 'reference' is missing: controller.kind = '{kind}' follows a torque; give "
+            "[reference] with its kind and settings"
+        )
+    return _NOTHING_TO_FOLLOW
 
 
 def _control(reading: Reading, period: float) -> Control:

@@ -222,7 +222,9 @@ def _scenario_file(*_kinds: Any) -> type[BaseModel]:
             controller_table(CONTROLLERS.loaded(), "Controller", lambda name: CONVERTER if name in FIXED_LAWS else ()),
             Field(description="what commands the valve"),
         ),
-        "reference": optional(reference, "torque that the controller follows; 0 N m unless given"),
+        "reference": optional(
+            reference, "torque that the controller follows; only one that follows none, as constant, may leave it out"
+        ),
         "sensors": optional(table("Sensors", _sensors()), "sensors of the controller; ideal unless given"),
     }
     return file_model("ScenarioFile", own)

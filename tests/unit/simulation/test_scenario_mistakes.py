@@ -340,3 +340,14 @@ def test_a_parameter_set_that_is_given_as_a_scenario_is_called_what_it_is() -> N
         match=r"^bench\.toml: is a parameter set, not a scenario; .*device\.set=bench\.toml --set device\.valve=main$",
     ):
         parse_scenario(b'name = "bench"\ndefault_valve = "main"\n', "bench.toml")
+
+
+def test_only_a_controller_that_follows_nothing_may_be_without_a_reference() -> None:
+    without = TEXT.replace("[reference]", "").replace('kind = "ramp_hold"', "").replace('level = "6 N m"', "")
+    assert problem_with(without.encode()).startswith("task.toml: 'reference' is missing: controller.kind = 'pid'")
+    constant = (
+        without.replace('"pid"', '"constant"').replace("proportional_gain", "command").replace("0.095 1/(N m)", "1")
+    )
+    assert parse_scenario(constant.encode(), "task.toml").reference.settings == {"level": 0.0}
+    words = ["reference.kind=constant", "reference.level=5 N m"]
+    assert parse_scenario(without.encode(), "task.toml", words).reference.settings == {"level": 5.0}

@@ -32,6 +32,7 @@ CONSTANT = ControllerKind(
     parameters=ConstantParameters,
     initial=ConstantState(),
     update=constant_update,
+    needs_reference=False,
 )
 
 
