@@ -37,6 +37,11 @@ def test_without_a_command_it_says_where_to_start(capsys: pytest.CaptureFixture[
             ["simulate", "step-response", "--set", "controller.rate=1 kHz", "--set", "controller.period=1 ms"],
             "--set controller.period: the same as controller.rate, which is set to '1 kHz'; leave one out",
         ),
+        (
+            ["walk", "solenoid", "--set", "run.duration=0.1 min", "--minutes", "0.2"],
+            "--set run.duration: the same as --minutes; leave one out",
+        ),
+        (["simulate", "step-response", "--set", "=3"], "override '=3' is not of the form PATH=VALUE"),
         (["simulat"], "there is no command 'simulat', did you mean 'simulate'?"),
         (["--bogus"], "there is no option '--bogus'; available: --help, --version, -h"),
         (["--bogus", "simulate", "step-response"], "there is no option '--bogus'"),
