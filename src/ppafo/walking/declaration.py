@@ -75,10 +75,6 @@ WALK_SENSORS = (
 )
 FORCES = tuple(item.name for item in WALK_SENSORS if item not in SENSORS)
 """Settings of sensors that no vane has."""
-ANGLE_BANDWIDTH = Quantity("angle_bandwidth", "Hz", "bandwidth of the angle sensor", None, 0.1, 1.0e6)
-PRESSURE_BANDWIDTH = Quantity("pressure_bandwidth", "Hz", "bandwidth of the pressure sensors", None, 0.1, 1.0e6)
-BANDWIDTHS = (ANGLE_BANDWIDTH, PRESSURE_BANDWIDTH)
-"""Sensors that follow at once unless one is given."""
 
 FAULTY = ("heel", "toe", "angle", "pressure_1", "pressure_2")
 FAULT_TIME = Quantity("time", "s", "when the sensor fails", None, 0.0, 1.0e6)
@@ -151,7 +147,7 @@ def quantities(controller: str, timing: str = THRESHOLDS) -> dict[str, Quantity]
         "wearer": (*WEARER, PERSON),
         "controller": (RATE, PERIOD, *controller_settings(controller), *converter_settings(controller)),
         "timing": timing_settings(timing),
-        "sensors": (*WALK_SENSORS, *BANDWIDTHS, SEED),
+        "sensors": (*WALK_SENSORS, SEED),
         "run": (DURATION, STEP),
         "gas_model": THERMAL_GAS,
         BOTTLE: BOTTLE_NUMBERS,
@@ -260,7 +256,6 @@ def walk_file() -> type[BaseModel]:
 def _walk_file(_kinds: Any) -> type[BaseModel]:
     seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
     sensors = quantity_fields(WALK_SENSORS)
-    sensors |= {item.name: optional(number_type(item), item.summary) for item in BANDWIDTHS}
     sensors["seed"] = (seed, Field(1, description=SEED.summary))
     faults = {name: optional(_fault(name), f"fault of the {name} sensor") for name in FAULTY}
     faults |= {part: optional(_broken(part), f"fault of the plant: {part}") for part in PLANT_FAULTS}

@@ -41,7 +41,6 @@ from ppafo.walking.contradictions import check_walk, rules
 from ppafo.walking.course import load_course
 from ppafo.walking.declaration import (
     ARITHMETIC,
-    BANDWIDTHS,
     DURATION,
     FAULTY,
     FORCES,
@@ -365,10 +364,6 @@ def _sensors(reading: Reading, settings: SensorSettings) -> Sensors:
 
 def _sensor_settings(reading: Reading) -> SensorSettings:
     numbers = reading.section("sensors", WALK_SENSORS)
-    for bandwidth in BANDWIDTHS:
-        path = f"sensors.{bandwidth.name}"
-        if value_at(reading.document, path) is not None:
-            numbers[bandwidth.name] = reading.number(path, bandwidth)
     return SensorSettings(numbers, {sensor: _fault(reading, sensor) for sensor in FAULTY})
 
 

@@ -112,7 +112,6 @@ def as_overrides(settings: tuple[Setting, ...], values: Values) -> list[str]:
     return [
         f"{path}={int(value) if path == 'sensors.seed' else repr(value)} {unit}".strip()
         for path, (unit, value) in given.items()
-        if not (path.endswith(("angle_bandwidth", "pressure_bandwidth")) and value == 0.0)
     ]
 
 

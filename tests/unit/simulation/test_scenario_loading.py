@@ -23,6 +23,7 @@ SMALL: dict[str, Any] = {
     "run": {"duration": "1 s"},
     "motion": {"kind": "held", "angle": "75 deg"},
     "controller": {"kind": "pid", "rate": "1 kHz"},
+    "reference": {"kind": "constant", "level": "0 N m"},
 }
 SMALL_TEXT = """
 schema_version = 1
@@ -31,6 +32,7 @@ device.set = "ppafo2011"
 run.duration = "1 s"
 motion = { kind = "held", angle = "75 deg" }
 controller = { kind = "pid", rate = "1 kHz" }
+reference = { kind = "constant", level = "0 N m" }
 """
 
 

@@ -40,7 +40,7 @@ MISTAKES = {
     "supply.atmospheric_pressure=80 kPa_a; controller.lowest_pressure=90 kPa_a": "must be below the atmosphere, which",
     "controller.filled_pressure=60 psi_g": "must be between atmosphere and supply, which are 0 psi_g and 50 psi_g",
     "controller.highest_pressure=60 psi_g": "must be above 88.8",
-    "sensors.angle_bandwidth=0 Hz": "must be at least 0.1 Hz and at most 1e",
+    "sensors.angle_bandwidth=-1 Hz": "must be at least 0 Hz and at most 1e",
     "sensors.pressure_lost_share=2": "must be at least 0 and at most 1",
 }
 ON_A_PROPORTIONAL_VALVE = {
@@ -90,6 +90,12 @@ def test_bandwidths_are_what_is_left_after_a_sample() -> None:
     assert gait_sensors_of(slow).pressure_memory == 0.0
     assert not has_ideal_sensors(slow)
     assert has_ideal_sensors(load_walk("solenoid", ["sensors.force_bandwidth=10 Hz"]))
+
+
+def test_bandwidth_of_0_is_a_sensor_that_follows_at_once_as_in_a_scenario() -> None:
+    given = load_walk("solenoid", ["sensors.angle_bandwidth=0 Hz", "sensors.pressure_bandwidth=0 Hz"])
+    assert (given.sensors, given.control) == (load_walk("solenoid").sensors, load_walk("solenoid").control)
+    assert has_ideal_sensors(given)
 
 
 @pytest.mark.parametrize("overrides", PROFILE)

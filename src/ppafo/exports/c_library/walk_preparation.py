@@ -24,7 +24,7 @@ from ppafo.simulation.numbers import device_numbers, number_at
 from ppafo.simulation.plan import profile_parameters
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.course import flat_foot
-from ppafo.walking.declaration import PERSON, STEP, WALK_SENSORS, fault_numbers
+from ppafo.walking.declaration import PERSON, STEP, fault_numbers
 from ppafo.walking.gait_series import fit_rocker, gait_series, gait_timing
 from ppafo.walking.motion import record_interval, walk_of
 from ppafo.walking.planning import NO_REFERENCE, course_of_walk, failing_of, law_of, sensor_settings
@@ -105,15 +105,7 @@ def _numbers(configuration: Scenario) -> dict[str, tuple[Quantity, float]]:
         "run.output_interval": record_interval(duration),
     }
     times, control = of_run | {"controller.period": configuration.control.period}, _control(configuration)
-    declared = (
-        declared_settings(configuration)
-        | control
-        | {
-            **{f"run.{item.name}": item for item in (*RUN, STEP)},
-            # A library takes the 0 of a sensor that is instant; the effect of one that is not has a bandwidth above it.
-            **{f"sensors.{item.name}": item for item in WALK_SENSORS},
-        }
-    )
+    declared = declared_settings(configuration) | control | {f"run.{item.name}": item for item in (*RUN, STEP)}
     # What fails of the plant, with its shut-off valve, is written out in the source; persons are drawn in Python.
     fixed = ("shut_off.", *(f"faults.{part}." for part in walk_of(configuration).broken), f"wearer.{PERSON.name}")
     # The structures of libraries have the times behind the device.
