@@ -21,6 +21,7 @@ FREE = (
     ("motion.kind=free", "run.duration=0.3 s", "reference.ramp_time=0.1 s", "motion.external_torque=3 N m"),
 )
 MOVED = ("torque-task-moving-ankle", ("run.duration=0.3 s",))
+PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "export-to-c.md").read_text(encoding="utf-8")
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-fsanitize=address,undefined", "-static-libasan")
 
 
@@ -130,6 +131,8 @@ def test_the_c_of_a_run_is_short_and_has_neither_lanes_nor_groups_that_are_packe
     contents = files_of(load_scenario("torque-task-proportional"))
     (text,) = (content.decode() for file, content in contents.items() if file.endswith(".c") and file != "main.c")
     assert text.count("\n") < {"loop": 2300, "plant": 1750}[shape]
+    said = {"loop": "The torque task has {:,} lines", "plant": "the plant alone {:,};"}[shape]
+    assert said.format(text.count("\n")) in PAGE
     assert not re.search(r"\blane\b|\[0\]\[|PPAFO_|make_PlantParameters|AT_[A-Z]+_", text)
     assert text.count("for (int64_t step_index") == 1
     functions = set(re.findall(r"^static [\w ]+?\b\*?(\w+)\(", text, re.MULTILINE))
