@@ -57,6 +57,7 @@ PLANTED = (
     Planted("damping a tenth", "friction.viscous_damping", {"friction.viscous_damping": 0.1}),
     Planted("torque constant 10 % low", "actuator.torque_constant", {"actuator.torque_constant": 0.9}),
     Planted("atmosphere of 83 kPa", ROOM, {ROOM: 83e3}),
+    Planted("atmosphere of 83 kPa under sensors of gauge pressure", ROOM, {ROOM: 83e3}, mistake="gauge"),
     Planted("kPa read as psi", "all pressures seem to be kPa read as psi", mistake="psi"),
     Planted("pressures swapped", "pressure_1 and pressure_2 seem to be swapped", mistake="swap"),
     Planted("pressure_1 3 ms late", "pressure_1 seems to be later", mistake="late"),
@@ -88,6 +89,9 @@ def recorded(planted: Planted, seed: int) -> Recording:
     if planted.mistake == "late":
         late = np.interp(TIMES - 0.003, TIMES, channels["pressure_1"].values)
         channels["pressure_1"] = Channel(late, "Pa")
+    if planted.mistake == "gauge":
+        for name in ("pressure_1", "pressure_2", "supply_pressure"):
+            channels[name] = Channel(channels[name].values + number_at(base, ROOM) - room, "Pa")
     if planted.mistake == "psi":
         for name in ("pressure_1", "pressure_2", "supply_pressure"):
             channels[name] = Channel(room + PSI * (channels[name].values - room), "Pa")

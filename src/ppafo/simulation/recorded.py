@@ -138,8 +138,10 @@ def between_stops(angles: Floats, device: Device, file: str) -> Floats:
     worst = angles[int(np.argmax(np.maximum(lowest - angles, angles - highest)))]
     if not lowest - margin <= worst <= highest + margin:
         shown, low, high = np.degrees([worst, lowest, highest])
+        is_negative = lowest - margin <= float(-angles.max()) and float(-angles.min()) <= highest + margin
+        hint = "; with the other sign all angles would lie between them" if is_negative else ""
         raise DataError(
-            f"{file}: 'angle' is {shown:.4g} deg, beyond the stops of {device.name}, {low:g} to {high:g} deg"
+            f"{file}: 'angle' is {shown:.4g} deg, beyond the stops of {device.name}, {low:g} to {high:g} deg{hint}"
         )
     return np.clip(angles, lowest, highest)
 

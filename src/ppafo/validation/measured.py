@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import DataError, UnitError, nearest_name, one_line
 from ppafo.parameters.device import Device
 from ppafo.signals import CHANNELS, Recording
@@ -132,6 +133,9 @@ MINIMUM_SAMPLES = 10
 """Fewer are a few readings and no course in time."""
 
 _REMARKED_GAP = 3.0
+_KILOPASCALS_AS_PSI = 1.0e3 / PASCALS_PER_PSI
+_LEAST_OF_SUPPLY = 0.5
+"""Factor that a wrong unit needs, and fraction of the supply that a chamber then reaches at least."""
 _ABOVE_SUPPLY = 0.05
 _MAXIMUM_RANGES = 20.0
 _MINIMUM_CHANGE = 0.01
@@ -230,6 +234,9 @@ def _check_pressures(recording: Recording, device: Device, file: str) -> None:
             shown = [f"{from_si(one, 'psi_g', 'Pa_a', atmosphere):.4g} psi_g" for one in (level, highest)]
             owner = f"the recorded '{SUPPLY}'" if is_recorded else f"the supply of {device.name}"
             remedy = "check both sensors" if is_recorded else f'record it, or give --set "supply.pressure={shown[0]}"'
+            top = float(recording[name].max()) - atmosphere
+            if _LEAST_OF_SUPPLY * (highest - atmosphere) < top * _KILOPASCALS_AS_PSI < allowed - atmosphere:
+                remedy += f"; '{name}' looks like kPa read as psi"
             raise DataError(f"{file}: '{name}' stays at {shown[0]}, above {owner}, {shown[1]}: {remedy}")
 
 

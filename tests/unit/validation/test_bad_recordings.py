@@ -144,6 +144,19 @@ def test_an_angle_far_beyond_the_stops_is_refused_and_noise_at_a_stop_is_not(
             agree(recording.with_channel("angle", recording["angle"] - np.radians(40.0), "rad"), device, motion=motion)
 
 
+def test_a_reversed_angle_is_named_as_that(step: Step, agree: Callable[..., Any]) -> None:
+    device, recording = step
+    with pytest.raises(DataError, match="with the other sign all angles would lie between them"):
+        agree(recording.with_channel("angle", -recording["angle"], "rad"), device)
+
+
+def test_kilopascals_read_as_psi_in_one_channel_are_named_as_that(step: Step) -> None:
+    device, recording = step
+    room = device.supply.atmospheric_pressure
+    wrong = recording.with_channel("pressure_1", room + 6.894757 * (recording["pressure_1"] - room), "Pa")
+    assert "'pressure_1' looks like kPa read as psi" in refused(wrong, device)
+
+
 def test_a_prescribed_vane_needs_its_angle(step: Step, agree: Callable[..., Any]) -> None:
     device, recording = step
     blind = renamed(recording, "angle", "knee_flexion")

@@ -37,6 +37,7 @@ _COMPARED = 8
 """Changes with the least squares of which the likelihood is compared."""
 _FACTORS = (0.02, 0.2, 0.5, 0.8, 0.95, 1.05, 1.25, 2.0, 5.0)
 _SEARCHES, _ROUNDS, _BETWEEN = 4, 3, 6
+_ROOM_ROUNDS = 6
 _LONGEST, _SHIFTS = 0.02, 41
 _JUST_NOISE = 1.1
 """Standard deviation of what is left, over the noise, up to which nothing is searched if it is white too."""
@@ -48,6 +49,8 @@ _GAIN = 0.01
 _OFFSET_APART, _ROOM = 0.5, 2.0e-3
 """Fraction of a sample from which a delay is one, and seconds by which it may be found to be another."""
 _PRESSURES = ("pressure_1", "pressure_2")
+_ATMOSPHERE, _ROOMS = "supply.atmospheric_pressure", (60.0e3, 110.0e3, 11)
+"""Atmospheres [Pa] from 4,000 m to below the sea: first and last that are tried, and how many."""
 _PSI = 6894.757
 _UNITS = (
     ("kPa read as psi", 1.0e3 / _PSI),
@@ -120,6 +123,7 @@ def explanations_of(experiments: Sequence[Experiment], delays: Sequence[float]) 
         return Explanations((), limit_for(ALARM) ** 2, 0)
     tried = [
         *_mistakes(experiments, delays, float(left @ left)),
+        *_other_room(experiments, delays),
         *_faults_of_channels(whole, base),
         *_numbers(whole),
         *_effects(whole, base),
@@ -370,6 +374,53 @@ def _changes_of_record(
                 return _with_pressures(one, group, lambda values: values + sign * room)
 
             yield f"kind of {', '.join(group)}", f"{which} {verb} to be {words}", other_kind
+
+
+def _other_room(experiments: Sequence[Experiment], delays: Sequence[float]) -> Iterator[_Tried]:
+    """Another atmosphere for sensors that read gauge pressure: every absolute pressure moves with it."""
+    own = experiments[0].scenario.device.supply.atmospheric_pressure
+
+    def left_in(room: float) -> Floats | None:
+        try:
+            left = _Whole.of([_in_room(one, room - own) for one in experiments], delays).base().left
+        except PpafoError:
+            return None
+        return left if np.isfinite(left).all() else None
+
+    found: dict[float, Floats] = {}
+    rooms, gap = np.linspace(*_ROOMS), 0.0
+    for _ in range(_ROOM_ROUNDS):
+        tried = {room: left_in(room) for room in rooms.tolist()}
+        found |= {room: left for room, left in tried.items() if left is not None}
+        if not found:
+            return
+        best = min(found, key=lambda room: float(found[room] @ found[room]))
+        gap = 0.5 * float(rooms[1] - rooms[0]) if len(rooms) > 2 else 0.5 * gap
+        rooms = np.array([best - gap, best + gap])
+    words = (
+        f"{_ATMOSPHERE} seems to be {best / own:.3g} times that of the set, under gauge pressures as they were recorded"
+    )
+    yield _Tried(
+        f"{_ATMOSPHERE} of gauge pressures", words, found[best], {_ATMOSPHERE: (best, "Pa")}, abs(best - own) > gap
+    )
+
+
+def _in_room(one: Experiment, higher: float) -> Experiment:
+    """Return an experiment whose atmosphere is higher by so much [Pa], and all its pressures with it."""
+    supply = one.scenario.device.supply
+    numbers = {
+        _ATMOSPHERE: supply.atmospheric_pressure + higher,
+        "supply.pressure": supply.pressure + higher,
+        "supply.dorsiflexion_pressure": supply.dorsiflexion_pressure + higher,
+    }
+    scenario = with_numbers(one.scenario, numbers)
+    first, second = one.scenario.initial_pressure_1 + higher, one.scenario.initial_pressure_2 + higher
+    names = [name for name in (*_PRESSURES, SUPPLY, DORSIFLEXION_SUPPLY) if name in one.recording.names]
+    return replace(
+        one,
+        recording=_with(one.recording, **{name: one.recording[name] + higher for name in names}),
+        scenario=replace(scenario, initial_pressure_1=first, initial_pressure_2=second),
+    )
 
 
 def _negative(one: Experiment, name: str) -> Experiment:
