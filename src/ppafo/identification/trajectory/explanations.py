@@ -401,7 +401,7 @@ def _other_room(experiments: Sequence[Experiment], delays: Sequence[float]) -> I
         f"{_ATMOSPHERE} seems to be {best / own:.3g} times that of the set, under gauge pressures as they were recorded"
     )
     yield _Tried(
-        f"{_ATMOSPHERE} of gauge pressures", words, found[best], {_ATMOSPHERE: (best, "Pa")}, abs(best - own) > gap
+        f"{_ATMOSPHERE} of gauge pressures", words, found[best], {_ATMOSPHERE: (best, "Pa_a")}, abs(best - own) > gap
     )
 
 
