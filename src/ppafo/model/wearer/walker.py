@@ -1,0 +1,434 @@
+"""A step of the whole wearer: muscles pull, the ground pushes, reflexes answer what was felt, segments move.
+
+H. Geyer and H. Herr, IEEE Trans. Neural Syst. Rehabil. Eng. 18 (2010) 263.
+"""
+
+from typing import NamedTuple
+
+from ppafo.model.elementary import QUARTER_TURN
+from ppafo.model.wearer.ground import Ground, Point, contact
+from ppafo.model.wearer.muscle import Fibre, Lever, Muscle, arm_and_way, next_fibre, tendon_force
+from ppafo.model.wearer.reflexes import Balance, Felt, Gains, Gait, Stimulation, next_gait, stimulation
+from ppafo.model.wearer.segments import (
+    Body,
+    Damping,
+    LegMatrix,
+    Limb,
+    Pose,
+    accelerations,
+    circle,
+    freed,
+    leg_matrix,
+)
+
+HALF_TURN = 3.141592653589793
+
+
+class Muscles(NamedTuple):
+    """Muscles of a leg, and how they pass ankle, knee and hip."""
+
+    soleus: Muscle
+    tibialis: Muscle
+    gastrocnemius: Muscle
+    vastus: Muscle
+    hamstring: Muscle
+    gluteus: Muscle
+    flexor: Muscle
+    soleus_ankle: Lever
+    tibialis_ankle: Lever
+    gastrocnemius_ankle: Lever
+    gastrocnemius_knee: Lever
+    vastus_knee: Lever
+    hamstring_knee: Lever
+    hamstring_hip: Lever
+    gluteus_hip: Lever
+    flexor_hip: Lever
+
+
+class Stop(NamedTuple):
+    """Soft ends of joints: stiffness [N m/rad], rate at which they relax [rad/s], angles [rad]."""
+
+    stiffness: float
+    relaxing: float
+    ankle_low: float
+    ankle_high: float
+    knee: float
+    hip: float
+
+
+class Wearer(NamedTuple):
+    """A wearer: body, muscles of both legs, gains of both legs, ends of joints, ground, weight [N]."""
+
+    body: Body
+    left: Muscles
+    right: Muscles
+    left_gains: Gains
+    right_gains: Gains
+    stop: Stop
+    ground: Ground
+    weight: float
+
+
+class Fibres(NamedTuple):
+    """State of the muscles of a leg."""
+
+    soleus: Fibre
+    tibialis: Fibre
+    gastrocnemius: Fibre
+    vastus: Fibre
+    hamstring: Fibre
+    gluteus: Fibre
+    flexor: Fibre
+
+
+class LegState(NamedTuple):
+    """State of a leg beside its angles: muscles, heel and ball on the ground."""
+
+    fibres: Fibres
+    heel: Point
+    ball: Point
+
+
+class Walker(NamedTuple):
+    """State of a wearer, without what is on its way along the nerves."""
+
+    pose: Pose
+    rates: Pose
+    left: LegState
+    right: LegState
+
+
+class Assist(NamedTuple):
+    """What a device does to an ankle: torque [N m], plantarflexion above 0, damping [N m s/rad], inertia [kg m^2]."""
+
+    torque: float
+    damping: float
+    inertia: float
+
+
+class Pull(NamedTuple):
+    """A leg's muscles: wholes [m], torques on ankle, knee and hip [N m], each growing its angle, and what is felt."""
+
+    soleus: float
+    tibialis: float
+    gastrocnemius: float
+    vastus: float
+    hamstring: float
+    gluteus: float
+    flexor: float
+    ankle: float
+    knee: float
+    hip: float
+    felt: Felt
+
+
+def whole(muscle: Muscle, way: float) -> float:
+    """Length of muscle and tendon [m] where the fibres have moved from rest [m]."""
+    return muscle.optimum + muscle.slack + way
+
+
+def force(muscle: Muscle, fibre: Fibre, length: float) -> float:
+    """Force of the tendon [largest forces] at a length of muscle and tendon [m]."""
+    return tendon_force(muscle, length - fibre.length)
+
+
+def pull(muscles: Muscles, fibres: Fibres, ankle: float, knee: float, hip: float, knee_rate: float) -> Pull:
+    """How the muscles of a leg pull at joint angles [rad]; the load that is felt is not known here."""
+    soleus_arm, soleus_way = arm_and_way(muscles.soleus_ankle, ankle)
+    tibialis_arm, tibialis_way = arm_and_way(muscles.tibialis_ankle, ankle)
+    calf_arm, calf_way = arm_and_way(muscles.gastrocnemius_ankle, ankle)
+    back_arm, back_way = arm_and_way(muscles.gastrocnemius_knee, knee)
+    vastus_arm, vastus_way = arm_and_way(muscles.vastus_knee, knee)
+    ham_arm, ham_way = arm_and_way(muscles.hamstring_knee, knee)
+    hip_way = muscles.hamstring_hip.share * muscles.hamstring_hip.lever * (muscles.hamstring_hip.rest_at - hip)
+    gluteus_way = muscles.gluteus_hip.share * muscles.gluteus_hip.lever * (muscles.gluteus_hip.rest_at - hip)
+    flexor_way = muscles.flexor_hip.share * muscles.flexor_hip.lever * (hip - muscles.flexor_hip.rest_at)
+    soleus = whole(muscles.soleus, -soleus_way)
+    tibialis = whole(muscles.tibialis, tibialis_way)
+    gastrocnemius = whole(muscles.gastrocnemius, back_way - calf_way)
+    vastus = whole(muscles.vastus, -vastus_way)
+    hamstring = whole(muscles.hamstring, ham_way + hip_way)
+    gluteus = whole(muscles.gluteus, gluteus_way)
+    flexor = whole(muscles.flexor, flexor_way)
+    soleus_force = force(muscles.soleus, fibres.soleus, soleus)
+    tibialis_force = force(muscles.tibialis, fibres.tibialis, tibialis)
+    calf_force = force(muscles.gastrocnemius, fibres.gastrocnemius, gastrocnemius)
+    vastus_force = force(muscles.vastus, fibres.vastus, vastus)
+    ham_force = force(muscles.hamstring, fibres.hamstring, hamstring)
+    gluteus_force = force(muscles.gluteus, fibres.gluteus, gluteus)
+    flexor_force = force(muscles.flexor, fibres.flexor, flexor)
+    calf = calf_force * muscles.gastrocnemius.force
+    ham = ham_force * muscles.hamstring.force
+    return Pull(
+        soleus=soleus,
+        tibialis=tibialis,
+        gastrocnemius=gastrocnemius,
+        vastus=vastus,
+        hamstring=hamstring,
+        gluteus=gluteus,
+        flexor=flexor,
+        ankle=soleus_force * muscles.soleus.force * soleus_arm
+        + calf * calf_arm
+        - tibialis_force * muscles.tibialis.force * tibialis_arm,
+        knee=vastus_force * muscles.vastus.force * vastus_arm - calf * back_arm - ham * ham_arm,
+        hip=ham * muscles.hamstring_hip.lever
+        + gluteus_force * muscles.gluteus.force * muscles.gluteus_hip.lever
+        - flexor_force * muscles.flexor.force * muscles.flexor_hip.lever,
+        felt=Felt(
+            soleus=soleus_force,
+            gastrocnemius=calf_force,
+            tibialis=fibres.tibialis.length / muscles.tibialis.optimum,
+            vastus=vastus_force,
+            knee=knee,
+            knee_rate=knee_rate,
+            hamstring=ham_force,
+            gluteus=gluteus_force,
+            hamstring_length=fibres.hamstring.length / muscles.hamstring.optimum,
+            flexor_length=fibres.flexor.length / muscles.flexor.optimum,
+            load=0.0,
+        ),
+    )
+
+
+class End(NamedTuple):
+    """Torque of a soft end on a joint [N m], growing its angle, and its damping [N m s/rad]."""
+
+    torque: float
+    damping: float
+
+
+def end_of_joint(stop: Stop, low: float, high: float, angle: float, rate: float) -> End:
+    """Soft ends at ``low`` and ``high`` [rad] of a joint, which never pull."""
+    above, below = max(angle - high, 0.0), max(low - angle, 0.0)
+    closing = 1.0 + rate / stop.relaxing
+    opening = 1.0 - rate / stop.relaxing
+    torque = stop.stiffness * (below * max(opening, 0.0) - above * max(closing, 0.0))
+    damping = stop.stiffness / stop.relaxing * ((above if closing > 0.0 else 0.0) + (below if opening > 0.0 else 0.0))
+    return End(torque, damping)
+
+
+class Joints(NamedTuple):
+    """Angles of ankle, knee and hip [rad], or rates; 90 deg, straight and straight at 90, 180 and 180 deg."""
+
+    ankle: float
+    knee: float
+    hip: float
+
+
+def joints(limb: Limb, lean: float) -> Joints:
+    """Joint angles [rad] of a leg: ankle grows in plantarflexion, knee and hip in extension."""
+    return Joints(
+        limb.shank - limb.foot + QUARTER_TURN, HALF_TURN + limb.shank - limb.thigh, HALF_TURN - limb.thigh - lean
+    )
+
+
+def rates_of_joints(limb: Limb, lean: float) -> Joints:
+    """Rates of the joints [rad/s] from those of the segments."""
+    return Joints(limb.shank - limb.foot, limb.shank - limb.thigh, -limb.thigh - lean)
+
+
+class LegNow(NamedTuple):
+    """A leg in a step: what it feels, its equations, the points on the ground after it, torque on hip, ways, forces."""
+
+    pull: Pull
+    felt: Felt
+    matrix: LegMatrix
+    heel: Point
+    ball: Point
+    hip: float
+    force_x: float
+    force_y: float
+
+
+def leg_now(
+    wearer: Wearer,
+    muscles: Muscles,
+    state: LegState,
+    pose: Pose,
+    rates: Pose,
+    limb: Limb,
+    limb_rates: Limb,
+    assist: Assist,
+    step: float,
+) -> LegNow:
+    """Everything about one leg before the body moves."""
+    body, ground = wearer.body, wearer.ground
+    angle, rate = joints(limb, pose.lean), rates_of_joints(limb_rates, rates.lean)
+    turned = circle(limb)
+    x = pose.x + body.thigh.length * turned.thigh_sine + body.shank.length * turned.shank_sine
+    y = pose.y - body.thigh.length * turned.thigh_cosine - body.shank.length * turned.shank_cosine
+    thigh_speed, shank_speed = body.thigh.length * limb_rates.thigh, body.shank.length * limb_rates.shank
+    speed_x = rates.x + thigh_speed * turned.thigh_cosine + shank_speed * turned.shank_cosine
+    speed_y = rates.y + thigh_speed * turned.thigh_sine + shank_speed * turned.shank_sine
+    # The foot's angle from the vertical is its angle over the ground plus 90 deg: its direction is (sine, -cosine).
+    along, up = turned.foot_sine, -turned.foot_cosine
+    heel = contact(
+        ground,
+        state.heel,
+        x - body.heel * along,
+        y - body.heel * up,
+        speed_x + body.heel * up * limb_rates.foot,
+        speed_y - body.heel * along * limb_rates.foot,
+    )
+    ball = contact(
+        ground,
+        state.ball,
+        x + body.foot.length * along,
+        y + body.foot.length * up,
+        speed_x - body.foot.length * up * limb_rates.foot,
+        speed_y + body.foot.length * along * limb_rates.foot,
+    )
+    pulled = pull(muscles, state.fibres, angle.ankle, angle.knee, angle.hip, rate.knee)
+    ankle_end = end_of_joint(wearer.stop, wearer.stop.ankle_low, wearer.stop.ankle_high, angle.ankle, rate.ankle)
+    knee_end = end_of_joint(wearer.stop, 0.0, wearer.stop.knee, angle.knee, rate.knee)
+    hip_end = wearer.stop.stiffness * max(angle.hip - wearer.stop.hip, 0.0)
+    ankle = pulled.ankle + ankle_end.torque + assist.torque - assist.damping * rate.ankle
+    knee, hip = pulled.knee + knee_end.torque, pulled.hip - hip_end
+    damping = Damping(
+        heel_along=heel.damping_along,
+        heel_normal=heel.damping_up,
+        ball_along=ball.damping_along,
+        ball_normal=ball.damping_up,
+        ankle=ankle_end.damping + assist.damping,
+        knee=knee_end.damping,
+        ankle_inertia=assist.inertia,
+    )
+    matrix = leg_matrix(
+        body,
+        turned,
+        limb_rates,
+        Limb(-knee - hip, ankle + knee, -ankle),
+        heel.along,
+        heel.up,
+        ball.along,
+        ball.up,
+        damping,
+        step,
+    )
+    felt = pulled.felt
+    return LegNow(
+        pull=pulled,
+        felt=Felt(
+            soleus=felt.soleus,
+            gastrocnemius=felt.gastrocnemius,
+            tibialis=felt.tibialis,
+            vastus=felt.vastus,
+            knee=felt.knee,
+            knee_rate=felt.knee_rate,
+            hamstring=felt.hamstring,
+            gluteus=felt.gluteus,
+            hamstring_length=felt.hamstring_length,
+            flexor_length=felt.flexor_length,
+            load=(heel.up + ball.up) / wearer.weight,
+        ),
+        matrix=matrix,
+        heel=heel.after,
+        ball=ball.after,
+        hip=hip,
+        force_x=heel.along + ball.along,
+        force_y=heel.up + ball.up,
+    )
+
+
+def next_fibres(muscles: Muscles, fibres: Fibres, given: Stimulation, now: Pull, step: float) -> Fibres:
+    """The muscles of a leg after a step [s]."""
+    return Fibres(
+        soleus=next_fibre(muscles.soleus, fibres.soleus, given.soleus, now.soleus, step),
+        tibialis=next_fibre(muscles.tibialis, fibres.tibialis, given.tibialis, now.tibialis, step),
+        gastrocnemius=next_fibre(
+            muscles.gastrocnemius, fibres.gastrocnemius, given.gastrocnemius, now.gastrocnemius, step
+        ),
+        vastus=next_fibre(muscles.vastus, fibres.vastus, given.vastus, now.vastus, step),
+        hamstring=next_fibre(muscles.hamstring, fibres.hamstring, given.hamstring, now.hamstring, step),
+        gluteus=next_fibre(muscles.gluteus, fibres.gluteus, given.gluteus, now.gluteus, step),
+        flexor=next_fibre(muscles.flexor, fibres.flexor, given.flexor, now.flexor, step),
+    )
+
+
+def moved_limb(limb: Limb, by: Limb, step: float) -> Limb:
+    """A leg after a step [s] at these rates."""
+    return Limb(limb.thigh + step * by.thigh, limb.shank + step * by.shank, limb.foot + step * by.foot)
+
+
+def moved(pose: Pose, by: Pose, step: float) -> Pose:
+    """A pose after a step [s] at these rates."""
+    return Pose(
+        pose.x + step * by.x,
+        pose.y + step * by.y,
+        pose.lean + step * by.lean,
+        moved_limb(pose.left, by.left, step),
+        moved_limb(pose.right, by.right, step),
+    )
+
+
+class Stepped(NamedTuple):
+    """A wearer after a step, and what both legs and the trunk felt at its begin."""
+
+    after: Walker
+    left_felt: Felt
+    right_felt: Felt
+    balance: Balance
+
+
+def next_walker(
+    wearer: Wearer,
+    walker: Walker,
+    to_left: Stimulation,
+    to_right: Stimulation,
+    left_assist: Assist,
+    right_assist: Assist,
+    step: float,
+) -> Stepped:
+    """A wearer after a step [s] in which the muscles are stimulated so, and devices act on the ankles."""
+    pose, rates = walker.pose, walker.rates
+    left = leg_now(wearer, wearer.left, walker.left, pose, rates, pose.left, rates.left, left_assist, step)
+    right = leg_now(wearer, wearer.right, walker.right, pose, rates, pose.right, rates.right, right_assist, step)
+    pushed = accelerations(
+        wearer.body, pose.lean, rates.lean, -left.hip - right.hip, freed(left.matrix), freed(right.matrix)
+    )
+    after = moved(rates, pushed, step)
+    left_fibres = next_fibres(wearer.left, walker.left.fibres, to_left, left.pull, step)
+    right_fibres = next_fibres(wearer.right, walker.right.fibres, to_right, right.pull, step)
+    return Stepped(
+        after=Walker(
+            pose=moved(pose, after, step),
+            rates=after,
+            left=LegState(left_fibres, left.heel, left.ball),
+            right=LegState(right_fibres, right.heel, right.ball),
+        ),
+        left_felt=left.felt,
+        right_felt=right.felt,
+        balance=Balance(pose.lean, rates.lean),
+    )
+
+
+class Answer(NamedTuple):
+    """What reflexes order until their next sample, and the phases of both legs."""
+
+    to_left: Stimulation
+    to_right: Stimulation
+    left: Gait
+    right: Gait
+
+
+def answer(
+    wearer: Wearer,
+    left: Gait,
+    right: Gait,
+    left_felt: Felt,
+    right_felt: Felt,
+    balance: Balance,
+    period: float,
+) -> Answer:
+    """The reflexes at a sample, a ``period`` [s] after the one before; felt is what has come along the nerves by now."""
+    left_gait = next_gait(left, left_felt.load, balance.lean, period)
+    right_gait = next_gait(right, right_felt.load, balance.lean, period)
+    both = left_gait.stands > 0.5 and right_gait.stands > 0.5
+    left_trails = 1.0 if both and left_gait.since > right_gait.since else 0.0
+    right_trails = 1.0 if both and right_gait.since > left_gait.since else 0.0
+    return Answer(
+        to_left=stimulation(wearer.left_gains, left_felt, balance, left_gait, right_felt.load, left_trails),
+        to_right=stimulation(wearer.right_gains, right_felt, balance, right_gait, left_felt.load, right_trails),
+        left=left_gait,
+        right=right_gait,
+    )
