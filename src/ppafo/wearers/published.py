@@ -1,0 +1,156 @@
+"""The wearer of H. Geyer and H. Herr: body, muscles, ends of joints and ground, and how the walker starts.
+
+IEEE Trans. Neural Syst. Rehabil. Eng. 18 (2010) 263, doi:10.1109/TNSRE.2010.2047592: tables and appendix. An adult of
+80 kg and 1.8 m; angles are printed in degrees there and are in rad here.
+"""
+
+import math
+
+from ppafo.model.elementary import QUARTER_TURN
+from ppafo.model.wearer.ground import Ground, Point
+from ppafo.model.wearer.muscle import Fibre, Lever, Muscle
+from ppafo.model.wearer.reflexes import Balance, Felt, Gains, Gait, Stimulation
+from ppafo.model.wearer.segments import Body, Limb, Pose, Segment
+from ppafo.model.wearer.walker import (
+    HALF_TURN,
+    Answer,
+    Assist,
+    Fibres,
+    Joints,
+    LegState,
+    Muscles,
+    Stop,
+    Walker,
+    Wearer,
+    joints,
+    leg_now,
+    pull,
+)
+
+GRAVITY = 9.81
+"""m/s^2, as the publication takes it."""
+
+BODY = Body(
+    trunk=Segment(length=0.8, mass_centre=0.35, mass=53.5, inertia=3.0),
+    thigh=Segment(length=0.5, mass_centre=0.2, mass=8.5, inertia=0.15),
+    shank=Segment(length=0.5, mass_centre=0.2, mass=3.5, inertia=0.05),
+    foot=Segment(length=0.16, mass_centre=0.02, mass=1.25, inertia=0.005),
+    heel=0.04,
+    gravity=GRAVITY,
+)
+"""Trunk with head and arms, and segments of a leg; mass centres are printed from the distal end."""
+
+MASS = BODY.trunk.mass + 2.0 * (BODY.thigh.mass + BODY.shank.mass + BODY.foot.mass)
+WEIGHT = MASS * GRAVITY
+
+
+def _lever(length: float, largest_at: float, rest_at: float, share: float) -> Lever:
+    """A lever [m] whose angles are in degrees."""
+    return Lever(length, math.radians(largest_at), math.radians(rest_at), share)
+
+
+MUSCLES = Muscles(
+    soleus=Muscle(force=4000.0, optimum=0.04, velocity=6.0, slack=0.26),
+    tibialis=Muscle(force=800.0, optimum=0.06, velocity=12.0, slack=0.24),
+    gastrocnemius=Muscle(force=1500.0, optimum=0.05, velocity=12.0, slack=0.40),
+    vastus=Muscle(force=6000.0, optimum=0.08, velocity=12.0, slack=0.23),
+    hamstring=Muscle(force=3000.0, optimum=0.10, velocity=12.0, slack=0.31),
+    gluteus=Muscle(force=1500.0, optimum=0.11, velocity=12.0, slack=0.13),
+    flexor=Muscle(force=2000.0, optimum=0.11, velocity=12.0, slack=0.10),
+    soleus_ankle=_lever(0.05, 110.0, 80.0, 0.5),
+    tibialis_ankle=_lever(0.04, 80.0, 110.0, 0.7),
+    gastrocnemius_ankle=_lever(0.05, 110.0, 80.0, 0.7),
+    gastrocnemius_knee=_lever(0.05, 140.0, 165.0, 0.7),
+    vastus_knee=_lever(0.06, 165.0, 125.0, 0.7),
+    hamstring_knee=_lever(0.05, 180.0, 180.0, 0.7),
+    # At the hip levers do not depend on the angle.
+    hamstring_hip=_lever(0.08, 0.0, 155.0, 0.7),
+    gluteus_hip=_lever(0.10, 0.0, 150.0, 0.5),
+    flexor_hip=_lever(0.10, 0.0, 180.0, 0.5),
+)
+"""The seven muscles of a leg: soleus, tibialis anterior, gastrocnemius, vasti, hamstrings, glutei and hip flexors."""
+
+STOP = Stop(
+    stiffness=0.3 / math.radians(1.0),
+    relaxing=math.radians(1.0),
+    ankle_low=math.radians(70.0),
+    ankle_high=math.radians(130.0),
+    knee=math.radians(175.0),
+    hip=math.radians(230.0),
+)
+
+GROUND = Ground(
+    stiffness=WEIGHT / 0.01,
+    stiffness_along=WEIGHT / 0.1,
+    relaxing=0.03,
+    sticking=0.9,
+    sliding=0.8,
+    rest_speed=0.01,
+)
+
+START_LEAN = 0.1
+"""Lean [rad] of the trunk at the start."""
+
+
+def published_wearer(left: Gains, right: Gains) -> Wearer:
+    """The body of the publication with these gains of both legs; the published ones are in the file ``geyer-herr``."""
+    return Wearer(BODY, MUSCLES, MUSCLES, left, right, STOP, GROUND, WEIGHT)
+
+
+def limb_of(angles: Joints, lean: float) -> Limb:
+    """Angles of the segments of a leg [rad] from its joints, the other way round than ``joints``."""
+    thigh = HALF_TURN - angles.hip - lean
+    shank = angles.knee - HALF_TURN + thigh
+    return Limb(thigh, shank, shank - angles.ankle + QUARTER_TURN)
+
+
+def start_of(wearer: Wearer, speed: float) -> Walker:
+    """A wearer who stands on the left leg, the right in front, and moves at a speed [m/s] without turning anywhere."""
+    left = limb_of(Joints(math.radians(85.0), math.radians(175.0), math.radians(175.0)), START_LEAN)
+    right = limb_of(Joints(math.radians(90.0), math.radians(175.0), math.radians(140.0)), START_LEAN)
+    body = wearer.body
+    ankle = -body.thigh.length * math.cos(left.thigh) - body.shank.length * math.cos(left.shank)
+    lowest = ankle + min(-body.heel * math.sin(left.foot), body.foot.length * math.sin(left.foot))
+    still = Limb(0.0, 0.0, 0.0)
+    return Walker(
+        # The lower end of the foot is 3 mm in the ground.
+        pose=Pose(0.0, -lowest - 0.003, START_LEAN, left, right),
+        rates=Pose(speed, 0.0, 0.0, still, still),
+        left=_leg_at_start(wearer.left, joints(left, START_LEAN)),
+        right=_leg_at_start(wearer.right, joints(right, START_LEAN)),
+    )
+
+
+def _leg_at_start(muscles: Muscles, angles: Joints) -> LegState:
+    """A leg that does not touch the ground yet, whose tendons are just without force."""
+    fibre = Fibre(activation=0.05, length=0.1)
+    wholes = pull(muscles, Fibres(*[fibre] * 7), angles.ankle, angles.knee, angles.hip, 0.0)
+    none = Point(0.0, 0.0, 0.0)
+    return LegState(
+        Fibres(
+            soleus=fibre._replace(length=wholes.soleus - muscles.soleus.slack),
+            tibialis=fibre._replace(length=wholes.tibialis - muscles.tibialis.slack),
+            gastrocnemius=fibre._replace(length=wholes.gastrocnemius - muscles.gastrocnemius.slack),
+            vastus=fibre._replace(length=wholes.vastus - muscles.vastus.slack),
+            hamstring=fibre._replace(length=wholes.hamstring - muscles.hamstring.slack),
+            gluteus=fibre._replace(length=wholes.gluteus - muscles.gluteus.slack),
+            flexor=fibre._replace(length=wholes.flexor - muscles.flexor.slack),
+        ),
+        heel=none,
+        ball=none,
+    )
+
+
+def first_answer() -> Answer:
+    """What the reflexes order at the start: the least, with the left leg in stance and the right one in swing."""
+    least = Stimulation(*[0.01] * 7)
+    return Answer(least, least, Gait(1.0, 0.3, START_LEAN), Gait(0.0, 0.0, START_LEAN))
+
+
+def felt_at(wearer: Wearer, walker: Walker, step: float) -> tuple[Felt, Felt, Balance]:
+    """What both legs and the trunk feel in a state: what is on its way along the nerves at the start."""
+    none = Assist(0.0, 0.0, 0.0)
+    pose, rates = walker.pose, walker.rates
+    left = leg_now(wearer, wearer.left, walker.left, pose, rates, pose.left, rates.left, none, step)
+    right = leg_now(wearer, wearer.right, walker.right, pose, rates, pose.right, rates.right, none, step)
+    return left.felt, right.felt, Balance(pose.lean, rates.lean)
