@@ -14,6 +14,7 @@ from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program, 
 from ppafo.engine.rows import leaf_paths, leaves, rebuilt, table
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import Pace
+from ppafo.engine.scheme.reacting import ReactingState, Reflexes
 from ppafo.engine.scheme.walking import DeviceShare, WalkState
 from ppafo.model.columns import larger, over_runs, truncated
 from ppafo.model.effects.kind import Moment, State
@@ -24,6 +25,9 @@ from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ch
 from ppafo.model.plant_faults import POWERED, PlantFaults, ShutOff
 from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters
+from ppafo.model.wearer.nerves import Nerves
+from ppafo.model.wearer.walker import Walker
+from ppafo.model.wearer.walker import Wearer as Body
 
 Members = NDArray[np.intp]
 Floats = NDArray[np.float64]
@@ -51,6 +55,20 @@ class Walk:
     sensors: GaitSensors
     initial: WalkState
     course: Course | None = None
+    failing: tuple[PlantFaults, ShutOff] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ReactingWalk:
+    """What a wearer who reacts adds to a run: the device on the left leg, the body, and where all of it begins."""
+
+    share: DeviceShare
+    body: Body
+    sensors: GaitSensors
+    initial: ReactingState
+    walker: Walker
+    reflexes: Reflexes
+    nerves: Nerves
     failing: tuple[PlantFaults, ShutOff] | None = None
 
 
@@ -94,6 +112,7 @@ class Run:
     needs_parts: bool = False
     tolerance: float = 1.0
     walk: Walk | None = None
+    reacting: ReactingWalk | None = None
     lines: Lines | None = None
     effects: tuple[Any, ...] = ()
     leg: LedLeg | None = None
@@ -128,7 +147,7 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
         step=run.step, period=run.period, command_lag=command_lag, signal_lag=signal_lag, tolerance=run.tolerance
     )
     plant, valve = [run.plant, run.thermal], [run.valve]
-    walk, walk_states = _walk_groups(run.walk)
+    walk, walk_states = _walk_groups(run.walk) if run.reacting is None else _reacting_groups(run.reacting)
     lines, line_states = ([], []) if run.lines is None else ([run.lines.parameters], [run.lines.initial])
     leg = [] if run.leg is None else [run.leg.load, run.leg.shank]
     rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, *leg, *run.effects]
@@ -256,6 +275,13 @@ def _walk_groups(walk: Walk | None) -> tuple[list[Any], list[Any]]:
     parameters += [] if walk.course is None else [walk.course]
     parameters += [] if walk.failing is None else [*walk.failing]
     return parameters, [walk.initial, NOTHING_SEEN, *([] if walk.failing is None else [POWERED])]
+
+
+def _reacting_groups(walk: ReactingWalk) -> tuple[list[Any], list[Any]]:
+    """The same of a wearer who reacts."""
+    failing = [] if walk.failing is None else [*walk.failing]
+    states = [walk.initial, NOTHING_SEEN, walk.walker, walk.reflexes, walk.nerves]
+    return [walk.share, walk.body, walk.sensors, *failing], [*states, *([POWERED] if failing else [])]
 
 
 def _members(group: Members, groups: int) -> list[Members]:

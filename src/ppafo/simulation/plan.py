@@ -19,7 +19,7 @@ from ppafo.engine.led_leg import GAIT_SHANK, LedLeg
 from ppafo.engine.pieces import GasScheme
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.rows import leaves, rebuilt
-from ppafo.engine.run import Lines, Run, Walk
+from ppafo.engine.run import Lines, ReactingWalk, Run, Walk
 from ppafo.engine.scheme.actuators import volumes_of
 from ppafo.engine.scheme.isothermal_gas import ISOTHERMAL
 from ppafo.engine.scheme.pneumatics import is_slow
@@ -127,7 +127,13 @@ StepRule = Callable[[PlantParameters], Steps]
 Start = Callable[[PlantParameters], PlantState]
 
 
-def compose_run(pieces: Pieces, plant: PlantParameters, rule: StepRule, start: Start, walk: Walk | None = None) -> Run:
+def compose_run(
+    pieces: Pieces,
+    plant: PlantParameters,
+    rule: StepRule,
+    start: Start,
+    walk: Walk | ReactingWalk | None = None,
+) -> Run:
     """Return the run of some pieces: ``rule`` says how it is stepped, ``start`` where it begins, ``walk`` adds a leg.
 
     A leg without ground is one of the pieces, and ``plant`` the bare one.
@@ -159,7 +165,8 @@ def compose_run(pieces: Pieces, plant: PlantParameters, rule: StepRule, start: S
         signal_delay=pieces.signal_delay,
         command_delay=delay,
         needs_parts=steps.needs_parts,
-        walk=walk,
+        walk=walk if isinstance(walk, Walk) else None,
+        reacting=walk if isinstance(walk, ReactingWalk) else None,
         lines=initial_lines(plant, pieces.supply_lines),
         effects=effect_rows(pieces.device, pieces.sections),
         leg=leg,
@@ -170,11 +177,14 @@ _ENERGY_BALANCE = "ppafo.engine.scheme.thermal_gas:ENERGY_BALANCE"
 _REAL = "ppafo.engine.scheme.real_gas:REAL"
 _LINES = "ppafo.engine.scheme.supply_lines:LINES"
 _WALKING = "ppafo.engine.scheme.walking:"
+_REACTING = "ppafo.engine.scheme.reacting:"
 """Where pieces of programs are that most runs do not have."""
 
 
-def _leg_scheme(walk: Walk) -> str:
+def _leg_scheme(walk: Walk | ReactingWalk) -> str:
     """Return where the scheme of a walking leg is."""
+    if isinstance(walk, ReactingWalk):
+        return f"{_REACTING}{'REACTING' if walk.failing is None else 'FAILING_REACTING'}"
     which = "STRIDES" if walk.course is None else "COURSE"
     return f"{_WALKING}{which}" if walk.failing is None else f"{_WALKING}FAILING_{which}"
 
@@ -197,7 +207,7 @@ def _gas_scheme(pieces: Pieces, effects: Sequence[Effect]) -> GasScheme:
     return scheme
 
 
-def _program(pieces: Pieces, steps: Steps, walk: Walk | None, has_delay: bool) -> Program:
+def _program(pieces: Pieces, steps: Steps, walk: Walk | ReactingWalk | None, has_delay: bool) -> Program:
     """Return what the lanes are composed of."""
     is_late, effects = first(pieces.signal_delay) > 0.0, effects_of(pieces.device, pieces.sections)
     return Program(

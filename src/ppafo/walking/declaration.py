@@ -30,6 +30,7 @@ from ppafo.simulation.declaration import (
     gas_settings,
     kind_at,
     line_paths,
+    value_at,
 )
 from ppafo.simulation.schema import (
     controller_table,
@@ -40,10 +41,16 @@ from ppafo.simulation.schema import (
     quantity_fields,
 )
 from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BOTTLE_NUMBERS, BOTTLE_OVERRIDES
+from ppafo.walking.reacting_wearer import REACTIONS, REACTS
 from ppafo.walking.wearer import WEARER
 
 THRESHOLDS = next(iter(TIMINGS))
 """The way to know the time in the stride of a walk file that names none."""
+
+REACTS_SUMMARY = (
+    "name of a wearer who reacts, or the path of its file; the gait is prescribed unless given, and strengths of muscles "
+    "and the start speed are for a wearer who reacts alone"
+)
 
 ARITHMETIC = "controller.arithmetic"
 """Where a walk says whether its controller computes with floats or with whole numbers."""
@@ -144,7 +151,7 @@ def timing_settings(kind: str) -> tuple[Quantity, ...]:
 def quantities(controller: str, timing: str = THRESHOLDS) -> dict[str, Quantity]:
     """Return the declaration of every number that a walk file with this controller and timing can hold, by path."""
     sections = {
-        "wearer": (*WEARER, PERSON),
+        "wearer": (*WEARER, PERSON, *REACTIONS),
         "controller": (RATE, PERIOD, *controller_settings(controller), *converter_settings(controller)),
         "timing": timing_settings(timing),
         "sensors": (*WALK_SENSORS, SEED),
@@ -182,7 +189,7 @@ def _texts(document: Mapping[str, Any]) -> tuple[str, ...]:
         "gas_model.kind",
         *(f"faults.{part}.kind" for part in (*FAULTY, *PLANT_FAULTS)),
     )
-    return (*TEXTS, "gait", "course", BOTTLE_NAME, *kinds, *arithmetic)
+    return (*TEXTS, "gait", "course", REACTS, BOTTLE_NAME, *kinds, *arithmetic)
 
 
 def _quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
@@ -192,6 +199,8 @@ def _quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
     lost = {
         f"gas_model.{item.name}" for item in THERMAL_GAS if item not in gas_settings(kind_at(document, "gas_model"))
     }
+    others = REACTIONS if value_at(document, REACTS) is None else (*WEARER, PERSON)
+    lost |= {f"wearer.{item.name}" for item in others}
     return {path: item for path, item in found.items() if path not in lost}
 
 
@@ -280,7 +289,7 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
         ),
         "timing": optional(_timing(), "how the controller knows the time in the stride; thresholds unless given"),
         "wearer": optional(
-            table("Wearer", quantity_fields((*WEARER, PERSON))),
+            table("Wearer", {"reacts": optional(str, REACTS_SUMMARY), **quantity_fields((*WEARER, PERSON, *REACTIONS))}),
             "who walks; the subject of the gait that is named, else the paper's, unless given",
         ),
         "sensors": optional(table("WalkSensors", sensors), "sensors of the controller; ideal unless given"),

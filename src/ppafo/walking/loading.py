@@ -69,6 +69,7 @@ from ppafo.walking.motion import (
 from ppafo.walking.nominal import nominal_terms
 from ppafo.walking.planning import NO_REFERENCE, course_of_walk, noise, plan_walks, switches, walking_valve
 from ppafo.walking.preparation import FaultSettings, SensorSettings
+from ppafo.walking.reacting_wearer import LONGEST_STEP, REACTS, read_reacting
 from ppafo.walking.result import lacks, measured
 from ppafo.walking.wearer import read_wearer, wearer_origin
 
@@ -174,6 +175,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     found = links_of_defaults({"controller": law.quantities, "timing": timing}, device, lines)
     links = {path: links for path, links in found.items() if value_at(reading.document, path) is None}
     _check_timing(law, reading)
+    reacts = read_reacting(reading, request.folder)
     motion = WalkMotion(
         kind=WALK,
         gait=walked,
@@ -187,9 +189,11 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         person=_person(reading),
         broken=_broken(reading, lines),
         shut_off=_shut_off(reading),
+        reacts=reacts,
     )
     more = tuple(f"{path}={_absolute(item)}" for path, item in instead.items())
-    supply, step = device.supply, reading.number("run.step", STEP)
+    supply = device.supply
+    step = reading.number("run.step", STEP if reacts is None else replace(STEP, default=LONGEST_STEP))
     scenario = Scenario(
         name=document["name"],
         description=document.get("description", ""),

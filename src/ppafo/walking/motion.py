@@ -31,6 +31,7 @@ from ppafo.walking.declaration import (
     timing_settings,
 )
 from ppafo.walking.preparation import FaultSettings
+from ppafo.walking.reacting_wearer import REACTIONS, ReactingWearer
 from ppafo.walking.wearer import WEARER, Wearer, who_walks
 
 
@@ -42,7 +43,8 @@ class WalkMotion:
     vane has, by name, and ``faults`` those that fail, by sensor; ``broken`` are parts of the plant that fail, and
     ``shut_off`` is the valve of the safe state, {} where none is fitted. ``course`` is what the wearer does one after
     the other, None where stride follows equal stride; ``bottle`` the one that the device hangs on, None where its
-    supply does not end. ``wearer_origin`` says in words whose body mass it is. ``person`` is the number of the person
+    supply does not end. ``reacts`` is a wearer whose reflexes answer the device, None where the gait is prescribed.
+    ``wearer_origin`` says in words whose body mass it is. ``person`` is the number of the person
     of the population who walks, 0 for the wearer with the gait as it is, or a ``Person`` who is drawn already. It, and
     numbers of wearer, ``forces`` and ``faults``, may be arrays (runs,).
     """
@@ -59,10 +61,13 @@ class WalkMotion:
     person: Any = 0.0
     broken: Mapping[str, FaultSettings] = field(default_factory=dict)
     shut_off: Mapping[str, Any] = field(default_factory=dict)
+    reacts: ReactingWearer | None = None
 
     @property
     def label(self) -> str:
         """The motion in a few words."""
+        if self.reacts is not None:
+            return f"a walk of a wearer who reacts, {self.reacts.name}"
         return f"a walk, gait {self.gait.name}" + ("" if self.course is None else f", course {self.course.name}")
 
 
@@ -76,6 +81,8 @@ def walk_of(scenario: Scenario) -> WalkMotion:
 def person_remarks(scenario: Scenario) -> list[str]:
     """Return who walks, and what is odd about the zero of the gait's ankle."""
     motion = walk_of(scenario)
+    if motion.reacts is not None:
+        return [f"wearer: {motion.reacts.name}, who reacts, {motion.reacts.mass:.4g} kg; the device is on the left leg"]
     remarks = [f"remark: {text}" for text in gait_file_remarks(motion.gait)]
     return [who_walks(motion.wearer, motion.gait, motion.wearer_origin), *remarks]
 
@@ -88,6 +95,7 @@ PLACES: Mapping[str, tuple[str, ...]] = {
     **{f"wearer.{item.name}": ("motion", "wearer", item.name) for item in WEARER},
     **{f"timing.{item.name}": ("control", "settings", item.name) for kind in TIMINGS for item in timing_settings(kind)},
     f"wearer.{PERSON.name}": ("motion", PERSON.name),
+    **{f"wearer.{item.name}": ("motion", "reacts", "settings", item.name) for item in REACTIONS},
     **{f"sensors.{name}": ("motion", "forces", name) for name in FORCES},
     **{
         f"faults.{sensor}.{item.name}": ("motion", "faults", sensor, "numbers", item.name)
@@ -120,6 +128,8 @@ def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
     for part, fault in motion.broken.items():
         kept |= {f"faults.{part}.{name}" for name in fault.numbers}
     kept |= {f"shut_off.{name}" for name in motion.shut_off}
+    others = REACTIONS if motion.reacts is None else (*WEARER, PERSON)
+    kept -= {f"wearer.{item.name}" for item in others}
     # An object in charge has no settings, and a timing is one of a controller that has some.
     lost = {path for path in kept if path.startswith("timing.") and path.partition(".")[2] not in control.settings}
     return {path: item for path, item in known.items() if path in kept - lost}

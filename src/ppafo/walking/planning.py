@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control.controllers import switching
 from ppafo.control.fixed.walking_law import SETTINGS as CONVERTER
 from ppafo.control.fixed.walking_law import GaitConverter, gait_converter
@@ -15,8 +16,8 @@ from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
 from ppafo.engine.lanes import Batch
 from ppafo.engine.rows import leaf_paths, leaves, rebuilt
-from ppafo.engine.run import Run, Walk, batches_of
-from ppafo.engine.scheme.walking import WalkState
+from ppafo.engine.run import ReactingWalk, Run, Walk, batches_of
+from ppafo.engine.scheme.walking import DeviceShare, WalkState
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
 from ppafo.model.catalog import VALVES
@@ -50,6 +51,7 @@ from ppafo.walking.preparation import (
     walk_step_counts,
     with_leg,
 )
+from ppafo.walking.reacting_wearer import LONGEST_STEP, start_of_body
 from ppafo.walking.wearer import Build, leg_parameters
 
 NO_REFERENCE = ProfileChoice("constant", {"level": 0.0})
@@ -73,6 +75,8 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
 
     All runs of an ensemble must ask for one program: the settings of ``switches`` are 0 for all of them or for none.
     """
+    if walk_of(scenario).reacts is not None:
+        return _plan_reacting(scenario)
     motion, device, period = walk_of(scenario), fed_device(scenario), scenario.control.period
     person = person_of(motion.gait, motion.person)
     leg = leg_of_person(leg_parameters(motion.wearer, heel_rocker(motion.gait, motion.wearer)), person)
@@ -91,7 +95,22 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         failing=failing_of(scenario),
     )
     controller, settings, problems = controller_of(_fitted(scenario, person))
-    pieces = Pieces(
+    pieces = _pieces_of_walk(scenario, device, controller, settings, _of_each(longest_delay, sensors) * period)
+    run = compose_run(
+        pieces,
+        with_leg(bare, leg),
+        lambda plant: walk_steps(scenario, plant),
+        lambda plant: vented_state(plant, walk.initial.now.ankle, walk.initial.now.ankle_rate),
+        walk,
+    )
+    return run, (too_many_steps(scenario, run.step, run.step_count), *problems)
+
+
+def _pieces_of_walk(
+    scenario: Scenario, device: Device, controller: ControllerKind | None, settings: Mapping[str, Any], delay: Any
+) -> Pieces:
+    """What the run of a walk is made of; ``delay`` [s] is the longest of its sensors."""
+    return Pieces(
         device=device,
         valve=walking_valve(device.valve),
         controller=None if scenario.control.kind == PYTHON_CONTROLLER else controller,
@@ -102,16 +121,43 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         has_ideal_sensors=has_ideal_sensors(scenario),
         thermal=scenario.thermal,
         supply_lines=scenario.supply_lines,
-        signal_delay=_of_each(longest_delay, sensors) * period,
+        signal_delay=delay,
     )
+
+
+def _plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
+    """As ``plan_walks``, of a wearer who reacts: the body begins at its start speed, with vented chambers."""
+    device, wearer = fed_device(scenario), walk_of(scenario).reacts
+    assert wearer is not None, "a wearer who reacts comes here"
+    bare, sensors, start = plant_parameters(device), gait_sensors_of(scenario), start_of_body(wearer)
+    walk = ReactingWalk(
+        share=DeviceShare(bare.inertia, bare.viscous_damping, bare.gravity_torque / STANDARD_GRAVITY),
+        body=wearer.row(),
+        sensors=sensors,
+        initial=start.walk,
+        walker=start.walker,
+        reflexes=start.reflexes,
+        nerves=start.nerves,
+        failing=failing_of(scenario),
+    )
+    controller, settings, problems = controller_of(scenario)
+    delay = _of_each(longest_delay, sensors) * scenario.control.period
     run = compose_run(
-        pieces,
-        with_leg(bare, leg),
+        _pieces_of_walk(scenario, device, controller, settings, delay),
+        bare._replace(gravity_torque=0.0, external_torque=0.0),
         lambda plant: walk_steps(scenario, plant),
-        lambda plant: vented_state(plant, walk.initial.now.ankle, walk.initial.now.ankle_rate),
+        lambda plant: vented_state(plant, start.walk.now.ankle, 0.0),
         walk,
     )
-    return run, (too_many_steps(scenario, run.step, run.step_count), *problems)
+    return run, (too_many_steps(scenario, run.step, run.step_count), *problems, _too_long(scenario))
+
+
+def _too_long(scenario: Scenario) -> Problem:
+    """A step that is too long for a body."""
+    step = scenario.time_step
+    return np.asarray(step > LONGEST_STEP), lambda run: (
+        f"run.step = {at(step, run):g} s: a wearer who reacts needs {LONGEST_STEP:g} s or less"
+    )
 
 
 def batch_of_many(scenario: Scenario, build: Build, gaits: VariedGaits, generator: np.random.Generator) -> Batch:

@@ -228,7 +228,11 @@ def rates_of_joints(limb: Limb, lean: float) -> Joints:
 
 
 class LegNow(NamedTuple):
-    """A leg in a step: what it feels, its equations, the points on the ground after it, torque on hip, ways, forces."""
+    """A leg in a step: what it feels, its equations, the points on the ground after it, torque on the hip, and forces.
+
+    Forces of the ground [N]: along and up in all, and up under heel and ball. ``place`` is the ankle in front of the hip
+    [m], ``toes`` the height of the ball over the ground [m], both at the begin of the step.
+    """
 
     pull: Pull
     felt: Felt
@@ -238,6 +242,10 @@ class LegNow(NamedTuple):
     hip: float
     force_x: float
     force_y: float
+    heel_up: float
+    ball_up: float
+    place: float
+    toes: float
 
 
 def leg_now(
@@ -327,6 +335,10 @@ def leg_now(
         hip=hip,
         force_x=heel.along + ball.along,
         force_y=heel.up + ball.up,
+        heel_up=heel.up,
+        ball_up=ball.up,
+        place=x - pose.x,
+        toes=y + body.foot.length * up,
     )
 
 
@@ -362,9 +374,11 @@ def moved(pose: Pose, by: Pose, step: float) -> Pose:
 
 
 class Stepped(NamedTuple):
-    """A wearer after a step, and what both legs and the trunk felt at its begin."""
+    """A wearer after a step; both legs, and what they and the trunk felt, at its begin."""
 
     after: Walker
+    left: LegNow
+    right: LegNow
     left_felt: Felt
     right_felt: Felt
     balance: Balance
@@ -396,6 +410,8 @@ def next_walker(
             left=LegState(left_fibres, left.heel, left.ball),
             right=LegState(right_fibres, right.heel, right.ball),
         ),
+        left=left,
+        right=right,
         left_felt=left.felt,
         right_felt=right.felt,
         balance=Balance(pose.lean, rates.lean),

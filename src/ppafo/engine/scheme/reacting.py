@@ -1,0 +1,367 @@
+"""One step of a wearer who reacts: muscles, reflexes and ground move a body, and the device acts on its left ankle.
+
+It stands beside ``walking.py``, where a gait leads the leg: here the body step comes before the gas, with the pressures
+at its begin, and the ankle that the gas sees is the body's. Device and body exchange torque and angle once a step, which
+is 0.1 ms long. What sensors, faults, controllers and metrics read of a walk has the same names in both.
+"""
+
+from typing import Any, NamedTuple
+
+from ppafo.engine.pieces import LegScheme, RarePhase
+from ppafo.engine.scheme.motion import clamp_angle, with_motion
+from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers, held_pressures
+from ppafo.engine.scheme.walking import NO_CLEARANCE, DeviceShare
+from ppafo.model.contact import FLAT, HEEL, SWING, TOE
+from ppafo.model.places import friction_in_motion
+from ppafo.model.plant import PlantParameters, PlantState, actuator_torque
+from ppafo.model.plant_faults import PlantFaults, ShutOff, Unpowered
+from ppafo.model.sensors import GaitSeen, GaitSensors
+from ppafo.model.wearer.muscle import Fibre, Muscle, tendon_force
+from ppafo.model.wearer.nerves import SAMPLE, LegNerves, Nerves, arrived, balance_arrived, next_nerves
+from ppafo.model.wearer.reflexes import Balance, Felt
+from ppafo.model.wearer.walker import (
+    Answer,
+    Assist,
+    Fibres,
+    LegNow,
+    Muscles,
+    Pull,
+    Walker,
+    Wearer,
+    answer,
+    joints,
+    next_walker,
+    rates_of_joints,
+)
+
+CREEP = 0.02
+"""Rate [rad/s] below which friction of the vane grows with it, so that a step can take it implicitly."""
+
+FALLEN = 0.6
+"""A wearer whose hip is lower than this share of the straight leg has fallen."""
+
+PASSING = 0.15
+"""The toes must clear the ground while the swinging ankle is within this share of the leg's length of the hip."""
+
+LOADED = 0.05
+"""Load [body weights] with which a foot stands: less is a scuff."""
+
+STANDING = -1.0
+"""Time of a fall [s] of a wearer who has not fallen."""
+
+SAME = 1.0e-9
+"""Time [s] that is none."""
+
+
+class WalkNow(NamedTuple):
+    """Phase of the stride in turns of the one before, angle of the shank, and of the ankle without a device [rad]."""
+
+    phase: float
+    shank: float
+    ankle: float
+
+
+class ReactingState(NamedTuple):
+    """Where the foot with the device stands, what the wearer gets, and totals since the start; as in ``WalkState``.
+
+    ``passes`` is 1 once the toes came by in this swing, ``lands`` 1 while the toes have yet to come down after the
+    heel. ``since`` [s] the strike, ``stride_time`` [s] of the stride before. ``load`` and ``other_load`` [body weights] of
+    both feet, ``muscle_work`` [J] that all muscles did as they shortened, ``fall_time`` [s], below 0 before a fall.
+    """
+
+    contact: float
+    now: WalkNow
+    external_torque: float
+    heel_force: float
+    toe_force: float
+    toes_first: float
+    lands: float
+    clearance: float
+    since: float
+    stride_time: float
+    strides: float
+    landings: float
+    toe_landings: float
+    slap_rates: float
+    clearances: float
+    push_off_work: float
+    load: float
+    other_load: float
+    muscle_work: float
+    fall_time: float
+
+
+class Reflexes(NamedTuple):
+    """What the reflexes have ordered, the phases of both legs, and the time until the nerves are sampled next [s]."""
+
+    ordered: Answer
+    until: float
+
+
+class BodyEnd(NamedTuple):
+    """A wearer after a step, and what was felt and acted at its begin.
+
+    ``due`` is 1 where the nerves are sampled, ``until`` [s] the sample after that. ``heel_up`` and ``ball_up`` [N] under
+    the foot with the device, ``place`` of its ankle in front of the hip and height of its ``toes`` [m], ``loads`` of both
+    feet [body weights], ``work`` of the muscles [J], ``given`` by the device [N m].
+    """
+
+    after: Walker
+    left_felt: Felt
+    right_felt: Felt
+    balance: Balance
+    due: float
+    until: float
+    heel_up: float
+    ball_up: float
+    place: float
+    toes: float
+    work: float
+    given: float
+
+
+class AnkleStep(NamedTuple):
+    """Angle [rad] and rate [rad/s] of the ankle at the end of the step."""
+
+    angle: float
+    rate: float
+
+
+def assist_of(plant: PlantParameters, share: DeviceShare, state: PlantState, held: HeldChambers) -> Assist:
+    """What the device does to the ankle: torque of both pressures, friction and damping of the vane, its inertia."""
+    pressure_1, pressure_2 = held_pressures(held, state)
+    torque = actuator_torque(pressure_1, pressure_2, plant.torque_constant)
+    friction = friction_in_motion(plant.dynamic_torque, state.angular_velocity, pressure_1, pressure_2)
+    damping = share.viscous_damping + friction / max(abs(state.angular_velocity), CREEP)
+    return Assist(torque, damping, share.inertia)
+
+
+def shortened(muscle: Muscle, before: Fibre, after: Fibre, whole: float) -> float:
+    """Work [J] of a muscle that shortens in a step; none where it is drawn out."""
+    return muscle.force * tendon_force(muscle, whole - before.length) * max(before.length - after.length, 0.0)
+
+
+def work_of_leg(muscles: Muscles, before: Fibres, after: Fibres, pull: Pull) -> float:
+    """Work [J] of the muscles of a leg that shorten in a step."""
+    ankle = shortened(muscles.soleus, before.soleus, after.soleus, pull.soleus)
+    ankle += shortened(muscles.tibialis, before.tibialis, after.tibialis, pull.tibialis)
+    ankle += shortened(muscles.gastrocnemius, before.gastrocnemius, after.gastrocnemius, pull.gastrocnemius)
+    hip = shortened(muscles.vastus, before.vastus, after.vastus, pull.vastus)
+    hip += shortened(muscles.hamstring, before.hamstring, after.hamstring, pull.hamstring)
+    hip += shortened(muscles.gluteus, before.gluteus, after.gluteus, pull.gluteus)
+    hip += shortened(muscles.flexor, before.flexor, after.flexor, pull.flexor)
+    return ankle + hip
+
+
+def next_body(
+    wearer: Wearer, walker: Walker, reflexes: Reflexes, fall_time: float, assist: Assist, step: float
+) -> BodyEnd:
+    """The wearer after a step [s]; one who has fallen lies still."""
+    moving = 0.0 if fall_time >= 0.0 else step
+    ordered, free = reflexes.ordered, Assist(0.0, 0.0, 0.0)
+    stepped = next_walker(wearer, walker, ordered.to_left, ordered.to_right, assist, free, moving)
+    left: LegNow = stepped.left
+    right: LegNow = stepped.right
+    after = stepped.after
+    is_due = reflexes.until <= SAME and moving > 0.0
+    work = work_of_leg(wearer.left, walker.left.fibres, after.left.fibres, left.pull)
+    work += work_of_leg(wearer.right, walker.right.fibres, after.right.fibres, right.pull)
+    return BodyEnd(
+        after=after,
+        left_felt=stepped.left_felt,
+        right_felt=stepped.right_felt,
+        balance=stepped.balance,
+        due=1.0 if is_due else 0.0,
+        until=reflexes.until + (SAMPLE if is_due else 0.0) - moving,
+        heel_up=left.heel_up,
+        ball_up=left.ball_up,
+        place=left.place,
+        toes=left.toes,
+        work=work,
+        given=assist.torque,
+    )
+
+
+def ankle_of(plant: PlantParameters, body: BodyEnd, fall_time: float) -> AnkleStep:
+    """The ankle to which the body led, as far as the vane can follow."""
+    after = body.after
+    angle = joints(after.pose.left, after.pose.lean).ankle
+    rate = rates_of_joints(after.rates.left, after.rates.lean).ankle
+    reached = clamp_angle(plant, angle)
+    return AnkleStep(reached, rate if fall_time < 0.0 and reached == angle else 0.0)
+
+
+def next_reflexes(wearer: Wearer, nerves: Nerves, reflexes: Reflexes, body: BodyEnd) -> Reflexes:
+    """The reflexes after a sample of the nerves."""
+    left: LegNerves = nerves.left
+    right: LegNerves = nerves.right
+    before = reflexes.ordered
+    ordered = answer(
+        wearer, before.left, before.right, arrived(left), arrived(right), balance_arrived(nerves), SAMPLE
+    )
+    return Reflexes(ordered, body.until)
+
+
+def advance_reacting(
+    wearer: Wearer,
+    share: DeviceShare,
+    walk: ReactingState,
+    body: BodyEnd,
+    before: PlantState,
+    after: PlantState,
+    damping: float,
+    follow_rate: float,
+    time: float,
+    step: float,
+) -> ReactingState:
+    """What the sensors show and what adds up over the strides; ``time`` [s] is that at the end of the step [s].
+
+    A strike is the foot that stands after the toes came by; what touches before is a scuff. ``damping`` [N m s/rad] is
+    that of the vane with its friction.
+    """
+    stood = walk.fall_time < 0.0
+    leg = wearer.body.thigh.length + wearer.body.shank.length
+    pose, rates = body.after.pose, body.after.rates
+    heel, ball = body.heel_up, body.ball_up
+    contact = (FLAT if ball > 0.0 else HEEL) if heel > 0.0 else (TOE if ball > 0.0 else SWING)
+    load = (heel + ball) / wearer.weight
+    # The ankle in front of the hip grows in the swing and falls in stance.
+    forward = wearer.body.thigh.length * rates.left.thigh + wearer.body.shank.length * rates.left.shank > 0.0
+    watched = stood and forward and abs(body.place) < PASSING * leg
+    passed = walk.clearance < NO_CLEARANCE
+    strikes = stood and passed and load > LOADED and body.place >= PASSING * leg
+    lowest = min(walk.clearance, body.toes if watched else walk.clearance)
+    touches_first = ball > heel
+    slaps = walk.lands > 0.5 and ball > 0.0 and not strikes
+    lands = (0.0 if touches_first else 1.0) if strikes else (0.0 if slaps or load <= 0.0 else walk.lands)
+    acceleration = (after.angular_velocity - before.angular_velocity) / max(step, 1.0e-30)
+    given = body.given - damping * after.angular_velocity - share.inertia * acceleration
+    turned = after.angle - before.angle
+    follows = follow_rate * step / (1.0 + follow_rate * step)
+    since = 0.0 if strikes else walk.since + step
+    falls = stood and not (pose.y > FALLEN * leg)
+    work = 0.5 * (given + walk.external_torque) * turned if contact == TOE and stood else 0.0
+    stride_time = walk.since if strikes and walk.strides > 0.5 else walk.stride_time
+    slap_rates = walk.slap_rates + (rates.left.foot if slaps else 0.0)
+    return ReactingState(
+        contact=contact,
+        now=WalkNow(min(since / stride_time, 1.0), pose.left.shank, after.angle),
+        external_torque=given if stood else 0.0,
+        heel_force=walk.heel_force + (heel - walk.heel_force) * follows,
+        toe_force=walk.toe_force + (ball - walk.toe_force) * follows,
+        toes_first=(1.0 if touches_first else 0.0) if strikes else walk.toes_first,
+        lands=lands,
+        clearance=NO_CLEARANCE if strikes else lowest,
+        since=since,
+        stride_time=stride_time,
+        strides=walk.strides + (1.0 if strikes else 0.0),
+        landings=walk.landings + (1.0 if slaps else 0.0),
+        toe_landings=walk.toe_landings + (1.0 if strikes and touches_first else 0.0),
+        slap_rates=slap_rates,
+        clearances=walk.clearances + (lowest if strikes else 0.0),
+        push_off_work=walk.push_off_work + work,
+        load=load,
+        other_load=body.right_felt.load,
+        muscle_work=walk.muscle_work + (body.work if stood else 0.0),
+        fall_time=time if falls else walk.fall_time,
+    )
+
+
+def find(rows: Any) -> list[str]:
+    """Lines that make what a step is handed by the one before; nothing but the chambers is."""
+    return []
+
+
+def lead(rows: Any) -> list[Any]:
+    """Phases before the gas: the body, and where few steps sample them, the nerves and the reflexes."""
+    add = rows.add
+    stepped = f"{add(next_body)}(wearer, walker, reflexes, walk.fall_time, assist, length)"
+    ordered = f"{add(next_reflexes)}(wearer, nerves, reflexes, body)"
+    passed_on = f"{add(next_nerves)}(nerves, body.left_felt, body.right_felt, body.balance)"
+    waits = f"{add(Reflexes)}(reflexes.ordered, body.until)"
+    return [
+        [
+            *[rows.load(name) for name in ("wearer", "walker", "reflexes")],
+            f"assist = {add(assist_of)}(plant, share, state, held)",
+            f"body = {stepped}",
+            f"begun = {add(ankle_of)}(plant, body, walk.fall_time)",
+            *rows.keep("body", "begun"),
+            f"reflexes = {waits}",
+            *rows.store("reflexes"),
+        ],
+        RarePhase(
+            [
+                *[rows.load(name) for name in ("wearer", "nerves", "reflexes", "body")],
+                "is_due = body.due > 0.5",
+                f"ordered = {ordered}",
+                f"passed_on = {passed_on}",
+                *rows.store("reflexes", "ordered", "is_due"),
+                *rows.store("nerves", "passed_on", "is_due"),
+            ],
+            rows.cells["body.due"],
+        ),
+    ]
+
+
+def assume(rows: Any) -> list[str]:
+    """Lines that find the chambers at the end of the step."""
+    return [
+        rows.load("begun"),
+        "next_angle = begun.angle",
+        f"ahead = {rows.add(held_chambers)}(plant, next_angle)",
+        *rows.keep("ahead"),
+    ]
+
+
+def reach(rows: Any, fed: str) -> list[Any]:
+    """No phases: the body has led the ankle already."""
+    return []
+
+
+def end(rows: Any) -> list[str]:
+    """Lines that lead to the state ``after`` the step."""
+    follow = rows.cells["gait_sensors.follow_rate"]
+    given = f"wearer, share, walk, body, state, after, assist.damping, {follow}, time + length, length"
+    return [
+        *[rows.load(name) for name in ("begun", "ahead", "body", "wearer")],
+        # The state at the begin has the pressures with which the body moved.
+        f"assist = {rows.add(assist_of)}(plant, share, state, held)",
+        "held = ahead",
+        *rows.keep("held"),
+        f"after = {rows.add(with_motion)}(fed, begun.angle, begun.rate)",
+        f"walk_after = {rows.add(advance_reacting)}({given})",
+        "walker_after = body.after",
+        *rows.program.gas.move(rows, "after", "begun.angle", "after.angle"),
+    ]
+
+
+def _scheme(fails: bool) -> LegScheme:
+    faults = {"plant_faults": PlantFaults, "shut_off": ShutOff} if fails else {}
+    return LegScheme(
+        takes_course=False,
+        parameters={"share": DeviceShare, "wearer": Wearer, "gait_sensors": GaitSensors, **faults},
+        states={
+            "walk": ReactingState,
+            "gait_seen": GaitSeen,
+            "walker": Walker,
+            "reflexes": Reflexes,
+            "nerves": Nerves,
+            **({"unpowered": Unpowered} if fails else {}),
+        },
+        loads=("share", "walk", *faults, *(["unpowered"] if fails else [])),
+        stored={"walk": "walk_after", "walker": "walker_after"},
+        begun=AnkleStep,
+        led={"body": BodyEnd},
+        handed={},
+        ended={"ahead": HeldChambers},
+        find=find,
+        lead=lead,
+        assume=assume,
+        reach=reach,
+        end=end,
+        fails=fails,
+    )
+
+
+REACTING, FAILING_REACTING = _scheme(fails=False), _scheme(fails=True)
+"""A leg of a wearer who reacts, and the same with a plant that may fail, or whose line has a shut-off valve."""

@@ -1,0 +1,126 @@
+"""A wearer who reacts, in the file of a walk: whose reflexes, how strong which muscle is, how fast the walk begins.
+
+The device is on the left leg. A strength is that of a muscle of this leg over the healthy one's; the body, the other leg
+and all gains are those of the wearer that is named.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ppafo.engine.scheme.reacting import STANDING, ReactingState, Reflexes, WalkNow
+from ppafo.engine.scheme.walking import NO_CLEARANCE
+from ppafo.model.contact import FLAT
+from ppafo.model.declaration import Quantity
+from ppafo.model.wearer.nerves import Nerves
+from ppafo.model.wearer.published import PUBLISHED, nerves_at_start, orders_at_start, published_wearer, start_of_walk
+from ppafo.model.wearer.walker import Fibres, Muscles, Walker, Wearer, joints
+from ppafo.simulation.declaration import Reading, value_at
+
+REACTS = "wearer.reacts"
+"""Where the file of a walk names a wearer who reacts."""
+
+STRENGTHS = tuple(
+    Quantity(f"{name}_strength", "1", f"strength of the {name} of the leg with the device over a healthy one", 1.0, 0.01, 2.0)
+    for name in Fibres._fields
+)
+START_SPEED = Quantity("start_speed", "m/s", "speed with which the walk begins", 1.3, 0.5, 2.0)
+REACTIONS = (*STRENGTHS, START_SPEED)
+"""Numbers of a wearer who reacts."""
+
+LONGEST_STEP = 1.0e-4
+"""Longest step [s] of a wearer who reacts, and the default: 0.2 ms is wrong by 4 % in the speed of walking."""
+
+FIRST_STRIDE = 1.0
+"""Time [s] that stands for the stride before the first one."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReactingWearer:
+    """A wearer who reacts: name, body with muscles and gains of both healthy legs, and its numbers by name.
+
+    ``settings`` has the numbers of ``REACTIONS``; each may be an array (runs,).
+    """
+
+    name: str
+    body: Wearer
+    settings: Mapping[str, Any]
+
+    @property
+    def mass(self) -> float:
+        """Mass of the body [kg]."""
+        return self.body.weight / self.body.body.gravity
+
+    def row(self) -> Wearer:
+        """The body with the strengths of the leg with the device, as the engine takes it."""
+        weak = {
+            name: muscle._replace(force=muscle.force * self.settings[f"{name}_strength"])
+            for name, muscle in zip(Fibres._fields, self.body.left[: len(Fibres._fields)], strict=True)
+        }
+        muscles: Muscles = self.body.left._replace(**weak)
+        return self.body._replace(left=muscles)
+
+
+@dataclass(frozen=True, slots=True)
+class BodyStart:
+    """Where a wearer begins: the body, the reflexes, the nerves, and what counts the strides."""
+
+    walker: Walker
+    reflexes: Reflexes
+    nerves: Nerves
+    walk: ReactingState
+
+
+def start_of_body(wearer: ReactingWearer) -> BodyStart:
+    """The start of a wearer: standing on the left leg, the right one swings, at the start speed."""
+    walker = start_of_walk(wearer.body, wearer.settings[START_SPEED.name])
+    leg = walker.pose.left
+    ankle = joints(leg, walker.pose.lean).ankle
+    walk = ReactingState(
+        contact=FLAT,
+        now=WalkNow(0.0, leg.shank, ankle),
+        external_torque=0.0,
+        heel_force=0.5 * wearer.body.weight,
+        toe_force=0.5 * wearer.body.weight,
+        toes_first=0.0,
+        lands=0.0,
+        clearance=NO_CLEARANCE,
+        since=0.0,
+        stride_time=FIRST_STRIDE,
+        strides=0.0,
+        landings=0.0,
+        toe_landings=0.0,
+        slap_rates=0.0,
+        clearances=0.0,
+        push_off_work=0.0,
+        load=1.0,
+        other_load=0.0,
+        muscle_work=0.0,
+        fall_time=STANDING,
+    )
+    return BodyStart(walker, Reflexes(orders_at_start(), 0.0), nerves_at_start(wearer.body, walker), walk)
+
+
+def read_reacting(reading: Reading, folder: Path) -> ReactingWearer | None:
+    """Return the wearer who reacts of the file of a walk, None where its gait is prescribed.
+
+    A path begins in ``folder``. ScenarioError for what does not go with a wearer who reacts, or needs one.
+    """
+    name = value_at(reading.document, REACTS)
+    given = reading.document.get("wearer", {})
+    if name is None:
+        for item in REACTIONS:
+            if item.name in given:
+                raise reading.refusal(f"wearer.{item.name}", f"needs a wearer who reacts: give {REACTS} = \"NAME\"")
+        return None
+    for path in ("gait", "course"):
+        if path in reading.document:
+            raise reading.refusal(path, f"a wearer who reacts makes the gait: leave out {path}, or {REACTS}")
+    known = {item.name for item in REACTIONS} | {"reacts"}
+    for item in given:
+        if item not in known:
+            raise reading.refusal(
+                f"wearer.{item}", f"is of a leg that a gait leads; a wearer who reacts has {', '.join(sorted(known))}"
+            )
+    return ReactingWearer(name, published_wearer(PUBLISHED, PUBLISHED), reading.section("wearer", REACTIONS))
