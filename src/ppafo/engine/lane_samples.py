@@ -18,7 +18,16 @@ from ppafo.model.plant import actuator_torque, chamber_pressures
 from ppafo.model.plant_faults import is_dark, is_due, is_silenced, next_unpowered, runs_at
 from ppafo.model.sensors import GaitMeasurement, Measurement, late_measurement, measure, measure_gait, samples_late
 from ppafo.model.valves.kind import VENT
-from ppafo.signals.meter import SAME_LEVEL, FootSample, Sample, StrideSample, advance_course, is_away
+from ppafo.signals.meter import (
+    SAME_LEVEL,
+    FootSample,
+    MeterKind,
+    Sample,
+    StrideSample,
+    WearerSample,
+    advance_course,
+    is_away,
+)
 
 STOPPED, LEVEL = 3.0, "safety.level"
 """Level of a controller of walking that has stopped for good, and where it keeps it."""
@@ -269,12 +278,17 @@ def _meter_updates(rows: Rows) -> tuple[list[str], list[str]]:
     program, add = rows.program, rows.add
     groups = program.meter_groups
     moving = {group: kind for group, kind in groups.items() if not (program.is_held and kind.of_motion)}
-    begin = [f"{group} = {add(kind.start)}(course, sample)" for group, kind in groups.items()]
+    begin = [f"{group} = {add(kind.start)}(course, {_sample_for(kind)})" for group, kind in groups.items()]
     begin += [line for group in groups for line in rows.store(group)]
     update = [rows.load(group) for group in moving]
-    update += [f"{group} = {add(kind.update)}({group}, course, sample)" for group, kind in moving.items()]
+    update += [f"{group} = {add(kind.update)}({group}, course, {_sample_for(kind)})" for group, kind in moving.items()]
     update += [line for group in moving for line in rows.store(group)]
     return begin, update
+
+
+def _sample_for(kind: MeterKind) -> str:
+    """What a meter takes."""
+    return "of_wearer" if kind.of_wearer else "sample"
 
 
 def _meter_lines(rows: LaneRows, moment: str) -> list[str]:
@@ -327,7 +341,16 @@ def sample_lines(rows: Rows, moment: str) -> list[str]:
         f"wanted = {wanted}",
         *on_gait,
         f"sample = {_row(add(Sample), values)}",
+        *(wearer_sample(rows) if any(kind.of_wearer for kind in program.meters) else []),
     ]
+
+
+def wearer_sample(rows: Rows) -> list[str]:
+    """Lines that make the sample of a wearer who reacts."""
+    values = {name: f"walk.{name}" for name in WearerSample._fields if name not in ("way", "time")}
+    values |= {"way": "walker.pose.x", "time": "next_record * (timing.step * interval)"}
+    in_order = {name: values[name] for name in WearerSample._fields}
+    return [rows.load("walker"), f"of_wearer = {_row(rows.add(WearerSample), in_order)}"]
 
 
 def _zeros(row: type[FootSample] | type[StrideSample]) -> dict[str, str]:

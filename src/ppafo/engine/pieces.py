@@ -90,7 +90,8 @@ class LegScheme:
     ``loads`` and ``stored`` are as in ``GasScheme``. ``led``, ``handed`` and ``ended`` are rows that phases hand on:
     before the gas, from the step before, at the end. ``find`` makes what a step is handed by the one before, ``lead``
     are phases before the gas, ``assume`` where the gas takes the vane to be, ``reach`` phases that find where the
-    step ends, ``end`` the state after it. One that ``fails`` has faults of the plant, and a shut-off valve.
+    step ends, ``end`` the state after it. One that ``fails`` has faults of the plant, and a shut-off valve; one that
+    ``reacts`` has a body of its own, which no gait leads.
     """
 
     takes_course: bool
@@ -103,8 +104,9 @@ class LegScheme:
     handed: Mapping[str, type]
     ended: Mapping[str, type]
     find: Callable[[Any], list[str]]
-    lead: Callable[[Any], list[list[str]]]
+    lead: Callable[[Any], Phases]
     assume: Callable[[Any], list[str]]
     reach: Callable[[Any, str], Phases]
     end: Callable[[Any], list[str]]
     fails: bool = False
+    reacts: bool = False

@@ -169,6 +169,11 @@ class Program:
         return self.leg is not None and self.leg.takes_course
 
     @property
+    def reacts(self) -> bool:
+        """True where the wearer of that leg reacts."""
+        return self.leg is not None and self.leg.reacts
+
+    @property
     def fails(self) -> bool:
         """True where the plant of a walk may fail, or a shut-off valve is in its line."""
         return self.leg is not None and self.leg.fails

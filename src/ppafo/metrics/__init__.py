@@ -4,7 +4,7 @@ To add a metric: a function and its MetricKind in a module of this folder, liste
 """
 
 from ppafo.kinds import Kinds
-from ppafo.metrics import gas, motion, strides, switching, tracking
+from ppafo.metrics import gas, motion, strides, switching, tracking, wearer
 from ppafo.metrics.metric import Metric, MetricKind
 from ppafo.signals import Recording
 
@@ -17,7 +17,14 @@ METRICS: Kinds[MetricKind] = Kinds(
     MetricKind,
     {
         kind.name: kind
-        for kind in (*tracking.METRICS, *gas.METRICS, *switching.METRICS, *motion.METRICS, *strides.METRICS)
+        for kind in (
+            *tracking.METRICS,
+            *gas.METRICS,
+            *switching.METRICS,
+            *motion.METRICS,
+            *strides.METRICS,
+            *wearer.METRICS,
+        )
     },
 )
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from ppafo.control.walking.phases import PUSH_OFF
 from ppafo.control.walking.signs import HELPS
-from ppafo.metrics.metric import REQUEST, STEADY, WALK, Floats, MetricKind, Readings
+from ppafo.metrics.metric import LED, REQUEST, STEADY, WALK, Floats, MetricKind, Readings
 from ppafo.model.columns import choose, larger, root
 from ppafo.signals.meter import Course, MeterKind, Sample, StrideSample
 
@@ -263,17 +263,17 @@ def _kind(name: str, unit: str, summary: str, read: Callable[[Readings], Floats]
     return MetricKind(name, unit, summary, (), None, read, (METER,), needs=(WALK, *needs))
 
 
-def _mean(name: str, read: Callable[[Readings], Floats]) -> MetricKind:
+def _mean(name: str, read: Callable[[Readings], Floats], *needs: str) -> MetricKind:
     """A mean over the strides with help, without the first ones; on a course it would be over other strides."""
     item = PER_STRIDE[name]
-    return _kind(name, item.unit, f"{item.summary}, mean", read, STEADY)
+    return _kind(name, item.unit, f"{item.summary}, mean", read, STEADY, *needs)
 
 
 METRICS = (
     _mean("gas", _gas),
     _mean("push_off_work", _work),
     _mean("slap_rate", _slap_rate),
-    _mean("toe_clearance", _clearance),
+    _mean("toe_clearance", _clearance, LED),
     _mean("toe_landing", _landing),
     _kind("counted_strides", "-", "strides over which the means are taken", _counted, STEADY),
     _kind(

@@ -39,6 +39,21 @@ class StrideSample(NamedTuple):
     time: float
 
 
+class WearerSample(NamedTuple):
+    """A wearer who reacts at a sample: totals since the start, as in the state of the leg.
+
+    ``strides``; ``way`` of the hip [m]; ``clearances`` [m]; ``muscle_work`` [J]; ``fall_time`` [s], below 0 before a
+    fall; ``time`` [s].
+    """
+
+    strides: float
+    way: float
+    clearances: float
+    muscle_work: float
+    fall_time: float
+    time: float
+
+
 class Sample(NamedTuple):
     """One sample of a recording: its number from 0, channels in SI units, and those of a foot and of a stride.
 
@@ -109,12 +124,13 @@ class MeterKind:
 
     ``start(course, sample)`` makes it at the first sample, ``update(state, course, sample)`` at each later one. What
     ``course`` says of the hold is right up to this sample. A meter without ``needs_course`` must not look at it; one
-    that is ``of_motion`` stays as it started while the vane stands still.
+    that is ``of_motion`` stays as it started while the vane stands still. One ``of_wearer`` takes a ``WearerSample``.
     """
 
     name: str
     state: type
-    start: Callable[[Course, Sample], Any]
-    update: Callable[[Any, Course, Sample], Any]
+    start: Callable[[Course, Any], Any]
+    update: Callable[[Any, Course, Any], Any]
     needs_course: bool = False
     of_motion: bool = False
+    of_wearer: bool = False

@@ -146,7 +146,7 @@ def _plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         _pieces_of_walk(scenario, device, controller, settings, delay),
         bare._replace(gravity_torque=0.0, external_torque=0.0),
         lambda plant: walk_steps(scenario, plant),
-        lambda plant: vented_state(plant, start.walk.now.ankle, 0.0),
+        lambda plant: vented_state(plant, start.ankle, 0.0),
         walk,
     )
     return run, (too_many_steps(scenario, run.step, run.step_count), *problems, _too_long(scenario))

@@ -1,11 +1,11 @@
 """A wearer who reacts, in the file of a walk: whose reflexes, how strong which muscle is, how fast the walk begins.
 
-The device is on the left leg. A strength is that of a muscle of this leg over the healthy one's; the body, the other leg
-and all gains are those of the wearer that is named.
+The device is on the left leg. A strength is that of a muscle of this leg over the one that the wearer's file gives it;
+the body, the other leg and all gains are those of the file.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +13,18 @@ from ppafo.engine.scheme.reacting import STANDING, ReactingState, Reflexes, Walk
 from ppafo.engine.scheme.walking import NO_CLEARANCE
 from ppafo.model.contact import FLAT
 from ppafo.model.declaration import Quantity
-from ppafo.model.wearer.nerves import Nerves
-from ppafo.model.wearer.published import PUBLISHED, nerves_at_start, orders_at_start, published_wearer, start_of_walk
+from ppafo.model.wearer.nerves import Nerves, settled_nerves
+from ppafo.model.wearer.segments import Limb, Pose
 from ppafo.model.wearer.walker import Fibres, Muscles, Walker, Wearer, joints
 from ppafo.simulation.declaration import Reading, value_at
+from ppafo.wearers.loading import find_wearer, wearer_of
+from ppafo.wearers.published import felt_at, first_answer, start_of
 
 REACTS = "wearer.reacts"
 """Where the file of a walk names a wearer who reacts."""
 
 STRENGTHS = tuple(
-    Quantity(f"{name}_strength", "1", f"strength of the {name} of the leg with the device over a healthy one", 1.0, 0.01, 2.0)
+    Quantity(f"{name}_strength", "1", f"strength of the {name} of the left leg, over that of the wearer", 1.0, 0.01, 2.0)
     for name in Fibres._fields
 )
 START_SPEED = Quantity("start_speed", "m/s", "speed with which the walk begins", 1.3, 0.5, 2.0)
@@ -64,22 +66,28 @@ class ReactingWearer:
 
 @dataclass(frozen=True, slots=True)
 class BodyStart:
-    """Where a wearer begins: the body, the reflexes, the nerves, and what counts the strides."""
+    """Where a wearer begins: ankle [rad], the body, the reflexes, the nerves, and what counts the strides."""
 
+    ankle: float
     walker: Walker
     reflexes: Reflexes
     nerves: Nerves
     walk: ReactingState
 
 
+_AT_REST = Pose(0.0, 0.0, 0.0, Limb(0.0, 0.0, 0.0), Limb(0.0, 0.0, 0.0))
+
+
 def start_of_body(wearer: ReactingWearer) -> BodyStart:
     """The start of a wearer: standing on the left leg, the right one swings, at the start speed."""
-    walker = start_of_walk(wearer.body, wearer.settings[START_SPEED.name])
+    walker = start_of(wearer.body, wearer.settings[START_SPEED.name])
     leg = walker.pose.left
     ankle = joints(leg, walker.pose.lean).ankle
+    # At rest: what the legs feel in the pose of the start does not depend on the speed, which may be an array.
+    nerves = settled_nerves(*felt_at(wearer.body, walker._replace(rates=_AT_REST), LONGEST_STEP))
     walk = ReactingState(
         contact=FLAT,
-        now=WalkNow(0.0, leg.shank, ankle),
+        now=WalkNow(0.0, leg.shank),
         external_torque=0.0,
         heel_force=0.5 * wearer.body.weight,
         toe_force=0.5 * wearer.body.weight,
@@ -99,28 +107,31 @@ def start_of_body(wearer: ReactingWearer) -> BodyStart:
         muscle_work=0.0,
         fall_time=STANDING,
     )
-    return BodyStart(walker, Reflexes(orders_at_start(), 0.0), nerves_at_start(wearer.body, walker), walk)
+    return BodyStart(ankle, walker, Reflexes(first_answer(), 0.0), nerves, walk)
 
 
 def read_reacting(reading: Reading, folder: Path) -> ReactingWearer | None:
     """Return the wearer who reacts of the file of a walk, None where its gait is prescribed.
 
-    A path begins in ``folder``. ScenarioError for what does not go with a wearer who reacts, or needs one.
+    A relative path begins in ``folder``. ScenarioError for what does not go with a wearer who reacts, or needs one;
+    DataError for a file that cannot be used.
     """
     name = value_at(reading.document, REACTS)
     given = reading.document.get("wearer", {})
     if name is None:
         for item in REACTIONS:
             if item.name in given:
-                raise reading.refusal(f"wearer.{item.name}", f"needs a wearer who reacts: give {REACTS} = \"NAME\"")
+                raise reading.refusal(f"wearer.{item.name}", f'needs a wearer who reacts: give {REACTS} = "NAME"')
         return None
-    for path in ("gait", "course"):
+    for path in ("gait", "course", "bottle"):
         if path in reading.document:
-            raise reading.refusal(path, f"a wearer who reacts makes the gait: leave out {path}, or {REACTS}")
+            raise reading.refusal(path, f"does not go with {REACTS} yet: leave one of both out")
     known = {item.name for item in REACTIONS} | {"reacts"}
     for item in given:
         if item not in known:
             raise reading.refusal(
                 f"wearer.{item}", f"is of a leg that a gait leads; a wearer who reacts has {', '.join(sorted(known))}"
             )
-    return ReactingWearer(name, published_wearer(PUBLISHED, PUBLISHED), reading.section("wearer", REACTIONS))
+    file = find_wearer(folder / name if Path(name).suffix == ".toml" else name)
+    start = replace(START_SPEED, default=file.speed)
+    return ReactingWearer(file.name, wearer_of(file), reading.section("wearer", (*STRENGTHS, start)))

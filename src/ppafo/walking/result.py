@@ -12,7 +12,7 @@ from ppafo.engine.lanes import BatchResult, Floats
 from ppafo.engine.program import LaneResult
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run
 from ppafo.metrics import METRICS, Metric, evaluate
-from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, MetricKind, Metrics
+from ppafo.metrics.metric import LED, LED_SHANK, REACTS, REQUEST, STEADY, MetricKind, Metrics
 from ppafo.model.contact import SWING
 from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix, passive_torque
 from ppafo.model.plant import chamber_pressures
@@ -259,6 +259,10 @@ def lacks(scenario: Scenario, kind: MetricKind) -> str:
         return "it needs the course of the whole run, which is not kept of a walk"
     if LED_SHANK in kind.needs:
         return "it needs a leg without ground, whose shank is that of a gait"
+    if LED in kind.needs and walk_of(scenario).reacts is not None:
+        return "it is measured from the gait that leads a leg, and this wearer reacts: lowest_toes is over the ground"
+    if REACTS in kind.needs and walk_of(scenario).reacts is None:
+        return "it needs a wearer who reacts (wearer.reacts)"
     if STEADY in kind.needs and walk_of(scenario).course is not None:
         return "it is a mean over equal strides, and a course has others: leave the course out"
     is_outside = scenario.control.kind == PYTHON_CONTROLLER

@@ -54,11 +54,10 @@ SAME = 1.0e-9
 
 
 class WalkNow(NamedTuple):
-    """Phase of the stride in turns of the one before, angle of the shank, and of the ankle without a device [rad]."""
+    """Phase of the stride in turns of the one before, and angle of the shank [rad]."""
 
     phase: float
     shank: float
-    ankle: float
 
 
 class ReactingState(NamedTuple):
@@ -245,7 +244,7 @@ def advance_reacting(
     slap_rates = walk.slap_rates + (rates.left.foot if slaps else 0.0)
     return ReactingState(
         contact=contact,
-        now=WalkNow(min(since / stride_time, 1.0), pose.left.shank, after.angle),
+        now=WalkNow(min(since / stride_time, 1.0), pose.left.shank),
         external_torque=given if stood else 0.0,
         heel_force=walk.heel_force + (heel - walk.heel_force) * follows,
         toe_force=walk.toe_force + (ball - walk.toe_force) * follows,
@@ -360,6 +359,7 @@ def _scheme(fails: bool) -> LegScheme:
         reach=reach,
         end=end,
         fails=fails,
+        reacts=True,
     )
 
 

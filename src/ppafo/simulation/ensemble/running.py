@@ -17,7 +17,7 @@ from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.errors import ScenarioError
 from ppafo.metrics import METRICS
 from ppafo.metrics.gas import ENERGIES
-from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, WALK, MetricKind, Readings
+from ppafo.metrics.metric import LED, LED_SHANK, REACTS, REQUEST, STEADY, WALK, MetricKind, Readings
 from ppafo.model.gas import energy_per_content
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, TrueMasses
 from ppafo.simulation.sampled import run_in_turn
@@ -235,6 +235,8 @@ def has_channels(program: Program, kind: MetricKind) -> bool:
     has = {
         WALK: program.walks,
         STEADY: not program.takes_course,
+        LED: not program.reacts,
+        REACTS: program.reacts,
         LED_SHANK: program.shank is GAIT_SHANK,
         REQUEST: REQUEST_ROW in row_numbers(program.state_rows()),
     }

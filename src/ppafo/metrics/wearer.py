@@ -1,0 +1,108 @@
+"""Metrics of a wearer who reacts, without a recording: whether and when a fall ended the walk, speed, toes, muscles."""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+from ppafo.metrics.metric import REACTS, WALK, Floats, MetricKind, Readings
+from ppafo.metrics.strides import NOT_YET, SETTLING, mean_of
+from ppafo.model.columns import choose, larger
+from ppafo.signals.meter import Course, MeterKind, WearerSample
+
+
+class WearerTotals(NamedTuple):
+    """The samples after the strike with which the counted strides begin, and after the last one; the latest sample.
+
+    The time of a strike is below 0 before there was one.
+    """
+
+    first: WearerSample
+    last: WearerSample
+    now: WearerSample
+
+
+def _start(_course: Course, sample: WearerSample) -> WearerTotals:
+    none = WearerSample(strides=0.0, way=0.0, clearances=0.0, muscle_work=0.0, fall_time=0.0, time=NOT_YET)
+    return WearerTotals(first=none, last=none, now=sample)
+
+
+def _update(totals: WearerTotals, _course: Course, sample: WearerSample) -> WearerTotals:
+    strikes = sample.strides - totals.now.strides > 0.5
+    begins = strikes and sample.strides > float(SETTLING) and totals.first.time < 0.0
+    first = totals.first
+    last = totals.last
+    return WearerTotals(
+        first=chosen(begins, sample, first),
+        last=chosen(strikes, sample, last),
+        now=sample,
+    )
+
+
+def chosen(is_new: bool, new: WearerSample, old: WearerSample) -> WearerSample:
+    """One of two samples."""
+    return WearerSample(
+        strides=new.strides if is_new else old.strides,
+        way=new.way if is_new else old.way,
+        clearances=new.clearances if is_new else old.clearances,
+        muscle_work=new.muscle_work if is_new else old.muscle_work,
+        fall_time=new.fall_time if is_new else old.fall_time,
+        time=new.time if is_new else old.time,
+    )
+
+
+METER = MeterKind("wearer", WearerTotals, _start, _update, of_wearer=True)
+
+
+def _stays_up(readings: Readings) -> Floats:
+    found: Floats = choose(readings.meters["wearer"].now.fall_time < 0.0, 1.0, 0.0)
+    return found
+
+
+def _fall_time(readings: Readings) -> Floats:
+    time = readings.meters["wearer"].now.fall_time
+    found: Floats = choose(time >= 0.0, time, math.nan)
+    return found
+
+
+def _walked_time(readings: Readings) -> Floats:
+    now = readings.meters["wearer"].now
+    found: Floats = choose(now.fall_time >= 0.0, now.fall_time, now.time)
+    return found
+
+
+def _strides(readings: Readings) -> Floats:
+    totals = readings.meters["wearer"]
+    found: Floats = choose(totals.first.time >= 0.0, totals.last.strides - totals.first.strides, 0.0)
+    return found
+
+
+def _speed(readings: Readings) -> Floats:
+    totals = readings.meters["wearer"]
+    time = totals.last.time - totals.first.time
+    found: Floats = choose(_strides(readings) > 0.5, (totals.last.way - totals.first.way) / larger(time, 1.0e-9), math.nan)
+    return found
+
+
+def _lowest_toes(readings: Readings) -> Floats:
+    totals = readings.meters["wearer"]
+    return mean_of(totals.last.clearances - totals.first.clearances, _strides(readings))
+
+
+def _muscle_work(readings: Readings) -> Floats:
+    totals = readings.meters["wearer"]
+    return mean_of(totals.last.muscle_work - totals.first.muscle_work, _strides(readings))
+
+
+def _kind(name: str, unit: str, summary: str, read: Callable[[Readings], Floats]) -> MetricKind:
+    return MetricKind(name, unit, summary, (), None, read, (METER,), needs=(WALK, REACTS))
+
+
+METRICS = (
+    _kind("stays_up", "-", "1 of a wearer who walks on to the end, 0 of one who falls", _stays_up),
+    _kind("fall_time", "s", "time at which the wearer falls", _fall_time),
+    _kind("walked_time", "s", "time until the wearer falls, or until the end", _walked_time),
+    _kind("walking_speed", "m/s", "speed, mean over whole strides without the first ones", _speed),
+    _kind("lowest_toes", "m", "lowest toe height above ground in mid-swing, mean over the strides", _lowest_toes),
+    _kind("muscle_work", "J", "work of all muscles of both legs as they shorten, in one stride", _muscle_work),
+)
+"""Those of a wearer who reacts; gas and the others of a walk are in ``strides``."""
