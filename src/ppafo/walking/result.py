@@ -38,6 +38,7 @@ from ppafo.walking.gait_series import AnklePath, ankle_path, truncate
 from ppafo.walking.motion import walk_of
 from ppafo.walking.person import as_drawn
 from ppafo.walking.planning import course_of_walk, law_of
+from ppafo.walking.reacting import FELL, reacting_metrics, recording_of_reacting
 from ppafo.walking.strides import (
     Curves,
     SegmentResult,
@@ -288,6 +289,8 @@ def _walk_result(
     status: Status,
     supply: SupplyCourse | None,
 ) -> WalkResult:
+    if run.reacting is not None:
+        return _reacting_result(scenario, run, time, record, status)
     walked, motion = scenario, walk_of(scenario)
     # Whom it is healthy for is the person who walked; what was planned stays in the result.
     gait, wearer = as_drawn(motion.gait, motion.wearer, motion.person)
@@ -320,6 +323,32 @@ def _walk_result(
         events=events,
         segments=segments,
         supply=supply,
+    )
+
+
+def _reacting_result(
+    scenario: Scenario, run: Run, time: Floats, record: Mapping[str, Floats], status: Status
+) -> WalkResult:
+    """The result of a wearer who reacts, until the end or a fall."""
+    fall_time = float(record[FELL][-1])
+    recording, rows = recording_of_reacting(scenario, run, time, record)
+    starts = stride_starts(rows["walk.strides"])
+    strides = per_stride(rows, starts)
+    helped = helped_strides(rows.get(SAFE_ROW, np.zeros(recording.time.size)), starts)
+    metrics = reacting_metrics(scenario, run, recording.time, rows, starts, strides, helped, fall_time)
+    if fall_time >= 0.0 and status.is_completed:
+        status = Status("completed", None, f"completed: the wearer fell at t = {fall_time:.4g} s")
+    return WalkResult(
+        scenario=scenario,
+        recording=recording,
+        strides=strides,
+        averages=mean_curves(recording, starts, settled(helped)),
+        metrics=Metrics(metrics),
+        status=status,
+        starts=starts,
+        helped=helped,
+        vented_metrics={},
+        events=safety_events(scenario, recording.time, rows),
     )
 
 

@@ -1,0 +1,127 @@
+"""A walk of a wearer who reacts as a recording with its metrics: rows of the engine as channels with units.
+
+A body of its own walks here, so that nothing is compared with a gait: toes are over the ground, and strides are those
+that the wearer makes.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.engine.lanes import Floats
+from ppafo.engine.run import Run
+from ppafo.metrics import METRICS, Metric
+from ppafo.metrics.metric import REACTS
+from ppafo.metrics.strides import PER_STRIDE, SETTLING
+from ppafo.model.plant import chamber_pressures
+from ppafo.model.wearer.segments import Limb
+from ppafo.model.wearer.walker import Fibres, Joints, joints
+from ppafo.signals import Channel, Recording
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import gas_channels
+from ppafo.walking.motion import walk_of
+
+FELL = "walk.fall_time"
+"""Row of the time of a fall [s], below 0 before one."""
+
+
+def recording_of_reacting(
+    configuration: Scenario, run: Run, time: Floats, record: Mapping[str, Floats]
+) -> tuple[Recording, Mapping[str, Floats]]:
+    """The recording of a wearer who reacts [SI] until a fall, and its rows until then, from rows (samples,) by path."""
+    assert run.reacting is not None, "of a wearer who reacts"
+    stands = record[FELL] < 0.0
+    stands[0] = True
+    time, record = time[stands], {path: values[stands] for path, values in record.items()}
+    body, weight = run.reacting.body.body, run.reacting.body.weight
+    angle, rate = record["state.angle"], record["state.angular_velocity"]
+    pressure_1, pressure_2 = chamber_pressures(run.plant, angle, record["state.mass_1"], record["state.mass_2"])
+    external = record["walk.external_torque"]
+    left, right = (angles_of(record, side) for side in ("left", "right"))
+    ankle_height = (
+        record["walker.pose.y"]
+        - body.thigh.length * np.cos(record["walker.pose.left.thigh"])
+        - body.shank.length * np.cos(record["walker.pose.left.shank"])
+    )
+    channels: dict[str, tuple[Any, str]] = {
+        "angle": (angle, "rad"),
+        "angular_velocity": (rate, "rad/s"),
+        "shank_angle": (record["walk.now.shank"], "rad"),
+        "knee_angle": (left.knee, "rad"),
+        "hip_angle": (left.hip, "rad"),
+        "other_ankle_angle": (right.ankle, "rad"),
+        "other_knee_angle": (right.knee, "rad"),
+        "other_hip_angle": (right.hip, "rad"),
+        "trunk_lean": (record["walker.pose.lean"], "rad"),
+        "hip_height": (record["walker.pose.y"], "m"),
+        "way": (record["walker.pose.x"], "m"),
+        "ground_force": (weight * record["walk.load"], "N"),
+        "other_ground_force": (weight * record["walk.other_load"], "N"),
+        "pressure_1": (pressure_1, "Pa"),
+        "pressure_2": (pressure_2, "Pa"),
+        "torque": (run.plant.torque_constant * np.subtract(pressure_1, pressure_2), "N m"),
+        "external_torque": (external, "N m"),
+        "device_power": (external * rate, "W"),
+        "toe_height": (ankle_height + body.foot.length * np.sin(record["walker.pose.left.foot"]), "m"),
+        "command": (record["result.command"], "-"),
+        "contact": (record["walk.contact"], "-"),
+        "heel_force": (record["walk.heel_force"], "N"),
+        "toe_force": (record["walk.toe_force"], "N"),
+        "supplied_mass": (record["state.supplied_mass"], "kg"),
+        "vented_mass": (record["state.vented_mass"], "kg"),
+        "muscle_work": (record["walk.muscle_work"], "J"),
+    }
+    for name in Fibres._fields:
+        channels[f"{name}_activation"] = (record[f"walker.left.fibres.{name}.activation"], "-")
+    channels |= gas_channels(configuration.device.gas, run, record)
+    values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
+    return Recording(f"walk, {configuration.name}", time, values, kind="simulated"), record
+
+
+def angles_of(record: Mapping[str, Floats], side: str) -> Joints:
+    """Joint angles [rad] of a leg, ``left`` or ``right``, sample by sample."""
+    limb: Any = Limb(*(record[f"walker.pose.{side}.{name}"] for name in Limb._fields))
+    lean: Any = record["walker.pose.lean"]
+    return joints(limb, lean)
+
+
+def reacting_metrics(
+    configuration: Scenario,
+    run: Run,
+    time: Floats,
+    record: Mapping[str, Floats],
+    starts: NDArray[np.intp],
+    strides: Mapping[str, Floats],
+    helped: NDArray[np.bool_],
+    fall_time: float,
+) -> dict[str, Metric]:
+    """Metrics of a wearer who reacts by name, in SI, of the strides without the first ones until a fall.
+
+    ``starts`` are the samples after each strike, ``strides`` numbers of each whole stride, ``helped`` those with help.
+    """
+    of_wearer = {name: kind for name, kind in METRICS.items() if REACTS in kind.needs}
+    fell = fall_time >= 0.0
+    values = {"stays_up": 0.0 if fell else 1.0, "walked_time": fall_time if fell else float(time[-1])}
+    values |= {"fall_time": fall_time} if fell else {}
+    counted = np.arange(helped.size) >= SETTLING
+    if counted.any():
+        first, last = starts[SETTLING], starts[-1]
+        count = float(counted.sum())
+        length = float(time[last] - time[first])
+        values["walking_speed"] = float(record["walker.pose.x"][last] - record["walker.pose.x"][first]) / length
+        values["lowest_toes"] = float(record["walk.clearances"][last] - record["walk.clearances"][first]) / count
+        values["muscle_work"] = float(record["walk.muscle_work"][last] - record["walk.muscle_work"][first]) / count
+    found = {name: Metric(value, of_wearer[name].unit, of_wearer[name].summary) for name, value in values.items()}
+    for name, item in PER_STRIDE.items():
+        own = strides[name][counted & helped]
+        own = own[own < 0.0] if name == "slap_rate" else own
+        if own.size and name != "toe_clearance":
+            found[name] = Metric(float(own.mean()), item.unit, f"{item.summary}, mean")
+    gas = record["state.supplied_mass"]
+    found["strides"] = Metric(float(helped.size), "-", "whole strides of the walk")
+    found["helped_strides"] = Metric(float(helped.sum()), "-", "whole strides with help from strike to strike")
+    found["counted_strides"] = Metric(float((counted & helped).sum()), "-", "strides over which the means are taken")
+    found["total_gas"] = Metric(float(gas[-1] - gas[0]), "kg", "gas taken from the supply in the whole walk")
+    return found
