@@ -79,7 +79,9 @@ def _strides(readings: Readings) -> Floats:
 def _speed(readings: Readings) -> Floats:
     totals = readings.meters["wearer"]
     time = totals.last.time - totals.first.time
-    found: Floats = choose(_strides(readings) > 0.5, (totals.last.way - totals.first.way) / larger(time, 1.0e-9), math.nan)
+    found: Floats = choose(
+        _strides(readings) > 0.5, (totals.last.way - totals.first.way) / larger(time, 1.0e-9), math.nan
+    )
     return found
 
 

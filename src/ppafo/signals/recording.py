@@ -84,7 +84,9 @@ CHANNELS: dict[str, ChannelKind] = {
         "m", "toes over the ground, against the healthy gait with a flat foot at the same instant"
     ),
     "knee_angle": ChannelKind("rad", "knee angle of the leg with the device, 180 deg straight"),
-    "hip_angle": ChannelKind("rad", "hip angle of the leg with the device, 180 deg in line with the trunk, growing in extension"),
+    "hip_angle": ChannelKind(
+        "rad", "hip angle of the leg with the device, 180 deg in line with the trunk, growing in extension"
+    ),
     "other_ankle_angle": ChannelKind("rad", "ankle angle of the other leg, growing in plantarflexion"),
     "other_knee_angle": ChannelKind("rad", "knee angle of the other leg, 180 deg straight"),
     "other_hip_angle": ChannelKind("rad", "hip angle of the other leg"),

@@ -289,7 +289,9 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
         ),
         "timing": optional(_timing(), "how the controller knows the time in the stride; thresholds unless given"),
         "wearer": optional(
-            table("Wearer", {"reacts": optional(str, REACTS_SUMMARY), **quantity_fields((*WEARER, PERSON, *REACTIONS))}),
+            table(
+                "Wearer", {"reacts": optional(str, REACTS_SUMMARY), **quantity_fields((*WEARER, PERSON, *REACTIONS))}
+            ),
             "who walks; the subject of the gait that is named, else the paper's, unless given",
         ),
         "sensors": optional(table("WalkSensors", sensors), "sensors of the controller; ideal unless given"),

@@ -155,9 +155,9 @@ def _plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
 def _too_long(scenario: Scenario) -> Problem:
     """A step that is too long for a body."""
     step = scenario.time_step
-    return np.asarray(step > LONGEST_STEP), lambda run: (
-        f"run.step = {at(step, run):g} s: a wearer who reacts needs {LONGEST_STEP:g} s or less"
-    )
+    return np.asarray(
+        step > LONGEST_STEP
+    ), lambda run: f"run.step = {at(step, run):g} s: a wearer who reacts needs {LONGEST_STEP:g} s or less"
 
 
 def batch_of_many(scenario: Scenario, build: Build, gaits: VariedGaits, generator: np.random.Generator) -> Batch:

@@ -14,6 +14,7 @@ from ppafo.engine.scheme.walking import NO_CLEARANCE
 from ppafo.model.contact import FLAT
 from ppafo.model.declaration import Quantity
 from ppafo.model.wearer.nerves import Nerves, settled_nerves
+from ppafo.model.wearer.reflexes import Gains
 from ppafo.model.wearer.segments import Limb, Pose
 from ppafo.model.wearer.walker import Fibres, Muscles, Walker, Wearer, joints
 from ppafo.simulation.declaration import Reading, value_at
@@ -24,11 +25,28 @@ REACTS = "wearer.reacts"
 """Where the file of a walk names a wearer who reacts."""
 
 STRENGTHS = tuple(
-    Quantity(f"{name}_strength", "1", f"strength of the {name} of the left leg, over that of the wearer", 1.0, 0.01, 2.0)
+    Quantity(
+        f"{name}_strength", "1", f"strength of the {name} of the left leg, over that of the wearer", 1.0, 0.01, 2.0
+    )
     for name in Fibres._fields
 )
+IN_RADIANS = ("knee_stop_angle", "lean_reference")
+GAINS = tuple(
+    Quantity(
+        f"{side}_{name}",
+        "rad" if name in IN_RADIANS else "1",
+        f"reflex gain {name} of the {side} leg; that of the wearer unless given",
+        0.0,
+        0.0,
+        4.0 if name in IN_RADIANS else 100.0,
+    )
+    for side in ("left", "right")
+    for name in Gains._fields
+)
+"""Gains of the reflexes of both legs, forces in largest forces, lengths in optimum lengths."""
+
 START_SPEED = Quantity("start_speed", "m/s", "speed with which the walk begins", 1.3, 0.5, 2.0)
-REACTIONS = (*STRENGTHS, START_SPEED)
+REACTIONS = (*STRENGTHS, *GAINS, START_SPEED)
 """Numbers of a wearer who reacts."""
 
 LONGEST_STEP = 1.0e-4
@@ -61,7 +79,10 @@ class ReactingWearer:
             for name, muscle in zip(Fibres._fields, self.body.left[: len(Fibres._fields)], strict=True)
         }
         muscles: Muscles = self.body.left._replace(**weak)
-        return self.body._replace(left=muscles)
+        left, right = (
+            Gains(*(self.settings[f"{side}_{name}"] for name in Gains._fields)) for side in ("left", "right")
+        )
+        return self.body._replace(left=muscles, left_gains=left, right_gains=right)
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,5 +154,8 @@ def read_reacting(reading: Reading, folder: Path) -> ReactingWearer | None:
                 f"wearer.{item}", f"is of a leg that a gait leads; a wearer who reacts has {', '.join(sorted(known))}"
             )
     file = find_wearer(folder / name if Path(name).suffix == ".toml" else name)
-    start = replace(START_SPEED, default=file.speed)
-    return ReactingWearer(file.name, wearer_of(file), reading.section("wearer", (*STRENGTHS, start)))
+    own = {f"left_{name}": value for name, value in file.left_gains._asdict().items()}
+    own |= {f"right_{name}": value for name, value in file.right_gains._asdict().items()}
+    own |= {START_SPEED.name: file.speed}
+    numbers = tuple(replace(item, default=own.get(item.name, item.default)) for item in REACTIONS)
+    return ReactingWearer(file.name, wearer_of(file), reading.section("wearer", numbers))

@@ -195,9 +195,7 @@ def next_reflexes(wearer: Wearer, nerves: Nerves, reflexes: Reflexes, body: Body
     left: LegNerves = nerves.left
     right: LegNerves = nerves.right
     before = reflexes.ordered
-    ordered = answer(
-        wearer, before.left, before.right, arrived(left), arrived(right), balance_arrived(nerves), SAMPLE
-    )
+    ordered = answer(wearer, before.left, before.right, arrived(left), arrived(right), balance_arrived(nerves), SAMPLE)
     return Reflexes(ordered, body.until)
 
 
