@@ -124,7 +124,7 @@ def start_of(wearer: Wearer, speed: float) -> Walker:
 def _leg_at_start(muscles: Muscles, angles: Joints) -> LegState:
     """A leg that does not touch the ground yet, whose tendons are just without force."""
     fibre = Fibre(activation=0.05, length=0.1)
-    wholes = pull(muscles, Fibres(*[fibre] * 7), angles.ankle, angles.knee, angles.hip, 0.0)
+    wholes = pull(muscles, Fibres(*[fibre] * 7), angles, Joints(0.0, 0.0, 0.0), 0.0)
     none = Point(0.0, 0.0, 0.0)
     return LegState(
         Fibres(

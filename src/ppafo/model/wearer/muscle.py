@@ -96,15 +96,17 @@ def slope_of_lengthening(force: float) -> float:
 
 
 def next_fibre(muscle: Muscle, fibre: Fibre, stimulation: float, whole: float, step: float) -> Fibre:
-    """The muscle after a step [s] at a stimulation [-], 0.01 to 1, and a length of muscle and tendon [m].
+    """The muscle after a step [s] at a stimulation [-], 0.01 to 1, and the length of muscle and tendon [m] halfway.
 
-    f_v = (F_SE + F_BE) / (A f_l + F_PE); the element moves by linearised implicit Euler, as a tendon is stiff.
+    f_v = (F_SE + F_BE) / (A f_l + F_PE). Both numbers move by the linearised rule of the middle: it bears how stiff a
+    tendon is, and its error goes with the square of the step. Implicit Euler is out by 2 % in speed at 0.1 ms.
     """
     relative = fibre.length / muscle.optimum
     strain = max((whole - fibre.length) / muscle.slack - 1.0, 0.0) / TENDON_STRAIN
     stretched = max(relative - 1.0, 0.0) / WIDTH
     pressed = max(1.0 - WIDTH - relative, 0.0) / (0.5 * WIDTH)
-    isometric = fibre.activation * bell(relative) + stretched * stretched
+    activation = fibre.activation + (stimulation - fibre.activation) * step / (EXCITATION_TIME + 0.5 * step)
+    isometric = 0.5 * (fibre.activation + activation) * bell(relative) + stretched * stretched
     borne = (strain * strain + pressed * pressed) / isometric
     speed = muscle.velocity * muscle.optimum
     # How the force that is borne falls with the length of the element: tendon and buffer; the bell is slow beside them.
@@ -112,8 +114,8 @@ def next_fibre(muscle: Muscle, fibre: Fibre, stimulation: float, whole: float, s
     stiffness += borne * 2.0 * stretched / (WIDTH * muscle.optimum)
     slope = speed * slope_of_lengthening(borne) * stiffness / isometric
     return Fibre(
-        activation=fibre.activation + (stimulation - fibre.activation) * step / EXCITATION_TIME,
-        length=fibre.length + step * speed * lengthening(borne) / (1.0 + step * slope),
+        activation=activation,
+        length=fibre.length + step * speed * lengthening(borne) / (1.0 + 0.5 * step * slope),
     )
 
 

@@ -106,8 +106,18 @@ class Assist(NamedTuple):
     inertia: float
 
 
+class Joints(NamedTuple):
+    """Angles of ankle, knee and hip [rad], or rates; 90 deg, straight and straight at 90, 180 and 180 deg."""
+
+    ankle: float
+    knee: float
+    hip: float
+
+
 class Pull(NamedTuple):
-    """A leg's muscles: wholes [m], torques on ankle, knee and hip [N m], each growing its angle, and what is felt."""
+    """A leg's muscles: lengths with their tendons halfway through the step [m], torques on ankle, knee and hip [N m], each
+    growing its angle, and what is felt.
+    """
 
     soleus: float
     tibialis: float
@@ -132,24 +142,27 @@ def force(muscle: Muscle, fibre: Fibre, length: float) -> float:
     return tendon_force(muscle, length - fibre.length)
 
 
-def pull(muscles: Muscles, fibres: Fibres, ankle: float, knee: float, hip: float, knee_rate: float) -> Pull:
-    """How the muscles of a leg pull at joint angles [rad]; the load that is felt is not known here."""
-    soleus_arm, soleus_way = arm_and_way(muscles.soleus_ankle, ankle)
-    tibialis_arm, tibialis_way = arm_and_way(muscles.tibialis_ankle, ankle)
-    calf_arm, calf_way = arm_and_way(muscles.gastrocnemius_ankle, ankle)
-    back_arm, back_way = arm_and_way(muscles.gastrocnemius_knee, knee)
-    vastus_arm, vastus_way = arm_and_way(muscles.vastus_knee, knee)
-    ham_arm, ham_way = arm_and_way(muscles.hamstring_knee, knee)
-    hip_way = muscles.hamstring_hip.share * muscles.hamstring_hip.lever * (muscles.hamstring_hip.rest_at - hip)
-    gluteus_way = muscles.gluteus_hip.share * muscles.gluteus_hip.lever * (muscles.gluteus_hip.rest_at - hip)
-    flexor_way = muscles.flexor_hip.share * muscles.flexor_hip.lever * (hip - muscles.flexor_hip.rest_at)
+def pull(muscles: Muscles, fibres: Fibres, angle: Joints, rate: Joints, ahead: float) -> Pull:
+    """How the muscles of a leg pull at joint angles [rad], and how long they are a time ``ahead`` [s] at the rates of now.
+
+    The load that is felt is not known here.
+    """
+    soleus_arm, soleus_way = arm_and_way(muscles.soleus_ankle, angle.ankle)
+    tibialis_arm, tibialis_way = arm_and_way(muscles.tibialis_ankle, angle.ankle)
+    calf_arm, calf_way = arm_and_way(muscles.gastrocnemius_ankle, angle.ankle)
+    back_arm, back_way = arm_and_way(muscles.gastrocnemius_knee, angle.knee)
+    vastus_arm, vastus_way = arm_and_way(muscles.vastus_knee, angle.knee)
+    ham_arm, ham_way = arm_and_way(muscles.hamstring_knee, angle.knee)
+    hip_share = muscles.hamstring_hip.share * muscles.hamstring_hip.lever
+    gluteus_share = muscles.gluteus_hip.share * muscles.gluteus_hip.lever
+    flexor_share = muscles.flexor_hip.share * muscles.flexor_hip.lever
     soleus = whole(muscles.soleus, -soleus_way)
     tibialis = whole(muscles.tibialis, tibialis_way)
     gastrocnemius = whole(muscles.gastrocnemius, back_way - calf_way)
     vastus = whole(muscles.vastus, -vastus_way)
-    hamstring = whole(muscles.hamstring, ham_way + hip_way)
-    gluteus = whole(muscles.gluteus, gluteus_way)
-    flexor = whole(muscles.flexor, flexor_way)
+    hamstring = whole(muscles.hamstring, ham_way + hip_share * (muscles.hamstring_hip.rest_at - angle.hip))
+    gluteus = whole(muscles.gluteus, gluteus_share * (muscles.gluteus_hip.rest_at - angle.hip))
+    flexor = whole(muscles.flexor, flexor_share * (angle.hip - muscles.flexor_hip.rest_at))
     soleus_force = force(muscles.soleus, fibres.soleus, soleus)
     tibialis_force = force(muscles.tibialis, fibres.tibialis, tibialis)
     calf_force = force(muscles.gastrocnemius, fibres.gastrocnemius, gastrocnemius)
@@ -157,16 +170,19 @@ def pull(muscles: Muscles, fibres: Fibres, ankle: float, knee: float, hip: float
     ham_force = force(muscles.hamstring, fibres.hamstring, hamstring)
     gluteus_force = force(muscles.gluteus, fibres.gluteus, gluteus)
     flexor_force = force(muscles.flexor, fibres.flexor, flexor)
+    ankle_turn, knee_turn, hip_turn = ahead * rate.ankle, ahead * rate.knee, ahead * rate.hip
+    calf_turn = muscles.gastrocnemius_knee.share * back_arm * knee_turn
+    calf_turn -= muscles.gastrocnemius_ankle.share * calf_arm * ankle_turn
     calf = calf_force * muscles.gastrocnemius.force
     ham = ham_force * muscles.hamstring.force
     return Pull(
-        soleus=soleus,
-        tibialis=tibialis,
-        gastrocnemius=gastrocnemius,
-        vastus=vastus,
-        hamstring=hamstring,
-        gluteus=gluteus,
-        flexor=flexor,
+        soleus=soleus - muscles.soleus_ankle.share * soleus_arm * ankle_turn,
+        tibialis=tibialis + muscles.tibialis_ankle.share * tibialis_arm * ankle_turn,
+        gastrocnemius=gastrocnemius + calf_turn,
+        vastus=vastus - muscles.vastus_knee.share * vastus_arm * knee_turn,
+        hamstring=hamstring + muscles.hamstring_knee.share * ham_arm * knee_turn - hip_share * hip_turn,
+        gluteus=gluteus - gluteus_share * hip_turn,
+        flexor=flexor + flexor_share * hip_turn,
         ankle=soleus_force * muscles.soleus.force * soleus_arm
         + calf * calf_arm
         - tibialis_force * muscles.tibialis.force * tibialis_arm,
@@ -179,8 +195,8 @@ def pull(muscles: Muscles, fibres: Fibres, ankle: float, knee: float, hip: float
             gastrocnemius=calf_force,
             tibialis=fibres.tibialis.length / muscles.tibialis.optimum,
             vastus=vastus_force,
-            knee=knee,
-            knee_rate=knee_rate,
+            knee=angle.knee,
+            knee_rate=rate.knee,
             hamstring=ham_force,
             gluteus=gluteus_force,
             hamstring_length=fibres.hamstring.length / muscles.hamstring.optimum,
@@ -205,14 +221,6 @@ def end_of_joint(stop: Stop, low: float, high: float, angle: float, rate: float)
     torque = stop.stiffness * (below * max(opening, 0.0) - above * max(closing, 0.0))
     damping = stop.stiffness / stop.relaxing * ((above if closing > 0.0 else 0.0) + (below if opening > 0.0 else 0.0))
     return End(torque, damping)
-
-
-class Joints(NamedTuple):
-    """Angles of ankle, knee and hip [rad], or rates; 90 deg, straight and straight at 90, 180 and 180 deg."""
-
-    ankle: float
-    knee: float
-    hip: float
 
 
 def joints(limb: Limb, lean: float) -> Joints:
@@ -286,7 +294,7 @@ def leg_now(
         speed_x - body.foot.length * up * limb_rates.foot,
         speed_y + body.foot.length * along * limb_rates.foot,
     )
-    pulled = pull(muscles, state.fibres, angle.ankle, angle.knee, angle.hip, rate.knee)
+    pulled = pull(muscles, state.fibres, angle, rate, 0.5 * step)
     ankle_end = end_of_joint(wearer.stop, wearer.stop.ankle_low, wearer.stop.ankle_high, angle.ankle, rate.ankle)
     knee_end = end_of_joint(wearer.stop, 0.0, wearer.stop.knee, angle.knee, rate.knee)
     hip_end = wearer.stop.stiffness * max(angle.hip - wearer.stop.hip, 0.0)
