@@ -1,7 +1,7 @@
 """A Hill muscle with its tendon: forces, and how its contractile element moves; and how muscles pull on joints.
 
-Forces are in units of the muscle's largest, lengths in metres. H. Geyer, A. Seyfarth and R. Blickhan, Proc. R. Soc. B 270
-(2003) 2173; H. Geyer and H. Herr, IEEE Trans. Neural Syst. Rehabil. Eng. 18 (2010) 263.
+Forces are in units of the muscle's largest, lengths in metres. H. Geyer, A. Seyfarth and R. Blickhan, Proc. R. Soc. B
+270 (2003) 2173; H. Geyer and H. Herr, IEEE Trans. Neural Syst. Rehabil. Eng. 18 (2010) 263.
 """
 
 from typing import NamedTuple
@@ -31,7 +31,7 @@ TERMS = 9
 
 
 class Muscle(NamedTuple):
-    """Largest isometric force [N], optimum length [m], largest velocity [optimum lengths/s], slack of the tendon [m]."""
+    """Largest isometric force [N], optimum length [m], largest velocity [optimum lengths/s], slack tendon [m]."""
 
     force: float
     optimum: float
@@ -47,8 +47,9 @@ class Fibre(NamedTuple):
 
 
 class Lever(NamedTuple):
-    """How a muscle passes a joint: lever [m], angle where it is largest and where the muscle is at rest [rad], and the
-    share of its way that its fibres, which lie askew, take [-].
+    """How a muscle passes a joint: lever [m], angles where it is largest and where the muscle is at rest [rad], share.
+
+    The share [-] is that of its way that its fibres, which lie askew, take.
     """
 
     lever: float

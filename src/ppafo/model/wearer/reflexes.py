@@ -1,7 +1,7 @@
 """Reflexes of a walking leg: stimulation of seven muscles from what the leg felt 5, 10 and 20 ms ago.
 
-H. Geyer and H. Herr, IEEE Trans. Neural Syst. Rehabil. Eng. 18 (2010) 263: stance and swing have their own; forces are in
-units of the muscle's largest, lengths in optimum lengths, loads in body weights.
+H. Geyer and H. Herr, IEEE Trans. Neural Syst. Rehabil. Eng. 18 (2010) 263: stance and swing have their own; forces are
+in units of the muscle's largest, lengths in optimum lengths, loads in body weights.
 """
 
 from typing import NamedTuple

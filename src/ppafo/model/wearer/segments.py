@@ -13,7 +13,7 @@ from ppafo.model.elementary import TURNS_OF_RADIAN, sine_and_cosine_of_turns
 
 
 class Segment(NamedTuple):
-    """Length [m], distance of the mass centre from the joint above [m], mass [kg], inertia about that centre [kg m^2]."""
+    """Length [m], distance of the mass centre from the joint above [m], mass [kg], inertia about it [kg m^2]."""
 
     length: float
     mass_centre: float
@@ -24,7 +24,7 @@ class Segment(NamedTuple):
 class Body(NamedTuple):
     """Segments of a wearer, SI units.
 
-    Of the foot ``length`` is from ankle to ball, and ``heel`` [m] is behind the ankle; the trunk counts from the hip up.
+    Of the foot ``length`` is from ankle to ball, and ``heel`` [m] is behind the ankle; the trunk begins at the hip.
     """
 
     trunk: Segment

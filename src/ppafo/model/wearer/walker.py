@@ -115,8 +115,9 @@ class Joints(NamedTuple):
 
 
 class Pull(NamedTuple):
-    """A leg's muscles: lengths with their tendons halfway through the step [m], torques on ankle, knee and hip [N m], each
-    growing its angle, and what is felt.
+    """A leg's muscles: lengths with tendons halfway through the step [m], torques on the joints [N m], what is felt.
+
+    A torque above 0 makes the angle of its joint grow.
     """
 
     soleus: float
@@ -143,7 +144,7 @@ def force(muscle: Muscle, fibre: Fibre, length: float) -> float:
 
 
 def pull(muscles: Muscles, fibres: Fibres, angle: Joints, rate: Joints, ahead: float) -> Pull:
-    """How the muscles of a leg pull at joint angles [rad], and how long they are a time ``ahead`` [s] at the rates of now.
+    """How the muscles of a leg pull at joint angles [rad], and how long they are a time ``ahead`` [s] at these rates.
 
     The load that is felt is not known here.
     """
@@ -444,7 +445,7 @@ def answer(
     balance: Balance,
     period: float,
 ) -> Answer:
-    """The reflexes at a sample, a ``period`` [s] after the one before; felt is what has come along the nerves by now."""
+    """The reflexes at a sample, a ``period`` [s] after the last; felt is what has come along the nerves by now."""
     left_gait = next_gait(left, left_felt.load, balance.lean, period)
     right_gait = next_gait(right, right_felt.load, balance.lean, period)
     both = left_gait.stands > 0.5 and right_gait.stands > 0.5
