@@ -143,13 +143,14 @@ def _platforms(parsed: argparse.Namespace) -> list[str]:
 def _torque(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
     from ppafo.exports.opensim import check_strikes, opensim_files
     from ppafo.walking.loading import load_walk
-    from ppafo.walking.motion import walk_of
+    from ppafo.walking.motion import check_led, walk_of
     from ppafo.walking.walk import walk
 
     strikes = () if parsed.strikes is None else _times(parsed.strikes)
     if parsed.strikes is not None:
         check_strikes(strikes)
     chosen = load_walk(parsed.scenario, parsed.overrides, parsed.gait)
+    check_led(chosen, "a torque file for OpenSim")
     few_strides = _FEW_STRIDES if walk_of(chosen).course is None else None
     result = walk(chosen, few_strides if parsed.minutes is None else parsed.minutes)
     contents = opensim_files(result, parsed.side, strikes)

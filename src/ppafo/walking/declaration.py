@@ -48,8 +48,8 @@ THRESHOLDS = next(iter(TIMINGS))
 """The way to know the time in the stride of a walk file that names none."""
 
 REACTS_SUMMARY = (
-    "name of a wearer who reacts, or the path of its file; the gait is prescribed unless given, and strengths of muscles "
-    "and the start speed are for a wearer who reacts alone"
+    "name of a wearer who reacts, or the path of its file; the gait is prescribed unless given, and strengths of "
+    "muscles, gains and the start speed are for a wearer who reacts alone"
 )
 
 ARITHMETIC = "controller.arithmetic"
@@ -192,6 +192,11 @@ def _texts(document: Mapping[str, Any]) -> tuple[str, ...]:
     return (*TEXTS, "gait", "course", REACTS, BOTTLE_NAME, *kinds, *arithmetic)
 
 
+def others_wearer(reacts: bool) -> set[str]:
+    """Return the paths that the other kind of wearer has: one who reacts, or one whom a gait leads."""
+    return {f"wearer.{item.name}" for item in ((*WEARER, PERSON) if reacts else REACTIONS)}
+
+
 def _quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
     """Return the declaration of every number that a document with its kinds can hold, by path."""
     find_kinds(document, "the file of a walk")
@@ -199,8 +204,7 @@ def _quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
     lost = {
         f"gas_model.{item.name}" for item in THERMAL_GAS if item not in gas_settings(kind_at(document, "gas_model"))
     }
-    others = REACTIONS if value_at(document, REACTS) is None else (*WEARER, PERSON)
-    lost |= {f"wearer.{item.name}" for item in others}
+    lost |= others_wearer(reacts=value_at(document, REACTS) is not None)
     return {path: item for path, item in found.items() if path not in lost}
 
 

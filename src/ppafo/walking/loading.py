@@ -69,7 +69,7 @@ from ppafo.walking.motion import (
 from ppafo.walking.nominal import nominal_terms
 from ppafo.walking.planning import NO_REFERENCE, course_of_walk, noise, plan_walks, switches, walking_valve
 from ppafo.walking.preparation import FaultSettings, SensorSettings
-from ppafo.walking.reacting_wearer import LONGEST_STEP, REACTS, read_reacting
+from ppafo.walking.reacting_wearer import LONGEST_STEP, read_reacting
 from ppafo.walking.result import lacks, measured
 from ppafo.walking.wearer import read_wearer, wearer_origin
 

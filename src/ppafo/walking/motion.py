@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.control.walking.catalog import TIMINGS
+from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
 from ppafo.gait.plausible import gait_file_remarks
 from ppafo.model.columns import Problem, at, over_runs
@@ -27,6 +28,7 @@ from ppafo.walking.declaration import (
     controller_settings,
     converter_settings,
     fault_numbers,
+    others_wearer,
     quantities,
     timing_settings,
 )
@@ -76,6 +78,15 @@ def walk_of(scenario: Scenario) -> WalkMotion:
     motion = scenario.motion
     assert isinstance(motion, WalkMotion), "only walks come here"
     return motion
+
+
+def check_led(scenario: Scenario, doing: str) -> None:
+    """Raise ScenarioError for a wearer who reacts, where ``doing`` needs a gait that is prescribed."""
+    if walk_of(scenario).reacts is not None:
+        raise ScenarioError(
+            f"{scenario.name}: {doing} needs a prescribed gait, and its wearer reacts; leave wearer.reacts out "
+            "(a wearer who reacts goes by simulate, walk, find, sweep, sensitivity, montecarlo and tune)"
+        )
 
 
 def person_remarks(scenario: Scenario) -> list[str]:
@@ -128,8 +139,7 @@ def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
     for part, fault in motion.broken.items():
         kept |= {f"faults.{part}.{name}" for name in fault.numbers}
     kept |= {f"shut_off.{name}" for name in motion.shut_off}
-    others = REACTIONS if motion.reacts is None else (*WEARER, PERSON)
-    kept -= {f"wearer.{item.name}" for item in others}
+    kept -= others_wearer(reacts=motion.reacts is not None)
     # An object in charge has no settings, and a timing is one of a controller that has some.
     lost = {path for path in kept if path.startswith("timing.") and path.partition(".")[2] not in control.settings}
     return {path: item for path, item in known.items() if path in kept - lost}

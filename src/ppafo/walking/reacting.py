@@ -21,7 +21,6 @@ from ppafo.model.wearer.walker import Fibres, Joints, joints
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import gas_channels
-from ppafo.walking.motion import walk_of
 
 FELL = "walk.fall_time"
 """Row of the time of a fall [s], below 0 before one."""
@@ -82,14 +81,13 @@ def recording_of_reacting(
 
 def angles_of(record: Mapping[str, Floats], side: str) -> Joints:
     """Joint angles [rad] of a leg, ``left`` or ``right``, sample by sample."""
-    limb: Any = Limb(*(record[f"walker.pose.{side}.{name}"] for name in Limb._fields))
+    angles: Any = [record[f"walker.pose.{side}.{name}"] for name in Limb._fields]
+    limb = Limb(*angles)
     lean: Any = record["walker.pose.lean"]
     return joints(limb, lean)
 
 
 def reacting_metrics(
-    configuration: Scenario,
-    run: Run,
     time: Floats,
     record: Mapping[str, Floats],
     starts: NDArray[np.intp],

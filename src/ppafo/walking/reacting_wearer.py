@@ -16,9 +16,9 @@ from ppafo.model.declaration import Quantity
 from ppafo.model.wearer.nerves import Nerves, settled_nerves
 from ppafo.model.wearer.reflexes import Gains
 from ppafo.model.wearer.segments import Limb, Pose
-from ppafo.model.wearer.walker import Fibres, Muscles, Walker, Wearer, joints
+from ppafo.model.wearer.walker import Fibres, Walker, Wearer, joints
 from ppafo.simulation.declaration import Reading, value_at
-from ppafo.wearers.loading import find_wearer, wearer_of
+from ppafo.wearers.loading import find_wearer, wearer_of, with_strengths
 from ppafo.wearers.published import felt_at, first_answer, start_of
 
 REACTS = "wearer.reacts"
@@ -74,11 +74,7 @@ class ReactingWearer:
 
     def row(self) -> Wearer:
         """The body with the strengths of the leg with the device, as the engine takes it."""
-        weak = {
-            name: muscle._replace(force=muscle.force * self.settings[f"{name}_strength"])
-            for name, muscle in zip(Fibres._fields, self.body.left[: len(Fibres._fields)], strict=True)
-        }
-        muscles: Muscles = self.body.left._replace(**weak)
+        muscles = with_strengths(self.body.left, {name: self.settings[f"{name}_strength"] for name in Fibres._fields})
         left, right = (
             Gains(*(self.settings[f"{side}_{name}"] for name in Gains._fields)) for side in ("left", "right")
         )
@@ -150,9 +146,8 @@ def read_reacting(reading: Reading, folder: Path) -> ReactingWearer | None:
     known = {item.name for item in REACTIONS} | {"reacts"}
     for item in given:
         if item not in known:
-            raise reading.refusal(
-                f"wearer.{item}", f"is of a leg that a gait leads; a wearer who reacts has {', '.join(sorted(known))}"
-            )
+            words = f"{', '.join(item.name for item in (*STRENGTHS, START_SPEED))} and gains such as {GAINS[0].name}"
+            raise reading.refusal(f"wearer.{item}", f"is of a leg that a gait leads; a wearer who reacts has {words}")
     file = find_wearer(folder / name if Path(name).suffix == ".toml" else name)
     own = {f"left_{name}": value for name, value in file.left_gains._asdict().items()}
     own |= {f"right_{name}": value for name, value in file.right_gains._asdict().items()}

@@ -254,22 +254,29 @@ def measured(
 
 def lacks(scenario: Scenario, kind: MetricKind) -> str:
     """Why a walk has not what a metric needs, an empty text where it has."""
-    if "reference" in kind.channels:
-        return "a walk has no one reference that its torque follows: push_off_error is the error in push-off"
-    if kind.traced:
-        return "it needs the course of the whole run, which is not kept of a walk"
-    if LED_SHANK in kind.needs:
-        return "it needs a leg without ground, whose shank is that of a gait"
-    if LED in kind.needs and walk_of(scenario).reacts is not None:
-        return "it is measured from the gait that leads a leg, and this wearer reacts: lowest_toes is over the ground"
-    if REACTS in kind.needs and walk_of(scenario).reacts is None:
-        return "it needs a wearer who reacts (wearer.reacts)"
-    if STEADY in kind.needs and walk_of(scenario).course is not None:
-        return "it is a mean over equal strides, and a course has others: leave the course out"
-    is_outside = scenario.control.kind == PYTHON_CONTROLLER
-    if REQUEST in kind.needs and (is_outside or not hasattr(law_of(scenario).initial, "request")):
-        return f"its controller '{scenario.control.kind}' requests no torque"
-    return ""
+    motion, control = walk_of(scenario), scenario.control.kind
+    is_outside = control == PYTHON_CONTROLLER
+    has_request = not is_outside and hasattr(law_of(scenario).initial, "request")
+    reacts, needs = motion.reacts is not None, kind.needs
+    reasons = (
+        (
+            "reference" in kind.channels,
+            "a walk has no one reference that its torque follows: push_off_error is the error in push-off",
+        ),
+        (bool(kind.traced), "it needs the course of the whole run, which is not kept of a walk"),
+        (LED_SHANK in needs, "it needs a leg without ground, whose shank is that of a gait"),
+        (REACTS in needs and not reacts, "it needs a wearer who reacts (wearer.reacts)"),
+        (
+            LED in needs and reacts,
+            "it is measured from the gait that leads a leg, and this wearer reacts: lowest_toes is over the ground",
+        ),
+        (
+            STEADY in needs and motion.course is not None,
+            "it is a mean over equal strides, and a course has others: leave the course out",
+        ),
+        (REQUEST in needs and not has_request, f"its controller '{control}' requests no torque"),
+    )
+    return next((reason for is_so, reason in reasons if is_so), "")
 
 
 def integral_of_a_stride(result: WalkResult, values: Floats) -> float:
@@ -335,7 +342,7 @@ def _reacting_result(
     starts = stride_starts(rows["walk.strides"])
     strides = per_stride(rows, starts)
     helped = helped_strides(rows.get(SAFE_ROW, np.zeros(recording.time.size)), starts)
-    metrics = reacting_metrics(scenario, run, recording.time, rows, starts, strides, helped, fall_time)
+    metrics = reacting_metrics(recording.time, rows, starts, strides, helped, fall_time)
     if fall_time >= 0.0 and status.is_completed:
         status = Status("completed", None, f"completed: the wearer fell at t = {fall_time:.4g} s")
     return WalkResult(

@@ -31,7 +31,7 @@ from ppafo.walking.declaration import THRESHOLDS
 from ppafo.walking.events import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
 from ppafo.walking.gait_series import landing_phase
 from ppafo.walking.loading import load_walk
-from ppafo.walking.motion import SHORTEST_STRIDES, duration_problems, walk_of, with_duration
+from ppafo.walking.motion import SHORTEST_STRIDES, check_led, duration_problems, walk_of, with_duration
 from ppafo.walking.person import crowd_of, draw_gaits
 from ppafo.walking.planning import course_of_walk, fed_device, plan_walk, plan_walks, unrecorded
 from ppafo.walking.preparation import FaultSettings
@@ -165,7 +165,8 @@ def compare_walks(configuration: Scenario, minutes: float | None = None, progres
     # As long as the bottle lasted, where there is one.
     as_long = minutes if worn.supply is None else float(worn.recording.time[-1]) / 60.0
     bare = walk(with_device_off(configuration), as_long, progress=progress)
-    return Comparison(worn, bare, healthy_metrics(configuration))
+    healthy = healthy_metrics(configuration) if walk_of(configuration).reacts is None else {}
+    return Comparison(worn, bare, healthy)
 
 
 def with_device_off(configuration: Scenario) -> Scenario:
@@ -303,6 +304,7 @@ def walk_population(
     """
     if not 1 <= wearers <= MAXIMUM_WEARERS:
         raise ScenarioError(f"the number of wearers must be from 1 to {MAXIMUM_WEARERS}, not {wearers}")
+    check_led(configuration, "walking with many wearers")
     if walk_of(configuration).bottle is not None:
         raise ScenarioError("many wearers walk at a constant supply: leave out the bottle, or the number of wearers")
     if walk_of(configuration).person:

@@ -1,13 +1,13 @@
 """One step of a wearer who reacts: muscles, reflexes and ground move a body, and the device acts on its left ankle.
 
-It stands beside ``walking.py``, where a gait leads the leg: here the body step comes before the gas, with the pressures
-at its begin, and the ankle that the gas sees is the body's. Device and body exchange torque and angle once a step, which
-is 0.1 ms long. What sensors, faults, controllers and metrics read of a walk has the same names in both.
+It stands beside ``walking.py``, where a gait leads the leg: here the body step comes before the gas, with the
+pressures at its begin, and the ankle that the gas sees is the body's. Device and body exchange torque and angle once a
+step, which is 0.1 ms long. What sensors, faults, controllers and metrics read of a walk has the same names in both.
 """
 
 from typing import Any, NamedTuple
 
-from ppafo.engine.pieces import LegScheme, RarePhase
+from ppafo.engine.pieces import LegScheme, Phases, RarePhase
 from ppafo.engine.scheme.motion import clamp_angle, with_motion
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers, held_pressures
 from ppafo.engine.scheme.walking import NO_CLEARANCE, DeviceShare
@@ -63,9 +63,9 @@ class WalkNow(NamedTuple):
 class ReactingState(NamedTuple):
     """Where the foot with the device stands, what the wearer gets, and totals since the start; as in ``WalkState``.
 
-    ``passes`` is 1 once the toes came by in this swing, ``lands`` 1 while the toes have yet to come down after the
-    heel. ``since`` [s] the strike, ``stride_time`` [s] of the stride before. ``load`` and ``other_load`` [body weights] of
-    both feet, ``muscle_work`` [J] that all muscles did as they shortened, ``fall_time`` [s], below 0 before a fall.
+    ``lands`` is 1 while the toes have yet to come down after the heel. ``since`` [s] the strike, ``stride_time`` [s] of
+    the stride before. ``load`` and ``other_load`` [body weights] of both feet, ``muscle_work`` [J] that all muscles did
+    as they shortened, ``fall_time`` [s], below 0 before a fall. ``clearance`` [m] is over the ground.
     """
 
     contact: float
@@ -100,9 +100,9 @@ class Reflexes(NamedTuple):
 class BodyEnd(NamedTuple):
     """A wearer after a step, and what was felt and acted at its begin.
 
-    ``due`` is 1 where the nerves are sampled, ``until`` [s] the sample after that. ``heel_up`` and ``ball_up`` [N] under
-    the foot with the device, ``place`` of its ankle in front of the hip and height of its ``toes`` [m], ``loads`` of both
-    feet [body weights], ``work`` of the muscles [J], ``given`` by the device [N m].
+    ``due`` is 1 where the nerves are sampled, ``until`` [s] the sample after that. ``heel_up`` and ``ball_up`` [N]
+    under the foot with the device, ``place`` of its ankle in front of the hip and height of its ``toes`` [m], ``work``
+    of the muscles [J], ``given`` by both pressures [N m].
     """
 
     after: Walker
@@ -264,12 +264,12 @@ def advance_reacting(
     )
 
 
-def find(rows: Any) -> list[str]:
+def find(_rows: Any) -> list[str]:
     """Lines that make what a step is handed by the one before; nothing but the chambers is."""
     return []
 
 
-def lead(rows: Any) -> list[Any]:
+def lead(rows: Any) -> Phases:
     """Phases before the gas: the body, and where few steps sample them, the nerves and the reflexes."""
     add = rows.add
     stepped = f"{add(next_body)}(wearer, walker, reflexes, walk.fall_time, assist, length)"
@@ -310,7 +310,7 @@ def assume(rows: Any) -> list[str]:
     ]
 
 
-def reach(rows: Any, fed: str) -> list[Any]:
+def reach(_rows: Any, _fed: str) -> Phases:
     """No phases: the body has led the ankle already."""
     return []
 

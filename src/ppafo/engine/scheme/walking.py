@@ -383,7 +383,7 @@ def find(rows: Any) -> list[str]:
     return [*[rows.load(name) for name in ("leg", "share", "walk")], carried, *rows.keep("carried")]
 
 
-def lead(rows: Any) -> list[list[str]]:
+def lead(rows: Any) -> Phases:
     """Phases before the gas: the gait at the end of the step, and where the foot would be."""
     foot = f"{rows.add(begin_walk)}(plant, leg, gait_timing, state, held, walk, carried, next_gait, length)"
     return [
@@ -392,7 +392,7 @@ def lead(rows: Any) -> list[list[str]]:
     ]
 
 
-def next_gait(rows: Any) -> list[list[str]]:
+def next_gait(rows: Any) -> Phases:
     """Phases that make the gait at the end of the step: stride after stride, or on a course, with its marks."""
     add = rows.add
     if rows.program.leg.takes_course:

@@ -26,7 +26,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.walking.course import flat_foot
 from ppafo.walking.declaration import PERSON, STEP, fault_numbers
 from ppafo.walking.gait_series import fit_rocker, gait_series, gait_timing
-from ppafo.walking.motion import record_interval, walk_of
+from ppafo.walking.motion import check_led, record_interval, walk_of
 from ppafo.walking.planning import NO_REFERENCE, course_of_walk, failing_of, law_of, sensor_settings
 from ppafo.walking.preparation import (
     DISTORTED,
@@ -76,6 +76,7 @@ _RELATIONS = (
 
 def check_can_leave(configuration: Scenario) -> None:
     """Raise ScenarioError for a walk that has no exported form."""
+    check_led(configuration, "a model in C")
     if walk_of(configuration).person:
         raise ScenarioError(
             f"{configuration.name}: wearer.person is drawn in Python, so a walk with one cannot be exported: leave it "

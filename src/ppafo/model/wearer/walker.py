@@ -239,8 +239,8 @@ def rates_of_joints(limb: Limb, lean: float) -> Joints:
 class LegNow(NamedTuple):
     """A leg in a step: what it feels, its equations, the points on the ground after it, torque on the hip, and forces.
 
-    Forces of the ground [N]: along and up in all, and up under heel and ball. ``place`` is the ankle in front of the hip
-    [m], ``toes`` the height of the ball over the ground [m], both at the begin of the step.
+    Forces of the ground [N]: along and up in all, and up under heel and ball. ``place`` is the ankle in front of the
+    hip [m], ``toes`` the height of the ball over the ground [m], both at the begin of the step.
     """
 
     pull: Pull

@@ -23,7 +23,7 @@ from ppafo.version import __version__
 from ppafo.walking.course import Segment, WalkingCourse, list_courses, load_course
 from ppafo.walking.events import EVENTS, EventErrors, event_errors, known_events, true_events, within
 from ppafo.walking.loading import load_walk
-from ppafo.walking.motion import walk_of
+from ppafo.walking.motion import check_led, walk_of
 from ppafo.walking.planning import course_of_walk, plan_walk
 from ppafo.walking.result import REMEDY
 from ppafo.walking.walk import lasting
@@ -376,6 +376,7 @@ def event_timing(
 
 def ways_of(configuration: Scenario) -> dict[str, WalkingCourse | None]:
     """The ways to walk: steadily, unevenly, and the courses that come with the package."""
+    check_led(configuration, "event timing")
     if walk_of(configuration).course is not None:
         raise ScenarioError(f"{configuration.origin.file}: course: event timing uses its own courses; remove this one")
     if walk_of(configuration).bottle is not None:

@@ -28,6 +28,7 @@ from ppafo.questions.walk.course import (
     course_sections,
     trust_remark,
 )
+from ppafo.questions.walk.reacting import reacting_answer
 from ppafo.questions.walk.risks import Risks, risks_of_walk
 from ppafo.questions.walk.volumes import (
     VolumeReading,
@@ -226,6 +227,8 @@ _LIMITS = (
 
 def answer_of(solved: WalkPair | Wearers) -> Answer:
     """Return the answer of one wearer's walks, or of many wearers."""
+    if isinstance(solved, WalkPair) and walk_of(solved.comparison.with_device.scenario).reacts is not None:
+        return reacting_answer(solved.comparison)
     return wearers_answer(solved.population, solved.volumes) if isinstance(solved, Wearers) else _pair_answer(solved)
 
 
@@ -505,7 +508,8 @@ def walk_with_and_without(
         advance = _reporter(report, "walking", "wearers", 0.0)
         return Wearers(*wearers_by_volume(chosen, minutes, wearers, seed, advance))
     comparison = compare_walks(chosen, minutes, _reporter(report, "walking", "min", _LONG))
-    return WalkPair(comparison, walks_by_volume(comparison.with_device, minutes))
+    reads = walk_of(chosen).reacts is None
+    return WalkPair(comparison, walks_by_volume(comparison.with_device, minutes) if reads else ())
 
 
 def list_files() -> list[dict[str, Any]]:

@@ -19,7 +19,7 @@ from ppafo.model.plant_faults import PLANT_FAULTS
 from ppafo.questions.question import Solved
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.declaration import FAULTY, READINGS, fault_numbers
-from ppafo.walking.motion import SHORTEST_STRIDES, walk_of, with_duration
+from ppafo.walking.motion import SHORTEST_STRIDES, check_led, walk_of, with_duration
 from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import walk, with_device_off
@@ -72,6 +72,7 @@ class Risks(Solved):
 
 def risks_of_walk(configuration: Scenario) -> Risks:
     """The table of a walk's faults: each begins at four instants of its fifth stride, and the worst is kept."""
+    check_led(configuration, "the table of risks")
     stride = walk_of(configuration).gait.stride_time
     motion = replace(walk_of(configuration), course=None, bottle=None)
     length = max(FIRST + AFTER + 1, SHORTEST_STRIDES) * stride

@@ -13,7 +13,7 @@ from ppafo.simulation.declaration import PERIOD, RATE
 from ppafo.simulation.loading import split_override
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.loading import load_walk
-from ppafo.walking.motion import walk_of
+from ppafo.walking.motion import check_led, walk_of
 from ppafo.walking.walk import lasting
 
 CONFIGURATION = "proportional"
@@ -88,6 +88,7 @@ def walking_task(
     for_all = [override for override in own if split_override(override)[0] not in _PUSH_OFF]
     judged = _with_profile(file, [*for_all, *desired], gait)
     told = _with_profile(file, [*desired, *own], gait)
+    check_led(judged, "a league")
     if walk_of(judged).course is not None:
         raise ScenarioError(f"{file}: course: a league compares equal strides; leave the course away")
     if walk_of(judged).bottle is not None:

@@ -1,0 +1,194 @@
+"""The answer of a walk of a wearer who reacts: with the device and without it, until a fall where there is one."""
+
+import platform
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ppafo.answers import Answer, Column, Figure, Section, Table
+from ppafo.answers.display_units import display_value, display_values, title_with_unit
+from ppafo.answers.style import BLUE, GREY, VERMILION, house_style, mark_kind
+from ppafo.simulation.scenario import UNITS, Scenario, plain
+from ppafo.storage.comma_separated import marked_csv_bytes
+from ppafo.storage.netcdf import netcdf_bytes
+from ppafo.version import __version__
+from ppafo.walking.motion import person_remarks, walk_of
+from ppafo.walking.reacting_wearer import ReactingWearer
+from ppafo.walking.result import WalkResult
+from ppafo.walking.strides import PHASES
+from ppafo.walking.walk import Comparison
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawn
+
+FORMAT, SCHEMA_VERSION = "ppafo walk of a wearer who reacts", 1
+
+ROWS = (
+    ("walked_time", "Walked until the end or a fall", "time", 1),
+    ("strides", "Whole strides", "", 0),
+    ("walking_speed", "Speed", "velocity", 2),
+    ("lowest_toes", "Lowest toes over the ground in mid-swing, mean", "body length", 1),
+    ("toe_landing", "Strides that begin on the toes", "fraction", 0),
+    ("slap_rate", "Rate of the foot as it comes down", "angular velocity", 0),
+    ("muscle_work", "Work of all muscles in one stride", "energy", 1),
+    ("push_off_work", "Work of the device in push-off", "energy", 2),
+    ("gas", "Gas per stride", "gas mass", 3),
+    ("total_gas", "Gas of the whole walk", "gas mass", 2),
+    ("counted_strides", "Strides with these means", "", 0),
+)
+"""Metric, title, kind of quantity and digits behind the point of each row."""
+
+_EXPLAINED = (
+    "'Without' is the same wearer with the same device and both chambers vented. The first two strides are left out of "
+    "the means. The device is on the left leg, and a stride is one step of that leg."
+)
+_LIMITS = (
+    "The wearer is unadapted: the gains of the reflexes are those of the wearer's file, with the device and without "
+    "it. The body is planar and without arms, and the device adds no weight, only friction, damping and the inertia of "
+    "vane and foot plate about the ankle. No number here is a benefit to a person: it is what this model does."
+)
+_CURVES = (
+    "Mean over the strides from strike to strike of the left foot, with the standard deviation as a band. The ground "
+    "force is that on the left foot."
+)
+_PANELS = (
+    ("angle", "Ankle angle", "angle"),
+    ("knee_angle", "Knee angle", "angle"),
+    ("toe_height", "Toes over the ground", "body length"),
+    ("ground_force", "Vertical ground force", "force"),
+    ("external_torque", "Torque on the ankle", "torque"),
+    ("tibialis_activation", "Activation of the tibialis", ""),
+)
+
+
+def reacting_answer(comparison: Comparison) -> Answer:
+    """Return the answer; one of a wearer who falls with the device has not passed."""
+    worn, bare = comparison.with_device, comparison.without_device
+    scenario = worn.scenario
+    wearer = wearer_of_walk(scenario)
+    remarks = [*person_remarks(scenario), *weak_remarks(wearer), *fall_remarks(comparison)]
+    stays = worn.metrics["stays_up"].value > 0.5
+    strides = f"{worn.metrics['strides'].value:.0f} strides"
+    ended = "walks to the end" if stays else f"falls after {worn.metrics['fall_time'].value:.1f} s"
+    return Answer(
+        name="walk",
+        kicker=f"A walk of a wearer who reacts, {scenario.duration / 60.0:.3g} min",
+        title=f"Walking with {scenario.name}",
+        lead=(f"{scenario.name}: {wearer.name} {ended}, {strides}",),
+        sections=(
+            Section(table=reacting_table(comparison), remarks=tuple(remarks)),
+            Section("How to read it", (_EXPLAINED, _LIMITS), is_detail=True),
+            *_curves(comparison),
+        ),
+        data={
+            "format": FORMAT,
+            "schema_version": SCHEMA_VERSION,
+            "units": UNITS,
+            "status": plain(worn.status),
+            "status_off": plain(bare.status),
+            "wearer": wearer.name,
+            "wearer_numbers": plain(dict(wearer.settings)),
+            "metrics": plain(dict(worn.metrics)),
+            "metrics_off": plain(dict(bare.metrics)),
+            "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
+            "file": scenario.origin.file,
+            "overrides": list(scenario.origin.overrides),
+            "content": scenario.origin.content,
+        },
+        passed=comparison.is_completed and stays and worn.is_helped,
+        files={
+            "recording.nc": lambda: netcdf_bytes(worn.recording, None),
+            "recording.csv": lambda: marked_csv_bytes(worn.recording),
+            "recording-off.nc": lambda: netcdf_bytes(bare.recording, None),
+        },
+        command="walk",
+    )
+
+
+def wearer_of_walk(scenario: Scenario) -> ReactingWearer:
+    """Return the wearer who reacts."""
+    wearer = walk_of(scenario).reacts
+    assert wearer is not None, "of a wearer who reacts"
+    return wearer
+
+
+def weak_remarks(wearer: ReactingWearer) -> list[str]:
+    """Return a line on the muscles that are weaker or stronger than those of the wearer's file."""
+    changed = [
+        f"{name.removesuffix('_strength')} {100.0 * value:.3g} %"
+        for name, value in wearer.settings.items()
+        if name.endswith("_strength") and value != 1.0
+    ]
+    return [f"strength of the left leg: {', '.join(changed)}"] if changed else []
+
+
+def fall_remarks(comparison: Comparison) -> list[str]:
+    """Return who falls, with the device and without."""
+    found = []
+    for words, walked in (("with the device", comparison.with_device), ("without", comparison.without_device)):
+        fall = walked.metrics.get("fall_time")
+        found += [] if fall is None else [f"{words}: the wearer falls at {fall.value:.1f} s"]
+    return found
+
+
+def reacting_table(comparison: Comparison) -> Table:
+    """Return a row for each number, with the device and without it."""
+    columns = (comparison.with_device.metrics, comparison.without_device.metrics)
+    rows = []
+    for name, title, quantity, digits in ROWS:
+        if not any(name in metrics for metrics in columns):
+            continue
+        head = title_with_unit(title, quantity) if quantity else title
+        rows.append((head, *(_cell(metrics, name, quantity, digits) for metrics in columns)))
+    return Table((Column(""), Column("with"), Column("without")), tuple(rows))
+
+
+def _cell(metrics: Any, name: str, quantity: str, digits: int) -> str | None:
+    if name not in metrics:
+        return None
+    value = metrics[name].value
+    text = f"{display_value(value, quantity) if quantity else value:.{digits}f}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
+
+
+def _curves(comparison: Comparison) -> tuple[Section, ...]:
+    if not comparison.with_device.averages:
+        return ()
+    figure = Figure("mean-stride", _CURVES, lambda: stride_figure(comparison))
+    return (Section("The mean stride", figure=figure, is_detail=True),)
+
+
+def stride_figure(comparison: Comparison) -> "Drawn":
+    """Return the mean stride of a wearer who reacts, with the device and without it."""
+    from matplotlib.figure import Figure as Drawn
+
+    walks: dict[str, tuple[WalkResult, str]] = {
+        "without": (comparison.without_device, GREY),
+        "with the device": (comparison.with_device, BLUE),
+    }
+    with house_style():
+        figure = Drawn(figsize=(9.4, 5.6))
+        figure.subplots_adjust(left=0.075, right=0.985, top=0.87, bottom=0.09, hspace=0.34, wspace=0.3)
+        for axes, (channel, title, quantity) in zip(figure.subplots(2, 3).ravel(), _PANELS, strict=True):
+            for label, (walked, color) in walks.items():
+                if channel not in walked.averages:
+                    continue
+                curves = walked.averages[channel]
+                mean, spread = (
+                    display_values(values, quantity) if quantity else values
+                    for values in (curves.mean, curves.mean + curves.deviation)
+                )
+                axes.plot(100.0 * PHASES, mean, color=color, linewidth=1.6, label=label)
+                axes.fill_between(100.0 * PHASES, 2.0 * mean - spread, spread, color=color, alpha=0.2, linewidth=0)
+            if channel == "toe_height":
+                axes.axhline(0.0, color=VERMILION, linewidth=0.8)
+            axes.set_ylabel(title_with_unit(title, quantity) if quantity else title, fontsize=9)
+            axes.set_xlim(0.0, 100.0)
+        for axes in figure.axes[3:]:
+            axes.set_xlabel("Stride [%]", fontsize=9)
+        figure.axes[0].legend(fontsize=8, loc="best")
+        scenario = comparison.with_device.scenario
+        title = f"{scenario.name}: {wearer_of_walk(scenario).name}, who reacts"
+        figure.text(0.012, 0.985, title, ha="left", va="top", fontweight="bold")
+        mark_kind(figure, "simulated")
+        return figure
