@@ -27,13 +27,14 @@ FELL = "walk.fall_time"
 
 
 def recording_of_reacting(
-    configuration: Scenario, run: Run, time: Floats, record: Mapping[str, Floats]
-) -> tuple[Recording, Mapping[str, Floats]]:
-    """The recording of a wearer who reacts [SI] until a fall, and its rows until then, from rows (samples,) by path."""
+    configuration: Scenario,
+    run: Run,
+    time: Floats,
+    record: Mapping[str, Floats],
+    of_bottle: Mapping[str, tuple[Floats, str]],
+) -> Recording:
+    """The recording of a wearer who reacts [SI] from rows (samples,) by path, with the channels of a bottle."""
     assert run.reacting is not None, "of a wearer who reacts"
-    stands = record[FELL] < 0.0
-    stands[0] = True
-    time, record = time[stands], {path: values[stands] for path, values in record.items()}
     body, weight = run.reacting.body.body, run.reacting.body.weight
     angle, rate = record["state.angle"], record["state.angular_velocity"]
     pressure_1, pressure_2 = chamber_pressures(run.plant, angle, record["state.mass_1"], record["state.mass_2"])
@@ -74,9 +75,9 @@ def recording_of_reacting(
     }
     for name in Fibres._fields:
         channels[f"{name}_activation"] = (record[f"walker.left.fibres.{name}.activation"], "-")
-    channels |= gas_channels(configuration.device.gas, run, record)
+    channels |= gas_channels(configuration.device.gas, run, record) | dict(of_bottle)
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
-    return Recording(f"walk, {configuration.name}", time, values, kind="simulated"), record
+    return Recording(f"walk, {configuration.name}", time, values, kind="simulated")
 
 
 def angles_of(record: Mapping[str, Floats], side: str) -> Joints:

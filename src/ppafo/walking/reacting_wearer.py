@@ -140,7 +140,7 @@ def read_reacting(reading: Reading, folder: Path) -> ReactingWearer | None:
             if item.name in given:
                 raise reading.refusal(f"wearer.{item.name}", f'needs a wearer who reacts: give {REACTS} = "NAME"')
         return None
-    for path in ("gait", "course", "bottle"):
+    for path in ("gait", "course"):
         if path in reading.document:
             raise reading.refusal(path, f"does not go with {REACTS} yet: leave one of both out")
     known = {item.name for item in REACTIONS} | {"reacts"}

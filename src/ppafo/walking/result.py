@@ -97,8 +97,7 @@ def recording_of_walk(
         channels["dorsiflexor_moment"] = (dorsiflexor_moment(run, record), "N m")
     channels |= gas_channels(configuration.device.gas, run, record)
     if supply is not None:
-        channels |= {name: (supply.at(name, time), UNITS[name]) for name in supply.values}
-        channels["bottle_mass"] = (supply.first.mass - record["line_state.regulated_mass"], "kg")
+        channels |= supply_channels(supply, time, record)
     if PHASE_ROW in record:
         channels["controller_phase"] = (record[PHASE_ROW], "-")
         channels["safe_state"] = (record[SAFE_ROW], "-")
@@ -111,6 +110,12 @@ def recording_of_walk(
         channels |= _course_channels(configuration, run, path, time, record)
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
     return Recording(f"walk, {configuration.name}", time, values, kind="simulated")
+
+
+def supply_channels(supply: SupplyCourse, time: Floats, record: Mapping[str, Floats]) -> dict[str, tuple[Floats, str]]:
+    """Channels of the bottle of a walk with their units."""
+    found = {name: (supply.at(name, time), UNITS[name]) for name in supply.values}
+    return found | {"bottle_mass": (supply.first.mass - record["line_state.regulated_mass"], "kg")}
 
 
 def _with_cold_gas(run: Run, supply: SupplyCourse, time: Floats) -> Run:
@@ -297,7 +302,7 @@ def _walk_result(
     supply: SupplyCourse | None,
 ) -> WalkResult:
     if run.reacting is not None:
-        return _reacting_result(scenario, run, time, record, status)
+        return _reacting_result(scenario, run, time, record, status, supply)
     walked, motion = scenario, walk_of(scenario)
     # Whom it is healthy for is the person who walked; what was planned stays in the result.
     gait, wearer = as_drawn(motion.gait, motion.wearer, motion.person)
@@ -334,11 +339,25 @@ def _walk_result(
 
 
 def _reacting_result(
-    scenario: Scenario, run: Run, time: Floats, record: Mapping[str, Floats], status: Status
+    scenario: Scenario,
+    run: Run,
+    time: Floats,
+    record: Mapping[str, Floats],
+    status: Status,
+    supply: SupplyCourse | None,
 ) -> WalkResult:
     """The result of a wearer who reacts, until the end or a fall."""
     fall_time = float(record[FELL][-1])
-    recording, rows = recording_of_reacting(scenario, run, time, record)
+    stands = record[FELL] < 0.0
+    stands[0] = True
+    time, rows = time[stands], {path: values[stands] for path, values in record.items()}
+    recording = recording_of_reacting(
+        scenario,
+        run if supply is None else _with_cold_gas(run, supply, time),
+        time,
+        rows,
+        {} if supply is None else supply_channels(supply, time, rows),
+    )
     starts = stride_starts(rows["walk.strides"])
     strides = per_stride(rows, starts)
     helped = helped_strides(rows.get(SAFE_ROW, np.zeros(recording.time.size)), starts)
@@ -356,6 +375,7 @@ def _reacting_result(
         helped=helped,
         vented_metrics={},
         events=safety_events(scenario, recording.time, rows),
+        supply=supply,
     )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import display_value, display_values, title_with_unit
 from ppafo.answers.style import BLUE, GREY, VERMILION, house_style, mark_kind
+from ppafo.questions.walk.course import bottle_data, bottle_remark, bottle_sections
 from ppafo.simulation.scenario import UNITS, Scenario, plain
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
@@ -67,6 +68,7 @@ def reacting_answer(comparison: Comparison) -> Answer:
     scenario = worn.scenario
     wearer = wearer_of_walk(scenario)
     remarks = [*person_remarks(scenario), *weak_remarks(wearer), *fall_remarks(comparison)]
+    remarks += [] if worn.supply is None else [bottle_remark(worn, [])]
     stays = worn.metrics["stays_up"].value > 0.5
     strides = f"{worn.metrics['strides'].value:.0f} strides"
     ended = "walks to the end" if stays else f"falls after {worn.metrics['fall_time'].value:.1f} s"
@@ -77,6 +79,7 @@ def reacting_answer(comparison: Comparison) -> Answer:
         lead=(f"{scenario.name}: {wearer.name} {ended}, {strides}",),
         sections=(
             Section(table=reacting_table(comparison), remarks=tuple(remarks)),
+            *bottle_sections(worn),
             Section("How to read it", (_EXPLAINED, _LIMITS), is_detail=True),
             *_curves(comparison),
         ),
@@ -90,6 +93,7 @@ def reacting_answer(comparison: Comparison) -> Answer:
             "wearer_numbers": plain(dict(wearer.settings)),
             "metrics": plain(dict(worn.metrics)),
             "metrics_off": plain(dict(bare.metrics)),
+            **bottle_data(worn),
             "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
             "file": scenario.origin.file,
             "overrides": list(scenario.origin.overrides),
