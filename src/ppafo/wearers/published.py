@@ -50,13 +50,13 @@ def _lever(length: float, largest_at: float, rest_at: float, share: float) -> Le
 
 
 MUSCLES = Muscles(
-    soleus=Muscle(force=4000.0, optimum=0.04, velocity=6.0, slack=0.26),
-    tibialis=Muscle(force=800.0, optimum=0.06, velocity=12.0, slack=0.24),
-    gastrocnemius=Muscle(force=1500.0, optimum=0.05, velocity=12.0, slack=0.40),
-    vastus=Muscle(force=6000.0, optimum=0.08, velocity=12.0, slack=0.23),
-    hamstring=Muscle(force=3000.0, optimum=0.10, velocity=12.0, slack=0.31),
-    gluteus=Muscle(force=1500.0, optimum=0.11, velocity=12.0, slack=0.13),
-    flexor=Muscle(force=2000.0, optimum=0.11, velocity=12.0, slack=0.10),
+    soleus=Muscle(force=4000.0, optimum=0.04, velocity=6.0, slack=0.26, slow=0.80),
+    tibialis=Muscle(force=800.0, optimum=0.06, velocity=12.0, slack=0.24, slow=0.70),
+    gastrocnemius=Muscle(force=1500.0, optimum=0.05, velocity=12.0, slack=0.40, slow=0.54),
+    vastus=Muscle(force=6000.0, optimum=0.08, velocity=12.0, slack=0.23, slow=0.50),
+    hamstring=Muscle(force=3000.0, optimum=0.10, velocity=12.0, slack=0.31, slow=0.49),
+    gluteus=Muscle(force=1500.0, optimum=0.11, velocity=12.0, slack=0.13, slow=0.55),
+    flexor=Muscle(force=2000.0, optimum=0.11, velocity=12.0, slack=0.10, slow=0.50),
     soleus_ankle=_lever(0.05, 110.0, 80.0, 0.5),
     tibialis_ankle=_lever(0.04, 80.0, 110.0, 0.7),
     gastrocnemius_ankle=_lever(0.05, 110.0, 80.0, 0.7),
@@ -68,7 +68,11 @@ MUSCLES = Muscles(
     gluteus_hip=_lever(0.10, 0.0, 150.0, 0.5),
     flexor_hip=_lever(0.10, 0.0, 180.0, 0.5),
 )
-"""The seven muscles of a leg: soleus, tibialis anterior, gastrocnemius, vasti, hamstrings, glutei and hip flexors."""
+"""The seven muscles of a leg: soleus, tibialis anterior, gastrocnemius, vasti, hamstrings, glutei and hip flexors.
+
+Shares of slow fibres, which the publication has not: T. K. Uchida et al., PLoS ONE 11 (2016) e0150378; means over the
+heads of a muscle.
+"""
 
 STOP = Stop(
     stiffness=0.3 / math.radians(1.0),

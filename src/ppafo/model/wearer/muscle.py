@@ -31,12 +31,16 @@ TERMS = 9
 
 
 class Muscle(NamedTuple):
-    """Largest isometric force [N], optimum length [m], largest velocity [optimum lengths/s], slack tendon [m]."""
+    """Largest isometric force [N], optimum length [m], largest velocity [optimum lengths/s], slack tendon [m].
+
+    ``slow`` is the share of slow fibres [-], on which only the metabolic rate depends.
+    """
 
     force: float
     optimum: float
     velocity: float
     slack: float
+    slow: float
 
 
 class Fibre(NamedTuple):
@@ -84,6 +88,14 @@ def lengthening(force: float) -> float:
     drawn = (1.0 + excess) / (1.0 - ECCENTRIC_SHAPE * CURVATURE * min(excess, 0.0))
     drawn = drawn if excess < 0.0 else 1.0 + 0.01 * (force - LARGEST_ECCENTRIC)
     return shortening if force < 1.0 else drawn
+
+
+def force_at(velocity: float) -> float:
+    """Force [isometric forces] that a muscle bears at a velocity [largest velocities], the other way round."""
+    shortens, lengthens = max(min(velocity, 0.0), -1.0), max(velocity, 0.0)
+    shape = ECCENTRIC_SHAPE * CURVATURE
+    drawn = LARGEST_ECCENTRIC - (LARGEST_ECCENTRIC - 1.0) * max(1.0 - lengthens, 0.0) / (1.0 + shape * lengthens)
+    return (1.0 + shortens) / (1.0 - CURVATURE * shortens) if velocity < 0.0 else drawn
 
 
 def slope_of_lengthening(force: float) -> float:
