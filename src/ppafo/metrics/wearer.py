@@ -95,6 +95,14 @@ def _muscle_work(readings: Readings) -> Floats:
     return mean_of(totals.last.muscle_work - totals.first.muscle_work, _strides(readings))
 
 
+def _muscle_power(readings: Readings) -> Floats:
+    totals = readings.meters["wearer"]
+    time = totals.last.time - totals.first.time
+    work = totals.last.muscle_work - totals.first.muscle_work
+    found: Floats = choose(_strides(readings) > 0.5, work / larger(time, 1.0e-9), math.nan)
+    return found
+
+
 def _kind(name: str, unit: str, summary: str, read: Callable[[Readings], Floats]) -> MetricKind:
     return MetricKind(name, unit, summary, (), None, read, (METER,), needs=(WALK, REACTS))
 
@@ -106,5 +114,6 @@ METRICS = (
     _kind("walking_speed", "m/s", "speed, mean over whole strides without the first ones", _speed),
     _kind("lowest_toes", "m", "lowest toe height above ground in mid-swing, mean over the strides", _lowest_toes),
     _kind("muscle_work", "J", "work of all muscles of both legs as they shorten, in one stride", _muscle_work),
+    _kind("muscle_power", "W", "mean power of all muscles of both legs as they shorten", _muscle_power),
 )
 """Those of a wearer who reacts; gas and the others of a walk are in ``strides``."""

@@ -29,6 +29,7 @@ QUESTIONS: Kinds[Question] = Kinds(
         "endurance": "ppafo.questions.endurance:QUESTION",
         "league": "ppafo.questions.league:QUESTION",
         "walk": "ppafo.questions.walk:QUESTION",
+        "adapt": "ppafo.questions.adapt:QUESTION",
         "timing": "ppafo.questions.timing:QUESTION",
         "bits": "ppafo.questions.bits:QUESTION",
     },

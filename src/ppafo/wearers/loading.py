@@ -70,6 +70,7 @@ def wearer_file() -> type[BaseModel]:
         "by": (Literal["publication", "search"], Field(description="where the gains are from")),
         "start": optional(str, "wearer whose gains the search began with"),
         "seed": optional(Annotated[int, Field(ge=0)], "seed of the search"),
+        "restart": optional(Annotated[int, Field(ge=1)], "which restart of the search, from 1"),
         "generations": optional(Annotated[int, Field(ge=1)], "generations of the search"),
         "population": optional(Annotated[int, Field(ge=2)], "candidates of a generation"),
         "target_speed": optional(str, "speed that the search aimed at, such as '1.3 m/s'"),
@@ -138,6 +139,7 @@ def _how_found(found: dict[str, Any]) -> str:
     parts = [
         f"from {found['start']}" if "start" in found else "",
         f"seed {found['seed']}" if "seed" in found else "",
+        f"restart {found['restart']}" if "restart" in found else "",
         f"{found['generations']} generations" if "generations" in found else "",
         f"of {found['population']}" if "population" in found else "",
         f"towards {found['target_speed']}" if "target_speed" in found else "",

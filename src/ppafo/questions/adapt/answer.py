@@ -1,0 +1,289 @@
+"""What a search of reflexes came to: before and after, each restart, their spread, and wearer files to walk with."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.answers import Answer, Column, Figure, Section, Table
+from ppafo.answers.style import BLUE, COLOURS, GREY, Margins, figure_of_free_panels, house_style, label_lines, mark_kind
+from ppafo.model.wearer.reflexes import Gains
+from ppafo.questions.question import Solved
+from ppafo.simulation.scenario import Scenario, plain
+from ppafo.walking.reacting_wearer import ReactingWearer
+
+if TYPE_CHECKING:
+    import matplotlib.figure
+
+Floats = NDArray[np.float64]
+
+FALLS = 10.0
+SETTLED, FEWEST = 0.02, 12
+"""Share by which the best cost may fall over the last quarter of a search that has settled; its fewest generations."""
+
+
+@dataclass(frozen=True, slots=True)
+class Walked:
+    """How a wearer walked from some start speeds [m/s]: metrics by name [SI], each (starts,)."""
+
+    starts: tuple[float, ...]
+    metrics: Mapping[str, Floats]
+
+    @property
+    def share(self) -> float:
+        """Share of the starts from which the wearer walked to the end."""
+        return float(np.mean(self.metrics["stays_up"] > 0.5))
+
+    def mean(self, name: str) -> float | None:
+        """Mean of a metric over the walks without a fall, None where there is none."""
+        values = self.metrics[name][(self.metrics["stays_up"] > 0.5) & np.isfinite(self.metrics[name])]
+        return float(values.mean()) if values.size else None
+
+
+@dataclass(frozen=True, slots=True)
+class Restart:
+    """One search: its number, the best gains (gains,), the best cost after each generation, and how they walk."""
+
+    number: int
+    gains: Floats
+    course: tuple[float, ...]
+    walked: Walked
+
+    @property
+    def is_settled(self) -> bool:
+        """True where a walk was found and the last quarter of the generations brought next to nothing."""
+        earlier = self.course[(3 * len(self.course)) // 4 - 1] if len(self.course) >= FEWEST else math.inf
+        return self.course[-1] < FALLS and earlier - self.course[-1] <= SETTLED * self.course[-1]
+
+
+@dataclass(frozen=True, slots=True)
+class Adaptation(Solved):
+    """A search of reflexes: the walk and its wearer, which gains, the speed to aim at [m/s], and what was found.
+
+    ``before`` (gains,) are the gains in the beginning, ``unadapted`` how they walk. ``restarts`` are in the order in
+    which they ran. ``folder`` is where the answer was written, empty where it was not.
+    """
+
+    scenario: Scenario
+    wearer: ReactingWearer
+    adapts: str
+    groups: tuple[tuple[str, ...], ...]
+    speed: float
+    before: Floats
+    unadapted: Walked
+    restarts: tuple[Restart, ...]
+    generations: int
+    population: int
+    seed: int
+    folder: str = ""
+
+    @property
+    def best(self) -> Restart:
+        """The restart with the lowest cost."""
+        return min(self.restarts, key=lambda restart: restart.course[-1])
+
+    def spread(self, name: str) -> tuple[float, float] | None:
+        """Mean and standard deviation of a metric over the restarts that walk on from every start, None below two."""
+        values = [restart.walked.mean(name) for restart in self.restarts if restart.walked.share == 1.0]
+        known = [value for value in values if value is not None]
+        return (float(np.mean(known)), float(np.std(known, ddof=1))) if len(known) > 1 else None
+
+    def gains_of(self, gains: Floats) -> tuple[Gains, Gains]:
+        """Gains of the left and of the right leg."""
+        found = {path: float(value) for value, paths in zip(gains, self.groups, strict=True) for path in paths}
+        left, right = (
+            Gains(
+                *(
+                    found.get(f"wearer.{side}_{name}", float(self.wearer.settings[f"{side}_{name}"]))
+                    for name in Gains._fields
+                )
+            )
+            for side in ("left", "right")
+        )
+        return left, right
+
+
+_SHOWN = (
+    ("walking_speed", "velocity", "Speed"),
+    ("muscle_power", "power", "Muscle power"),
+    ("lowest_toes", "length", "Lowest toes"),
+    ("gas", "gas mass", "Gas a stride"),
+)
+
+
+def answer_of(found: Adaptation) -> Answer:
+    """Return the answer of a search; it has passed where a restart walks on from every start."""
+    head = (
+        Column("Gains"),
+        Column("Walks on", "fraction", ".3g"),
+        *(Column(title, quantity) for _, quantity, title in _SHOWN),
+        Column("Settled"),
+    )
+    rows = [_row("before", found.unadapted, "")]
+    rows += [
+        _row(f"restart {restart.number}", restart.walked, "yes" if restart.is_settled else "no")
+        for restart in found.restarts
+    ]
+    caption = (
+        "Left: the best cost so far of each restart. Right: gains found over the gains before, one mark a restart."
+    )
+    return Answer(
+        name="adapt",
+        kicker="Adaptation",
+        title=f"{found.scenario.name}: reflexes that adapt",
+        lead=(verdict(found), *remarks(found)),
+        sections=(
+            Section(
+                f"Means over the walks without a fall, from {len(found.unadapted.starts)} start speeds",
+                table=Table(head, tuple(rows)),
+            ),
+            Section("The search", figure=Figure("adapt", caption, lambda: draw(found))),
+        ),
+        data=_data(found),
+        passed=found.best.walked.share == 1.0,
+        files={f"wearer-{restart.number}.toml": _file(found, restart) for restart in found.restarts},
+    )
+
+
+def _file(found: Adaptation, restart: Restart) -> Callable[[], bytes]:
+    return lambda: wearer_text(found, restart).encode()
+
+
+def _row(name: str, walked: Walked, settled: str) -> tuple[str | float | None, ...]:
+    return (name, walked.share, *(walked.mean(metric) for metric, _, _ in _SHOWN), settled)
+
+
+def verdict(found: Adaptation) -> str:
+    """Return in a sentence how the wearer walks before and after."""
+    whole = sum(restart.walked.share == 1.0 for restart in found.restarts)
+    before = _walks(found.unadapted)
+    if not whole:
+        return f"with the gains before the wearer {before}; no restart found gains that walk on from every start speed"
+    count = f"{whole} of {len(found.restarts)} restarts"
+    after = f"with the best gains found the wearer {_walks(found.best.walked)}"
+    return f"with the gains before the wearer {before}; {after} ({count} walk on from every start speed)"
+
+
+def _walks(walked: Walked) -> str:
+    speed = walked.mean("walking_speed")
+    if speed is None:
+        longest = float(np.nanmax(walked.metrics["walked_time"]))
+        return f"falls from every start speed, after {longest:.3g} s at the latest"
+    everywhere = "" if walked.share == 1.0 else f" from {walked.share:.0%} of the start speeds"
+    return f"walks on{everywhere}, at {speed:.3g} m/s"
+
+
+def remarks(found: Adaptation) -> list[str]:
+    """Return how sure that is: the spread over restarts, and what did not converge."""
+    said = []
+    power = found.spread("muscle_power")
+    if power is not None:
+        said.append(
+            f"over the restarts that walk on, muscle power is {power[0]:.4g} +- {power[1]:.2g} W (standard deviation): "
+            "a difference between two devices that is smaller is none"
+        )
+    unsettled = [str(restart.number) for restart in found.restarts if not restart.is_settled]
+    if unsettled:
+        said.append(f"restart {', '.join(unsettled)} had not settled: more --generations may find better gains")
+    said.append(
+        "the wearer is a model: gains were searched for little muscle work at a speed, which no person is known to do; "
+        "see docs/how-to/let-a-wearer-react.md"
+    )
+    return said
+
+
+def wearer_text(found: Adaptation, restart: Restart) -> str:
+    """Return the wearer file (TOML) of a restart."""
+    left, right = found.gains_of(restart.gains)
+    lines = [
+        "schema_version = 1",
+        f'name = "{found.wearer.name}-{restart.number}"',
+        f'title = "{found.wearer.name} with reflexes searched for {found.speed:.3g} m/s"',
+        f'source = "body and reflexes of {found.wearer.name}; gains by search"',
+        f'start_speed = "{found.speed:.6g} m/s"',
+        "",
+        "[found]",
+        'by = "search"',
+        f'start = "{found.wearer.name}"',
+        f"seed = {found.seed}",
+        f"restart = {restart.number}",
+        f"generations = {found.generations}",
+        f"population = {found.population}",
+        f'target_speed = "{found.speed:.6g} m/s"',
+        'objective = "no fall, the speed, little muscle work over weight and way"',
+        "",
+        "[gains]",
+        *(f"{name} = {value!r}" for name, value in left._asdict().items()),
+    ]
+    other = [f"{name} = {value!r}" for name, value in right._asdict().items() if value != getattr(left, name)]
+    return "\n".join([*lines, *(["", "[right.gains]", *other] if other else []), ""])
+
+
+def draw(found: Adaptation) -> "matplotlib.figure.Figure":
+    """Return the cost over the generations, and how the gains changed."""
+    names = [paths[0].removeprefix("wearer.") for paths in found.groups]
+    names = [name.removeprefix("left_") if found.adapts != "apart" else name for name in names]
+    margins = Margins(left=0.75, right=0.3, top=0.55, bottom=0.55, row_gap=0.0, column_gap=2.2)
+    height = margins.top + margins.bottom + max(3.0, 0.17 * len(names))
+    with house_style():
+        figure, ((course, changes),) = figure_of_free_panels((8.8, height), margins, 1, 2)
+        for restart in found.restarts:
+            colour = COLOURS[(restart.number - 1) % len(COLOURS)]
+            course.plot(np.arange(1, len(restart.course) + 1), restart.course, color=colour, linewidth=1.3)
+            changes.plot(
+                restart.gains / np.where(found.before == 0.0, np.nan, found.before),
+                np.arange(len(names))[::-1],
+                "|",
+                color=colour,
+                markersize=8,
+                markeredgewidth=1.6,
+                label=f"restart {restart.number}",
+            )
+        course.axhline(FALLS, color=GREY, linestyle="--", linewidth=1.0)
+        course.text(0.98, FALLS * 1.06, "above: falls", transform=course.get_yaxis_transform(), ha="right", color=GREY)
+        course.set_yscale("log")
+        course.set_xlabel("Generation")
+        course.set_ylabel("Best cost so far")
+        changes.axvline(1.0, color=BLUE, linewidth=0.8, alpha=0.5)
+        changes.set_yticks(np.arange(len(names))[::-1], [name.replace("_", " ") for name in names], fontsize=7)
+        changes.set_xlabel("Gain over the gain before")
+        label_lines(changes)
+        mark_kind(figure, "simulated")
+        return figure
+
+
+def _data(found: Adaptation) -> dict[str, Any]:
+    def walked(item: Walked) -> dict[str, Any]:
+        return {
+            "start_speeds": list(item.starts),
+            "share": item.share,
+            "means": {name: item.mean(name) for name in item.metrics},
+            "metrics": {name: plain(values.tolist()) for name, values in item.metrics.items()},
+        }
+
+    return {
+        "walk": found.scenario.name,
+        "wearer": found.wearer.name,
+        "gains": found.adapts,
+        "speed": found.speed,
+        "generations": found.generations,
+        "population": found.population,
+        "seed": found.seed,
+        "before": walked(found.unadapted),
+        "restarts": [
+            {
+                "number": restart.number,
+                "cost": restart.course[-1],
+                "settled": restart.is_settled,
+                "left_gains": found.gains_of(restart.gains)[0]._asdict(),
+                "right_gains": found.gains_of(restart.gains)[1]._asdict(),
+                **walked(restart.walked),
+            }
+            for restart in found.restarts
+        ],
+        "best": found.best.number,
+        "folder": found.folder,
+    }
