@@ -169,6 +169,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     law = walking_controllers()[kind_at(document, "controller")]
     hardware = read_hardware(reading, request, changed.device)
     device = _device(reading, hardware)
+    reacts = read_reacting(reading, request.folder)
     walked = load_gait(_named_file("gait", request, document) or NORMATIVE)
     is_named = "gait" in instead or "gait" in document
     course = _named_file("course", request, document)
@@ -180,7 +181,6 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     found = links_of_defaults({"controller": law.quantities, "timing": timing}, device, lines)
     links = {path: links for path, links in found.items() if value_at(reading.document, path) is None}
     _check_timing(law, reading)
-    reacts = read_reacting(reading, request.folder)
     motion = WalkMotion(
         kind=WALK,
         gait=walked,

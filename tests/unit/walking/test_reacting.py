@@ -1,0 +1,216 @@
+"""A wearer who reacts under the device: body and gas step by step, falls, columns, and what refuses one."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import ppafo
+from ppafo.engine.lanes import BatchResult, run_batch
+from ppafo.engine.rows import leaf_paths, numbers, rebuild, row_numbers
+from ppafo.engine.run import Run, batch_of
+from ppafo.engine.scheme import reacting
+from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers
+from ppafo.errors import PpafoError, ScenarioError
+from ppafo.exports.c_library import walk_library
+from ppafo.metrics import METRICS
+from ppafo.metrics.metric import REACTS
+from ppafo.model.plant import PlantState
+from ppafo.model.wearer.nerves import Nerves
+from ppafo.model.wearer.walker import Walker
+from ppafo.questions.league.walking.task import walking_task
+from ppafo.questions.timing.answer import event_timing
+from ppafo.questions.walk.answer import answer_of, walk_with_and_without
+from ppafo.questions.walk.risks import risks_of_walk
+from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.ensemble.running import lacking
+from ppafo.simulation.scenario import Scenario
+from ppafo.validation.measured import check_recording
+from ppafo.validation.replay import replay_recording, start_of
+from ppafo.walking import load_walk, walk, walk_population
+from ppafo.walking.loading import list_led_walks, list_walks
+from ppafo.walking.motion import with_duration
+from ppafo.walking.planning import plan_walk
+
+WALK, STEP = "reacting", 1.0e-4
+WEAK = "wearer.tibialis_strength=0.3"
+METERS = [name for name, kind in METRICS.items() if REACTS in kind.needs]
+
+
+class Alternating:
+    """Fills one chamber for 0.2 s and then the other, whatever the foot does."""
+
+    def reset(self) -> None:
+        pass
+
+    def update(self, time: float, _reference: float, _measurement: Any) -> float:
+        return 1.0 if int(time / 0.2) % 2 == 0 else -1.0
+
+
+def every_step(scenario: Scenario, seconds: float) -> tuple[Run, BatchResult]:
+    """A run that records every step."""
+    run = plan_walk(replace(with_duration(scenario, seconds), output_interval=STEP))
+    return run, run_batch(batch_of(run))
+
+
+def test_each_step_of_the_lanes_is_the_step_of_plain_python_to_the_bit() -> None:
+    run, result = every_step(load_walk(WALK, [WEAK]), 0.05)
+    walk = run.reacting
+    assert walk is not None
+    rows = row_numbers(run.program.state_rows())
+
+    def group(kind: Any, name: str, sample: int) -> Any:
+        return rebuild(kind, [result.record[sample, rows[path], 0] for path in leaf_paths(kind, name)])
+
+    sampled = 0
+    for sample in range(499):
+        state: PlantState = group(PlantState, "state", sample)
+        held: HeldChambers = held_chambers(run.plant, state.angle)
+        before = group(reacting.ReactingState, "walk", sample)
+        reflexes, nerves = group(reacting.Reflexes, "reflexes", sample), group(Nerves, "nerves", sample)
+        assist = reacting.assist_of(run.plant, walk.share, state, held)
+        body = reacting.next_body(
+            walk.body, group(Walker, "walker", sample), reflexes, before.fall_time, assist, run.step
+        )
+        assert numbers(body.after) == numbers(group(Walker, "walker", sample + 1)), sample
+        after: PlantState = group(PlantState, "state", sample + 1)
+        ankle = reacting.ankle_of(run.plant, body, before.fall_time)
+        assert (ankle.angle, ankle.rate) == (after.angle, after.angular_velocity)
+        later = reacting.next_reflexes(walk.body, nerves, reflexes, body) if body.due else None
+        if later is not None:
+            assert numbers(later) == numbers(group(reacting.Reflexes, "reflexes", sample + 1))
+            passed_on = reacting.next_nerves(nerves, body.left_felt, body.right_felt, body.balance)
+            assert numbers(passed_on) == numbers(group(Nerves, "nerves", sample + 1))
+            sampled += 1
+    assert sampled == 50, "the nerves are sampled every millisecond"
+
+
+def test_the_gas_is_that_of_a_vane_which_is_led_along_the_same_ankle() -> None:
+    scenario = load_walk(WALK, ["wearer.start_speed=1.2 m/s"])
+    played = walk(replace(with_duration(scenario.controlled_by(Alternating()), 1.0), output_interval=STEP))
+    recording = played.recording
+    assert recording["angle"].max() - recording["angle"].min() > 0.3, "the foot moves"
+    measured = check_recording(recording, scenario.device, "walk")
+    start = start_of(measured, scenario.device, {})
+    found = replay_recording(measured, scenario.device, start, "measured", 0.0).recording
+    for chamber in ("pressure_1", "pressure_2"):
+        again = np.interp(recording.time, found.time, found[chamber])
+        away = np.abs(again - recording[chamber])
+        assert float(away.max()) < 0.01 * float(np.ptp(recording[chamber])), chamber
+
+
+@pytest.mark.long
+def test_rows_of_an_ensemble_are_single_walks_to_the_bit() -> None:
+    scenario = with_duration(load_walk(WALK), 6.0)
+    strength, speed = np.array([0.2, 0.3, 0.5, 0.9, 1.0]), np.array([1.2, 1.3, 1.3, 1.4, 1.2])
+    columns = {"wearer.tibialis_strength": strength, "wearer.start_speed": speed}
+    together = run_ensemble(scenario, columns, [*METERS, "gas", "strides"])
+    for row in range(strength.size):
+        own = {path: values[row : row + 1] for path, values in columns.items()}
+        alone = run_ensemble(scenario, own, [*METERS, "gas", "strides"])
+        for name, values in together.metrics.items():
+            np.testing.assert_array_equal(values[row : row + 1], alone.metrics[name], name)
+    single = ppafo.simulate(WALK, ["run.duration=6 s", WEAK]).metrics
+    for name in (*METERS, "gas", "strides"):
+        value = together.metrics[name][1]
+        assert (name not in single) if np.isnan(value) else single[name].value == pytest.approx(value, rel=1e-9), name
+
+
+@pytest.mark.long
+def test_a_weak_tibialis_falls_without_the_device_and_walks_on_with_it() -> None:
+    pair = walk_with_and_without(load_walk(WALK, [WEAK]), 0.25)
+    worn, bare = pair.comparison.with_device, pair.comparison.without_device
+    assert worn.metrics["stays_up"].value == 1.0
+    assert worn.metrics["lowest_toes"].value > 0.0
+    assert bare.metrics["stays_up"].value == 0.0
+    fall = bare.metrics["fall_time"].value
+    assert bare.recording.time[-1] <= fall < bare.recording.time[-1] + 0.01, "the recording ends with the fall"
+    assert f"fell at t = {fall:.4g} s" in bare.status.message
+    answer = answer_of(pair)
+    assert answer.passed
+    assert "unadapted" in str(answer.sections)
+
+
+@pytest.mark.long
+def test_a_healthy_wearer_walks_at_the_published_speed_with_the_device_off() -> None:
+    found = walk(with_duration(load_walk(WALK, ["controller.kind=off"]), 20.0))
+    assert found.metrics["stays_up"].value == 1.0
+    assert 1.2 < found.metrics["walking_speed"].value < 1.5
+    assert found.metrics["total_gas"].value == 0.0
+    weight = 80.0 * 9.81
+    both = found.recording["ground_force"] + found.recording["other_ground_force"]
+    assert float(both.mean()) == pytest.approx(weight, rel=0.02), "the ground carries the body, on average"
+
+
+@pytest.mark.long
+def test_half_the_step_gives_the_same_mean_stride() -> None:
+    off = with_duration(load_walk(WALK, ["controller.kind=off"]), 20.0)
+    speeds = [walk(replace(off, time_step=step)).metrics["walking_speed"].value for step in (STEP, 0.5 * STEP)]
+    assert speeds[0] == pytest.approx(speeds[1], rel=0.01)
+
+
+@pytest.mark.long
+def test_a_gain_of_one_leg_is_a_setting_and_a_column() -> None:
+    scenario = load_walk(WALK, ["wearer.left_soleus_force=1.1", "run.duration=6 s"])
+    found = run_ensemble(scenario, {"wearer.left_soleus_force": np.array([1.1, 1.2])}, ["walking_speed"])
+    speeds = found.metrics["walking_speed"]
+    assert speeds[0] != speeds[1]
+    assert speeds[0] == pytest.approx(ppafo.simulate(scenario).metrics["walking_speed"].value, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"wearer": {"tibialis_strength": 0.3}}, 'needs a wearer who reacts: give wearer.reacts = "NAME"'),
+        ({"course": "uneven-ground"}, "does not go with wearer.reacts yet"),
+        ({"gait": "normal"}, "does not go with wearer.reacts yet"),
+        ({"wearer": {"reacts": "geyer-herr", "body_mass": "70 kg"}}, "is of a leg that a gait leads"),
+        ({"wearer": {"reacts": "geyer-her"}}, "did you mean 'geyer-herr'"),
+        ({"run": {"step": "0.2 ms"}}, "a wearer who reacts needs 0.0001 s or less"),
+    ],
+)
+def test_what_a_file_cannot_say_is_one_line(changes: dict[str, Any], words: str) -> None:
+    content: dict[str, Any] = {
+        "schema_version": 1,
+        "name": "mine",
+        "motion": {"kind": "walk"},
+        "wearer": {"reacts": "geyer-herr"},
+        "device": {"set": "ppafo2011", "valve": "solenoid"},
+        "controller": {"kind": "event_on_off"},
+        **changes,
+    }
+    with pytest.raises(PpafoError) as caught:
+        plan_walk(ppafo.scenario_from_dict(content))
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_what_needs_a_prescribed_gait_refuses_in_one_line() -> None:
+    scenario, line = load_walk(WALK), "needs a prescribed gait, and its wearer reacts"
+    for refused in (
+        lambda: walk_library(scenario),
+        lambda: risks_of_walk(scenario),
+        lambda: walk_population(scenario, 0.1, 8),
+        lambda: walking_task(WALK),
+        lambda: event_timing(WALK),
+    ):
+        with pytest.raises(ScenarioError, match=line):
+            refused()
+    assert "lowest_toes is over the ground" in lacking(scenario, METRICS["toe_clearance"])
+    assert "it needs a wearer who reacts (wearer.reacts)" in lacking(load_walk("solenoid"), METRICS["fall_time"])
+
+
+def test_the_led_walks_are_those_without_a_wearer_who_reacts() -> None:
+    assert set(list_walks()) - set(list_led_walks()) == {WALK}
+
+
+def test_a_wearer_file_beside_the_walk_is_found(tmp_path: Path) -> None:
+    shipped = Path(ppafo.__file__).parent
+    text = (shipped / "wearers" / "files" / "geyer-herr.toml").read_text()
+    (tmp_path / "me.toml").write_text(text.replace('"geyer-herr"', '"me"', 1))
+    walked = (shipped / "walking" / "configurations" / "reacting.toml").read_text()
+    (tmp_path / "mine.toml").write_text(walked.replace('"geyer-herr"', '"me.toml"'))
+    found = load_walk(tmp_path / "mine.toml")
+    assert "me" in found.motion.label
