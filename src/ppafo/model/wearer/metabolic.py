@@ -93,8 +93,8 @@ def umberger_2010(muscle: Muscle, work: Work) -> float:
 def bhargava_2004(muscle: Muscle, work: Work) -> float:
     """Metabolic rate of a muscle [W]: heats of activation, maintenance and shortening, and work, negative too.
 
-    Slow fibres are recruited by sin(pi u / 2), fast ones by 1 - cos(pi u / 2). The activation heat does not decay with the
-    time of stimulation, and a muscle gains no energy.
+    Slow fibres are recruited by sin(pi u / 2), fast ones by 1 - cos(pi u / 2). The activation heat does not decay, and
+    a muscle gains no energy.
     """
     sine, cosine = sine_and_cosine_of_turns(0.25 * work.stimulation)
     slow, fast = muscle.slow * sine, (1.0 - muscle.slow) * (1.0 - cosine)
