@@ -25,6 +25,7 @@ FOLDERS: dict[str, list[str]] = {
     "league": [],
     "league --walk": ["--walk"],
     "timing": ["--minutes", "0.2"],
+    "adapt": ["reacting"],
     "validate": ["ppafo2011", "bench.csv"],
     "rig": ["record", "step-response"],
     "identify": ["problem.toml"],

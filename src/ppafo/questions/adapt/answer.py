@@ -285,5 +285,5 @@ def _data(found: Adaptation) -> dict[str, Any]:
             for restart in found.restarts
         ],
         "best": found.best.number,
-        "folder": found.folder,
+        **({"folder": found.folder} if found.folder else {}),
     }

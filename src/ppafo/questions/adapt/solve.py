@@ -119,7 +119,7 @@ def adapt(
     ``adapts`` says whose gains: of both legs ``alike``, of each leg ``apart``, of the ``left`` leg with the device.
     StudyError for bad input.
     """
-    search = _search_of(walk, speed, adapts, restarts, generations, population, seed, overrides)
+    search = search_of(walk, speed, adapts, restarts, generations, population, seed, overrides)
     return _adapted(search, None, {}, threads, progress)
 
 
@@ -140,7 +140,7 @@ def adapt_into_folder(
 
     DataError for a folder of somebody else's, StudyError for one of another search.
     """
-    search = _search_of(walk, speed, adapts, restarts, generations, population, seed, overrides)
+    search = search_of(walk, speed, adapts, restarts, generations, population, seed, overrides)
     folder = Path(out or Path("out") / f"adapt-{search.scenario.name}")
     journal, known = folder / JOURNAL, {}
     kind = marked_folder("adapt")
@@ -158,13 +158,12 @@ def adapt_into_folder(
         found = _adapted(search, journal, known, threads, progress)
     except KeyboardInterrupt:
         raise KeyboardInterrupt("interrupted; finished generations are kept, and the same command resumes") from None
-    found = replace(found, folder=str(folder))
     contents = files_of(answer_of(found))
     write_marked_folder(folder, {**contents, JOURNAL: read_bytes(journal, _MAXIMUM_BYTES)}, "adapt")
-    return found
+    return replace(found, folder=str(folder))
 
 
-def _search_of(
+def search_of(
     walk: Scenario | str | Path | None,
     speed: float | None,
     adapts: str,
@@ -174,6 +173,7 @@ def _search_of(
     seed: int,
     overrides: Sequence[str],
 ) -> Search:
+    """Return the search that arguments of ``adapt`` describe; StudyError where they cannot be."""
     scenario = with_overrides(scenario_or_load(WALK if walk is None else walk), overrides)
     motion = scenario.motion
     if not isinstance(motion, WalkMotion) or motion.reacts is None:
