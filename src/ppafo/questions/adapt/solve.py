@@ -178,7 +178,7 @@ def search_of(
     motion = scenario.motion
     if not isinstance(motion, WalkMotion) or motion.reacts is None:
         raise StudyError(
-            f"'{scenario.name}': its wearer does not react, so that no reflexes can adapt; see 'ppafo walk'"
+            f"'{scenario.name}': is no walk of a wearer who reacts, so that no reflexes can adapt; 'reacting' is one"
         )
     names = Gains._fields
     groups: Mapping[str, tuple[tuple[str, ...], ...]] = {

@@ -19,8 +19,8 @@ SHORT = ["run.duration=6 s"]
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        ({"walk": "solenoid"}, "its wearer does not react"),
-        ({"walk": "torque-task-solenoid"}, "its wearer does not react"),
+        ({"walk": "solenoid"}, "is no walk of a wearer who reacts"),
+        ({"walk": "torque-task-solenoid"}, "is no walk of a wearer who reacts"),
         ({"population": 3}, "population = 3: must be at least 4"),
         ({"generations": 0}, "generations = 0: must be at least 1"),
         ({"speed": 4.0}, "speed = 4 m/s: must be at least"),
