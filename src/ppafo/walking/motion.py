@@ -150,9 +150,15 @@ def record_interval(seconds: float) -> float:
     return 1.0e-3 if seconds <= 61.0 else (5.0e-3 if seconds <= 601.0 else 2.0e-2)
 
 
+def interval_with_body(seconds: float) -> float:
+    """The same [s] of a wearer who reacts, each sample of whom has some hundred numbers more."""
+    return 5.0e-3 if seconds <= 61.0 else (1.0e-2 if seconds <= 601.0 else 5.0e-2)
+
+
 def with_duration(scenario: Scenario, seconds: float) -> Scenario:
     """A walk of another length [s], recorded as often as that allows."""
-    return replace(scenario, duration=seconds, output_interval=record_interval(seconds))
+    interval = record_interval if walk_of(scenario).reacts is None else interval_with_body
+    return replace(scenario, duration=seconds, output_interval=interval(seconds))
 
 
 def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
@@ -177,6 +183,7 @@ def clock_with(scenario: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tup
     period = times.get("controller.period", scenario.control.period)
     if "controller.rate" in times:
         period = 1.0 / times["controller.rate"]
-    output = over_runs(record_interval, duration) if "run.duration" in times else scenario.output_interval
+    interval = record_interval if walk_of(scenario).reacts is None else interval_with_body
+    output = over_runs(interval, duration) if "run.duration" in times else scenario.output_interval
     problems = duration_problems(scenario, duration) if "run.duration" in times else ()
     return Clock(duration, times.get("run.step", scenario.time_step), output, period), problems

@@ -1,4 +1,4 @@
-"""The answer of a walk of a wearer who reacts: with the device and without it, until a fall where there is one."""
+"""The answer of a walk of a wearer who reacts: with the device and with it off, until a fall where there is one."""
 
 import platform
 from typing import TYPE_CHECKING, Any
@@ -40,13 +40,13 @@ ROWS = (
 """Metric, title, kind of quantity and digits behind the point of each row."""
 
 _EXPLAINED = (
-    "'Without' is the same wearer with the same device and both chambers vented. The first two strides are left out of "
-    "the means. The device is on the left leg, and a stride is one step of that leg."
+    "'Device off' is the same wearer with the same device and both chambers vented: it still rubs and has inertia. The "
+    "first two strides are left out of the means. The device is on the left leg, and a stride is one step of that leg."
 )
 _LIMITS = (
-    "The wearer is unadapted: the gains of the reflexes are those of the wearer's file, with the device and without "
-    "it. The body is planar and without arms, and the device adds no weight, only friction, damping and the inertia of "
-    "vane and foot plate about the ankle. No number here is a benefit to a person: it is what this model does."
+    "The wearer is unadapted: the gains of the reflexes are those of the wearer's file, with the device on and off. "
+    "The body is planar and has no arms, and the device adds no weight, only friction, damping and the inertia of vane "
+    "and foot plate about the ankle. No number here is a benefit to a person: it is what this model does."
 )
 _CURVES = (
     "Mean over the strides from strike to strike of the left foot, with the standard deviation as a band. The ground "
@@ -57,7 +57,7 @@ _PANELS = (
     ("knee_angle", "Knee angle", "angle"),
     ("toe_height", "Toes over the ground", "body length"),
     ("ground_force", "Vertical ground force", "force"),
-    ("external_torque", "Torque on the ankle", "torque"),
+    ("torque", "Actuator torque", "torque"),
     ("tibialis_activation", "Activation of the tibialis", ""),
 )
 
@@ -129,14 +129,17 @@ def weak_remarks(wearer: ReactingWearer) -> list[str]:
 def fall_remarks(comparison: Comparison) -> list[str]:
     """Return who falls, with the device and without."""
     found = []
-    for words, walked in (("with the device", comparison.with_device), ("without", comparison.without_device)):
+    for words, walked in (
+        ("with the device", comparison.with_device),
+        ("with the device off", comparison.without_device),
+    ):
         fall = walked.metrics.get("fall_time")
         found += [] if fall is None else [f"{words}: the wearer falls at {fall.value:.1f} s"]
     return found
 
 
 def reacting_table(comparison: Comparison) -> Table:
-    """Return a row for each number, with the device and without it."""
+    """Return a row for each number, with the device and with it off."""
     columns = (comparison.with_device.metrics, comparison.without_device.metrics)
     rows = []
     for name, title, quantity, digits in ROWS:
@@ -144,7 +147,7 @@ def reacting_table(comparison: Comparison) -> Table:
             continue
         head = title_with_unit(title, quantity) if quantity else title
         rows.append((head, *(_cell(metrics, name, quantity, digits) for metrics in columns)))
-    return Table((Column(""), Column("with"), Column("without")), tuple(rows))
+    return Table((Column(""), Column("with"), Column("device off")), tuple(rows))
 
 
 def _cell(metrics: Any, name: str, quantity: str, digits: int) -> str | None:
@@ -163,11 +166,11 @@ def _curves(comparison: Comparison) -> tuple[Section, ...]:
 
 
 def stride_figure(comparison: Comparison) -> "Drawn":
-    """Return the mean stride of a wearer who reacts, with the device and without it."""
+    """Return the mean stride of a wearer who reacts, with the device and with it off."""
     from matplotlib.figure import Figure as Drawn
 
     walks: dict[str, tuple[WalkResult, str]] = {
-        "without": (comparison.without_device, GREY),
+        "device off (vented)": (comparison.without_device, VERMILION),
         "with the device": (comparison.with_device, BLUE),
     }
     with house_style():
@@ -185,11 +188,11 @@ def stride_figure(comparison: Comparison) -> "Drawn":
                 axes.plot(100.0 * PHASES, mean, color=color, linewidth=1.6, label=label)
                 axes.fill_between(100.0 * PHASES, 2.0 * mean - spread, spread, color=color, alpha=0.2, linewidth=0)
             if channel == "toe_height":
-                axes.axhline(0.0, color=VERMILION, linewidth=0.8)
+                axes.axhline(0.0, color=GREY, linewidth=0.8)
             axes.set_ylabel(title_with_unit(title, quantity) if quantity else title, fontsize=9)
             axes.set_xlim(0.0, 100.0)
         for axes in figure.axes[3:]:
-            axes.set_xlabel("Stride [%]", fontsize=9)
+            axes.set_xlabel("Stride (%)", fontsize=9)
         figure.axes[0].legend(fontsize=8, loc="best")
         scenario = comparison.with_device.scenario
         title = f"{scenario.name}: {wearer_of_walk(scenario).name}, who reacts"
