@@ -1,1 +1,1 @@
-"""Wearers who react: shipped gains of reflexes, the published body, and the search that finds gains."""
+"""Wearers who react: shipped gains of reflexes and changes by disease, and the published body."""

@@ -17,6 +17,9 @@ from ppafo.model.wearer.walker import Fibres, Muscles, Wearer
 from ppafo.units import parse_quantity
 from ppafo.wearers.published import published_wearer
 
+NOT_PUBLISHED = ("soleus_stretch", "gastrocnemius_stretch")
+"""Gains that a file may leave out: they are 0 but in a spastic leg."""
+
 PUBLISHED = "geyer-herr"
 """The wearer that is taken where none is named."""
 
@@ -27,7 +30,8 @@ _FILE = TomlKind("wearer", "wearer", resources.files("ppafo") / "wearers" / "fil
 class WearerFile:
     """A wearer who reacts: name, one line about him, source, notes, speed at the start [m/s], how the gains were found.
 
-    Gains of both legs in the units of ``Gains``; strengths of the muscles of both legs, 1 healthy, those not named 1.
+    Gains of both legs in the units of ``Gains``; strengths of the muscles of both legs, 1 healthy, those not named 1;
+    their largest velocities as a factor, and the stiffness of the ankles beside muscles [N m/rad].
     """
 
     name: str
@@ -40,6 +44,10 @@ class WearerFile:
     right_gains: Gains
     left_strengths: Mapping[str, float]
     right_strengths: Mapping[str, float]
+    left_quickness: float = 1.0
+    right_quickness: float = 1.0
+    left_ankle_stiffness: float = 0.0
+    right_ankle_stiffness: float = 0.0
 
 
 @functools.cache
@@ -64,6 +72,10 @@ def wearer_file() -> type[BaseModel]:
                 table("GainsOfLeg", {name: optional(gain, "gain of this leg alone") for name in names}),
                 "gains in which this leg differs",
             ),
+            "quickness": optional(
+                Annotated[number, Field(ge=0.1, le=3.0)], "largest velocity of all muscles, of the healthy one"
+            ),
+            "ankle_stiffness": optional(str, "what resists the ankle beside muscles, such as '20 N m/rad'"),
         },
     )
     found = {
@@ -88,11 +100,24 @@ def wearer_file() -> type[BaseModel]:
                 Annotated[str, Field(pattern=r"^\s*[+-]?(\d|\.\d)")],
                 Field(description="speed of the body at the start, such as '1.3 m/s'"),
             ),
-            "found": (table("Found", found), Field(description="how the gains were found")),
+            "found": optional(table("Found", found), "how the gains were found"),
             "gains": (
-                table("GainsOfBoth", {name: (gain, Field(description="gain of both legs")) for name in names}),
-                Field(description="gains of the reflexes: forces in largest forces, lengths in optimum lengths, rad"),
+                table(
+                    "GainsOfBoth",
+                    {
+                        name: optional(gain, "gain of both legs")
+                        if name in NOT_PUBLISHED
+                        else (gain, Field(description="gain of both legs"))
+                        for name in names
+                    },
+                ),
+                Field(
+                    default_factory=dict,
+                    description="gains of the reflexes: forces in largest forces, lengths in optimum lengths, rad",
+                ),
             ),
+            "based_on": optional(str, "wearer of the package whose gains these are, instead of [gains] and [found]"),
+            "both": optional(leg, "in what both legs differ from the published body"),
             "left": optional(leg, "in what the left leg differs"),
             "right": optional(leg, "in what the right leg differs"),
         },
@@ -111,25 +136,52 @@ def find_wearer(name_or_path: str | Path = PUBLISHED) -> WearerFile:
     """
     model, file = read_model(_FILE, wearer_file(), name_or_path)
     document = model.model_dump(exclude_unset=True)
-    with refused_as(DataError, f"{file}: start_speed = {document['start_speed']!r}", UnitError):
-        speed = parse_quantity(document["start_speed"], "m/s")
-    if not 0.0 <= speed <= 3.0:
-        raise DataError(
-            f"{file}: start_speed = {document['start_speed']!r} is not allowed; it lies between 0 and 3 m/s"
-        )
-    left, right = document.get("left", {}), document.get("right", {})
+    base = _base(document, file)
+    gains = {**dict.fromkeys(NOT_PUBLISHED, 0.0), **base["gains"]}
+    speed = _number(document, "start_speed", "m/s", 3.0, file)
+    left, right = ({**document.get("both", {}), **document.get(side, {})} for side in ("left", "right"))
     return WearerFile(
         name=document["name"],
         title=document.get("title", ""),
         source=document["source"],
         notes=document.get("notes", ""),
         speed=speed,
-        found=_how_found(document["found"]),
-        left_gains=Gains(**{**document["gains"], **left.get("gains", {})}),
-        right_gains=Gains(**{**document["gains"], **right.get("gains", {})}),
+        found=_how_found(base["found"]),
+        left_gains=Gains(**{**gains, **left.get("gains", {})}),
+        right_gains=Gains(**{**gains, **right.get("gains", {})}),
         left_strengths=left.get("strength", {}),
         right_strengths=right.get("strength", {}),
+        left_quickness=left.get("quickness", 1.0),
+        right_quickness=right.get("quickness", 1.0),
+        left_ankle_stiffness=_number(left, "ankle_stiffness", "N m/rad", 500.0, file),
+        right_ankle_stiffness=_number(right, "ankle_stiffness", "N m/rad", 500.0, file),
     )
+
+
+def _base(document: dict[str, Any], file: str) -> dict[str, Any]:
+    """The document that has the gains: this one, or that of the wearer on whom it is based."""
+    given = [key for key in ("gains", "found", "based_on") if key in document]
+    if given == ["gains", "found"]:
+        return document
+    if given != ["based_on"]:
+        raise DataError(f"{file}: give [gains] and [found], or based_on alone with the name of a wearer")
+    model, other = read_model(_FILE, wearer_file(), document["based_on"])
+    base: dict[str, Any] = model.model_dump(exclude_unset=True)
+    if "based_on" in base:
+        raise DataError(
+            f"{file}: based_on = {document['based_on']!r} is not allowed; '{other}' has no gains of its own"
+        )
+    return base
+
+
+def _number(table: Mapping[str, Any], key: str, unit: str, largest: float, file: str) -> float:
+    """A quantity of a table in SI, 0 where it is missing."""
+    text = table.get(key, f"0 {unit}")
+    with refused_as(DataError, f"{file}: {key} = {text!r}", UnitError):
+        value = parse_quantity(text, unit)
+    if not 0.0 <= value <= largest:
+        raise DataError(f"{file}: {key} = {text!r} is not allowed; it lies between 0 and {largest:g} {unit}")
+    return value
 
 
 def _how_found(found: dict[str, Any]) -> str:
@@ -150,14 +202,25 @@ def _how_found(found: dict[str, Any]) -> str:
 def wearer_of(file: WearerFile) -> Wearer:
     """Return the wearer that a file describes, on the published body."""
     wearer = published_wearer(file.left_gains, file.right_gains)
+    left = _quicker(with_strengths(wearer.left, file.left_strengths), file.left_quickness)
+    right = _quicker(with_strengths(wearer.right, file.right_strengths), file.right_quickness)
     return wearer._replace(
-        left=with_strengths(wearer.left, file.left_strengths), right=with_strengths(wearer.right, file.right_strengths)
+        left=left._replace(ankle_stiffness=file.left_ankle_stiffness),
+        right=right._replace(ankle_stiffness=file.right_ankle_stiffness),
+    )
+
+
+def _quicker(muscles: Muscles, factor: float) -> Muscles:
+    """The muscles of a leg with largest velocities times a factor."""
+    own: dict[str, Any] = {name: getattr(muscles, name) for name in Fibres._fields}
+    return muscles._replace(
+        **{name: muscle._replace(velocity=muscle.velocity * factor) for name, muscle in own.items()}
     )
 
 
 def with_strengths(muscles: Muscles, strengths: Mapping[str, float]) -> Muscles:
     """Return the muscles of a leg with largest forces times these factors, by the names of ``Fibres``."""
-    weaker = {name: getattr(muscles, name) for name in strengths}
+    weaker: dict[str, Any] = {name: getattr(muscles, name) for name in strengths}
     return muscles._replace(
         **{name: muscle._replace(force=muscle.force * strengths[name]) for name, muscle in weaker.items()}
     )

@@ -67,6 +67,8 @@ MUSCLES = Muscles(
     hamstring_hip=_lever(0.08, 0.0, 155.0, 0.7),
     gluteus_hip=_lever(0.10, 0.0, 150.0, 0.5),
     flexor_hip=_lever(0.10, 0.0, 180.0, 0.5),
+    ankle_stiffness=0.0,
+    ankle_rest=math.radians(90.0),
 )
 """The seven muscles of a leg: soleus, tibialis anterior, gastrocnemius, vasti, hamstrings, glutei and hip flexors.
 
@@ -127,7 +129,7 @@ def start_of(wearer: Wearer, speed: float) -> Walker:
 
 def _leg_at_start(muscles: Muscles, angles: Joints) -> LegState:
     """A leg that does not touch the ground yet, whose tendons are just without force."""
-    fibre = Fibre(activation=0.05, length=0.1)
+    fibre = Fibre(activation=0.05, length=0.1, velocity=0.0)
     wholes = pull(muscles, Fibres(*[fibre] * 7), angles, Joints(0.0, 0.0, 0.0), 0.0)
     none = Point(0.0, 0.0, 0.0)
     return LegState(

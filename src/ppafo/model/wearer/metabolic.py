@@ -44,11 +44,11 @@ def mass_of(muscle: Muscle) -> float:
     return DENSITY * muscle.force * muscle.optimum / TENSION
 
 
-def work_between(muscle: Muscle, before: Fibre, after: Fibre, stimulation: float, step: float) -> Work:
-    """What a muscle did in a step [s], in the middle of which its numbers are taken."""
+def work_between(muscle: Muscle, before: Fibre, after: Fibre, stimulation: float) -> Work:
+    """What a muscle did in a step, in the middle of which its numbers are taken."""
     activation = 0.5 * (before.activation + after.activation)
     length = 0.5 * (before.length + after.length) / muscle.optimum
-    velocity = (after.length - before.length) / (step * muscle.optimum)
+    velocity = after.velocity / muscle.optimum
     isometric = bell(length)
     return Work(
         stimulation=stimulation,

@@ -44,10 +44,11 @@ class Muscle(NamedTuple):
 
 
 class Fibre(NamedTuple):
-    """State of a muscle: activation [-] and length of the contractile element [m]."""
+    """State of a muscle: activation [-], length of the contractile element [m] and its velocity [m/s] in the last step."""
 
     activation: float
     length: float
+    velocity: float
 
 
 class Lever(NamedTuple):
@@ -126,10 +127,8 @@ def next_fibre(muscle: Muscle, fibre: Fibre, stimulation: float, whole: float, s
     stiffness = 2.0 * strain / (TENDON_STRAIN * muscle.slack) + 2.0 * pressed / (0.5 * WIDTH * muscle.optimum)
     stiffness += borne * 2.0 * stretched / (WIDTH * muscle.optimum)
     slope = speed * slope_of_lengthening(borne) * stiffness / isometric
-    return Fibre(
-        activation=activation,
-        length=fibre.length + step * speed * lengthening(borne) / (1.0 + 0.5 * step * slope),
-    )
+    velocity = speed * lengthening(borne) / (1.0 + 0.5 * step * slope)
+    return Fibre(activation=activation, length=fibre.length + step * velocity, velocity=velocity)
 
 
 def pull_of(muscle: Muscle, fibre: Fibre, whole: float) -> float:

@@ -1,7 +1,7 @@
 """What a wearer has felt and is still on its way: each feeling reaches the muscles 20, 10 or 5 ms after it was felt.
 
 Nerves are sampled every ``SAMPLE``; what is on its way is a row of the last samples, the latest first. A hundred and
-twenty numbers a leg, but they move along one place in ten steps only.
+sixty numbers a leg, but they move along one place in ten steps only.
 """
 
 from typing import Annotated, NamedTuple
@@ -20,6 +20,8 @@ class LegNerves(NamedTuple):
 
     soleus: Annotated[tuple[float, ...], FAR]
     gastrocnemius: Annotated[tuple[float, ...], FAR]
+    soleus_stretch: Annotated[tuple[float, ...], FAR]
+    gastrocnemius_stretch: Annotated[tuple[float, ...], FAR]
     tibialis: Annotated[tuple[float, ...], FAR]
     vastus: Annotated[tuple[float, ...], MIDDLE]
     knee: Annotated[tuple[float, ...], MIDDLE]
@@ -82,6 +84,8 @@ def arrived(nerves: LegNerves) -> Felt:
     return Felt(
         soleus=nerves.soleus[19],
         gastrocnemius=nerves.gastrocnemius[19],
+        soleus_stretch=nerves.soleus_stretch[19],
+        gastrocnemius_stretch=nerves.gastrocnemius_stretch[19],
         tibialis=nerves.tibialis[19],
         vastus=nerves.vastus[9],
         knee=nerves.knee[9],
@@ -104,6 +108,8 @@ def next_of_leg(nerves: LegNerves, felt: Felt) -> LegNerves:
     return LegNerves(
         soleus=after_20(nerves.soleus, felt.soleus),
         gastrocnemius=after_20(nerves.gastrocnemius, felt.gastrocnemius),
+        soleus_stretch=after_20(nerves.soleus_stretch, felt.soleus_stretch),
+        gastrocnemius_stretch=after_20(nerves.gastrocnemius_stretch, felt.gastrocnemius_stretch),
         tibialis=after_20(nerves.tibialis, felt.tibialis),
         vastus=after_10(nerves.vastus, felt.vastus),
         knee=after_10(nerves.knee, felt.knee),
@@ -131,6 +137,8 @@ def settled_leg(felt: Felt) -> LegNerves:
     return LegNerves(
         soleus=(felt.soleus,) * FAR,
         gastrocnemius=(felt.gastrocnemius,) * FAR,
+        soleus_stretch=(felt.soleus_stretch,) * FAR,
+        gastrocnemius_stretch=(felt.gastrocnemius_stretch,) * FAR,
         tibialis=(felt.tibialis,) * FAR,
         vastus=(felt.vastus,) * MIDDLE,
         knee=(felt.knee,) * MIDDLE,

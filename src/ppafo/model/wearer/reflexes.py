@@ -16,11 +16,14 @@ LEAST = 0.01
 class Felt(NamedTuple):
     """What a leg feels: of the ankle, of the knee, of the hip; each comes to the muscles after its own delay.
 
-    Forces [largest forces], lengths [optimum lengths], knee [rad], [rad/s], load on the ground [body weights].
+    Forces [largest forces], lengths [optimum lengths], knee [rad], [rad/s], load on the ground [body weights]; how fast
+    the calf is stretched [optimum lengths/s], above 0 while it lengthens.
     """
 
     soleus: float
     gastrocnemius: float
+    soleus_stretch: float
+    gastrocnemius_stretch: float
     tibialis: float
     vastus: float
     knee: float
@@ -48,7 +51,11 @@ class Gait(NamedTuple):
 
 
 class Gains(NamedTuple):
-    """Gains of the reflexes, in the units of ``Felt``; angles in rad. Names say which feeling drives which muscle."""
+    """Gains of the reflexes, in the units of ``Felt``; angles in rad. Names say which feeling drives which muscle.
+
+    The stretch reflexes of the calf by its velocity, in stance and swing, are 0 in the publication: they make it spastic.
+    K. Jansen et al., J. NeuroEng. Rehabil. 11 (2014) 78 added them to this model.
+    """
 
     soleus_force: float
     gastrocnemius_force: float
@@ -75,6 +82,8 @@ class Gains(NamedTuple):
     tone: float
     tone_of_vastus: float
     tone_of_hip: float
+    soleus_stretch: float
+    gastrocnemius_stretch: float
 
 
 class Stimulation(NamedTuple):
@@ -108,11 +117,13 @@ def stimulation(
     tibialis = gains.tone + gains.tibialis_length * (felt.tibialis - gains.tibialis_rest)
     flexor = gains.tone_of_hip + gains.flexor_length * (felt.flexor_length - gains.flexor_rest)
     flexor += gains.lean_at_leaving * (gait.lean_at_leaving - gains.lean_reference)
+    soleus = gains.tone + gains.soleus_stretch * max(felt.soleus_stretch, 0.0)
+    gastrocnemius = gains.tone + gains.gastrocnemius_stretch * max(felt.gastrocnemius_stretch, 0.0)
     flexor -= gains.hamstring_on_flexor * max(felt.hamstring_length - gains.hamstring_rest, 0.0)
     standing = Stimulation(
-        soleus=gains.tone + gains.soleus_force * felt.soleus,
+        soleus=soleus + gains.soleus_force * felt.soleus,
         tibialis=tibialis - gains.soleus_on_tibialis * felt.soleus,
-        gastrocnemius=gains.tone + gains.gastrocnemius_force * felt.gastrocnemius,
+        gastrocnemius=gastrocnemius + gains.gastrocnemius_force * felt.gastrocnemius,
         vastus=gains.tone_of_vastus
         + gains.vastus_force * felt.vastus
         - stop
@@ -122,9 +133,9 @@ def stimulation(
         flexor=gains.tone_of_hip + max(-upright - turns, 0.0) * load + rear,
     )
     swinging = Stimulation(
-        soleus=gains.tone,
+        soleus=soleus,
         tibialis=tibialis,
-        gastrocnemius=gains.tone,
+        gastrocnemius=gastrocnemius,
         vastus=gains.tone,
         hamstring=gains.tone + gains.hamstring_force * felt.hamstring,
         gluteus=gains.tone + gains.gluteus_force * felt.gluteus,

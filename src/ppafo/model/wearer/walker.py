@@ -25,7 +25,10 @@ HALF_TURN = 3.141592653589793
 
 
 class Muscles(NamedTuple):
-    """Muscles of a leg, and how they pass ankle, knee and hip."""
+    """Muscles of a leg, how they pass ankle, knee and hip, and what else resists the ankle.
+
+    That is ``ankle_stiffness`` [N m/rad] around ``ankle_rest`` [rad], 0 in a healthy leg, whose ends are in ``Stop``.
+    """
 
     soleus: Muscle
     tibialis: Muscle
@@ -43,6 +46,8 @@ class Muscles(NamedTuple):
     hamstring_hip: Lever
     gluteus_hip: Lever
     flexor_hip: Lever
+    ankle_stiffness: float
+    ankle_rest: float
 
 
 class Stop(NamedTuple):
@@ -194,6 +199,8 @@ def pull(muscles: Muscles, fibres: Fibres, angle: Joints, rate: Joints, ahead: f
         felt=Felt(
             soleus=soleus_force,
             gastrocnemius=calf_force,
+            soleus_stretch=fibres.soleus.velocity / muscles.soleus.optimum,
+            gastrocnemius_stretch=fibres.gastrocnemius.velocity / muscles.gastrocnemius.optimum,
             tibialis=fibres.tibialis.length / muscles.tibialis.optimum,
             vastus=vastus_force,
             knee=angle.knee,
@@ -299,7 +306,8 @@ def leg_now(
     ankle_end = end_of_joint(wearer.stop, wearer.stop.ankle_low, wearer.stop.ankle_high, angle.ankle, rate.ankle)
     knee_end = end_of_joint(wearer.stop, 0.0, wearer.stop.knee, angle.knee, rate.knee)
     hip_end = wearer.stop.stiffness * max(angle.hip - wearer.stop.hip, 0.0)
-    ankle = pulled.ankle + ankle_end.torque + assist.torque - assist.damping * rate.ankle
+    stiff = muscles.ankle_stiffness * (angle.ankle - muscles.ankle_rest)
+    ankle = pulled.ankle + ankle_end.torque - stiff + assist.torque - assist.damping * rate.ankle
     knee, hip = pulled.knee + knee_end.torque, pulled.hip - hip_end
     damping = Damping(
         heel_along=heel.damping_along,
@@ -328,6 +336,8 @@ def leg_now(
         felt=Felt(
             soleus=felt.soleus,
             gastrocnemius=felt.gastrocnemius,
+            soleus_stretch=felt.soleus_stretch,
+            gastrocnemius_stretch=felt.gastrocnemius_stretch,
             tibialis=felt.tibialis,
             vastus=felt.vastus,
             knee=felt.knee,

@@ -92,11 +92,11 @@ def test_a_long_muscle_needs_less_heat() -> None:
 
 def test_the_work_of_a_step_is_that_of_the_force_along_its_way() -> None:
     """A muscle that pulls a tendon of fixed ends stores in it what it works, but for what its own springs keep."""
-    step, whole, fibre = 1e-5, 0.30, Fibre(0.01, 0.0398)
+    step, whole, fibre = 1e-5, 0.30, Fibre(0.01, 0.0398, 0.0)
     done, stored = 0.0, 0.0
     for _ in range(20000):
         after = next_fibre(SLOW, fibre, 0.6, whole, step)
-        work = work_between(SLOW, fibre, after, 0.6, step)
+        work = work_between(SLOW, fibre, after, 0.6)
         done -= step * SLOW.force * SLOW.optimum * work.force * work.velocity
         fibre = after
     strain = max((whole - fibre.length) / SLOW.slack - 1.0, 0.0)
