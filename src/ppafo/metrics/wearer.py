@@ -85,6 +85,11 @@ def _speed(readings: Readings) -> Floats:
     return found
 
 
+def _stride_time(readings: Readings) -> Floats:
+    totals = readings.meters["wearer"]
+    return mean_of(totals.last.time - totals.first.time, _strides(readings))
+
+
 def _lowest_toes(readings: Readings) -> Floats:
     totals = readings.meters["wearer"]
     return mean_of(totals.last.clearances - totals.first.clearances, _strides(readings))
@@ -112,6 +117,7 @@ METRICS = (
     _kind("fall_time", "s", "time at which the wearer falls", _fall_time),
     _kind("walked_time", "s", "time until the wearer falls, or until the end", _walked_time),
     _kind("walking_speed", "m/s", "speed, mean over whole strides without the first ones", _speed),
+    _kind("stride_time", "s", "time of a stride, mean over whole strides without the first ones", _stride_time),
     _kind("lowest_toes", "m", "lowest toe height above ground in mid-swing, mean over the strides", _lowest_toes),
     _kind("muscle_work", "J", "work of all muscles of both legs as they shorten, in one stride", _muscle_work),
     _kind("muscle_power", "W", "mean power of all muscles of both legs as they shorten", _muscle_power),

@@ -110,8 +110,10 @@ def reacting_metrics(
         count = float(counted.sum())
         length = float(time[last] - time[first])
         values["walking_speed"] = float(record["walker.pose.x"][last] - record["walker.pose.x"][first]) / length
+        values["stride_time"] = length / count
         values["lowest_toes"] = float(record["walk.clearances"][last] - record["walk.clearances"][first]) / count
-        values["muscle_work"] = float(record["walk.muscle_work"][last] - record["walk.muscle_work"][first]) / count
+        work = float(record["walk.muscle_work"][last] - record["walk.muscle_work"][first])
+        values |= {"muscle_work": work / count, "muscle_power": work / length}
     found = {name: Metric(value, of_wearer[name].unit, of_wearer[name].summary) for name, value in values.items()}
     for name, item in PER_STRIDE.items():
         own = strides[name][counted & helped]

@@ -28,6 +28,7 @@ ROWS = (
     ("walked_time", "Walked until the end or a fall", "time", 1),
     ("strides", "Whole strides", "", 0),
     ("walking_speed", "Speed", "velocity", 2),
+    ("stride_time", "Time of a stride", "time", 3),
     ("lowest_toes", "Lowest toes over the ground in mid-swing, mean", "body length", 1),
     ("toe_landing", "Strides that begin on the toes", "fraction", 0),
     ("slap_rate", "Rate of the foot as it comes down", "angular velocity", 0),
