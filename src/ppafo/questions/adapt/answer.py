@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 FALLS = 10.0
+"""Cost of a fall at the very end; one at the very start costs twice as much. A walk costs about 0.1."""
+
 SETTLED, FEWEST = 0.02, 12
 """Share by which the best cost may fall over the last quarter of a search that has settled; its fewest generations."""
 
@@ -190,7 +192,7 @@ def remarks(found: Adaptation) -> list[str]:
         said.append(f"restart {', '.join(unsettled)} had not settled: more --generations may find better gains")
     said.append(
         "the wearer is a model: gains were searched for little muscle work at a speed, which no person is known to do; "
-        "see docs/how-to/let-a-wearer-react.md"
+        "see docs/how-to/adapt-reflexes.md"
     )
     return said
 

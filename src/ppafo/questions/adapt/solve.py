@@ -20,7 +20,7 @@ from ppafo.errors import DataError, StudyError
 from ppafo.loading import scenario_or_load
 from ppafo.model.wearer.reflexes import Gains
 from ppafo.progress import Report
-from ppafo.questions.adapt.answer import Adaptation, Restart, Walked, answer_of
+from ppafo.questions.adapt.answer import FALLS, Adaptation, Restart, Walked, answer_of
 from ppafo.simulation.scenario import Scenario, scenario_document
 from ppafo.storage.files import read_bytes
 from ppafo.storage.result_folder import check_owned_folder, marked_folder, write_marked_folder
@@ -43,9 +43,6 @@ FRESH_STARTS = tuple(np.linspace(0.85, 1.15, 8).tolist())
 """Start speeds from which what was found is judged, none of them one of the search."""
 
 METRICS = ("stays_up", "walked_time", "walking_speed", "muscle_power", "lowest_toes", "gas")
-FALLS = 10.0
-"""Cost of a fall at the very end; one at the very start costs twice as much. A walk costs about 0.1."""
-
 OF_SPEED = 10.0
 """Cost of being off the speed, over its square [s^2/m^2]: 0.1 m/s cost as much as the work of the muscles."""
 
