@@ -1,0 +1,65 @@
+"""Wearer files: the shipped ones, those based on another, and what is wrong with a file in one line."""
+
+from pathlib import Path
+
+import pytest
+
+from ppafo.errors import DataError
+from ppafo.wearers.loading import find_wearer, list_wearers, wearer_of
+
+HEALTHY = ("healthy-98", "healthy-110", "healthy-123", "healthy-128", "healthy-138")
+
+
+def written(folder: Path, text: str) -> Path:
+    file = folder / "own.toml"
+    file.write_text(f'schema_version = 1\nname = "own"\nsource = "a test"\nstart_speed = "1.3 m/s"\n{text}')
+    return file
+
+
+@pytest.mark.parametrize("name", list_wearers())
+def test_every_shipped_wearer_says_how_it_was_found(name: str) -> None:
+    wearer = find_wearer(name)
+    assert wearer.name == name
+    assert wearer.title
+    assert wearer.source
+    assert wearer.found == "published" or wearer.found.startswith("by search: from geyer-herr seed")
+    assert wearer_of(wearer).weight == pytest.approx(80.0 * 9.81)
+
+
+def test_at_least_five_healthy_wearers_have_gains_of_their_own() -> None:
+    gains = {find_wearer(name).left_gains for name in HEALTHY}
+    assert len(gains) == 5
+    assert all(find_wearer(name).left_gains == find_wearer(name).right_gains for name in HEALTHY)
+
+
+def test_a_disease_changes_one_leg_and_keeps_the_gains() -> None:
+    healthy, spastic = find_wearer("healthy-128"), find_wearer("spastic-calf")
+    assert spastic.right_gains == healthy.right_gains
+    assert spastic.left_gains == healthy.left_gains._replace(soleus_stretch=0.05, gastrocnemius_stretch=0.05)
+    weak = wearer_of(find_wearer("drop-foot"))
+    assert weak.left.tibialis.force == 0.25 * weak.right.tibialis.force
+    stiff = wearer_of(find_wearer("stiff-ankle"))
+    assert (stiff.left.ankle_stiffness, stiff.right.ankle_stiffness) == (40.0, 0.0)
+    old, young = wearer_of(find_wearer("elderly")), wearer_of(healthy)
+    assert old.right.soleus.force == pytest.approx(0.7 * young.right.soleus.force)
+    assert old.left.flexor.velocity == pytest.approx(0.8 * young.left.flexor.velocity)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "give [gains] and [found], or based_on alone with the name of a wearer"),
+        ('based_on = "healthy-128"\n[found]\nby = "search"\n', "give [gains] and [found], or based_on alone"),
+        ('based_on = "drop-foot"\n', "'drop-foot' has no gains of its own"),
+        ('based_on = "healthy-12"\n', "there is no wearer 'healthy-12', did you mean 'healthy-1"),
+        ('based_on = "healthy-128"\n[left]\nankle_stiffness = "40 N"\n', "ankle_stiffness = '40 N'"),
+        ('based_on = "healthy-128"\n[left]\nankle_stiffness = "4 kN m/rad"\n', "it lies between 0 and 500 N m/rad"),
+        ('based_on = "healthy-128"\n[left.strength]\ntibials = 0.1\n', "tibialis"),
+        ('based_on = "healthy-128"\n[left.strength]\ntibialis = -0.1\n', "tibialis"),
+    ],
+)
+def test_a_wrong_file_is_refused_in_one_line(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(DataError) as refused:
+        find_wearer(written(tmp_path, text))
+    assert said in str(refused.value)
+    assert "\n" not in str(refused.value)
