@@ -19,7 +19,7 @@ from ppafo.model.wearer.segments import Limb, Pose
 from ppafo.model.wearer.walker import Fibres, Walker, Wearer, joints
 from ppafo.simulation.declaration import Reading, value_at
 from ppafo.wearers.loading import find_wearer, wearer_of, with_strengths
-from ppafo.wearers.published import felt_at, first_answer, start_of
+from ppafo.wearers.published import felt_at, first_answer, on_slope, start_of
 
 REACTS = "wearer.reacts"
 """Where the file of a walk names a wearer who reacts."""
@@ -46,7 +46,8 @@ GAINS = tuple(
 """Gains of the reflexes of both legs, forces in largest forces, lengths in optimum lengths."""
 
 START_SPEED = Quantity("start_speed", "m/s", "speed with which the walk begins", 1.3, 0.5, 2.0)
-REACTIONS = (*STRENGTHS, *GAINS, START_SPEED)
+SLOPE = Quantity("slope", "1", "rise of the ground along the walk, above 0 uphill", 0.0, -0.2, 0.2)
+REACTIONS = (*STRENGTHS, *GAINS, START_SPEED, SLOPE)
 """Numbers of a wearer who reacts."""
 
 LONGEST_STEP = 1.0e-4
@@ -78,7 +79,8 @@ class ReactingWearer:
         left, right = (
             Gains(*(self.settings[f"{side}_{name}"] for name in Gains._fields)) for side in ("left", "right")
         )
-        return self.body._replace(left=muscles, left_gains=left, right_gains=right)
+        body = on_slope(self.body, self.settings[SLOPE.name])
+        return body._replace(left=muscles, left_gains=left, right_gains=right)
 
 
 @dataclass(frozen=True, slots=True)

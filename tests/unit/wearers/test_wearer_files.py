@@ -1,11 +1,13 @@
 """Wearer files: the shipped ones, those based on another, and what is wrong with a file in one line."""
 
+import math
 from pathlib import Path
 
 import pytest
 
 from ppafo.errors import DataError
 from ppafo.wearers.loading import find_wearer, list_wearers, wearer_of
+from ppafo.wearers.published import on_slope
 
 HEALTHY = ("healthy-98", "healthy-110", "healthy-123", "healthy-128", "healthy-138")
 
@@ -63,3 +65,13 @@ def test_a_wrong_file_is_refused_in_one_line(tmp_path: Path, text: str, said: st
         find_wearer(written(tmp_path, text))
     assert said in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("slope", [-0.2, -0.05, 0.0, 0.08, 0.2])
+def test_a_slope_turns_gravity_and_what_is_upright(slope: float) -> None:
+    level = wearer_of(find_wearer("healthy-128"))
+    body, angle = on_slope(level, slope).body, math.atan(slope)
+    assert body.gravity == pytest.approx(9.81 * math.cos(angle), rel=1e-14)
+    assert body.gravity_along == pytest.approx(9.81 * math.sin(angle), rel=1e-13)
+    assert body.upright == pytest.approx(angle, rel=1e-9)
+    assert (body == level.body) is (slope == 0.0)

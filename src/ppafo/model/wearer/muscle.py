@@ -44,7 +44,7 @@ class Muscle(NamedTuple):
 
 
 class Fibre(NamedTuple):
-    """State of a muscle: activation [-], length of the contractile element [m] and its velocity [m/s] in the last step."""
+    """State of a muscle: activation [-], length of the contractile element [m], its velocity [m/s] in the last step."""
 
     activation: float
     length: float

@@ -53,8 +53,8 @@ class Gait(NamedTuple):
 class Gains(NamedTuple):
     """Gains of the reflexes, in the units of ``Felt``; angles in rad. Names say which feeling drives which muscle.
 
-    The stretch reflexes of the calf by its velocity, in stance and swing, are 0 in the publication: they make it spastic.
-    K. Jansen et al., J. NeuroEng. Rehabil. 11 (2014) 78 added them to this model.
+    Stretch reflexes of the calf by its velocity, in stance and swing, are 0 in the publication: they make it spastic;
+    K. Jansen et al., J. NeuroEng. Rehabil. 11 (2014) 78.
     """
 
     soleus_force: float

@@ -25,6 +25,8 @@ class Body(NamedTuple):
     """Segments of a wearer, SI units.
 
     Of the foot ``length`` is from ankle to ball, and ``heel`` [m] is behind the ankle; the trunk begins at the hip.
+    On a slope x is along the ground: ``gravity`` is normal to it, ``gravity_along`` against x, above 0 uphill [m/s^2],
+    and ``upright`` is the lean [rad] at which the trunk is vertical.
     """
 
     trunk: Segment
@@ -33,6 +35,8 @@ class Body(NamedTuple):
     foot: Segment
     heel: float
     gravity: float
+    gravity_along: float
+    upright: float
 
 
 class Limb(NamedTuple):
@@ -180,25 +184,29 @@ def leg_matrix(
         b1=torques.thigh
         - p12 * s12 * w2
         - p13 * s13 * w3
-        - s1 * body.gravity * turned.thigh_sine
+        - s1 * (body.gravity * turned.thigh_sine + body.gravity_along * turned.thigh_cosine)
         + x1 * force_x
         + y1 * force_y,
         b2=torques.shank
         + p12 * s12 * w1
         - p23 * s23 * w3
-        - s2 * body.gravity * turned.shank_sine
+        - s2 * (body.gravity * turned.shank_sine + body.gravity_along * turned.shank_cosine)
         + x2 * force_x
         + y2 * force_y,
         b3=torques.foot
         + p13 * s13 * w1
         + p23 * s23 * w2
-        - s3 * body.gravity * turned.foot_sine
+        - s3 * (body.gravity * turned.foot_sine + body.gravity_along * turned.foot_cosine)
         + x3 * moment_x
         + y3 * moment_y,
         hip_xx=mass + step * dx0,
         hip_xy=0.0,
         hip_yy=mass + step * dy0,
-        force_x=force_x + s1 * turned.thigh_sine * w1 + s2 * turned.shank_sine * w2 + s3 * turned.foot_sine * w3,
+        force_x=force_x
+        - mass * body.gravity_along
+        + s1 * turned.thigh_sine * w1
+        + s2 * turned.shank_sine * w2
+        + s3 * turned.foot_sine * w3,
         force_y=force_y
         - mass * body.gravity
         - s1 * turned.thigh_cosine * w1
@@ -272,12 +280,12 @@ def accelerations(body: Body, lean: float, lean_rate: float, torque: float, left
     moment = body.trunk.mass * body.trunk.mass_centre
     inertia = body.trunk.inertia + moment * body.trunk.mass_centre
     along, upward = moment * cosine, -moment * sine
-    turning = torque + moment * body.gravity * sine
+    turning = torque + moment * (body.gravity * sine - body.gravity_along * cosine)
     whirl = moment * lean_rate * lean_rate
     xx = left.xx + right.xx + body.trunk.mass - along * along / inertia
     xy = left.xy + right.xy - along * upward / inertia
     yy = left.yy + right.yy + body.trunk.mass - upward * upward / inertia
-    x = left.x + right.x + whirl * sine - along * turning / inertia
+    x = left.x + right.x + whirl * sine - body.trunk.mass * body.gravity_along - along * turning / inertia
     y = left.y + right.y + whirl * cosine - body.trunk.mass * body.gravity - upward * turning / inertia
     determinant = xx * yy - xy * xy
     hip_x, hip_y = (x * yy - y * xy) / determinant, (y * xx - x * xy) / determinant

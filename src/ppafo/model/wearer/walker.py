@@ -433,7 +433,7 @@ def next_walker(
         right=right,
         left_felt=left.felt,
         right_felt=right.felt,
-        balance=Balance(pose.lean, rates.lean),
+        balance=Balance(pose.lean - wearer.body.upright, rates.lean),
     )
 
 

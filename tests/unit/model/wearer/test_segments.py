@@ -22,6 +22,8 @@ BODY = Body(
     foot=Segment(length=0.16, mass_centre=0.02, mass=1.25, inertia=0.005),
     heel=0.04,
     gravity=9.81,
+    gravity_along=0.0,
+    upright=0.0,
 )
 NONE = Damping(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -107,6 +109,19 @@ def test_gravity_alone_changes_momentum_in_the_air(seed: int) -> None:
     centre = sum(mass * place[0] for mass, _, place, _ in masses(BODY, q))
     expected = [0.0, -mass * BODY.gravity, -centre * BODY.gravity]
     assert (ahead - behind) / (2 * small) == pytest.approx(expected, abs=1e-3 * mass * BODY.gravity)
+
+
+def test_on_a_slope_gravity_pulls_back_as_much_as_the_ground_rises() -> None:
+    q, v = drawn(3)
+    a = moved(BODY._replace(gravity=9.0, gravity_along=3.0), q, v)
+    small = 1e-4
+    _, ahead = motion(BODY, q + small * v + 0.5 * small**2 * a, v + small * a)
+    _, behind = motion(BODY, q - small * v + 0.5 * small**2 * a, v - small * a)
+    every = masses(BODY, q)
+    mass = sum(part for part, *_ in every)
+    turning = sum(part * (3.0 * place[1] - 9.0 * place[0]) for part, _, place, _ in every)
+    expected = [-3.0 * mass, -9.0 * mass, turning]
+    assert (ahead - behind) / (2 * small) == pytest.approx(expected, abs=1e-3 * mass * 9.81)
 
 
 def test_damping_at_the_end_of_a_step_is_that_of_the_rates_there() -> None:
