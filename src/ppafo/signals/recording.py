@@ -92,7 +92,7 @@ CHANNELS: dict[str, ChannelKind] = {
     "other_hip_angle": ChannelKind("rad", "hip angle of the other leg"),
     "trunk_lean": ChannelKind("rad", "lean of the trunk from the vertical, forward above 0"),
     "hip_height": ChannelKind("m", "hip over the ground"),
-    "way": ChannelKind("m", "way of the hip since the start"),
+    "hip_position": ChannelKind("m", "hip in front of where it started"),
     "ground_force": ChannelKind("N", "vertical force of the ground on the foot with the device"),
     "other_ground_force": ChannelKind("N", "vertical force of the ground on the other foot"),
     "muscle_work": ChannelKind("J", "work of all muscles as they shorten since the start"),

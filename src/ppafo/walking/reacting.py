@@ -56,7 +56,7 @@ def recording_of_reacting(
         "other_hip_angle": (right.hip, "rad"),
         "trunk_lean": (record["walker.pose.lean"], "rad"),
         "hip_height": (record["walker.pose.y"], "m"),
-        "way": (record["walker.pose.x"], "m"),
+        "hip_position": (record["walker.pose.x"], "m"),
         "ground_force": (weight * record["walk.load"], "N"),
         "other_ground_force": (weight * record["walk.other_load"], "N"),
         "pressure_1": (pressure_1, "Pa"),
