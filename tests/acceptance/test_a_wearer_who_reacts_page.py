@@ -10,6 +10,7 @@ from ppafo.simulation.ensemble import run_ensemble
 from ppafo.studies.loading import load_study
 from ppafo.units import to_si
 from ppafo.walking import load_walk
+from ppafo.walking.motion import walk_of
 
 PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "a-wearer-who-reacts.md").read_text(encoding="utf-8")
 ROOM = 2.0
@@ -27,7 +28,7 @@ def test_the_pressures_of_the_page_keep_the_toes_clear_at_its_gas() -> None:
         {
             "wearer.tibialis_strength": np.tile(strength, 3),
             "supply.dorsiflexion_pressure": np.array(
-                [to_si(value, "psi_g", "Pa_a") for value in (*pressure, *(pressure + ROOM), *(pressure - ROOM))]
+                [to_si(float(value), "psi_g", "Pa_a") for value in (*pressure, *(pressure + ROOM), *(pressure - ROOM))]
             ),
         },
         ["lowest_toes", "gas", "stays_up"],
@@ -43,4 +44,8 @@ def test_the_pressures_of_the_page_keep_the_toes_clear_at_its_gas() -> None:
 def test_the_study_of_the_page_is_the_one_that_is_shipped() -> None:
     study = load_study("pressure-for-a-weak-tibialis")
     assert f"--out out/{study.name}" in PAGE
-    assert [item.overrides for item in study.configurations] == [("wearer.reacts=healthy-128", "run.duration=20 s")]
+    assert [item.scenario.name for item in study.configurations] == ["reacting"]
+    assert "healthy-128" in walk_of(study.configurations[0].scenario).label
+    assert "12 strengths" in PAGE
+    assert "10 pressures" in PAGE
+    assert sorted(len(axis.values) for axis in study.axes) == [10, 12]
