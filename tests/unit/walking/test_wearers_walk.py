@@ -41,7 +41,7 @@ def strikes(recording: Recording) -> NDArray[np.intp]:
 def mean_stride(recording: Recording) -> tuple[float, float, float]:
     """Speed [m/s], time [s] and share of stance [-], over whole strides."""
     at = strikes(recording)
-    way, loaded = channel(recording, "way"), channel(recording, "ground_force") > 0.0
+    way, loaded = channel(recording, "hip_position"), channel(recording, "ground_force") > 0.0
     length = float(recording.time[at[-1]] - recording.time[at[0]])
     return (
         float(way[at[-1]] - way[at[0]]) / length,
