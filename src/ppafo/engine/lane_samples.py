@@ -348,9 +348,10 @@ def sample_lines(rows: Rows, moment: str) -> list[str]:
 def wearer_sample(rows: Rows) -> list[str]:
     """Lines that make the sample of a wearer who reacts."""
     values = {name: f"walk.{name}" for name in WearerSample._fields if name not in ("way", "time")}
+    values |= {name: f"reflexes.{name}" for name in ("umberger", "bhargava")}
     values |= {"way": "walker.pose.x", "time": "next_record * (timing.step * interval)"}
     in_order = {name: values[name] for name in WearerSample._fields}
-    return [rows.load("walker"), f"of_wearer = {_row(rows.add(WearerSample), in_order)}"]
+    return [rows.load("walker"), rows.load("reflexes"), f"of_wearer = {_row(rows.add(WearerSample), in_order)}"]
 
 
 def _zeros(row: type[FootSample] | type[StrideSample]) -> dict[str, str]:

@@ -22,7 +22,9 @@ class WearerTotals(NamedTuple):
 
 
 def _start(_course: Course, sample: WearerSample) -> WearerTotals:
-    none = WearerSample(strides=0.0, way=0.0, clearances=0.0, muscle_work=0.0, fall_time=0.0, time=NOT_YET)
+    none = WearerSample(
+        strides=0.0, way=0.0, clearances=0.0, muscle_work=0.0, umberger=0.0, bhargava=0.0, fall_time=0.0, time=NOT_YET
+    )
     return WearerTotals(first=none, last=none, now=sample)
 
 
@@ -45,6 +47,8 @@ def chosen(is_new: bool, new: WearerSample, old: WearerSample) -> WearerSample:
         way=new.way if is_new else old.way,
         clearances=new.clearances if is_new else old.clearances,
         muscle_work=new.muscle_work if is_new else old.muscle_work,
+        umberger=new.umberger if is_new else old.umberger,
+        bhargava=new.bhargava if is_new else old.bhargava,
         fall_time=new.fall_time if is_new else old.fall_time,
         time=new.time if is_new else old.time,
     )
@@ -100,12 +104,17 @@ def _muscle_work(readings: Readings) -> Floats:
     return mean_of(totals.last.muscle_work - totals.first.muscle_work, _strides(readings))
 
 
-def _muscle_power(readings: Readings) -> Floats:
-    totals = readings.meters["wearer"]
-    time = totals.last.time - totals.first.time
-    work = totals.last.muscle_work - totals.first.muscle_work
-    found: Floats = choose(_strides(readings) > 0.5, work / larger(time, 1.0e-9), math.nan)
-    return found
+def _power(energy: str) -> Callable[[Readings], Floats]:
+    """Mean of what adds up to an energy of the samples, by its name, over the strides."""
+
+    def read(readings: Readings) -> Floats:
+        totals = readings.meters["wearer"]
+        time = totals.last.time - totals.first.time
+        gained = getattr(totals.last, energy) - getattr(totals.first, energy)
+        found: Floats = choose(_strides(readings) > 0.5, gained / larger(time, 1.0e-9), math.nan)
+        return found
+
+    return read
 
 
 def _kind(name: str, unit: str, summary: str, read: Callable[[Readings], Floats]) -> MetricKind:
@@ -120,6 +129,8 @@ METRICS = (
     _kind("stride_time", "s", "time of a stride, mean over whole strides without the first ones", _stride_time),
     _kind("lowest_toes", "m", "lowest toe height above ground in mid-swing, mean over the strides", _lowest_toes),
     _kind("muscle_work", "J", "work of all muscles of both legs as they shorten, in one stride", _muscle_work),
-    _kind("muscle_power", "W", "mean power of all muscles of both legs as they shorten", _muscle_power),
+    _kind("muscle_power", "W", "mean power of all muscles of both legs as they shorten", _power("muscle_work")),
+    _kind("metabolic_power_umberger", "W", "metabolic rate of all muscles, Umberger 2010", _power("umberger")),
+    _kind("metabolic_power_bhargava", "W", "metabolic rate of all muscles, Bhargava 2004", _power("bhargava")),
 )
 """Those of a wearer who reacts; gas and the others of a walk are in ``strides``."""

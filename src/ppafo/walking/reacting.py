@@ -114,6 +114,9 @@ def reacting_metrics(
         values["lowest_toes"] = float(record["walk.clearances"][last] - record["walk.clearances"][first]) / count
         work = float(record["walk.muscle_work"][last] - record["walk.muscle_work"][first])
         values |= {"muscle_work": work / count, "muscle_power": work / length}
+        for model in ("umberger", "bhargava"):
+            energy = record[f"reflexes.{model}"]
+            values[f"metabolic_power_{model}"] = float(energy[last] - energy[first]) / length
     found = {name: Metric(value, of_wearer[name].unit, of_wearer[name].summary) for name, value in values.items()}
     for name, item in PER_STRIDE.items():
         own = strides[name][counted & helped]

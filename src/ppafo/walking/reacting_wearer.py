@@ -126,7 +126,7 @@ def start_of_body(wearer: ReactingWearer) -> BodyStart:
         muscle_work=0.0,
         fall_time=STANDING,
     )
-    return BodyStart(ankle, walker, Reflexes(first_answer(), 0.0), nerves, walk)
+    return BodyStart(ankle, walker, Reflexes(first_answer(), 0.0, 0.0, 0.0), nerves, walk)
 
 
 def read_reacting(reading: Reading, folder: Path) -> ReactingWearer | None:

@@ -16,6 +16,7 @@ from ppafo.model.places import friction_in_motion
 from ppafo.model.plant import PlantParameters, PlantState, actuator_torque
 from ppafo.model.plant_faults import PlantFaults, ShutOff, Unpowered
 from ppafo.model.sensors import GaitSeen, GaitSensors
+from ppafo.model.wearer.metabolic import rates_of_leg
 from ppafo.model.wearer.muscle import Fibre, Muscle, tendon_force
 from ppafo.model.wearer.nerves import SAMPLE, LegNerves, Nerves, arrived, balance_arrived, next_nerves
 from ppafo.model.wearer.reflexes import Balance, Felt
@@ -91,10 +92,15 @@ class ReactingState(NamedTuple):
 
 
 class Reflexes(NamedTuple):
-    """What the reflexes have ordered, the phases of both legs, and the time until the nerves are sampled next [s]."""
+    """What the reflexes have ordered, the phases of both legs, and the time until the nerves are sampled next [s].
+
+    Also the metabolic energy [J] of all muscles since the start by both models, sampled with the nerves.
+    """
 
     ordered: Answer
     until: float
+    umberger: float
+    bhargava: float
 
 
 class BodyEnd(NamedTuple):
@@ -196,7 +202,15 @@ def next_reflexes(wearer: Wearer, nerves: Nerves, reflexes: Reflexes, body: Body
     right: LegNerves = nerves.right
     before = reflexes.ordered
     ordered = answer(wearer, before.left, before.right, arrived(left), arrived(right), balance_arrived(nerves), SAMPLE)
-    return Reflexes(ordered, body.until)
+    legs = body.after
+    of_left = rates_of_leg(wearer.left, legs.left.fibres, before.to_left)
+    of_right = rates_of_leg(wearer.right, legs.right.fibres, before.to_right)
+    return Reflexes(
+        ordered,
+        body.until,
+        reflexes.umberger + SAMPLE * (of_left.umberger + of_right.umberger),
+        reflexes.bhargava + SAMPLE * (of_left.bhargava + of_right.bhargava),
+    )
 
 
 def advance_reacting(
@@ -275,7 +289,7 @@ def lead(rows: Any) -> Phases:
     stepped = f"{add(next_body)}(wearer, walker, reflexes, walk.fall_time, assist, length)"
     ordered = f"{add(next_reflexes)}(wearer, nerves, reflexes, body)"
     passed_on = f"{add(next_nerves)}(nerves, body.left_felt, body.right_felt, body.balance)"
-    waits = f"{add(Reflexes)}(reflexes.ordered, body.until)"
+    waits = f"{add(Reflexes)}(reflexes.ordered, body.until, reflexes.umberger, reflexes.bhargava)"
     return [
         [
             *[rows.load(name) for name in ("wearer", "walker", "reflexes")],

@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 from ppafo.model.elementary import sine_and_cosine_of_turns
 from ppafo.model.wearer.muscle import Fibre, Muscle, bell, force_at
+from ppafo.model.wearer.reflexes import Stimulation
+from ppafo.model.wearer.walker import Fibres, Muscles
 
 DENSITY, TENSION = 1059.7, 0.25e6
 """Of muscle [kg/m^3], and its largest stress [Pa]: Umberger 2003."""
@@ -44,18 +46,16 @@ def mass_of(muscle: Muscle) -> float:
     return DENSITY * muscle.force * muscle.optimum / TENSION
 
 
-def work_between(muscle: Muscle, before: Fibre, after: Fibre, stimulation: float) -> Work:
-    """What a muscle did in a step, in the middle of which its numbers are taken."""
-    activation = 0.5 * (before.activation + after.activation)
-    length = 0.5 * (before.length + after.length) / muscle.optimum
-    velocity = after.velocity / muscle.optimum
+def work_of(muscle: Muscle, fibre: Fibre, stimulation: float) -> Work:
+    """What a muscle does at a stimulation [-]."""
+    length, velocity = fibre.length / muscle.optimum, fibre.velocity / muscle.optimum
     isometric = bell(length)
     return Work(
         stimulation=stimulation,
-        activation=activation,
+        activation=fibre.activation,
         length=length,
         velocity=velocity,
-        force=activation * isometric * force_at(velocity / muscle.velocity),
+        force=fibre.activation * isometric * force_at(velocity / muscle.velocity),
         isometric=isometric,
     )
 
@@ -105,3 +105,33 @@ def bhargava_2004(muscle: Muscle, work: Work) -> float:
     share = 0.157 * work.force if work.velocity > 0.0 else 0.16 * isometric + 0.18 * work.force
     moving = -(share + work.force) * work.velocity
     return max(mass_of(muscle) * heat + muscle.force * muscle.optimum * moving, 0.0)
+
+
+class Rates(NamedTuple):
+    """Metabolic rate [W] by both models."""
+
+    umberger: float
+    bhargava: float
+
+
+def both(muscle: Muscle, fibre: Fibre, stimulation: float) -> Rates:
+    """Metabolic rate of a muscle [W] by both models."""
+    work = work_of(muscle, fibre, stimulation)
+    return Rates(umberger_2010(muscle, work), bhargava_2004(muscle, work))
+
+
+def rates_of_leg(muscles: Muscles, fibres: Fibres, given: Stimulation) -> Rates:
+    """Metabolic rate [W] of the muscles of a leg by both models."""
+    soleus = both(muscles.soleus, fibres.soleus, given.soleus)
+    tibialis = both(muscles.tibialis, fibres.tibialis, given.tibialis)
+    gastrocnemius = both(muscles.gastrocnemius, fibres.gastrocnemius, given.gastrocnemius)
+    vastus = both(muscles.vastus, fibres.vastus, given.vastus)
+    hamstring = both(muscles.hamstring, fibres.hamstring, given.hamstring)
+    gluteus = both(muscles.gluteus, fibres.gluteus, given.gluteus)
+    flexor = both(muscles.flexor, fibres.flexor, given.flexor)
+    umberger = soleus.umberger + tibialis.umberger + gastrocnemius.umberger + vastus.umberger
+    bhargava = soleus.bhargava + tibialis.bhargava + gastrocnemius.bhargava + vastus.bhargava
+    return Rates(
+        umberger + hamstring.umberger + gluteus.umberger + flexor.umberger,
+        bhargava + hamstring.bhargava + gluteus.bhargava + flexor.bhargava,
+    )

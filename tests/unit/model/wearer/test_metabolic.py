@@ -12,7 +12,7 @@ from ppafo.model.wearer.metabolic import (
     mass_of,
     to_three_fifths,
     umberger_2010,
-    work_between,
+    work_of,
 )
 from ppafo.model.wearer.muscle import Fibre, Muscle, force_at, lengthening, next_fibre
 
@@ -96,7 +96,7 @@ def test_the_work_of_a_step_is_that_of_the_force_along_its_way() -> None:
     done, stored = 0.0, 0.0
     for _ in range(20000):
         after = next_fibre(SLOW, fibre, 0.6, whole, step)
-        work = work_between(SLOW, fibre, after, 0.6)
+        work = work_of(SLOW, after, 0.6)
         done -= step * SLOW.force * SLOW.optimum * work.force * work.velocity
         fibre = after
     strain = max((whole - fibre.length) / SLOW.slack - 1.0, 0.0)
