@@ -135,7 +135,8 @@ class Declared:
     """What files of one kind of scenario can hold, for the kinds that a document names.
 
     ``texts`` are paths, ``quantities`` the declarations of numbers by path; ``find_kinds`` loads the kinds of other
-    packages. ``same`` maps a path to another one of the same value, which the document keeps. ``appended`` maps a path
+    packages, ``check_motion`` refuses a kind of motion that they cannot have, with the place that begins the message.
+    ``same`` maps a path to another one of the same value, which the document keeps. ``appended`` maps a path
     to the section whose own list of overrides has it, and to the path there.
     """
 
@@ -144,6 +145,7 @@ class Declared:
     quantities: Callable[[Mapping[str, Any]], dict[str, Quantity]]
     same: Mapping[str, str] = field(default_factory=dict)
     appended: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    check_motion: Callable[[object, str], None] = lambda _kind, _place: None
 
     def paths(self, document: Mapping[str, Any]) -> tuple[str, ...]:
         """Return every path that an override can set, beside those of the device."""
@@ -214,14 +216,20 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
         ("motion.profile", PROFILES),
         *((("motion.shank", PROFILES),) if kind_at(document, "motion.shank") != GAIT_SHANK else ()),
     )
-    motion, known = kind_at(document, "motion"), (*MOTIONS, WALK)
+    motion = kind_at(document, "motion")
     check_motion_kind(motion, f"{file}: motion.kind")
-    if motion and motion not in known:
-        hint = nearest_name(motion, known)
-        raise ScenarioError(f"{file}: motion.kind = {quote(motion)} is not known{hint}; allowed: {', '.join(known)}")
+    check_known_motion(motion, file)
     for section, kinds in sections:
         with refused_as(ScenarioError, f"{file}: {section}.kind", KindError):
             kinds.get(kind_at(document, section))
+
+
+def check_known_motion(kind: str, file: str) -> None:
+    """Raise ScenarioError for a kind of motion that no scenario has, walks among them; none is an empty text."""
+    known = (*MOTIONS, WALK)
+    if kind and kind not in known:
+        hint = nearest_name(kind, known)
+        raise ScenarioError(f"{file}: motion.kind = {quote(kind)} is not known{hint}; allowed: {', '.join(known)}")
 
 
 def check_motion_kind(kind: object, place: str) -> None:
@@ -283,7 +291,9 @@ def line_paths() -> dict[str, Quantity]:
     return {f"{SUPPLY_LINE}.{line}.{item.name}": item for line in SUPPLY_LINES for item in line_quantities(line)}
 
 
-OF_A_VANE = Declared(find_kinds, texts, lambda document: quantities(document) | line_paths())
+OF_A_VANE = Declared(
+    find_kinds, texts, lambda document: quantities(document) | line_paths(), check_motion=check_motion_kind
+)
 """What the file of a vane alone can hold; one without lines can be given some."""
 
 

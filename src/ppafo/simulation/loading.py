@@ -93,29 +93,37 @@ def apply_overrides(
     """Return a changed copy of a document; ``file`` is what messages call it.
 
     Naming another kind of motion, controller, timing or profile drops the settings that only the old kind has; giving a
-    rate drops the period, and the reverse. A gain on the torque may leave out its unit. ScenarioError for a path that
-    is neither ``declared`` nor of the device.
+    rate drops the period, and the reverse. A gain on the torque may leave out its unit. A setting may come before the
+    kind that has it. ScenarioError for a path that is neither ``declared`` nor of the device.
     """
     changed = _with_one_path_each(document, file, declared)
     paths: set[str] = set()
     device: list[str] = []
-    for override in overrides:
-        given, text = split_override(override)
-        path = declared.same.get(given, given)
-        if path in declared.appended:
-            section, own = declared.appended[path]
-            changed.setdefault(section, {}).setdefault("overrides", []).append(f"{own}={text}")
-        elif is_of_device(path):
-            device.append(override)
-            continue
-        else:
-            known = declared.paths(changed)
-            if path not in known:
-                raise unknown_value(override, known, f"{file} has")
-            if path == "motion.kind":
-                declaration.check_motion_kind(text, f"override '{override}'")
-            _set(changed, path, text, file, declared)
-        paths.add(path)
+    waiting, before = list(overrides), frozenset[str]()
+    while waiting:
+        unknown: list[str] = []
+        for override in waiting:
+            given, text = split_override(override)
+            path = declared.same.get(given, given)
+            if path in declared.appended:
+                section, own = declared.appended[path]
+                changed.setdefault(section, {}).setdefault("overrides", []).append(f"{own}={text}")
+            elif is_of_device(path):
+                device.append(override)
+                continue
+            elif path not in declared.paths(changed):
+                unknown.append(override)
+                continue
+            elif path in before:
+                continue  # what came behind the kind counts
+            else:
+                if path == "motion.kind":
+                    declared.check_motion(text, f"override '{override}'")
+                _set(changed, path, text, file, declared)
+            paths.add(path)
+        if len(unknown) == len(waiting):
+            raise unknown_value(unknown[0], declared.paths(changed), f"{file} has")
+        waiting, before = unknown, frozenset(paths)
     return OverriddenDocument(changed, frozenset(paths), tuple(device))
 
 

@@ -20,6 +20,7 @@ from ppafo.errors import KindError, ScenarioError, refused_as
 from ppafo.model.declaration import Quantity
 from ppafo.model.plant_faults import PLANT_FAULTS, SHUT_OFF
 from ppafo.simulation.declaration import (
+    MOTIONS,
     PERIOD,
     RATE,
     SENSORS,
@@ -27,6 +28,7 @@ from ppafo.simulation.declaration import (
     THERMAL_GAS,
     WALK,
     Declared,
+    check_known_motion,
     gas_settings,
     kind_at,
     line_paths,
@@ -176,8 +178,18 @@ def timing_of(document: Mapping[str, Any]) -> str:
 
 def find_kinds(document: Mapping[str, Any], file: str) -> None:
     """Load the controller that a document names, where another package has it; ScenarioError where that fails."""
+    check_known_motion(kind_at(document, "motion"), file)
     with refused_as(ScenarioError, f"{file}: controller.kind", KindError):
         load_walking_controller(kind_at(document, "controller"))
+
+
+def _check_motion(kind: object, place: str) -> None:
+    """Raise ScenarioError for a motion of a vane alone, which has other sections; ``place`` begins the message."""
+    if kind in MOTIONS:
+        raise ScenarioError(
+            f"{place}: this is the file of a walk, and its motion is '{WALK}'; 'ppafo new scenario' writes the "
+            "file of a vane alone"
+        )
 
 
 def _texts(document: Mapping[str, Any]) -> tuple[str, ...]:
@@ -189,7 +201,7 @@ def _texts(document: Mapping[str, Any]) -> tuple[str, ...]:
         "gas_model.kind",
         *(f"faults.{part}.kind" for part in (*FAULTY, *PLANT_FAULTS)),
     )
-    return (*TEXTS, "gait", "course", REACTS, BOTTLE_NAME, *kinds, *arithmetic)
+    return (*TEXTS, "motion.kind", "gait", "course", REACTS, BOTTLE_NAME, *kinds, *arithmetic)
 
 
 def others_wearer(reacts: bool) -> set[str]:
@@ -214,6 +226,7 @@ OF_A_WALK = Declared(
     _quantities,
     same={"motion.gait": "gait", "motion.course": "course"},
     appended={path: (BOTTLE, own) for path, own in BOTTLE_OVERRIDES.items()},
+    check_motion=_check_motion,
 )
 """What the file of a walk can hold. Gait and course stand at the top of the file or, as its motion, in [motion]."""
 

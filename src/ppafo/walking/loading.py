@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -11,7 +12,7 @@ from ppafo.control.fixed.torque_laws import FIXED, FLOAT
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ParameterError, ScenarioError, one_line, refused_as
+from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError, one_line, refused_as
 from ppafo.gait import NORMATIVE, load_gait
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG, Quantity
@@ -170,9 +171,12 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     hardware = read_hardware(reading, request, changed.device)
     device = _device(reading, hardware)
     reacts = read_reacting(reading, request.folder)
-    walked = load_gait(_named_file("gait", request, document) or NORMATIVE)
+    with _named_by("gait", reading, request, DataError):
+        walked = load_gait(_named_file("gait", request, document) or NORMATIVE)
     is_named = "gait" in instead or "gait" in document
-    course = _named_file("course", request, document)
+    named_course = _named_file("course", request, document)
+    with _named_by("course", reading, request, ScenarioError):
+        course = None if named_course is None else load_course(named_course)
     carried = read_bottle(reading, device, Path() if BOTTLE_NAME in instead else request.folder)
     lines = _lines(reading, document, device, carried)
     settings = _sensor_settings(reading)
@@ -188,7 +192,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         timing=timing_of(document),
         forces={name: number for name, number in settings.numbers.items() if name in FORCES},
         faults=settings.faults,
-        course=None if course is None else load_course(course),
+        course=course,
         bottle=carried,
         wearer_origin=wearer_origin(reading, walked, is_named),
         person=_person(reading),
@@ -232,6 +236,14 @@ def _named_file(path: str, request: ScenarioRequest, document: Mapping[str, Any]
     if name is None or Path(name).suffix != ".toml" or Path(name).is_absolute():
         return name
     return str(request.folder / name)
+
+
+def _named_by(
+    path: str, reading: Reading, request: ScenarioRequest, kind: type[PpafoError]
+) -> AbstractContextManager[None]:
+    """Return what names the key in errors about a file that the walk itself names; an option names its own."""
+    own = path not in request.instead and path in reading.document
+    return refused_as(kind, reading.quote(path), kind) if own else nullcontext()
 
 
 def _absolute(name: str) -> str:

@@ -1,6 +1,7 @@
 """Changing single values of a scenario and of its device by dotted path."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -148,3 +149,33 @@ def test_any_override_text_is_taken_or_refused_cleanly(path: str, text: str) -> 
     except PpafoError as error:
         message = str(error)
     assert len(message.splitlines()) <= 1
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["controller.kind=pid", "controller.integral_gain=1", "reference.kind=constant", "reference.level=2 N m"],
+        [
+            "motion.kind=prescribed",
+            "motion.profile.kind=sine",
+            "motion.profile.level=80 deg",
+            "motion.profile.amplitude=5 deg",
+            "motion.profile.frequency=1 Hz",
+        ],
+        [
+            "gas_model.kind=thermal",
+            "gas_model.heat_transfer_coefficient=50 W/(m^2 K)",
+            "gas_model.wall_area_per_volume=9 1/m",
+        ],
+    ],
+)
+def test_a_setting_may_come_before_its_kind(words: list[str]) -> None:
+    first, last = (load_scenario("step-response", order) for order in (words, words[::-1]))
+    assert replace(last, origin=first.origin) == first
+
+
+def test_of_two_values_before_and_behind_a_kind_the_last_counts() -> None:
+    gain, kind = "controller.integral_gain={}".format, "controller.kind=pid"
+    reference = ("reference.kind=constant", "reference.level=2 N m")
+    for words in ([gain(1), kind, gain(2)], [gain(1), gain(2), kind], [kind, gain(1), gain(2)]):
+        assert load_scenario("step-response", [*words, *reference]).control.settings["integral_gain"] == 2.0

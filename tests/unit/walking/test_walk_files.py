@@ -12,7 +12,7 @@ import pytest
 
 import ppafo
 from ppafo.cli.main import main
-from ppafo.errors import ScenarioError
+from ppafo.errors import DataError, PpafoError, ScenarioError
 from ppafo.loading import json_schema, list_all_scenarios, load_scenario, scenario_from_dict
 from ppafo.simulation.loading import load_scenario as load_vane
 from ppafo.simulation.numbers import declared_numbers
@@ -115,6 +115,30 @@ def test_a_misspelt_motion_is_told_of_walks_too(tmp_path: Path) -> None:
         ScenarioError, match=r"motion\.kind = 'wlak' is not known, did you mean 'walk'\?; allowed: free"
     ):
         load_scenario(written(tmp_path, text))
+
+
+def test_a_walk_takes_its_own_motion_and_names_the_kinds_that_exist(tmp_path: Path) -> None:
+    assert load_walk(NAME, ["motion.kind=walk"]).control == load_walk(NAME).control
+    with pytest.raises(ScenarioError, match=r"override 'motion\.kind=free': this is the file of a walk"):
+        load_walk(NAME, ["motion.kind=free"])
+    misspelt = written(tmp_path, (text_of(NAME) + MOTION).replace('"walk"', '"wlak"'))
+    with pytest.raises(
+        ScenarioError, match=r"\.toml: motion\.kind = 'wlak' .* allowed: free, held, prescribed, leg, walk"
+    ):
+        load_walk(misspelt)
+
+
+@pytest.mark.parametrize(("key", "kind"), [("gait", DataError), ("course", ScenarioError)])
+def test_a_gait_or_course_that_is_not_there_names_the_file_and_the_key(
+    key: str, kind: type[PpafoError], tmp_path: Path
+) -> None:
+    file = written(tmp_path, f'{key} = "nobody"\n{text_of(NAME)}')
+    with pytest.raises(kind, match=rf"{file.name}: {key} = 'nobody': there is no {key} 'nobody'"):
+        load_walk(file)
+    with pytest.raises(kind, match=rf"^{NAME}: override {key}=nobody: there is no {key} 'nobody'"):
+        load_walk(NAME, [f"{key}=nobody"])
+    with pytest.raises(kind, match=rf"^there is no {key} 'nobody'"):
+        load_walk(NAME, gait="nobody") if key == "gait" else load_walk(NAME, course="nobody")
 
 
 def test_where_only_a_vane_will_do_a_walk_is_refused_by_its_motion(tmp_path: Path) -> None:
