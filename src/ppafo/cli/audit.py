@@ -1,7 +1,8 @@
-"""``ppafo audit SET``: what in a parameter set contradicts itself, and what would reconcile it."""
+"""``ppafo audit SET``: what a parameter set changed against its parent, and where it contradicts itself."""
 
 import argparse
 import textwrap
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from ppafo.cli import output
@@ -20,24 +21,65 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "names", metavar="SET", nargs="+", help="name of a set, or a .toml file; several are shown side by side"
     )
+    parser.add_argument(
+        "--parent", metavar="SET", help="show what changed against this set, in place of the one that the file names"
+    )
     output.add_override_argument(parser)
     output.add_output_arguments(parser)
 
 
 def run(parsed: argparse.Namespace) -> int:
-    """Print the findings of one set, or a table of several; 1 where one of them is an error, else 0."""
+    """Print changes and findings of one set, or a table of several; 1 where a finding is an error, else 0."""
     from ppafo.parameters import apply_overrides, load_parameter_set
     from ppafo.parameters.audit import audit
 
     output.check_output(parsed)
     sets = [apply_overrides(load_parameter_set(name), parsed.overrides) for name in parsed.names]
     found = [(parameter_set, audit(parameter_set)) for parameter_set in sets]
-    documents = [_document(*one, parsed.overrides) for one in found]
+    parents = [_parent(parameter_set, parsed.parent) for parameter_set in sets]
+    documents = [
+        _document(*one, parsed.overrides) | _changes_document(one[0], parent)
+        for one, parent in zip(found, parents, strict=True)
+    ]
     if len(found) == 1:
-        output.deliver(f"audit-{sets[0].name}", _text(*found[0]), documents[0], parsed)
+        text = _text(*found[0])
+        if parents[0] is not None:
+            text = f"{_changes_text(sets[0], parents[0])}\n\n{text}"
+        output.deliver(f"audit-{sets[0].name}", text, documents[0], parsed)
     else:
         output.deliver("audit", _table(found), {"sets": documents}, parsed)
     return output.EXIT_CHECK_FAILED if any(_counts(findings)["error"] for _, findings in found) else output.EXIT_GOOD
+
+
+def _parent(parameter_set: "ParameterSet", given: str | None) -> "ParameterSet | None":
+    """Return the set to compare with: the one given, else the one that the file names, if it names any."""
+    from ppafo.errors import ParameterError, refused_as
+    from ppafo.parameters import load_parameter_set
+
+    name = given or parameter_set.parent
+    if not name:
+        return None
+    with refused_as(ParameterError, "--parent" if given else f"{parameter_set.file}: parent", ParameterError):
+        return load_parameter_set(name)
+
+
+def _changes_document(parameter_set: "ParameterSet", parent: "ParameterSet | None") -> dict[str, Any]:
+    from ppafo.parameters.audit.changes import changes
+
+    changed = [] if parent is None else [asdict(change) for change in changes(parameter_set, parent)]
+    return {"parent": None if parent is None else parent.name, "changes": changed}
+
+
+def _changes_text(parameter_set: "ParameterSet", parent: "ParameterSet") -> str:
+    from ppafo.answers.writing import align_columns
+    from ppafo.parameters.audit.changes import changes
+
+    changed = changes(parameter_set, parent)
+    count = f"{len(changed)} value{'' if len(changed) == 1 else 's'}" if changed else "nothing"
+    first = f"{parameter_set.name} changes {count} of its parent {parent.name}"
+    rows = [(change.path, change.before or "-", change.after or "-", change.origin) for change in changed]
+    table = align_columns([("value", parent.name, parameter_set.name, "origin"), *rows], 4) if changed else []
+    return "\n".join([first, *(_INDENT + line for line in table)])
 
 
 def _document(parameter_set: "ParameterSet", findings: "list[Finding]", overrides: list[str]) -> dict[str, Any]:

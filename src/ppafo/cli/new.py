@@ -1,6 +1,7 @@
 """``ppafo new KIND NAME``: an input file to start from, a commented template or a copy of a file of the package."""
 
 import argparse
+import json
 import os
 import re
 import shlex
@@ -17,6 +18,7 @@ _SCHEMAS = {"set": "parameters"}
 _TEMPLATES = resources.files("ppafo.cli") / "templates"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 _NAME_LINE = re.compile(r"""^name *= *(["'])(.*?)\1""", re.MULTILINE)
+_PARENT_LINE = re.compile(r"^parent *=.*\n", re.MULTILINE)
 _FIRST_TABLE = re.compile(r"^\s*\[", re.MULTILINE)
 
 
@@ -132,7 +134,12 @@ def _content(kind: str, source: str | None, name: str, path: Path) -> str:
     named = _NAME_LINE.search(text, 0, table.start() if table else len(text))
     if named is None:
         return text
-    text = f'{text[: named.start()]}name = "{name}"{text[named.end() :]}'
+    head, rest = text[: named.start()], text[named.end() :]
+    if kind == "set" and source is not None:
+        # What the copy changes is shown by 'ppafo audit'; what the source changed is not its matter.
+        parent = source if source in files.names() else os.path.relpath(source, path.parent)
+        rest = f"\nparent = {json.dumps(parent, ensure_ascii=False)}{_PARENT_LINE.sub('', rest, count=1)}"
+    text = f'{head}name = "{name}"{rest}'
     # A file of the package shows in its first lines how it is run.
     shown = [line.replace(named[2], str(path)) if line.startswith("#   ppafo ") else line for line in text.split("\n")]
     return "\n".join(shown)

@@ -61,6 +61,7 @@ def _document(parameter_set: "ParameterSet") -> dict[str, Any]:
         "citation": None if citation is None else citation.model_dump(mode="json"),
         "notes": parameter_set.notes.strip(),
         "completed_by": parameter_set.completed_by,
+        "parent": parameter_set.parent,
         "default_valve": parameter_set.default_valve,
         "valves": dict(parameter_set.valve_kinds),
         "actuator": parameter_set.actuator_kind,

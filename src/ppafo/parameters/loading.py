@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field
 
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table, validate
-from ppafo.documents.toml_text import TomlKind, label
+from ppafo.documents.toml_text import TomlKind, beside, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as
 from ppafo.kinds import Kinds
 from ppafo.model.actuators.table import Table
@@ -132,6 +132,14 @@ def _parameter_file(_kinds: Any) -> type[BaseModel]:
         "citation": optional(Citation, "where the set was published"),
         "notes": (str, ""),
         "completed_by": (str, Field("", description="name of a set that completes this one")),
+        "parent": (
+            str,
+            Field(
+                "",
+                description="set that this one began as: a name, or a path from the folder of this file; the audit "
+                "shows what changed",
+            ),
+        ),
         "default_valve": (str, Field(description="name of the valve that a device has by default")),
         "accepted": (list[Accepted], Field(default_factory=list, description="contradictions kept for a reason")),
     }
@@ -184,7 +192,7 @@ def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -
     effects = document.get(SECTION)
     find_effects(f"{SECTION}.{name}" for name in (effects if isinstance(effects, dict) else ()))
     parsed: Any = validate(parameter_file(), document, file, ParameterError, whole_parameter_file)
-    parameter_set = _flatten(parsed, file, _read_table(parsed.actuator, folder or Path()))
+    parameter_set = _flatten(parsed, file, folder or Path())
     _check(parameter_set)
     return parameter_set
 
@@ -214,7 +222,7 @@ def _read_table(actuator: Any, folder: Path) -> Table | None:
     return read_actuator_table(folder / actuator.file) if has_file else None
 
 
-def _flatten(parsed: Any, file: str, actuator_table: Table | None) -> ParameterSet:
+def _flatten(parsed: Any, file: str, folder: Path) -> ParameterSet:
     leaves = dict(_leaves(parsed, ""))
     return ParameterSet(
         file=file,
@@ -223,11 +231,12 @@ def _flatten(parsed: Any, file: str, actuator_table: Table | None) -> ParameterS
         citation=parsed.citation,
         notes=parsed.notes,
         completed_by=parsed.completed_by,
+        parent=beside(parsed.parent, folder, list_sets()) if parsed.parent else "",
         default_valve=parsed.default_valve,
         valve_kinds={name: valve.kind for name, valve in parsed.valves.items()},
         actuator_kind=VANE if parsed.actuator is None else parsed.actuator.kind,
         actuator_file=getattr(parsed.actuator, "file", ""),
-        actuator_table=actuator_table,
+        actuator_table=_read_table(parsed.actuator, folder),
         numbers={path: leaf for path, leaf in leaves.items() if isinstance(leaf, Entry)},
         texts={path: leaf for path, leaf in leaves.items() if isinstance(leaf, TextEntry)},
         flags={path: leaf for path, leaf in leaves.items() if isinstance(leaf, FlagEntry)},
@@ -269,6 +278,7 @@ def _lines(parameter_set: ParameterSet) -> Iterator[str]:
         "title": parameter_set.title,
         "default_valve": parameter_set.default_valve,
         "completed_by": parameter_set.completed_by,
+        "parent": parameter_set.parent,
         "notes": parameter_set.notes,
     }
     yield "schema_version = 1"

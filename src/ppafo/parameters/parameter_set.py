@@ -95,7 +95,7 @@ class ParameterSet:
     ``file`` is what messages call the set; ``numbers``, ``texts`` and ``flags`` are keyed by paths such as
     ``actuator.leak.area`` or ``valves.solenoid.area``; ``valve_kinds`` gives each valve's kind in the catalogue,
     ``actuator_kind`` the actuator's, ``actuator_file`` the file of one that was measured, and ``actuator_table`` what
-    is in it.
+    is in it. ``parent`` is the set that this one began as, a name of the package or a path from here; '' without one.
     """
 
     file: str
@@ -104,6 +104,7 @@ class ParameterSet:
     citation: Citation | None
     notes: str
     completed_by: str
+    parent: str
     default_valve: str
     valve_kinds: Mapping[str, str]
     actuator_kind: str

@@ -1,6 +1,7 @@
 """``ppafo new``."""
 
 import json
+import re
 import shlex
 from importlib import resources
 from pathlib import Path
@@ -70,6 +71,9 @@ def test_every_file_of_the_package_is_copied_under_a_new_name_and_loads(kind: st
     assert main(["new", kind, "my-own", "--from", source]) == 0
     made = Path("my-own.toml").read_text(encoding="utf-8")
     first = (resources.files("ppafo").joinpath(*KINDS[kind].shipped.split("/")) / f"{source}.toml").read_text("utf-8")
+    if kind == "set":
+        assert f'parent = "{source}"' in made.split("\n")
+        made, first = (re.sub(r"^parent = .*\n", "", text, flags=re.MULTILINE) for text in (made, first))
     differing = [line for old, line in zip(first.split("\n"), made.split("\n"), strict=True) if old != line]
     assert 'name = "my-own"' in differing
     assert all(line == 'name = "my-own"' or line.startswith("#   ppafo ") for line in differing)

@@ -2,6 +2,7 @@
 
 import importlib
 import json
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -141,3 +142,42 @@ def test_several_sets_are_audited_side_by_side(capsys: pytest.CaptureFixture[str
     document = json.loads(capsys.readouterr().out)
     assert [one["set"] for one in document["sets"]] == ["ppafo2011", "ppafo2011-printed"]
     assert document["sets"][1]["counts"]["error"] == 9
+
+
+def test_an_audit_shows_first_what_the_set_changes_of_its_parent(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["audit", "ppafo2011-fitted"]) == 0
+    shown = capsys.readouterr().out.partition("\n\n")[0]
+    page = (Path(__file__).parents[3] / "docs/how-to/add-a-parameter-set.md").read_text(encoding="utf-8")
+    assert shown.startswith("ppafo2011-fitted changes 4 values of its parent ppafo2011\n")
+    assert textwrap.indent(shown, "   ") in page
+
+
+def test_a_set_without_a_parent_begins_with_its_findings_and_may_be_compared_with_any(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    main(["audit", "muscle-pair", "--json"])
+    assert json.loads(capsys.readouterr().out)["parent"] is None
+    main(["audit", "muscle-pair", "--parent", "muscle-pair", "--set", "gas.temperature=30 degC", "--json"])
+    document = json.loads(capsys.readouterr().out)
+    assert document["parent"] == "muscle-pair"
+    (change,) = document["changes"]
+    assert change == {"path": "gas.temperature", "before": "293.15 K", "after": "30 degC", "origin": "assumed"}
+
+
+def test_the_copy_of_a_set_names_it_as_parent_from_wherever_it_lies(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "below").mkdir()
+    main(["new", "set", "first", "--from", "ppafo2011-fitted"])
+    file = tmp_path / "first.toml"
+    file.write_text(file.read_text().replace("value = 23.5", "value = 31.5"))
+    main(["new", "set", "second", "--from", "first.toml", "--out", "below/second.toml"])
+    capsys.readouterr()
+    main(["audit", "first.toml"])
+    assert capsys.readouterr().out.startswith("first changes 1 value of its parent ppafo2011-fitted\n")
+    main(["audit", "below/second.toml"])
+    assert capsys.readouterr().out.startswith("second changes nothing of its parent first\n")
+    file.unlink()
+    assert main(["audit", "below/second.toml"]) == 2
+    assert "below/second.toml: parent: below/../first.toml: cannot be read" in capsys.readouterr().err

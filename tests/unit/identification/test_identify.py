@@ -87,6 +87,7 @@ def test_the_new_set_reads_back_and_makes_a_device(solved: Solve, bench: Path) -
     outcome = solved(ALL)
     text = parameter_set_toml(outcome.new_set.parameter_set)
     assert parse_parameter_set(text.encode(), "twin.toml") == outcome.new_set.parameter_set
+    assert outcome.new_set.parameter_set.parent == "ppafo2011"
     (bench / "twin.toml").write_text(text)
     device = load_device(bench / "twin.toml")
     assert device.valve.settings["dead_band"] == pytest.approx(0.12, abs=0.01)

@@ -12,7 +12,7 @@ from ppafo.answers.style import BLACK, BLUE, GREY, VERMILION, house_style, mark_
 from ppafo.identification.devices import Spread, coefficient_of_variation
 from ppafo.identification.estimate import half_width_for
 from ppafo.identification.new_set import in_set_unit
-from ppafo.parameters.loading import parameter_set_toml
+from ppafo.parameters.loading import list_sets, parameter_set_toml
 from ppafo.parameters.parameter_set import CONFIDENCE, ParameterSet
 from ppafo.questions.question import Solved
 from ppafo.signals import RecordingKind
@@ -117,6 +117,7 @@ class DeviceSpread(Solved):
             file=f"{NEXT}.toml",
             name=NEXT,
             title=f"The next device after {len(self.devices)} of its kind",
+            parent=self.first.parent if self.first.parent in list_sets() else "",
             numbers=numbers,
         )
 

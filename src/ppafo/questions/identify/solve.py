@@ -21,7 +21,7 @@ from ppafo.identification.trajectory.section import Setting as FitSetting
 from ppafo.identification.trajectory.section import solve_section
 from ppafo.identification.trajectory.tolerances import AbilitySection, Tolerances, ability_of, tolerances_of
 from ppafo.parameters.device import VANE
-from ppafo.parameters.loading import load_parameter_set
+from ppafo.parameters.loading import list_sets, load_parameter_set
 from ppafo.parameters.parameter_set import ParameterSet, apply_overrides, atmospheric_pressure, chosen_valve
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.identify.answer import Beforehand, Identification, _bench_estimates
@@ -165,5 +165,7 @@ def _name_set(new_set: NewSet, problem: ProblemFile) -> ParameterSet:
         file=f"{problem.name}.toml",
         name=problem.name,
         title=problem.title or f"{old.title}, identified",
+        # The new set may go anywhere, where the path of a file would not lead to its parent.
+        parent=problem.device.set if problem.device.set in list_sets() else "",
         notes=f"{old.notes.rstrip()}\n{origins}".lstrip(),
     )

@@ -1,0 +1,70 @@
+"""What a parameter set changed against the set that it began as: value by value, whatever the unit."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from ppafo.errors import UnitError
+from ppafo.parameters.parameter_set import Entry, ParameterSet, atmospheric_pressure, entry_in_si, entry_text
+
+_SAME = 1e-12
+"""Relative difference that a change of unit leaves."""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A value that differs, as each set gives it; '' where a set has none. ``origin`` is that of the new value."""
+
+    path: str
+    before: str
+    after: str
+    origin: str
+
+
+def changes(parameter_set: ParameterSet, parent: ParameterSet) -> list[Change]:
+    """Return what a set has otherwise than its parent: kinds and choices first, then values in the set's order.
+
+    Numbers are compared in SI, so that a value in another unit is the same value; sources and notes do not count.
+    """
+    return [*_choices(parameter_set, parent), *_values(parameter_set, parent)]
+
+
+def _choices(parameter_set: ParameterSet, parent: ParameterSet) -> Iterator[Change]:
+    after, before = _chosen(parameter_set), _chosen(parent)
+    for path in dict.fromkeys((*after, *before)):
+        if after.get(path) != before.get(path):
+            yield Change(path, before.get(path, ""), after.get(path, ""), "")
+
+
+def _chosen(parameter_set: ParameterSet) -> Mapping[str, str]:
+    kinds = {f"valves.{name}.kind": kind for name, kind in parameter_set.valve_kinds.items()}
+    actuator = {"actuator.kind": parameter_set.actuator_kind, "actuator.file": parameter_set.actuator_file}
+    return {"default_valve": parameter_set.default_valve, **actuator, **kinds}
+
+
+def _values(parameter_set: ParameterSet, parent: ParameterSet) -> Iterator[Change]:
+    after, before = parameter_set.entries(), parent.entries()
+    for path in dict.fromkeys((*after, *before)):
+        new, old = after.get(path), before.get(path)
+        if new is None or old is None or not _is_same(path, parameter_set, parent):
+            yield Change(
+                path,
+                "" if old is None else entry_text(old),
+                "" if new is None else entry_text(new),
+                "" if new is None else new.origin,
+            )
+
+
+def _is_same(path: str, parameter_set: ParameterSet, parent: ParameterSet) -> bool:
+    new, old = parameter_set.entries()[path], parent.entries()[path]
+    if not isinstance(new, Entry) or not isinstance(old, Entry):
+        return new.value == old.value
+    if (new.value, new.unit) == (old.value, old.unit):
+        return True
+    quantity = parameter_set.declarations()[path]
+    try:
+        mine = entry_in_si(new, quantity, atmospheric_pressure(parameter_set))
+        theirs = entry_in_si(old, quantity, atmospheric_pressure(parent))
+    except UnitError:  # A unit that does not fit, as one may be printed: its mending is a change.
+        return False
+    return math.isclose(mine, theirs, rel_tol=_SAME)
