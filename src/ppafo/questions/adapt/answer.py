@@ -225,9 +225,14 @@ def wearer_text(found: Adaptation, restart: Restart) -> str:
 
 
 def draw(found: Adaptation) -> "matplotlib.figure.Figure":
-    """Return the cost over the generations, and how the gains changed."""
+    """Return the cost over the generations, and how the gains changed; a gain that was 0 has no ratio and no row."""
+    from matplotlib.ticker import MaxNLocator
+
     names = [paths[0].removeprefix("wearer.") for paths in found.groups]
     names = [name.removeprefix("left_") if found.adapts != "apart" else name for name in names]
+    had = found.before != 0.0
+    names = [name.replace("_", " ").capitalize() for name, drawn in zip(names, had, strict=True) if drawn]
+    rows = np.arange(len(names))[::-1]
     margins = Margins(left=0.75, right=0.3, top=0.55, bottom=0.55, row_gap=0.0, column_gap=2.2)
     height = margins.top + margins.bottom + max(3.0, 0.17 * len(names))
     with house_style():
@@ -236,8 +241,8 @@ def draw(found: Adaptation) -> "matplotlib.figure.Figure":
             colour = COLOURS[(restart.number - 1) % len(COLOURS)]
             course.plot(np.arange(1, len(restart.course) + 1), restart.course, color=colour, linewidth=1.3)
             changes.plot(
-                restart.gains / np.where(found.before == 0.0, np.nan, found.before),
-                np.arange(len(names))[::-1],
+                restart.gains[had] / found.before[had],
+                rows,
                 "|",
                 color=colour,
                 markersize=8,
@@ -247,10 +252,12 @@ def draw(found: Adaptation) -> "matplotlib.figure.Figure":
         course.axhline(FALLS, color=GREY, linestyle="--", linewidth=1.0)
         course.text(0.98, FALLS * 1.06, "above: falls", transform=course.get_yaxis_transform(), ha="right", color=GREY)
         course.set_yscale("log")
+        course.xaxis.set_major_locator(MaxNLocator(integer=True))
         course.set_xlabel("Generation")
         course.set_ylabel("Best cost so far")
         changes.axvline(1.0, color=BLUE, linewidth=0.8, alpha=0.5)
-        changes.set_yticks(np.arange(len(names))[::-1], [name.replace("_", " ") for name in names], fontsize=7)
+        changes.set_yticks(rows, names, fontsize=7)
+        changes.set_ylim(-0.7, len(names) - 0.3)
         changes.set_xlabel("Gain over the gain before")
         label_lines(changes)
         mark_kind(figure, "simulated")

@@ -175,12 +175,12 @@ def _scale(set_scale: "Callable[[str], None]", axis: "Axis", values: Floats) -> 
 
 
 def _growth(axes: "Axes", design: Design) -> None:
-    designs = [count for count, _ in design.growth]
+    designs = [count / 1000.0 for count, _ in design.growth]
     fractions = [fraction for _, fraction in design.growth]
     axes.plot(designs, fractions, color=BLUE, marker="o", markersize=3)
     axes.set_title("$\\bf{D}$   Hypervolume of the front", pad=8)
-    axes.set_xlabel("Designs tried")
-    axes.set_ylabel("Fraction of the box of the first designs")
+    axes.set_xlabel("Designs tried (thousands)")
+    axes.set_ylabel("Fraction of the box")
     axes.locator_params(axis="x", nbins=5)
 
 

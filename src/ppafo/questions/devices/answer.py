@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
+from ppafo.answers.display_units import typeset_unit
 from ppafo.answers.style import BLACK, BLUE, GREY, VERMILION, house_style, mark_kind
 from ppafo.identification.devices import Spread, coefficient_of_variation
 from ppafo.identification.estimate import half_width_for
 from ppafo.identification.new_set import in_set_unit
+from ppafo.live.words import label_of
 from ppafo.parameters.loading import list_sets, parameter_set_toml
 from ppafo.parameters.parameter_set import CONFIDENCE, ParameterSet
 from ppafo.questions.question import Solved
@@ -259,7 +261,7 @@ def _data(found: DeviceSpread) -> dict[str, Any]:
     }
 
 
-_COLUMNS, _WIDTH, _ROW, _NAMES, _GAP, _TOP, _BOTTOM = 3, 2.6, 0.24, 1.1, 0.35, 0.75, 0.5
+_COLUMNS, _WIDTH, _ROW, _NAMES, _GAP, _TOP, _BOTTOM = 3, 2.6, 0.24, 1.1, 0.35, 0.55, 0.35
 """Panels beside each other; inches of a panel, of a device, of names, between panels, above and below."""
 
 
@@ -304,8 +306,11 @@ def _draw_number(axes: "Axes", found: DeviceSpread, one: PooledNumber, is_first:
     axes.set_ylim(count + 1.6, -0.6)
     axes.axhline(count - 0.5, color=GREY, linewidth=0.6)
     axes.grid(visible=False, axis="y")
-    axes.set_title(f"{'.'.join(one.path.split('.')[-2:])}", fontsize=9.5)
     unit = found.unit(one)
-    axes.set_xlabel(f"({unit})" if unit not in ("", "-") else "")
+    group, _, name = one.path.rpartition(".")
+    # Two valves may have a number of the same name.
+    owner = f", {group.removeprefix('valves.')}" if group.startswith("valves.") else ""
+    label = label_of(f"valve.{name}" if owner else one.path)
+    axes.set_title(f"{label}{owner}" + (f" ({typeset_unit(unit)})" if unit not in ("", "-") else ""), fontsize=9.5)
     axes.locator_params(axis="x", nbins=5)
     axes.ticklabel_format(axis="x", useOffset=False)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import axis_unit, display_value, display_values, quantity_text
-from ppafo.answers.style import ACTUAL, BLACK, BLUE, GREEN, GREY, ORANGE, REFERENCE, VERMILION, house_style, mark_kind
+from ppafo.answers.style import BLACK, BLUE, GREEN, GREY, ORANGE, REFERENCE, VERMILION, house_style, mark_kind
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.errors import ParameterError, StudyError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle, scaled_entries
@@ -179,11 +179,13 @@ def sizing_figure(sizing: Sizing) -> "matplotlib.figure.Figure":
         )
         title = "Torque (N m)"
         if sizing.recording is not None and sizing.choice is not None:
-            axes.plot(
-                sizing.recording.time, sizing.recording["torque"], color=ACTUAL.colour, label=sizing.choice.valve.name
-            )
             pressure = display_value(sizing.choice.pressure, "pressure")
-            title += f", {sizing.choice.valve.name} at {pressure:.1f} {axis_unit('pressure')}"
+            axes.plot(
+                sizing.recording.time,
+                sizing.recording["torque"],
+                color=_COLOURS[sizing.valves.index(sizing.choice) % len(_COLOURS)],
+                label=f"{sizing.choice.valve.name} at {pressure:.1f} {axis_unit('pressure')}",
+            )
         axes.set_title(f"$\\bf{{A}}$   {title}", pad=18)
         axes.set_xlabel("Time (s)")
         axes.margins(x=0.0)

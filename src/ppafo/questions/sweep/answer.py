@@ -196,7 +196,9 @@ def study_figure(results: StudyResults) -> "matplotlib.figure.Figure":
 
         title = f"{results.name}, {results.summary['completed']:,} runs"
         if not is_mapped and len(device) > 1:
-            title += f" over {len(device)} values: {', '.join(label_of(path) for path in device[:_NAMED])}"
+            title += (
+                f" over {len(device)} values: {', '.join(_in_a_sentence(label_of(path)) for path in device[:_NAMED])}"
+            )
             title += f" and {len(device) - _NAMED} more" if len(device) > _NAMED else ""
         figure.suptitle(title, x=0.01, ha="left", fontsize=11, wrap=True)
         if not is_mapped and len(names) > 1:
@@ -204,6 +206,11 @@ def study_figure(results: StudyResults) -> "matplotlib.figure.Figure":
             figure.legend(handles, names, loc="outside lower center", ncols=len(names))
         mark_kind(figure, "simulated")
         return figure
+
+
+def _in_a_sentence(label: str) -> str:
+    """Return a label without its capital, but for a name in capitals."""
+    return label if label[:2].isupper() else label[:1].lower() + label[1:]
 
 
 def _layout() -> "ConstrainedLayoutEngine":
@@ -330,8 +337,8 @@ def _draw_bands(axes: "Axes", results: StudyResults, channel: str, colours: Mapp
             )
         if _MEDIAN in fractions:
             axes.plot(time, levels["q0.5"][own], color=colour, label=name)
-    axes.set_xlabel("time (s)")
-    label = channel.replace("_", " ")
+    axes.set_xlabel("Time (s)")
+    label = channel.replace("_", " ").capitalize()
     axes.set_ylabel(_axis_label(label, quantity, unit))
     percentages = ", ".join(f"{100.0 * fraction:g}" for fraction in fractions)
     axes.set_title(f"{label}: {percentages} % of runs below", fontsize=9)
@@ -351,7 +358,7 @@ def _path_for_display(results: StudyResults, path: str, values: Floats) -> tuple
 def _axis_label(name: str, quantity: str, unit: str) -> str:
     """Return a name with the unit in which it is drawn: that of its quantity, else its own."""
     drawn = axis_unit(quantity) if quantity else unit.removeprefix("-")
-    return f"{name} ({drawn})" if drawn else name
+    return f"{name} ({drawn})" if drawn not in {"", "1"} else name
 
 
 FIGURE = "figure"

@@ -22,6 +22,7 @@ from ppafo.answers.style import (
     label_lines,
     mark_kind,
 )
+from ppafo.live.words import label_of
 from ppafo.questions.question import Solved
 from ppafo.questions.tune.problem import Gains, Limit, Problem
 from ppafo.simulation.scenario import plain, worn_kind
@@ -178,7 +179,7 @@ def task_figure(tuning: Tuning) -> "matplotlib.figure.Figure":
 def search_figure(tuning: Tuning) -> "matplotlib.figure.Figure":
     """Return the cost of each start over its generations, and the gains between their bounds."""
     paths = [item.path for item in tuning.problem.searched]
-    names = 0.55 + _LETTER * max(len(path) for path in paths)
+    names = 0.55 + _LETTER * max(len(label_of(path)) for path in paths)
     margins = Margins(left=0.85, right=0.45, top=0.55, bottom=0.55, row_gap=0.0, column_gap=names)
     height = margins.top + margins.bottom + max(2.3, 0.4 * len(paths))
     with house_style():
@@ -214,7 +215,7 @@ def _draw_places(axes: "Axes", tuning: Tuning) -> None:
             np.clip(item.fraction(item.before), -0.05, 1.05), row, "o", color=VERMILION, markersize=7, label="before"
         )
         axes.plot(item.fraction(tuning.after.gains[item.path]), row, "o", color=BLUE, markersize=7, label="after")
-    axes.set_yticks(rows, [item.path for item in searched])
+    axes.set_yticks(rows, [label_of(item.path) for item in searched])
     axes.set_ylim(-0.6, len(searched) - 0.4)
     axes.set_xticks([0.0, 1.0], ["minimum", "maximum"])
     axes.set_title("Between bounds")

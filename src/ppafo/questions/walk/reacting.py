@@ -176,7 +176,7 @@ def stride_figure(comparison: Comparison) -> "Drawn":
     }
     with house_style():
         figure = Drawn(figsize=(9.4, 5.6))
-        figure.subplots_adjust(left=0.075, right=0.985, top=0.87, bottom=0.09, hspace=0.34, wspace=0.3)
+        figure.subplots_adjust(left=0.075, right=0.985, top=0.9, bottom=0.09, hspace=0.28, wspace=0.3)
         for axes, (channel, title, quantity) in zip(figure.subplots(2, 3).ravel(), _PANELS, strict=True):
             for label, (walked, color) in walks.items():
                 if channel not in walked.averages:
@@ -194,7 +194,8 @@ def stride_figure(comparison: Comparison) -> "Drawn":
             axes.set_xlim(0.0, 100.0)
         for axes in figure.axes[3:]:
             axes.set_xlabel("Stride (%)", fontsize=9)
-        figure.axes[0].legend(fontsize=8, loc="best")
+        handles, labels = figure.axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.53, 1.0), ncols=2)
         scenario = comparison.with_device.scenario
         title = f"{scenario.name}: {wearer_of_walk(scenario).name}, who reacts"
         figure.text(0.012, 0.985, title, ha="left", va="top", fontweight="bold")

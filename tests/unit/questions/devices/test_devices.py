@@ -12,6 +12,7 @@ from ppafo.cli.main import main
 from ppafo.errors import IdentificationError, PpafoError
 from ppafo.parameters.loading import load_parameter_set, parameter_set_toml
 from ppafo.parameters.parameter_set import Entry
+from ppafo.questions.devices.answer import draw
 
 AREA, SUPPLY = "actuator.leak.area", "supply.pressure"
 
@@ -55,6 +56,11 @@ def test_areas_are_pooled_by_ratios_and_a_number_that_may_be_zero_by_differences
     assert torque.pooled.next_device[0] < 0.0
     assert torque.next_device[0] == 0.0
     assert "no difference between 4 devices shows" in found.answer().lead[1]
+    # A picture says what people call a number, with its unit.
+    assert [panel.get_title(loc="left") for panel in draw(found).axes] == [
+        "Leak area (mm$^2$)",
+        "Dynamic friction (N m)",
+    ]
 
 
 def test_gauge_pressures_are_pooled_as_pressures(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 import ppafo
 from ppafo.errors import StudyError
-from ppafo.questions.tune.answer import Tuning, remarks, verdict
+from ppafo.questions.tune.answer import Tuning, remarks, search_figure, verdict
 from ppafo.questions.tune.problem import json_schema, list_tunings, load_tuning, present_value
 from ppafo.questions.tune.solve import tune
 
@@ -45,6 +45,8 @@ def test_gains_are_found_that_are_better_and_can_be_pasted() -> None:
     assert tuning.before.result.metrics["rms_error"].value == pytest.approx(tuning.before.values["rms_error"], rel=1e-9)
     assert tuning.bounds_reached["controller.proportional_gain"] == "maximum"  # no delay: any gain is taken
     assert tune(DOCUMENT).lines == tuning.lines
+    _, places = search_figure(tuning).axes
+    assert [label.get_text() for label in places.get_yticklabels()] == ["Proportional gain", "Integral gain"]
 
 
 def test_a_constraint_is_kept_or_said_to_be_out_of_reach() -> None:
