@@ -355,7 +355,7 @@ def find_figure(found: Found) -> "matplotlib.figure.Figure":
         if found.value is not None:
             value = display_value(found.value, quantity)
             axes.axvline(value, color=VERMILION, linewidth=1.4, label=f"found: {value:.4g} {unit}".rstrip())
-        axes.set_xlabel(f"{name} ({unit})" if unit else name)
+        axes.set_xlabel(name if unit in ("", "1") else f"{name} ({unit})")
         label_lines(axes)
         axes.set_ylabel(metric_title(found.condition.metric))
         mark_kind(figure, "simulated")
