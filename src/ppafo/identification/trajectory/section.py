@@ -4,7 +4,7 @@ Texts have units, scenarios and recordings go by name; the problem is in SI unit
 refused before the search begins, and what the recordings can give is said before it.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -139,7 +139,8 @@ class ExperimentSection(StrictTable):
         Literal["scenario", "recording", "fitted"] | None,
         Field(
             description="where the state at the start comes from; 'fitted': from the recording, and its pressures are "
-            "fitted too. Default: the scenario, if there is one"
+            "fitted too. Default: the scenario, if there is one; else 'fitted' where two samples or more precede the "
+            "first command, and 'recording' where they do not"
         ),
     ] = None
     time_offset: Annotated[
@@ -265,7 +266,11 @@ def trajectory_problem(section: TrajectorySection, setting: Setting) -> Trajecto
     if twice:
         raise IdentificationError(f"{setting.file}: {twice}; bench values are where the fit starts and what it holds")
     parameters = [_parameter(item, scenarios, setting) for item in section.parameters]
-    nuisances = [one for item in section.experiments for one in _nuisances(item, setting)]
+    nuisances = [
+        one
+        for item, made in zip(section.experiments, experiments, strict=True)
+        for one in _nuisances(item, made, parameters, setting)
+    ]
     search = Search(
         loss=section.loss,
         other_starts=section.other_starts,
@@ -330,10 +335,20 @@ def _scenario(name: str, overrides: tuple[str, ...], setting: Setting) -> Scenar
     return load_scenario(found, (*chosen, *overrides), setting.parameter_set)
 
 
-def _nuisances(item: ExperimentSection, setting: Setting) -> list[FreeParameter]:
+def _nuisances(
+    item: ExperimentSection, made: Experiment, parameters: Sequence[FreeParameter], setting: Setting
+) -> list[FreeParameter]:
     """Return the numbers that are fitted to one recording only because nobody knows them exactly."""
-    names = ("pressure_1", "pressure_2") if item.initial_state == "fitted" else ()
-    found = [FreeParameter(f"initial.{name}", recordings=(item.label,)) for name in names]
+    starts: tuple[str, ...] = FITTED_CHANNELS[1:] if item.initial_state == "fitted" else ()
+    if item.initial_state is None and item.scenario is None and setting.tolerances.start_of_pressure == 0.0:
+        # Samples at rest say where a run begins no better than their noise. They are compared: a prior would count
+        # them twice.
+        begun = made.recording.between(made.start, float(made.recording.time[-1]))
+        is_at_rest = not begun[COMMAND][:2].any()
+        starts = tuple(name for name in FITTED_CHANNELS[1:] if is_at_rest and name in made.channels)
+    given = {one.path for one in parameters if not one.recordings or item.label in one.recordings}
+    paths = [path for name in starts if (path := f"initial.{name}") not in given]
+    found = [FreeParameter(path, recordings=(item.label,)) for path in paths]
     if item.time_offset is not None:
         said = f"{setting.file}: experiment '{item.label}': time_offset"
         longest = quantity_of(said, item.time_offset, "s")
