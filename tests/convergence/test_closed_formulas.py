@@ -132,7 +132,7 @@ def test_decay_with_coulomb_and_viscous_friction_stops_when_and_where_it_should(
 ) -> None:
     """I omega' = -beta omega - T_d: an exponential that ends at I/beta ln(1 + beta omega_0/T_d), or a parabola."""
     inertia, dynamic, speed = 8.4e-3, 0.03, 1.0
-    lines = ("actuator.torque_constant=1e-20 m^3", f"friction.dynamic_torque={dynamic} N m")
+    lines = ("actuator.torque_constant=1e-18 m^3", f"friction.dynamic_torque={dynamic} N m")
     found = course(thrown(60.0, speed, 0.4, *lines, f"friction.viscous_damping={damping} N m s/rad"))
     end = inertia * speed / dynamic
     if damping > 0.0:

@@ -237,7 +237,8 @@ def _slider(entry: Mapping[str, Any]) -> Interval:
     else:
         end = _nice(2.5 * abs(value)) if value else (high if high is not None and high <= 1.0 else 1.0)
         begin = -end if value < 0.0 else 0.0
-    if entry["kept"] == "above zero" or (low is not None and low >= begin and not entry["is_minimum_allowed"]):
+    is_small = low is not None and (not entry["is_minimum_allowed"] or 0.0 < low < end / 100.0)
+    if entry["kept"] == "above zero" or (low is not None and low >= begin and is_small):
         begin = max(begin, (low or 0.0) + (end - (low or 0.0)) / 100.0)
     begin = begin if low is None else max(begin, low)
     end = end if high is None else min(end, high)

@@ -10,6 +10,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from ppafo.model.actuators.vane import KIND as VANE
+from ppafo.model.actuators.vane import SMALLEST_VOLUME
 from ppafo.model.catalog import ACTUATORS, VALVES, device_effects
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect
@@ -44,8 +45,8 @@ ACTUATOR = (
     *VANE.quantities,
     Quantity("angle_min", "rad", "lower stop, where chamber 1 is smallest", minimum=-10.0, maximum=10.0),
     Quantity("angle_max", "rad", "upper stop, where chamber 2 is smallest", minimum=-10.0, maximum=10.0),
-    Quantity("dead_volume_1", "m^3", "line and clearance of chamber 1", minimum=0.0, minimum_allowed=False),
-    Quantity("dead_volume_2", "m^3", "line and clearance of chamber 2", minimum=0.0, minimum_allowed=False),
+    Quantity("dead_volume_1", "m^3", "line and clearance of chamber 1", minimum=SMALLEST_VOLUME),
+    Quantity("dead_volume_2", "m^3", "line and clearance of chamber 2", minimum=SMALLEST_VOLUME),
     *RESTITUTION.quantities,
 )
 _OF_A_VANE = frozenset(quantity.name for quantity in VANE.quantities)

@@ -160,7 +160,7 @@ def test_ranges_are_written_as_people_write_them(chromium: Any, file: Path) -> N
         said[key] = page.locator(f"[id='about-{key}'] span").nth(1).inner_text().replace("\u00a0", " ")
     assert said == {
         "friction.static_torque": "0 to 10,000 N m. friction.static_torque",
-        "actuator.dead_volume_1": "More than 0 cm³. actuator.dead_volume_1",
+        "actuator.dead_volume_1": "At least 10⁻¹² cm³. actuator.dead_volume_1",
         "actuator.angle_max": "\u2212572 to 572 deg. actuator.angle_max",
         "run.step": "10⁻⁸ to 1,000 s. run.step",
         "motion.angle": "\u2212572 to 572 deg. motion.angle",

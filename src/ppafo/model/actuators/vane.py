@@ -32,12 +32,14 @@ def problem(settings: Mapping[str, float], stops: Range) -> str:
 
 
 MODEL = ActuatorModel(None, prepare, chambers, chamber_pressures, torque)
+SMALLEST_VOLUME = 1e-18
+"""A cube of a micrometre [m^3]: less is a slip, and what is divided by it leaves the range of floats."""
 KIND = ActuatorKind(
     name="vane",
     summary="A vane between two chambers whose volumes run linearly with the angle.",
     quantities=(
-        Quantity("torque_constant", "m^3", "torque per pressure difference", minimum=0.0, minimum_allowed=False),
-        Quantity("volume_per_angle", "m^3/rad", "chamber volume per angle", minimum=0.0, minimum_allowed=False),
+        Quantity("torque_constant", "m^3", "torque per pressure difference", minimum=SMALLEST_VOLUME),
+        Quantity("volume_per_angle", "m^3/rad", "chamber volume per angle", minimum=SMALLEST_VOLUME),
     ),
     model=MODEL,
     problem=problem,
