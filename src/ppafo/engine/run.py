@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,6 @@ from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program, 
 from ppafo.engine.rows import leaf_paths, leaves, rebuilt, table
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import Pace
-from ppafo.engine.scheme.reacting import ReactingState, Reflexes
 from ppafo.engine.scheme.walking import DeviceShare, WalkState
 from ppafo.model.columns import larger, over_runs, truncated
 from ppafo.model.effects.kind import Moment, State
@@ -25,9 +24,12 @@ from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ch
 from ppafo.model.plant_faults import POWERED, PlantFaults, ShutOff
 from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters
-from ppafo.model.wearer.nerves import Nerves
-from ppafo.model.wearer.walker import Walker
-from ppafo.model.wearer.walker import Wearer as Body
+
+if TYPE_CHECKING:  # for most runs know no wearer who reacts
+    from ppafo.engine.scheme.reacting import ReactingState, Reflexes
+    from ppafo.model.wearer.nerves import Nerves
+    from ppafo.model.wearer.walker import Walker
+    from ppafo.model.wearer.walker import Wearer as Body
 
 Members = NDArray[np.intp]
 Floats = NDArray[np.float64]
@@ -63,12 +65,12 @@ class ReactingWalk:
     """What a wearer who reacts adds to a run: the device on the left leg, the body, and where all of it begins."""
 
     share: DeviceShare
-    body: Body
+    body: "Body"
     sensors: GaitSensors
-    initial: ReactingState
-    walker: Walker
-    reflexes: Reflexes
-    nerves: Nerves
+    initial: "ReactingState"
+    walker: "Walker"
+    reflexes: "Reflexes"
+    nerves: "Nerves"
     failing: tuple[PlantFaults, ShutOff] | None = None
 
 

@@ -70,7 +70,9 @@ def test_what_cannot_be_translated_is_refused_by_file_and_line_and_nothing_is_wr
 ) -> None:
     law = CONTROLLERS["constant"].__class__
     given = {name: getattr(CONSTANT, name) for name in ("summary", "source", "quantities", "parameters", "initial")}
-    monkeypatch.setitem(CONTROLLERS, "exponential", law(name="exponential", update=with_exponential, **given))
+    monkeypatch.setitem(
+        CONTROLLERS, "exponential", law(name="exponential", update=with_exponential, needs_reference=False, **given)
+    )
     folder = tmp_path / "library"
     changed = ["--set", "controller.kind=exponential"]
     assert main(["export", "c", "step-response", *changed, "--out", str(folder)]) == 2
