@@ -77,7 +77,7 @@ class ReactingWearer:
         """The body with the strengths of the leg with the device, as the engine takes it."""
         muscles = with_strengths(self.body.left, {name: self.settings[f"{name}_strength"] for name in Fibres._fields})
         left, right = (
-            Gains(*(self.settings[f"{side}_{name}"] for name in Gains._fields)) for side in ("left", "right")
+            Gains._make(self.settings[f"{side}_{name}"] for name in Gains._fields) for side in ("left", "right")
         )
         body = on_slope(self.body, self.settings[SLOPE.name])
         return body._replace(left=muscles, left_gains=left, right_gains=right)
@@ -94,7 +94,7 @@ class BodyStart:
     walk: ReactingState
 
 
-_AT_REST = Pose(0.0, 0.0, 0.0, Limb(0.0, 0.0, 0.0), Limb(0.0, 0.0, 0.0))
+_AT_REST = Pose(x=0.0, y=0.0, lean=0.0, left=Limb(0.0, 0.0, 0.0), right=Limb(0.0, 0.0, 0.0))
 
 
 def start_of_body(wearer: ReactingWearer) -> BodyStart:
@@ -126,7 +126,9 @@ def start_of_body(wearer: ReactingWearer) -> BodyStart:
         muscle_work=0.0,
         fall_time=STANDING,
     )
-    return BodyStart(ankle, walker, Reflexes(first_answer(), 0.0, 0.0, 0.0), nerves, walk)
+    return BodyStart(
+        ankle, walker, Reflexes(ordered=first_answer(), until=0.0, umberger=0.0, bhargava=0.0), nerves, walk
+    )
 
 
 def read_reacting(reading: Reading, folder: Path) -> ReactingWearer | None:

@@ -51,7 +51,7 @@ WEIGHT = MASS * GRAVITY
 
 def _lever(length: float, largest_at: float, rest_at: float, share: float) -> Lever:
     """A lever [m] whose angles are in degrees."""
-    return Lever(length, math.radians(largest_at), math.radians(rest_at), share)
+    return Lever(lever=length, largest_at=math.radians(largest_at), rest_at=math.radians(rest_at), share=share)
 
 
 MUSCLES = Muscles(
@@ -122,7 +122,16 @@ START_LEAN = 0.1
 
 def published_wearer(left: Gains, right: Gains) -> Wearer:
     """The body of the publication with these gains of both legs; the published ones are in the file ``geyer-herr``."""
-    return Wearer(BODY, MUSCLES, MUSCLES, left, right, STOP, GROUND, WEIGHT)
+    return Wearer(
+        body=BODY,
+        left=MUSCLES,
+        right=MUSCLES,
+        left_gains=left,
+        right_gains=right,
+        stop=STOP,
+        ground=GROUND,
+        weight=WEIGHT,
+    )
 
 
 def limb_of(angles: Joints, lean: float) -> Limb:
@@ -142,8 +151,8 @@ def start_of(wearer: Wearer, speed: float) -> Walker:
     still = Limb(0.0, 0.0, 0.0)
     return Walker(
         # The lower end of the foot is 3 mm in the ground.
-        pose=Pose(0.0, -lowest - 0.003, START_LEAN, left, right),
-        rates=Pose(speed, 0.0, 0.0, still, still),
+        pose=Pose(x=0.0, y=-lowest - 0.003, lean=START_LEAN, left=left, right=right),
+        rates=Pose(x=speed, y=0.0, lean=0.0, left=still, right=still),
         left=_leg_at_start(wearer.left, joints(left, START_LEAN)),
         right=_leg_at_start(wearer.right, joints(right, START_LEAN)),
     )
@@ -152,7 +161,7 @@ def start_of(wearer: Wearer, speed: float) -> Walker:
 def _leg_at_start(muscles: Muscles, angles: Joints) -> LegState:
     """A leg that does not touch the ground yet, whose tendons are just without force."""
     fibre = Fibre(activation=0.05, length=0.1, velocity=0.0)
-    wholes = pull(muscles, Fibres(*[fibre] * 7), angles, Joints(0.0, 0.0, 0.0), 0.0)
+    wholes = pull(muscles, Fibres._make([fibre] * 7), angles, Joints(0.0, 0.0, 0.0), 0.0)
     none = Point(0.0, 0.0, 0.0)
     return LegState(
         Fibres(
@@ -171,8 +180,8 @@ def _leg_at_start(muscles: Muscles, angles: Joints) -> LegState:
 
 def first_answer() -> Answer:
     """What the reflexes order at the start: the least, with the left leg in stance and the right one in swing."""
-    least = Stimulation(*[0.01] * 7)
-    return Answer(least, least, Gait(1.0, 0.3, START_LEAN), Gait(0.0, 0.0, START_LEAN))
+    least = Stimulation._make([0.01] * 7)
+    return Answer(to_left=least, to_right=least, left=Gait(1.0, 0.3, START_LEAN), right=Gait(0.0, 0.0, START_LEAN))
 
 
 def felt_at(wearer: Wearer, walker: Walker, step: float) -> tuple[Felt, Felt, Balance]:

@@ -206,10 +206,10 @@ def next_reflexes(wearer: Wearer, nerves: Nerves, reflexes: Reflexes, body: Body
     of_left = rates_of_leg(wearer.left, legs.left.fibres, before.to_left)
     of_right = rates_of_leg(wearer.right, legs.right.fibres, before.to_right)
     return Reflexes(
-        ordered,
-        body.until,
-        reflexes.umberger + SAMPLE * (of_left.umberger + of_right.umberger),
-        reflexes.bhargava + SAMPLE * (of_left.bhargava + of_right.bhargava),
+        ordered=ordered,
+        until=body.until,
+        umberger=reflexes.umberger + SAMPLE * (of_left.umberger + of_right.umberger),
+        bhargava=reflexes.bhargava + SAMPLE * (of_left.bhargava + of_right.bhargava),
     )
 
 

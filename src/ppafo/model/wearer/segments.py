@@ -117,7 +117,14 @@ def circle(limb: Limb) -> Circle:
     thigh_sine, thigh_cosine = sine_and_cosine_of_turns(limb.thigh * TURNS_OF_RADIAN)
     shank_sine, shank_cosine = sine_and_cosine_of_turns(limb.shank * TURNS_OF_RADIAN)
     sine, cosine = sine_and_cosine_of_turns(limb.foot * TURNS_OF_RADIAN)
-    return Circle(thigh_sine, thigh_cosine, shank_sine, shank_cosine, cosine, -sine)
+    return Circle(
+        thigh_sine=thigh_sine,
+        thigh_cosine=thigh_cosine,
+        shank_sine=shank_sine,
+        shank_cosine=shank_cosine,
+        foot_sine=cosine,
+        foot_cosine=-sine,
+    )
 
 
 def leg_matrix(

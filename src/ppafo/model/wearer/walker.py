@@ -384,11 +384,11 @@ def moved_limb(limb: Limb, by: Limb, step: float) -> Limb:
 def moved(pose: Pose, by: Pose, step: float) -> Pose:
     """A pose after a step [s] at these rates."""
     return Pose(
-        pose.x + step * by.x,
-        pose.y + step * by.y,
-        pose.lean + step * by.lean,
-        moved_limb(pose.left, by.left, step),
-        moved_limb(pose.right, by.right, step),
+        x=pose.x + step * by.x,
+        y=pose.y + step * by.y,
+        lean=pose.lean + step * by.lean,
+        left=moved_limb(pose.left, by.left, step),
+        right=moved_limb(pose.right, by.right, step),
     )
 
 

@@ -97,11 +97,9 @@ class Adaptation(Solved):
         """Gains of the left and of the right leg."""
         found = {path: float(value) for value, paths in zip(gains, self.groups, strict=True) for path in paths}
         left, right = (
-            Gains(
-                *(
-                    found.get(f"wearer.{side}_{name}", float(self.wearer.settings[f"{side}_{name}"]))
-                    for name in Gains._fields
-                )
+            Gains._make(
+                found.get(f"wearer.{side}_{name}", float(self.wearer.settings[f"{side}_{name}"]))
+                for name in Gains._fields
             )
             for side in ("left", "right")
         )
