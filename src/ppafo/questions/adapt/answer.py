@@ -172,7 +172,7 @@ def _walks(walked: Walked) -> str:
     if speed is None:
         longest = float(np.nanmax(walked.metrics["walked_time"]))
         return f"falls from every start speed, after {longest:.3g} s at the latest"
-    everywhere = "" if walked.share == 1.0 else f" from {walked.share:.0%} of the start speeds"
+    everywhere = "" if walked.share == 1.0 else f" from {100.0 * walked.share:.0f} % of the start speeds"
     return f"walks on{everywhere}, at {speed:.3g} m/s"
 
 
