@@ -43,6 +43,7 @@ def damaged(changes: list[tuple[str, int, str]]) -> bytes:
 
 
 @settings(max_examples=500)
+@example([("value", LINES.index('value = "CO2"'), r'"\n"')])
 @given(st.lists(mutations, min_size=1, max_size=4))
 def test_a_damaged_file_gives_a_clear_error_or_a_usable_set(changes: list[tuple[str, int, str]]) -> None:
     try:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as
+from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, refused_as
 from ppafo.model.actuators.kind import Range
 from ppafo.model.actuators.table import Table
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
@@ -193,7 +193,9 @@ def _species(parameter_set: ParameterSet) -> str:
     if name not in SPECIES:
         hint = nearest_name(name, SPECIES)
         known = ", ".join(SPECIES)
-        raise ParameterError(f"{parameter_set.file}: gas.species = '{name}' is unknown{hint}; available: {known}")
+        raise ParameterError(
+            f"{parameter_set.file}: gas.species = '{one_line(name)}' is unknown{hint}; available: {known}"
+        )
     return name
 
 
