@@ -39,7 +39,7 @@ def read_clock(reading: Reading) -> Clock:
     duration = reading.number(_DURATION_PATH, _DURATION)
     period = _read_period(reading)
     step = _read_step(reading, duration, period)
-    output = _read_output(reading, duration, dividing_step(period, step)) or output_unless_given(duration, period, step)
+    output = _read_output(reading, duration, step) or output_unless_given(duration, period, step)
     clock = Clock(duration, dividing_step(period, step), output, period)
     _check_size(reading, clock)
     return clock
@@ -124,6 +124,7 @@ def _read_step(reading: Reading, duration: float, period: float) -> float:
             return step_unless_given(duration, period)
         return step_with_output(duration, period, reading.number(_OUTPUT_PATH, _OUTPUT))
     step = reading.number(_STEP_PATH, _STEP)
+    _not_above(reading, _STEP_PATH, step, _rate_or_period(reading), period)
     _not_above(reading, _STEP_PATH, step, _DURATION_PATH, duration)
     return step
 
@@ -150,3 +151,7 @@ def _read_output(reading: Reading, duration: float, step: float) -> float | None
 def _not_above(reading: Reading, path: str, value: float, limit_path: str, limit: float) -> None:
     if value > limit * (1.0 + _RELATIVE):
         raise reading.refusal(path, f"must not be above {quantity_text(limit, 's')}, which {limit_path} gives")
+
+
+def _rate_or_period(reading: Reading) -> str:
+    return _PERIOD_PATH if value_at(reading.document, _RATE_PATH) is None else _RATE_PATH

@@ -8,8 +8,6 @@ import pytest
 
 from ppafo.errors import ParameterError, PpafoError, ScenarioError
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
-from ppafo.walking import load_walk
-from ppafo.walking.planning import plan_walk
 from tests.scenario_text import parse_scenario
 
 TEXT = """
@@ -217,6 +215,7 @@ def test_a_ramp_that_would_leave_the_stops_after_the_run_is_allowed() -> None:
         ('"3 s"', '"0 s"', "run.duration = '0 s': must be more than 0 s"),
         ('"3 s"', '"-1 s"', "run.duration = '-1 s': must be more than 0 s"),
         ('"3 s"', '"2 min^2"', "a unit like 's' is needed"),
+        ('step = "1 ms"', 'step = "2 ms"', "run.step = '2 ms': must not be above 0.001 s, which controller.rate gives"),
         ('output_interval = "1 ms"', 'output_interval = "0.5 ms"', "must not be below run.step = 0.001 s"),
         ('output_interval = "1 ms"', 'output_interval = "4 s"', "must not be above 3 s, which run.duration gives"),
         (
@@ -352,16 +351,3 @@ def test_only_a_controller_that_follows_nothing_may_be_without_a_reference() -> 
     assert parse_scenario(constant.encode(), "task.toml").reference.settings == {"level": 0.0}
     words = ["reference.kind=constant", "reference.level=5 N m"]
     assert parse_scenario(without.encode(), "task.toml", words).reference.settings == {"level": 5.0}
-
-
-@pytest.mark.parametrize("rate", ["1 kHz", "997 Hz", "1e7 Hz"])
-def test_a_step_longer_than_a_sample_of_the_controller_is_one_sample_long(rate: str) -> None:
-    text = (
-        TEXT.replace("1 kHz", rate)
-        .replace('duration = "3 s"', 'duration = "0.5 s"')
-        .replace('l = "1 ms"', 'l = "10 ms"')
-    )
-    long = parse_scenario(text.replace('step = "1 ms"', 'step = "5 ms"').encode(), "task.toml")
-    assert long.time_step == pytest.approx(long.control.period, rel=1e-12)
-    walks = [load_walk("solenoid", [f"run.step={step}", "controller.rate=500 Hz"]) for step in ("2 ms", "5 ms")]
-    assert plan_walk(walks[0]).step == plan_walk(walks[1]).step

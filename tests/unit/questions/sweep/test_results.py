@@ -188,11 +188,11 @@ BOTH = ("proportional", "solenoid")
     ("document", "panels"),
     [
         (study(DRAWN), ["Supply pressure (psig)"] * 2),
-        (study(DRAWN, LEAK, names=BOTH, bands=["torque"]), ["Supply pressure (psig)"] * 4 + ["time (s)"]),
+        (study(DRAWN, LEAK, names=BOTH, bands=["torque"]), ["Supply pressure (psig)"] * 4 + ["Time (s)"]),
         (study(AXIS), ["Torque to hold (N m)"] * 2),
         (study(AXIS, OTHER), ["Torque to hold (N m)"] * 2),
         (study(AXIS, OTHER | {"spacing": "logarithmic"}, DRAWN, names=BOTH), ["Torque to hold (N m)"] * 4),
-        (study(DRAWN, metrics=[], bands=["command"]), ["time (s)"]),
+        (study(DRAWN, metrics=[], bands=["command"]), ["Time (s)"]),
         (study(DRAWN, metrics=[], trajectories=["command"]), []),
         (study(NOBODY), ["Lower stop (deg)"] * 2),
         (study(names=BOTH), ["RMS error (N m)", "Switchings"]),
