@@ -77,11 +77,13 @@ def test_recordings_and_what_is_made_of_them_say_that_they_are_synthetic(found: 
     assert all("synthetic" in source for estimate in found.estimates for source in estimate.recordings)
 
 
+@pytest.mark.thorough
 def test_intervals_hold_the_planted_values_as_often_as_they_claim(study: Coverage) -> None:
     for path, inside in zip(study.paths, study.inside, strict=True):
         assert binomial_below(inside, REPETITIONS, study.confidence) > UNLIKELY, path
 
 
+@pytest.mark.thorough
 def test_scores_are_neither_too_wide_nor_too_narrow(study: Coverage) -> None:
     from scipy.stats import chi2
 
@@ -90,6 +92,7 @@ def test_scores_are_neither_too_wide_nor_too_narrow(study: Coverage) -> None:
         assert chi2.ppf(UNLIKELY, REPETITIONS) < square < chi2.ppf(1.0 - UNLIKELY, REPETITIONS), path
 
 
+@pytest.mark.thorough
 def test_scores_have_no_preferred_side(study: Coverage) -> None:
     # The mean of normal scores has the standard deviation 1 / sqrt(repetitions); 3.9 of these are one in 10 000.
     assert np.abs(study.scores.mean(axis=0)).max() < 3.9 / math.sqrt(REPETITIONS)
@@ -106,6 +109,7 @@ def test_a_robust_fit_of_recordings_with_stray_samples_knows_its_uncertainty() -
         assert binomial_below(inside, STRAY_REPETITIONS, robust.confidence) > UNLIKELY, path
 
 
+@pytest.mark.thorough
 def test_the_study_prints_a_line_for_each_parameter_and_one_for_all(study: Coverage) -> None:
     lines = coverage_text(study).splitlines()
     assert len(lines) == len(EIGHT_PARAMETERS) + 4

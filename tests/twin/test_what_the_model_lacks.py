@@ -116,7 +116,7 @@ def test_a_zero_that_is_off_by_more_than_a_bench_has_is_named() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("fault", ["late stamps", "wandering gain"])
+@pytest.mark.parametrize("fault", ["late stamps", pytest.param("wandering gain", marks=THOROUGH)])
 def test_intervals_hold_where_noise_grows_with_slope_or_level(fault: str) -> None:
     fine = np.arange(4001, dtype=np.float64) * 1e-4
     signals = [bench(one, [(0.0, one.control.settings["command"])], fine) for one in PLANTED.scenarios]

@@ -166,7 +166,10 @@ def samples_in_c(library: ctypes.CDLL, name: str, values: Values, outputs: int) 
     return np.array(found)
 
 
-@pytest.mark.parametrize(("name", "overrides"), VARIED)
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [pytest.param(*one, marks=pytest.mark.thorough) if one == BY_NUMBA else one for one in VARIED],
+)
 def test_every_sample_of_drawn_settings_has_the_bits_of_the_lanes(
     name: str, overrides: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

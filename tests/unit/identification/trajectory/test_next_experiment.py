@@ -155,6 +155,7 @@ def test_next_needs_to_know_what_the_bench_can_do(tmp_path: Path, capsys: pytest
 
 
 @pytest.mark.long
+@pytest.mark.thorough
 def test_play_that_a_step_cannot_show_is_promised_to_show_and_the_rig_records_what_was_chosen(tmp_path: Path) -> None:
     (tmp_path / "problem.toml").write_text(PROBLEM + BENCH)
     device = ("motion.kind=free",)

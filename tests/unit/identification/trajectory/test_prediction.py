@@ -55,7 +55,9 @@ def test_sets_that_predict_the_same_do_not_differ() -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("memory", [0.0, 0.9])
-@pytest.mark.parametrize("size", [0.3, 1.0, 3.0])
+@pytest.mark.parametrize(
+    "size", [pytest.param(0.3, marks=pytest.mark.thorough), 1.0, pytest.param(3.0, marks=pytest.mark.thorough)]
+)
 def test_equal_sets_are_indistinguishable_and_no_wrong_one_wins(memory: float, size: float) -> None:
     draws = 100
     found = [ranked(seed, memory, {"high": size, "low": -size, "right": 0.0}) for seed in range(draws)]
