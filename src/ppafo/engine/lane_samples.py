@@ -345,13 +345,22 @@ def sample_lines(rows: Rows, moment: str) -> list[str]:
     ]
 
 
+WEARER_ROWS = {
+    "strides": "walk.strides",
+    "way": "walker.pose.x",
+    "clearances": "walk.clearances",
+    "muscle_work": "walk.muscle_work",
+    "umberger": "reflexes.umberger",
+    "bhargava": "reflexes.bhargava",
+    "fall_time": "walk.fall_time",
+}
+"""The rows that the sample of a wearer who reacts is made of, beside its time."""
+
+
 def wearer_sample(rows: Rows) -> list[str]:
     """Lines that make the sample of a wearer who reacts."""
-    values = {name: f"walk.{name}" for name in WearerSample._fields if name not in ("way", "time")}
-    values |= {name: f"reflexes.{name}" for name in ("umberger", "bhargava")}
-    values |= {"way": "walker.pose.x", "time": "next_record * (timing.step * interval)"}
-    in_order = {name: values[name] for name in WearerSample._fields}
-    return [rows.load("walker"), rows.load("reflexes"), f"of_wearer = {_row(rows.add(WearerSample), in_order)}"]
+    values = {**WEARER_ROWS, "time": "next_record * (timing.step * interval)"}
+    return [rows.load("walker"), rows.load("reflexes"), f"of_wearer = {_row(rows.add(WearerSample), values)}"]
 
 
 def _zeros(row: type[FootSample] | type[StrideSample]) -> dict[str, str]:

@@ -80,38 +80,24 @@ def _strides(readings: Readings) -> Floats:
     return found
 
 
-def _speed(readings: Readings) -> Floats:
+def gained(readings: Readings, name: str) -> Floats:
+    """How much a total of the samples grew over the counted strides, in its unit."""
     totals = readings.meters["wearer"]
-    time = totals.last.time - totals.first.time
-    found: Floats = choose(
-        _strides(readings) > 0.5, (totals.last.way - totals.first.way) / larger(time, 1.0e-9), math.nan
-    )
+    found: Floats = getattr(totals.last, name) - getattr(totals.first, name)
     return found
 
 
-def _stride_time(readings: Readings) -> Floats:
-    totals = readings.meters["wearer"]
-    return mean_of(totals.last.time - totals.first.time, _strides(readings))
+def _of_a_stride(name: str) -> Callable[[Readings], Floats]:
+    """Mean of a total over the strides."""
+    return lambda readings: mean_of(gained(readings, name), _strides(readings))
 
 
-def _lowest_toes(readings: Readings) -> Floats:
-    totals = readings.meters["wearer"]
-    return mean_of(totals.last.clearances - totals.first.clearances, _strides(readings))
-
-
-def _muscle_work(readings: Readings) -> Floats:
-    totals = readings.meters["wearer"]
-    return mean_of(totals.last.muscle_work - totals.first.muscle_work, _strides(readings))
-
-
-def _power(energy: str) -> Callable[[Readings], Floats]:
-    """Mean of what adds up to an energy of the samples, by its name, over the strides."""
+def _rate(name: str) -> Callable[[Readings], Floats]:
+    """A total over the time of the strides."""
 
     def read(readings: Readings) -> Floats:
-        totals = readings.meters["wearer"]
-        time = totals.last.time - totals.first.time
-        gained = getattr(totals.last, energy) - getattr(totals.first, energy)
-        found: Floats = choose(_strides(readings) > 0.5, gained / larger(time, 1.0e-9), math.nan)
+        in_time = gained(readings, name) / larger(gained(readings, "time"), 1.0e-9)
+        found: Floats = choose(_strides(readings) > 0.5, in_time, math.nan)
         return found
 
     return read
@@ -125,12 +111,22 @@ METRICS = (
     _kind("stays_up", "-", "1 of a wearer who walks on to the end, 0 of one who falls", _stays_up),
     _kind("fall_time", "s", "time at which the wearer falls", _fall_time),
     _kind("walked_time", "s", "time until the wearer falls, or until the end", _walked_time),
-    _kind("walking_speed", "m/s", "speed, mean over whole strides without the first ones", _speed),
-    _kind("stride_time", "s", "time of a stride, mean over whole strides without the first ones", _stride_time),
-    _kind("lowest_toes", "m", "lowest toe height above ground in mid-swing, mean over the strides", _lowest_toes),
-    _kind("muscle_work", "J", "work of all muscles of both legs as they shorten, in one stride", _muscle_work),
-    _kind("muscle_power", "W", "mean power of all muscles of both legs as they shorten", _power("muscle_work")),
-    _kind("metabolic_power_umberger", "W", "metabolic rate of all muscles, Umberger 2010", _power("umberger")),
-    _kind("metabolic_power_bhargava", "W", "metabolic rate of all muscles, Bhargava 2004", _power("bhargava")),
+    _kind("walking_speed", "m/s", "speed, mean over whole strides without the first ones", _rate("way")),
+    _kind("stride_time", "s", "time of a stride, mean over whole strides without the first ones", _of_a_stride("time")),
+    _kind(
+        "lowest_toes",
+        "m",
+        "lowest toe height above ground in mid-swing, mean over the strides",
+        _of_a_stride("clearances"),
+    ),
+    _kind(
+        "muscle_work",
+        "J",
+        "work of all muscles of both legs as they shorten, in one stride",
+        _of_a_stride("muscle_work"),
+    ),
+    _kind("muscle_power", "W", "mean power of all muscles of both legs as they shorten", _rate("muscle_work")),
+    _kind("metabolic_power_umberger", "W", "metabolic rate of all muscles, Umberger 2010", _rate("umberger")),
+    _kind("metabolic_power_bhargava", "W", "metabolic rate of all muscles, Bhargava 2004", _rate("bhargava")),
 )
 """Those of a wearer who reacts; gas and the others of a walk are in ``strides``."""

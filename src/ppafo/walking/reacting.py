@@ -4,21 +4,26 @@ A body of its own walks here, so that nothing is compared with a gait: toes are 
 that the wearer makes.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.engine.lane_samples import WEARER_ROWS
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
-from ppafo.metrics import METRICS, Metric
-from ppafo.metrics.metric import REACTS
+from ppafo.metrics import Metric
+from ppafo.metrics.metric import Readings
 from ppafo.metrics.strides import PER_STRIDE, SETTLING
+from ppafo.metrics.wearer import METER, WearerTotals
+from ppafo.metrics.wearer import METRICS as OF_WEARER
 from ppafo.model.plant import chamber_pressures
 from ppafo.model.wearer.segments import Limb
 from ppafo.model.wearer.walker import Fibres, Joints, joints
 from ppafo.signals import Channel, Recording
+from ppafo.signals.meter import WearerSample
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import gas_channels
 
@@ -88,6 +93,12 @@ def angles_of(record: Mapping[str, Floats], side: str) -> Joints:
     return joints(limb, lean)
 
 
+def sample_at(time: Floats, record: Mapping[str, Floats], place: int) -> WearerSample:
+    """What a meter is shown at a sample."""
+    totals = {field: float(record[row][place]) for field, row in WEARER_ROWS.items()}
+    return WearerSample(**totals, time=float(time[place]))
+
+
 def reacting_metrics(
     time: Floats,
     record: Mapping[str, Floats],
@@ -100,24 +111,23 @@ def reacting_metrics(
 
     ``starts`` are the samples after each strike, ``strides`` numbers of each whole stride, ``helped`` those with help.
     """
-    of_wearer = {name: kind for name, kind in METRICS.items() if REACTS in kind.needs}
-    fell = fall_time >= 0.0
-    values = {"stays_up": 0.0 if fell else 1.0, "walked_time": fall_time if fell else float(time[-1])}
-    values |= {"fall_time": fall_time} if fell else {}
     counted = np.arange(helped.size) >= SETTLING
-    if counted.any():
-        first, last = starts[SETTLING], starts[-1]
-        count = float(counted.sum())
-        length = float(time[last] - time[first])
-        values["walking_speed"] = float(record["walker.pose.x"][last] - record["walker.pose.x"][first]) / length
-        values["stride_time"] = length / count
-        values["lowest_toes"] = float(record["walk.clearances"][last] - record["walk.clearances"][first]) / count
-        work = float(record["walk.muscle_work"][last] - record["walk.muscle_work"][first])
-        values |= {"muscle_work": work / count, "muscle_power": work / length}
-        for model in ("umberger", "bhargava"):
-            energy = record[f"reflexes.{model}"]
-            values[f"metabolic_power_{model}"] = float(energy[last] - energy[first]) / length
-    found = {name: Metric(value, of_wearer[name].unit, of_wearer[name].summary) for name, value in values.items()}
+    # Read as a study reads them, from the samples that its meter keeps.
+    now = sample_at(time, record, -1)._replace(fall_time=fall_time)
+    first, last = (sample_at(time, record, starts[place]) for place in (SETTLING, -1)) if counted.any() else (now, now)
+    readings = Readings(
+        meters={METER.name: WearerTotals(first=first, last=last, now=now)},
+        course=(),
+        interval=np.zeros(()),
+        samples=time.size,
+        gains={},
+        traces={},
+    )
+    found: dict[str, Metric] = {}
+    for kind in OF_WEARER:
+        value = float(kind.read(readings))
+        if math.isfinite(value):
+            found[kind.name] = Metric(value, kind.unit, kind.summary)
     for name, item in PER_STRIDE.items():
         own = strides[name][counted & helped]
         own = own[own < 0.0] if name == "slap_rate" else own
