@@ -108,7 +108,7 @@ class BodyEnd(NamedTuple):
 
     ``due`` is 1 where the nerves are sampled, ``until`` [s] the sample after that. ``heel_up`` and ``ball_up`` [N]
     under the foot with the device, ``place`` of its ankle in front of the hip and height of its ``toes`` [m], ``work``
-    of the muscles [J], ``given`` by both pressures [N m].
+    of the muscles [J], ``given`` by both pressures [N m], ``damping`` of the vane with its friction [N m s/rad].
     """
 
     after: Walker
@@ -123,6 +123,7 @@ class BodyEnd(NamedTuple):
     toes: float
     work: float
     given: float
+    damping: float
 
 
 class AnkleStep(NamedTuple):
@@ -184,6 +185,7 @@ def next_body(
         toes=left.toes,
         work=work,
         given=assist.torque,
+        damping=assist.damping,
     )
 
 
@@ -220,15 +222,13 @@ def advance_reacting(
     body: BodyEnd,
     before: PlantState,
     after: PlantState,
-    damping: float,
     follow_rate: float,
     time: float,
     step: float,
 ) -> ReactingState:
     """What the sensors show and what adds up over the strides; ``time`` [s] is that at the end of the step [s].
 
-    A strike is the foot that stands after the toes came by; what touches before is a scuff. ``damping`` [N m s/rad] is
-    that of the vane with its friction.
+    A strike is the foot that stands after the toes came by; what touches before is a scuff.
     """
     stood = walk.fall_time < 0.0
     leg = wearer.body.thigh.length + wearer.body.shank.length
@@ -246,7 +246,7 @@ def advance_reacting(
     slaps = walk.lands > 0.5 and ball > 0.0 and not strikes
     lands = (0.0 if touches_first else 1.0) if strikes else (0.0 if slaps or load <= 0.0 else walk.lands)
     acceleration = (after.angular_velocity - before.angular_velocity) / max(step, 1.0e-30)
-    given = body.given - damping * after.angular_velocity - share.inertia * acceleration
+    given = body.given - body.damping * after.angular_velocity - share.inertia * acceleration
     turned = after.angle - before.angle
     follows = follow_rate * step / (1.0 + follow_rate * step)
     since = 0.0 if strikes else walk.since + step
@@ -332,11 +332,9 @@ def reach(_rows: Any, _fed: str) -> Phases:
 def end(rows: Any) -> list[str]:
     """Lines that lead to the state ``after`` the step."""
     follow = rows.cells["gait_sensors.follow_rate"]
-    given = f"wearer, share, walk, body, state, after, assist.damping, {follow}, time + length, length"
+    given = f"wearer, share, walk, body, state, after, {follow}, time + length, length"
     return [
         *[rows.load(name) for name in ("begun", "ahead", "body", "wearer")],
-        # The state at the begin has the pressures with which the body moved.
-        f"assist = {rows.add(assist_of)}(plant, share, state, held)",
         "held = ahead",
         *rows.keep("held"),
         f"after = {rows.add(with_motion)}(fed, begun.angle, begun.rate)",
