@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.style import BLUE, COLOURS, GREY, Margins, figure_of_free_panels, house_style, label_lines, mark_kind
 from ppafo.model.wearer.reflexes import Gains
+from ppafo.questions.adapt.problem import Search
 from ppafo.questions.question import Solved
-from ppafo.simulation.scenario import Scenario, plain
-from ppafo.walking.reacting_wearer import ReactingWearer
+from ppafo.simulation.scenario import plain
 
 if TYPE_CHECKING:
     import matplotlib.figure
@@ -63,23 +63,14 @@ class Restart:
 
 @dataclass(frozen=True, slots=True)
 class Adaptation(Solved):
-    """A search of reflexes: the walk and its wearer, which gains, the speed to aim at [m/s], and what was found.
+    """What a search of reflexes found: how the wearer walks with the gains of before, and the restarts in their order.
 
-    ``before`` (gains,) are the gains in the beginning, ``unadapted`` how they walk. ``restarts`` are in the order in
-    which they ran. ``folder`` is where the answer was written, empty where it was not.
+    ``folder`` is where the answer was written, empty where it was not.
     """
 
-    scenario: Scenario
-    wearer: ReactingWearer
-    adapts: str
-    groups: tuple[tuple[str, ...], ...]
-    speed: float
-    before: Floats
+    search: Search
     unadapted: Walked
     restarts: tuple[Restart, ...]
-    generations: int
-    population: int
-    seed: int
     folder: str = ""
 
     @property
@@ -95,10 +86,10 @@ class Adaptation(Solved):
 
     def gains_of(self, gains: Floats) -> tuple[Gains, Gains]:
         """Gains of the left and of the right leg."""
-        found = {path: float(value) for value, paths in zip(gains, self.groups, strict=True) for path in paths}
+        found = {path: float(value) for value, paths in zip(gains, self.search.groups, strict=True) for path in paths}
         left, right = (
             Gains._make(
-                found.get(f"wearer.{side}_{name}", float(self.wearer.settings[f"{side}_{name}"]))
+                found.get(f"wearer.{side}_{name}", float(self.search.wearer.settings[f"{side}_{name}"]))
                 for name in Gains._fields
             )
             for side in ("left", "right")
@@ -133,7 +124,7 @@ def answer_of(found: Adaptation) -> Answer:
     return Answer(
         name="adapt",
         kicker="Adaptation",
-        title=f"{found.scenario.name}: reflexes that adapt",
+        title=f"{found.search.scenario.name}: reflexes that adapt",
         lead=(verdict(found), *remarks(found)),
         sections=(
             Section(
@@ -200,19 +191,19 @@ def wearer_text(found: Adaptation, restart: Restart) -> str:
     left, right = found.gains_of(restart.gains)
     lines = [
         "schema_version = 1",
-        f'name = "{found.wearer.name}-{restart.number}"',
-        f'title = "{found.wearer.name} with reflexes searched for {found.speed:.3g} m/s"',
-        f'source = "body and reflexes of {found.wearer.name}; gains by search"',
-        f'start_speed = "{found.speed:.6g} m/s"',
+        f'name = "{found.search.wearer.name}-{restart.number}"',
+        f'title = "{found.search.wearer.name} with reflexes searched for {found.search.speed:.3g} m/s"',
+        f'source = "body and reflexes of {found.search.wearer.name}; gains by search"',
+        f'start_speed = "{found.search.speed:.6g} m/s"',
         "",
         "[found]",
         'by = "search"',
-        f'start = "{found.wearer.name}"',
-        f"seed = {found.seed}",
+        f'start = "{found.search.wearer.name}"',
+        f"seed = {found.search.seed}",
         f"restart = {restart.number}",
-        f"generations = {found.generations}",
-        f"population = {found.population}",
-        f'target_speed = "{found.speed:.6g} m/s"',
+        f"generations = {found.search.generations}",
+        f"population = {found.search.population}",
+        f'target_speed = "{found.search.speed:.6g} m/s"',
         'objective = "no fall, the speed, little muscle work over weight and way"',
         "",
         "[gains]",
@@ -226,9 +217,9 @@ def draw(found: Adaptation) -> "matplotlib.figure.Figure":
     """Return the cost over the generations, and how the gains changed; a gain that was 0 has no ratio and no row."""
     from matplotlib.ticker import MaxNLocator
 
-    names = [paths[0].removeprefix("wearer.") for paths in found.groups]
-    names = [name.removeprefix("left_") if found.adapts != "apart" else name for name in names]
-    had = found.before != 0.0
+    names = [paths[0].removeprefix("wearer.") for paths in found.search.groups]
+    names = [name.removeprefix("left_") if found.search.adapts != "apart" else name for name in names]
+    had = found.search.before != 0.0
     names = [name.replace("_", " ").capitalize() for name, drawn in zip(names, had, strict=True) if drawn]
     rows = np.arange(len(names))[::-1]
     margins = Margins(left=0.75, right=0.3, top=0.55, bottom=0.55, row_gap=0.0, column_gap=2.2)
@@ -239,7 +230,7 @@ def draw(found: Adaptation) -> "matplotlib.figure.Figure":
             colour = COLOURS[(restart.number - 1) % len(COLOURS)]
             course.plot(np.arange(1, len(restart.course) + 1), restart.course, color=colour, linewidth=1.3)
             changes.plot(
-                restart.gains[had] / found.before[had],
+                restart.gains[had] / found.search.before[had],
                 rows,
                 "|",
                 color=colour,
@@ -272,13 +263,13 @@ def _data(found: Adaptation) -> dict[str, Any]:
         }
 
     return {
-        "walk": found.scenario.name,
-        "wearer": found.wearer.name,
-        "gains": found.adapts,
-        "speed": found.speed,
-        "generations": found.generations,
-        "population": found.population,
-        "seed": found.seed,
+        "walk": found.search.scenario.name,
+        "wearer": found.search.wearer.name,
+        "gains": found.search.adapts,
+        "speed": found.search.speed,
+        "generations": found.search.generations,
+        "population": found.search.population,
+        "seed": found.search.seed,
         "before": walked(found.unadapted),
         "restarts": [
             {

@@ -1,15 +1,14 @@
 """The search: an evolution strategy over gains of reflexes, each generation one ensemble, kept line by line.
 
-What is kept are the costs alone: told them again, the strategy draws the same candidates, so that an interrupted search
-goes on with the same bits.
+Only the costs are stored. Given them again, the strategy draws the same candidates, so that an interrupted search
+resumes with the same bits.
 """
 
 import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,83 +16,23 @@ from numpy.typing import NDArray
 from ppafo import interrupts
 from ppafo.answers.writing import files_of
 from ppafo.errors import DataError, StudyError
-from ppafo.loading import scenario_or_load
-from ppafo.model.wearer.reflexes import Gains
 from ppafo.progress import Report
 from ppafo.questions.adapt.answer import FALLS, Adaptation, Restart, Walked, answer_of
-from ppafo.simulation.scenario import Scenario, scenario_document
+from ppafo.questions.adapt.problem import FRESH_STARTS, START_PATH, STARTS, Search, line_of, search_of
+from ppafo.simulation.scenario import Scenario
 from ppafo.storage.files import read_bytes
 from ppafo.storage.result_folder import check_owned_folder, marked_folder, write_marked_folder
 from ppafo.studies.draws import Model, Tally, scenario_model
-from ppafo.studies.study import with_overrides
-from ppafo.version import __version__
-from ppafo.walking.motion import WalkMotion
-from ppafo.walking.reacting_wearer import GAINS, START_SPEED, ReactingWearer
+from ppafo.walking.reacting_wearer import GAINS
 
 Floats = NDArray[np.float64]
-
-WALK = "reacting"
-"""The walk that is taken where none is named."""
-
-START_PATH = f"wearer.{START_SPEED.name}"
-STARTS = (0.9, 1.1)
-"""Start speeds of each candidate over the speed to aim at: who walks from one of them only is no walker."""
-
-FRESH_STARTS = tuple(np.linspace(0.85, 1.15, 8).tolist())
-"""Start speeds from which what was found is judged, none of them one of the search."""
 
 METRICS = ("stays_up", "walked_time", "walking_speed", "muscle_power", "lowest_toes", "gas")
 OF_SPEED = 10.0
 """Cost of being off the speed, over its square [s^2/m^2]: 0.1 m/s cost as much as the work of the muscles."""
 
-STEP, LEAST_STEP = 0.1, 2.0e-3
-"""First standard deviation of a gain, as a share of it, and the least one."""
-
-MOST_GENERATIONS, LARGEST_POPULATION = 10_000, 1_000
 JOURNAL = "search.jsonl"
 _MAXIMUM_BYTES = 64_000_000
-
-
-@dataclass(frozen=True, slots=True)
-class Search:
-    """What is searched: the walk, its wearer, the gains by group of paths, the speed to aim at [m/s], and how long."""
-
-    scenario: Scenario
-    wearer: ReactingWearer
-    groups: tuple[tuple[str, ...], ...]
-    before: Floats
-    speed: float
-    restarts: int
-    generations: int
-    population: int
-    seed: int
-    adapts: str
-
-    @property
-    def scale(self) -> Floats:
-        """First standard deviations (gains,)."""
-        return np.maximum(STEP * np.abs(self.before), LEAST_STEP)
-
-    def columns(self, gains: Floats) -> dict[str, Floats]:
-        """The values by path (candidates,) of candidates (candidates, gains)."""
-        return {path: gains[:, number] for number, paths in enumerate(self.groups) for path in paths}
-
-    def document(self) -> dict[str, Any]:
-        """What must be the same for a search to go on, as plain data."""
-        described = scenario_document(self.scenario)
-        del described["origin"]
-        return {
-            "format": "ppafo adaptation",
-            "schema_version": 1,
-            "version": __version__,
-            "walk": self.scenario.name,
-            "sha256": hashlib.sha256(_line(described)).hexdigest(),
-            "gains": self.adapts,
-            "speed": self.speed,
-            "generations": self.generations,
-            "population": self.population,
-            "seed": self.seed,
-        }
 
 
 def adapt(
@@ -150,7 +89,7 @@ def adapt_into_folder(
                 file.truncate(content.rindex(b"\n") + 1)
     else:
         check_owned_folder(folder, kind)
-        write_marked_folder(folder, {JOURNAL: _line(search.document())}, "adapt")
+        write_marked_folder(folder, {JOURNAL: line_of(search.document())}, "adapt")
     try:
         found = _adapted(search, journal, known, threads, progress)
     except KeyboardInterrupt:
@@ -158,50 +97,6 @@ def adapt_into_folder(
     contents = files_of(answer_of(found))
     write_marked_folder(folder, {**contents, JOURNAL: read_bytes(journal, _MAXIMUM_BYTES)}, "adapt")
     return replace(found, folder=str(folder))
-
-
-def search_of(
-    walk: Scenario | str | Path | None,
-    speed: float | None,
-    adapts: str,
-    restarts: int,
-    generations: int,
-    population: int,
-    seed: int,
-    overrides: Sequence[str],
-) -> Search:
-    """Return the search that arguments of ``adapt`` describe; StudyError where they cannot be."""
-    scenario = with_overrides(scenario_or_load(WALK if walk is None else walk), overrides)
-    motion = scenario.motion
-    if not isinstance(motion, WalkMotion) or motion.reacts is None:
-        raise StudyError(
-            f"'{scenario.name}': is no walk of a wearer who reacts, so that no reflexes can adapt; 'reacting' is one"
-        )
-    names = Gains._fields
-    groups: Mapping[str, tuple[tuple[str, ...], ...]] = {
-        "alike": tuple((f"wearer.left_{name}", f"wearer.right_{name}") for name in names),
-        "left": tuple((f"wearer.left_{name}",) for name in names),
-        "apart": tuple((f"wearer.{item.name}",) for item in GAINS),
-    }
-    if adapts not in groups:
-        raise StudyError(f"gains = {adapts!r}: must be one of {', '.join(groups)}")
-    for name, value, least, most in (
-        ("restarts", restarts, 1, 100),
-        ("generations", generations, 1, MOST_GENERATIONS),
-        ("population", population, 4, LARGEST_POPULATION),
-    ):
-        if not least <= value <= most:
-            raise StudyError(f"{name} = {value}: must be at least {least} and at most {most:,}")
-    aim = float(motion.reacts.settings[START_SPEED.name]) if speed is None else speed
-    low, high = START_SPEED.minimum / FRESH_STARTS[0], START_SPEED.maximum / FRESH_STARTS[-1]
-    if not low <= aim <= high:
-        raise StudyError(f"speed = {aim:g} m/s: must be at least {low:.2g} m/s and at most {high:.3g} m/s")
-    before = np.array([float(motion.reacts.settings[paths[0].removeprefix("wearer.")]) for paths in groups[adapts]])
-    return Search(scenario, motion.reacts, groups[adapts], before, aim, restarts, generations, population, seed, adapts)
-
-
-def _line(document: Mapping[str, Any]) -> bytes:
-    return f"{json.dumps(document, sort_keys=True)}\n".encode()
 
 
 def _known(journal: Path, content: bytes, search: Search) -> dict[tuple[int, int], tuple[str, list[float]]]:
@@ -248,19 +143,7 @@ def _adapted(
             course.append(min([float(costs[best]), *course[-1:]]))
         restarts.append(Restart(number + 1, gains, tuple(course), walked(search, model, gains)))
     before = walked(search, model, search.before)
-    return Adaptation(
-        search.scenario,
-        search.wearer,
-        search.adapts,
-        search.groups,
-        search.speed,
-        search.before,
-        before,
-        tuple(restarts),
-        search.generations,
-        search.population,
-        search.seed,
-    )
+    return Adaptation(search, before, tuple(restarts))
 
 
 def _generations(
@@ -301,7 +184,7 @@ def _generations(
             if journal is not None:
                 item = {"restart": restart, "generation": generation, "drawn": mark, "costs": costs.tolist()}
                 with journal.open("ab") as file:
-                    file.write(_line(item))
+                    file.write(line_of(item))
         strategy.tell(list(zip(asked, costs.tolist(), strict=True)))
         yield drawn, costs
 

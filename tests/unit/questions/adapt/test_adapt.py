@@ -9,7 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from ppafo.errors import DataError, StudyError
-from ppafo.questions.adapt.solve import JOURNAL, METRICS, adapt, adapt_into_folder, costs_of, search_of
+from ppafo.questions.adapt.problem import search_of
+from ppafo.questions.adapt.solve import JOURNAL, METRICS, adapt, adapt_into_folder, costs_of
 from ppafo.studies.draws import Outcomes
 from ppafo.wearers.loading import find_wearer
 
