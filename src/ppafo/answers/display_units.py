@@ -83,6 +83,12 @@ def display_value(value: float, quantity: str, atmosphere: float = STANDARD_ATMO
     return float(value) if si == unit or not math.isfinite(value) else from_si(float(value), unit, si, atmosphere)
 
 
+def rounded_text(value: float, quantity: str, digits: int) -> str:
+    """Return a value in SI as text in the unit in which it is shown, without the sign of what is rounded to zero."""
+    text = f"{display_value(value, quantity):.{digits}f}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
+
+
 def display_difference(value: float, quantity: str) -> float:
     """Return a difference of two values in SI in the unit in which it is shown."""
     return display_value(value, quantity) - display_value(0.0, quantity)

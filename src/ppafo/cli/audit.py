@@ -43,8 +43,8 @@ def run(parsed: argparse.Namespace) -> int:
     ]
     if len(found) == 1:
         text = _text(*found[0])
-        if parents[0] is not None:
-            text = f"{_changes_text(sets[0], parents[0])}\n\n{text}"
+        if documents[0]["parent"] is not None:
+            text = f"{_changes_text(documents[0])}\n\n{text}"
         output.deliver(f"audit-{sets[0].name}", text, documents[0], parsed)
     else:
         output.deliver("audit", _table(found), {"sets": documents}, parsed)
@@ -70,16 +70,14 @@ def _changes_document(parameter_set: "ParameterSet", parent: "ParameterSet | Non
     return {"parent": None if parent is None else parent.name, "changes": changed}
 
 
-def _changes_text(parameter_set: "ParameterSet", parent: "ParameterSet") -> str:
+def _changes_text(document: dict[str, Any]) -> str:
     from ppafo.answers.writing import align_columns
-    from ppafo.parameters.audit.changes import changes
 
-    changed = changes(parameter_set, parent)
+    name, parent, changed = document["set"], document["parent"], document["changes"]
     count = f"{len(changed)} value{'' if len(changed) == 1 else 's'}" if changed else "nothing"
-    first = f"{parameter_set.name} changes {count} of its parent {parent.name}"
-    rows = [(change.path, change.before or "-", change.after or "-", change.origin) for change in changed]
-    table = align_columns([("value", parent.name, parameter_set.name, "origin"), *rows], 4) if changed else []
-    return "\n".join([first, *(_INDENT + line for line in table)])
+    rows = [(one["path"], one["before"] or "-", one["after"] or "-", one["origin"]) for one in changed]
+    table = align_columns([("value", parent, name, "origin"), *rows], 4) if changed else []
+    return "\n".join([f"{name} changes {count} of its parent {parent}", *(_INDENT + line for line in table)])
 
 
 def _document(parameter_set: "ParameterSet", findings: "list[Finding]", overrides: list[str]) -> dict[str, Any]:

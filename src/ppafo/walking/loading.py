@@ -170,7 +170,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     law = walking_controllers()[kind_at(document, "controller")]
     hardware = read_hardware(reading, request, changed.device)
     device = _device(reading, hardware)
-    reacts = read_reacting(reading, request.folder)
+    reacts = read_reacting(reading, request.folder, request.instead)
     with _named_by("gait", reading, request, DataError):
         walked = load_gait(_named_file("gait", request, document) or NORMATIVE)
     is_named = "gait" in instead or "gait" in document

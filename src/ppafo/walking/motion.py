@@ -3,7 +3,7 @@
 What may vary in it stands below: its numbers by path, and its times, one by one or as columns of an ensemble.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -85,7 +85,7 @@ def check_led(scenario: Scenario, doing: str) -> None:
     if walk_of(scenario).reacts is not None:
         raise ScenarioError(
             f"{scenario.name}: {doing} needs a prescribed gait, and its wearer reacts; leave wearer.reacts out "
-            "(a wearer who reacts goes by simulate, walk, find, sweep, sensitivity, montecarlo and tune)"
+            "(simulate, walk, find, sweep, sensitivity, montecarlo and tune take a wearer who reacts)"
         )
 
 
@@ -155,10 +155,13 @@ def interval_with_body(seconds: float) -> float:
     return 5.0e-3 if seconds <= 61.0 else (1.0e-2 if seconds <= 601.0 else 5.0e-2)
 
 
+def _interval_of(scenario: Scenario) -> Callable[[float], float]:
+    return record_interval if walk_of(scenario).reacts is None else interval_with_body
+
+
 def with_duration(scenario: Scenario, seconds: float) -> Scenario:
     """A walk of another length [s], recorded as often as that allows."""
-    interval = record_interval if walk_of(scenario).reacts is None else interval_with_body
-    return replace(scenario, duration=seconds, output_interval=interval(seconds))
+    return replace(scenario, duration=seconds, output_interval=_interval_of(scenario)(seconds))
 
 
 def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
@@ -183,7 +186,6 @@ def clock_with(scenario: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tup
     period = times.get("controller.period", scenario.control.period)
     if "controller.rate" in times:
         period = 1.0 / times["controller.rate"]
-    interval = record_interval if walk_of(scenario).reacts is None else interval_with_body
-    output = over_runs(interval, duration) if "run.duration" in times else scenario.output_interval
+    output = over_runs(_interval_of(scenario), duration) if "run.duration" in times else scenario.output_interval
     problems = duration_problems(scenario, duration) if "run.duration" in times else ()
     return Clock(duration, times.get("run.step", scenario.time_step), output, period), problems

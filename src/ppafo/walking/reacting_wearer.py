@@ -11,6 +11,7 @@ from typing import Any
 
 from ppafo.engine.scheme.reacting import STANDING, ReactingState, Reflexes, WalkNow
 from ppafo.engine.scheme.walking import NO_CLEARANCE
+from ppafo.errors import ScenarioError
 from ppafo.model.contact import FLAT
 from ppafo.model.declaration import Quantity
 from ppafo.model.wearer.nerves import Nerves, settled_nerves
@@ -131,10 +132,11 @@ def start_of_body(wearer: ReactingWearer) -> BodyStart:
     )
 
 
-def read_reacting(reading: Reading, folder: Path) -> ReactingWearer | None:
+def read_reacting(reading: Reading, folder: Path, instead: Mapping[str, str]) -> ReactingWearer | None:
     """Return the wearer who reacts of the file of a walk, None where its gait is prescribed.
 
-    A relative path begins in ``folder``. ScenarioError for what does not go with a wearer who reacts, or needs one;
+    A relative path begins in ``folder``; ``instead`` has the files that options name in place of those of the
+    document. ScenarioError for what does not go with a wearer who reacts, or needs one;
     DataError for a file that cannot be used.
     """
     name = value_at(reading.document, REACTS)
@@ -145,6 +147,8 @@ def read_reacting(reading: Reading, folder: Path) -> ReactingWearer | None:
                 raise reading.refusal(f"wearer.{item.name}", f'needs a wearer who reacts: give {REACTS} = "NAME"')
         return None
     for path in ("gait", "course"):
+        if path in instead:
+            raise ScenarioError(f"{reading.file}: {path} '{instead[path]}' does not go with {REACTS} yet: leave it out")
         if path in reading.document:
             raise reading.refusal(path, f"does not go with {REACTS} yet: leave one of both out")
     known = {item.name for item in REACTIONS} | {"reacts"}

@@ -187,6 +187,13 @@ def test_what_a_file_cannot_say_is_one_line(changes: dict[str, Any], words: str)
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("path", ["gait", "course"])
+def test_a_gait_or_course_of_an_option_is_refused_as_one_of_the_file_is(path: str) -> None:
+    name = {"gait": "normal", "course": "stairs"}[path]
+    with pytest.raises(ScenarioError, match=f"{path} '{name}' does not go with wearer.reacts yet"):
+        load_walk(WALK, **{path: name})
+
+
 def test_what_needs_a_prescribed_gait_refuses_in_one_line() -> None:
     scenario, line = load_walk(WALK), "needs a prescribed gait, and its wearer reacts"
     for refused in (

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.display_units import display_value, title_with_unit
+from ppafo.answers.display_units import rounded_text, title_with_unit
 from ppafo.live.workbench import live_part
 from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE
@@ -105,8 +105,8 @@ def wearers_answer(population: Population, volumes: Mapping[str, Population]) ->
 
 
 def _cells(values: Floats, quantity: str, digits: int) -> list[str | None]:
-    texts = [f"{display_value(value, quantity):.{digits}f}" for value in _values(values).tolist()]
-    return [text.removeprefix("-") if float(text) == 0.0 else text for text in texts] or [None] * len(QUANTILES)
+    texts: list[str | None] = [rounded_text(value, quantity, digits) for value in _values(values).tolist()]
+    return texts or [None] * len(QUANTILES)
 
 
 def _wearers_data(population: Population) -> dict[str, Any]:
@@ -305,19 +305,17 @@ def comparison_table(comparison: Comparison) -> Table:
     columns = tuple(person | dict(metrics) for metrics in (worn.metrics, *vented, bare.metrics, healthy))
     head = (*_HEAD[:2], *(_VENTED,) * len(vented), *_HEAD[2:])
     rows = [
-        (title_with_unit(title, quantity), *(_cell(metrics.get(name), quantity, digits) for metrics in columns))
+        (
+            title_with_unit(title, quantity),
+            *(
+                None if one is None else rounded_text(one.value, quantity, digits)
+                for one in (metrics.get(name) for metrics in columns)
+            ),
+        )
         for name, title, quantity, digits in _ROWS
         if any(name in metrics for metrics in columns)
     ]
     return Table(tuple(map(Column, head)), tuple(rows))
-
-
-def _cell(metric: Metric | None, quantity: str, digits: int) -> str | None:
-    """Return a cell, without the sign of a number that is rounded to zero."""
-    if metric is None:
-        return None
-    text = f"{display_value(metric.value, quantity):.{digits}f}"
-    return text.removeprefix("-") if float(text) == 0.0 else text
 
 
 def _slap(comparison: Comparison) -> str:

@@ -1,12 +1,12 @@
 """The answer of a walk of a wearer who reacts: with the device and with it off, until a fall where there is one."""
 
 import platform
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.display_units import display_value, display_values, title_with_unit
+from ppafo.answers.display_units import display_values, rounded_text, title_with_unit
 from ppafo.answers.style import BLUE, GREY, VERMILION, house_style, mark_kind
 from ppafo.questions.walk.course import bottle_data, bottle_remark, bottle_sections
 from ppafo.simulation.scenario import UNITS, Scenario, plain
@@ -45,7 +45,7 @@ _EXPLAINED = (
     "first two strides are left out of the means. The device is on the left leg, and a stride is one step of that leg."
 )
 _LIMITS = (
-    "The wearer is unadapted: the gains of the reflexes are those of the wearer's file, with the device on and off. "
+    "The gains of the reflexes are those of the wearer's file, with the device on and off: they do not adapt. "
     "The body is planar and has no arms, and the device adds no weight, only friction, damping and the inertia of vane "
     "and foot plate about the ankle. No number here is a benefit to a person: it is what this model does."
 )
@@ -147,16 +147,9 @@ def reacting_table(comparison: Comparison) -> Table:
         if not any(name in metrics for metrics in columns):
             continue
         head = title_with_unit(title, quantity) if quantity else title
-        rows.append((head, *(_cell(metrics, name, quantity, digits) for metrics in columns)))
+        found = (metrics.get(name) for metrics in columns)
+        rows.append((head, *(None if one is None else rounded_text(one.value, quantity, digits) for one in found)))
     return Table((Column(""), Column("with"), Column("device off")), tuple(rows))
-
-
-def _cell(metrics: Any, name: str, quantity: str, digits: int) -> str | None:
-    if name not in metrics:
-        return None
-    value = metrics[name].value
-    text = f"{display_value(value, quantity) if quantity else value:.{digits}f}"
-    return text.removeprefix("-") if float(text) == 0.0 else text
 
 
 def _curves(comparison: Comparison) -> tuple[Section, ...]:
