@@ -45,7 +45,7 @@ _EXPLAINED = (
     "first two strides are left out of the means. The device is on the left leg, and a stride is one step of that leg."
 )
 _LIMITS = (
-    "The gains of the reflexes are those of the wearer's file, with the device on and off: they do not adapt. "
+    "The gains of the reflexes are those of the wearer's file, with the device on and off: the wearer is unadapted. "
     "The body is planar and has no arms, and the device adds no weight, only friction, damping and the inertia of vane "
     "and foot plate about the ankle. No number here is a benefit to a person: it is what this model does."
 )
