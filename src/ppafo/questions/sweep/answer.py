@@ -1,7 +1,7 @@
 """The results of a study and their answer: counts, metrics of each configuration, what varied, the figure."""
 
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
+    from matplotlib.cm import ScalarMappable
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 SUMMARY = "summary.json"
@@ -149,7 +150,7 @@ class StudyResults(Solved):
 
 COLOURS = (BLUE, VERMILION, GREEN, ORANGE, GREY)
 MOST_METRICS, MOST_CONFIGURATIONS = 9, len(COLOURS)
-_COLUMNS, _PANEL = 3, (3.5, 2.7)
+_COLUMNS, _PANEL, _COMPARED = 3, (3.5, 2.7), (2.6, 2.3)
 _HISTOGRAM_BINS = 60
 _MAXIMUM_POINTS = 3000
 _MEDIAN = 0.5
@@ -172,25 +173,28 @@ def study_figure(results: StudyResults) -> "matplotlib.figure.Figure":
     is_grid = len(_grid_paths(results)) == 2
     # Two values that vary are the axes of every panel: as a map where they are a grid, else as points.
     is_mapped = is_grid or len(device) == 2
-    panels = [(metric, name) for metric in metrics for name in (names if is_mapped else ("",))]
-    count = max(1, len(panels) + len(bands))
-    columns = 2 if count == 4 else min(_COLUMNS, count)
+    panels = len(metrics) * (len(names) if is_mapped else 1)
+    count = max(1, panels + len(bands))
+    # Maps of several configurations: a row for each metric.
+    is_compared = is_mapped and len(names) > 1
+    columns = len(names) if is_compared else 2 if count == 4 else min(_COLUMNS, count)
     rows = -(-count // columns)
+    width, height = _COMPARED if is_compared else _PANEL
     with house_style():
-        figure = matplotlib.figure.Figure(figsize=(_PANEL[0] * columns + 0.3, _PANEL[1] * rows + 0.7), layout=_layout())
+        figure = matplotlib.figure.Figure(figsize=(width * columns + 0.3, height * rows + 0.7), layout=_layout())
         grid = figure.subplots(rows, columns, squeeze=False)
         places = list(grid.flat)
-        draw = _draw_map if is_grid else _draw_points if is_mapped else None
-        for axes, (metric, name) in zip(places, panels, strict=False):
-            if draw is not None:
-                draw(axes, results, name, metric)
-            elif len(device) == 1:
-                _draw_over(axes, results, device[0], metric)
-            else:
-                _draw_histogram(axes, results, metric)
-        for axes, channel in zip(places[len(panels) :], bands, strict=False):
+        if is_mapped:
+            _draw_mapped(places, results, metrics, names, _draw_map if is_grid else _draw_points)
+        else:
+            for axes, metric in zip(places, metrics, strict=False):
+                if len(device) == 1:
+                    _draw_over(axes, results, device[0], metric)
+                else:
+                    _draw_histogram(axes, results, metric)
+        for axes, channel in zip(places[panels:], bands, strict=False):
             _draw_bands(axes, results, channel, dict(zip(names, COLOURS, strict=False)))
-        for axes in places[len(panels) + len(bands) :]:
+        for axes in places[panels + len(bands) :]:
             axes.set_axis_off()
         from matplotlib.lines import Line2D
 
@@ -256,7 +260,33 @@ def _draw_over(axes: "Axes", results: StudyResults, path: str, metric: str) -> N
     axes.set_ylabel(metric_title(metric))
 
 
-def _draw_map(axes: "Axes", results: StudyResults, name: str, metric: str) -> None:
+def _draw_mapped(
+    places: "Sequence[Axes]",
+    results: StudyResults,
+    metrics: Sequence[str],
+    names: Sequence[str],
+    draw: "Callable[[Axes, StudyResults, str, str], ScalarMappable]",
+) -> None:
+    """Draw a panel for each metric and configuration; those of a metric have one scale of colours."""
+    for row, metric in enumerate(metrics):
+        panels = places[row * len(names) : (row + 1) * len(names)]
+        mapped = [draw(axes, results, name, metric) for axes, name in zip(panels, names, strict=True)]
+        limits = np.array([panel.get_clim() for panel in mapped], dtype=np.float64)
+        limits = limits[np.isfinite(limits).all(axis=1)]
+        for panel in mapped if limits.size else ():
+            panel.set_clim(float(limits[:, 0].min()), float(limits[:, 1].max()))
+        bar = panels[0].figure.colorbar(mapped[0], ax=panels, pad=0.02)
+        if len(names) == 1:
+            panels[0].set_title(metric_title(metric))
+            continue
+        bar.set_label(metric_title(metric))
+        for axes, name in zip(panels, names, strict=True):
+            axes.set_title(name)
+        for axes in panels[1:]:
+            axes.set_ylabel("")
+
+
+def _draw_map(axes: "Axes", results: StudyResults, name: str, metric: str) -> "ScalarMappable":
     """Draw the mean of a metric over the two paths, for one configuration; white where no run completed."""
     across, upward = _grid_paths(results)
     columns, column = np.unique(results.thin(across, MAXIMUM_DRAWN)[name], return_inverse=True)
@@ -268,23 +298,24 @@ def _draw_map(axes: "Axes", results: StudyResults, name: str, metric: str) -> No
     count = np.bincount(place[known], minlength=places)
     total = np.bincount(place[known], weights=values[known], minlength=places)
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(rows.size, columns.size)
-    (x_label, x), (y_label, y) = _path_for_display(results, across, columns), _path_for_display(results, upward, rows)
-    mesh = axes.pcolormesh(x, y, mean, shading="nearest", rasterized=True, cmap="cividis")
-    axes.figure.colorbar(mesh, ax=axes, pad=0.02)
+    shown = (_path_for_display(results, across, columns), _path_for_display(results, upward, rows))
+    places_of = []
+    for path, (label, values), axis in zip((across, upward), shown, (axes.xaxis, axes.yaxis), strict=True):
+        axis.set_label_text(label)
+        # Values of a list are side by side, in cells of the same size.
+        places_of.append(np.arange(values.size) if _is_listed(results, path) else values)
+    mesh = axes.pcolormesh(*places_of, mean, shading="nearest", rasterized=True, cmap="cividis")
     axes.grid(visible=False)
-    axes.set_xlabel(x_label)
-    axes.set_ylabel(y_label)
-    if _is_logarithmic(results, across):
-        axes.set_xscale("log")
-        _mark_plainly(axes.xaxis)
-    if _is_logarithmic(results, upward):
-        axes.set_yscale("log")
-        _mark_plainly(axes.yaxis)
-    label = metric_title(metric)
-    axes.set_title(label if len(results.configurations) == 1 else f"{label}, {name}")
+    for path, (_, values), axis in zip((across, upward), shown, (axes.xaxis, axes.yaxis), strict=True):
+        if _is_listed(results, path):
+            axis.set_ticks(np.arange(values.size), [f"{value:g}" for value in values])
+        elif _is_logarithmic(results, path):
+            (axes.set_xscale if axis is axes.xaxis else axes.set_yscale)("log")
+            _mark_plainly(axis)
+    return mesh
 
 
-def _draw_points(axes: "Axes", results: StudyResults, name: str, metric: str) -> None:
+def _draw_points(axes: "Axes", results: StudyResults, name: str, metric: str) -> "ScalarMappable":
     """Draw a metric as the colour of points over the two values that were drawn, for one configuration."""
     across, upward = (path for path in results.varied if path != NOISE)
     columns = [
@@ -296,11 +327,9 @@ def _draw_points(axes: "Axes", results: StudyResults, name: str, metric: str) ->
     points = axes.scatter(
         x, y, c=_metric_values(metric, columns[2]), s=9, linewidths=0, cmap="cividis", rasterized=True
     )
-    axes.figure.colorbar(points, ax=axes, pad=0.02)
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
-    label = metric_title(metric)
-    axes.set_title(label if len(results.configurations) == 1 else f"{label}, {name}")
+    return points
 
 
 def _grid_paths(results: StudyResults) -> list[str]:
@@ -310,6 +339,11 @@ def _grid_paths(results: StudyResults) -> list[str]:
 def _is_logarithmic(results: StudyResults, path: str) -> bool:
     items = {item["path"]: item for item in results.document["study"]["vary"]}
     return bool(items[path].get("spacing") == "logarithmic")
+
+
+def _is_listed(results: StudyResults, path: str) -> bool:
+    items = {item["path"]: item for item in results.document["study"]["vary"]}
+    return bool(items[path]["kind"] == "list")
 
 
 def _mark_plainly(axis: "Axis") -> None:

@@ -215,6 +215,20 @@ def test_two_values_that_were_drawn_are_the_axes_of_each_panel() -> None:
     assert figure.axes[0].get_title(loc="left") == "Gas supplied (g)"
 
 
+def test_maps_of_several_configurations_have_one_scale_of_colours_for_a_metric() -> None:
+    levels = {"path": "reference.level", "kind": "list", "values": ["2 N m", "5 N m", "6 N m"]}
+    figure = study_figure(sweep(study(levels, OTHER, names=BOTH, metrics=["rms_error", "gas_supplied"])))
+    panels = [axes for axes in figure.axes if axes.get_label() != "<colorbar>"]
+    assert len(panels) == 4
+    for row in (panels[:2], panels[2:]):
+        limits = {axes.collections[0].get_clim() for axes in row}
+        assert len(limits) == 1
+        low, high = limits.pop()
+        assert low == min(axes.collections[0].get_array().min() for axes in row)
+        assert high == max(axes.collections[0].get_array().max() for axes in row)
+    assert [label.get_text() for label in panels[0].get_xticklabels()] == ["2", "5", "6"], "a list: cells side by side"
+
+
 def test_a_map_shows_the_mean_over_the_draws_where_it_belongs() -> None:
     results = sweep(study(AXIS, OTHER, DRAWN, metrics=["gas_supplied"]))
     figure = results.plot()
