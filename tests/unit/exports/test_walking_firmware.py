@@ -124,6 +124,14 @@ def test_a_walk_with_a_failing_heel_sensor_and_the_chip_in_charge_has_the_bits_o
 
 
 @on_chip
+@pytest.mark.long
+@pytest.mark.thorough
+def test_a_chip_in_charge_of_a_wearer_who_reacts_has_the_bits_of_the_lanes() -> None:
+    found = walk_on_chip(load_walk("reacting", (FIXED,)), 0.09)
+    assert (found.samples, found.differences, found.same_bits, found.level) == (5400, 0, True, 0)
+
+
+@on_chip
 def test_a_chip_with_other_numbers_is_found_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     wrong = walk_firmware(fixed_walk("controller.push_off_end=0.5"))
     monkeypatch.setattr("ppafo.exports.firmware.walking.walk_firmware", lambda _: wrong)

@@ -442,13 +442,17 @@ class VentedNumbers(NamedTuple):
 
 
 class SafetyNumbers(NamedTuple):
-    """``SafetyRules`` in counts, samples, strides and fractions of the stride time, with the constants of the signs."""
+    """``SafetyRules`` in counts, samples, strides and fractions of the stride time, with the constants of the signs.
+
+    An ankle within ``rests`` [counts] of where it was on the ground rests.
+    """
 
     ranges: RangeNumbers
     stride: StrideNumbers
     still: StillNumbers
     vented: VentedNumbers
     stands_up: int
+    rests: int
     trace: TraceNumbers
     observer: ObserverNumbers
 
@@ -466,6 +470,7 @@ class SafetyCounts(NamedTuple):
     ``heel_seen`` and ``toe_seen`` are 1 once loaded since the strike, ``toe_strides`` those on the toes alone, and
     ``steady`` is 1 after a stride of the usual time. ``side`` is the last command, 1, -1 or 0 where it vented, and
     ``held`` for how many samples it has been that. ``thin`` is for how many the lower pressure has been too low.
+    ``flat_angle`` is the angle [counts] while the heel carried last, 0 once the ankle has left it.
     """
 
     level: int
@@ -473,6 +478,7 @@ class SafetyCounts(NamedTuple):
     good_strides: int
     heel_seen: int
     toe_seen: int
+    flat_angle: int
     toe_strides: int
     steady: int
     side: int
@@ -641,10 +647,14 @@ def remembered(
         toe_strides = min(toe_strides + 1, MOST_STRIDES) if on_toes else 0
     seen = next_sensors(numbers.trace, state.seen, given, before, phase)
     is_thin = min(given.pressure_1, given.pressure_2) < numbers.ranges.thin
+    flat = state.seen.angle.last == 0 or (phase.phase == MID_STANCE and phase.heel.loaded == 1)
+    # Once it is 0, any angle that can be is further from it.
+    turns = has_moved(given.angle, state.flat_angle, numbers.rests)
     return state._replace(
         good_strides=good_strides,
         heel_seen=phase.heel.loaded if enters else max(state.heel_seen, phase.heel.loaded),
         toe_seen=phase.toe.loaded if enters else max(state.toe_seen, phase.toe.loaded),
+        flat_angle=given.angle if flat else (0 if turns else state.flat_angle),
         toe_strides=toe_strides,
         steady=steady,
         seen=seen,
@@ -673,8 +683,14 @@ def next_level(numbers: SafetyNumbers, state: SafetyCounts, good_strides: int, s
     return max(level, level_of(sign))
 
 
-def permits(level: int, heel_seen: int, phase: int) -> bool:
-    """True where the device may act in a phase: a push needs a heel that was loaded in this stance and has risen."""
+def permits(level: int, heel_seen: int, flat_angle: int, phase: int) -> bool:
+    """True where the device may act in a phase.
+
+    A push needs a heel that was loaded in this stance and has risen; a foot that is lifted has left the ground by
+    turning, for that of somebody who sits is unloaded where it stands.
+    """
+    if phase <= LANDING and flat_angle > 0:
+        return False
     return level < PAUSED and (phase != PUSH_OFF or (level < LIFTS and heel_seen == 1))
 
 
@@ -723,7 +739,7 @@ def sample(numbers: WalkNumbers, state: WalkCounts, readings: GaitReadings) -> t
     standing = phase.spell if phase.heel.loaded + phase.toe.loaded == BOTH else 0
     level = next_level(numbers.safety, last, good_strides, standing, sign)
     lifting = next_lifting(numbers, state.lifting, readings.angle) if phase.phase <= LANDING else 0
-    side = wanted_side(numbers, phase, lifting) if permits(level, now.heel_seen, phase.phase) else 0
+    side = wanted_side(numbers, phase, lifting) if permits(level, now.heel_seen, now.flat_angle, phase.phase) else 0
     safety = now._replace(
         level=level,
         sign=sign if level > last.level else last.sign,

@@ -87,6 +87,7 @@ NUMBERS = (
     _count("filled", "a filled chamber has a higher pressure, a vented one a lower"),
     _count("squeezes", "from this angle on the ankle compresses chamber 2 to any pressure"),
     _samples("stands_up", "who stands for longer after sitting is helped again"),
+    _count("rests", "an ankle within this of its angle on the ground rests"),
     _share("slow_share", "share of a change that slow readings take at once"),
     _share("fall_share", "share of a change that slow pressures take at once"),
     _stride_share("lands", "who comes down on the heel steps within this"),
@@ -111,6 +112,7 @@ def whole_numbers(
         step / converter.scale for step in (converter.angle_step, converter.force_step, converter.pressure_step)
     )
     steps = {
+        "rests": safety.RESTS / angle,
         "moves": signs.MOVES / force,
         "turns": signs.TURNS / angle,
         "fades": signs.FADES * period / angle,
@@ -246,6 +248,7 @@ START_COUNTS = walking_law.WalkCounts(
         good_strides=0,
         heel_seen=0,
         toe_seen=0,
+        flat_angle=0,
         toe_strides=0,
         steady=0,
         side=0,
@@ -274,6 +277,7 @@ STATE_RANGES = {
     "good_strides": (-1, walking_law.MOST_STRIDES),
     "heel_seen": _BIT,
     "toe_seen": _BIT,
+    "flat_angle": _READING,
     "toe_strides": (0, walking_law.MOST_STRIDES),
     "steady": _BIT,
     "side": (-1, 1),
