@@ -138,7 +138,9 @@ def steps(readings: tuple[int, ...]) -> GaitMeasurement:
 
 
 @pytest.mark.parametrize(("turned", "lifts"), [(0.0, False), (0.04, False), (0.06, True)])
-def test_who_sits_with_a_foot_that_was_flat_above_the_angle_of_lifting_is_not_lifted(turned: float, lifts: bool) -> None:
+def test_who_sits_with_a_foot_that_was_flat_above_the_angle_of_lifting_is_not_lifted(
+    turned: float, lifts: bool
+) -> None:
     both, commands = Both(), set()
     # 109 deg, as of somebody who sits with the knee stretched: a foot in the air is lifted from 104 deg on.
     for force, angle in (*((200.0, 1.9),) * 400, *((0.0, 1.9),) * 50, *((0.0, 1.9 + turned),) * 8):
