@@ -38,7 +38,7 @@ LINES: dict[str, str] = {
     "morris": "sensitivity torque-task-uncertainty --configuration proportional --samples 32 --method morris",
     "montecarlo": "montecarlo torque-task-uncertainty --configuration proportional --metric rms_error --draws 2048",
     "endurance": "endurance --gas-per-step '0.3 g'",
-    "size": "size push-off",
+    "design": "design push-off",
     "tune": "tune pid-gains",
     "league": "league --draws 8",
     "league-walk": "league --walk --minutes 0.1 --draws 8",

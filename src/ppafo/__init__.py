@@ -50,8 +50,9 @@ if TYPE_CHECKING:
     from ppafo.questions.bits.solve import bits as bits
     from ppafo.questions.compare.answer import Comparison as Comparison
     from ppafo.questions.compare.solve import compare as compare
-    from ppafo.questions.design.answer import Design as Design
-    from ppafo.questions.design.problem import load_design as load_design
+    from ppafo.questions.design.front.answer import Design as Design
+    from ppafo.questions.design.loading import load_design as load_design
+    from ppafo.questions.design.profile.answer import Sizing as Sizing
     from ppafo.questions.design.solve import design as design
     from ppafo.questions.devices.answer import DeviceSpread as DeviceSpread
     from ppafo.questions.devices.solve import pool_devices as pool_devices
@@ -74,9 +75,6 @@ if TYPE_CHECKING:
     from ppafo.questions.reproduce.solve import reproduce as reproduce
     from ppafo.questions.sensitivity.solve import Sensitivity as Sensitivity
     from ppafo.questions.sensitivity.solve import sensitivity as sensitivity
-    from ppafo.questions.size.answer import Sizing as Sizing
-    from ppafo.questions.size.answer import size as size
-    from ppafo.questions.size.problem import load_sizing as load_sizing
     from ppafo.questions.sweep.answer import StudyResults as StudyResults
     from ppafo.questions.sweep.results import load_study_results as load_study_results
     from ppafo.questions.sweep.solve import sweep as sweep
@@ -134,8 +132,9 @@ _HOMES = {
     "ppafo.questions.bits.solve": ("bits",),
     "ppafo.questions.compare.answer": ("Comparison",),
     "ppafo.questions.compare.solve": ("compare",),
-    "ppafo.questions.design.answer": ("Design",),
-    "ppafo.questions.design.problem": ("load_design",),
+    "ppafo.questions.design.front.answer": ("Design",),
+    "ppafo.questions.design.loading": ("load_design",),
+    "ppafo.questions.design.profile.answer": ("Sizing",),
     "ppafo.questions.design.solve": ("design",),
     "ppafo.questions.devices.answer": ("DeviceSpread",),
     "ppafo.questions.devices.solve": ("pool_devices",),
@@ -153,8 +152,6 @@ _HOMES = {
     "ppafo.questions.reproduce.answer": ("Reproduction",),
     "ppafo.questions.reproduce.solve": ("reproduce",),
     "ppafo.questions.sensitivity.solve": ("Sensitivity", "sensitivity"),
-    "ppafo.questions.size.answer": ("Sizing", "size"),
-    "ppafo.questions.size.problem": ("load_sizing",),
     "ppafo.questions.sweep.answer": ("StudyResults",),
     "ppafo.questions.sweep.results": ("load_study_results",),
     "ppafo.questions.sweep.solve": ("sweep",),
@@ -179,8 +176,14 @@ _HOMES = {
 _HOME_OF = dict(sorted((name, module) for module, names in _HOMES.items() for name in names))
 __all__ = list(_HOME_OF)
 
-_RENAMED = {"run_design": "design", "run_sizing": "size", "run_study": "sweep"}
-"""Names of version 0.1 and what they are called now."""
+_RENAMED = {
+    "run_design": "design",
+    "run_sizing": "design",
+    "run_study": "sweep",
+    "size": "design",
+    "load_sizing": "load_design",
+}
+"""Names of earlier versions and what they are called now."""
 
 
 def _compiler_of_c(name: str) -> Compiler:

@@ -20,7 +20,7 @@ def blocks(page: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
 
 
-@pytest.mark.parametrize(("place", "written"), [(0, "out/wearer/bottle.png"), (2, "out/size/suggested.csv")])
+@pytest.mark.parametrize(("place", "written"), [(0, "out/wearer/bottle.png"), (2, "out/profile/suggested.csv")])
 def test_the_sizing_of_the_page_prints_what_the_page_shows(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

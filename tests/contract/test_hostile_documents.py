@@ -17,10 +17,9 @@ from ppafo.identification.problem import load_problem
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.bottles.bottle import load_bottle
 from ppafo.parameters.parts import load_catalogue
-from ppafo.questions.design.problem import read_design_file
+from ppafo.questions.design.loading import read_design_file
 from ppafo.questions.endurance.draw import read_walk_gas
 from ppafo.questions.reproduce.publication import load_publication
-from ppafo.questions.size.problem import read_sizing_file
 from ppafo.questions.sweep.results import load_study_results
 from ppafo.questions.tune.problem import load_tuning
 from ppafo.rig.experiments import check_rig_folder
@@ -39,7 +38,6 @@ LOADERS: dict[str, Callable[[str], Any]] = {
     "tuning": load_tuning,
     "parts": load_catalogue,
     "design": read_design_file,
-    "size": read_sizing_file,
     "walk": load_walk,
     "course": load_course,
     "identification": load_problem,

@@ -34,7 +34,7 @@ FOLDERS: dict[str, list[str]] = {
     "gait import": ["import", "walk.mot", "--body-mass", "62 kg"],
     "endurance": ["--gas-per-step", "0.3 g"],
     "design": ["torque-task"],
-    "size": ["push-off"],
+    "design of a profile": ["push-off"],
     "sets": [],
     "sets show": ["show", "ppafo2011"],
     "parts": [],

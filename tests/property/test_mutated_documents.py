@@ -15,8 +15,7 @@ from ppafo.errors import PpafoError
 from ppafo.gait.document import load_gait
 from ppafo.parameters.bottles.bottle import load_bottle
 from ppafo.parameters.parts import load_catalogue
-from ppafo.questions.design.problem import load_design
-from ppafo.questions.size.problem import load_sizing
+from ppafo.questions.design.loading import load_design
 from ppafo.questions.tune.problem import load_tuning
 from ppafo.rig.preset import load_preset
 from ppafo.studies.loading import load_study
@@ -27,7 +26,6 @@ FORMATS: dict[str, tuple[Callable[[str], Any], Traversable]] = {
     "study": (load_study, PACKAGE / "studies" / "library"),
     "tuning": (load_tuning, PACKAGE / "questions" / "tune" / "library"),
     "design": (load_design, PACKAGE / "questions" / "design" / "library"),
-    "size": (load_sizing, PACKAGE / "questions" / "size" / "library"),
     "walk": (load_walk, PACKAGE / "walking" / "configurations"),
     "bottle": (load_bottle, PACKAGE / "parameters" / "bottles" / "files"),
     "parts": (load_catalogue, PACKAGE / "parameters" / "parts" / "catalogues"),

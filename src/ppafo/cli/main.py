@@ -69,7 +69,7 @@ the paper
   ppafo reproduce                           its experiments against its printed numbers
 your device
   ppafo new set mine                        a file to fill in; also for a scenario, a study, a walk
-  ppafo size push-off                       from a torque profile to valve, pressure and bottle; also from a wearer
+  ppafo design push-off                     from a torque profile to valve, pressure and bottle; also from a wearer
   ppafo identify FILE                       from bench recordings to parameters with intervals
 learn
   ppafo examples                            the examples of the how-to pages, ready to run
@@ -82,6 +82,9 @@ MOVED: dict[str, str] = {
     "coverage": "'python scripts/interval_coverage.py'",
 }
 """Commands that the package had once, and what does the same in a checkout of the repository."""
+
+JOINED: dict[str, str] = {"size": "design"}
+"""Commands that are part of another one, which takes the same words."""
 
 
 _BAD_VALUE = re.compile(r"argument (?:--?\w+/)*(\S+): (?!invalid )(.+: .+)")
@@ -156,6 +159,8 @@ def check_command(word: str | None) -> None:
         return
     if word in MOVED:
         raise UsageError(f"'{word}' is no longer a command of the package: run {MOVED[word]} in a checkout of ppafo")
+    if word in JOINED:
+        raise UsageError(f"'{word}' is now part of '{JOINED[word]}': 'ppafo {JOINED[word]}' takes the same arguments")
     if word not in QUESTIONS:
         known = tuple(dict.fromkeys((*COMMANDS, *QUESTIONS)))
         hint = nearest_name(word, known)

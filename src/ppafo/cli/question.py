@@ -51,7 +51,7 @@ def run(parsed: argparse.Namespace, question: Question) -> int:
                 names, options = ", ".join(library.names()), ", ".join(f"--{name}" for name in question.instead_of_file)
                 raise library.error(
                     f"no {library.noun} was given: name one ({names}) or give a .toml file"
-                    f"{f', or say what is wanted by {options}' if options else ''}"
+                    f"{f', or state what is wanted by {options}' if options else ''}"
                 )
     solve = question.solver()
     values = {argument.parameter: getattr(parsed, argument.parameter) for argument in question.arguments}

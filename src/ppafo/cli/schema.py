@@ -12,8 +12,7 @@ FORMATS: dict[str, str] = {
     "study": "ppafo.studies.declaration",
     "tuning": "ppafo.questions.tune.problem",
     "parts": "ppafo.parameters.parts.catalogue",
-    "design": "ppafo.questions.design.problem",
-    "size": "ppafo.questions.size.problem",
+    "design": "ppafo.questions.design.loading",
     "walk": "ppafo.walking.declaration",
     "course": "ppafo.walking.course",
     "identification": "ppafo.identification.problem",
@@ -26,6 +25,9 @@ FORMATS: dict[str, str] = {
 }
 """Each file format and the module whose ``json_schema()`` describes it. To add one: one line here."""
 
+JOINED: dict[str, str] = {"size": "design"}
+"""Formats that are now part of another one."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
@@ -35,6 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(parsed: argparse.Namespace) -> int:
     """Print the schema, which is JSON with or without ``--json``."""
+    if parsed.format in JOINED:
+        raise DataError(f"the format '{parsed.format}' is now part of '{JOINED[parsed.format]}'; print that one")
     if parsed.format not in FORMATS:
         hint = nearest_name(parsed.format, FORMATS)
         raise DataError(f"there is no file format '{parsed.format}'{hint}; available: {', '.join(FORMATS)}")

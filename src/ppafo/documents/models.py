@@ -167,6 +167,9 @@ class StrictTable(BaseModel):
 Text = Annotated[str, Field(min_length=1)]
 Texts = Annotated[tuple[Text, ...], Field(strict=False)]
 
+SCHEMA = "https://json-schema.org/draft/2020-12/schema"
+"""The version of JSON Schema in which the layouts of files are published."""
+
 _CONFIG = ConfigDict(strict=True, extra="forbid", frozen=True, defer_build=True)
 
 
@@ -215,7 +218,7 @@ def validate(
 
 def make_schema(model: type[BaseModel], title: str) -> dict[str, Any]:
     """Return the JSON Schema of a file with this layout."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **model.model_json_schema(), "title": title}
+    return {"$schema": SCHEMA, **model.model_json_schema(), "title": title}
 
 
 def _no_value() -> None:

@@ -25,7 +25,6 @@ QUESTIONS: Kinds[Question] = Kinds(
         "tune": "ppafo.questions.tune:QUESTION",
         "linearise": "ppafo.questions.linearise:QUESTION",
         "design": "ppafo.questions.design:QUESTION",
-        "size": "ppafo.questions.size:QUESTION",
         "endurance": "ppafo.questions.endurance:QUESTION",
         "league": "ppafo.questions.league:QUESTION",
         "walk": "ppafo.questions.walk:QUESTION",

@@ -19,7 +19,7 @@ def test_without_a_command_it_says_where_to_start(capsys: pytest.CaptureFixture[
     said = capsys.readouterr().err
     first = re.findall(r"^  ppafo (\w+) ", said, re.MULTILINE)
     assert (
-        {"simulate", "reproduce", "walk", "workbench", "new", "size", "identify", "examples"}
+        {"simulate", "reproduce", "walk", "workbench", "new", "design", "identify", "examples"}
         == set(first)
         <= set(COMMANDS)
     )

@@ -3,7 +3,6 @@
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,19 +11,14 @@ from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import axis_unit, display_value, display_values, quantity_text
 from ppafo.answers.style import BLACK, BLUE, GREEN, GREY, ORANGE, REFERENCE, VERMILION, house_style, mark_kind
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.errors import ParameterError, StudyError
+from ppafo.errors import ParameterError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle, scaled_entries
 from ppafo.parameters.chamber_volumes import ChamberVolumes, other_readings
 from ppafo.parameters.device import Actuator
 from ppafo.parameters.parts import Part
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.questions.endurance.discharge import TIME_IS_UP
-from ppafo.questions.endurance.draw import draw_of_numbers
-from ppafo.questions.endurance.solve import follow_bottle
-from ppafo.questions.parts.solve import doubts_data, doubts_sections, titles_section
-from ppafo.questions.question import Solved
-from ppafo.questions.size.problem import SizingProblem, load_sizing
-from ppafo.questions.size.search import (
+from ppafo.questions.design.profile.problem import SizingProblem
+from ppafo.questions.design.profile.search import (
     LIMITS,
     Floats,
     Limit,
@@ -36,7 +30,11 @@ from ppafo.questions.size.search import (
     limit_of,
     try_pressures,
 )
-from ppafo.questions.size.wearer import WearerSizing, Wish, size_for_wearer
+from ppafo.questions.endurance.discharge import TIME_IS_UP
+from ppafo.questions.endurance.draw import draw_of_numbers
+from ppafo.questions.endurance.solve import follow_bottle
+from ppafo.questions.parts.solve import doubts_data, doubts_sections, titles_section
+from ppafo.questions.question import Solved
 from ppafo.signals import Recording
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate
@@ -47,9 +45,6 @@ from ppafo.walking.bottle import Schedule
 if TYPE_CHECKING:
     import matplotlib.figure
     from matplotlib.axes import Axes
-
-
-FOR_A_WEARER = "--mass '72.5 kg' --torque '2.5 N m' --pressure '50 psi_g' --minutes 5"
 
 
 @dataclass(frozen=True, slots=True)
@@ -297,7 +292,7 @@ def answer_of(sizing: Sizing) -> Answer:
         places = tuple(working.index(place) for place in marked)
         sections.append(Section("Margins", table=Table(_MARGIN_HEAD, margins, places)))
     return Answer(
-        name="size",
+        name="design",
         kicker="Sizing study",
         title=problem.name,
         lead=(*([problem.description] if problem.description else []), _profile_sentence(problem)),
@@ -306,7 +301,7 @@ def answer_of(sizing: Sizing) -> Answer:
             Section(remarks=(suggestion, *other_sentences(sizing.others), *_remarks(sizing))),
             Section(
                 "Error and gas over pressure",
-                figure=Figure("size", _CAPTION, lambda: sizing_figure(sizing)),
+                figure=Figure("profile", _CAPTION, lambda: sizing_figure(sizing)),
                 is_detail=True,
             ),
             *doubts_sections(sizing.doubtful),
@@ -478,46 +473,22 @@ def _tried(
     return OtherChambers(chambers.name, keeps, error, gas, gas * problem.repetitions * (1.0 + problem.reserve))
 
 
-def size(
-    problem: SizingProblem | str | Path | None = None,
-    threads: int | None = None,
-    mass: float | None = None,
-    stature: float | None = None,
-    torque: float | None = None,
-    pressure: float | None = None,
-    minutes: float | None = None,
-    progress: Report | None = None,
-) -> Sizing | WearerSizing:
-    """Return the device for a wearer, or for a torque profile the lowest pressure and smallest bottle of each valve.
-
-    A wearer has a body ``mass`` [kg] and may have a ``stature`` [m]; ``torque`` [N m], ``pressure`` [Pa absolute]
-    and ``minutes`` of walking [min] are what the device is for. ``problem`` may be the name or path of a sizing file.
-    StudyError or ParameterError for bad input, and where every run with a valve fails.
-    """
-    wished = {"mass": mass, "torque": torque, "pressure": pressure, "minutes": minutes}
-    if problem is None:
-        missing = [f"--{name}" for name, value in wished.items() if value is None]
-        if mass is None or torque is None or pressure is None or minutes is None:
-            raise StudyError(f"for a wearer give {', '.join(missing)} too, for example {FOR_A_WEARER}")
-        return size_for_wearer(Wish(mass, stature, torque, pressure, 60.0 * minutes), progress or report_nothing)
-    given = [f"--{name}" for name, value in {**wished, "stature": stature}.items() if value is not None]
-    if given:
-        raise StudyError(f"{', '.join(given)}: a sizing file says itself what is wanted; give the one or the other")
-    chosen = problem if isinstance(problem, SizingProblem) else load_sizing(problem)
-    report = progress or report_nothing
+def size_for_profile(problem: SizingProblem, threads: int | None = None, report: Report = report_nothing) -> Sizing:
+    """Return the lowest pressure and smallest bottle of each valve for a profile; StudyError where all runs fail."""
     begun = time.perf_counter()
-    trials = Trials(chosen, threads)
+    trials = Trials(problem, threads)
     sized = []
-    for place, valve in enumerate(chosen.valves):
-        report(Progress(f"trying {valve.name}", place, len(chosen.valves), 0, 0, time.perf_counter() - begun, "valves"))
+    for place, valve in enumerate(problem.valves):
+        passed = time.perf_counter() - begun
+        report(Progress(f"trying {valve.name}", place, len(problem.valves), 0, 0, passed, "valves"))
         sized.append(_size_valve(trials, valve))
     good = [place for place, item in enumerate(sized) if item.works and item.mass is not None]
     suggested = min(good, key=lambda place: (sized[place].mass, sized[place].pressure), default=None)
     choice = None if suggested is None else sized[suggested]
     recording = None if choice is None else _recording(trials, choice)
-    others = () if choice is None else with_other_chambers(chosen, choice.valve, choice.pressure, threads)
+    others = () if choice is None else with_other_chambers(problem, choice.valve, choice.pressure, threads)
     return Sizing(
-        problem=chosen,
+        problem=problem,
         valves=tuple(sized),
         suggested=suggested,
         recording=recording,

@@ -1,9 +1,8 @@
-"""A sizing file: the prescribed torque as a table that the lanes follow, and the problem in SI units that it makes."""
+"""A design file with a profile: the torque as a table that the lanes follow, and the problem in SI units."""
 
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -13,8 +12,8 @@ from pydantic import Field
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.profiles import KNOTS
-from ppafo.documents.models import NAME, StrictTable, Text, Texts, make_schema, read_model
-from ppafo.documents.toml_text import TomlKind, beside
+from ppafo.documents.models import NAME, StrictTable, Text, Texts
+from ppafo.documents.toml_text import beside
 from ppafo.errors import DataError, StudyError, UnitError, refused_as
 from ppafo.parameters.parts import Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
@@ -90,7 +89,7 @@ class TorqueProfile:
 
 
 def read_profile(table: ProfileTable, folder: Path, file: str) -> TorqueProfile:
-    """Return the profile of a sizing file; a recording's path begins in ``folder``."""
+    """Return the profile of a design file; a recording's path begins in ``folder``."""
     place = f"{file}: profile"
     is_typed = bool(table.time or table.torque)
     if is_typed == (table.recording is not None):
@@ -158,7 +157,6 @@ def _number(text: str, unit: str, place: str) -> float:
         return parse_quantity(text, unit)
 
 
-FILE = TomlKind("sizing", "size", resources.files("ppafo.questions.size") / "library", StudyError)
 _Names = Annotated[tuple[Text, ...], Field(strict=False, min_length=1)]
 _Factor = Annotated[float, Field(ge=0.0, le=1000.0)]
 _SECONDS_PER_HOUR = 3600.0
@@ -200,7 +198,7 @@ class PressureTable(StrictTable):
 
 
 class SizingFile(StrictTable):
-    """A sizing file, as it is written."""
+    """A design file with a profile, as it is written."""
 
     schema_version: Annotated[Literal[1], Field(description="version of this layout")]
     name: Annotated[str, Field(pattern=NAME, max_length=100)]
@@ -227,16 +225,6 @@ class SizingFile(StrictTable):
     simulated: Annotated[
         int, Field(ge=1, le=1000, description="repetitions to simulate; the first fills the lines")
     ] = 3
-
-
-def read_sizing_file(name_or_path: str | Path) -> tuple[SizingFile, str]:
-    """Return a sizing file by its name in the package or by its path, and what messages call it."""
-    return read_model(FILE, SizingFile, name_or_path)
-
-
-def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a sizing file."""
-    return make_schema(SizingFile, "ppafo sizing")
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,10 +266,8 @@ class SizingProblem:
         return self.repetitions * self.profile.period / _SECONDS_PER_HOUR
 
 
-def load_sizing(name_or_path: str | Path) -> SizingProblem:
-    """Return the problem of a sizing file, by its name in the package or its path; paths in it begin in its folder."""
-    document, file = read_sizing_file(name_or_path)
-    folder = Path(name_or_path).parent
+def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProblem:
+    """Return the problem of a design file with a profile, which messages call ``file``; paths begin in ``folder``."""
     catalogue = load_catalogue(beside(document.catalogue, folder))
     profile = read_profile(document.profile, folder, file)
     scenario = _scenario(document, profile, folder, file)

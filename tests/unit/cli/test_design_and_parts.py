@@ -1,4 +1,4 @@
-"""``ppafo design``, ``ppafo size`` and ``ppafo parts``, from files to files."""
+"""``ppafo design`` and ``ppafo parts``, from files to files."""
 
 import json
 from pathlib import Path
@@ -93,14 +93,14 @@ def test_the_json_of_a_design_is_the_same_for_the_same_seed(folder: Path, capsys
 
 def test_a_sizing_is_printed_and_written(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = folder / "out"
-    assert main(["size", str(folder / "sizing.toml"), "--out", str(out)]) == 0
+    assert main(["design", str(folder / "sizing.toml"), "--out", str(out)]) == 0
     printed = capsys.readouterr().out
     assert "(typed, not measured)" in printed
     assert "\n*  enfield-ls-v05s " in printed
     assert "suggested: enfield-ls-v05s at " in printed
-    names = ["ppafo.json", "report.html", "size.json", "size.png", "size.svg", "size.txt", "suggested.csv"]
+    names = ["design.json", "design.txt", "ppafo.json", "profile.png", "profile.svg", "report.html", "suggested.csv"]
     assert sorted(path.name for path in out.iterdir()) == names
-    document = json.loads((out / "size.json").read_text())
+    document = json.loads((out / "design.json").read_text())
     assert document["suggested"] == "enfield-ls-v05s"
     assert document["valves"][0]["bottle"] == "pipeline-jacpac-9oz"
     assert (out / "suggested.csv").read_text().startswith("# simulated")
@@ -113,22 +113,22 @@ def test_a_sizing_without_a_suggestion_ends_with_1_and_says_why(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (folder / "hard.toml").write_text(SIZING.replace("0.6 N m", "0.001 N m"))
-    assert main(["size", str(folder / "hard.toml"), "--out", str(folder / "out")]) == 1
+    assert main(["design", str(folder / "hard.toml"), "--out", str(folder / "out")]) == 1
     assert "no suggestion: no valve keeps the error limit" in capsys.readouterr().out
     assert "no valve keeps the error limit" in (folder / "out" / "report.html").read_text()
 
 
-@pytest.mark.parametrize("command", ["design", "size"])
+@pytest.mark.parametrize("way", ["front", "profile"])
 def test_an_interrupted_study_writes_nothing_and_ends_with_130(
-    command: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    way: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    module = "ppafo.questions.design.solve" if command == "design" else "ppafo.questions.size.search"
+    module = f"ppafo.questions.design.{'front.solve' if way == 'front' else 'profile.search'}"
     monkeypatch.setattr(f"{module}.run_ensemble", interrupted)
-    file = folder / ("design.toml" if command == "design" else "sizing.toml")
-    assert main([command, str(file), "--out", str(folder / "out")]) == 130
+    file = folder / ("design.toml" if way == "front" else "sizing.toml")
+    assert main(["design", str(file), "--out", str(folder / "out")]) == 130
     assert not (folder / "out").exists()
     assert "interrupted; nothing is half written" in capsys.readouterr().err
 
@@ -136,16 +136,19 @@ def test_an_interrupted_study_writes_nothing_and_ends_with_130(
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["design"], "no design was given: name one (torque-task) or give a .toml file"),
+        (["design"], "no design was given: name one (push-off, torque-task) or give a .toml file"),
         (["design", "torque-tusk"], "there is no design 'torque-tusk', did you mean 'torque-task'?"),
         (["design", "torque-task", "--seed", "-1"], "--seed -1: must be a whole number, 0 or more"),
         (
             ["design", "torque-task", "--seed", "4294967296"],
             "seed = 4294967296: must be a whole number from 0 to 429496",
         ),
-        (["size", "push-off", "--threads", "0"], "--threads 0: must be a whole number, 1 or more"),
-        (["size"], "no sizing was given: name one (push-off)"),
-        (["size", "pushoff"], "there is no sizing 'pushoff', did you mean 'push-off'?"),
+        (["design", "push-off", "--threads", "0"], "--threads 0: must be a whole number, 1 or more"),
+        (["design", "push-off", "--seed", "1"], "push-off: nothing is drawn for a profile"),
+        (["design", "--mass", "70 kg", "--seed", "1"], "for a wearer give --torque, --pressure, --minutes too"),
+        (["design", "push-off", "--mass", "70 kg"], "--mass: the design file states what is wanted"),
+        (["size", "push-off"], "'size' is now part of 'design': 'ppafo design' takes the same arguments"),
+        (["schema", "size"], "the format 'size' is now part of 'design'; print that one"),
         (["parts", "enfield"], "there is no part 'enfield'"),
         (["parts", "--catalogue", "mine.toml"], "mine.toml: cannot be read"),
     ],
@@ -161,10 +164,9 @@ def test_bad_input_is_one_line_and_2(
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize(("command", "name"), [("design", "torque-task"), ("size", "push-off")])
-def test_files_of_the_package_are_listed(command: str, name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([command, "--list"]) == 0
-    assert capsys.readouterr().out.startswith(name)
+def test_files_of_the_package_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["design", "--list"]) == 0
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == ["push-off", "torque-task"]
 
 
 def test_parts_are_listed_with_what_is_doubtful_and_what_is_not_known(capsys: pytest.CaptureFixture[str]) -> None:
@@ -177,7 +179,7 @@ def test_parts_are_listed_with_what_is_doubtful_and_what_is_not_known(capsys: py
     assert "not known: largest_pressure, nominal_flow, spool_frequency" in printed
 
 
-@pytest.mark.parametrize("name", ["parts", "design", "size"])
+@pytest.mark.parametrize("name", ["parts", "design"])
 def test_the_layouts_of_the_files_are_published(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema", name]) == 0
     assert json.loads(capsys.readouterr().out)["$schema"].startswith("https://json-schema.org")

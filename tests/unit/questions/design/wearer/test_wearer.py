@@ -13,9 +13,9 @@ from ppafo.cli.main import main
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import load_catalogue
 from ppafo.parameters.parts.catalogue import Catalogue
-from ppafo.questions.size import wearer
-from ppafo.questions.size.electrical import electrical_of, valve_power
-from ppafo.questions.size.wearer import WearerSizing
+from ppafo.questions.design.wearer import solve as wearer
+from ppafo.questions.design.wearer.electrical import electrical_of, valve_power
+from ppafo.questions.design.wearer.solve import WearerSizing
 from ppafo.signals import Channel, Recording
 
 PSI = 6894.757
@@ -44,7 +44,7 @@ def little(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def sized(torque: float, minutes: float, stature: float | None = 1.75) -> WearerSizing:
     pressure = 101325.0 + 50.0 * PSI
-    found = ppafo.size(mass=72.5, stature=stature, torque=torque, pressure=pressure, minutes=minutes)
+    found = ppafo.design(mass=72.5, stature=stature, torque=torque, pressure=pressure, minutes=minutes)
     assert isinstance(found, WearerSizing)
     return found
 
@@ -84,16 +84,16 @@ def test_where_nothing_does_it_the_answer_says_what_to_give_up() -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ([], "or say what is wanted by --mass, --stature, --torque, --pressure, --minutes"),
+        ([], "or state what is wanted by --mass, --stature, --torque, --pressure, --minutes"),
         (["--mass", "70 kg"], "for a wearer give --torque, --pressure, --minutes too, for example --mass"),
-        (["push-off", "--torque", "3 N m"], "--torque: a sizing file says itself what is wanted"),
+        (["push-off", "--torque", "3 N m"], "--torque: the design file states what is wanted"),
         (["--mass", "70", "--torque", "3 N m"], "70"),
     ],
 )
 def test_what_is_missing_is_said_with_what_to_write(
     words: list[str], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["size", *words]) == 2
+    assert main(["design", *words]) == 2
     error = capsys.readouterr().err
     assert said in error
 
@@ -105,7 +105,7 @@ def test_what_is_missing_is_said_with_what_to_write(
 def test_what_no_walk_can_be_asked_is_refused(change: dict[str, float]) -> None:
     wanted = {"mass": 70.0, "stature": 1.7, "torque": 2.0, "pressure": 4.5e5, "minutes": 5.0}
     with pytest.raises(StudyError, match=f"--{next(iter(change))}"):
-        ppafo.size(**{**wanted, **change})
+        ppafo.design(**{**wanted, **change})
 
 
 def test_coils_and_spool_take_the_power_of_their_command() -> None:

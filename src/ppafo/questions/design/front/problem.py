@@ -1,17 +1,16 @@
-"""A design file: numbers to choose, tasks, parts and constraints, and the problem in SI units that it makes."""
+"""A design file with tasks: numbers to choose, parts and constraints, and the problem in SI units that it makes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib import resources
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
-from ppafo.documents.models import NAME, StrictTable, Text, Texts, make_schema, read_model
-from ppafo.documents.toml_text import TomlKind, beside
+from ppafo.documents.models import NAME, StrictTable, Text, Texts
+from ppafo.documents.toml_text import beside
 from ppafo.errors import StudyError, UnitError, first_twice, nearest_name, refused_as
 from ppafo.loading import load_scenario, placed
 from ppafo.metrics import METRICS
@@ -21,7 +20,7 @@ from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM, is_within
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.parts import Catalogue, Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
-from ppafo.questions.design.search import LARGEST_SEED, Floats, SearchTable
+from ppafo.questions.design.front.search import LARGEST_SEED, Floats, SearchTable
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import TIMES, declared_numbers
 from ppafo.simulation.scenario import Scenario
@@ -165,7 +164,6 @@ def _number(text: str, quantity: Quantity, atmosphere: float, place: str) -> flo
     return value
 
 
-FILE = TomlKind("design", "design", resources.files("ppafo.questions.design") / "library", StudyError)
 OBJECTIVES = {"error": "N m", "gas": "kg", "mass": "kg"}
 """What a design is judged by, all to be small, with the SI unit."""
 GAS = "gas_supplied"
@@ -221,16 +219,6 @@ class DesignFile(StrictTable):
     search: SearchTable = SearchTable()
 
 
-def read_design_file(name_or_path: str | Path) -> tuple[DesignFile, str]:
-    """Return a design file by its name in the package or by its path, and what messages call it."""
-    return read_model(FILE, DesignFile, name_or_path)
-
-
-def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of a design file."""
-    return make_schema(DesignFile, "ppafo design")
-
-
 @dataclass(frozen=True, slots=True)
 class Task:
     """A task: a scenario for each kind of valve, and its weight in use [-], all weights together 1."""
@@ -282,13 +270,11 @@ class DesignProblem:
         return tuple({(part.group, part.name): part for part in parts}.values())
 
 
-def load_design(name_or_path: str | Path, seed: int | None = None) -> DesignProblem:
-    """Return the problem of a design file, by its name in the package or by its path; paths in it begin in its folder.
+def design_problem(document: DesignFile, file: str, folder: Path, seed: int | None = None) -> DesignProblem:
+    """Return the problem of a design file, which messages call ``file``; paths in it begin in ``folder``.
 
     ``seed`` replaces that of the file. StudyError or ParameterError for what is not usable, in one line.
     """
-    document, file = read_design_file(name_or_path)
-    folder = Path(name_or_path).parent
     catalogue = load_catalogue(beside(document.catalogue, folder))
     combinations = _combinations(document.parts, catalogue)
     kinds = sorted({item.valve.kind for item in combinations})

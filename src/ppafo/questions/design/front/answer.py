@@ -12,8 +12,8 @@ from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import display_values, quantity_of_unit, title_with_unit
 from ppafo.answers.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, house_style, mark_kind
 from ppafo.parameters.parts import Part
-from ppafo.questions.design.problem import SEARCHED_STREAMS, DesignProblem, Variable
-from ppafo.questions.design.search import PATIENCE, Floats
+from ppafo.questions.design.front.problem import SEARCHED_STREAMS, DesignProblem, Variable
+from ppafo.questions.design.front.search import PATIENCE, Floats
 from ppafo.questions.parts.solve import doubts_data, doubts_sections, titles_section
 from ppafo.questions.question import Solved
 from ppafo.version import __version__

@@ -9,15 +9,16 @@ import numpy as np
 import pytest
 
 from ppafo.errors import PpafoError, StudyError
-from ppafo.questions.design.answer import Design, answer_of, front_table
-from ppafo.questions.design.problem import json_schema, load_design
-from ppafo.questions.design.search import Candidates
-from ppafo.questions.design.solve import Evaluation, design, design_columns, noise_streams
+from ppafo.questions.design.front.answer import Design, answer_of, front_table
+from ppafo.questions.design.front.search import Candidates
+from ppafo.questions.design.front.solve import Evaluation, design_columns, noise_streams
+from ppafo.questions.design.loading import json_schema, load_design
+from ppafo.questions.design.solve import design
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers
 
-SHIPPED = Path(__file__).parents[4] / "src" / "ppafo" / "questions" / "design" / "library" / "torque-task.toml"
+SHIPPED = Path(__file__).parents[5] / "src" / "ppafo" / "questions" / "design" / "library" / "torque-task.toml"
 FILE = """
 schema_version = 1
 name = "small"

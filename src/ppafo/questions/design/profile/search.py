@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part
-from ppafo.questions.size.problem import SizingProblem
+from ppafo.questions.design.profile.problem import SizingProblem
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.studies.draws import Uncertainty
 from ppafo.studies.sampling import NOISE

@@ -14,15 +14,17 @@ from ppafo.answers.writing import text_of
 from ppafo.control.profiles import KNOTS
 from ppafo.errors import PpafoError
 from ppafo.parameters.parts import load_catalogue
-from ppafo.questions.size import search
-from ppafo.questions.size.answer import Sizing, _lasting_bottle, size, smallest_bottle, suggestion_sentence
-from ppafo.questions.size.problem import choose_knots, json_schema, load_sizing
-from ppafo.questions.size.search import Floats, Trials, ceiling, ceiling_pressure, cut_error
+from ppafo.questions.design.loading import json_schema, load_design
+from ppafo.questions.design.profile import search
+from ppafo.questions.design.profile.answer import Sizing, _lasting_bottle, smallest_bottle, suggestion_sentence
+from ppafo.questions.design.profile.problem import choose_knots
+from ppafo.questions.design.profile.search import Floats, Trials, ceiling, ceiling_pressure, cut_error
+from ppafo.questions.design.solve import design
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.storage import write_csv
 
-SHIPPED = Path(__file__).parents[4] / "src" / "ppafo" / "questions" / "size" / "library" / "push-off.toml"
+SHIPPED = Path(__file__).parents[5] / "src" / "ppafo" / "questions" / "design" / "library" / "push-off.toml"
 ATMOSPHERE = 101325.0
 TORQUE_CONSTANT = 1.451e-5
 FILE = """
@@ -58,12 +60,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def sizing(folder: Path) -> Sizing:
-    return size(folder / "trapezium.toml")
+    return design(folder / "trapezium.toml")
 
 
 def test_the_shipped_sizing_keeps_its_published_schema_and_loads() -> None:
     jsonschema.validate(tomllib.loads(SHIPPED.read_text(encoding="utf-8")), json_schema())
-    problem = load_sizing("push-off")
+    problem = load_design("push-off")
     assert problem.profile.table_error == 0.0
     assert problem.largest_error == pytest.approx(0.06 * 6.0)
 
@@ -119,26 +121,26 @@ def test_a_valve_that_is_too_small_is_limited_by_its_flow(folder: Path) -> None:
     catalogue = load_text_of_catalogue().replace("value = 31.6", "value = 2.6", 1)
     (folder / "small.toml").write_text(catalogue)
     (folder / "flow.toml").write_text(FILE.replace('name = "trap', 'catalogue = "./small.toml"\nname = "trap'))
-    item = size(folder / "flow.toml").valves[0]
+    item = design(folder / "flow.toml").valves[0]
     assert item.limit == "flow"
-    assert not item.works or item.pressure > 1.2 * ceiling_pressure(load_sizing(folder / "flow.toml"))
+    assert not item.works or item.pressure > 1.2 * ceiling_pressure(load_design(folder / "flow.toml"))
 
 
 def load_text_of_catalogue() -> str:
-    place = Path(__file__).parents[4] / "src" / "ppafo" / "parameters" / "parts" / "catalogues" / "parts.toml"
+    place = Path(__file__).parents[5] / "src" / "ppafo" / "parameters" / "parts" / "catalogues" / "parts.toml"
     return place.read_text(encoding="utf-8")
 
 
 def test_a_controller_without_gains_is_limited_by_the_control(folder: Path) -> None:
     (folder / "idle.toml").write_text(FILE.replace("[1.0, 4.0]", "[0.0]"))
-    sized = size(folder / "idle.toml")
+    sized = design(folder / "idle.toml")
     assert (sized.valves[0].works, sized.valves[0].limit, sized.choice) == (False, "control", None)
     assert sized.recording is None
 
 
 def test_use_that_no_bottle_lasts_for_is_no_suggestion(folder: Path) -> None:
     (folder / "long.toml").write_text(FILE.replace("repetitions = 100", "hours = 24"))
-    sized = size(folder / "long.toml")
+    sized = design(folder / "long.toml")
     assert sized.choice is None
     assert sized.valves[0].works
     assert "no bottle is large enough: pipeline-jacpac-9oz lasts for" in sized.valves[0].remark
@@ -158,7 +160,7 @@ def test_a_recording_becomes_a_table_with_its_corners_and_says_where_it_comes_fr
     write_csv(tmp_path / "ankle.csv", Recording("ankle", time, {"torque": Channel(torque, "N m")}, "synthetic"))
     typed = re.sub(r"time = .*\ntorque = .*\n", 'recording = "ankle.csv"\nscale = 0.1\n', FILE)
     (tmp_path / "recorded.toml").write_text(typed)
-    profile = load_sizing(tmp_path / "recorded.toml").profile
+    profile = load_design(tmp_path / "recorded.toml").profile
     assert (profile.kind, profile.period) == ("synthetic", pytest.approx(1.1))
     assert profile.largest == pytest.approx(6.0)
     assert profile.table_error < 1e-9
@@ -175,13 +177,13 @@ def test_many_samples_are_thinned_to_the_knots_that_matter() -> None:
 
 def test_a_profile_that_ends_elsewhere_than_it_begins_jumps_at_its_end(tmp_path: Path) -> None:
     (tmp_path / "saw.toml").write_text(FILE.replace('"0 N m", "0 N m"]', '"0 N m", "2 N m"]'))
-    profile = load_sizing(tmp_path / "saw.toml").profile
+    profile = load_design(tmp_path / "saw.toml").profile
     assert profile.at(np.array([0.9, 0.9999, 1.0])).tolist() == pytest.approx([1.0, 1.999, 0.0], abs=1e-3)
 
 
 def test_simulated_repetitions_are_covered_to_a_whole_sample(folder: Path) -> None:
     (folder / "odd.toml").write_text(FILE.replace('"1 s"]', '"1.0007 s"]').replace("simulated = 1", "simulated = 3"))
-    problem = load_sizing(folder / "odd.toml")
+    problem = load_design(folder / "odd.toml")
     assert problem.scenario.duration == pytest.approx(3.003)
     assert dataclasses.asdict(problem.scenario.reference)["kind"] == "tabulated"
 
@@ -212,7 +214,7 @@ def test_every_mistake_in_a_file_is_one_line(tmp_path: Path, before: str, after:
     path = tmp_path / "wrong.toml"
     path.write_text(FILE.replace(before, after, 1))
     with pytest.raises(PpafoError, match=re.escape(message)) as caught:
-        load_sizing(path)
+        load_design(path)
     assert "\n" not in str(caught.value)
 
 
@@ -222,7 +224,7 @@ def test_runs_that_all_fail_are_said_in_one_line(folder: Path) -> None:
     )
     (folder / "failing.toml").write_text(late)
     with pytest.raises(PpafoError, match=r"every run with 'enfield-ls-v05s' failed; the first: ") as caught:
-        size(folder / "failing.toml")
+        design(folder / "failing.toml")
     assert "\n" not in str(caught.value)
 
 
@@ -238,7 +240,7 @@ def test_a_recording_that_is_no_profile_is_one_line(tmp_path: Path, content: str
     (tmp_path / "r.csv").write_text(content)
     (tmp_path / "wrong.toml").write_text(re.sub(r"time = .*\ntorque = .*\n", 'recording = "r.csv"\n', FILE))
     with pytest.raises(PpafoError, match=re.escape(message)) as caught:
-        load_sizing(tmp_path / "wrong.toml")
+        load_design(tmp_path / "wrong.toml")
     assert "\n" not in str(caught.value)
 
 
@@ -270,7 +272,7 @@ def test_an_actuator_of_its_own_has_no_other_chambers(folder: Path) -> None:
     path.write_text(
         FILE.replace("smc-crb2bw40-90d", "smc-crb2bw30-90d").replace('rms_error = "0.4 N m"', 'rms_error = "2 N m"')
     )
-    found = size(path)
+    found = design(path)
     assert found.choice is not None
     assert found.others == ()
 
@@ -310,7 +312,7 @@ def test_a_pressure_that_cuts_half_of_the_peak_is_not_suggested(tmp_path: Path) 
         '[use]\nrepetitions = 10\n[limits]\nrms_error = "1.5 N m"\n[parts]\nvalves = ["festo-mpye-5-1-8-hf-010-b"]\n'
         'bottles = ["pipeline-jacpac-9oz"]\n[pressure]\nlowest = "15 psi_g"\nhighest = "100 psi_g"\n'
     )
-    sizing = size(tmp_path / "brief.toml")
+    sizing = design(tmp_path / "brief.toml")
     assert isinstance(sizing, Sizing)
     assert sizing.choice is not None
     assert sizing.choice.margins is not None
@@ -320,7 +322,7 @@ def test_a_pressure_that_cuts_half_of_the_peak_is_not_suggested(tmp_path: Path) 
 
 
 def test_a_bottle_with_gas_enough_that_gets_too_cold_is_not_suggested() -> None:
-    problem = dataclasses.replace(load_sizing("push-off"), repetitions=500.0)
+    problem = dataclasses.replace(load_design("push-off"), repetitions=500.0)
     parts = load_catalogue().groups["bottles"]
     bottles = tuple(parts[name] for name in ("pipeline-jacpac-9oz", "co2-20oz"))
     gas, pressure = 0.45e-3, 101325.0 + 50.0 * 6894.757

@@ -20,11 +20,11 @@ from ppafo.model.plant_faults import SHUT_OFF
 from ppafo.parameters.declaration import ACTUATOR, ORIFICE
 from ppafo.parameters.parts import Catalogue, Part, load_catalogue
 from ppafo.progress import Progress, Report
+from ppafo.questions.design.wearer.electrical import Electrical, electrical_of, electrical_sentences
 from ppafo.questions.endurance.answer import Endurance
 from ppafo.questions.endurance.solve import endurance_of_walk
 from ppafo.questions.parts.solve import doubts_data, doubts_sections, titles_section
 from ppafo.questions.question import Solved
-from ppafo.questions.size.electrical import Electrical, electrical_of, electrical_sentences
 from ppafo.version import __version__
 from ppafo.walking.bottle import WALKED, Schedule, lasting_text, minutes_text
 from ppafo.walking.figures.over_time import bottle_figure, peak_torques
@@ -350,7 +350,7 @@ def answer_of(sizing: WearerSizing) -> Answer:
         else (*_sections(wish, device), tried, *doubts_sections(doubtful), titles_section(parts))
     )
     return Answer(
-        name="size",
+        name="design",
         kicker="From a wearer to a device",
         title="The device",
         lead=(lead,),

@@ -5,7 +5,7 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 
-from ppafo.questions.design.search import (
+from ppafo.questions.design.front.search import (
     Candidates,
     Floats,
     SearchTable,

@@ -1,0 +1,1 @@
+"""The valve, pressure and bottle that are just enough for a torque profile."""

@@ -1,0 +1,1 @@
+"""The lightest parts with which a wearer walks for some minutes on a bottle."""
