@@ -66,12 +66,24 @@ def check_all(chains: Iterable[Sequence[Callable[[], None]]]) -> None:
     """
     found: list[PpafoError] = []
     for chain in chains:
-        try:
+        with noted_in(found):
             for check in chain:
                 check()
-        except PpafoError as error:
-            found.append(error)
-    parts = tuple(part for error in found for part in error.parts or (str(error),))
+    raise_noted(found)
+
+
+@contextlib.contextmanager
+def noted_in(found: list[PpafoError]) -> Iterator[None]:
+    """Add what is raised within a ``with`` block to a list, for ``raise_noted``, and go on behind the block."""
+    try:
+        yield
+    except PpafoError as error:
+        found.append(error)
+
+
+def raise_noted(found: Sequence[PpafoError]) -> None:
+    """Raise one PpafoError, of the class of the first, that says everything that was noted, each thing once."""
+    parts = tuple(dict.fromkeys(part for error in found for part in error.parts or (str(error),)))
     if len(parts) == 1:
         raise found[0]
     if parts:

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.errors import DataError, check_all
+from ppafo.errors import DataError, check_all, raise_noted
 from ppafo.gait.gait import HARMONICS, KNEE, Gait, fit_curve
 from ppafo.signals.recording import Floats
 
@@ -57,18 +57,30 @@ def check_gait(gait: Gait, file: str) -> None:
 
 def check_plausible(walk: MeanStride) -> None:
     """Raise DataError for a mean stride that is not plausible; names file, curve, number, limits and remedy of all."""
-    chains = ((check_times, check_moment_time), (check_shank, check_ankle, check_knee), (check_moment,), (check_force,))
+    chains = (
+        (check_stride_time,),
+        (check_stance, check_moment_time),
+        (check_shank, check_knee),
+        (check_knee_means,),
+        (check_ankle_range, check_shank, check_ankle),
+        (check_moment,),
+        (check_force,),
+    )
     check_all([partial(check, walk) for check in chain] for chain in chains)
 
 
-def check_times(walk: MeanStride) -> None:
-    """Raise DataError for a stride time or a stance that no walk has."""
+def check_stride_time(walk: MeanStride) -> None:
+    """Raise DataError for a stride time that no walk has."""
     low, high = STRIDE_TIME
     if not low <= walk.stride_time <= high:
         raise DataError(
             f"{walk.file['shank_angle']}: a stride takes {walk.stride_time:.3g} s, plausible is {low:g} to {high:g} s; "
             "is the time in seconds?"
         )
+
+
+def check_stance(walk: MeanStride) -> None:
+    """Raise DataError for a stance that no walk has."""
     low, high = STANCE_FRACTION
     if low <= walk.stance_share <= high:
         return
@@ -133,17 +145,21 @@ def check_shank(walk: MeanStride) -> None:
         )
 
 
-def check_ankle(walk: MeanStride) -> None:
-    """Raise DataError for an ankle angle that no leg has, or not with this shank."""
-    theta = np.degrees(walk.curves["ankle_angle"])
-    place = f"{walk.file['ankle_angle']}: ankle_angle"
-    travel = float(np.ptp(theta))
+def check_ankle_range(walk: MeanStride) -> None:
+    """Raise DataError for an ankle angle over a range that no leg has."""
+    travel = float(np.ptp(np.degrees(walk.curves["ankle_angle"])))
     low, high = ANKLE_RANGE
     if not low <= travel <= high:
         raise DataError(
-            f"{place} covers a range of {travel:.3g} deg in a stride, plausible is {low:g} to {high:g} deg; "
-            f"{_unit_hint(travel, low, high)}"
+            f"{walk.file['ankle_angle']}: ankle_angle covers a range of {travel:.3g} deg in a stride, plausible is "
+            f"{low:g} to {high:g} deg; {_unit_hint(travel, low, high)}"
         )
+
+
+def check_ankle(walk: MeanStride) -> None:
+    """Raise DataError for an ankle angle that no leg has with this shank."""
+    theta = np.degrees(walk.curves["ankle_angle"])
+    place = f"{walk.file['ankle_angle']}: ankle_angle"
     turned, reversed_turned = standing_turns(walk.curves["shank_angle"], walk.curves["ankle_angle"])
     if turned > _CLEARLY_BETTER * reversed_turned and turned > _TURNS:
         raise DataError(
@@ -478,24 +494,38 @@ def check_knee(walk: MeanStride) -> None:
         (missing,) = set(KNEE) - set(there)
         raise DataError(f"{walk.file[there[0]]}: {there[0]} is given without {missing}; give both, or neither")
     check_turning(walk)
-    for name in there:
-        values, place = walk.curves[name], f"{walk.file[name]}: {name}"
-        travel, mean, (low, high) = float(np.ptp(values)), float(np.mean(values[:-1])), KNEE_TRAVEL
-        if abs(mean) > KNEE_MEAN:
-            raise DataError(
-                f"{place} is {mean:.3g} m/s^2 on average, and a periodic stride has 0 (up to {KNEE_MEAN:g} is "
-                "accepted); an accelerometer measures gravity too: subtract it"
+    check_knee_means(walk)
+    check_all([partial(_check_knee_curve, walk, name)] for name in there)
+
+
+def check_knee_means(walk: MeanStride) -> None:
+    """Raise DataError for accelerations of the knee, where there are some, that do not average to 0 over a stride."""
+    means = {name: float(np.mean(walk.curves[name][:-1])) for name in KNEE if name in walk.curves}
+    raise_noted(
+        [
+            DataError(
+                f"{walk.file[name]}: {name} is {mean:.3g} m/s^2 on average, and a periodic stride has 0 (up to "
+                f"{KNEE_MEAN:g} is accepted); an accelerometer measures gravity too: subtract it"
             )
-        if not low <= travel <= high:
-            raise DataError(
-                f"{place} covers a range of {travel:.3g} m/s^2 in a stride, plausible is {low:g} to {high:g} m/s^2; "
-                "is the unit right (m/s^2, or m for a position)?"
-            )
-        swung = (np.linspace(0.0, 1.0, values.size) - walk.stance_share) / (1.0 - walk.stance_share)
-        driven, held = (float(np.mean(values[(swung >= start) & (swung <= end)])) for start, end in _PARTS[name])
-        if held - driven > _HELD_BACK * travel:
-            raise DataError(
-                f"{place} is {driven:.3g} m/s^2 about toe-off and {held:.3g} m/s^2 in the middle of the swing, and it "
-                "is the other way round in walking: its sign is reversed, or it is of the other knee; "
-                f"{walk.other_sign(f'the sign of knee.{name[5:]}')}"
-            )
+            for name, mean in means.items()
+            if abs(mean) > KNEE_MEAN
+        ]
+    )
+
+
+def _check_knee_curve(walk: MeanStride, name: str) -> None:
+    values, place = walk.curves[name], f"{walk.file[name]}: {name}"
+    travel, (low, high) = float(np.ptp(values)), KNEE_TRAVEL
+    if not low <= travel <= high:
+        raise DataError(
+            f"{place} covers a range of {travel:.3g} m/s^2 in a stride, plausible is {low:g} to {high:g} m/s^2; "
+            "is the unit right (m/s^2, or m for a position)?"
+        )
+    swung = (np.linspace(0.0, 1.0, values.size) - walk.stance_share) / (1.0 - walk.stance_share)
+    driven, held = (float(np.mean(values[(swung >= start) & (swung <= end)])) for start, end in _PARTS[name])
+    if held - driven > _HELD_BACK * travel:
+        raise DataError(
+            f"{place} is {driven:.3g} m/s^2 about toe-off and {held:.3g} m/s^2 in the middle of the swing, and it "
+            "is the other way round in walking: its sign is reversed, or it is of the other knee; "
+            f"{walk.other_sign(f'the sign of knee.{name[5:]}')}"
+        )

@@ -253,6 +253,41 @@ def test_all_that_is_wrong_is_said_in_one_go(csv_of: Callable[..., Path], column
         import_gait([csv_of(headers)], ImportSettings(62.0))
 
 
+def test_what_is_wrong_at_several_stages_is_said_in_one_go(
+    csv_of: Callable[..., Path], columns: dict[str, Floats]
+) -> None:
+    wrong = columns | {FORCE: -columns[FORCE], MOMENT: -columns[MOMENT], UP: columns[UP] + 9.81}
+    wrong = {name.replace("rad", "deg"): values for name, values in wrong.items()}
+    with pytest.raises(DataError) as refused:
+        import_gait([csv_of(wrong)], ImportSettings())
+    said = (
+        "does not state the body mass",
+        "vertical_force is -0.999 body weights at its largest, downwards: its sign is reversed",
+        "shank_angle covers a range of .* look like radians",
+        "knee_up is 9.81 m/s\\^2 on average",
+        "ankle_angle covers a range of .* look like radians",
+        "ankle_moment is -1 N m/kg at its largest, into dorsiflexion",
+    )
+    assert len(refused.value.parts) == len(said)
+    assert all(re.search(text, part) for text, part in zip(said, refused.value.parts, strict=True))
+
+
+def test_all_columns_without_a_unit_are_named_and_all_options_that_are_not_plausible(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], tmp_path: Path
+) -> None:
+    plain = tmp_path / "plain.csv"
+    rows = csv_of(columns).read_text().splitlines()
+    names = ["time", *(name.partition(" ")[0] for name in columns)]
+    plain.write_text("\n".join([",".join(names), *(row for row in rows if row[:1].isdigit())]))
+    with pytest.raises(DataError) as refused:
+        import_gait([plain], ImportSettings(body_mass=62.0))
+    stated = [part.partition("'")[2].partition("'")[0] for part in refused.value.parts]
+    assert stated == names[1:-1]
+    several = r"^2 things are wrong: \(1\) a body mass of 900 kg .*; \(2\) a stature of 17 m"
+    with pytest.raises(DataError, match=several):
+        import_gait([plain], ImportSettings(body_mass=900.0, stature=17.0))
+
+
 @pytest.mark.parametrize("slope", [0.18, -0.01, -0.04])
 def test_an_ankle_that_rests_in_mid_stance_is_no_reversed_one(
     csv_of: Callable[..., Path], columns: dict[str, Floats], slope: float

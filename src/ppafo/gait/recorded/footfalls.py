@@ -14,7 +14,6 @@ import numpy as np
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import DataError
 from ppafo.gait.gait import REQUIRED
-from ppafo.gait.plausible import SignSource, check_force_scale
 from ppafo.gait.recorded.mapping import Side
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.gait.recorded.walk import LOADS, CurveColumns, Signal, low_pass, with_absence
@@ -303,19 +302,18 @@ def find_footfalls(
     walk: Mapping[str, Signal],
     tables: Sequence[MotionTable],
     side: Side,
-    signs_from: SignSource,
     given_least: int | None,
 ) -> Footfalls:
     """Return the strides of a walk: from the force where it has enough of them, else from where there are more."""
     least = given_least or LEAST_STRIDES
-    found = _of_walk(walk, tables, side, signs_from, least)
+    found = _of_walk(walk, tables, side, least)
     usable = usable_strides(walk, found.strides)
     if len(usable) >= (1 if found.is_overground else least) or least > LEAST_STRIDES:
         return found
     cycle = wrap_cycle(walk)
     if cycle is None:
         return found
-    again = _of_walk(cycle.walk, (), side, signs_from, 1)
+    again = _of_walk(cycle.walk, (), side, 1)
     whole = usable_strides(cycle.walk, again.strides)
     if not whole:
         return found
@@ -332,15 +330,12 @@ def usable_strides(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> lis
     return [item for item in strides if all(strides_within(walk[name], [item]) for name in REQUIRED)]
 
 
-def _of_walk(
-    walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Side, signs_from: SignSource, least: int
-) -> Footfalls:
+def _of_walk(walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Side, least: int) -> Footfalls:
     recorded = _strides_of_file(tables, side)
     if FORCE not in walk:
         if recorded:
             return Footfalls(walk, recorded, FILE, is_overground=True)
         return Footfalls(walk, strides_from_shank(walk[SHANK]), SHANK)
-    check_force_scale(walk[FORCE].file, walk[FORCE].values, signs_from)
     forced = strides_from_force(walk[FORCE])
     if len(usable_strides(walk, forced)) >= least:
         return Footfalls(walk, forced, FORCE)

@@ -8,16 +8,16 @@ last value, and strides that scatter too much, or that no series comes near.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from ppafo.errors import DataError, check_all
+from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.gait.gait import HARMONICS, REQUIRED, Curve, FitError, Gait, Origin, fit_curve
 from ppafo.gait.plausible import (
     MeanStride,
     SignSource,
+    check_force_scale,
     check_plausible,
     force_remarks,
     moment_remarks,
@@ -26,6 +26,7 @@ from ppafo.gait.plausible import (
     zero_remarks,
 )
 from ppafo.gait.recorded.footfalls import (
+    FORCE,
     LEAST_STRIDES,
     SHANK,
     Footfalls,
@@ -157,12 +158,17 @@ _STEPS_OF_REST = 3.0
 
 
 def without_drop_outs(
-    walk: Mapping[str, Signal], tables: Sequence[MotionTable], covered: Mapping[str, Sequence[Stride]], strides: Strides
+    walk: Mapping[str, Signal],
+    tables: Sequence[MotionTable],
+    covered: Mapping[str, Sequence[Stride]],
+    strides: Strides,
+    wrong: list[PpafoError],
 ) -> Strides:
     """Leave out strides in which a column keeps one value for more than 0.1 s; a load may in swing.
 
     Loads are looked at in the strides that they cover. A column that never moves is no drop-out, and a stretch that a
-    coarse sensor enters and leaves by its smallest step is none either. DataError where too few strides are left.
+    coarse sensor enters and leaves by its smallest step is none either. Where too few strides would be left all stay,
+    and that is added to ``wrong``.
     """
     by_file = {table.file: table for table in tables}
     for name, signal in walk.items():
@@ -179,12 +185,13 @@ def without_drop_outs(
         for column, values in columns:
             for start, end in constant_stretches(table.time, values, spans):
                 what = f"column {column!r} of {name} keeps one value from {start:.4g} to {end:.4g} s"
-                strides = strides.without(
-                    [item for item in strides.taken if item.start < end and start < item.end],
-                    f"{what}: a drop-out was filled with it",
-                    f"{table.file}: {what} while the wearer walks: a drop-out was filled with it; cut the file there "
-                    "and give the longer part",
-                )
+                with noted_in(wrong):
+                    strides = strides.without(
+                        [item for item in strides.taken if item.start < end and start < item.end],
+                        f"{what}: a drop-out was filled with it",
+                        f"{table.file}: {what} while the wearer walks: a drop-out was filled with it; cut the file "
+                        "there and give the longer part",
+                    )
     return strides
 
 
@@ -264,12 +271,16 @@ def check_scatter(
     curves: Mapping[str, CurveStatistics], errors: Mapping[str, FitError], walk: Mapping[str, Signal]
 ) -> None:
     """Raise DataError for curves that scatter by a quarter of their range, or that no series comes near."""
-    for item in _scatters(curves, errors):
-        if item.spread > REFUSED_SPREAD or item.misfit > REFUSED_MISFIT:
-            raise DataError(
+    raise_noted(
+        [
+            DataError(
                 f"{walk[item.name].file}: {_statement(item)}; at most {100.0 * REFUSED_SPREAD:.0f} % and "
                 f"{100.0 * REFUSED_MISFIT:.0f} % are accepted; {_REMEDY}"
             )
+            for item in _scatters(curves, errors)
+            if item.spread > REFUSED_SPREAD or item.misfit > REFUSED_MISFIT
+        ]
+    )
 
 
 def _statement(item: _Scatter) -> str:
@@ -302,16 +313,23 @@ class Source:
     remarks: tuple[str, ...]
 
 
-def read_source(files: Sequence[str | Path], settings: ImportSettings) -> Source:
-    """Return the signals in recorded files; DataError names what is wrong and what to do."""
+def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: list[PpafoError]) -> Source:
+    """Return the signals in recorded files; what is wrong and leaves both angles to go on with is added to ``wrong``.
+
+    DataError for what ends the import, with everything in ``wrong``.
+    """
     if not files:
         raise DataError("no file was given; a gait needs at least the angles of shank and ankle")
-    cut = settings.longest_gap, settings.start, settings.end
-    tables = [read_table(path, *cut, settings.form) for path in files]
+    cut, tables = (settings.longest_gap, settings.start, settings.end), []
+    for path in files:
+        with noted_in(wrong):
+            tables.append(read_table(path, *cut, settings.form))
+    if len(tables) < len(files):
+        raise_noted(wrong)
     if settings.columns is None:
         tables = [arranged(table) for table in tables]
-    settings, said = _with_subject(settings, tables)
-    person = Person(settings.body_mass or 0.0, settings.stature)
+    settings, said = _with_subject(settings, tables, wrong)
+    person = Person(settings.body_mass or 1.0, settings.stature)
     convention = (
         find_convention(tables, settings.side, person.body_mass)
         if settings.columns is None
@@ -324,27 +342,46 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings) -> Source
     mapped = [getattr(columns, name) for name in GaitMap.model_fields if name != "schema_version"]
     names = [name.removeprefix("-") for item in mapped if item is not None for name in column_names(item)]
     tables = [fill_gaps(table, names, settings.longest_gap) for table in tables]
-    walk = walk_signals(tables, columns, person, is_default=settings.columns is None)
-    if convention.plates and "vertical_force" not in walk:
-        force, more = force_of_plates(tables, convention.plates, walk["shank_angle"], person.body_mass)
-        walk |= {} if force is None else {"vertical_force": force}
-        said += more
+    walk = walk_signals(tables, columns, person, settings.columns is None, wrong)
+    if settings.body_mass is None:
+        walk |= {name: _of_one(walk[name]) for name in ("ankle_moment", FORCE) if name in walk}
+    if convention.plates and FORCE not in walk and settings.body_mass is not None:
+        with noted_in(wrong):
+            force, more = force_of_plates(tables, convention.plates, walk["shank_angle"], person.body_mass)
+            walk |= {} if force is None else {FORCE: force}
+            said += more
     mended = [f"{Path(table.file).name}: {remark}" for table in tables for remark in table.remarks]
     mended += _ends(walk, tables)
     signs_from: SignSource = "columns" if settings.columns is None else "map"
     return Source(tables, columns, walk, settings, signs_from, (*said, *convention.remarks, *mended))
 
 
-def _with_subject(settings: ImportSettings, tables: Sequence[MotionTable]) -> tuple[ImportSettings, list[str]]:
-    """Return the settings with body mass and stature that a C3D file states; what the user states wins."""
+def _of_one(signal: Signal, is_upwards: bool = False) -> Signal:
+    """Return a load whose largest number is 1: its scale is wrong or not known, and the rest is looked at with it."""
+    largest = float(signal.values[np.argmax(np.abs(signal.values))]) or 1.0
+    return replace(signal, values=signal.values / (largest if is_upwards else abs(largest)))
+
+
+def _with_subject(
+    settings: ImportSettings, tables: Sequence[MotionTable], wrong: list[PpafoError]
+) -> tuple[ImportSettings, list[str]]:
+    """Return the settings with body mass and stature that a C3D file states; what the user states wins.
+
+    That nobody states the mass is added to ``wrong``.
+    """
     masses, statures = (
         [(table.file, value) for table in tables if table.trial and (value := getattr(table.trial, name)) is not None]
         for name in ("body_mass", "stature")
     )
     said = []
-    if settings.body_mass is None:
-        if not masses:
-            raise DataError(f"{tables[0].file}: does not state the body mass; give it, such as --body-mass '62 kg'")
+    if settings.body_mass is None and not masses:
+        wrong.append(
+            DataError(
+                f"{tables[0].file}: does not state the body mass; give it, such as --body-mass '62 kg' (until then "
+                "loads are judged relative to their largest value)"
+            )
+        )
+    elif settings.body_mass is None:
         file, mass = masses[0]
         settings = replace(settings, body_mass=mass)
         said.append(f"body mass {mass:.4g} kg, as {Path(file).name} states")
@@ -404,44 +441,67 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     """Return the mean stride in recorded files (.mot, .sto, .csv, .c3d, .trc) of one walk of one person on one clock.
 
     Strides come from the vertical force where there is one, else from events of the file or from the shank. DataError
-    names what is wrong with file, column and row, and what to do. What was mended is among the remarks.
+    names all that is wrong with file, column and row, and what to do: what is wrong with one curve is noted, and the
+    others are looked at without it. What was mended is among the remarks.
     """
     check_settings(settings)
-    source = read_source(files, settings)
-    signs_from, settings = source.signs_from, source.settings
-    footfalls = find_footfalls(source.walk, source.tables, settings.side, signs_from, settings.least_strides)
+    wrong: list[PpafoError] = []
+    source = read_source(files, settings, wrong)
+    settings = source.settings
+    walk: Mapping[str, Signal] = source.walk
+    force = walk.get(FORCE)
+    if force is not None:
+        try:
+            check_force_scale(force.file, force.values, source.signs_from)
+        except DataError as error:
+            wrong.append(error)
+            walk = {**walk, FORCE: _of_one(force, is_upwards=True)}
+    footfalls = None
+    with noted_in(wrong):
+        footfalls = find_footfalls(walk, source.tables, settings.side, settings.least_strides)
+    if footfalls is None:
+        raise_noted(wrong)
     walk, events, found = footfalls.walk, footfalls.events, footfalls.strides
     least = settings.least_strides or (1 if footfalls.is_one_cycle or footfalls.is_overground else LEAST_STRIDES)
     strides = of_usual_time(usable_strides(walk, found), least)
-    _check_enough(strides, found, {name: walk[name] for name in (*REQUIRED, events) if name in walk})
+    with noted_in(wrong):
+        _check_enough(strides, found, {name: walk[name] for name in (*REQUIRED, events) if name in walk})
+    if not strides.taken:
+        raise_noted(wrong)
     covered = {name: strides_of_curve(footfalls, name, signal, strides.taken) for name, signal in walk.items()}
     unmeasured = [
         name for name in LOADS if name in walk and not covered[name] and strides_within(walk[name], strides.taken)
     ]
     walk = {name: signal for name, signal in walk.items() if name not in unmeasured}
-    strides = without_drop_outs(walk, source.tables, covered, strides)
+    strides = without_drop_outs(walk, source.tables, covered, strides, wrong)
     smooth = walk if settings.low_pass is None else {n: low_pass(s, settings.low_pass) for n, s in walk.items()}
     curves = {
         name: statistics(name, signal, [item for item in covered[name] if item in strides.taken])
         for name, signal in smooth.items()
     }
     strides = without_odd_shapes(curves, strides)
-    for name, item in curves.items():
+    for name, item in list(curves.items()):
         kept = [stride in strides.taken for stride in item.strides]
         if not any(kept):
             signal = walk[name]
-            raise DataError(
-                f"{signal.file}: {name} goes from {signal.time[0]:.4g} to {signal.time[-1]:.4g} s and covers no whole "
-                f"stride ({strides.taken[0].start:.4g} to {strides.taken[0].end:.4g} s is the first); give a longer "
-                "file, or leave it out"
+            wrong.append(
+                DataError(
+                    f"{signal.file}: {name} goes from {signal.time[0]:.4g} to {signal.time[-1]:.4g} s and covers no "
+                    f"whole stride ({strides.taken[0].start:.4g} to {strides.taken[0].end:.4g} s is the first); give a "
+                    "longer file, or leave it out"
+                )
             )
-        if not all(kept):
+            del curves[name]
+        elif not all(kept):
             curves[name] = over_strides(
                 name, item.curves[kept], [stride for stride in item.strides if stride in strides.taken]
             )
     missing = [f"{name} is left out: in no whole stride was it measured throughout the stance" for name in unmeasured]
     remarks = [*source.remarks, *footfalls.remarks, *missing]
-    return _finish(source, replace(footfalls, walk=walk), curves, strides, remarks)
+    if any(name not in curves for name in REQUIRED):
+        raise_noted(wrong)
+    walk = {name: signal for name, signal in walk.items() if name in curves}
+    return _finish(source, replace(footfalls, walk=walk), curves, strides, remarks, wrong)
 
 
 def _finish(
@@ -450,21 +510,22 @@ def _finish(
     curves: Mapping[str, CurveStatistics],
     strides: Strides,
     remarks: Sequence[str],
+    wrong: list[PpafoError],
 ) -> ImportedGait:
-    """Return the gait of mean curves that legs can have."""
+    """Return the gait of mean curves that legs can have; DataError where any cannot, with everything in ``wrong``."""
     taken, walk, settings, signs_from = strides.taken, footfalls.walk, source.settings, source.signs_from
     share, time = _mean([item.stance_share for item in taken]), _mean([item.time for item in taken])
     means = {name: item.mean for name, item in curves.items()}
     fitted = {name: fit_curve(item.mean, HARMONICS[name], item.spread) for name, item in curves.items()}
     errors = {name: error for name, (_, error) in fitted.items()}
     mean_stride = MeanStride({name: signal.file for name, signal in walk.items()}, means, share, time, signs_from)
-    check_all(
-        [
-            [partial(check_scatter, curves, errors, walk)],
-            [partial(check_plausible, mean_stride)],
-            [partial(check_way, walk, signs_from)],
-        ]
-    )
+    with noted_in(wrong):
+        check_scatter(curves, errors, walk)
+    with noted_in(wrong):
+        check_plausible(mean_stride)
+    with noted_in(wrong):
+        check_way(walk, signs_from)
+    raise_noted(wrong)
     gait = _gait(settings, source.tables, taken, {name: curve for name, (curve, _) in fitted.items()}, footfalls.events)
     said = [*remarks, *_remarks(curves, strides, footfalls.events)]
     said += knee_remarks(source.columns.knee, walk, settings.stature)

@@ -16,7 +16,7 @@ from pydantic import Field, model_validator
 
 from ppafo.documents.models import NAME, StrictTable, Text, make_schema, read_model
 from ppafo.documents.toml_text import TomlKind
-from ppafo.errors import DataError, UnitError, refused_as
+from ppafo.errors import DataError, UnitError, raise_noted, refused_as
 from ppafo.gait.recorded.table import LONGEST_FILLED
 from ppafo.units import parse_quantity
 
@@ -227,20 +227,22 @@ class ImportSettings:
 
 
 def check_settings(settings: ImportSettings) -> None:
-    """Raise DataError for settings that are not plausible."""
+    """Raise DataError for settings that are not plausible, which names all of them."""
+    wrong: list[str] = []
     if settings.body_mass is not None and not 1.0 <= settings.body_mass <= 500.0:
-        raise DataError(f"a body mass of {settings.body_mass:g} kg is not plausible; give it in kg, such as '62 kg'")
+        wrong.append(f"a body mass of {settings.body_mass:g} kg is not plausible; give it in kg, such as '62 kg'")
     if settings.walking_speed is not None and not 0.05 <= settings.walking_speed <= 4.0:
-        raise DataError(f"a walking speed of {settings.walking_speed:g} m/s is not plausible; walking is 0.05 to 4 m/s")
+        wrong.append(f"a walking speed of {settings.walking_speed:g} m/s is not plausible; walking is 0.05 to 4 m/s")
     if settings.stature is not None and not 0.5 <= settings.stature <= 2.5:
-        raise DataError(f"a stature of {settings.stature:g} m is not plausible; give it in m, such as '1.75 m'")
+        wrong.append(f"a stature of {settings.stature:g} m is not plausible; give it in m, such as '1.75 m'")
     if settings.low_pass is not None and not (math.isfinite(settings.low_pass) and settings.low_pass >= 1.0):
-        raise DataError(f"a low pass at {settings.low_pass:g} Hz would remove the gait itself; 6 Hz is usual")
+        wrong.append(f"a low pass at {settings.low_pass:g} Hz would remove the gait itself; 6 Hz is usual")
     if not 0.0 <= settings.longest_gap <= LONGEST_FILLED:
-        raise DataError(f"gaps of {settings.longest_gap:g} s cannot be filled; allowed is 0 to {LONGEST_FILLED:g} s")
+        wrong.append(f"gaps of {settings.longest_gap:g} s cannot be filled; allowed is 0 to {LONGEST_FILLED:g} s")
     if settings.start is not None and settings.end is not None and not settings.start < settings.end:
-        raise DataError(f"the start, {settings.start:g} s, must be before the end, {settings.end:g} s")
+        wrong.append(f"the start, {settings.start:g} s, must be before the end, {settings.end:g} s")
     if re.fullmatch(NAME, settings.name) is None:
-        raise DataError(f"name {settings.name!r} must consist of lower-case letters, digits, '-' and '_'")
+        wrong.append(f"name {settings.name!r} must consist of lower-case letters, digits, '-' and '_'")
     if settings.least_strides is not None and settings.least_strides < 1:
-        raise DataError(f"the minimum number of strides must be 1 or more, not {settings.least_strides}")
+        wrong.append(f"the minimum number of strides must be 1 or more, not {settings.least_strides}")
+    raise_noted([DataError(text) for text in wrong])

@@ -7,13 +7,21 @@ that turns against it), or, for the knee, from hip and thigh.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.errors import DataError, UnitError, check_all, nearest_name, one_line, refused_as
+from ppafo.errors import (
+    DataError,
+    PpafoError,
+    UnitError,
+    nearest_name,
+    noted_in,
+    one_line,
+    raise_noted,
+    refused_as,
+)
 from ppafo.gait.gait import HARMONICS, REQUIRED, fit_curve
 from ppafo.gait.plausible import SignSource, other_sign
 from ppafo.gait.recorded.mapping import (
@@ -111,17 +119,21 @@ class CurveColumns:
         """Return the sum of the terms in the first SI unit that fits, and that unit. DataError where none fits."""
         total = np.zeros(self.table.time.size)
         chosen = si_units[0]
+        wrong: list[PpafoError] = []
         for sign, name in self.terms:
-            values, chosen = self._column(name, stated, si_units)
-            total += sign * values
+            if not self.may_be_absent:
+                with noted_in(wrong):
+                    check_finite(self.table.columns[name], f"{self.table.file}: column {name!r}", self.table.time)
+            with noted_in(wrong):
+                values, chosen = self._column(name, stated, si_units)
+                total += sign * values
+        raise_noted(wrong)
         return total, chosen
 
     def _column(self, name: str, stated: str | None, si_units: Sequence[str]) -> tuple[Floats, str]:
         place = f"{self.table.file}: column {name!r}"
         unit = stated or self.table.units[name]
         values = self.table.columns[name]
-        if not self.may_be_absent:
-            check_finite(values, place, self.table.time)
         if not unit:
             raise DataError(f"{place}: the file does not state its unit; give {self.unit_key} in a gait map")
         given = "" if unit == "-" else unit
@@ -352,13 +364,13 @@ class Person:
 
 
 def walk_signals(
-    tables: Sequence[MotionTable], columns: GaitMap, person: Person, is_default: bool
+    tables: Sequence[MotionTable], columns: GaitMap, person: Person, is_default: bool, wrong: list[PpafoError]
 ) -> dict[str, Signal]:
-    """Return the signals that a map finds in tables.
+    """Return the signals that a map finds in tables; all that is wrong with their columns is added to ``wrong``.
 
     With a convention of the package (``is_default``) only both angles have to be there; what a map of the user names
     has to be there. A motion goes from its first number to its last, a load is 0 where it was not measured. DataError
-    names all that is wrong with the columns.
+    where an angle cannot be used, with everything in ``wrong``.
     """
     walk: dict[str, Signal] = {}
 
@@ -382,7 +394,13 @@ def walk_signals(
             knee = knee_signals(columns.knee, tables, person.stature, is_default)
             walk.update((name, without_ends(signal)) for name, signal in knee.items())
 
-    check_all([*([partial(read_curve, name)] for name in _READERS), [read_knee]])
+    for name in _READERS:
+        with noted_in(wrong):
+            read_curve(name)
+    with noted_in(wrong):
+        read_knee()
+    if any(name not in walk for name in REQUIRED):
+        raise_noted(wrong)
     return walk
 
 
