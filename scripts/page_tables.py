@@ -41,7 +41,10 @@ def main() -> int:
     """Write both files."""
     names = [*list_scenarios(), *list_led_walks()]
     lines = [f"{json.dumps(name)}: {json.dumps(found)}" for name, found in openings_of(names).items()]
-    for name, text in (("opening", "{\n" + ",\n".join(lines) + "\n}"), ("minutes", json.dumps(minutes_of_bottle()))):
+    for name, text in (
+        ("opening", "{\n" + ",\n".join(lines) + "\n}"),
+        ("minutes", json.dumps(minutes_of_bottle(), ensure_ascii=False)),
+    ):
         Path(str(files("ppafo.live").joinpath(f"{name}.json"))).write_text(f"{text}\n", encoding="utf-8")
     return 0
 

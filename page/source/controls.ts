@@ -228,8 +228,8 @@ function blame({ fault, value }: Control, wrong: string): void {
 }
 
 /** A text somewhere on a slider, from 0 to 1, with the decimals that tell two neighbouring places apart; never beyond its ends. */
-export function textOnSlider({ slider: [from, to], shown }: Setting, share: number): string {
-  const decimals = decimalsOf((to - from) / STEPS);
+export function textOnSlider({ key, slider: [from, to], shown }: Setting, share: number): string {
+  const decimals = key.endsWith(".seed") ? 0 : decimalsOf((to - from) / STEPS);
   const unit = 10 ** -decimals;
   const value = from + (to - from) * share;
   const rounded = Number(value.toFixed(decimals));

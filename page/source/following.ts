@@ -11,7 +11,8 @@ function nearestWhole(value: number): number {
 }
 
 const stepUnlessGiven = (duration: number, period: number) => Math.min(duration, period, LONGEST_STEP);
-const dividingStep = (period: number, step: number) => period / Math.max(1, Math.ceil((period / step) * (1 - RELATIVE)));
+/** The longest step, up to one that is given, that divides a sample of the controller. */
+export const dividingStep = (period: number, step: number) => period / Math.max(1, Math.ceil((period / step) * (1 - RELATIVE)));
 
 const UNIVERSAL_GAS_CONSTANT = 8.314;
 const REFERENCE_DENSITY = 1.185;

@@ -1,12 +1,15 @@
 /** From what is typed to the numbers that the engine is given: one configuration at a time. */
 
 import { type Content, programNamed, type Program, type Relation, scalesOf, type Setting } from "./content";
-import { madeOf } from "./following";
+import { dividingStep, madeOf } from "./following";
 import { fromSi, InputError, plain, readableUnit, scaleOf, short, splitQuantity, toSi } from "./units";
 
 export const ATMOSPHERE = "supply.atmospheric_pressure";
 const STANDARD_ATMOSPHERE = 101325;
 const RELATIVE = 1e-9;
+const MOST_PARTS = 50;
+/** Below this an end of a range is none that anybody has in mind, in the unit that is shown. */
+const LEAST_NAMED = 1e-9;
 const RAISED: Readonly<Record<string, string>> = { ...Object.fromEntries([..."⁰¹²³⁴⁵⁶⁷⁸⁹"].map((sign, digit) => [String(digit), sign])), "−": "⁻" };
 
 /** The pressure [Pa] from which the gauge pressures of a configuration count. */
@@ -77,7 +80,35 @@ export function madeFrom(program: Program, { changes }: Configuration, values: V
     const value = madeOf(made, (source) => found.get(source) ?? values.get(source) ?? NaN);
     if (value !== null) found.set(key, value);
   }
+  if (changes["run.step"] === undefined && isRecordedOnSteps(program)) {
+    const at = (key: string) => found.get(key) ?? values.get(key) ?? NaN;
+    found.set("run.step", stepOnSamples(at("controller.period"), firstOf(program, "run.step"), at("run.output_interval")));
+  }
   return found;
+}
+
+const firstOf = (program: Program, key: string) => settingsByKey(program).get(key)?.value ?? NaN;
+
+/** Whether the samples of a run are recorded at the beginnings of steps: they have to, in programs that are compiled so. */
+function isRecordedOnSteps(program: Program): boolean {
+  const step = settingsByKey(program).get("run.step");
+  const isGiven = program.kind === "scenario" && step !== undefined && step.made === null;
+  return isGiven && isOnSteps(firstOf(program, "controller.period"), step.value, firstOf(program, "run.output_interval"));
+}
+
+function isOnSteps(period: number, step: number, interval: number): boolean {
+  const count = interval / dividingStep(period, step);
+  return count > 0.5 && Math.abs(count - Math.round(count)) <= RELATIVE * count;
+}
+
+/** The longest step, up to one that is given, with which samples of a controller and of the recording fall on steps; that one itself where none does. */
+function stepOnSamples(period: number, step: number, interval: number): number {
+  for (let parts = 1; parts <= MOST_PARTS; parts += 1) {
+    const part = step / parts;
+    const isPart = Math.abs(dividingStep(period, part) - part) <= RELATIVE * part;
+    if (isPart && isOnSteps(period, part, interval)) return part;
+  }
+  return step;
 }
 
 /** A typed number with its unit in SI, within its range. A bare number has the unit that is shown. */
@@ -87,7 +118,7 @@ export function numberFrom(content: Content, setting: Setting, text: string, atm
   const zero = setting.key.startsWith("controller.") ? STANDARD_ATMOSPHERE : atmosphere;
   const value = toSi(number, scaleOf(unit === "" ? setting.shown : unit, scalesOf(content, setting.unit)), zero);
   if (!isInside(setting, value)) {
-    throw new InputError(`${setting.key}: '${short(text)}' is outside of its range, ${rangeText(content, setting, atmosphere)}`);
+    throw new InputError(`${setting.key}: '${short(text)}' is outside of its range, ${rangeText(content, setting, atmosphere, true)}`);
   }
   if (setting.kept !== "" && (setting.kept === "zero") !== (value === 0)) {
     throw new InputError(`${setting.key}: must stay ${setting.kept === "zero" ? "0" : "above 0"} on this page; another value needs a different compiled program`);
@@ -113,9 +144,13 @@ export function normalText(setting: Setting, text: string): string {
   return `${String(number)} ${isShown ? setting.shown : unit}`.trim();
 }
 
-export function rangeText(content: Content, setting: Setting, atmosphere: number): string {
-  const { low, high, isLowAllowed } = setting;
+/** What a setting may be, in words. A lowest value that nobody would come near is above 0, unless the text has to be `exact`. */
+export function rangeText(content: Content, setting: Setting, atmosphere: number, exact = false): string {
+  const { high } = setting;
   const scale = scaleOf(setting.shown, scalesOf(content, setting.unit));
+  const lowest = setting.low === null ? null : fromSi(setting.low, scale, atmosphere);
+  const isTiny = !exact && lowest !== null && lowest > 0 && lowest < LEAST_NAMED;
+  const [low, isLowAllowed] = isTiny ? [0, false] : [setting.low, setting.isLowAllowed];
   const end = (value: number | null, isLow: boolean) => (value === null ? null : written(fromSi(value, scale, atmosphere), isLow));
   const [least, most] = [end(low, true), end(high, false)];
   const unit = ` ${readableUnit(setting.shown)}`.trimEnd();
@@ -146,7 +181,7 @@ export function contradiction(program: Program, values: Values): string {
     if (left === undefined || right === undefined) continue;
     if (!holds(relation, left, factor * right, slack)) return `${key} must be ${relation} ${factor < 1.01 ? "" : `${factor} times `}${other}`;
   }
-  return program.kind === "walk" ? contradictionOfProfile(values) : contradictionOfTimes(values);
+  return program.kind === "walk" ? contradictionOfProfile(values) : contradictionOfTimes(program, values);
 }
 
 /** A torque over the stride must have ended with it. */
@@ -156,13 +191,15 @@ function contradictionOfProfile(values: Values): string {
 }
 
 /** What a scenario file may not have either: samples that do not divide the run, a step longer than a sample of the controller. */
-function contradictionOfTimes(values: Values): string {
+function contradictionOfTimes(program: Program, values: Values): string {
   const [duration, interval, step, period] = ["run.duration", "run.output_interval", "run.step", "controller.period"].map((key) => values.get(key));
   if (duration !== undefined && interval !== undefined) {
     const count = duration / interval;
     if (Math.abs(count - Math.round(count)) > RELATIVE * count) return `run.output_interval must divide run.duration; it fits ${plain(count, 6)} times`;
   }
   if (step !== undefined && period !== undefined && step > period * (1 + RELATIVE)) return "run.step must be at most controller.period";
+  const isRecorded = step === undefined || period === undefined || interval === undefined || isOnSteps(period, step, interval);
+  if (!isRecorded && isRecordedOnSteps(program)) return "run.output_interval must be a whole number of steps, and so must controller.period: take rounder numbers, or another run.step";
   return "";
 }
 

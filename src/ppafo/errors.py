@@ -2,6 +2,7 @@
 
 import contextlib
 import difflib
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 
@@ -94,9 +95,19 @@ def raise_noted(found: Sequence[PpafoError]) -> None:
 
 
 def nearest_name(name: str, allowed: Iterable[str]) -> str:
-    """Return a hint such as ``, did you mean 'angle'?``, or an empty text where no allowed name is near."""
-    near = difflib.get_close_matches(str(name), list(allowed), n=1, cutoff=0.6)
+    """Return a hint such as ``, did you mean 'angle'?``, or an empty text where no allowed name is near.
+
+    A name that is far from all in letters may be short for one: its first word, or another.
+    """
+    known = list(allowed)
+    near = difflib.get_close_matches(str(name), known, n=1, cutoff=0.6) or _first_with_word(str(name), known)
     return f", did you mean '{near[0]}'?" if near else ""
+
+
+def _first_with_word(word: str, names: Sequence[str]) -> list[str]:
+    """Return the first name that has a word at its beginning, else anywhere, as ``rms`` is in ``rms_error``."""
+    words = [(re.split(r"[^0-9A-Za-z]+", name), name) for name in names]
+    return [name for found, name in words if found[0] == word] or [name for found, name in words if word in found[1:]]
 
 
 def first_twice(names: Iterable[str]) -> str | None:

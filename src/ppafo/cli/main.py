@@ -62,7 +62,7 @@ FIRST_STEPS = """\
 Model-based design of pneumatic powered orthoses. Start with one of these:
 
 see it
-  ppafo simulate torque-task-proportional   the paper's torque task; add --out DIR for figures and a report
+  ppafo simulate torque-task-proportional   the paper's torque task; figures and a report go to out/
   ppafo walk solenoid                       a minute of walking with the device
   ppafo workbench --out page.html           all of it with sliders, in a browser
 the paper

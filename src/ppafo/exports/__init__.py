@@ -7,7 +7,10 @@ import re
 from collections.abc import Mapping
 from importlib.resources import files
 
+from ppafo.errors import one_line
+
 _MARK = re.compile(r"@(\w+)@")
+_OF_MARKDOWN = re.compile(r"([\\`*_{}\[\]()#+\-!|~<>&:])")
 
 
 def template(package: str, name: str) -> str:
@@ -18,6 +21,16 @@ def template(package: str, name: str) -> str:
 def filled(text: str, words: Mapping[str, str]) -> str:
     """A text with its marks, as ``@name@``, replaced."""
     return _MARK.sub(lambda found: words[found[1]], text)
+
+
+def in_markdown(text: str) -> str:
+    """What a scenario says, for a page in Markdown: one line of plain words, without marks, links or HTML."""
+    return _OF_MARKDOWN.sub(r"\\\1", one_line(text))
+
+
+def in_comment(text: str) -> str:
+    """What a scenario says, for a comment in C: one line that neither ends the comment nor begins another."""
+    return one_line(text).replace("*/", "* /").replace("/*", "/ *")
 
 
 def licence() -> str:

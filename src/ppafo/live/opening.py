@@ -25,7 +25,7 @@ LEAST_CHANGE = 1e-3
 """Change, as a fraction, below which a setting changes nothing that could be seen."""
 _STEP = 0.2
 """How far a setting is moved to either side: this fraction of its value; of a gauge pressure above the atmosphere."""
-_PLACES = 150
+_PLACES = 300
 _NATURE = ("gas.", "gas_model.", "flow.", "run.", "sensors.seed", "supply.atmospheric_pressure")
 """Settings that never come first: what nature sets, and how finely a run is computed and for how long."""
 _RANKED = ("published", "task", "changed", "identified", "fitted", "datasheet", "derived", "assumed", "default")

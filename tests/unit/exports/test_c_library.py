@@ -19,6 +19,8 @@ from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of, batches_of
 from ppafo.exports.c_library import c_library, scenario_library
 from ppafo.exports.c_library.files import c_identifier
+from ppafo.exports.c_library.plant import plant_library
+from ppafo.exports.firmware import firmware
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import Readings
 from ppafo.running import simulate
@@ -280,6 +282,26 @@ def test_a_description_cannot_end_or_begin_a_comment() -> None:
     described = replace(load_scenario("step-response"), description="first /* and last */ of a comment")
     head = c_library(described)["step_response.h"].decode().split("#ifndef")[0]
     assert (head.count("/*"), head.count("*/")) == (1, 1)
+
+
+def test_what_a_scenario_says_is_plain_words_in_every_page_and_comment() -> None:
+    """Neither HTML, nor a heading, a link, or a mark that turns the direction of what follows in a source file."""
+    hostile = "</p><script>alert(1)</script> `a` [x](javascript:b) ``` \\ \u202e \x1b[31m\n# Heading */"
+    described = replace(load_scenario("torque-task-proportional"), description=hostile)
+    fixed = load_scenario("torque-task-proportional", ("controller.arithmetic=fixed",))
+    texts = {
+        **c_library(described),
+        **{f"plant/{name}": text for name, text in plant_library(described).items()},
+        **{f"firmware/{name}": text for name, text in firmware(replace(fixed, description=hostile)).items()},
+    }
+    said = [text.decode() for name, text in texts.items() if name.endswith("README.md")]
+    assert len(said) == 3
+    for page in said:
+        (line,) = [line for line in page.splitlines() if "alert" in line]
+        assert re.search(r"(?<!\\)[<>`\[\]()#]", line.split("Controller `pid`")[0]) is None
+        assert "Heading" in line
+    for text in texts.values():
+        assert not any(mark in text.decode() for mark in "\u202e\x1b")
 
 
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="no cmake on this machine")

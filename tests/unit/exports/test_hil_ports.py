@@ -265,6 +265,20 @@ def test_packets_of_somebody_else_are_counted_and_do_nothing() -> None:
 
 
 @needs_terminals
+def test_a_datagram_without_a_byte_hides_no_packet_behind_it() -> None:
+    port = free_port()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as friend:
+        friend.bind(("127.0.0.1", port))
+        friend.settimeout(5.0)
+        mine = open_port(f"udp:127.0.0.1:{port}")
+        mine.send(b"sample")
+        _, address = friend.recvfrom(64)
+        for data in (b"", b"", b"an answer"):
+            friend.sendto(data, address)
+        assert mine.receive(5.0) == b"an answer"
+        mine.close()
+
+
 def test_a_serial_device_that_is_pulled_out_breaks_and_does_not_raise() -> None:
     pytest.importorskip("serial")
     import pty

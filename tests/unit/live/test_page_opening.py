@@ -10,7 +10,8 @@ import pytest
 
 from ppafo.answers.style import PAGE_COLOURS
 from ppafo.live import page as pages
-from ppafo.live.opening import LEAST_CHANGE, MOST_FIRST
+from ppafo.live import workbench as workbench_module
+from ppafo.live.opening import LEAST_CHANGE, MOST_FIRST, _key
 from ppafo.live.words import words
 from ppafo.live.workbench import DEFAULT, declared_workbenches, openings_of, workbench
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
@@ -22,6 +23,8 @@ from scripts.page_tables import FLOWS
 
 has_browser = pytest.mark.skipif(bool(missing()), reason=missing() or "there is a browser")
 LARGE = {"width": 1400, "height": 1000}
+FAULTS = "[...document.querySelectorAll('.fault')].filter(one => one.checkVisibility()).map(one => one.innerText)"
+"""What a page says is wrong."""
 
 
 def _opening() -> dict[str, Any]:
@@ -33,6 +36,12 @@ def test_what_the_package_keeps_of_a_scenario_is_what_its_program_gives() -> Non
     """Else run ``python scripts/page_tables.py``."""
     name = "torque-task-proportional"
     assert openings_of([name])[name] == _opening()[name]
+
+
+def test_what_the_package_keeps_is_of_the_files_that_it_has(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else pages of these compile and run a model first: run ``python scripts/page_tables.py``."""
+    monkeypatch.setattr(workbench_module, "computed_opening", lambda _, *made_from: _key(*made_from))
+    assert openings_of(_opening()) == {name: one["key"] for name, one in _opening().items()}
 
 
 @has_browser
@@ -101,13 +110,37 @@ def test_the_page_says_its_main_fact_and_its_questions_set_the_sliders(chromium:
     values = page.evaluate("[0, 1].map(place => workbench.values(place)['controller.period'])")
     assert values == [0.0125, 0.001]
     assert page.evaluate("workbench.values(0)['reference.level']") == 6.0
+    assert page.evaluate(FAULTS) == []
+    assert "(Solenoid pair)" in facts.inner_text()
     for tab, question in (("Step response", "30 psi"), ("Walk", "110 kg")):
         page.get_by_role("tab", name=tab).click()
         page.get_by_role("link", name=re.compile(question)).click()
         page.wait_for_timeout(300)
+        assert page.evaluate(FAULTS) == []
         assert page.evaluate("Object.keys(JSON.parse(workbench.file()).benches.flat().at(-1).changes).length") > 0
         assert page.locator(".notice").is_hidden()
     assert page.said == []
+
+
+@has_browser
+def test_a_sampling_period_takes_the_step_with_it_that_its_samples_need(chromium: Any, file: Path) -> None:
+    page = opened(chromium, file, viewport=LARGE)
+    box, slider = (page.get_by_label(name, exact=True) for name in ("Sampling period", "Sampling period, slider"))
+    steps = {}
+    for period in ("12.5 ms", "0.4 ms", "37.3 ms", "50 ms"):
+        box.fill(period)
+        box.press("Enter")
+        page.wait_for_timeout(300)
+        assert page.evaluate(FAULTS) == []
+        steps[period] = page.evaluate("workbench.values(0)['run.step']")
+    assert steps == {"12.5 ms": 0.0005, "0.4 ms": 0.0002, "37.3 ms": 0.0001, "50 ms": 0.001}
+    for place in (0, 57, 233, 400):
+        slider.evaluate(f"slider => {{ slider.value = {place}; slider.dispatchEvent(new Event('input')); }}")
+        page.wait_for_timeout(300)
+        assert page.evaluate(FAULTS) == []
+    box.fill("0.0123456789 s")
+    box.press("Enter")
+    page.locator("#panel > .fault", has_text="run.output_interval must be a whole number of steps").wait_for()
 
 
 @has_browser
@@ -160,7 +193,7 @@ def test_ranges_are_written_as_people_write_them(chromium: Any, file: Path) -> N
         said[key] = page.locator(f"[id='about-{key}'] span").nth(1).inner_text().replace("\u00a0", " ")
     assert said == {
         "friction.static_torque": "0 to 10,000 N m. friction.static_torque",
-        "actuator.dead_volume_1": "At least 10⁻¹² cm³. actuator.dead_volume_1",
+        "actuator.dead_volume_1": "More than 0 cm³. actuator.dead_volume_1",
         "actuator.angle_max": "\u2212572 to 572 deg. actuator.angle_max",
         "run.step": "10⁻⁸ to 1,000 s. run.step",
         "motion.angle": "\u2212572 to 572 deg. motion.angle",

@@ -101,7 +101,10 @@ def test_a_plot_of_a_completed_run_has_no_remark_and_one_of_a_diverged_run_has(r
     assert not diverged.status.is_completed
 
 
-@pytest.mark.parametrize(("name", "near"), [("switching", "switchings"), ("gas_suplied", "gas_supplied")])
+@pytest.mark.parametrize(
+    ("name", "near"),
+    [("switching", "switchings"), ("gas_suplied", "gas_supplied"), ("rms", "rms_error"), ("gas", "gas_supplied")],
+)
 def test_a_metric_that_is_not_there_is_answered_with_the_nearest(name: str, near: str) -> None:
     metrics = ppafo.simulate("torque-task-proportional", ["run.duration=0.02 s"]).metrics
     with pytest.raises(DataError, match=rf"there is no metric '{name}', did you mean '{near}'\?; available: "):

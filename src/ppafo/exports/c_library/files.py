@@ -13,7 +13,7 @@ from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import SIGNAL_ROWS
 from ppafo.engine.run import NEVER_FAILED
 from ppafo.engine.source_text import Collector
-from ppafo.exports import filled, licence, template
+from ppafo.exports import filled, in_comment, in_markdown, licence, template
 from ppafo.exports.c_library.boundary import Boundary
 from ppafo.exports.c_library.program import Entry, ExportedProgram, Further, c_text_of_run
 from ppafo.metrics import METRICS
@@ -213,7 +213,8 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "name": name,
         "NAME": name.upper(),
         "title": library.title,
-        "description": "\n * ".join(textwrap.wrap(_in_comment(library.description), 110)),
+        "description": "\n * ".join(textwrap.wrap(in_comment(library.description), 110)),
+        "about": in_markdown(library.description),
         "version": __version__,
         "in_parts": in_parts(program),
         "run": filled(template("c_library", "run.h"), {"name": name}),
@@ -258,14 +259,9 @@ def _members(items: Iterable[tuple[str, str, str]]) -> str:
     """Members of a struct, each with its unit and meaning."""
     lines = []
     for name, unit, said in items:
-        comment = _in_comment(f"{UNITS.get(unit, unit) or '-'}: {said}")
+        comment = in_comment(f"{UNITS.get(unit, unit) or '-'}: {said}")
         lines.append(f"    double {name}; /* {comment} */")
     return "\n".join(lines)
-
-
-def _in_comment(text: str) -> str:
-    """A text without what ends a comment in C or begins another."""
-    return text.replace("*/", "* /").replace("/*", "/ *")
 
 
 def _said(quantity: Quantity) -> str:

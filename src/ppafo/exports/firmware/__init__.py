@@ -10,7 +10,7 @@ from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, LARGEST_READING, SE
 from ppafo.engine.rows import is_number, leaf_paths, members, rebuilt
 from ppafo.engine.source_text import SourceCollector, is_row
 from ppafo.errors import ProgramError, ScenarioError
-from ppafo.exports import filled, licence, template
+from ppafo.exports import filled, in_markdown, licence, template
 from ppafo.exports.firmware.catalog import target_of
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.plant import plant_parameters
@@ -198,7 +198,7 @@ def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
     converter = chip.converter
     words = {
         "title": scenario.name,
-        "description": scenario.description,
+        "description": in_markdown(scenario.description),
         "kind": chip.law.name,
         "target": chosen.name,
         "processor": chosen.processor,

@@ -300,7 +300,7 @@ class UdpPort:
             self._socket.sendto(data, self._other)
 
     def receive(self, timeout: float) -> bytes:
-        """The first packet of the other side within a time [s]."""
+        """The first packet of the other side within a time [s]; a datagram without a byte is none."""
         until = time.perf_counter() + timeout
         for _ in range(_STRANGERS_AT_ONCE):
             ready, _, _ = select.select([self._socket], [], [], max(0.0, until - time.perf_counter()))
@@ -309,6 +309,8 @@ class UdpPort:
             try:
                 data, sender = self._socket.recvfrom(_LARGEST_RECEIVED)
             except OSError:
+                continue
+            if not data:  # to the caller that would be silence, with packets behind it still unread
                 continue
             if self._other is None:
                 if not Reader(is_stream=False).take(data):

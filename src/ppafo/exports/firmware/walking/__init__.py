@@ -28,7 +28,7 @@ from ppafo.engine.lanes import run_batch
 from ppafo.engine.rows import leaf_paths, rebuilt, row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
-from ppafo.exports import filled, licence, template
+from ppafo.exports import filled, in_markdown, licence, template
 from ppafo.exports.firmware import TICK, ChipController, law_source, parameters_header, ticks_of
 from ppafo.exports.firmware.catalog import MSP430G2553
 from ppafo.exports.firmware.lock_step import ChipLaw, Comparison, Cost, PythonChip, compare_with, cost_of
@@ -508,7 +508,7 @@ def _words(configuration: Scenario, chip: ChipController, target: str) -> dict[s
     given, converter = configuration.control.settings, chip.converter
     return {
         "title": configuration.name,
-        "description": configuration.description,
+        "description": in_markdown(configuration.description),
         "kind": chip.law.name,
         "target": target,
         "version": __version__,
