@@ -20,7 +20,7 @@ from ppafo.model.wearer.segments import Limb, Pose
 from ppafo.model.wearer.walker import Fibres, Walker, Wearer, joints
 from ppafo.simulation.declaration import Reading, value_at
 from ppafo.wearers.loading import find_wearer, wearer_of, with_strengths
-from ppafo.wearers.published import felt_at, first_answer, on_slope, start_of
+from ppafo.wearers.published import felt_at, first_answer, on_slope, start_of, start_with_size, with_size
 
 REACTS = "wearer.reacts"
 """Where the file of a walk names a wearer who reacts."""
@@ -46,9 +46,21 @@ GAINS = tuple(
 )
 """Gains of the reflexes of both legs, forces in largest forces, lengths in optimum lengths."""
 
+RATIOS = tuple(
+    Quantity(f"{name}_ratio", "1", f"reflex gain {name} of both legs, over left_{name} and right_{name}", 1.0, 0.0, 5.0)
+    for name in Gains._fields
+)
+"""Gains of both legs in proportion, for studies that scatter them whoever walks."""
+
+LENGTH_RATIO = Quantity(
+    "length_ratio", "1", "lengths of the body, its muscles and levers, over those of the wearer", 1.0, 0.7, 1.3
+)
+MASS_RATIO = Quantity(
+    "mass_ratio", "1", "masses of the body and forces of its muscles, over those of the wearer", 1.0, 0.3, 2.0
+)
 START_SPEED = Quantity("start_speed", "m/s", "speed with which the walk begins", 1.3, 0.5, 2.0)
 SLOPE = Quantity("slope", "1", "rise of the ground along the walk, above 0 uphill", 0.0, -0.2, 0.2)
-REACTIONS = (*STRENGTHS, *GAINS, START_SPEED, SLOPE)
+REACTIONS = (*STRENGTHS, *GAINS, *RATIOS, LENGTH_RATIO, MASS_RATIO, START_SPEED, SLOPE)
 """Numbers of a wearer who reacts."""
 
 LONGEST_STEP = 1.0e-4
@@ -70,18 +82,25 @@ class ReactingWearer:
     settings: Mapping[str, Any]
 
     @property
-    def mass(self) -> float:
-        """Mass of the body [kg]."""
-        return self.body.weight / self.body.body.gravity
+    def weight(self) -> Any:
+        """Weight of the body [N], an array where its mass is one."""
+        return self.body.weight * self.settings[MASS_RATIO.name]
+
+    @property
+    def mass(self) -> Any:
+        """Mass of the body [kg], likewise."""
+        return self.weight / self.body.body.gravity
 
     def row(self) -> Wearer:
         """The body with the strengths of the leg with the device, as the engine takes it."""
-        muscles = with_strengths(self.body.left, {name: self.settings[f"{name}_strength"] for name in Fibres._fields})
+        own = self.settings
+        muscles = with_strengths(self.body.left, {name: own[f"{name}_strength"] for name in Fibres._fields})
         left, right = (
-            Gains._make(self.settings[f"{side}_{name}"] for name in Gains._fields) for side in ("left", "right")
+            Gains._make(own[f"{side}_{name}"] * own[f"{name}_ratio"] for name in Gains._fields)
+            for side in ("left", "right")
         )
-        body = on_slope(self.body, self.settings[SLOPE.name])
-        return body._replace(left=muscles, left_gains=left, right_gains=right)
+        body = on_slope(self.body._replace(left=muscles, left_gains=left, right_gains=right), own[SLOPE.name])
+        return with_size(body, own[LENGTH_RATIO.name], own[MASS_RATIO.name])
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,14 +122,15 @@ def start_of_body(wearer: ReactingWearer) -> BodyStart:
     walker = start_of(wearer.body, wearer.settings[START_SPEED.name])
     leg = walker.pose.left
     ankle = joints(leg, walker.pose.lean).ankle
-    # At rest: what the legs feel in the pose of the start does not depend on the speed, which may be an array.
+    # At rest: what the legs feel in the pose of the start depends neither on the speed nor on their size, which may be
+    # arrays; only the load does, for 20 ms.
     nerves = settled_nerves(*felt_at(wearer.body, walker._replace(rates=_AT_REST), LONGEST_STEP))
     walk = ReactingState(
         contact=FLAT,
         now=WalkNow(0.0, leg.shank),
         external_torque=0.0,
-        heel_force=0.5 * wearer.body.weight,
-        toe_force=0.5 * wearer.body.weight,
+        heel_force=0.5 * wearer.weight,
+        toe_force=0.5 * wearer.weight,
         toes_first=0.0,
         lands=0.0,
         clearance=NO_CLEARANCE,
@@ -128,7 +148,11 @@ def start_of_body(wearer: ReactingWearer) -> BodyStart:
         fall_time=STANDING,
     )
     return BodyStart(
-        ankle, walker, Reflexes(ordered=first_answer(), until=0.0, umberger=0.0, bhargava=0.0), nerves, walk
+        ankle,
+        start_with_size(walker, wearer.settings[LENGTH_RATIO.name]),
+        Reflexes(ordered=first_answer(), until=0.0, umberger=0.0, bhargava=0.0),
+        nerves,
+        walk,
     )
 
 

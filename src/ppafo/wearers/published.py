@@ -116,6 +116,59 @@ def on_slope(wearer: Wearer, slope: Any) -> Wearer:
     return wearer._replace(body=body)
 
 
+def with_size(wearer: Wearer, lengths: Any, masses: Any) -> Wearer:
+    """Return a wearer of another size: factors [-] of all lengths and all masses, which may be arrays (runs,).
+
+    Segments, levers, fibres and tendons keep their proportions, forces of muscles go with the weight, so that joint
+    torques over weight and length, and gains, stay as they are. The ground gives as much under the weight as before.
+    """
+    body = wearer.body
+    trunk, thigh, shank, foot = (
+        Segment(
+            length=segment.length * lengths,
+            mass_centre=segment.mass_centre * lengths,
+            mass=segment.mass * masses,
+            inertia=segment.inertia * masses * lengths * lengths,
+        )
+        for segment in (body.trunk, body.thigh, body.shank, body.foot)
+    )
+    return wearer._replace(
+        body=body._replace(trunk=trunk, thigh=thigh, shank=shank, foot=foot, heel=body.heel * lengths),
+        left=_muscles_with_size(wearer.left, lengths, masses),
+        right=_muscles_with_size(wearer.right, lengths, masses),
+        stop=wearer.stop._replace(stiffness=wearer.stop.stiffness * masses * lengths),
+        ground=wearer.ground._replace(
+            stiffness=wearer.ground.stiffness * masses, stiffness_along=wearer.ground.stiffness_along * masses
+        ),
+        weight=wearer.weight * masses,
+    )
+
+
+def _muscles_with_size(muscles: Muscles, lengths: Any, masses: Any) -> Muscles:
+    changed: dict[str, Any] = {}
+    for name, own in muscles._asdict().items():
+        if isinstance(own, Muscle):
+            changed[name] = own._replace(
+                force=own.force * masses, optimum=own.optimum * lengths, slack=own.slack * lengths
+            )
+        elif isinstance(own, Lever):
+            changed[name] = own._replace(lever=own.lever * lengths)
+    return muscles._replace(**changed, ankle_stiffness=muscles.ankle_stiffness * masses * lengths)
+
+
+def start_with_size(walker: Walker, lengths: Any) -> Walker:
+    """Return the start of a wearer of another size: the same angles and speed, with all lengths by a factor [-]."""
+
+    def of_leg(leg: LegState) -> LegState:
+        fibres: dict[str, Any] = {
+            name: fibre._replace(length=fibre.length * lengths) for name, fibre in leg.fibres._asdict().items()
+        }
+        return leg._replace(fibres=Fibres(**fibres))
+
+    pose = walker.pose._replace(y=walker.pose.y * lengths)
+    return walker._replace(pose=pose, left=of_leg(walker.left), right=of_leg(walker.right))
+
+
 START_LEAN = 0.1
 """Lean [rad] of the trunk at the start."""
 
@@ -150,7 +203,6 @@ def start_of(wearer: Wearer, speed: float) -> Walker:
     lowest = ankle + min(-body.heel * math.sin(left.foot), body.foot.length * math.sin(left.foot))
     still = Limb(0.0, 0.0, 0.0)
     return Walker(
-        # The lower end of the foot is 3 mm in the ground.
         pose=Pose(x=0.0, y=-lowest - 0.003, lean=START_LEAN, left=left, right=right),
         rates=Pose(x=speed, y=0.0, lean=0.0, left=still, right=still),
         left=_leg_at_start(wearer.left, joints(left, START_LEAN)),

@@ -31,7 +31,7 @@ from ppafo.validation.measured import check_recording
 from ppafo.validation.replay import replay_recording, start_of
 from ppafo.walking import load_walk, walk, walk_population
 from ppafo.walking.loading import list_led_walks, list_walks
-from ppafo.walking.motion import with_duration
+from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import plan_walk
 
 WALK, STEP = "reacting", 1.0e-4
@@ -158,6 +158,14 @@ def test_a_gain_of_one_leg_is_a_setting_and_a_column() -> None:
     speeds = found.metrics["walking_speed"]
     assert speeds[0] != speeds[1]
     assert speeds[0] == pytest.approx(ppafo.simulate(scenario).metrics["walking_speed"].value, rel=1e-9)
+
+
+def test_a_ratio_changes_a_gain_of_both_legs() -> None:
+    wearer = walk_of(load_walk(WALK, ["wearer.soleus_force_ratio=1.1", "wearer.left_soleus_force=1.0"])).reacts
+    assert wearer is not None
+    row, plain = wearer.row(), wearer.body
+    assert row.left_gains == plain.left_gains._replace(soleus_force=1.1)
+    assert row.right_gains == plain.right_gains._replace(soleus_force=1.1 * plain.right_gains.soleus_force)
 
 
 @pytest.mark.parametrize(

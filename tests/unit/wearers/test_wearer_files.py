@@ -5,9 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from ppafo.engine.rows import numbers
 from ppafo.errors import DataError
+from ppafo.model.wearer.walker import Assist, next_walker
 from ppafo.wearers.loading import find_wearer, list_wearers, wearer_of
-from ppafo.wearers.published import on_slope
+from ppafo.wearers.published import felt_at, first_answer, on_slope, start_of, start_with_size, with_size
 
 HEALTHY = ("healthy-98", "healthy-110", "healthy-123", "healthy-128", "healthy-138")
 
@@ -75,3 +77,33 @@ def test_a_slope_turns_gravity_and_what_is_upright(slope: float) -> None:
     assert body.gravity_along == pytest.approx(9.81 * math.sin(angle), rel=1e-13)
     assert body.upright == pytest.approx(angle, rel=1e-9)
     assert (body == level.body) is (slope == 0.0)
+
+
+def test_who_is_heavier_by_all_masses_and_forces_moves_the_same_way() -> None:
+    light = wearer_of(find_wearer("healthy-128"))
+    heavy, free, ordered = with_size(light, 1.0, 1.3), Assist(0.0, 0.0, 0.0), first_answer()
+    ends = []
+    for wearer in (light, heavy):
+        walker = start_of(wearer, 1.3)
+        for _ in range(300):
+            walker = next_walker(wearer, walker, ordered.to_left, ordered.to_right, free, free, 1e-4).after
+        ends.append(walker)
+    assert numbers(ends[1].pose) == pytest.approx(numbers(ends[0].pose), rel=1e-9, abs=1e-12)
+    assert numbers(ends[1].left.fibres) == pytest.approx(numbers(ends[0].left.fibres), rel=1e-9, abs=1e-12)
+    assert ends[0].left.heel.touches or ends[0].left.ball.touches, "the ground is felt"
+    assert heavy.weight == pytest.approx(1.3 * 80.0 * 9.81)
+
+
+def test_who_is_longer_starts_in_proportion_and_feels_the_same() -> None:
+    short = wearer_of(find_wearer("healthy-128"))
+    long, start = with_size(short, 1.1, 1.0), start_of(short, 0.0)
+    longer = start_with_size(start, 1.1)
+    assert longer.pose.y == pytest.approx(start_of(long, 0.0).pose.y, abs=4e-4), "the heel is 3 mm in the ground"
+    for felt, again in zip(felt_at(short, start, 1e-4)[:2], felt_at(long, longer, 1e-4)[:2], strict=True):
+        assert again._replace(load=felt.load) == pytest.approx(felt, rel=1e-9, abs=1e-9)
+
+
+def test_of_the_same_size_nothing_changes_by_a_bit() -> None:
+    wearer = wearer_of(find_wearer("spastic-calf"))
+    assert with_size(wearer, 1.0, 1.0) == wearer
+    assert start_with_size(start_of(wearer, 1.3), 1.0) == start_of(wearer, 1.3)

@@ -191,7 +191,7 @@ def _generations(
 
 def costs_of(search: Search, model: Model, gains: Floats) -> Floats:
     """The cost of candidates (candidates, gains), each the mean over its start speeds (candidates,)."""
-    metrics, weight = _run(search, model, gains, STARTS), search.wearer.body.weight
+    metrics, weight = _run(search, model, gains, STARTS), search.wearer.weight
     share = np.nan_to_num(metrics["walked_time"]) / search.scenario.duration
     speed, power = metrics["walking_speed"], metrics["muscle_power"]
     walks = power / (weight * speed) + OF_SPEED * (speed - search.speed) ** 2

@@ -23,6 +23,14 @@ QUESTION = Question(
             "target width of the interval: '1 %%' of the value (default), or '0.01 N m'; of a probability, 0.02",
             metavar="WIDTH",
         ),
+        Argument(
+            ("--also",),
+            "also",
+            "a further metric, whose mean over the same draws is given; may be repeated",
+            metavar="NAME",
+            action="append",
+            default=(),
+        ),
         Argument(("--configuration",), "configuration", "configuration of the study, needed if it has several", "NAME"),
         Argument(
             ("--first-draws",), "first_draws", "draws before the first estimate; default 256", "N", whole_number, 256

@@ -222,7 +222,8 @@ class Look:
 class MonteCarlo(Solved):
     """The looks one after the other, whether the last one met the rule, and the values of the metric (draws,) [SI].
 
-    ``noise`` is the fraction of the variance that is due to sensor noise; None where there is none.
+    ``noise`` is the fraction of the variance that is due to sensor noise; None where there is none. ``also`` has the
+    means [SI] of further metrics over the same draws, and how many draws have each.
     """
 
     metric: str
@@ -232,6 +233,7 @@ class MonteCarlo(Solved):
     looks: tuple[Look, ...]
     outcomes: Outcomes
     noise: Interval | None
+    also: Mapping[str, tuple[int, Interval]] = field(default_factory=dict)
 
     @property
     def last(self) -> Look:
@@ -256,7 +258,13 @@ class MonteCarlo(Solved):
 
 
 def draw_until(
-    model: Model, uncertainty: Uncertainty, metric: str, statistic: Statistic, rule: StoppingRule, seed: int
+    model: Model,
+    uncertainty: Uncertainty,
+    metric: str,
+    statistic: Statistic,
+    rule: StoppingRule,
+    seed: int,
+    also: Sequence[str] = (),
 ) -> MonteCarlo:
     """Draw from one stream until the rule is met or there are no more looks.
 
@@ -280,7 +288,14 @@ def draw_until(
     if uncertainty.has_noise:
         again = model(with_new_noise(drawn, NOISE_DRAWS)).metrics[metric]
         noise = noise_interval(outcomes.metrics[metric][: again.size], again, rule.confidence)
-    return MonteCarlo(metric, statistic, rule, seed, tuple(looks), outcomes, noise)
+    further = {name: _mean(outcomes.metrics[name], rule.confidence_of_look) for name in also}
+    return MonteCarlo(metric, statistic, rule, seed, tuple(looks), outcomes, noise, further)
+
+
+def _mean(values: Floats, level: float) -> tuple[int, Interval]:
+    """How many draws have a value, and their mean; its interval is infinite where few do."""
+    count = int(np.count_nonzero(np.isfinite(values)))
+    return count, floored_interval(values, REPLICATES, level) if count else Interval(math.nan, -math.inf, math.inf)
 
 
 def _look(outcomes: Outcomes, metric: str, statistic: Statistic, rule: StoppingRule) -> Look:
@@ -312,6 +327,7 @@ def monte_carlo(
     draws: int = 2**20,
     confidence: float = 0.95,
     maximum_failed: float = 0.01,
+    also: Sequence[str] = (),
     threads: int | None = None,
     progress: Report | None = None,
 ) -> MonteCarlo:
@@ -320,20 +336,21 @@ def monte_carlo(
     ``statistic`` is ``mean``, ``quantile 0.95`` or ``probability above 3 N m``; ``width`` a fraction of its value
     (default ``1 %``) or a difference with its unit (``0.01 N m``; for a probability a number, 0.02). Draws are
     those that the interval needs, whatever the study's sampling method: randomised Sobol replicates for a mean, else
-    independent ones. ``seed`` is the study's by default.
+    independent ones. ``seed`` is the study's by default. ``also`` names further metrics: means over the same draws.
     StudyError for bad input and where more than the fraction ``maximum_failed`` of the runs fails.
     """
     chosen = study_of(study, overrides)
     base = choose_configuration(chosen, configuration)
     uncertainty = uncertainty_in(chosen, base).with_noise_of([base.scenario])
-    check_metrics([metric], base.scenario)
+    wanted = tuple(dict.fromkeys((metric, *also)))
+    check_metrics(wanted, base.scenario)
     atmosphere = atmosphere_of(base.scenario, {*uncertainty.paths, *uncertainty.same})
     what = parse_statistic(statistic, metric, atmosphere)
     asked = width or (PROBABILITY_WIDTH if what.threshold is not None else DEFAULT_WIDTH)
     rule = stopping_rule(what, metric, asked, StoppingRule(1.0, False, first_draws, draws, confidence, maximum_failed))
     tally = Tally(rule.first, progress)
-    model = scenario_model(base.scenario, [metric], threads, tally.add, uncertainty.gauge)
-    return draw_until(model, uncertainty, metric, what, rule, chosen.sample.seed if seed is None else seed)
+    model = scenario_model(base.scenario, wanted, threads, tally.add, uncertainty.gauge)
+    return draw_until(model, uncertainty, metric, what, rule, chosen.sample.seed if seed is None else seed, wanted[1:])
 
 
 def stopping_rule(statistic: Statistic, metric: str, width: str, like: StoppingRule) -> StoppingRule:
@@ -408,7 +425,7 @@ def answer_of(estimate: MonteCarlo) -> Answer:
         kicker="Monte Carlo",
         title=title[:1].upper() + title[1:],
         lead=(verdict(estimate), *remarks(estimate)),
-        sections=(Section("Trace", (policy(estimate),), table, figure=figure),),
+        sections=(*_further(estimate), Section("Trace", (policy(estimate),), table, figure=figure)),
         data={
             "metric": estimate.metric,
             "statistic": estimate.statistic.label,
@@ -418,6 +435,7 @@ def answer_of(estimate: MonteCarlo) -> Answer:
             "failed": estimate.outcomes.failures,
             "interval": plain(estimate.last.interval),
             "remarks": remarks(estimate),
+            "also": {name: {"draws": count, **plain(mean)} for name, (count, mean) in estimate.also.items()},
             "share_of_noise": None if estimate.noise is None else plain(estimate.noise),
             "seed": estimate.seed,
             "rule": {**plain(estimate.rule), "looks": len(estimate.rule.sizes), "correction": "Bonferroni"},
@@ -425,6 +443,20 @@ def answer_of(estimate: MonteCarlo) -> Answer:
         },
         passed=estimate.is_met,
     )
+
+
+def _further(estimate: MonteCarlo) -> tuple[Section, ...]:
+    """The means of further metrics, where some were requested."""
+    rows = []
+    for name, (count, mean) in estimate.also.items():
+        quantity = metric_quantity(name)
+        shown = (f"{display_value(value, quantity):.4g}" for value in (mean.value, mean.low, mean.high))
+        rows.append((metric_title(name), f"{count:,}", *shown))
+    if not rows:
+        return ()
+    head = tuple(map(Column, ("mean over the same draws", "with a value", "estimate", "low", "high")))
+    said = f"Each with {100.0 * estimate.rule.confidence_of_look:.4g} % confidence, of the draws that have a value."
+    return (Section("Further metrics", (said,), Table(head, tuple(rows))),)
 
 
 def verdict(estimate: MonteCarlo) -> str:

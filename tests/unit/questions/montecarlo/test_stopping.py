@@ -201,3 +201,21 @@ def test_a_scenario_is_drawn_until_its_error_is_known() -> None:
     assert found.last.interval.low < 0.875 < found.last.interval.high
     again = monte_carlo(STUDY, METRIC, width="10 %", configuration="proportional", first_draws=64, draws=1024)
     assert again.last == found.last
+
+
+def test_further_metrics_are_means_over_the_same_draws_that_have_a_value() -> None:
+    def model(columns: Mapping[str, Floats]) -> Outcomes:
+        x = columns["x"]
+        half = np.where(x > 1.0, 2.0 * x, np.nan)
+        return Outcomes({METRIC: x, "final_error": half}, np.zeros(x.size, bool), "")
+
+    rule = StoppingRule(10.0, is_relative=False, first=256, maximum=256)
+    found = draw_until(model, UNCERTAIN, METRIC, mean_of("N m"), rule, 1, ["final_error"])
+    count, mean = found.also["final_error"]
+    above = found.values[found.values > 1.0]
+    assert count == above.size < 256
+    assert mean.value == pytest.approx(2.0 * above.mean())
+    truth = 2.0 * MEAN * NORMAL.cdf(SIGMA**2) / 0.5
+    assert mean.low < truth < mean.high
+    assert found.to_dict()["also"]["final_error"]["draws"] == count
+    assert "Further metrics" in [section.heading for section in found.answer().sections]
