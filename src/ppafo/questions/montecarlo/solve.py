@@ -327,9 +327,9 @@ def monte_carlo(
     draws: int = 2**20,
     confidence: float = 0.95,
     maximum_failed: float = 0.01,
-    also: Sequence[str] = (),
     threads: int | None = None,
     progress: Report | None = None,
+    also: Sequence[str] = (),
 ) -> MonteCarlo:
     """Estimate a statistic of a metric over the distributions of a study until its interval is ``width`` wide.
 
