@@ -3,7 +3,8 @@
     python scripts/drawn_walks.py --courses 1000 --seed 32
     python scripts/drawn_walks.py --faults 60 --seed 32
 
-The first prints for each valve how many walks without a fault stop, pause to their end, or press against the wearer.
+The first prints for each valve how many walks without a fault stop, pause to their end, press against the wearer, or
+have no help back after two strides of steady walking.
 The second draws faults of the plant with a shut-off valve fitted, and prints how soon each is found, by which sign, and
 what is left on the wearer half a second later. The controller believes in the nominal device, whatever device is drawn.
 They print tables of docs/walking-faults.md; all of it is simulated.
@@ -14,11 +15,12 @@ import tempfile
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from ppafo.control.walking.signs import PAUSED, STOPPED
+from ppafo.control.walking.signs import HELPS, PAUSED, STOPPED
 from ppafo.errors import ScenarioError
 from ppafo.model import contact as ground
 from ppafo.model.plant_faults import PLANT_FAULTS
@@ -37,6 +39,7 @@ ON_HEEL, ON_TOES, AT_REST, AFTER = 0.5, 1.0, 0.5, 2.0
 SETTLED, SHUT_OFF = 0.5, "shut_off.area=10 mm^2"
 """Time after an alarm [s] from which its torque counts, and the valve that is then in the line."""
 
+TWO_STRIDES = 2.0
 LASTING = 0.06
 """A torque counts that lasts this long [s]: a foot that comes down needs as long to empty a chamber."""
 
@@ -48,18 +51,28 @@ some 60 ms before its heel carries, and then turns so quickly that the gas of a 
 STANDS = 0.5
 """Who has stood still for so long [s] is not helped."""
 
+STEADY, MOST_WITHOUT = 0.1, 2
+"""A stride is steady where it takes as long as the one before within this part of it, and loads heel and toes on the
+ground alone; after so many of them in a row help is back."""
+
 WITHOUT = (
     "| Valve | Walks | Stops | Paused to the end | Pressed down on the heel | ... before the heel carries "
-    "| Lifted on the toes | On who stands or sits |"
+    "| Lifted on the toes | On who stands or sits | No help in more than two steady strides |"
 )
-WITH = "| Fault | Valve | Within two strides | Last (strides) | Signs | N m after it is found | N m where it is not |"
+WITH = (
+    "| Fault | Valve | Within two strides | Last (strides) | Signs | N m until it is found later "
+    "| Last above 2 N m (s after it is found) | N m from 0.5 s after | N m where it is not found |"
+)
 
 
 @dataclass(frozen=True)
 class Outcome:
     """What one walk came to: stops, a pause to its end, peak torques [N m], strides to the first sign, its name.
 
-    ``flat`` is the peak in plantarflexion where heel or foot are down and the heel does not carry yet.
+    ``until`` is the peak against the wearer from a fault to its sign, ``after`` that from ``SETTLED`` later on, or
+    where no sign comes; ``settles`` [s] is how long after the sign more than ``AFTER`` is left. ``flat`` is the peak in
+    plantarflexion where heel or foot are down and the heel does not carry yet, ``unhelped`` the most steady strides in
+    a row from strike to strike without all of the help.
     """
 
     stopped: bool
@@ -71,6 +84,9 @@ class Outcome:
     found: float
     sign: str
     after: float
+    until: float
+    settles: float
+    unhelped: int
 
 
 def drawn_course(draws: np.random.Generator) -> str:
@@ -154,14 +170,34 @@ def drawn_walk(valve: str, draws: np.random.Generator, folder: Path, overrides: 
         return with_numbers(base, drawn_device(base, draws))
 
 
+def lasting(torque: np.ndarray, where: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """The torque [N m] that is reached in some samples for ``LASTING`` from each sample on; 0 in the others."""
+    count = max(1, round(LASTING / float(time[1] - time[0])))
+    kept = np.concatenate([np.where(where, torque, 0.0), np.zeros(count - 1)])
+    found: np.ndarray = np.lib.stride_tricks.sliding_window_view(kept, count).min(axis=1).clip(min=0.0)
+    return found
+
+
 def lasting_peak(torque: np.ndarray, where: np.ndarray, time: np.ndarray) -> float:
     """The largest torque [N m] that is reached for ``LASTING`` on end in some samples; 0 where never."""
-    count = max(1, round(LASTING / float(time[1] - time[0])))
-    kept = np.where(where, torque, 0.0)
-    if kept.size < count:
-        return 0.0
-    least = np.lib.stride_tricks.sliding_window_view(kept, count).min(axis=1)
-    return float(max(least.max(), 0.0))
+    return float(lasting(torque, where, time).max())
+
+
+def steady_without_help(result: WalkResult) -> int:
+    """Most steady strides in a row in which help was less from strike to strike, or that had no lift."""
+    data, time = result.recording, result.recording.time
+    in_air = data["contact"] == ground.SWING
+    starts = np.flatnonzero(in_air[:-1] & ~in_air[1:]) + 1
+    most, row, last = 0, 0, np.inf
+    for begins, ends in pairwise(starts.tolist()):
+        taken, own = float(time[ends] - time[begins]), slice(begins, ends)
+        loads = min(float(data["heel_force"][own].max()), float(data["toe_force"][own].max())) > CARRIES
+        scuffs = bool((in_air[own] & (data["toe_force"][own] > CARRIES)).any())
+        steady = loads and not scuffs and abs(taken - last) < STEADY * last
+        less = bool((data["safe_state"][own] > HELPS).all()) or not (data["command"][own] < 0.0).any()
+        row = row + 1 if steady and less else 0
+        most, last = max(most, row), taken
+    return most
 
 
 def outcome(result: WalkResult, begins: float = np.inf) -> Outcome:
@@ -176,7 +212,9 @@ def outcome(result: WalkResult, begins: float = np.inf) -> Outcome:
     event = next((item for item in result.events if item.sign is not None and item.time >= begins), None)
     stride = walk_of(result.scenario).gait.stride_time
     against = np.where(contact == ground.TOE, -torque, torque)
-    late = time > (event.time + SETTLED if event is not None else min(begins, 1.0e9))
+    alarm = min(begins, 1.0e9) if event is None else event.time
+    late = time > (alarm if event is None else alarm + SETTLED)
+    above = time[lasting(against, time > alarm, time) > AFTER] + LASTING
     return Outcome(
         stopped=bool((level >= STOPPED).any()),
         paused=bool(level[-1] == PAUSED),
@@ -187,6 +225,9 @@ def outcome(result: WalkResult, begins: float = np.inf) -> Outcome:
         found=np.inf if event is None else (event.time - begins) / stride,
         sign="-" if event is None or event.sign is None else event.sign.name,
         after=lasting_peak(against, late, time) if np.isfinite(begins) else 0.0,
+        until=lasting_peak(against, (time > begins) & (time < alarm), time),
+        settles=float(above[-1] - alarm) if above.size and event is not None else 0.0,
+        unhelped=steady_without_help(result),
     )
 
 
@@ -222,19 +263,24 @@ def row_without(valve: str, found: list[Outcome]) -> str:
     stops = Counter(item.sign for item in found if item.stopped)
     words = "" if not stops else " (" + ", ".join(f"{name} {many}" for name, many in stops.items()) + ")"
     stopped, paused = f"{sum(item.stopped for item in found)}{words}", str(sum(item.paused for item in found))
-    return f"| {' | '.join((valve, str(len(found)), stopped, paused, *cells))} |"
+    late = f"{sum(item.unhelped > MOST_WITHOUT for item in found)} (at most {max(item.unhelped for item in found)})"
+    return f"| {' | '.join((valve, str(len(found)), stopped, paused, *cells, late))} |"
 
 
 def row_with(valve: str, part: str, kind: str, found: list[Outcome]) -> str:
     """One row of the table of faults."""
     times = [item.found for item in found if np.isfinite(item.found)]
-    quick = sum(time <= 2.0 for time in times)
+    quick = sum(time <= TWO_STRIDES for time in times)
     names = ", ".join(f"`{name}` {many}" for name, many in Counter(item.sign for item in found).most_common())
     worst = max((item.after for item in found if np.isfinite(item.found)), default=0.0)
     missed = max((item.after for item in found if not np.isfinite(item.found)), default=0.0)
     last = f"{max(times):.2f}" if times else "-"
+    slow = [item.until for item in found if TWO_STRIDES < item.found < np.inf]
+    until = f"{max(slow):.1f}" if slow else "-"
+    settles = f"{max(item.settles for item in found):.2f}"
     shown = f"{missed:.1f}" if len(times) < len(found) else "-"
-    return f"| {part}: {kind} | {valve} | {quick} of {len(found)} | {last} | {names} | {worst:.1f} | {shown} |"
+    cells = (f"{part}: {kind}", valve, f"{quick} of {len(found)}", last, names, until, settles, f"{worst:.1f}", shown)
+    return f"| {' | '.join(cells)} |"
 
 
 def main() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ppafo.model.plant_faults import PLANT_FAULTS
-from scripts.drawn_walks import AFTER, AT_REST, ON_HEEL, ON_TOES, VALVES, with_fault, without_faults
+from scripts.drawn_walks import AFTER, AT_REST, MOST_WITHOUT, ON_HEEL, ON_TOES, VALVES, with_fault, without_faults
 
 pytestmark = pytest.mark.long
 SEED = 7
@@ -19,13 +19,15 @@ SLOWLY = {"creeping"}
 
 @pytest.mark.parametrize(("count", "seed"), [(30, SEED), pytest.param(300, 8, marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("valve", VALVES)
-def test_no_drawn_walk_without_a_fault_stops_pauses_to_its_end_or_presses_against_the_wearer(
+def test_no_drawn_walk_without_a_fault_stops_pauses_on_presses_against_the_wearer_or_is_long_without_help(
     valve: str, count: int, seed: int
 ) -> None:
     found = without_faults(valve, count, seed)
     assert not [item for item in found if item.stopped or item.paused]
     assert max(item.on_toes for item in found) <= ON_TOES
     assert max(item.at_rest for item in found) <= AT_REST
+    # After a pause, a stop of the person, a climb or a stumble.
+    assert max(item.unhelped for item in found) <= MOST_WITHOUT
     # What is left is the gas of a vented chamber, pinched by a foot that came down on its toes.
     assert sum(item.on_heel > ON_HEEL for item in found) <= MOST_PINCHED * count
 

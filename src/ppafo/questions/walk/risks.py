@@ -1,12 +1,12 @@
 """What can go wrong in a walk: a table in the form of ISO 14971, of simulated faults, to begin a risk file from.
 
-Every fault of the plant, and faults of each sensor, begin at some instants of a stride. What is shown is the worst of
-them: how long until the walk is safe, by which sign, the angular impulse against the wearer and the lowest toes until
-then, and the torque that is left.
+Every fault of the plant, and faults of each sensor, begin at some instants of a stride. Each number is the worst of
+them: how long until the walk is safe, the angular impulse against the wearer, the lowest toes, the torque that is left.
 """
 
 import csv
 import io
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -14,17 +14,20 @@ from typing import Any
 import numpy as np
 
 from ppafo.answers import Answer, Column, Section, Table
+from ppafo.control.walking.signs import FORCE_RANGE, LIFTS, PAUSED, SIGNS, STOPPED, level_of
 from ppafo.model import contact as ground
 from ppafo.model.plant_faults import PLANT_FAULTS
 from ppafo.questions.question import Solved
+from ppafo.simulation.declaration import short_quantity_text
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.declaration import FAULTY, READINGS, fault_numbers
+from ppafo.walking.events import SILENT
 from ppafo.walking.motion import SHORTEST_STRIDES, check_led, walk_of, with_duration
 from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import walk, with_device_off
 
-INSTANTS, FIRST, AFTER = 4, 4, 4
+INSTANTS, FIRST, AFTER = 4, 4, 6
 """Instants of a stride at which each fault begins, the stride in which it does, and strides that are walked on."""
 
 HARM, SETTLED = 2.0, 0.5
@@ -43,9 +46,35 @@ SAYS = (
 )
 
 
+LEFT = {
+    STOPPED: "no help until it is switched on again",
+    PAUSED: "no help until the wearer walks steadily",
+    LIFTS: "the foot is lifted, without push-off",
+}
+"""What is left of the help at each level of ``control.walking.signs``."""
+
+NEVER = "never"
+
+TO_FILL_IN = ("severity", "probability", "risk_control", "residual_risk")
+"""Columns of the CSV file that are left empty for the risk file that it begins."""
+
+DEFINITIONS = (
+    "chamber 1 turns the toes down (plantarflexion), chamber 2 lifts them",
+    f"a fault begins at {INSTANTS} instants of a stride, and each number is the worst of them; signs are those of all",
+    "torque against the wearer: plantarflexion in the air and on heel or flat foot, dorsiflexion on the toes",
+    f"safe: at most {HARM:g} N m against the wearer from then on, and no sooner than the alarm; 'never' where that is "
+    f"not so in the last of the {AFTER} strides that follow",
+    f"harm: angular impulse of the torque above {HARM:g} N m against the wearer, from the fault on",
+    "toe clearance: lowest toes in a swing; below 0 the foot scuffs, for hip and knee move as prescribed",
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Risk:
-    """One cause, with the worst of its instants: times [s], impulse [N m s], heights [m], torque [N m]."""
+    """One cause, the worst of its instants in each number: times [s], impulse [N m s], heights [m], torque [N m].
+
+    A time is None where one instant has no alarm or no safe state; ``sign`` names the signs of all.
+    """
 
     hazard: str
     cause: str
@@ -61,13 +90,29 @@ class Risk:
     what_is_left: str
 
 
+@dataclass(frozen=True, slots=True)
+class _Instant:
+    """What a fault that begins at one instant comes to; times [s] from then on, None where never."""
+
+    sign: str
+    level: float
+    alarm: float | None
+    safe: float | None
+    impulse: float
+    peak: float
+    toes: float
+    left: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Risks(Solved):
-    """The risks of a walk, and its lowest toes [m] without the device."""
+    """The risks of a walk; lowest toes [m] without the device, and with it where nothing fails, with its peak [N m]."""
 
     scenario: Scenario
     risks: tuple[Risk, ...]
     bare_toes: float
+    sound_toes: float
+    sound_peak: float
 
 
 def risks_of_walk(configuration: Scenario) -> Risks:
@@ -78,9 +123,12 @@ def risks_of_walk(configuration: Scenario) -> Risks:
     length = max(FIRST + AFTER + 1, SHORTEST_STRIDES) * stride
     level = with_duration(replace(configuration, motion=motion), length)
     bare = _toes(walk(with_device_off(level)), FIRST * stride)
+    sound = walk(level)
     begins = [(FIRST + place / INSTANTS) * stride for place in range(INSTANTS)]
     risks = [_risk(level, cause, begins, bare) for cause in _causes(level)]
-    return Risks(level, tuple(risks), bare)
+    after = sound.recording.time >= begins[0]
+    peak = float(np.maximum(_against(sound), 0.0)[after].max())
+    return Risks(level, tuple(risks), bare, _toes(sound, begins[0]), peak)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +147,13 @@ def _causes(configuration: Scenario) -> Iterator[_Cause]:
         if has_lines and part.startswith(("regulator", "bottle")):
             continue
         for kind, fault in kinds.items():
-            numbers = {item.name: item.default or 0.0 for item in fault.quantities if item.name != "time"}
-            yield _Cause(part, kind, numbers, f"{part.replace('_', ' ')} {kind.replace('_', ' ')}")
+            sized = [item for item in fault.quantities if item.name != "time"]
+            numbers = {item.name: item.default or 0.0 for item in sized}
+            sizes = ", ".join(
+                f"{item.name} {short_quantity_text(numbers[item.name], item.unit)}".rstrip() for item in sized
+            )
+            words = f"{part.replace('_', ' ')} {kind.replace('_', ' ')}"
+            yield _Cause(part, kind, numbers, f"{words} ({sizes})" if sizes else words)
     readings = {"angle": 0.5 * np.pi, "pressure_1": configuration.device.supply.atmospheric_pressure}
     readings["pressure_2"] = readings["pressure_1"]
     for sensor in FAULTY:
@@ -124,8 +177,27 @@ def _failing(configuration: Scenario, cause: _Cause, time: float) -> Scenario:
 
 
 def _risk(configuration: Scenario, cause: _Cause, begins: list[float], bare: float) -> Risk:
-    found = [_one(walk(_failing(configuration, cause, time)), cause, time, bare) for time in begins]
-    return max(found, key=lambda item: (item.left, item.impulse, bare - item.toes))
+    found = [_one(walk(_failing(configuration, cause, time)), time) for time in begins]
+    alarms, safe = [item.alarm for item in found], [item.safe for item in found]
+    left, toes = max(item.left for item in found), min(item.toes for item in found)
+    impulse, level = max(item.impulse for item in found), max(item.level for item in found)
+    drags = toes < bare - DRAGS
+    hazard = "torque against the wearer" if impulse > 0.0 else ("toes drag" if drags else "loss of help")
+    help_left = LEFT.get(level, "help goes on")
+    return Risk(
+        hazard,
+        cause.words,
+        cause.part,
+        cause.kind,
+        ", ".join(name for name, _ in Counter(item.sign for item in found).most_common()),
+        None if None in alarms else max(time for time in alarms if time is not None),
+        None if None in safe else max(time for time in safe if time is not None),
+        impulse,
+        max(item.peak for item in found),
+        toes,
+        left,
+        f"up to {left:.1f} N m against the wearer; {help_left}" if left > HARM else help_left,
+    )
 
 
 def _against(result: WalkResult) -> np.ndarray:
@@ -140,45 +212,49 @@ def _toes(result: WalkResult, since: float) -> float:
     return float(data["toe_height"][swings].min()) if swings.any() else 0.0
 
 
-def _one(result: WalkResult, cause: _Cause, begins: float, bare: float) -> Risk:
+def _one(result: WalkResult, begins: float) -> _Instant:
     time = result.recording.time
     against = np.maximum(_against(result), 0.0)
     event = next((item for item in result.events if item.sign is not None and item.time >= begins), None)
     alarm = None if event is None else event.time - begins
     after = time >= begins
     harmful = np.flatnonzero(after & (against > HARM))
-    safe_from = begins if not harmful.size else float(time[harmful[-1]])
-    is_safe = not harmful.size or harmful[-1] < time.size - 2
-    to_safe = max(safe_from - begins, alarm or 0.0) if is_safe else None
-    impulse = float(np.trapezoid(np.where(after & (against > HARM), against, 0.0), time))
-    toes = _toes(result, begins)
-    settled = time >= (begins if event is None else event.time + SETTLED)
-    left = float(against[settled].max()) if settled.any() else 0.0
-    drags = toes < bare - DRAGS
-    hazard = "torque against the wearer" if harmful.size else ("toes drag" if drags else "loss of help")
-    stays = (
-        f"up to {left:.1f} N m against the wearer" if left > HARM else "no help" if event is not None else "none seen"
+    last = begins if not harmful.size else float(time[harmful[-1]])
+    is_safe = last < time[-1] - walk_of(result.scenario).gait.stride_time
+    # Without an alarm all of it is left, but of what is over by then.
+    since = (begins if not is_safe else last + time[1]) if event is None else event.time + SETTLED
+    settled = time >= since
+    return _Instant(
+        sign="none" if event is None or event.sign is None else event.sign.name,
+        level=max(float(result.recording["safe_state"][-1]), STOPPED if event and event.sign == SILENT else 0.0),
+        alarm=alarm,
+        safe=max(last - begins, alarm or 0.0) if is_safe else None,
+        impulse=float(np.trapezoid(np.where(after & (against > HARM), against, 0.0), time)),
+        peak=float(against[after].max()),
+        toes=_toes(result, begins),
+        left=float(against[settled].max()) if settled.any() else 0.0,
     )
-    sign = "-" if event is None or event.sign is None else event.sign.name
-    peak = float(against[after].max())
-    return Risk(hazard, cause.words, cause.part, cause.kind, sign, alarm, to_safe, impulse, peak, toes, left, stays)
 
 
 _HEAD = (
     Column("Hazard"),
     Column("Cause"),
-    Column("Sign"),
+    Column("Signs"),
+    Column("What is left"),
     Column("Alarm after (s)"),
     Column("Safe after (s)"),
     Column("Harm (N m s)"),
     Column("Peak (N m)"),
-    Column("Lowest toes (cm)"),
-    Column("What is left"),
+    Column("Toe clearance (cm)"),
 )
 
 
 def _number(value: float | None, form: str) -> str:
-    return "-" if value is None else format(value, form)
+    return NEVER if value is None else format(value, form)
+
+
+def _centimetres(height: float) -> str:
+    return f"{round(100.0 * height, 1) + 0.0:.1f}"
 
 
 def answer_of(solved: Risks) -> Answer:
@@ -188,14 +264,20 @@ def answer_of(solved: Risks) -> Answer:
             item.hazard,
             item.cause,
             item.sign,
+            item.what_is_left,
             _number(item.time_to_alarm, ".2f"),
             _number(item.time_to_safe_state, ".2f"),
             f"{item.impulse:.2f}",
             f"{item.peak:.1f}",
-            f"{round(100.0 * item.toes, 1) + 0.0:.1f}",
-            item.what_is_left,
+            _centimetres(item.toes),
         )
         for item in solved.risks
+    )
+    signs = {name for item in solved.risks for name in item.sign.split(", ")}
+    meanings = tuple(
+        (sign.name, sign.summary, LEFT[level_of(number)])
+        for number, sign in (*SIGNS.items(), (FORCE_RANGE, SILENT))
+        if sign.name in signs
     )
     name, fitted = solved.scenario.name, bool(walk_of(solved.scenario).shut_off)
     valve = "A shut-off valve is fitted." if fitted else "No shut-off valve is fitted: [shut_off] of the walk fits one."
@@ -203,11 +285,20 @@ def answer_of(solved: Risks) -> Answer:
         name="risks",
         kicker="What can go wrong",
         title=f"Risks of {name}",
-        lead=(f"{name}: {len(rows)} causes, each at {INSTANTS} instants of a stride; the worst is shown", SAYS),
+        lead=(f"{name}: {len(rows)} causes, each at {INSTANTS} instants of a stride", SAYS),
         sections=(
             Section(
-                table=Table(_HEAD, rows, left=3),
-                remarks=(valve, f"without the device the toes reach {100.0 * solved.bare_toes:.1f} cm"),
+                table=Table(_HEAD, rows, left=4),
+                remarks=(
+                    valve,
+                    f"where nothing fails: at most {solved.sound_peak:.1f} N m against the wearer, toe clearance "
+                    f"{_centimetres(solved.sound_toes)} cm; without the device {_centimetres(solved.bare_toes)} cm",
+                    *DEFINITIONS,
+                ),
+            ),
+            Section(
+                heading="Signs",
+                table=Table((Column("Sign"), Column("What is seen"), Column("What is left")), meanings, left=3),
             ),
         ),
         data={
@@ -217,7 +308,10 @@ def answer_of(solved: Risks) -> Answer:
             "simulated": True,
             "walk": name,
             "shut_off": fitted,
+            "definitions": DEFINITIONS,
             "toes_without_device": solved.bare_toes,
+            "toes_without_fault": solved.sound_toes,
+            "peak_without_fault": solved.sound_peak,
             "risks": [{field: getattr(item, field) for field in Risk.__dataclass_fields__} for item in solved.risks],
         },
         files={"risks.csv": lambda: risks_csv(solved)},
@@ -226,10 +320,11 @@ def answer_of(solved: Risks) -> Answer:
 
 
 def risks_csv(solved: Risks) -> bytes:
-    """One line a cause, in SI units."""
+    """One line a cause, in SI units, with empty columns for what a simulation cannot say."""
     text = io.StringIO()
     text.write(f"# simulated: {SAYS}\n")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(Risk.__dataclass_fields__)
-    writer.writerows([getattr(item, field) for field in Risk.__dataclass_fields__] for item in solved.risks)
+    fields = tuple(Risk.__dataclass_fields__)
+    writer.writerow((*fields, *TO_FILL_IN))
+    writer.writerows([*(getattr(item, field) for field in fields), *("" for _ in TO_FILL_IN)] for item in solved.risks)
     return text.getvalue().encode()
