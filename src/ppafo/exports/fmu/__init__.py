@@ -167,7 +167,7 @@ def closed_loop(item: Scenario) -> Interface:
     return Interface(
         name=item.name,
         library=library,
-        templates=("closed_loop.c",),
+        templates=("stepped.c", "closed_loop.c"),
         time=_LOOP_TIME,
         tuning=_LOOP_TUNING,
         step=times["run.output_interval"],
@@ -281,7 +281,7 @@ def plant_alone(item: Scenario) -> Interface:
     return Interface(
         name=library.title,
         library=library,
-        templates=("plant_inputs.c", "plant.c"),
+        templates=("stepped.c", "plant_inputs.c", "plant.c"),
         time=PLANT_TIME.format(motion=alone.motion),
         tuning=PLANT_TUNING,
         step=alone.step,

@@ -13,20 +13,6 @@ static bool get_metric(unit *item, uint32_t number, double *value)
     return true;
 }
 
-static bool get_further(unit *item, uint32_t number, double *value)
-{
-    (void)number;
-    (void)value;
-    return refuse(item, "there is no such variable");
-}
-
-/* The outputs are those of the last sample. */
-static bool bring_up(unit *item)
-{
-    (void)item;
-    return true;
-}
-
 static bool go_to_sample(unit *item, int64_t sample)
 {
     while (item->run->samples_shown <= sample) {
@@ -36,8 +22,7 @@ static bool go_to_sample(unit *item, int64_t sample)
         case @NAME@_FINISHED:
             return refuse(item, "the run ends at run.duration = %g s: set that before the start", item->now.settings.run_duration);
         default:
-            return refuse(item, "the run left what is possible after %g s: try a smaller run.step, and check inertia, volumes and areas",
-                item->now.time);
+            return refuse_impossible(item);
         }
     }
     return true;

@@ -1,27 +1,8 @@
 /* ---- The plant alone: it goes on by steps of the engine, under inputs that are constant from one point to the next. ---- */
 
-static bool get_further(unit *item, uint32_t number, double *value)
-{
-    (void)number;
-    (void)value;
-    return refuse(item, "there is no such variable");
-}
-
-/* The outputs are those of the last step. */
-static bool bring_up(unit *item)
-{
-    (void)item;
-    return true;
-}
-
-/* Do steps; where that fails the unit says why. */
 static bool do_steps(unit *item, int64_t steps)
 {
-    if (!advance_steps(item->run, steps)) {
-        return refuse(item, "the run left what is possible after %g s: try a smaller run.step, and check inertia, volumes and areas",
-            item->now.time);
-    }
-    return true;
+    return advance_steps(item->run, steps) || refuse_impossible(item);
 }
 
 static bool take_first_sample(unit *item)

@@ -119,7 +119,9 @@ def design_figure(design: Design) -> "matplotlib.figure.Figure":
             _view(axes, design, table, x, y)
             axes.set_title(f"$\\bf{{{letter}}}$   {title}", pad=8)
         _growth(panels[3], design)
-        _legend(figure, names, panels[0])
+        titles = {part.name: part.title for point in design.front for part in (point.valve, point.actuator)}
+        valves, actuators = ([titles[name] for name in group] for group in names)
+        _legend(figure, valves, actuators, panels[0])
         mark_kind(figure, "simulated")
     return figure
 
@@ -184,10 +186,9 @@ def _growth(axes: "Axes", design: Design) -> None:
     axes.locator_params(axis="x", nbins=5)
 
 
-def _legend(figure: "matplotlib.figure.Figure", names: tuple[list[str], list[str]], axes: "Axes") -> None:
+def _legend(figure: "matplotlib.figure.Figure", valves: list[str], actuators: list[str], axes: "Axes") -> None:
     from matplotlib.lines import Line2D
 
-    valves, actuators = names
     handles = [
         Line2D([], [], linestyle="none", marker="s", markersize=7, color=_COLOURS[number % len(_COLOURS)], label=name)
         for number, name in enumerate(valves)

@@ -179,7 +179,7 @@ def sizing_figure(sizing: Sizing) -> "matplotlib.figure.Figure":
                 sizing.recording.time,
                 sizing.recording["torque"],
                 color=_COLOURS[sizing.valves.index(sizing.choice) % len(_COLOURS)],
-                label=f"{sizing.choice.valve.name} at {pressure:.1f} {axis_unit('pressure')}",
+                label=f"{sizing.choice.valve.title} at {pressure:.1f} {axis_unit('pressure')}",
             )
         axes.set_title(f"$\\bf{{A}}$   {title}", pad=18)
         axes.set_xlabel("Time (s)")
@@ -198,7 +198,7 @@ def _errors(axes: "Axes", sizing: Sizing) -> None:
         pressure, error, _ = item.curve
         colour = _COLOURS[number % len(_COLOURS)]
         axes.plot(
-            display_values(pressure, "pressure"), error, color=colour, marker=".", markersize=4, label=item.valve.name
+            display_values(pressure, "pressure"), error, color=colour, marker=".", markersize=4, label=item.valve.title
         )
         _mark(axes, item, item.error, colour)
     axes.axhline(limit, color=BLACK, linewidth=1.0, linestyle="--")

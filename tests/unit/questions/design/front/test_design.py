@@ -285,7 +285,10 @@ def test_a_limit_in_gauge_pressure_counts_from_the_atmosphere_of_the_tasks(tmp_p
 
 
 def test_a_design_is_drawn_and_told_as_data_like_any_answer(study: Design) -> None:
-    labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in study.plot().axes]
+    figure = study.plot()
+    labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes]
+    parts = {part.title for point in study.front for part in (point.valve, point.actuator)}
+    assert {text.get_text() for text in figure.legends[0].get_texts()} == {*parts, "suggested"}
     assert labels[0] == ("Error (N m)", "Gas per task (g)")
     assert labels[1] == ("Error (N m)", "Mass (g)")
     assert study.to_dict()["suggested"] == study.knee

@@ -92,7 +92,11 @@ def test_the_lowest_pressure_is_just_above_the_torque_ceiling_and_is_said_to_be_
 
 
 def test_a_sizing_is_drawn_and_told_as_data_like_any_answer(sizing: Sizing) -> None:
-    assert [axes.get_xlabel() for axes in sizing.plot().axes] == ["Time (s)", *["Supply pressure (psig)"] * 2]
+    panels = sizing.plot().axes
+    assert [axes.get_xlabel() for axes in panels] == ["Time (s)", *["Supply pressure (psig)"] * 2]
+    legend = panels[1].get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == ["Enfield Technologies LS-V05s"]
     assert sizing.to_dict()["suggested"] == "enfield-ls-v05s"
 
 
