@@ -62,6 +62,13 @@ def test_an_effect_that_the_model_lacks_is_named_with_the_size_of_a_fit_with_it(
     held = [one for one in found.estimates if one.verdict == "holds for this model only"]
     assert held
     assert all("Fitted with " in one.explanation for one in held)
+    # Only a fit that takes no form of the effect for granted has intervals that can be printed.
+    assert first.refit.is_of_any_form == (extra.leak_opens > 0.0)
+    assert all(("whatever its form" in one.explanation) == first.refit.is_of_any_form for one in held)
+    if first.refit.is_of_any_form:
+        # With one form for all leaks the area was off by 3 to 9 standard errors.
+        for item, at, error in zip(found.optimum.residuals.ranges, first.refit.point, first.refit.errors, strict=True):
+            assert abs(item.coordinate(PLANTED.truth(item.path)) - at) < 2.6 * error
 
 
 def test_friction_that_grows_unseen_is_in_the_condition_and_the_truth_in_the_interval_beside() -> None:

@@ -26,6 +26,10 @@ from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.signals.recording import BETWEEN, PLAIN_NUMBER, TIME, TIME_UNIT, Between, Floats
 from ppafo.storage.files import read_bytes, write_file
 
+_OTHERS = (
+    (";", "semicolons", 'delimiter = "semicolon", and decimal = "comma" if numbers have decimal commas'),
+    ("\t", "tabs", 'delimiter = "tab", and decimal = "comma" if numbers have decimal commas'),
+)
 _HEADER = re.compile(r"\s*(\w+)\s*\[\s*([^\[\]]+?)\s*\]\s*(\w*)\s*", re.ASCII)
 _LEVEL = "Pa_a"
 
@@ -58,9 +62,10 @@ def parse_header(cells: list[str]) -> list[Column]:
         match = _HEADER.fullmatch(cell)
         if match is None:
             shown = cell if len(cell) <= 40 else f"{cell[:36]} ..."
-            remedy = f"; {DECIMAL_COMMAS}" if ";" in cell else ""
+            remedy = next((f"; {one} need a column map with {key}" for mark, one, key in _OTHERS if mark in cell), "")
             raise DataError(
-                f"the header must name columns as 'name [unit]', separated by commas; '{shown}' is not one{remedy}"
+                f"the header must name columns as 'name [unit]', separated by commas; '{one_line(shown)}' is not one"
+                f"{remedy or ('' if cell.strip() else '; does the line end with a comma?')}"
             )
         columns.append(Column(match[1], match[2], _between(match[3], match[1])))
     names = [column.name for column in columns]
@@ -130,7 +135,12 @@ _LONGEST_CELL = 40
 _UNDERSCORE = "_"
 """Python takes 1_000 for a thousand; in a table it is a slip."""
 
-DECIMAL_COMMAS = 'numbers with a decimal comma need a column map with decimal = "comma" and their delimiter'
+SPLIT_NUMBERS = (
+    "commas seem to separate columns and decimals alike: write the file with decimal points, or with another delimiter "
+    'and read it through a column map with decimal = "comma"'
+)
+"""Of rows that have twice as many cells as there are columns."""
+_DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*", re.ASCII)
 _SIMILAR = 0.8
 """How near a word has to be to a kind to be a misspelling of it; 'measurement: run 3' is a remark like any other."""
 
@@ -217,7 +227,8 @@ def _lines(path: str | Path) -> list[str]:
     try:
         text = decoded(content)
     except UnicodeDecodeError as error:
-        raise DataError(f"{path}: is not a text file in UTF-8 (byte {error.start})") from error
+        remedy = 'a column map with encoding = "latin-1" reads that'
+        raise DataError(f"{path}: is not a text file in UTF-8 (byte {error.start}); {remedy}") from error
     if "\0" in text:
         raise DataError(f"{path}: is not a text file (byte {text.index(chr(0))} is zero)")
     if not text.endswith(("\n", "\r")):
@@ -235,7 +246,7 @@ def _table(header: list[str], rows: Iterable[list[str]], skipped: int) -> Floats
         if blank is not None:
             raise DataError(f"line {blank} has 0 values for {len(header)} columns")
         if len(row) != len(header):
-            remedy = f"; {DECIMAL_COMMAS}" if len(row) == 2 * len(header) else ""
+            remedy = f"; {SPLIT_NUMBERS}" if len(row) == 2 * len(header) else ""
             raise DataError(f"line {line} has {len(row)} values for {len(header)} columns{remedy}")
         try:
             values = [float(cell) for cell in row]
@@ -251,7 +262,8 @@ def _no_number(header: list[str], row: list[str], line: int) -> DataError:
     """Return the error of a row in which a cell is no finite number."""
     column = next((index for index, cell in enumerate(row) if not _is_finite(cell)), 0)
     name, cell = header[column].strip(), one_line(row[column])[:_LONGEST_CELL]
-    return DataError(f"line {line}, column '{name}': {cell!r} is not a number, or not a finite one")
+    remedy = '; decimal commas need a column map with decimal = "comma"' if _DECIMAL_COMMA.fullmatch(cell) else ""
+    return DataError(f"line {line}, column '{name}': {cell!r} is not a number, or not a finite one{remedy}")
 
 
 def _is_finite(cell: str) -> bool:

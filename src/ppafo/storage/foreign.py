@@ -7,7 +7,7 @@ import csv
 import math
 import re
 from array import array
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from importlib import resources
 from itertools import chain, islice
@@ -24,7 +24,7 @@ from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import DataError, UnitError, nearest_name, one_line, refused_as
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT, Between, Floats
-from ppafo.storage.comma_separated import DECIMAL_COMMAS, Column, check_clock, in_si, kind_of_comments
+from ppafo.storage.comma_separated import SPLIT_NUMBERS, Column, check_clock, in_si, kind_of_comments
 from ppafo.storage.files import read_bytes
 
 Thousands = Literal["point", "comma", "apostrophe", "blank"]
@@ -128,16 +128,16 @@ def read_foreign(
         lines = _lines(path, columns.encoding)
         if TIME not in columns.channels:
             raise DataError(f"the column map has no channel '{TIME}'")
-        names, width, rows = _rows(lines, columns)
+        names, first, rows = _rows(lines, columns)
+        width = len(names) or len(first)
         places = {
-            name: place for name, item in columns.channels.items() if (place := _place(name, item, names, width)) >= 0
+            name: place for name, item in columns.channels.items() if (place := _place(name, item, names, first)) >= 0
         }
         titles = {name: names[place] if names else str(place + 1) for name, place in places.items()}
         table = _Table(array("q"), {name: array("d") for name in places})
         for line, row in rows:
             if len(row) != width:
-                is_split = columns.decimal == "point" and columns.delimiter == "comma" and len(row) == 2 * width
-                remedy = f"; {DECIMAL_COMMAS}" if is_split else ""
+                remedy = f"; {SPLIT_NUMBERS}" if columns.delimiter == "comma" and len(row) == 2 * width else ""
                 raise DataError(f"line {line} has {len(row)} values for {width} columns{remedy}")
             table.lines.append(line)
             for name, place in places.items():
@@ -168,8 +168,8 @@ class _Table:
     numbers: dict[str, "array[float]"]
 
 
-def _rows(lines: list[str], columns: ColumnMap) -> tuple[list[str], int, Rows]:
-    """Return the names of the columns (none without a header), how many there are, and the rows of text."""
+def _rows(lines: list[str], columns: ColumnMap) -> tuple[list[str], list[str], Rows]:
+    """Return the names of the columns (none without a header), the first row of numbers, and all rows of text."""
     numbered = islice(enumerate(lines, start=1), columns.skip_lines, None)
     cells = ((number, row) for number, row in _split(numbered, columns.delimiter) if row)
     head = next(cells, None)
@@ -180,7 +180,7 @@ def _rows(lines: list[str], columns: ColumnMap) -> tuple[list[str], int, Rows]:
     first = next(rows, None)
     if first is None:
         raise DataError("has no rows of numbers")
-    return names, len(names) or len(first[1]), chain([first], rows)
+    return names, first[1], chain([first], rows)
 
 
 def _lines(path: str | Path, encoding: str) -> list[str]:
@@ -209,7 +209,15 @@ def _split(lines: Iterable[tuple[int, str]], delimiter: str) -> Rows:
             raise DataError(f"line {number} cannot be read: {error}") from error
 
 
-def _place(name: str, item: MappedChannel, names: list[str], width: int) -> int:
+def _other_delimiter(cells: list[str], is_there: Callable[[list[str]], bool]) -> str:
+    """Return the remedy where the first line with another delimiter would have what is missing, else nothing."""
+    parts = (
+        (name, [part.strip() for cell in cells for part in cell.split(mark)]) for name, mark in _DELIMITERS.items()
+    )
+    return next((f'; give delimiter = "{name}"' for name, found in parts if found != cells and is_there(found)), "")
+
+
+def _place(name: str, item: MappedChannel, names: list[str], first: list[str]) -> int:
     """Return the place of the column of a channel from 0, -1 for a constant."""
     if (item.column is None) == (item.constant is None):
         raise DataError(
@@ -219,16 +227,19 @@ def _place(name: str, item: MappedChannel, names: list[str], width: int) -> int:
     if item.column is None:
         return -1
     if isinstance(item.column, int):
-        if item.column > width:
-            raise DataError(f"channel '{name}' is to come from column {item.column}, the file has {width}")
-        return item.column - 1
+        wanted, line = item.column, names or first
+        if wanted > len(line):
+            remedy = _other_delimiter(line, lambda found: len(found) >= wanted)
+            raise DataError(f"channel '{name}' is to come from column {wanted}, the file has {len(line)}{remedy}")
+        return wanted - 1
     if not names:
         raise DataError(f"channel '{name}' names a column {item.column!r}, but the file has no header; give its number")
     places = [place for place, known in enumerate(names, start=1) if known == item.column]
     if not places:
         shown = ", ".join(one_line(known)[:_LONGEST_SHOWN] for known in names)
         hint = nearest_name(item.column, names)
-        raise DataError(f"channel '{name}': there is no column {item.column!r}{hint}; the file has {shown}")
+        remedy = _other_delimiter(names, lambda found: item.column in found)
+        raise DataError(f"channel '{name}': there is no column {item.column!r}{hint}; the file has {shown}{remedy}")
     if len(places) > 1:
         shown = " and ".join(map(str, places))
         raise DataError(f"channel '{name}': columns {shown} are both called {item.column!r}; give the number of one")

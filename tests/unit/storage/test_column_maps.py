@@ -289,3 +289,22 @@ def test_a_file_in_utf_16_is_read(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("t,Öffnung\n0,1\n1,0\n", encoding="utf-16")
     channels = {"time": {"column": "t", "unit": "s"}, "command": {"column": "Öffnung"}}
     assert read_foreign(tmp_path / "log.csv", ColumnMap.model_validate({"channels": channels}))["command"][0] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("text", "header", "column"),
+    [("t;u\n0;1\n1;2\n", True, "u"), ("t;u\n0,5;1,5\n", True, "u"), ("0;1\n1;2\n", False, 2), ("t;u\n0;1\n", True, 2)],
+)
+def test_a_delimiter_that_the_map_lacks_is_named(tmp_path: Path, text: str, header: bool, column: str | int) -> None:
+    (tmp_path / "log.csv").write_text(text)
+    channels = {"time": {"column": 1, "unit": "s"}, "command": {"column": column}}
+    wanted = ColumnMap.model_validate({"header": header, "channels": channels})
+    with pytest.raises(DataError, match='give delimiter = "semicolon"'):
+        read_foreign(tmp_path / "log.csv", wanted)
+
+
+def test_commas_for_columns_and_decimals_alike_are_named_whatever_the_map_says(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("t,u\n0,5,1,5\n")
+    channels = {"time": {"column": "t", "unit": "s"}, "command": {"column": "u"}}
+    with pytest.raises(DataError, match="commas seem to separate columns and decimals alike"):
+        read_foreign(tmp_path / "log.csv", ColumnMap.model_validate({"decimal": "comma", "channels": channels}))

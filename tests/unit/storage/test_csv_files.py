@@ -157,9 +157,35 @@ def test_a_table_is_read_whatever_mark_its_encoding_has(tmp_path: Path, encoding
     assert read_csv(path)["angle"].tolist() == [1.0, 2.0]
 
 
-@pytest.mark.parametrize("text", ["time [s];angle [rad]\n0,0;1,5\n", "time [s],angle [rad]\n0,0,1,5\n"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "time [s];angle [rad]\n0,0;1,5\n",
+        "time [s],angle [rad]\n0,0,1,5\n",
+        'time [s],angle [rad]\n"0,0","1,5"\n',
+        "time [s]\tangle [rad]\n0,0\t1,5\n",
+    ],
+)
 def test_a_decimal_comma_is_named_where_it_breaks_a_table(tmp_path: Path, text: str) -> None:
     path = tmp_path / "bench.csv"
     path.write_text(text)
     with pytest.raises(DataError, match='decimal = "comma"'):
+        read_csv(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "remedy"),
+    [
+        (b"time [s];angle [rad]\n0.0;1.5\n", 'semicolons need a column map with delimiter = "semicolon"'),
+        (b"time [s]\tangle [rad]\n0.0\t1.5\n", 'tabs need a column map with delimiter = "tab"'),
+        (b"time [s],angle [rad],\n0.0,1.5,\n", "does the line end with a comma"),
+        (b"time [s],angle [\xb0]\n0.0,1.5\n", 'encoding = "latin-1"'),
+    ],
+)
+def test_how_another_program_writes_a_table_is_named_with_the_remedy(
+    tmp_path: Path, content: bytes, remedy: str
+) -> None:
+    path = tmp_path / "bench.csv"
+    path.write_bytes(content)
+    with pytest.raises(DataError, match=remedy):
         read_csv(path)

@@ -31,6 +31,7 @@ from ppafo.identification.trajectory.posterior import whiten
 from ppafo.identification.trajectory.refit import Refit, likelihood_with, refit_from_afar, refit_with
 from ppafo.identification.trajectory.residuals import Floats, Residuals, signals_at
 from ppafo.identification.trajectory.search import WhitenedFit
+from ppafo.identification.trajectory.uncertainty import WithEffect
 from ppafo.model.catalog import find_effects
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.recorded import COMMAND
@@ -46,6 +47,8 @@ _CLEAR = 4.0
 _SPAN = 2.0
 """Standard errors of a size on either side that the recordings leave open."""
 _INVISIBLE = 1.0e-9
+_NOTABLE = 3.0
+"""Standard errors of a score from which all effects are fitted: few of a right model, and a fit with each decides."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,13 +122,14 @@ class Doubt:
     conditions: tuple[str, ...]
 
     @property
-    def with_effect(self) -> tuple[str, Floats] | None:
-        """The effect that explains what is left, with the coordinates of the fit with it; None for none."""
+    def with_effect(self) -> WithEffect | None:
+        """The effect that explains what is left, with the fit with it; None for none."""
         first = self.shown[0] if self.shown else None
         if first is None or first.refit is None or not first.explains:
             return None
         rest = "" if first.refit.is_all else ", which leaves more than white noise,"
-        return f"{first.title}{rest}", first.refit.point
+        is_known = first.refit.is_all and first.refit.is_of_any_form
+        return WithEffect(f"{first.title}{rest}", first.refit.point, first.refit.errors if is_known else None)
 
     @property
     def misfit(self) -> str:
@@ -146,11 +150,12 @@ def title_of(name: str) -> str:
     return titles.get(name, name)
 
 
-def doubt_of(found: WhitenedFit, low: Floats, high: Floats, is_misfit: bool) -> Doubt:
+def doubt_of(found: WhitenedFit, low: Floats, high: Floats, is_doubtful: bool) -> Doubt:
     """Return what the recordings say of all directions, and what they leave open of each parameter.
 
-    ``low`` and ``high`` are the ends of the intervals in coordinates. ``is_misfit`` says that parts of the recordings
-    want different numbers: scores at numbers that are wrong may then miss what is, so that each effect is fitted.
+    ``low`` and ``high`` are the ends of the intervals in coordinates. ``is_doubtful`` says that parts of the recordings
+    seem to want different numbers. Scores at numbers that are wrong may miss what is, so that each effect of the device
+    is then fitted, and also where some score is large for chance; whether it shows is the fit's to say.
     """
     of_model = _of_model(found)
     residuals, point = found.optimum.residuals, found.optimum.point
@@ -163,8 +168,9 @@ def doubt_of(found: WhitenedFit, low: Floats, high: Floats, is_misfit: bool) -> 
     findings, at_other_sizes = every[: len(columns)], every[len(columns) :]
     limit = limit_for(ALARM / max(1, len(findings)))
     alarms, of_device = [], {one.name for one in EVERY_DIRECTION}
+    is_doubtful = is_doubtful or any(abs(one.score) > _NOTABLE for one in every if one.column.name in of_device)
     for one in findings:
-        is_tried = is_misfit and one.column.name in of_device
+        is_tried = is_doubtful and one.column.name in of_device
         if is_tried or (abs(one.score) > limit and abs(one.size) >= one.column.tolerance):
             alike = [other for other in at_other_sizes if other.column.name == one.column.name and other.score > 0.0]
             alarms.append(max((one, *alike), key=lambda item: item.score))

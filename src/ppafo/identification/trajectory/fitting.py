@@ -266,7 +266,8 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     """Return the numbers of a problem that explain its recordings best, each with interval and verdict.
 
     Estimates are in SI units; matrices (parameters, parameters) follow their order. Residuals are weighted with the
-    noise of their channel. ``report`` hears what is being done. IdentificationError where it cannot be run.
+    noise of their channel. ``report`` hears what is being done. IdentificationError where it cannot be run, or where a
+    fitted start cannot be.
     """
     first = optimum(residuals_of(problem), problem.search, report)
     report(Progress("trajectory fit: noise of the sensors"))
@@ -283,14 +284,16 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     low, high = coordinate_bounds(ranges)
     highest = [item.number(float(end)) for item, end in zip(ranges, uncertainty.high, strict=True)]
     atmosphere = prepared[0].scenario.device.supply.atmospheric_pressure
+    impossible = impossible_start(ranges, highest, atmosphere)
+    if impossible:
+        raise IdentificationError(impossible)
     doubt = None
     if problem.search.directions:
         report(Progress("trajectory fit: what the model may lack"))
-        doubt = doubt_of(whole, uncertainty.low, uncertainty.high, uncertainty.misfit.is_found)
+        doubt = doubt_of(whole, uncertainty.low, uncertainty.high, uncertainty.misfit.is_doubtful)
     reasons = (
         "" if doubt is None else doubt.misfit,
         reason_of_misfit(uncertainty.misfit, channels, uncertainty.sensors),
-        impossible_start(ranges, highest, atmosphere),
     )
     evidence = Evidence(
         ranges=ranges,

@@ -1,4 +1,7 @@
-"""A fit with one effect more: all numbers and the size of the effect at once, and by how much it is likelier."""
+"""A fit with one effect more, all numbers, size and forms of the effect at once, and by how much it is likelier.
+
+A point of the search has the coordinates of the fit, then the logarithms of the forms of the effect and of its size.
+"""
 
 import math
 from collections.abc import Sequence
@@ -84,7 +87,8 @@ class Refit:
     """What a fit with one effect found: ``point`` and standard ``errors`` of all coordinates with it.
 
     ``size`` and its ``error`` are in the SI unit of the effect; ``gain`` [-] is by how much twice the logarithm of the
-    likelihood rises, less 2 for the number that is new. ``explains`` says whether hardly more than white noise is left,
+    likelihood rises, less 2 for each number that is new. ``is_of_any_form`` says that the form of the effect is one of
+    these, so that the errors know of it. ``explains`` says whether hardly more than white noise is left,
     or little of what is left without it; ``is_all`` whether no more is left than white noise leaves.
     """
 
@@ -93,6 +97,7 @@ class Refit:
     point: Floats
     errors: Floats
     gain: float
+    is_of_any_form: bool
     explains: bool
     is_all: bool
 
@@ -157,10 +162,13 @@ def refit_with(
     """
     runs, first = _Runs.of(found, direction), found.optimum.point
     low, high = _ends(direction)
-    sizes = np.array([min(max(start, low), high), *direction.sizes])
-    values = runs.residuals(np.repeat(first[None, :], len(sizes), axis=0), sizes)
-    place = int(np.argmin(_squares(values, np.hstack([found.model.slopes, starts]))))
-    return _refit_from(found, starts, runs, first, float(sizes[place]), without)
+    begins = np.array([runs.begin(first, size) for size in (min(max(start, low), high), *direction.sizes)])
+    nearest = int(np.argmin(_squares(runs.residuals(begins), np.hstack([found.model.slopes, starts]))))
+    # Where the form is free as well, a way from the size that is nearest in a straight line may end far from the best.
+    middle = 1 + len(direction.sizes) // 2
+    places = {nearest, middle} if direction.forms else {nearest}
+    tried = [_refit_from(found, starts, runs, begins[place], without) for place in sorted(places)]
+    return max((one for one in tried if one is not None), key=lambda one: one.gain, default=None)
 
 
 def refit_from_afar(found: WhitenedFit, starts: Floats, direction: Direction, without: Likelihood) -> Refit | None:
@@ -178,7 +186,7 @@ def refit_from_afar(found: WhitenedFit, starts: Floats, direction: Direction, wi
             held.append((ended.cost, ended.point, size))
     best: Refit | None = None
     for _, point, size in sorted(held, key=lambda one: one[0])[:_STARTS]:
-        tried = _refit_from(found, starts, runs, point, size, without)
+        tried = _refit_from(found, starts, runs, runs.begin(point, size), without)
         if tried is not None and (best is None or tried.gain > best.gain):
             best = tried
         if best is not None and best.is_all:
@@ -191,37 +199,38 @@ def _ends(direction: Direction) -> tuple[float, float]:
     return _SMALLEST * direction.sizes[0], _LARGEST * direction.largest
 
 
-def _refit_from(
-    found: WhitenedFit, starts: Floats, runs: "_Runs", begin: Floats, size: float, without: Likelihood
-) -> Refit | None:
-    """Return the fit with an effect, searched from a point and one size of it.
-
-    The coordinates are those of the fit and the logarithm of the size, which spans decades.
-    """
-    first, kept = found.optimum.point, len(found.optimum.point)
-    hum, precision, pull_at = found.model.slopes[:, kept:], found.model.precision, found.model.pull
-    free, width = np.hstack([hum, starts]), len(pull_at)
-    low, high = coordinate_bounds(found.optimum.residuals.ranges)
-    low, high = (np.append(bound, math.log(end)) for bound, end in zip((low, high), _ends(runs.direction), strict=True))
+def _refit_from(found: WhitenedFit, starts: Floats, runs: "_Runs", begin: Floats, without: Likelihood) -> Refit | None:
+    """Return the fit with an effect, searched from a point."""
+    kept, forms = len(found.optimum.point), runs.direction.forms
+    own = kept + len(forms)
+    hum = found.model.slopes[:, kept:]
+    free, width = np.hstack([hum, starts]), own + hum.shape[1]
+    # The priors of what the linear model has, its coordinates and hum, and behind them those of the forms.
+    of_model = [*range(kept), *range(own, width)]
+    precision, pull_at = np.zeros((width, width)), np.zeros(width)
+    precision[np.ix_(of_model, of_model)], pull_at[of_model] = found.model.precision, found.model.pull
+    for place, form in enumerate(forms, start=kept):
+        precision[place, place] = 1.0 / math.log(form.factor) ** 2
+    first = runs.begin(found.optimum.point, 1.0)[:own]
+    bounds = zip(coordinate_bounds(found.optimum.residuals.ranges), _ends(runs.direction), strict=True)
+    of_forms = [[math.log(form.low) for form in forms], [math.log(form.high) for form in forms]]
+    low, high = (np.array([*ends, *of_forms[side], math.log(size)]) for side, (ends, size) in enumerate(bounds))
     expected = float(len(found.model.residuals))
-    at, slow = np.append(begin, math.log(size)), 0
+    at, slow = begin, 0
     for turn in range(_TURNS):
-        near = _around(runs, at[:kept], math.exp(at[kept]))
+        near = _around(runs, at)
         if near is None:
             return None
-        left, slopes, of_size = near
-        shift = at[:kept] - first
+        left, slopes = near
+        shift = at[:own] - first
         pull = pull_at.copy()
-        pull[:kept] += precision[:kept, :kept] @ shift
+        pull[:own] += precision[:own, :own] @ shift
         if turn < _TURNS - 1 and slow < _PATIENCE:
-            moving = np.column_stack([slopes, of_size])
-            moves = _damped_steps(moving, free, left, pull[:kept], precision[:kept, :kept])
+            moves = _damped_steps(slopes, free, left, pull[:own], precision[:own, :own])
             tried = np.clip(at + moves, low, high)
-            values = runs.residuals(tried[:, :kept], np.exp(tried[:, kept]))
-            shifts = np.vstack([tried[:, :kept] - first, shift])
-            of_priors = shifts @ (2.0 * pull_at[:kept]) + np.einsum(
-                "ij,jk,ik->i", shifts, precision[:kept, :kept], shifts
-            )
+            values = runs.residuals(tried)
+            shifts = np.vstack([tried[:, :own] - first, shift])
+            of_priors = shifts @ (2.0 * pull_at[:own]) + np.einsum("ij,jk,ik->i", shifts, precision[:own, :own], shifts)
             costs = np.array(_squares(np.column_stack([values, left]), free)) + of_priors
             best = int(np.argmin(costs[:-1]))
             fall = float(costs[-1] - costs[best])
@@ -229,19 +238,21 @@ def _refit_from(
                 slow = slow + 1 if fall < _SLOW * max(float(costs[-1]) - expected, 0.0) else 0
                 at = tried[best]
                 continue
-        model = replace(found.model, columns=np.hstack([slopes, hum, left[:, None]]), pull=pull)
-        likely = likelihood_with(found, model, np.column_stack([of_size, starts]))
+        columns = np.hstack([slopes[:, :own], hum, left[:, None]])
+        model = replace(found.model, columns=columns, pull=pull, precision=precision)
+        likely = likelihood_with(found, model, np.column_stack([slopes[:, own], starts]))
         excess = _squares(left[:, None], free)[0] - expected
         # The priors were given for the first point: what they have lost since then is part of the likelihood.
-        of_priors_here = float(shift @ (2.0 * pull_at[:kept] + precision[:kept, :kept] @ shift))
+        of_priors_here = float(shift @ (2.0 * pull_at[:own] + precision[:own, :own] @ shift))
         deviations = np.sqrt(np.maximum(np.diag(likely.covariance), 0.0))
-        reached = np.clip(at + np.append(likely.move[:kept], likely.move[width]), low, high)
+        reached = np.clip(at + np.append(likely.move[:own], likely.move[width]), low, high)
         return Refit(
-            size=math.exp(reached[kept]),
-            error=math.exp(reached[kept]) * float(deviations[width]),
+            size=math.exp(reached[own]),
+            error=math.exp(reached[own]) * float(deviations[width]),
             point=reached[:kept],
             errors=deviations[:kept],
-            gain=likely.value - of_priors_here - without.value - 2.0,
+            gain=likely.value - of_priors_here - without.value - 2.0 * (1 + len(forms)),
+            is_of_any_form=bool(forms),
             explains=replace(likely, excess=excess).explains_beside(without),
             is_all=excess < _OF_CHANCE * math.sqrt(2.0 * likely.samples),
         )
@@ -273,18 +284,14 @@ def _squares(values: Floats, free: Floats) -> list[float]:
     return [float(one @ one) if ok else math.inf for one, ok in zip(left.T, is_run.tolist(), strict=True)]
 
 
-def _around(runs: "_Runs", point: Floats, size: float) -> tuple[Floats, Floats, Floats] | None:
-    """Return residuals [-] at a point and a size, their slopes over coordinates and log size; None for a failed run."""
-    count = len(point)
-    steps = np.vstack([np.eye(count) * _STEP, -np.eye(count) * _STEP, np.zeros((3, count))])
-    sizes = np.full(2 * count + 3, size)
-    sizes[2 * count : 2 * count + 2] *= (1.0 + _OF_SIZE, 1.0 - _OF_SIZE)
-    values = runs.residuals(point + steps, sizes)
+def _around(runs: "_Runs", at: Floats) -> tuple[Floats, Floats] | None:
+    """Return residuals [-] at a point and their slopes there (samples, coordinates); None for a failed run."""
+    steps = np.full(len(at), _OF_SIZE)
+    steps[: len(at) - 1 - len(runs.direction.forms)] = _STEP
+    values = runs.residuals(at + np.vstack([np.diag(steps), -np.diag(steps), np.zeros(len(at))]))
     if not np.isfinite(values).all():
         return None
-    slopes = (values[:, :count] - values[:, count : 2 * count]) / (2.0 * _STEP)
-    of_size = (values[:, 2 * count] - values[:, 2 * count + 1]) / (2.0 * _OF_SIZE)
-    return values[:, -1], slopes, of_size
+    return values[:, -1], (values[:, : len(at)] - values[:, len(at) : -1]) / (2.0 * steps)
 
 
 @dataclass(frozen=True, slots=True)
@@ -317,11 +324,18 @@ class _Runs:
         ]
         return Residuals(tuple(made), self.found.optimum.residuals.ranges).quick()
 
-    def residuals(self, points: Floats, sizes: Floats) -> Floats:
-        """Return residuals [-] (samples, points) at points (points, coordinates) with sizes; NaN for a failure."""
+    def begin(self, point: Floats, size: float) -> Floats:
+        """Return a point of a search from coordinates of the fit and a size, with the usual forms."""
+        return np.array([*point, *(math.log(form.usual) for form in self.direction.forms), math.log(size)])
+
+    def residuals(self, points: Floats) -> Floats:
+        """Return residuals [-] (samples, points) at points (points, coordinates); NaN for a failure."""
         parts = []
+        ranges, forms = self.found.optimum.residuals.ranges, self.direction.forms
+        kept, sizes = points.shape[1] - 1 - len(forms), np.exp(points[:, -1])
         for one in self.made:
-            columns = columns_in(one.label, self.found.optimum.residuals.ranges, points)
+            columns = columns_in(one.label, ranges, points[:, :kept])
+            columns |= {form.path: np.exp(points[:, kept + place]) for place, form in enumerate(forms)}
             for lane, size in enumerate(sizes.tolist()):
                 for path, number in self.direction.settings(size, one.scenario).items():
                     columns.setdefault(path, np.full(len(sizes), number_at(one.scenario, path)))[lane] = number

@@ -42,6 +42,8 @@ ALARM = 5.0e-4
 
 It is small because the chances are those of a linear model; an impact between two samples makes low ones more frequent.
 """
+DOUBTFUL = 0.01
+"""Chance below which one of them is worth a fit with each effect that the model may lack."""
 
 _SMALLEST_FRACTION = 0.02
 """Directions of which a part knows less than this fraction are not compared: its fit would leave the linear range."""
@@ -78,6 +80,11 @@ class Misfit:
     def is_found(self) -> bool:
         """Whether parts of the recordings want different numbers."""
         return any(one.chance < ALARM for one in self.comparisons)
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether chance makes parts of the recordings differ as much in few cases only: worth a closer look."""
+        return any(one.chance < DOUBTFUL for one in self.comparisons)
 
     @property
     def in_words(self) -> str:
@@ -264,13 +271,24 @@ FROM_PRIOR = 0.8
 
 
 @dataclass(frozen=True, slots=True)
+class WithEffect:
+    """A fit with an effect that the model lacks: what it is called in a sentence, coordinates and standard errors.
+
+    The errors are None where the fit takes one form of the effect for granted, so that they say too little.
+    """
+
+    title: str
+    point: Floats
+    errors: Floats | None
+
+
+@dataclass(frozen=True, slots=True)
 class Evidence:
     """What a verdict is made of, in coordinates: point, information of data and priors, covariance, bounds, sources.
 
     ``interval`` has the ends of the intervals, ``beside`` those with effects that nothing shows, and ``conditions``
     says for each parameter which of these must not be, empty for none. ``misfit`` says why the model is wrong, empty
-    where it is not, and ``with_effect`` has the effect that would make it right, with the coordinates
-    then; ``alone`` names for each parameter the only channel that speaks of it, empty where several do.
+    where it is not, and ``with_effect`` has the effect that would make it right; ``alone`` names for each parameter the only channel that speaks of it, empty where several do.
     """
 
     ranges: tuple[Range, ...]
@@ -290,7 +308,7 @@ class Evidence:
     search: Search
     conditions: tuple[str, ...] = ()
     beside: tuple[Floats, Floats] | None = None
-    with_effect: tuple[str, Floats] | None = None
+    with_effect: WithEffect | None = None
 
 
 def estimate_of(evidence: Evidence, index: int) -> Estimate:
@@ -318,9 +336,15 @@ def estimate_of(evidence: Evidence, index: int) -> Estimate:
             " These recordings cannot show whether that is so; if not, the interval is the one behind 'else'."
         )
     if evidence.with_effect is not None and verdict == "holds for this model only":
-        effect, points = evidence.with_effect
-        fitted = f"{item.number(float(points[index])):.6g} {item.unit}".removesuffix(" -").removesuffix(" 1")
-        explanation += f" Fitted with {effect} it is {fitted}."
+        effect = evidence.with_effect
+        unit = f" {item.unit}".removesuffix(" -").removesuffix(" 1")
+        explanation += f" Fitted with {effect.title} it is {item.number(float(effect.point[index])):.6g}{unit}"
+        if effect.errors is not None:
+            reach = interval_factor(evidence.search.confidence) * math.sqrt(evidence.inflation)
+            half_with = reach * effect.errors
+            least, most = ends((effect.point - half_with, effect.point + half_with))
+            explanation += f", {least:.6g} to {most:.6g}{unit} whatever its form"
+        explanation += "."
     return Estimate(
         path=item.name,
         value=item.number(at),

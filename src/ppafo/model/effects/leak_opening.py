@@ -8,24 +8,26 @@ from ppafo.model.places import way_across
 
 
 class LeakOpening(NamedTuple):
-    """Pressure between the chambers at which the leak begins [Pa], above 0."""
+    """Pressure between the chambers at which the leak begins [Pa], above 0, and how slowly it then opens [-]."""
 
     opening_pressure: float
+    rise: float
 
 
 def prepare(settings: Any, _device: Any) -> LeakOpening:
-    """The row of the setting."""
-    return LeakOpening(settings["pressure"])
+    """The row of the settings."""
+    return LeakOpening(settings["pressure"], settings["rise"])
 
 
 def lifted(conductance: float, pressure_1: float, pressure_2: float, leak_opening: LeakOpening) -> float:
-    """Conductance [kg/(s Pa)] of the leak: ``C (1 - P_o / |P_1 - P_2|)``, and 0 below ``P_o``.
+    """Conductance [kg/(s Pa)] of the leak: ``C e / (e + w P_o)`` with ``e = |P_1 - P_2| - P_o``, and 0 below ``P_o``.
 
-    The gas lifts the lip of a seal against its preload, in either direction. The flow begins without a jump, and far
-    above the opening pressure the leak is that of its orifice.
+    The gas lifts the lip of a seal against its preload, in either direction. The flow begins without a jump, is half
+    that of the orifice at ``w P_o`` above the opening pressure ``P_o``, and far above it that of the orifice.
     """
-    opening = leak_opening.opening_pressure
-    share = 1.0 - opening / max(abs(pressure_1 - pressure_2), opening)
+    opening, rise = leak_opening.opening_pressure, leak_opening.rise
+    above = max(abs(pressure_1 - pressure_2), opening) + (rise - 1.0) * opening
+    share = max(1.0 - rise * opening / above, 0.0)
     return way_across(conductance * share, pressure_1, pressure_2)
 
 
@@ -36,12 +38,16 @@ EFFECT = Effect(
         Quantity(
             "pressure", "Pa_d", "pressure between chambers at which the leak opens, 0 for always", 0.0, 0.0, 1.0e7
         ),
+        Quantity("rise", "", "excess at which half of the leak is open, over that pressure", 1.0, 0.01, 100.0),
     ),
     parameters=LeakOpening,
     prepare=prepare,
     switch=("pressure",),
     laws={way_across: lifted},
     source="assumed: a lip that the gas lifts against a constant preload, to be fitted to an actuator",
-    equation="C = C_l max(0, 1 - P_o / |P_1 - P_2|)",
-    symbols=(("P_o", "opening_pressure", "Pa", "pressure between the chambers at which the leak opens"),),
+    equation="C = C_l e / (e + w P_o), e = max(0, |P_1 - P_2| - P_o)",
+    symbols=(
+        ("P_o", "opening_pressure", "Pa", "pressure between the chambers at which the leak opens"),
+        ("w", "rise", "-", "excess at which half of the leak is open, over the pressure at which it opens"),
+    ),
 )

@@ -207,6 +207,17 @@ def test_an_initial_pressure_of_one_recording_is_found(experiment: Experiment) -
     assert estimate.verdict == "identified"
 
 
+def test_a_start_that_comes_out_below_the_atmosphere_is_refused_with_what_it_hints_at(
+    experiment: Experiment, step: Scenario, recorded: Callable[..., Recording]
+) -> None:
+    drawn = recorded(with_numbers(step, {"initial.pressure_1": 8.0e4}))
+    start = FreeParameter("initial.pressure_1", start=101325.0, recordings=("step",))
+    with pytest.raises(
+        IdentificationError, match=r"initial.pressure_1.* below the atmosphere .* a gauge pressure read"
+    ):
+        fitted(dataclasses.replace(experiment, recording=drawn), start)
+
+
 def test_a_number_limited_to_one_recording_leaves_the_other_alone(
     experiment: Experiment, step: Scenario, recorded: Callable[..., Recording]
 ) -> None:

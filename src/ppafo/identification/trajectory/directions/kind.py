@@ -13,6 +13,21 @@ TRACE = 1.0e-12
 
 
 @dataclass(frozen=True, slots=True)
+class Form:
+    """A number of an effect that says how it acts rather than how much of it there is, above 0.
+
+    Its logarithm is fitted with a normal prior around ``usual`` whose standard deviation is the logarithm of ``factor``
+    [-], and stays between ``low`` and ``high``.
+    """
+
+    path: str
+    usual: float
+    factor: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
 class Direction:
     """One effect of the device that a fitted model may lack.
 
@@ -20,7 +35,7 @@ class Direction:
     the size as ``size_in_words`` writes it. ``sizes`` grow to the largest that can be believed. ``settings`` gives the
     numbers [SI] of a size by path, on the device of a scenario; ``neutral`` those with which the effect acts, and
     changes nothing. ``suits`` says which scenarios can have it. What it changes grows with the size to the power of
-    ``growth``.
+    ``growth``. ``forms`` are what a fit with the effect finds beside its size.
     """
 
     name: str
@@ -33,6 +48,7 @@ class Direction:
     neutral: Mapping[str, float] = field(default_factory=dict)
     suits: Callable[[Scenario], bool] = lambda _: True
     growth: float = 1.0
+    forms: tuple[Form, ...] = ()
 
     @property
     def largest(self) -> float:
