@@ -38,10 +38,18 @@ def test_a_leak_that_opens_in_the_lanes_is_that_of_the_reference_solver(name: st
 
 
 def test_a_leak_that_opens_at_a_pressure_is_tight_below_and_whole_far_above() -> None:
-    row = LeakOpening(3.0e4)
+    row = LeakOpening(3.0e4, 1.0)
     assert lifted(2.0e-9, 1.0e5, 1.29e5, row) == 0.0
     assert lifted(2.0e-9, 1.0e5, 1.6e5, row) == lifted(2.0e-9, 1.6e5, 1.0e5, row) == pytest.approx(1.0e-9)
     assert lifted(2.0e-9, 1.0e5, 3.1e6, row) == pytest.approx(2.0e-9, rel=0.011)
+
+
+@pytest.mark.parametrize("rise", [0.01, 0.3, 1.0, 7.0])
+def test_half_of_a_leak_is_open_where_its_rise_says(rise: float) -> None:
+    row = LeakOpening(3.0e4, rise)
+    assert lifted(2.0e-9, 1.0e5, 1.3e5, row) == pytest.approx(0.0, abs=1e-22)
+    assert lifted(2.0e-9, 1.0e5, 1.3e5, row) >= 0.0
+    assert lifted(2.0e-9, 1.0e5, 1.3e5 + rise * 3.0e4, row) == pytest.approx(1.0e-9)
 
 
 def test_a_leak_that_never_opens_loses_nothing() -> None:

@@ -11,7 +11,7 @@ class LeakOpening(NamedTuple):
     """Pressure between the chambers at which the leak begins [Pa], above 0, and how slowly it then opens [-]."""
 
     opening_pressure: float
-    rise: float
+    opening_rise: float
 
 
 def prepare(settings: Any, _device: Any) -> LeakOpening:
@@ -25,7 +25,7 @@ def lifted(conductance: float, pressure_1: float, pressure_2: float, leak_openin
     The gas lifts the lip of a seal against its preload, in either direction. The flow begins without a jump, is half
     that of the orifice at ``w P_o`` above the opening pressure ``P_o``, and far above it that of the orifice.
     """
-    opening, rise = leak_opening.opening_pressure, leak_opening.rise
+    opening, rise = leak_opening.opening_pressure, leak_opening.opening_rise
     above = max(abs(pressure_1 - pressure_2), opening) + (rise - 1.0) * opening
     share = max(1.0 - rise * opening / above, 0.0)
     return way_across(conductance * share, pressure_1, pressure_2)
@@ -48,6 +48,6 @@ EFFECT = Effect(
     equation="C = C_l e / (e + w P_o), e = max(0, |P_1 - P_2| - P_o)",
     symbols=(
         ("P_o", "opening_pressure", "Pa", "pressure between the chambers at which the leak opens"),
-        ("w", "rise", "-", "excess at which half of the leak is open, over the pressure at which it opens"),
+        ("w", "opening_rise", "-", "excess at which half of the leak is open, over the pressure at which it opens"),
     ),
 )
