@@ -288,7 +288,8 @@ class Evidence:
 
     ``interval`` has the ends of the intervals, ``beside`` those with effects that nothing shows, and ``conditions``
     says for each parameter which of these must not be, empty for none. ``misfit`` says why the model is wrong, empty
-    where it is not, and ``with_effect`` has the effect that would make it right; ``alone`` names for each parameter the only channel that speaks of it, empty where several do.
+    where it is not, and ``with_effect`` has the effect that would make it right; ``alone`` names for each parameter the
+    only channel that speaks of it, empty where several do.
     """
 
     ranges: tuple[Range, ...]
