@@ -58,7 +58,7 @@ def driven(instance: Instance, recording: Recording, channels: tuple[str, ...], 
 
 
 @pytest.mark.parametrize("which", ["free", "moved"])
-def test_tools_may_show_units_of_the_bench_and_know_the_limits_of_the_command(
+def test_tools_may_show_units_of_the_bench_and_know_the_limits_of_the_inputs(
     which: str, request: pytest.FixtureRequest
 ) -> None:
     described = fmpy.read_model_description(request.getfixturevalue(which))
@@ -68,7 +68,15 @@ def test_tools_may_show_units_of_the_bench_and_know_the_limits_of_the_command(
         assert shown[name].displayUnit == unit
         kind = factors[shown[name].unit]
         assert (kind.name, float(kind.factor) * one) == (unit, pytest.approx(1.0, rel=1e-9))
-    assert (float(shown["command"].min), float(shown["command"].max)) == (-1.0, 1.0)
+    ranges = {"command": (-1.0, 1.0)}
+    if which == "moved":
+        stops = math.radians(20.0), math.radians(130.0)
+        fastest = (10.0 - stops[1]) * 128.0
+        ranges |= {"angle": stops, "angular_velocity": (-fastest, fastest)}
+    else:
+        ranges["external_torque"] = (-1e4, 1e4)
+    found = {item.name: (float(item.min), float(item.max)) for item in shown.values() if item.causality == "input"}
+    assert found == {name: pytest.approx(limits, rel=1e-9) for name, limits in ranges.items()}
 
 
 def test_under_the_commands_of_a_closed_loop_a_free_vane_moves_with_its_bits(free: str) -> None:

@@ -70,12 +70,14 @@ class PlantAlone:
     step: float
 
 
+_SHORT = 0.0078125
+"""Length [s] of the ramp that the angle begins with."""
 _FIRST_ANGLE = (
     ("motion_profile_start_level", "angle"),
-    ("motion_profile_level", "angle + angular_velocity * 0.0078125"),
+    ("motion_profile_level", f"angle + angular_velocity * {_SHORT}"),
     ("motion_profile_ramp_start", "0.0"),
     # Short: a fast ankle stays in the range of a level.
-    ("motion_profile_ramp_time", "0.0078125"),
+    ("motion_profile_ramp_time", f"{_SHORT}"),
 )
 _LEAD_ANGLE = (
     ("path.start_level", "angle"),
@@ -99,9 +101,12 @@ def plant_of(item: Scenario) -> PlantAlone:
     if isinstance(motion, PrescribedMotion):
         said, first, lead = LED, _FIRST_ANGLE, _LEAD_ANGLE
         angle = motion.profile.settings["start_level"]
+        settings = {one.path: one for one in library.settings}
+        stops = [settings[f"actuator.angle_{end}"].value for end in ("min", "max")]
+        fastest = (settings["motion.profile.level"].quantity.maximum - max(map(abs, stops))) / _SHORT
         further = (
-            Input("angle", "rad", "angle of the ankle, 90 deg neutral, growing in plantarflexion", angle),
-            Input("angular_velocity", "rad/s", "its rate", 0.0),
+            Input("angle", "rad", "angle of the ankle, 90 deg neutral, growing in plantarflexion", angle, *stops),
+            Input("angular_velocity", "rad/s", "its rate", 0.0, -fastest, fastest),
         )
         unseen |= {"angle", "angular_velocity"}
     elif isinstance(motion, FreeMotion):
@@ -116,7 +121,10 @@ def plant_of(item: Scenario) -> PlantAlone:
         lead = (("plant.external_torque", "external_torque"),)
         joint = "T_ex on the joint" if is_alone else "on the ankle of the leg, -T_2"
         words = f"torque {joint}, above 0 works against plantarflexion"
-        further = (Input("external_torque", "N m", words, outside_torque(motion)),)
+        path = "motion.external_torque" if is_alone else "motion.ankle_torque"
+        range_of = next(one.quantity for one in library.settings if one.path == path)
+        limits = range_of.minimum, range_of.maximum
+        further = (Input("external_torque", "N m", words, outside_torque(motion), *limits),)
     else:
         said, command, highest = ON_LEG, WALKING_COMMAND, VENT
     unused = ("sensors.", "motion.profile.", "motion.external_torque", "motion.ankle_torque")

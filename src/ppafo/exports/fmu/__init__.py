@@ -213,6 +213,7 @@ def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
         "kind": interface.kind,
         "fmi_type": "fmi2ModelExchange" if interface.states else "fmi2CoSimulation",
         "fields": "",
+        "checked": "inertia, volumes and areas",
         **interface.words,
     }
     unit = "\n".join(filled(template("fmu", file), words) for file in ("unit.c", *interface.templates))
@@ -292,7 +293,11 @@ def plant_alone(item: Scenario) -> Interface:
         clock=None,
         hidden=alone.hidden,
         inputs=alone.inputs,
-        words={"inputs": given, "follow": follow_lines(alone, "settings", numbers)},
+        words={
+            "inputs": given,
+            "follow": follow_lines(alone, "settings", numbers),
+            "checked": "the limits of the inputs, inertia, volumes and areas",
+        },
     )
 
 

@@ -15,6 +15,6 @@ static bool bring_up(unit *item)
 
 static bool refuse_impossible(unit *item)
 {
-    return refuse(item, "the run left what is possible after %g s: try a smaller run.step, and check inertia, volumes and areas",
+    return refuse(item, "the run left what is possible after %g s: try a smaller run.step, and check @checked@",
         item->now.time);
 }
