@@ -72,7 +72,7 @@ from ppafo.walking.planning import NO_REFERENCE, course_of_walk, noise, plan_wal
 from ppafo.walking.preparation import FaultSettings, SensorSettings
 from ppafo.walking.reacting_wearer import LONGEST_STEP, REACTS, read_reacting
 from ppafo.walking.result import lacks, measured
-from ppafo.walking.wearer import read_wearer, wearer_origin
+from ppafo.walking.wearer import links_of_stature, read_wearer, wearer_origin
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 DEFAULT_PERIOD = 1.0e-3
@@ -184,6 +184,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     timing = timing_settings(timing_of(reading.document))
     found = links_of_defaults({"controller": law.quantities, "timing": timing}, device, lines)
     links = {path: links for path, links in found.items() if value_at(reading.document, path) is None}
+    of_wearer = links_of_stature(reading.document) if reacts is None else {}
     _check_timing(law, reading)
     motion = WalkMotion(
         kind=WALK,
@@ -222,7 +223,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         ),
         thermal=read_thermal(reading),
         supply_lines=lines,
-        links=links,
+        links={**links, **of_wearer},
     )
     check_walk(scenario, reading)
     return with_duration(scenario, _duration(reading, scenario))

@@ -4,11 +4,13 @@ A person is scaled in mass and length. A segment keeps its fraction of the body 
 and where its mass lies in it (as in table 4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th ed.
 2009). So masses go with body mass, lengths with stature, and inertias with mass times length squared; the fractions are
 those of the wearer that is scaled. Tissue stays as it is. Where a walk file does not say who walks, it is the subject
-of the gait, or the paper's where no gait is named.
+of the gait, or the paper's where no gait is named. Where it gives the stature, each segment that it does not give
+follows body mass and stature.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,11 +19,24 @@ from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
 from ppafo.model.declaration import Quantity
 from ppafo.model.leg import LegParameters
+from ppafo.parameters.graph import Follows, Graph, Term
 from ppafo.signals.recording import Floats
 from ppafo.simulation.declaration import FOOT, Reading, value_at
 
+SHANK_SHARE = 0.246
+"""Knee to ankle as a share of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th
+ed. 2009. The paper prints a shank of 0.46 m and no stature, which makes 1.87 m."""
+
 WEARER = (
     Quantity("body_mass", "kg", "mass of the body", 72.5, 10.0, 300.0),
+    Quantity(
+        "stature",
+        "m",
+        "height of the body; given, the segments follow it and the body mass",
+        (FOOT["shank_length"].default or 0.0) / SHANK_SHARE,
+        0.5,
+        2.5,
+    ),
     FOOT["shank_length"],
     Quantity("shank_mass_centre", "m", "knee to the mass centre of the shank", 0.199, 0.0, 1.0),
     Quantity("shank_mass", "kg", "mass of the shank", 4.5, 0.1, 30.0),
@@ -63,12 +78,11 @@ _LENGTHS = ("shank_length", "shank_mass_centre", "foot_mass_centre", "heel_lever
 _MASSES = ("shank_mass", "foot_mass")
 _INERTIAS = ("shank_inertia", "foot_inertia")
 
-SHANK_SHARE = 0.246
-"""Knee to ankle as a share of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th
-ed. 2009. The paper prints a shank of 0.46 m and no stature, which makes 1.87 m."""
-
 _SAME = 1.0e-3
-"""Share of the body mass that is rounding."""
+"""Share of the body mass, or of the stature, that is rounding."""
+
+STATURES = (1.45, 2.0)
+"""Statures [m] of nearly all adults, in which the fractions of segments were measured."""
 
 
 class HeelRocker(NamedTuple):
@@ -84,6 +98,7 @@ class Wearer:
     """One leg of a person; lengths [m], masses [kg], inertias [kg m^2], the ankle as in ``LegParameters``."""
 
     body_mass: float
+    stature: float
     shank_length: float
     shank_mass_centre: float
     shank_mass: float
@@ -165,17 +180,103 @@ def segment_values(wearer: Wearer, build: Build) -> dict[str, Floats]:
     return {"body_mass": wearer.body_mass * build.mass, **found}
 
 
-def read_wearer(reading: Reading, gait: Gait, is_named: bool) -> Wearer:
-    """Return the wearer of a walk file; what it leaves out is of the gait's subject, or of the paper's by default."""
-    if not is_named:
-        return Wearer(**reading.section("wearer", WEARER))
-    # The wearer with body mass, and lengths where the stature is known, of the subject of a gait.
+def _share(name: str, power_of_mass: int, power_of_stature: int) -> float:
+    """Return a number of a segment of the paper's subject over its body mass and its stature to these powers."""
     paper = paper_subject()
-    stature = 1.0 if gait.stature is None else SHANK_SHARE * gait.stature / paper.shank_length
-    build = Build(np.array([gait.body_mass / paper.body_mass]), np.array([stature]))
-    segments = {name: float(values[0]) for name, values in segment_values(paper, build).items()}
-    subject = replace(paper, **segments)
+    return float(getattr(paper, name) / (paper.body_mass**power_of_mass * paper.stature**power_of_stature))
+
+
+_SHANK_CENTRE, _FOOT_CENTRE = _share("shank_mass_centre", 0, 1), _share("foot_mass_centre", 0, 1)
+_HEEL, _TOE = _share("heel_lever", 0, 1), _share("toe_lever", 0, 1)
+_SHANK_MASS, _FOOT_MASS = _share("shank_mass", 1, 0), _share("foot_mass", 1, 0)
+_SHANK_INERTIA, _FOOT_INERTIA = _share("shank_inertia", 1, 2), _share("foot_inertia", 1, 2)
+
+
+def shank_length_of(stature: float) -> float:
+    """Length of the shank [m] of a stature [m]."""
+    return SHANK_SHARE * stature
+
+
+def shank_mass_centre_of(stature: float) -> float:
+    """From the knee to the mass centre of the shank [m] of a stature [m]."""
+    return _SHANK_CENTRE * stature
+
+
+def foot_mass_centre_of(stature: float) -> float:
+    """From the ankle to the mass centre of the foot [m] of a stature [m]."""
+    return _FOOT_CENTRE * stature
+
+
+def heel_lever_of(stature: float) -> float:
+    """From the ankle back to the heel [m] of a stature [m]."""
+    return _HEEL * stature
+
+
+def toe_lever_of(stature: float) -> float:
+    """From the ankle to the toes [m] of a stature [m]."""
+    return _TOE * stature
+
+
+def shank_mass_of(_stature: float, body_mass: float) -> float:
+    """Mass of the shank [kg] of a body mass [kg]."""
+    return _SHANK_MASS * body_mass
+
+
+def foot_mass_of(_stature: float, body_mass: float) -> float:
+    """Mass of the foot [kg] of a body mass [kg]."""
+    return _FOOT_MASS * body_mass
+
+
+def shank_inertia_of(stature: float, body_mass: float) -> float:
+    """Inertia of the shank about its mass centre [kg m^2] of a stature [m] and a body mass [kg]."""
+    return _SHANK_INERTIA * body_mass * stature * stature
+
+
+def foot_inertia_of(stature: float, body_mass: float) -> float:
+    """Inertia of the foot about its mass centre [kg m^2] of a stature [m] and a body mass [kg]."""
+    return _FOOT_INERTIA * body_mass * stature * stature
+
+
+_OF_LENGTH = {
+    "shank_length": shank_length_of,
+    "shank_mass_centre": shank_mass_centre_of,
+    "foot_mass_centre": foot_mass_centre_of,
+    "heel_lever": heel_lever_of,
+    "toe_lever": toe_lever_of,
+}
+_OF_BOTH = {
+    "shank_mass": shank_mass_of,
+    "foot_mass": foot_mass_of,
+    "shank_inertia": shank_inertia_of,
+    "foot_inertia": foot_inertia_of,
+}
+STATURE, BODY_MASS = "wearer.stature", "wearer.body_mass"
+
+
+def links_of_stature(document: Mapping[str, Any]) -> Graph:
+    """Return how the segments of a walk file follow stature and body mass: now, or once the stature is given."""
+    later = value_at(document, STATURE) is None
+    terms = {name: Term((STATURE,), function) for name, function in _OF_LENGTH.items()}
+    terms |= {name: Term((STATURE, BODY_MASS), function) for name, function in _OF_BOTH.items()}
+    paths = {f"wearer.{name}": (Follows((term,), when_set=later),) for name, term in terms.items()}
+    return {path: links for path, links in paths.items() if value_at(document, path) is None}
+
+
+def read_wearer(reading: Reading, gait: Gait, is_named: bool) -> Wearer:
+    """Return the wearer of a walk file; what it leaves out is of the gait's subject, or of the paper's by default.
+
+    Where it gives the stature, segments follow that and the body mass.
+    """
+    subject = _subject(gait) if is_named else paper_subject()
+    if value_at(reading.document, STATURE) is not None:
+        known = {item.name: replace(item, default=getattr(subject, item.name)) for item in WEARER}
+        given = {path: reading.number(path, known[path.partition(".")[2]]) for path in (STATURE, BODY_MASS)}
+        links = links_of_stature(reading.document)
+        found = {path.partition(".")[2]: float(of[0].number(given.__getitem__)) for path, of in links.items()}
+        subject = replace(subject, **found)
     quantities = tuple(replace(item, default=getattr(subject, item.name)) for item in WEARER)
+    if not is_named:
+        return Wearer(**reading.section("wearer", quantities))
     for item in quantities:
         value = getattr(subject, item.name)
         if not item.minimum <= value <= item.maximum and value_at(reading.document, f"wearer.{item.name}") is None:
@@ -185,6 +286,28 @@ def read_wearer(reading: Reading, gait: Gait, is_named: bool) -> Wearer:
                 f"{item.unit}: give wearer.{item.name}"
             )
     return Wearer(**reading.section("wearer", quantities))
+
+
+def _subject(gait: Gait) -> Wearer:
+    """Return the wearer with body mass, and lengths where the stature is known, of the subject of a gait."""
+    paper = paper_subject()
+    stature = 1.0 if gait.stature is None else SHANK_SHARE * gait.stature / paper.shank_length
+    build = Build(np.array([gait.body_mass / paper.body_mass]), np.array([stature]))
+    segments = {name: float(values[0]) for name, values in segment_values(paper, build).items()}
+    return replace(paper, stature=paper.stature if gait.stature is None else gait.stature, **segments)
+
+
+def _of_stature(wearer: Wearer, gait: Gait, origin: str) -> str:
+    """Return the stature in words where it is not that of the subject who is named, and where nobody was measured."""
+    own = gait.stature if origin.startswith("the subject of") else None
+    if abs(wearer.stature - (own or paper_subject().stature)) <= _SAME * wearer.stature:
+        return ""
+    low, high = STATURES
+    known = f", outside the {low:g} to {high:g} m of adults of whom that is known: give the segments themselves"
+    return (
+        f"; {wearer.stature:.4g} m tall, and the segments follow mass and stature"
+        f"{'' if low <= wearer.stature <= high else known}; the curves of the gait are not scaled by stature"
+    )
 
 
 SCALED_MASS = (0.6, 1.7)
@@ -204,9 +327,9 @@ def wearer_origin(reading: Reading, gait: Gait, is_named: bool) -> str:
 
 def who_walks(wearer: Wearer, gait: Gait, origin: str) -> str:
     """Return one line on the person who walks, and on the gait's own subject where that is another."""
-    line = f"wearer: {wearer.body_mass:.4g} kg, {origin}"
+    line = f"wearer: {wearer.body_mass:.4g} kg, {origin}{_of_stature(wearer, gait, origin)}"
     if origin.startswith("the subject of"):
-        return line if gait.stature is None else f"{line}, {gait.stature:.4g} m"
+        return line if gait.stature is None or wearer.stature != gait.stature else f"{line}, {gait.stature:.4g} m"
     if abs(wearer.body_mass - gait.body_mass) <= _SAME * gait.body_mass:
         return line
     scaled = (

@@ -8,6 +8,7 @@ import pytest
 from ppafo.errors import ScenarioError
 from ppafo.gait import load_gait
 from ppafo.gait.document import gait_toml
+from ppafo.simulation.numbers import with_numbers
 from ppafo.walking import load_walk
 from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.wearer import paper_subject
@@ -37,6 +38,39 @@ def test_a_stature_scales_lengths_and_inertias(tmp_path: Path) -> None:
     assert found.toe_lever == pytest.approx(paper.toe_lever * taller)
     assert found.foot_inertia == pytest.approx(paper.foot_inertia * 85.07 / 72.5 * taller**2)
     assert found.ankle_stiffness == paper.ankle_stiffness
+
+
+def test_segments_follow_a_stature_that_is_given_and_the_body_mass_but_for_those_that_are_given() -> None:
+    changes = ("wearer.stature=1.75 m", "wearer.body_mass=90 kg", "wearer.toe_lever=0.2 m")
+    found, paper, length = walk_of(load_walk("solenoid", changes)).wearer, paper_subject(), 0.246 * 1.75 / 0.46
+    assert (found.stature, found.body_mass, found.toe_lever) == (1.75, 90.0, 0.2)
+    assert found.shank_length == pytest.approx(0.246 * 1.75)
+    assert found.heel_lever == pytest.approx(paper.heel_lever * length)
+    assert found.foot_mass == pytest.approx(paper.foot_mass * 90.0 / 72.5)
+    assert found.shank_inertia == pytest.approx(paper.shank_inertia * 90.0 / 72.5 * length**2)
+    alone = walk_of(load_walk("solenoid", ["wearer.body_mass=90 kg"])).wearer
+    assert alone == replace(paper, body_mass=90.0), "without a stature segments stay as they are"
+
+
+@pytest.mark.parametrize("in_file", [True, False])
+def test_a_column_of_stature_or_mass_is_the_single_run_with_it(in_file: bool) -> None:
+    fixed = ("wearer.stature=1.6 m", "wearer.toe_lever=0.2 m") if in_file else ()
+    varied = {"wearer.body_mass": 90.0} | ({} if in_file else {"wearer.stature": 1.75})
+    row = with_numbers(load_walk("solenoid", fixed), varied)
+    units = {"wearer.body_mass": "kg", "wearer.stature": "m"}
+    single = load_walk("solenoid", (*fixed, *(f"{path}={value} {units[path]}" for path, value in varied.items())))
+    assert walk_of(row).wearer == walk_of(single).wearer
+
+
+def test_a_stature_beyond_those_of_adults_is_said() -> None:
+    (adult,) = person_remarks(load_walk("solenoid", ["wearer.stature=1.75 m"]))
+    assert "; 1.75 m tall, and the segments follow mass and stature; the curves of the gait are not scaled" in adult
+    (child,) = person_remarks(load_walk("solenoid", ["wearer.stature=1.2 m", "wearer.body_mass=20 kg"]))
+    assert "1.2 m tall" in child
+    assert "outside the 1.45 to 2 m of adults" in child
+    assert "not known to hold for a body so different" in child
+    with pytest.raises(ScenarioError, match=r"wearer.stature=3 m: must be at least 0.5 m and at most 2.5 m"):
+        load_walk("solenoid", ["wearer.stature=3 m"])
 
 
 def test_without_a_named_gait_the_papers_subject_walks_and_the_difference_is_said() -> None:

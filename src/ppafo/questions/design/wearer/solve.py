@@ -32,12 +32,10 @@ from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import LONGEST_MINUTES, walk_of
 from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import bottle_life, walk
-from ppafo.walking.wearer import SCALED_MASS, SHANK_SHARE, WEARER, Build, paper_subject, segment_values, who_walks
+from ppafo.walking.wearer import SCALED_MASS, STATURES, WEARER, paper_subject, who_walks
 
 WALKS = {"solenoid": "solenoid-regulators", "proportional": "proportional-regulators"}
 """The walk, with its controller, of each kind of valve."""
-STATURES = (1.45, 2.0)
-"""Statures [m] of nearly all adults, in which the fractions of segments were measured."""
 _REQUESTS = (1.0, 1.3, 1.7)
 """Torque that a torque controller is told, over the torque that is wanted: it lags behind its reference."""
 _FEW = 0.15
@@ -170,16 +168,9 @@ def _check(wish: Wish) -> None:
 
 
 def _wearer(wish: Wish) -> list[str]:
-    """Return the overrides of the person, whose segments are fractions of mass and stature as the paper's are."""
-    paper = paper_subject()
-    length = 1.0 if wish.stature is None else SHANK_SHARE * wish.stature / paper.shank_length
-    build = Build(np.array([wish.mass / paper.body_mass]), np.array([length]))
-    units = {"body_mass": "kg", "shank_mass": "kg", "foot_mass": "kg", "shank_inertia": "kg m^2"}
-    units["foot_inertia"] = "kg m^2"
-    return [
-        f"wearer.{name}={float(values[0]):.6g} {units.get(name, 'm')}"
-        for name, values in segment_values(paper, build).items()
-    ]
+    """Return the overrides of the person, of the paper's stature unless one is given."""
+    stature = paper_subject().stature if wish.stature is None else wish.stature
+    return [f"wearer.body_mass={wish.mass:.6g} kg", f"wearer.stature={stature:.6g} m"]
 
 
 def _few_strides(wish: Wish, valve: Part, actuator: Part) -> list[Tried]:
