@@ -1,0 +1,242 @@
+"""The wearer who reacts against an independent simulator, in which MuJoCo moves the segments.
+
+First each part at random states: accelerations, torques of the muscles, velocities of fibres, stimulation, ground; then
+energy and momentum of the body in the air by MuJoCo, step by step of the package; then walks.
+"""
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from ppafo.model.wearer.ground import Point, contact
+from ppafo.model.wearer.muscle import Fibre, next_fibre
+from ppafo.model.wearer.reflexes import Balance, Felt, Gait, stimulation
+from ppafo.model.wearer.segments import Damping, Limb, Pose, accelerations, circle, freed, leg_matrix
+from ppafo.model.wearer.walker import Assist, Fibres, Joints, Walker, Wearer, next_walker, pull
+from ppafo.wearers.loading import find_wearer, wearer_of, with_strengths
+from ppafo.wearers.published import first_answer, on_slope, start_of
+from tests.judge import wearer as judge
+from tests.judge.wearer_comparison import STEPS, by_judge, by_package, gap, strides_of
+
+pytestmark = pytest.mark.long
+
+WEARER = wearer_of(find_wearer("healthy-128"))
+ROUNDING = 1e-6
+"""Torque [N m] that antagonists of up to 10 kN m each, who cancel, leave of their rounding."""
+
+FEELINGS = (
+    "soleus",
+    "gastrocnemius",
+    "soleus_stretch",
+    "gastrocnemius_stretch",
+    "tibialis",
+    "vastus",
+    "knee",
+    "knee_rate",
+    "hamstring",
+    "gluteus",
+    "hamstring_length",
+    "flexor_length",
+    "load",
+)
+"""Feelings in the judge's order."""
+
+
+def to_joints(pose: Pose, offset: float) -> np.ndarray:
+    """Coordinates of MuJoCo at a pose; of rates and accelerations without the ``offset`` of angles, 0 or 1."""
+    half, quarter = offset * math.pi, offset * math.pi / 2.0
+    legs = [
+        (half - leg.thigh - pose.lean, half + leg.shank - leg.thigh, quarter + leg.shank - leg.foot)
+        for leg in (pose.left, pose.right)
+    ]
+    return np.array([pose.x, pose.y, pose.lean, *legs[0], *legs[1]])
+
+
+def drawn_pose(draw: np.random.Generator, size: float) -> Pose:
+    numbers = draw.uniform(-size, size, 9).tolist()
+    return Pose(*numbers[:3], Limb(*numbers[3:6]), Limb(*numbers[6:9]))
+
+
+def body_of_judge(wearer: Wearer, device: judge.Device = judge.NONE) -> tuple[Any, Any]:
+    model = mujoco.MjModel.from_xml_string(judge.body_file(wearer.body, device))
+    return model, mujoco.MjData(model)
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.1])
+def test_mujoco_accelerates_the_body_as_the_package_does(slope: float) -> None:
+    wearer, device = on_slope(WEARER, slope), judge.Device(inertia=0.0084)
+    model, data = body_of_judge(wearer, device)
+    draw = np.random.default_rng(1)
+    for _ in range(100):
+        pose, rates = drawn_pose(draw, 1.2), drawn_pose(draw, 6.0)
+        torques, points = draw.uniform(-200.0, 200.0, (2, 3)), draw.uniform(-2000.0, 2000.0, (2, 2, 2))
+        data.qpos[:], data.qvel[:] = to_joints(pose, 1.0), to_joints(rates, 0.0)
+        data.qfrc_applied[:] = [0.0, 0.0, 0.0, *torques[0], *torques[1]]
+        mujoco.mj_fwdPosition(model, data)
+        for site in range(4):
+            body, force = (
+                model.site_bodyid[site],
+                np.array([points[site // 2, site % 2, 0], 0.0, points[site // 2, site % 2, 1]]),
+            )
+            mujoco.mj_applyFT(model, data, force, np.zeros(3), data.site_xpos[site], body, data.qfrc_applied)
+        mujoco.mj_forward(model, data)
+        legs = []
+        for number, (limb, rate, inertia) in enumerate(
+            ((pose.left, rates.left, device.inertia), (pose.right, rates.right, 0.0))
+        ):
+            hip, knee, ankle = torques[number].tolist()
+            none = Damping(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, inertia)
+            given = Limb(-knee - hip, ankle + knee, -ankle)
+            forces = points[number].ravel().tolist()
+            legs.append(freed(leg_matrix(wearer.body, circle(limb), rate, given, *forces, none, 0.0)))
+        found = accelerations(wearer.body, pose.lean, rates.lean, -float(torques[:, 0].sum()), *legs)
+        expected = np.array(data.qacc)
+        assert to_joints(found, 0.0) == pytest.approx(expected, rel=1e-9, abs=1e-9 * np.abs(expected).max())
+
+
+def drawn_leg(draw: np.random.Generator) -> tuple[Joints, Joints, Fibres]:
+    """Angles, rates and fibres of a leg, from slack to far above the largest forces."""
+    angles = Joints(*np.radians(draw.uniform([60.0, 90.0, 120.0], [140.0, 185.0, 240.0])).tolist())
+    own: list[Fibre] = []
+    for name in judge.MUSCLES:
+        muscle = getattr(WEARER.left, name)
+        own.append(Fibre(float(draw.uniform(0.01, 1.0)), muscle.optimum * float(draw.uniform(0.35, 1.5)), 0.0))
+    rates = Joints(*draw.uniform(-8.0, 8.0, 3).tolist())
+    return angles, rates, Fibres._make(own)
+
+
+def test_muscles_pull_and_move_as_those_of_the_judge() -> None:
+    free = WEARER._replace(stop=WEARER.stop._replace(stiffness=0.0))
+    numbers, draw = judge.numbers_of(free), np.random.default_rng(2)
+    for _ in range(200):
+        angles, rates, fibres = drawn_leg(draw)
+        pulled = pull(WEARER.left, fibres, angles, rates, 0.0)
+        q, v = np.zeros(9), np.zeros(9)
+        q[3:6] = q[6:9] = [angles.hip, angles.knee, angles.ankle]
+        v[3:6] = v[6:9] = [rates.hip, rates.knee, rates.ankle]
+        activation, length = (
+            np.array([[getattr(item, name) for item in fibres]] * 2) for name in ("activation", "length")
+        )
+        torque, speeds, felt = np.zeros(6), np.zeros((2, 7)), np.zeros(28)
+        judge.forces_on_legs(numbers, q, v, activation, length, torque, speeds, felt)
+        assert torque == pytest.approx([pulled.hip, pulled.knee, pulled.ankle] * 2, abs=ROUNDING)
+        moved = [
+            next_fibre(getattr(WEARER.left, name), getattr(fibres, name), 0.5, getattr(pulled, name), 0.0).velocity
+            for name in judge.MUSCLES
+        ]
+        assert speeds == pytest.approx(np.array([moved, moved]), rel=1e-8, abs=1e-12)
+        known = [getattr(pulled.felt, name) for name in FEELINGS]
+        assert np.delete(felt[:13], [judge.V_SOL, judge.V_GAS, judge.LOAD]) == pytest.approx(
+            np.delete(known, [judge.V_SOL, judge.V_GAS, judge.LOAD]), rel=1e-10, abs=1e-12
+        )
+
+
+def test_reflexes_answer_as_those_of_the_judge() -> None:
+    draw, drawn = np.random.default_rng(3), set()
+    for _ in range(500):
+        gains = WEARER.left_gains._make(draw.uniform(0.0, 3.0, 27).tolist())
+        numbers = judge.numbers_of(WEARER._replace(left_gains=gains, right_gains=gains))
+        felt = draw.uniform(-0.5, 1.5, 26)
+        felt[judge.PHI_K], felt[13 + judge.PHI_K] = draw.uniform(0.0, 3.2, 2)
+        stands, rear = float(draw.integers(2)), float(draw.integers(2))
+        lean, rate, left_at = draw.uniform(-1.0, 1.0, 3).tolist()
+        own, other = (Felt(**dict(zip(FEELINGS, felt[a : a + 13].tolist(), strict=True))) for a in (0, 13))
+        order = stimulation(gains, own, Balance(lean, rate), Gait(stands, 0.1, left_at), other.load, rear)
+        given = np.zeros(7)
+        stance = np.array([[stands, 0.1, left_at], [1.0, 0.0, 0.0]])
+        judge.stimulate(numbers, felt, lean, rate, stance, 0, rear > 0.5, given)
+        assert given == pytest.approx([getattr(order, name) for name in judge.MUSCLES], rel=1e-12)
+        drawn |= {(stands, muscle) for muscle in np.flatnonzero((given > 0.01) & (given < 1.0)).tolist()}
+    assert len(drawn) == 14, "every muscle is answered between its limits, in stance and in swing"
+
+
+def test_the_ground_pushes_as_that_of_the_judge() -> None:
+    draw, ground = np.random.default_rng(4), judge.numbers_of(WEARER).ground
+    seen = set()
+    for _ in range(300):
+        state, point = np.zeros(2), Point(0.0, 0.0, 0.0)
+        x, speed = 0.0, float(draw.normal() * 10.0 ** draw.uniform(-3.0, 0.0))
+        for _ in range(20):
+            z, rise = float(draw.uniform(-0.02, 0.002)), float(draw.normal() * 0.02)
+            speed += float(draw.normal() * 0.01)
+            x += 0.01 * speed
+            on_foot = contact(WEARER.ground, point, x, z, speed, rise)
+            along, up = judge.ground_force(ground, state, x, z, speed, rise, True)
+            # A point that comes to rest sticks at once before the judge, and from the next step on in the package.
+            rests = point.touches > 0.5 and point.sticks < 0.5 and abs(speed) < WEARER.ground.rest_speed
+            assert up == pytest.approx(on_foot.up, rel=1e-12, abs=1e-12)
+            assert rests or along == pytest.approx(on_foot.along, rel=1e-12, abs=1e-12)
+            seen.add(float(state[0]))
+            point = on_foot.after
+    assert seen == {judge.AIR, judge.STICKS, judge.SLIDES}
+
+
+def flying(height: float) -> tuple[Wearer, Walker]:
+    """A wearer without muscles and ends of joints, high above the ground, who tumbles."""
+    names = dict.fromkeys(judge.MUSCLES, 0.0)
+    wearer = WEARER._replace(
+        left=with_strengths(WEARER.left, names),
+        right=with_strengths(WEARER.right, names),
+        stop=WEARER.stop._replace(stiffness=0.0),
+    )
+    walker = start_of(wearer, 1.3)
+    rates = Pose(1.3, 2.0, 1.0, Limb(3.0, -2.0, 4.0), Limb(-2.0, 1.0, -3.0))
+    return wearer, walker._replace(pose=walker.pose._replace(y=height), rates=rates)
+
+
+def drift(step: float, seconds: float) -> tuple[float, np.ndarray]:
+    """Change of energy [J], and of momentum but for gravity [kg m/s, kg m/s, kg m^2/s], in the air by MuJoCo."""
+    wearer, walker = flying(100.0)
+    model, data = body_of_judge(wearer)
+    weight = float(model.body_subtreemass[1]) * wearer.body.gravity
+    ordered, free = first_answer(), Assist(0.0, 0.0, 0.0)
+    energies, momenta = [], []
+    for number in range(round(seconds / step) + 1):
+        if number % round(0.01 / step) == 0:
+            data.qpos[:], data.qvel[:] = to_joints(walker.pose, 1.0), to_joints(walker.rates, 0.0)
+            mujoco.mj_forward(model, data)
+            mujoco.mj_subtreeVel(model, data)
+            energies.append(float(data.energy.sum()))
+            linear = data.subtree_linvel[1] * model.body_subtreemass[1]
+            momenta.append([linear[0], linear[2] + weight * number * step, data.subtree_angmom[1][1]])
+        walker = next_walker(wearer, walker, ordered.to_left, ordered.to_right, free, free, step).after
+    return float(np.ptp(energies)), np.ptp(momenta, axis=0)
+
+
+def test_in_the_air_energy_stays_and_gravity_alone_changes_momentum_to_first_order() -> None:
+    """The step is Euler's, rates first: what it adds in a second of tumbling halves with the step."""
+    (energy, momentum), (half_energy, half_momentum) = drift(2e-4, 1.0), drift(1e-4, 1.0)
+    assert energy == pytest.approx(2.0 * half_energy, rel=0.05)
+    assert momentum == pytest.approx(2.0 * half_momentum, rel=0.05, abs=1e-9)
+    assert half_energy < 1.0
+    assert (half_momentum < 0.005).all()
+
+
+def test_the_first_step_comes_to_that_of_the_judge_as_the_step_shortens() -> None:
+    """Paths part at the first strike already; until then the error is of first order, and there is no other."""
+    judged = by_judge("healthy-128", seconds=0.32)
+    far, _, near = (by_package("healthy-128", step, seconds=5.5) for step in STEPS)
+    for until, low, high in ((0.1, 3.0, 5.0), (0.3, 2.0, 8.0)):
+        for coarse, fine in zip(gap(far, judged, until), gap(near, judged, until), strict=True):
+            assert low < coarse / fine < high
+    first = gap(far, judged, 0.1)
+    assert first.hip < 0.1
+    assert first.joints < 0.05
+    assert first.load < 0.05
+    assert first.activation < 0.005
+
+
+@pytest.mark.thorough
+def test_ten_strides_are_as_long_and_as_quick_as_those_of_the_judge() -> None:
+    """At the package's own step, whose half changes the mean stride by one percent too."""
+    judged = strides_of(by_judge("healthy-128", 80, 11.6))
+    walked = strides_of(by_package("healthy-128", STEPS[0], 11.6))
+    assert walked.strikes[:2] == pytest.approx(judged.strikes[:2], abs=0.01)
+    assert walked.lengths == pytest.approx(judged.lengths, rel=0.03)
+    assert walked.length == pytest.approx(judged.length, rel=0.02)
+    assert walked.time == pytest.approx(judged.time, rel=0.02)
+    assert walked.speed == pytest.approx(judged.speed, rel=0.01)
+    assert walked.stance == pytest.approx(judged.stance, abs=0.01)
