@@ -237,6 +237,11 @@ SECTIONS: Mapping[str, Mapping[str, Check]] = {
             "a simulator of its own with the properties of CoolProp",
             "tests/unit/walking/test_on_bottle.py",
         ),
+        "wearer": tested(
+            "The wearer who reacts: its parts, the first step, ten strides",
+            "a simulator of its own in which MuJoCo moves the segments",
+            "tests/judge/test_wearer_against_judge.py",
+        ),
     },
     "The same bits elsewhere": {
         "bits": bits,

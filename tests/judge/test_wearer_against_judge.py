@@ -5,6 +5,8 @@ energy and momentum of the body in the air by MuJoCo, step by step of the packag
 """
 
 import math
+import re
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -23,6 +25,7 @@ from tests.judge.wearer_comparison import STEPS, by_judge, by_package, gap, stri
 
 pytestmark = pytest.mark.long
 
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "a-wearer-who-reacts.md"
 WEARER = wearer_of(find_wearer("healthy-128"))
 ROUNDING = 1e-6
 """Torque [N m] that antagonists of up to 10 kN m each, who cancel, leave of their rounding."""
@@ -240,3 +243,7 @@ def test_ten_strides_are_as_long_and_as_quick_as_those_of_the_judge() -> None:
     assert walked.time == pytest.approx(judged.time, rel=0.02)
     assert walked.speed == pytest.approx(judged.speed, rel=0.01)
     assert walked.stance == pytest.approx(judged.stance, abs=0.01)
+    rows = re.findall(r"\| mean from stride 3 on, .*? \| ([\d.]+) \| ([\d.]+) \|", PAGE.read_text(encoding="utf-8"))
+    by_page = np.array(rows[:4], dtype=float)
+    assert judged[2:] == pytest.approx(by_page[:, 0], rel=1e-3)
+    assert walked[2:] == pytest.approx(by_page[:, 1], rel=1e-3)
