@@ -256,8 +256,8 @@ def impossible_start(ranges: "Sequence[Range]", highest: Sequence[float], atmosp
         if item.path in _STARTS and most < (1.0 - _BELOW_ATMOSPHERE) * atmosphere:
             return (
                 f"{item.name} would be at most {most:.4g} Pa absolute, below the atmosphere of {atmosphere:.6g} Pa "
-                "into which the chamber is vented: no start, but the zero or the unit of its sensor, a gauge pressure "
-                "read as an absolute one, another atmosphere, or a run that starts too late"
+                "into which the chamber is vented, which cannot be; check the zero and the unit of its sensor, whether "
+                "a gauge pressure is read as an absolute one, the atmosphere, and whether the run starts too late"
             )
     return ""
 

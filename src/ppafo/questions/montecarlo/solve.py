@@ -99,8 +99,13 @@ class Statistic:
         return draw(first, count, seed)
 
     def effective_size(self, values: Floats) -> float:
-        """Return how many of the values determine the estimate; all where its interval is exact."""
+        """Return how many of the values determine the estimate; all where its interval is exact.
+
+        None of them, for a mean, while all are equal and few: one that comes later may lie anywhere.
+        """
         known = values[np.isfinite(values)]
+        if self.is_of_replicates and 0 < known.size < FEWEST_EQUAL and float(np.ptp(known)) == 0.0:
+            return 0.0
         return effective_sample_size(known) if self.is_of_replicates else float(known.size)
 
 
@@ -148,6 +153,8 @@ def parse_statistic(text: str, metric: str, atmosphere: float | None) -> Statist
 
 
 FEWEST_DRAWS = 32
+FEWEST_EQUAL = 3000
+"""Equal values from which they count as their mean: one in a thousand that differs would have come (95 %)."""
 _RULE_OF_THREE = 3.0
 """Over the draws: probability of an event that 95 of 100 such sets of draws show."""
 NOISE_DRAWS = 512
@@ -476,7 +483,13 @@ def remarks(estimate: MonteCarlo) -> list[str]:
     """Return what the number must not be read without: draws that decide alone, and noise."""
     said = []
     last = estimate.last
-    if not last.is_carried:
+    are_equal = estimate.values.size > 0 and float(np.ptp(estimate.values)) == 0.0
+    if not last.is_carried and are_equal:
+        said.append(
+            f"do not trust this interval: all {last.draws - last.missing:,} values are equal, which do not show how "
+            f"far a rare one lies; draw at least {FEWEST_EQUAL:,}"
+        )
+    elif not last.is_carried:
         said.append(
             f"do not trust this interval: the mean has an effective sample size of {last.effective_size:.3g} of "
             f"{last.draws - last.missing:,} draws, so that the true value lies outside more often than stated; request "
@@ -485,10 +498,13 @@ def remarks(estimate: MonteCarlo) -> list[str]:
     known = last.draws - last.missing
     if estimate.statistic.is_of_replicates and known:
         share, span = _RULE_OF_THREE / known, float(np.ptp(estimate.values))
-        said.append(
-            f"what happens in fewer than {100.0 * share:.2g} % of the runs may be missing among these draws (95 %): if "
-            f"it lay beyond the others by their range, {_difference(estimate, span)}, the mean would move by up to "
+        moved = (
+            f"if it lay beyond the others by their range, {_difference(estimate, span)}, the mean would move by up to "
             f"{_difference(estimate, share * span)}, and more the further it lies"
+        )
+        said.append(
+            f"what happens in fewer than {100.0 * share:.2g} % of the runs may be missing among these draws (95 %): "
+            f"{f'it would move the mean by up to {share:.2g} times its distance' if are_equal else moved}"
         )
     if estimate.noise is not None:
         said.append(f"sensor noise causes {fraction_text(estimate.noise)} of the variance over the draws")

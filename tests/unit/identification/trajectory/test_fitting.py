@@ -213,7 +213,7 @@ def test_a_start_that_comes_out_below_the_atmosphere_is_refused_with_what_it_hin
     drawn = recorded(with_numbers(step, {"initial.pressure_1": 8.0e4}))
     start = FreeParameter("initial.pressure_1", start=101325.0, recordings=("step",))
     with pytest.raises(
-        IdentificationError, match=r"initial.pressure_1.* below the atmosphere .* a gauge pressure read"
+        IdentificationError, match=r"initial.pressure_1.* below the atmosphere .* gauge pressure is read"
     ):
         fitted(dataclasses.replace(experiment, recording=drawn), start)
 

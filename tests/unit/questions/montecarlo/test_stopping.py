@@ -118,6 +118,30 @@ def test_a_mean_that_a_few_draws_carry_is_not_believed_and_drawn_on() -> None:
     assert "fewer than 0.037 % of the runs may be missing" in unseen
 
 
+def test_equal_values_are_no_known_mean_before_a_rare_one_could_have_come() -> None:
+    rare = Uncertainty((Drawn("x0", UniformBetween(0.0, 1.0)),))
+
+    def outcomes(share: float) -> Model:
+        def run(columns: Mapping[str, Floats]) -> Outcomes:
+            values = 100.0 * (columns["x0"] < share)
+            return Outcomes({METRIC: values}, np.zeros(values.size, bool), "")
+
+        return run
+
+    rule = StoppingRule(0.2, is_relative=False, first=64, maximum=4096)
+    found = [draw_until(outcomes(0.001), rare, METRIC, mean_of("N m"), rule, seed) for seed in range(60)]
+    wrong = [not item.last.interval.low <= 0.1 <= item.last.interval.high for item in found]
+    # Each of these was met at its first look, with an interval from 0 to 0.
+    assert np.mean([item.is_met and is_wrong for item, is_wrong in zip(found, wrong, strict=True)]) <= 0.05
+    few = draw_until(outcomes(0.0), rare, METRIC, mean_of("N m"), StoppingRule(0.2, False, 64, 1024), 1)
+    assert not few.is_met
+    assert "all 1,024 values are equal" in remarks(few)[0]
+    many = draw_until(outcomes(0.0), rare, METRIC, mean_of("N m"), rule, 1)
+    assert many.is_met
+    (unseen,) = remarks(many)
+    assert "would move the mean by up to 0.00073 times its distance" in unseen
+
+
 def test_replicates_know_the_mean_of_a_smooth_function_far_better_than_independent_draws() -> None:
     def smooth(columns: Mapping[str, Floats]) -> Floats:
         return 3.0 + columns["x0"] + 2.0 * columns["x1"] + 3.0 * columns["x2"] + 0.1 * columns["x0"] * columns["x1"]
