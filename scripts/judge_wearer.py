@@ -22,6 +22,7 @@ from tests.judge.wearer_comparison import (
     STEPS,
     STRIDES,
     Columns,
+    Floats,
     Strides,
     by_judge,
     by_package,
@@ -34,6 +35,11 @@ FINE, COARSE = 100, 67
 """Steps of the judge in a millisecond, and what it is compared with."""
 UNTIL = (0.1, 0.3, 0.9)
 """Times [s]: the first leg stands; the right foot has struck; so has the left one."""
+
+
+def cells_of(series: list[Floats], number: int) -> str:
+    """Cells of a row: one number of each series, a dash where a wearer fell before."""
+    return " | ".join(f"{values[number]:.3f}" if number < values.size else "-" for values in series)
 
 
 def compare(name: str, steps: Sequence[float]) -> None:
@@ -56,10 +62,9 @@ def compare(name: str, steps: Sequence[float]) -> None:
     print(f"|---|{'---|' * len(every)}")
     shown = (0, 2, 5, STRIDES - 1)
     for number in (*shown[:-1], STRIDES):
-        print(f"| strike {number + 1} (s) | {' | '.join(f'{item.strikes[number]:.3f}' for item in every.values())} |")
+        print(f"| strike {number + 1} (s) | {cells_of([item.strikes for item in every.values()], number)} |")
     for number in shown:
-        cells = " | ".join(f"{item.lengths[number]:.3f}" for item in every.values())
-        print(f"| length of stride {number + 1} (m) | {cells} |")
+        print(f"| length of stride {number + 1} (m) | {cells_of([item.lengths for item in every.values()], number)} |")
     for words, field in (
         ("length (m)", "length"),
         ("time (s)", "time"),

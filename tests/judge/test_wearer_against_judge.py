@@ -4,6 +4,7 @@ First each part at random states: accelerations, torques of the muscles, velocit
 energy and momentum of the body in the air by MuJoCo, step by step of the package; then walks.
 """
 
+import ast
 import math
 import re
 from pathlib import Path
@@ -21,7 +22,7 @@ from ppafo.model.wearer.walker import Assist, Fibres, Joints, Walker, Wearer, ne
 from ppafo.wearers.loading import find_wearer, wearer_of, with_strengths
 from ppafo.wearers.published import first_answer, on_slope, start_of
 from tests.judge import wearer as judge
-from tests.judge.wearer_comparison import STEPS, by_judge, by_package, gap, strides_of
+from tests.judge.wearer_comparison import STEPS, Columns, by_judge, by_package, gap, strides_of
 
 pytestmark = pytest.mark.long
 
@@ -218,9 +219,14 @@ def test_in_the_air_energy_stays_and_gravity_alone_changes_momentum_to_first_ord
     assert (half_momentum < 0.005).all()
 
 
-def test_the_first_step_comes_to_that_of_the_judge_as_the_step_shortens() -> None:
+@pytest.fixture(scope="module")
+def judged() -> Columns:
+    """The first step before the judge."""
+    return by_judge("healthy-128", seconds=0.32)
+
+
+def test_the_first_step_comes_to_that_of_the_judge_as_the_step_shortens(judged: Columns) -> None:
     """Paths part at the first strike already; until then the error is of first order, and there is no other."""
-    judged = by_judge("healthy-128", seconds=0.32)
     far, _, near = (by_package("healthy-128", step, seconds=5.5) for step in STEPS)
     for until, low, high in ((0.1, 3.0, 5.0), (0.3, 2.0, 8.0)):
         for coarse, fine in zip(gap(far, judged, until), gap(near, judged, until), strict=True):
@@ -232,18 +238,34 @@ def test_the_first_step_comes_to_that_of_the_judge_as_the_step_shortens() -> Non
     assert first.activation < 0.005
 
 
+def test_the_judge_would_see_a_muscle_or_a_gain_that_is_wrong_by_two_in_a_thousand(judged: Columns) -> None:
+    flaws = ("wearer.soleus_strength=0.998", "wearer.vastus_strength=0.998", "wearer.left_soleus_force=1.1611")
+    sound, *wrong = (
+        gap(by_package("healthy-128", 0.0125, 5.5, changes), judged, 0.3).hip
+        for changes in ((), *((flaw,) for flaw in flaws))
+    )
+    assert min(wrong) > 1.7 * sound
+
+
+def test_the_judge_has_nothing_of_the_package_but_the_numbers_of_wearers() -> None:
+    tree = ast.parse(Path(judge.__file__).read_text(encoding="utf-8"))
+    taken = [item.module for item in ast.walk(tree) if isinstance(item, ast.ImportFrom)]
+    taken += [name.name for item in ast.walk(tree) if isinstance(item, ast.Import) for name in item.names]
+    assert {name for name in taken if name and name.startswith("ppafo")} == {"ppafo.wearers.loading"}
+
+
 @pytest.mark.thorough
 def test_ten_strides_are_as_long_and_as_quick_as_those_of_the_judge() -> None:
     """At the package's own step, whose half changes the mean stride by one percent too."""
-    judged = strides_of(by_judge("healthy-128", 80, 11.6))
+    expected = strides_of(by_judge("healthy-128", 80, 11.6))
     walked = strides_of(by_package("healthy-128", STEPS[0], 11.6))
-    assert walked.strikes[:2] == pytest.approx(judged.strikes[:2], abs=0.01)
-    assert walked.lengths == pytest.approx(judged.lengths, rel=0.03)
-    assert walked.length == pytest.approx(judged.length, rel=0.02)
-    assert walked.time == pytest.approx(judged.time, rel=0.02)
-    assert walked.speed == pytest.approx(judged.speed, rel=0.01)
-    assert walked.stance == pytest.approx(judged.stance, abs=0.01)
+    assert walked.strikes[:2] == pytest.approx(expected.strikes[:2], abs=0.01)
+    assert walked.lengths == pytest.approx(expected.lengths, rel=0.03)
+    assert walked.length == pytest.approx(expected.length, rel=0.02)
+    assert walked.time == pytest.approx(expected.time, rel=0.02)
+    assert walked.speed == pytest.approx(expected.speed, rel=0.01)
+    assert walked.stance == pytest.approx(expected.stance, abs=0.01)
     rows = re.findall(r"\| mean from stride 3 on, .*? \| ([\d.]+) \| ([\d.]+) \|", PAGE.read_text(encoding="utf-8"))
     by_page = np.array(rows[:4], dtype=float)
-    assert judged[2:] == pytest.approx(by_page[:, 0], rel=1e-3)
+    assert expected[2:] == pytest.approx(by_page[:, 0], rel=1e-3)
     assert walked[2:] == pytest.approx(by_page[:, 1], rel=1e-3)

@@ -1,5 +1,6 @@
 """A shipped wearer who reacts in the package and before the judge: the first step, and ten strides."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -17,7 +18,7 @@ Floats = NDArray[np.float64]
 LIGHT = ("controller.kind=off", "actuator.torque_constant=1e-12 m^3")
 """A device that is vented and whose gas cannot turn the ankle; its inertia, damping and friction remain."""
 
-SECONDS = 13.0
+SECONDS = 16.0
 STEPS = (0.1, 0.05, 0.025)
 """Steps of the package [ms]: the default, its half and its quarter."""
 
@@ -56,15 +57,15 @@ class Gap(NamedTuple):
     activation: float
 
 
-def light_walk(name: str, step: float, seconds: float = SECONDS) -> Scenario:
+def light_walk(name: str, step: float, seconds: float = SECONDS, changes: Sequence[str] = ()) -> Scenario:
     """The walk of a wearer with the lightest device, at a step [ms], recorded with each sample of the reflexes."""
-    given = [f"wearer.reacts={name}", *LIGHT, f"run.duration={seconds} s", f"run.step={step} ms"]
+    given = [f"wearer.reacts={name}", *LIGHT, f"run.duration={seconds} s", f"run.step={step} ms", *changes]
     return replace(load_walk("reacting", given), output_interval=SAMPLE)
 
 
-def by_package(name: str, step: float, seconds: float = SECONDS) -> Columns:
-    """The walk of the package at a step [ms], from the first sample on."""
-    recording = walk(light_walk(name, step, seconds)).recording
+def by_package(name: str, step: float, seconds: float = SECONDS, changes: Sequence[str] = ()) -> Columns:
+    """The walk of the package at a step [ms], from the first sample on; ``changes`` make another wearer of this one."""
+    recording = walk(light_walk(name, step, seconds, changes)).recording
     columns: Columns = {column: np.asarray(recording[column]) for column in COLUMNS if column in recording.channels}
     return columns
 
@@ -79,8 +80,7 @@ def device_of(name: str) -> Device:
 
 def by_judge(name: str, steps: int = 100, seconds: float = SECONDS) -> Columns:
     """The walk of the judge with ``steps`` steps a millisecond."""
-    walked = walk_of_judge(name, seconds, steps, device_of(name))
-    return {column: walked[column] for column in COLUMNS[1:]}
+    return walk_of_judge(name, seconds, steps, device_of(name)).columns
 
 
 def strides_of(columns: Columns) -> Strides:
