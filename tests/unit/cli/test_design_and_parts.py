@@ -70,6 +70,7 @@ def test_a_design_is_printed_and_written_with_its_doubts(folder: Path, capsys: p
     assert printed.count("\n*  enfield-ls-v05s ") == 1
     assert "enfield-ls-v05s  mass (assumed)" in printed
     names = ["design.json", "design.txt", "front.csv", "front.png", "front.svg", "ppafo.json", "report.html"]
+    names += ["suggested.png", "suggested.svg"]
     assert sorted(path.name for path in out.iterdir()) == names
     document = json.loads((out / "design.json").read_text())
     assert 0 <= document["suggested"] < len(document["front"])

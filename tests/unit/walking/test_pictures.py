@@ -79,14 +79,16 @@ def test_the_mean_stride_shows_both_walks_and_the_healthy_gait() -> None:
     pair = compared("solenoid")
     figure = walk_figure({"with the device": pair.with_device, "without": pair.without_device})
     angle, torque, _, pressures, toes = figure.axes
+    counted = [f"{walked.metrics['counted_strides'].value:.0f}" for walked in (pair.with_device, pair.without_device)]
+    named = f"with the device, mean of {counted[0]}"
     assert [line.get_label() for line in angle.lines if not str(line.get_label()).startswith("_")] == [
-        "with the device",
-        "without",
+        named,
+        f"without, mean of {counted[1]}",
         "healthy gait",
     ]
-    flexion = next(line for line in angle.lines if line.get_label() == "with the device").get_ydata()
+    flexion = next(line for line in angle.lines if line.get_label() == named).get_ydata()
     np.testing.assert_allclose(flexion, 90.0 - np.degrees(pair.with_device.averages["angle"].mean))
-    curve = next(line for line in torque.lines if line.get_label() == "with the device").get_ydata()
+    curve = next(line for line in torque.lines if line.get_label() == named).get_ydata()
     np.testing.assert_array_equal(curve, pair.with_device.averages["external_torque"].mean)
     assert len([line for line in pressures.lines if len(np.asarray(line.get_xdata())) > 2]) == 2
     assert len([line for line in toes.lines if len(np.asarray(line.get_xdata())) > 2]) == 3
@@ -168,5 +170,7 @@ def test_the_mean_stride_says_how_many_strides_it_is_the_mean_of() -> None:
     counted = int(settled(failing.helped).sum())
     assert 0 < counted < failing.helped.size
     assert failing.metrics["counted_strides"].value == counted
-    said = texts(walk_figure({"with the device": failing}))[0]
-    assert said.endswith(f"mean of {counted} of {failing.helped.size} strides")
+    figure = walk_figure({"with the device": failing})
+    assert texts(figure)[0].endswith(f", {failing.helped.size} strides")
+    legend = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert legend[0] == f"with the device, mean of {counted}"

@@ -10,6 +10,7 @@ from ppafo.answers import Column, Figure, Section, Table
 from ppafo.answers.display_units import display_value, quantity_text
 from ppafo.errors import DataError
 from ppafo.gait.gait import speed_range
+from ppafo.questions.endurance.answer import steps_text
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.walking.bottle import SupplyCourse, lasted, lasting_text
@@ -57,6 +58,14 @@ def bottle_remark(worn: WalkResult, others: Sequence[WalkResult]) -> str:
     return f"bottle {supply.supply.bottle.name}: {ended}{supply.ending.message}"
 
 
+def _walked(worn: WalkResult, seconds: float) -> str:
+    """Return how many strides were walked in a time [s], as ``ppafo endurance`` counts; of a course the whole ones."""
+    motion = walk_of(worn.scenario)
+    if motion.course is not None or motion.reacts is not None:
+        return f"after {worn.helped.size} whole strides"
+    return f"{steps_text(seconds / motion.gait.stride_time)} strides, {worn.helped.size} of them whole between strikes"
+
+
 def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
     values, peaks = supply.values, peak_torques(worn)
     bottle = supply.supply.bottle
@@ -64,7 +73,7 @@ def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
     rows = [
         ("bottle", f"{bottle.title}, with {_gas(supply.supply.mass)} at {_warmth(supply.supply.temperature)}"),
         ("what ended it", supply.ending.message),
-        ("when", f"{quantity_text(supply.ending.time, 'duration')}, after {worn.helped.size} whole strides"),
+        ("when", f"{quantity_text(supply.ending.time, 'duration')}, {_walked(worn, supply.ending.time)}"),
         ("gas used", f"{_gas(supply.balance.left_bottle)}, left {_gas(float(values['bottle_mass'][-1]))}{liquid}"),
         ("bottle at the end", f"{_warmth(float(values['bottle_temperature'][-1]))}, {_pressure(supply)}"),
         ("coldest gas behind the regulator", _warmth(float(values["outlet_temperature"].min()))),

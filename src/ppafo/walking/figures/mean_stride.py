@@ -81,7 +81,8 @@ def walk_figure(walks: Mapping[str, Strides]) -> "Figure":
             axes.set_title(panel.title)
             axes.locator_params(axis="y", nbins=5)
             for (name, result), colour in zip(walks.items(), (WITH, WITHOUT), strict=False):
-                _draw(axes, panel, result, name, colour)
+                counted = result.metrics["counted_strides"].value
+                _draw(axes, panel, result, f"{name}, mean of {counted:.0f}", colour)
         angle = grid[0][0]
         gait = walk_of(first.scenario).gait
         look: dict[str, Any] = {"color": HEALTHY, "linewidth": 1.2, "linestyle": (0, (1, 1.2)), "label": "healthy gait"}
@@ -114,11 +115,11 @@ def _draw(axes: "Axes", panel: _Panel, result: Strides, name: str, colour: str) 
 
 def _head(figure: "Figure", axes: "Axes", result: Strides, height: float) -> None:
     configuration = result.scenario
-    strides, counted = (f"{result.metrics[name].value:.0f}" for name in ("strides", "counted_strides"))
-    title = f"{configuration.name}: {walk_of(configuration).gait.name}, mean of {counted} of {strides} strides"
+    strides = f"{result.metrics['strides'].value:.0f}"
+    title = f"{configuration.name}: {walk_of(configuration).gait.name}, {strides} strides"
     figure.text(0.12 / _WIDTH, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
     handles, labels = axes.get_legend_handles_labels()
     place = (0.1 / _WIDTH, 1.0 - 0.3 / height)
     figure.legend(handles, labels, loc="upper left", bbox_to_anchor=place, ncols=3, borderaxespad=0.0, handlelength=1.8)
     remark = "band: standard deviation; grey: stance"
-    figure.text(1.0 - 0.2 / _WIDTH, 1.0 - 0.34 / height, remark, ha="right", va="top", fontsize=8.5, color=GREY)
+    figure.text(1.0 - 0.2 / _WIDTH, 0.1 / height, remark, ha="right", va="bottom", fontsize=8.5, color=GREY)

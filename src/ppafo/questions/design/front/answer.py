@@ -2,20 +2,21 @@
 
 import csv
 import io
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
-from ppafo.answers.display_units import display_values, quantity_of_unit, title_with_unit
+from ppafo.answers.display_units import display_values, quantity_of_unit, quantity_text, title_with_unit
 from ppafo.answers.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, house_style, mark_kind
 from ppafo.parameters.parts import Part
-from ppafo.questions.design.front.problem import SEARCHED_STREAMS, DesignProblem, Variable
+from ppafo.questions.design.front.problem import GAS, SEARCHED_STREAMS, DesignProblem, Variable
 from ppafo.questions.design.front.search import PATIENCE, Floats
 from ppafo.questions.parts.solve import doubts_data, doubts_sections, titles_section
 from ppafo.questions.question import Solved
+from ppafo.simulation.simulate import Result
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
@@ -52,6 +53,15 @@ class DesignPoint:
         return self.error, self.gas, self.mass
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Rerun:
+    """The suggestion run once more in a task: the command that repeats it, and its result."""
+
+    task: str
+    command: str
+    result: Result
+
+
 @dataclass(frozen=True, slots=True)
 class Design(Solved):
     """The result of a design study.
@@ -60,6 +70,7 @@ class Design(Solved):
     place of the suggestion and ``reason`` states why. ``growth`` has pairs of designs evaluated and hypervolume [-];
     ``failures`` maps the reason of a failed run to the task it failed in. ``streams`` is how many new streams of noise
     the front was judged over, 0 without noise, and ``fallen`` how many of its designs did not stand there.
+    ``suggested`` is the suggestion run once more in each task.
     """
 
     problem: DesignProblem
@@ -76,6 +87,7 @@ class Design(Solved):
     seconds: float
     streams: int = 0
     fallen: int = 0
+    suggested: tuple[Rerun, ...] = ()
 
     @property
     def doubtful(self) -> tuple[tuple[Part, str], ...]:
@@ -235,6 +247,7 @@ def answer_of(design: Design) -> Answer:
                 remarks=(f"suggested: {design.reason}", _search_sentence(design), *_noise(design), *_failures(design))
             ),
             Section("Error, gas and mass", figure=figure, is_detail=True),
+            *_suggestion(design),
             _method_section(design),
             *doubts_sections(design.doubtful),
             titles_section(part for point in points for part in (point.valve, point.actuator)),
@@ -242,6 +255,22 @@ def answer_of(design: Design) -> Answer:
         data=_data(design),
         files={"front.csv": lambda: front_table(design).encode()},
     )
+
+
+def _suggestion(design: Design) -> Iterator[Section]:
+    """Yield the suggestion as it ran once more in each task, with its figure and the command that repeats it."""
+    error = design.problem.error
+    for number, rerun in enumerate(design.suggested, 1):
+        found = rerun.result.metrics
+        gas = quantity_text(found[GAS].value, "gas mass")
+        numbers = f"error {quantity_text(found[error].value, 'torque')}, gas {gas}"
+        stem = "suggested" if number == 1 else f"suggested-{number}"
+        yield Section(
+            "The suggestion, run once more" if number == 1 else "",
+            remarks=(f"in '{rerun.task}': {numbers}", f"again: {rerun.command}"),
+        )
+        caption = f"The suggestion in the task '{rerun.task}'."
+        yield Section(f"The run in '{rerun.task}'", figure=Figure(stem, caption, rerun.result.plot), is_detail=True)
 
 
 def front_table(design: Design) -> str:

@@ -1,7 +1,8 @@
 """What designs are worth on every task and in every noise stream, and the study: problem in, front out."""
 
+import shlex
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import final
 
@@ -13,7 +14,7 @@ from ppafo.errors import StudyError
 from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.parameters.parts import Part
 from ppafo.progress import Report, report_nothing
-from ppafo.questions.design.front.answer import SHOWN_OBJECTIVES, Design, DesignPoint, objective_table
+from ppafo.questions.design.front.answer import SHOWN_OBJECTIVES, Design, DesignPoint, Rerun, objective_table
 from ppafo.questions.design.front.problem import (
     DEAD_VOLUME,
     FRESH_STREAMS,
@@ -35,6 +36,8 @@ from ppafo.questions.design.front.search import (
     representatives,
     search_front,
 )
+from ppafo.running import simulate
+from ppafo.simulation.declaration import PLAIN
 from ppafo.simulation.ensemble import COMPLETED, run_ensemble
 from ppafo.simulation.numbers import TIMES, declared_numbers, moving_together, number_at
 from ppafo.simulation.scenario import Scenario
@@ -244,7 +247,26 @@ def find_front(problem: DesignProblem, threads: int | None = None, report: Repor
         seconds=time.perf_counter() - begun,
         streams=FRESH_STREAMS if evaluation.seeds.size else 0,
         fallen=len(front.candidates) - len(points),
+        suggested=tuple(_run_again(problem, candidates.at(np.array([knee(table)])))),
     )
+
+
+def _run_again(problem: DesignProblem, chosen: Candidates) -> Iterator[Rerun]:
+    """Yield one design as its files and the command line have it, in each task."""
+    valve = problem.combinations[int(chosen.choice[0])].valve
+    for task in problem.tasks:
+        scenario = task.scenarios[valve.kind]
+        origin, columns = scenario.origin, design_columns(problem, scenario, chosen)
+        known = {path: item.unit for path, item in declared_numbers(scenario).items()}
+        units = known | {item.path: item.unit for item in problem.variables}
+        texts = [
+            f"{path}={values[0]:.6g} {'' if units[path] in PLAIN else units[path]}".strip()
+            for path, values in columns.items()
+        ]
+        own = [text for text in origin.overrides if text.partition("=")[0].strip() not in columns]
+        overrides = (*own, *texts)
+        sets = " ".join(f"--set {shlex.quote(text)}" for text in overrides)
+        yield Rerun(task.name, f"ppafo simulate {origin.file} {sets}", simulate(origin.file or "", overrides))
 
 
 def _standing(evaluation: Evaluation, front: Front) -> tuple[Candidates, Judged]:

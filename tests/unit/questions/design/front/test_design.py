@@ -8,6 +8,7 @@ import jsonschema
 import numpy as np
 import pytest
 
+from ppafo.answers.writing import text_of
 from ppafo.errors import PpafoError, StudyError
 from ppafo.questions.design.front.answer import Design, answer_of, front_table
 from ppafo.questions.design.front.search import Candidates
@@ -112,6 +113,16 @@ def test_a_design_does_what_the_table_says_when_it_is_simulated_alone(study: Des
     assert point.error == pytest.approx(0.75 * errors[0] + 0.25 * errors[1], rel=1e-9)
     assert point.gas == pytest.approx(0.75 * gases[0] + 0.25 * gases[1], rel=1e-9)
     assert point.mass == pytest.approx(0.300 + size * point.actuator.values["mass"] + 0.707 + 1.9)
+
+
+def test_the_suggestion_is_run_once_more_in_each_task_and_comes_to_what_the_front_says(study: Design) -> None:
+    point = study.front[study.knee]
+    assert [rerun.task for rerun in study.suggested] == [task.name for task in study.problem.tasks]
+    for rerun in study.suggested:
+        error, gas = point.tasks[rerun.task]
+        assert rerun.result.metrics["rms_error"].value == pytest.approx(error, rel=1e-4)
+        assert rerun.result.metrics["gas_supplied"].value == pytest.approx(gas, rel=1e-4)
+        assert rerun.command in text_of(answer_of(study))
 
 
 def load_design_scenario(task: str, rate: str):  # type: ignore[no-untyped-def]
