@@ -101,8 +101,9 @@ function isOnSteps(period: number, step: number, interval: number): boolean {
   return count > 0.5 && Math.abs(count - Math.round(count)) <= RELATIVE * count;
 }
 
-/** The longest step, up to one that is given, with which samples of a controller and of the recording fall on steps; that one itself where none does. */
+/** The longest step, up to one that is given, with which samples of a controller and of the recording fall on steps; that one itself where none does, or where it is longer than they are: that is refused. */
 function stepOnSamples(period: number, step: number, interval: number): number {
+  if (step > Math.min(period, interval) * (1 + RELATIVE)) return step;
   for (let parts = 1; parts <= MOST_PARTS; parts += 1) {
     const part = step / parts;
     const isPart = Math.abs(dividingStep(period, part) - part) <= RELATIVE * part;
@@ -181,7 +182,7 @@ export function contradiction(program: Program, values: Values): string {
     if (left === undefined || right === undefined) continue;
     if (!holds(relation, left, factor * right, slack)) return `${key} must be ${relation} ${factor < 1.01 ? "" : `${factor} times `}${other}`;
   }
-  return program.kind === "walk" ? contradictionOfProfile(values) : contradictionOfTimes(program, values);
+  return program.kind === "walk" ? contradictionOfProfile(values) : contradictionOfTimes(values);
 }
 
 /** A torque over the stride must have ended with it. */
@@ -191,15 +192,13 @@ function contradictionOfProfile(values: Values): string {
 }
 
 /** What a scenario file may not have either: samples that do not divide the run, a step longer than a sample of the controller. */
-function contradictionOfTimes(program: Program, values: Values): string {
+function contradictionOfTimes(values: Values): string {
   const [duration, interval, step, period] = ["run.duration", "run.output_interval", "run.step", "controller.period"].map((key) => values.get(key));
   if (duration !== undefined && interval !== undefined) {
     const count = duration / interval;
     if (Math.abs(count - Math.round(count)) > RELATIVE * count) return `run.output_interval must divide run.duration; it fits ${plain(count, 6)} times`;
   }
   if (step !== undefined && period !== undefined && step > period * (1 + RELATIVE)) return "run.step must be at most controller.period";
-  const isRecorded = step === undefined || period === undefined || interval === undefined || isOnSteps(period, step, interval);
-  if (!isRecorded && isRecordedOnSteps(program)) return "run.output_interval must be a whole number of steps, and so must controller.period: take rounder numbers, or another run.step";
   return "";
 }
 

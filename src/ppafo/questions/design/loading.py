@@ -19,6 +19,12 @@ def read_design_file(name_or_path: str | Path) -> tuple[DesignFile | SizingFile,
     """Return a design file by its name in the package or by its path, and what messages call it."""
     file = label(str(name_or_path))
     document = FILE.parse(FILE.read(name_or_path), file)
+    known = {*DesignFile.model_fields, *SizingFile.model_fields}
+    if document.keys() <= known - {"profile", "task"}:
+        raise StudyError(
+            f"{file}: says neither which torque is wanted nor in which tasks; write a table [profile] with time and "
+            "torque or recording, or tables [[task]]; 'ppafo schema design' prints the format of both"
+        )
     if "profile" in document:
         return validate(SizingFile, document, file, StudyError), file
     return validate(DesignFile, document, file, StudyError), file

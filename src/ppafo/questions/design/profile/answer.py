@@ -386,7 +386,7 @@ def _method(sizing: Sizing) -> list[str]:
         f"{problem.simulated} repetitions of the profile were simulated from the initial state of the scenario; "
         "error and gas cover all of them, including the first filling of the chambers. Friction, leak, dead volumes "
         "and sensors are those of the scenario; what the data sheet of a valve does not state is taken as ideal.",
-        f"Made with: ppafo size {problem.file}",
+        f"Made with: ppafo design {problem.file}",
     ]
 
 

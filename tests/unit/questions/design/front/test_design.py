@@ -295,6 +295,14 @@ def test_a_limit_in_gauge_pressure_counts_from_the_atmosphere_of_the_tasks(tmp_p
     assert load_design(path).constraints[-1].most == 350e3
 
 
+def test_a_file_without_a_profile_and_without_tasks_says_what_to_write(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text('schema_version = 1\nname = "mine"\n')
+    with pytest.raises(
+        PpafoError, match=r"write a table \[profile\] with time and torque or recording, or tables \[\[task"
+    ):
+        load_design(tmp_path / "mine.toml")
+
+
 def test_a_design_is_drawn_and_told_as_data_like_any_answer(study: Design) -> None:
     figure = study.plot()
     labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes]
