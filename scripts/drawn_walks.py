@@ -2,11 +2,13 @@
 
     python scripts/drawn_walks.py --courses 1000 --seed 32
     python scripts/drawn_walks.py --faults 60 --seed 32
+    python scripts/drawn_walks.py --residuals 12 --seed 32
 
 The first prints for each valve how many walks without a fault stop, pause to their end, press against the wearer, or
 have no help back after two strides of steady walking.
 The second draws faults of the plant with a shut-off valve fitted, and prints how soon each is found, by which sign, and
-what is left on the wearer half a second later. The controller believes in the nominal device, whatever device is drawn.
+what is left on the wearer half a second later. The third prints how far a regulator that creeps shows in the residuals
+of the observer, beside walks without a fault. The controller believes in the nominal device, whatever device is drawn.
 They print tables of docs/walking-faults.md; all of it is simulated.
 """
 
@@ -20,8 +22,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ppafo.control.walking import observer
 from ppafo.control.walking.signs import HELPS, PAUSED, STOPPED
 from ppafo.errors import ScenarioError
+from ppafo.exports.firmware.walking import nominal_device
 from ppafo.model import contact as ground
 from ppafo.model.plant_faults import PLANT_FAULTS
 from ppafo.parameters.device import Orifice
@@ -63,6 +67,14 @@ WITH = (
     "| Fault | Valve | Within two strides | Last (strides) | Signs | N m until it is found later "
     "| Last above 2 N m (s after it is found) | N m from 0.5 s after | N m where it is not found |"
 )
+
+
+RESIDUALS = (
+    "| Walks | Valve | Largest share of what is allowed, in 2 strides | in 3 | in 4 "
+    "| Largest growth over strides, in 2 strides | in 3 | in 4 |"
+)
+CREEPS = (2, 3, 4)
+"""Strides since a regulator began to creep in which its residual is looked for."""
 
 
 @dataclass(frozen=True)
@@ -241,13 +253,76 @@ def without_faults(valve: str, count: int, seed: int) -> list[Outcome]:
 
 def with_fault(valve: str, part: str, kind: str, count: int, seed: int) -> list[Outcome]:
     """Outcomes of drawn level walks in which a part fails at a drawn time, with a shut-off valve in the line."""
-    draws, found = np.random.default_rng([seed, VALVES.index(valve), *map(ord, part + kind)]), []
-    for _ in range(count):
-        begins = float(draws.uniform(3.0, 4.1))
-        given = [f"faults.{part}.kind={kind}", f"faults.{part}.time={begins!r} s", SHUT_OFF]
-        base = load_walk(valve, [f"wearer.person={int(draws.integers(1, 100_000))}", *given])
-        found.append(outcome(walk(with_numbers(base, drawn_device(base, draws)), 0.17), begins))
-    return found
+    draws = np.random.default_rng([seed, VALVES.index(valve), *map(ord, part + kind)])
+    return [outcome(*failing_walk(valve, part, kind, draws)) for _ in range(count)]
+
+
+def residual_peaks(result: WalkResult) -> tuple[np.ndarray, np.ndarray]:
+    """Ends of strides [s], and the largest share of what is allowed that the residual of each chamber reaches in them.
+
+    Above 0 is more gas than expected, for as many samples as make an alarm. The readings are the true ones.
+    """
+    nominal, data, time = nominal_device(result.scenario), result.recording, result.recording.time
+    period = result.scenario.control.period
+    every = round(period / float(time[1] - time[0]))
+    seen = list(zip(*(data[name][::every].tolist() for name in ("angle", "pressure_1", "pressure_2")), strict=True))
+    means = observer.volumes(nominal, 0.5 * (nominal.nominal_angle_min + nominal.nominal_angle_max))
+    state, shares = observer.START, []
+    for last, now, command in zip(seen, seen[1:], data["command"][::every].tolist(), strict=False):
+        state = observer.next_observer(
+            nominal, state._replace(command=command), last[0], last[1], last[2], now[0], now[1], now[2], period
+        )
+        chambers, volumes = (state.chamber_1, state.chamber_2), observer.volumes(nominal, now[0])
+        shares.append(
+            [
+                (measured - chamber.pressure)
+                * volume
+                / (
+                    observer.OF_PASSED * chamber.passed
+                    + mean * (observer.OFFSET + observer.OF_PRESSURE * abs(measured))
+                )
+                for chamber, measured, volume, mean in zip(chambers, now[1:], volumes, means, strict=True)
+            ]
+        )
+    lasts = np.lib.stride_tricks.sliding_window_view(np.array(shares), int(observer.ALARM_SAMPLES), axis=0).min(axis=2)
+    begins = time[::every][1 : len(lasts) + 1]
+    in_air = data["contact"] == ground.SWING
+    strikes = time[np.flatnonzero(in_air[:-1] & ~in_air[1:]) + 1]
+    return strikes[1:], np.array([lasts[(begins >= a) & (begins < b)].max(axis=0) for a, b in pairwise(strikes)])
+
+
+def growth(peaks: np.ndarray) -> np.ndarray:
+    """By how much each stride's peaks are above the mean of up to three strides that ended a stride before."""
+    none = np.zeros((min(2, len(peaks)), 2))
+    later = [peaks[k] - peaks[max(0, k - 4) : k - 1].mean(axis=0) for k in range(2, len(peaks))]
+    return np.concatenate([none, np.array(later).reshape(-1, 2)])
+
+
+def rows_of_residuals(valve: str, count: int, seed: int) -> Iterator[str]:
+    """Rows of the table of residuals: the largest of all walks without a fault, the smallest of those that creep."""
+    draws = np.random.default_rng([seed, VALVES.index(valve), 1])
+    with tempfile.TemporaryDirectory() as folder:
+        found = [residual_peaks(walk(drawn_walk(valve, draws, Path(folder))))[1] for _ in range(count)]
+    sound = [max(float(peaks.max()) for peaks in found), max(float(growth(peaks).max()) for peaks in found)]
+    yield f"| without a fault, at most | {valve} | {sound[0]:.2f} | | | {sound[1]:.2f} | | |"
+    for chamber, part in enumerate(("regulator_1", "regulator_2")):
+        rows = []
+        for _ in range(count):
+            result, begins = failing_walk(valve, part, "creeping", draws)
+            ends, peaks = residual_peaks(result)
+            stride = walk_of(result.scenario).gait.stride_time
+            within = [(ends > begins) & (ends < begins + strides * stride) for strides in CREEPS]
+            rows.append([each[own, chamber].max(initial=0.0) for each in (peaks, growth(peaks)) for own in within])
+        least = " | ".join(f"{value:.2f}" for value in np.min(rows, axis=0))
+        yield f"| {part} creeps, at least | {valve} | {least} |"
+
+
+def failing_walk(valve: str, part: str, kind: str, draws: np.random.Generator) -> tuple[WalkResult, float]:
+    """A drawn level walk in which a part fails, with a shut-off valve in the line, and when it does [s]."""
+    begins = float(draws.uniform(3.0, 4.1))
+    given = [f"faults.{part}.kind={kind}", f"faults.{part}.time={begins!r} s", SHUT_OFF]
+    base = load_walk(valve, [f"wearer.person={int(draws.integers(1, 100_000))}", *given])
+    return walk(with_numbers(base, drawn_device(base, draws)), 0.17), begins
 
 
 def row_without(valve: str, found: list[Outcome]) -> str:
@@ -288,6 +363,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--courses", type=int, default=0, help="drawn walks without a fault, of each valve")
     parser.add_argument("--faults", type=int, default=0, help="drawn walks of each fault and valve")
+    parser.add_argument("--residuals", type=int, default=0, help="drawn walks of each row of the table of residuals")
     parser.add_argument("--seed", type=int, default=32)
     given = parser.parse_args()
     if given.courses:
@@ -302,6 +378,11 @@ def main() -> None:
                     print(
                         row_with(valve, part, kind, with_fault(valve, part, kind, given.faults, given.seed)), flush=True
                     )
+    if given.residuals:
+        print(f"{RESIDUALS}\n|{'---|' * (RESIDUALS.count('|') - 1)}")
+        for valve in VALVES:
+            for row in rows_of_residuals(valve, given.residuals, given.seed):
+                print(row, flush=True)
 
 
 if __name__ == "__main__":
