@@ -187,6 +187,7 @@ def main() -> None:
     parser.add_argument("--candidates", type=int, default=40)
     parser.add_argument("--bench", action="store_true", help="with errors of the bench, stated in the fit")
     parser.add_argument("--minutes", type=float, default=math.inf)
+    parser.add_argument("--effects", default="", help="names of the effects that are planted, by commas; all of them")
     words = parser.parse_args()
     tolerances = TOLERANCES if words.bench else Tolerances()
     begun = time.process_time()
@@ -199,7 +200,9 @@ def main() -> None:
     for one in design.chosen:
         scenarios[one.label] = load_scenario(one.scenario, (*one.overrides, f"name={one.label}"))
     effects = harmful_sizes(present)
-    planted = [number for number, effect in enumerate(effects) if effect.direction is not HEAT]
+    names = [effect.direction.name for effect in effects]
+    wanted = words.effects.split(",") if words.effects else [name for name in names if name != HEAT.name]
+    planted = [number for number, name in enumerate(names) if name in wanted]
     found: dict[int, list[Truth | None]] = {number: [] for number in planted}
     for draw in range(words.draws):
         for number in planted:

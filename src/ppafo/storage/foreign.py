@@ -237,8 +237,8 @@ def _place(name: str, item: MappedChannel, names: list[str], first: list[str]) -
     places = [place for place, known in enumerate(names, start=1) if known == item.column]
     if not places:
         shown = ", ".join(one_line(known)[:_LONGEST_SHOWN] for known in names)
-        hint = nearest_name(item.column, names)
         remedy = _other_delimiter(names, lambda found: item.column in found)
+        hint = "" if remedy else nearest_name(item.column, names)
         raise DataError(f"channel '{name}': there is no column {item.column!r}{hint}; the file has {shown}{remedy}")
     if len(places) > 1:
         shown = " and ".join(map(str, places))
