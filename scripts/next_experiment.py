@@ -154,7 +154,8 @@ def truth_of(
     effects = harmful_sizes(present)
     base = scenarios["there"]
     truth = {path: number_at(base, path) * math.exp(random.uniform(-0.15, 0.15)) for path in PARAMETERS}
-    on = effects[planted].direction.settings(effects[planted].size, base)
+    # In the form that the promise takes the effect to have.
+    on = {**effects[planted].direction.neutral, **effects[planted].direction.settings(effects[planted].size, base)}
     problem = problem_of(scenarios, tolerances, random, {**truth, **on})
     first = fit(_of_first(problem, tolerances))
     promises = promised_by(first, tolerances, design.chosen, effects, load_scenario)
