@@ -222,6 +222,8 @@ def outcome(result: WalkResult, begins: float = np.inf) -> Outcome:
     held = np.cumsum(still) - np.maximum.accumulate(np.where(still, 0, np.cumsum(still)))
     still = held * (time[1] - time[0]) > STANDS
     event = next((item for item in result.events if item.sign is not None and item.time >= begins), None)
+    stop = next((item for item in result.events if item.sign is not None and item.level >= STOPPED), event)
+    named = event or stop
     stride = walk_of(result.scenario).gait.stride_time
     against = np.where(contact == ground.TOE, -torque, torque)
     alarm = min(begins, 1.0e9) if event is None else event.time
@@ -235,7 +237,7 @@ def outcome(result: WalkResult, begins: float = np.inf) -> Outcome:
         on_toes=lasting_peak(-torque, contact == ground.TOE, time),
         at_rest=lasting_peak(np.abs(torque), still, time),
         found=np.inf if event is None else (event.time - begins) / stride,
-        sign="-" if event is None or event.sign is None else event.sign.name,
+        sign="-" if named is None or named.sign is None else named.sign.name,
         after=lasting_peak(against, late, time) if np.isfinite(begins) else 0.0,
         until=lasting_peak(against, (time > begins) & (time < alarm), time),
         settles=float(above[-1] - alarm) if above.size and event is not None else 0.0,
@@ -335,8 +337,8 @@ def row_without(valve: str, found: list[Outcome]) -> str:
     above.insert(1, sum(item.flat > ON_HEEL for item in found))
     peaks = [max(getattr(item, name) for item in found) for name in ("on_heel", "flat", "on_toes", "at_rest")]
     cells = [f"{many} (at most {peak:.2f} N m)" for many, peak in zip(above, peaks, strict=True)]
-    stops = Counter(item.sign for item in found if item.stopped)
-    words = "" if not stops else " (" + ", ".join(f"{name} {many}" for name, many in stops.items()) + ")"
+    stops = [f"`{item.sign}` in walk {number}" for number, item in enumerate(found, start=1) if item.stopped]
+    words = f" ({', '.join(stops)})" if stops else ""
     stopped, paused = f"{sum(item.stopped for item in found)}{words}", str(sum(item.paused for item in found))
     late = f"{sum(item.unhelped > MOST_WITHOUT for item in found)} (at most {max(item.unhelped for item in found)})"
     return f"| {' | '.join((valve, str(len(found)), stopped, paused, *cells, late))} |"
