@@ -20,8 +20,9 @@ from ppafo.metrics.strides import PER_STRIDE, SETTLING
 from ppafo.metrics.wearer import METER, WearerTotals
 from ppafo.metrics.wearer import METRICS as OF_WEARER
 from ppafo.model.plant import chamber_pressures
+from ppafo.model.wearer.muscle import Fibre
 from ppafo.model.wearer.segments import Limb
-from ppafo.model.wearer.walker import Fibres, Joints, joints
+from ppafo.model.wearer.walker import Fibres, Joints, Wearer, end_of_joint, joints, pull
 from ppafo.signals import Channel, Recording
 from ppafo.signals.meter import WearerSample
 from ppafo.simulation.scenario import Scenario
@@ -76,6 +77,7 @@ def recording_of_reacting(
         "toe_force": (record["walk.toe_force"], "N"),
         "supplied_mass": (record["state.supplied_mass"], "kg"),
         "vented_mass": (record["state.vented_mass"], "kg"),
+        "ankle_moment": (ankle_moments(run.reacting.body, record, left), "N m"),
         "muscle_work": (record["walk.muscle_work"], "J"),
     }
     for name in Fibres._fields:
@@ -91,6 +93,27 @@ def angles_of(record: Mapping[str, Floats], side: str) -> Joints:
     limb = Limb(*angles)
     lean: Any = record["walker.pose.lean"]
     return joints(limb, lean)
+
+
+def ankle_moments(wearer: Wearer, record: Mapping[str, Floats], angles: Joints) -> Floats:
+    """Moments [N m] of muscles, tissue and the soft ends of the joint on the left ankle, sample by sample."""
+    still = Joints(0.0, 0.0, 0.0)
+    low, high, muscles = wearer.stop.ankle_low, wearer.stop.ankle_high, wearer.left
+    fibres = np.array(
+        [[record[f"walker.left.fibres.{name}.{field}"] for field in Fibre._fields] for name in Fibres._fields]
+    )
+    found = np.empty(fibres.shape[-1])
+    for sample, (own, ankle, knee, hip, rate) in enumerate(
+        zip(
+            np.moveaxis(fibres, -1, 0).tolist(),
+            *(np.asarray(values).tolist() for values in (*angles, record["state.angular_velocity"])),
+            strict=True,
+        )
+    ):
+        pulled = pull(muscles, Fibres._make(Fibre._make(fibre) for fibre in own), Joints(ankle, knee, hip), still, 0.0)
+        end = end_of_joint(wearer.stop, low, high, ankle, rate)
+        found[sample] = pulled.ankle + end.torque - muscles.ankle_stiffness * (ankle - muscles.ankle_rest)
+    return found
 
 
 def sample_at(time: Floats, record: Mapping[str, Floats], place: int) -> WearerSample:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.engine.lanes import BatchResult, run_batch
+from ppafo.engine.lanes import BatchResult, run_batch, write_source
 from ppafo.engine.rows import leaf_paths, numbers, rebuild, row_numbers
 from ppafo.engine.run import Run, batch_of
 from ppafo.engine.scheme import reacting
@@ -23,10 +23,10 @@ from ppafo.model.wearer.walker import Walker
 from ppafo.questions.league.walking.task import walking_task
 from ppafo.questions.timing.answer import event_timing
 from ppafo.questions.walk.answer import answer_of, walk_with_and_without
-from ppafo.questions.walk.risks import risks_of_walk
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.scenario import Scenario
+from ppafo.translation.native import translated_text
 from ppafo.validation.measured import check_recording
 from ppafo.validation.replay import replay_recording, start_of
 from ppafo.walking import load_walk, walk, walk_population
@@ -99,6 +99,13 @@ def test_the_gas_is_that_of_a_vane_which_is_led_along_the_same_ankle() -> None:
         again = np.interp(recording.time, found.time, found[chamber])
         away = np.abs(again - recording[chamber])
         assert float(away.max()) < 0.01 * float(np.ptp(recording[chamber])), chamber
+
+
+@pytest.mark.long
+def test_faults_and_a_shut_off_valve_are_translated_to_c_as_well() -> None:
+    faults = [f"faults.{part}.{item}" for part in ("valve_1", "heel") for item in ("kind=stuck", "time=4 s")]
+    walk = load_walk(WALK, [*faults, "faults.heel.reading=0 N", "shut_off.area=10 mm^2"])
+    assert "walker_" in translated_text(write_source(plan_walk(walk).program)[1])
 
 
 @pytest.mark.long
@@ -206,7 +213,6 @@ def test_what_needs_a_prescribed_gait_refuses_in_one_line() -> None:
     scenario, line = load_walk(WALK), "needs a prescribed gait, and its wearer reacts"
     for refused in (
         lambda: walk_library(scenario),
-        lambda: risks_of_walk(scenario),
         lambda: walk_population(scenario, 0.1, 8),
         lambda: walking_task(WALK),
         lambda: event_timing(WALK),

@@ -304,9 +304,9 @@ def lead(rows: Any) -> Phases:
             [
                 *[rows.load(name) for name in ("wearer", "nerves", "reflexes", "body")],
                 "is_due = body.due > 0.5",
-                f"ordered = {ordered}",
+                f"reflexes_after = {ordered}",
                 f"passed_on = {passed_on}",
-                *rows.store("reflexes", "ordered", "is_due"),
+                *rows.store("reflexes", "reflexes_after", "is_due"),
                 *rows.store("nerves", "passed_on", "is_due"),
             ],
             rows.cells["body.due"],

@@ -97,9 +97,18 @@ class Adaptation(Solved):
         return left, right
 
 
+EFFORT = (
+    ("muscle_power", "muscle power"),
+    ("metabolic_power_umberger", "metabolic rate (Umberger 2010)"),
+    ("metabolic_power_bhargava", "metabolic rate (Bhargava 2004)"),
+)
+"""Metrics that say how much an effort walking is, and their words."""
+
 _SHOWN = (
     ("walking_speed", "velocity", "Speed"),
     ("muscle_power", "power", "Muscle power"),
+    ("metabolic_power_umberger", "power", "Umberger"),
+    ("metabolic_power_bhargava", "power", "Bhargava"),
     ("lowest_toes", "length", "Lowest toes"),
     ("gas", "gas mass", "Gas a stride"),
 )
@@ -170,11 +179,12 @@ def _walks(walked: Walked) -> str:
 def remarks(found: Adaptation) -> list[str]:
     """Return how sure that is: the spread over restarts, and what did not converge."""
     said = []
-    power = found.spread("muscle_power")
-    if power is not None:
+    spreads = [(words, spread) for name, words in EFFORT if (spread := found.spread(name)) is not None]
+    if spreads:
+        listed = ", ".join(f"{words} {mean:.4g} +- {deviation:.2g} W" for words, (mean, deviation) in spreads)
         said.append(
-            f"over the restarts that walk on, muscle power is {power[0]:.4g} +- {power[1]:.2g} W (standard deviation): "
-            "a difference between two devices that is smaller is none"
+            f"over the restarts that walk on: {listed} (standard deviation): a difference between two devices that is "
+            "smaller is none"
         )
     unsettled = [str(restart.number) for restart in found.restarts if not restart.is_settled]
     if unsettled:

@@ -17,7 +17,7 @@ from ppafo import interrupts
 from ppafo.answers.writing import files_of
 from ppafo.errors import DataError, StudyError
 from ppafo.progress import Report
-from ppafo.questions.adapt.answer import FALLS, Adaptation, Restart, Walked, answer_of
+from ppafo.questions.adapt.answer import EFFORT, FALLS, Adaptation, Restart, Walked, answer_of
 from ppafo.questions.adapt.problem import FRESH_STARTS, START_PATH, STARTS, Search, line_of, search_of
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.files import read_bytes
@@ -27,7 +27,7 @@ from ppafo.walking.reacting_wearer import GAINS
 
 Floats = NDArray[np.float64]
 
-METRICS = ("stays_up", "walked_time", "walking_speed", "muscle_power", "lowest_toes", "gas")
+METRICS = ("stays_up", "walked_time", "walking_speed", *(name for name, _ in EFFORT), "lowest_toes", "gas")
 OF_SPEED = 10.0
 """Cost of being off the speed, over its square [s^2/m^2]: 0.1 m/s cost as much as the work of the muscles."""
 

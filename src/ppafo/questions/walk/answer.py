@@ -28,6 +28,7 @@ from ppafo.questions.walk.course import (
     course_sections,
     trust_remark,
 )
+from ppafo.questions.walk.falls import Falls, falls_of_walk
 from ppafo.questions.walk.reacting import reacting_answer
 from ppafo.questions.walk.risks import Risks, risks_of_walk
 from ppafo.questions.walk.volumes import (
@@ -487,21 +488,21 @@ def walk_with_and_without(
     overrides: Sequence[str] = (),
     risks: bool = False,
     progress: Report | None = None,
-) -> WalkPair | Wearers | Risks:
+) -> WalkPair | Wearers | Risks | Falls:
     """Walk with the device, with it switched off, and beside the healthy gait; or let many wearers walk with it.
 
     ``configuration`` is a walk file, its name or a loaded one; ``minutes`` the length of the walk [min], one or
     that of its course unless given; ``gait``, ``course`` and ``bottle`` stand in place of those of the configuration;
     ``wearers`` the number of different wearers, drawn with ``seed``. With ``risks`` faults begin in the walk, and the
-    answer is a table of what they do. ScenarioError for bad input; a walk that diverges
-    is an answer that has not passed.
+    answer is a table of what they do, of a wearer who reacts by falls. ScenarioError for bad input; a walk that
+    diverges is an answer that has not passed.
     """
     chosen = configuration
     if not isinstance(chosen, Scenario):
         chosen = load_walk(chosen, overrides, gait, course, bottle)
     report = progress or report_nothing
     if risks:
-        return risks_of_walk(chosen)
+        return risks_of_walk(chosen) if walk_of(chosen).reacts is None else falls_of_walk(chosen, report)
     if wearers is not None:
         advance = _reporter(report, "walking", "wearers", 0.0)
         return Wearers(*wearers_by_volume(chosen, minutes, wearers, seed, advance))

@@ -1,6 +1,7 @@
 """The answer of a walk of a wearer who reacts: with the device and with it off, until a fall where there is one."""
 
 import platform
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import display_values, rounded_text, title_with_unit
 from ppafo.answers.style import BLUE, GREY, VERMILION, house_style, mark_kind
+from ppafo.gait.document import load_gait
 from ppafo.questions.walk.course import bottle_data, bottle_remark, bottle_sections
 from ppafo.simulation.scenario import UNITS, Scenario, plain
 from ppafo.storage.comma_separated import marked_csv_bytes
@@ -33,6 +35,9 @@ ROWS = (
     ("toe_landing", "Strides that begin on the toes", "fraction", 0),
     ("slap_rate", "Rate of the foot as it comes down", "angular velocity", 0),
     ("muscle_work", "Work of all muscles in one stride", "energy", 1),
+    ("muscle_power", "Power of all muscles", "power", 1),
+    ("metabolic_power_umberger", "Metabolic rate of all muscles, Umberger 2010", "power", 0),
+    ("metabolic_power_bhargava", "Metabolic rate of all muscles, Bhargava 2004", "power", 0),
     ("push_off_work", "Work of the device in push-off", "energy", 2),
     ("gas", "Gas per stride", "gas mass", 3),
     ("total_gas", "Gas of the whole walk", "gas mass", 2),
@@ -44,6 +49,11 @@ _EXPLAINED = (
     "'Device off' is the same wearer with the same device and both chambers vented: it still rubs and has inertia. The "
     "first two strides are left out of the means. The device is on the left leg, and a stride is one step of that leg."
 )
+_EFFORT = (
+    "Power and metabolic rate are of one set of reflexes. Those that other searches find differ by some percent, which "
+    "'ppafo adapt' prints: a difference between with and off that is smaller is none. The rate at rest is not in it, "
+    "and the two models differ by a factor of two."
+)
 _LIMITS = (
     "The gains of the reflexes are those of the wearer's file, with the device on and off: the wearer is unadapted. "
     "The body is planar and has no arms, and the device adds no weight, only friction, damping and the inertia of vane "
@@ -53,6 +63,20 @@ _CURVES = (
     "Mean over the strides from strike to strike of the left foot, with the standard deviation as a band. The ground "
     "force is that on the left foot."
 )
+_LIKENESS = (
+    "Of the mean stride: correlation r, root mean square of the difference, and the delay of the wearer, below 0 where "
+    "the wearer is early, at which r is largest. The measured gait is that of healthy people without a device; numbers "
+    "are printed whatever they are."
+)
+_COMPARED = (
+    ("ground_force", "vertical_force", "Vertical ground force (body weights)"),
+    ("angle", "ankle_angle", "Ankle angle (deg)"),
+    ("shank_angle", "shank_angle", "Shank angle (deg)"),
+    ("ankle_moment", "ankle_moment", "Ankle moment (N m/kg)"),
+)
+"""Channel of the wearer, curve of the gait, and title with unit."""
+MOST_LAG = 10
+"""Delays that are tried, in percent of the stride."""
 _PANELS = (
     ("angle", "Ankle angle", "angle"),
     ("knee_angle", "Knee angle", "angle"),
@@ -81,7 +105,8 @@ def reacting_answer(comparison: Comparison) -> Answer:
         sections=(
             Section(table=reacting_table(comparison), remarks=tuple(remarks)),
             *bottle_sections(worn),
-            Section("How to read it", (_EXPLAINED, _LIMITS), is_detail=True),
+            *_likeness_section(comparison),
+            Section("How to read it", (_EXPLAINED, _EFFORT, _LIMITS), is_detail=True),
             *_curves(comparison),
         ),
         data={
@@ -94,6 +119,10 @@ def reacting_answer(comparison: Comparison) -> Answer:
             "wearer_numbers": plain(dict(wearer.settings)),
             "metrics": plain(dict(worn.metrics)),
             "metrics_off": plain(dict(bare.metrics)),
+            "likeness": {
+                words: {name: plain(item) for name, item in likeness(walked).items()}
+                for words, walked in (("with", worn), ("off", bare))
+            },
             **bottle_data(worn),
             "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
             "file": scenario.origin.file,
@@ -108,6 +137,64 @@ def reacting_answer(comparison: Comparison) -> Answer:
         },
         command="walk",
     )
+
+
+@dataclass(frozen=True, slots=True)
+class Likeness:
+    """How alike a curve of the wearer is to that of a gait: r, RMS difference [unit of the curve], and r after a delay.
+
+    ``delay`` [strides] of the wearer is that at which r is largest, ``delayed_r``.
+    """
+
+    r: float
+    rms: float
+    delay: float
+    delayed_r: float
+
+
+def likeness(walked: WalkResult) -> dict[str, Likeness]:
+    """Return how alike the mean stride is to the measured gait that is shipped, by curve; {} without strides."""
+    gait, wearer = load_gait(), wearer_of_walk(walked.scenario)
+    over = {"ground_force": wearer.weight, "ankle_moment": wearer.mass}
+    found = {}
+    for channel, curve, _ in _COMPARED:
+        measured = getattr(gait, curve)
+        if channel not in walked.averages or measured is None:
+            continue
+        own, places = walked.averages[channel].mean / over.get(channel, 1.0), np.asarray(PHASES)
+        with np.errstate(invalid="ignore"):
+            delays = np.arange(-MOST_LAG, MOST_LAG + 1) / 100.0
+            shifted = [float(np.corrcoef(own, measured.values_at(places - delay))[0, 1]) for delay in delays]
+        difference = own - measured.values_at(places)
+        best = int(np.nanargmax(shifted)) if np.isfinite(shifted).any() else MOST_LAG
+        rms = float(np.sqrt(np.mean(difference**2)))
+        found[curve] = Likeness(shifted[MOST_LAG], rms, float(delays[best]), shifted[best])
+    return found
+
+
+def _likeness_section(comparison: Comparison) -> tuple[Section, ...]:
+    found = [likeness(walked) for walked in (comparison.with_device, comparison.without_device)]
+    if not any(found):
+        return ()
+    head = [Column("Mean stride of the wearer and measured gait")]
+    for words in ("with", "device off"):
+        head += [Column(f"r {words}"), Column("RMS"), Column("delay (%)"), Column("r then")]
+    rows = []
+    for _, curve, title in _COMPARED:
+        cells: list[str | None] = []
+        for own in found:
+            if curve not in own:
+                cells += [None] * 4
+                continue
+            item, unit = own[curve], np.degrees(1.0) if curve.endswith("angle") else 1.0
+            cells += [
+                f"{item.r:.2f}",
+                f"{unit * item.rms:.3g}",
+                f"{100.0 * item.delay:.0f}",
+                f"{item.delayed_r:.2f}",
+            ]
+        rows.append((title, *cells))
+    return (Section("As people walk?", (_LIKENESS,), Table(tuple(head), tuple(rows)), is_detail=True),)
 
 
 def wearer_of_walk(scenario: Scenario) -> ReactingWearer:

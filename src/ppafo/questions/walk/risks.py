@@ -125,14 +125,14 @@ def risks_of_walk(configuration: Scenario) -> Risks:
     bare = _toes(walk(with_device_off(level)), FIRST * stride)
     sound = walk(level)
     begins = [(FIRST + place / INSTANTS) * stride for place in range(INSTANTS)]
-    risks = [_risk(level, cause, begins, bare) for cause in _causes(level)]
+    risks = [_risk(level, cause, begins, bare) for cause in causes_of(level)]
     after = sound.recording.time >= begins[0]
     peak = float(np.maximum(_against(sound), 0.0)[after].max())
     return Risks(level, tuple(risks), bare, _toes(sound, begins[0]), peak)
 
 
 @dataclass(frozen=True, slots=True)
-class _Cause:
+class Cause:
     """A part or sensor that fails, how, with which numbers beside the time, and in words."""
 
     part: str
@@ -141,7 +141,8 @@ class _Cause:
     words: str
 
 
-def _causes(configuration: Scenario) -> Iterator[_Cause]:
+def causes_of(configuration: Scenario) -> Iterator[Cause]:
+    """The causes of a walk: every fault of its plant, and each sensor stuck and frozen."""
     has_lines = configuration.supply_lines is not None
     for part, kinds in PLANT_FAULTS.items():
         if has_lines and part.startswith(("regulator", "bottle")):
@@ -153,17 +154,18 @@ def _causes(configuration: Scenario) -> Iterator[_Cause]:
                 f"{item.name} {short_quantity_text(numbers[item.name], item.unit)}".rstrip() for item in sized
             )
             words = f"{part.replace('_', ' ')} {kind.replace('_', ' ')}"
-            yield _Cause(part, kind, numbers, f"{words} ({sizes})" if sizes else words)
+            yield Cause(part, kind, numbers, f"{words} ({sizes})" if sizes else words)
     readings = {"angle": 0.5 * np.pi, "pressure_1": configuration.device.supply.atmospheric_pressure}
     readings["pressure_2"] = readings["pressure_1"]
     for sensor in FAULTY:
         name = sensor.replace("_", " ")
         own = {READINGS[sensor].name: float(readings.get(sensor, 0.0))}
-        yield _Cause(sensor, "stuck", own, f"{name} sensor stuck at {LOWEST[sensor]}")
-        yield _Cause(sensor, "frozen", {}, f"{name} sensor frozen")
+        yield Cause(sensor, "stuck", own, f"{name} sensor stuck at {LOWEST[sensor]}")
+        yield Cause(sensor, "frozen", {}, f"{name} sensor frozen")
 
 
-def _failing(configuration: Scenario, cause: _Cause, time: float) -> Scenario:
+def failing(configuration: Scenario, cause: Cause, time: float) -> Scenario:
+    """The walk in which a cause begins at a time [s]."""
     motion = walk_of(configuration)
     given: dict[str, Any] = {"time": time, **cause.numbers}
     if cause.part in FAULTY:
@@ -176,8 +178,8 @@ def _failing(configuration: Scenario, cause: _Cause, time: float) -> Scenario:
     return replace(configuration, motion=changed)
 
 
-def _risk(configuration: Scenario, cause: _Cause, begins: list[float], bare: float) -> Risk:
-    found = [_one(walk(_failing(configuration, cause, time)), time) for time in begins]
+def _risk(configuration: Scenario, cause: Cause, begins: list[float], bare: float) -> Risk:
+    found = [_one(walk(failing(configuration, cause, time)), time) for time in begins]
     alarms, safe = [item.alarm for item in found], [item.safe for item in found]
     left, toes = max(item.left for item in found), min(item.toes for item in found)
     impulse, level = max(item.impulse for item in found), max(item.level for item in found)
