@@ -174,7 +174,9 @@ def with_device_off(configuration: Scenario) -> Scenario:
     name = f"{configuration.name}-off"
     control = Control(event_on_off.OFF.name, {}, configuration.control.period)
     motion = replace(walk_of(configuration), bottle=None, timing=THRESHOLDS)
-    return replace(configuration, name=name, control=control, motion=motion, supply_lines=None)
+    gone = ("controller.", "timing.", "supply_lines.")  # what follows others and is no longer there
+    links = {path: own for path, own in configuration.links.items() if not path.startswith(gone)}
+    return replace(configuration, name=name, control=control, motion=motion, supply_lines=None, links=links)
 
 
 def healthy_metrics(configuration: Scenario) -> dict[str, Metric]:

@@ -33,6 +33,7 @@ from ppafo.walking import load_walk, walk, walk_population
 from ppafo.walking.loading import list_led_walks, list_walks
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import plan_walk
+from ppafo.walking.walk import with_device_off
 
 WALK, STEP = "reacting", 1.0e-4
 WEAK = "wearer.tibialis_strength=0.3"
@@ -165,6 +166,12 @@ def test_a_gain_of_one_leg_is_a_setting_and_a_column() -> None:
     speeds = found.metrics["walking_speed"]
     assert speeds[0] != speeds[1]
     assert speeds[0] == pytest.approx(ppafo.simulate(scenario).metrics["walking_speed"].value, rel=1e-9)
+
+
+def test_the_same_wearer_with_the_device_off_takes_columns_as_well() -> None:
+    off = with_device_off(with_duration(load_walk(WALK), 1.0))
+    found = run_ensemble(off, {"wearer.start_speed": np.array([1.2, 1.4])}, ["walked_time"]).metrics
+    assert found["walked_time"].tolist() == pytest.approx([1.0, 1.0])
 
 
 def test_a_ratio_changes_a_gain_of_both_legs() -> None:

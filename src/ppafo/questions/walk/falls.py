@@ -14,6 +14,7 @@ import numpy as np
 
 from ppafo.answers import Answer, Column, Section, Table
 from ppafo.control.walking.signs import SAFETY_QUANTITIES
+from ppafo.errors import SimulationError
 from ppafo.model.plant_faults import SHUT_OFF
 from ppafo.progress import Progress, Report
 from ppafo.questions.question import Solved
@@ -39,11 +40,14 @@ AREA = 1.0e-5
 WITHOUT, WITH, SHUT = "without the safe state", "with it", "with a shut-off valve too"
 
 _WIDEST = {
-    name: (item.minimum if name.startswith(("lowest", "shortest", "flat_to")) else item.maximum)
+    name: (item.minimum if name.startswith(("lowest", "shortest")) else item.maximum)
     for item in SAFETY_QUANTITIES
-    if not (name := item.name).startswith(("nominal", "filled", "resume"))
+    if not (name := item.name).startswith(("nominal", "filled", "resume", "flat"))
 }
-"""Limits of the checks that no reading passes: the widest that each setting may have."""
+"""Limits of the checks that no reading passes: the widest that each setting may have.
+
+When in the stride a foot must stand flat has no widest: that heel and toes are loaded then is still checked.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,9 +116,11 @@ def _fall_times(configuration: Scenario, cause: Cause | None) -> Any:
     columns = {f"wearer.{START_SPEED.name}": speeds}
     if cause is not None:
         columns[f"faults.{cause.part}.time"] = np.tile(FIRST + np.array(INSTANTS), len(SPEEDS))
-    found = run_ensemble(configuration, columns, ["stays_up", "fall_time"]).metrics
-    # A walk that diverges has no metrics; it does not end on its feet.
-    return np.where(found["stays_up"] > 0.5, np.nan, np.nan_to_num(found["fall_time"], nan=configuration.duration))
+    outcome = run_ensemble(configuration, columns, ["stays_up", "fall_time"])
+    found = outcome.metrics
+    if outcome.reasons:
+        raise SimulationError(f"{configuration.name}: {next(iter(outcome.reasons.values()))}")
+    return np.where(found["stays_up"] > 0.5, np.nan, found["fall_time"])
 
 
 def answer_of(solved: Falls) -> Answer:

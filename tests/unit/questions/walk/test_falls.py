@@ -1,11 +1,13 @@
 """Who falls when something fails: counts of falls with and without the safe state, of a wearer who reacts."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from ppafo.control.walking.signs import SAFETY_QUANTITIES
+from ppafo.errors import SimulationError
 from ppafo.progress import Progress
 from ppafo.questions.walk import falls
 from ppafo.questions.walk.falls import SHUT, WITH, WITHOUT, answer_of, falls_of_walk
@@ -51,6 +53,13 @@ def test_without_the_safe_state_every_limit_is_as_wide_as_it_may_be() -> None:
     assert widest["lowest_angle"] == quantities["lowest_angle"].minimum
     assert widest["shortest_swing"] == 0.0
     assert widest["swing_angle"] == load_walk("reacting").control.settings["swing_angle"]
+
+
+def test_a_walk_that_cannot_run_is_no_fall() -> None:
+    walk = load_walk("reacting")
+    settings = {**walk.control.settings, "flat_from": 0.6}
+    with pytest.raises(SimulationError, match=r"flat_from: must be below controller\.flat_to"):
+        falls._fall_times(replace(walk, control=replace(walk.control, settings=settings)), None)
 
 
 @pytest.mark.long
