@@ -1,9 +1,8 @@
 """Who falls when something fails: the faults of a walk, on a wearer who reacts, by falls.
 
 Every fault of the plant, and faults of each sensor, begin at some instants of a stride, at two start speeds. Each is
-walked with the limits of the controller's checks as wide as they go, with those of the
-walk, and with a shut-off valve as well. A safe state vents the device: who cannot walk without it falls in the safe
-state too.
+walked with the limits of the controller's checks as wide as they go, with those of the walk, and with a shut-off valve
+as well. A safe state vents the device: who cannot walk without it falls in the safe state too.
 """
 
 from collections.abc import Mapping
@@ -148,8 +147,8 @@ def answer_of(solved: Falls) -> Answer:
     remarks = (
         f"without a fault {solved.sound} of {solved.walks} fall, with the device off (vented) {solved.vented}",
         *(f"{words}: {totals[words]} of {all_walks} walks fall" for words in columns),
-        "with wide limits the controller still vents where a pressure does not follow its valve, or a flat foot shows no "
-        "load: those checks have no limit that could be wider",
+        "with wide limits the controller still vents where a pressure does not follow its valve, or a flat foot shows "
+        "no load: those checks have no limit that could be wider",
         f"against wide limits the walk as it is has fewer falls for {len(better)} causes, more for {len(worse)}"
         + (f": {', '.join(worse)}" if worse else ""),
     )
