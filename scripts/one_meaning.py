@@ -47,7 +47,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.studies.loading import load_study
 from ppafo.studies.varying import varied_path
 from ppafo.units import parse_quantity
-from ppafo.walking import list_led_walks, list_walks
+from ppafo.walking import list_walks
 from ppafo.worlds.gym.environments import TARGETS
 from ppafo.worlds.gym.episodes import FromOutside, scenario_episodes
 from scripts.typed_words import (
@@ -309,8 +309,8 @@ DOORS: Mapping[str, tuple[Door, Sequence[str]]] = {
     "study": (at_study, (*list_scenarios(), *list_walks())),
     "numbers": (at_numbers, (*list_scenarios(), *list_walks())),
     "gym": (at_gym, list_scenarios()),
-    "page": (at_page, (*list_scenarios(), *list_led_walks())),
-    "library": (at_library, (*list_scenarios(), *list_led_walks())),
+    "page": (at_page, (*list_scenarios(), *list_walks())),
+    "library": (at_library, (*list_scenarios(), *list_walks())),
 }
 """Doors by name, and the items that can be taken through them."""
 

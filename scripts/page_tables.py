@@ -16,7 +16,7 @@ from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.questions.endurance.draw import draw_of_numbers
 from ppafo.questions.endurance.solve import follow_bottle
 from ppafo.simulation.loading import list_scenarios
-from ppafo.walking import list_led_walks
+from ppafo.walking import list_walks
 from ppafo.walking.bottle import Schedule
 
 FLOWS = np.geomspace(2e-6, 5e-3, 24)
@@ -39,7 +39,7 @@ def minutes_of_bottle() -> dict[str, Any]:
 
 def main() -> int:
     """Write both files."""
-    names = [*list_scenarios(), *list_led_walks()]
+    names = [*list_scenarios(), *list_walks()]
     lines = [f"{json.dumps(name)}: {json.dumps(found)}" for name, found in openings_of(names).items()]
     for name, text in (
         ("opening", "{\n" + ",\n".join(lines) + "\n}"),

@@ -33,7 +33,7 @@ from ppafo.exports.c_library import library_of
 from ppafo.exports.wasm import module_of
 from ppafo.loading import load_scenario
 from ppafo.simulation.loading import list_scenarios
-from ppafo.walking.loading import list_led_walks
+from ppafo.walking.loading import list_walks
 from tests.modules_under_node import compared, drawn, drawn_walks
 
 FOLDER = Path(wasm.__file__).parent / "programs"
@@ -43,7 +43,7 @@ SIDE, SIDE_OF_WALKS = 32, 8
 
 def shipped() -> tuple[str, ...]:
     """Names of all that has a program here."""
-    return (*list_scenarios(), *list_led_walks())
+    return (*list_scenarios(), *list_walks())
 
 
 def shipped_programs() -> dict[str, bytes]:
@@ -78,7 +78,7 @@ def compare(names: list[str], draws: int) -> int:
     """Print how many drawn runs of each had the bits of Python; AssertionError where one had not."""
     for name in names:
         module = module_of(load_scenario(name))
-        settings = drawn_walks(module, draws) if name in list_led_walks() else drawn(module, draws)
+        settings = drawn_walks(module, draws) if name in list_walks() else drawn(module, draws)
         ended = Counter(compared(name, module, settings))
         print(
             f"{name}: {', '.join(f'{count} {how}' for how, count in ended.most_common())}, no bit differs", flush=True
@@ -91,7 +91,7 @@ def time_programs(names: list[str]) -> int:
     print("| program | kB | gzip | ready | first run | run | map | per run |\n|---|---|---|---|---|---|---|---|")
     for name in names:
         module = module_of(load_scenario(name))
-        runs = _map(module.description["settings"], SIDE_OF_WALKS if name in list_led_walks() else SIDE)
+        runs = _map(module.description["settings"], SIDE_OF_WALKS if name in list_walks() else SIDE)
         found = _timed(module.wasm, {**module.description, "runs": runs})
         size, packed = len(module.wasm) / 1e3, len(gzip.compress(module.wasm, 9)) / 1e3
         times = (

@@ -80,27 +80,55 @@ def _strides(readings: Readings) -> Floats:
     return found
 
 
-def gained(readings: Readings, name: str) -> Floats:
-    """How much a total of the samples grew over the counted strides, in its unit."""
+# What reads a meter is compiled into exported libraries: plain functions, no closures.
+
+
+def _per_stride(readings: Readings, gained: Floats) -> Floats:
+    """Mean over the strides of what a total gained in them."""
+    return mean_of(gained, _strides(readings))
+
+
+def _per_second(readings: Readings, gained: Floats) -> Floats:
+    """What a total gained over the time of the strides."""
     totals = readings.meters["wearer"]
-    found: Floats = getattr(totals.last, name) - getattr(totals.first, name)
+    in_time = gained / larger(totals.last.time - totals.first.time, 1.0e-9)
+    found: Floats = choose(_strides(readings) > 0.5, in_time, math.nan)
     return found
 
 
-def _of_a_stride(name: str) -> Callable[[Readings], Floats]:
-    """Mean of a total over the strides."""
-    return lambda readings: mean_of(gained(readings, name), _strides(readings))
+def _walking_speed(readings: Readings) -> Floats:
+    totals = readings.meters["wearer"]
+    return _per_second(readings, totals.last.way - totals.first.way)
 
 
-def _rate(name: str) -> Callable[[Readings], Floats]:
-    """A total over the time of the strides."""
+def _stride_time(readings: Readings) -> Floats:
+    totals = readings.meters["wearer"]
+    return _per_stride(readings, totals.last.time - totals.first.time)
 
-    def read(readings: Readings) -> Floats:
-        in_time = gained(readings, name) / larger(gained(readings, "time"), 1.0e-9)
-        found: Floats = choose(_strides(readings) > 0.5, in_time, math.nan)
-        return found
 
-    return read
+def _lowest_toes(readings: Readings) -> Floats:
+    totals = readings.meters["wearer"]
+    return _per_stride(readings, totals.last.clearances - totals.first.clearances)
+
+
+def _muscle_work(readings: Readings) -> Floats:
+    totals = readings.meters["wearer"]
+    return _per_stride(readings, totals.last.muscle_work - totals.first.muscle_work)
+
+
+def _muscle_power(readings: Readings) -> Floats:
+    totals = readings.meters["wearer"]
+    return _per_second(readings, totals.last.muscle_work - totals.first.muscle_work)
+
+
+def _metabolic_power_umberger(readings: Readings) -> Floats:
+    totals = readings.meters["wearer"]
+    return _per_second(readings, totals.last.umberger - totals.first.umberger)
+
+
+def _metabolic_power_bhargava(readings: Readings) -> Floats:
+    totals = readings.meters["wearer"]
+    return _per_second(readings, totals.last.bhargava - totals.first.bhargava)
 
 
 def _kind(name: str, unit: str, summary: str, read: Callable[[Readings], Floats]) -> MetricKind:
@@ -111,22 +139,22 @@ METRICS = (
     _kind("stays_up", "-", "1 of a wearer who walks on to the end, 0 of one who falls", _stays_up),
     _kind("fall_time", "s", "time at which the wearer falls", _fall_time),
     _kind("walked_time", "s", "time until the wearer falls, or until the end", _walked_time),
-    _kind("walking_speed", "m/s", "speed, mean over whole strides without the first ones", _rate("way")),
-    _kind("stride_time", "s", "time of a stride, mean over whole strides without the first ones", _of_a_stride("time")),
+    _kind("walking_speed", "m/s", "speed, mean over whole strides without the first ones", _walking_speed),
+    _kind("stride_time", "s", "time of a stride, mean over whole strides without the first ones", _stride_time),
     _kind(
         "lowest_toes",
         "m",
         "lowest toe height above ground in mid-swing, mean over the strides",
-        _of_a_stride("clearances"),
+        _lowest_toes,
     ),
     _kind(
         "muscle_work",
         "J",
         "work of all muscles of both legs as they shorten, in one stride",
-        _of_a_stride("muscle_work"),
+        _muscle_work,
     ),
-    _kind("muscle_power", "W", "mean power of all muscles of both legs as they shorten", _rate("muscle_work")),
-    _kind("metabolic_power_umberger", "W", "metabolic rate of all muscles, Umberger 2010", _rate("umberger")),
-    _kind("metabolic_power_bhargava", "W", "metabolic rate of all muscles, Bhargava 2004", _rate("bhargava")),
+    _kind("muscle_power", "W", "mean power of all muscles of both legs as they shorten", _muscle_power),
+    _kind("metabolic_power_umberger", "W", "metabolic rate of all muscles, Umberger 2010", _metabolic_power_umberger),
+    _kind("metabolic_power_bhargava", "W", "metabolic rate of all muscles, Bhargava 2004", _metabolic_power_bhargava),
 )
 """Those of a wearer who reacts; gas and the others of a walk are in ``strides``."""

@@ -1,7 +1,7 @@
 """The device on a walking leg: wearer, gait, sensors and event-based control, and the results."""
 
 from ppafo.simulation.scenario import Scenario
-from ppafo.walking.loading import list_led_walks, list_walks, load_walk
+from ppafo.walking.loading import list_walks, load_walk
 from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import Comparison, Population, compare_walks, walk, walk_population
 
@@ -11,7 +11,6 @@ __all__ = [
     "Scenario",
     "WalkResult",
     "compare_walks",
-    "list_led_walks",
     "list_walks",
     "load_walk",
     "walk",

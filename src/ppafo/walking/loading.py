@@ -70,7 +70,7 @@ from ppafo.walking.motion import (
 from ppafo.walking.nominal import nominal_terms
 from ppafo.walking.planning import NO_REFERENCE, course_of_walk, noise, plan_walks, switches, walking_valve
 from ppafo.walking.preparation import FaultSettings, SensorSettings
-from ppafo.walking.reacting_wearer import LONGEST_STEP, REACTS, read_reacting
+from ppafo.walking.reacting_wearer import LONGEST_STEP, read_reacting
 from ppafo.walking.result import lacks, measured
 from ppafo.walking.wearer import links_of_stature, read_wearer, wearer_origin
 
@@ -85,11 +85,6 @@ _TURN = 2.0 * math.pi
 def list_walks() -> tuple[str, ...]:
     """Return the names of the walk configurations that come with the package."""
     return FILE.names()
-
-
-def list_led_walks() -> tuple[str, ...]:
-    """Return those of the package whose gait is prescribed: what leads a leg can be exported, compared and timed."""
-    return tuple(name for name in list_walks() if value_at(FILE.parse(FILE.read(name), name), REACTS) is None)
 
 
 def load_walk(

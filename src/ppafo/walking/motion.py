@@ -155,13 +155,14 @@ def interval_with_body(seconds: float) -> float:
     return 5.0e-3 if seconds <= 61.0 else (1.0e-2 if seconds <= 601.0 else 5.0e-2)
 
 
-def _interval_of(scenario: Scenario) -> Callable[[float], float]:
+def interval_of(scenario: Scenario) -> Callable[[float], float]:
+    """What finds the time [s] between two samples of the record of a walk from its length [s]."""
     return record_interval if walk_of(scenario).reacts is None else interval_with_body
 
 
 def with_duration(scenario: Scenario, seconds: float) -> Scenario:
     """A walk of another length [s], recorded as often as that allows."""
-    return replace(scenario, duration=seconds, output_interval=_interval_of(scenario)(seconds))
+    return replace(scenario, duration=seconds, output_interval=interval_of(scenario)(seconds))
 
 
 def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
@@ -186,6 +187,6 @@ def clock_with(scenario: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tup
     period = times.get("controller.period", scenario.control.period)
     if "controller.rate" in times:
         period = 1.0 / times["controller.rate"]
-    output = over_runs(_interval_of(scenario), duration) if "run.duration" in times else scenario.output_interval
+    output = over_runs(interval_of(scenario), duration) if "run.duration" in times else scenario.output_interval
     problems = duration_problems(scenario, duration) if "run.duration" in times else ()
     return Clock(duration, times.get("run.step", scenario.time_step), output, period), problems

@@ -17,7 +17,7 @@ from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_tim
 from ppafo.engine.lanes import Batch
 from ppafo.engine.rows import leaf_paths, leaves, rebuilt
 from ppafo.engine.run import ReactingWalk, Run, Walk, batches_of
-from ppafo.engine.scheme.walking import DeviceShare, WalkState
+from ppafo.engine.scheme.walking import WalkState
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
 from ppafo.model.catalog import VALVES
@@ -50,6 +50,7 @@ from ppafo.walking.preparation import (
     walk_from_strike,
     walk_step_counts,
     with_leg,
+    without_leg,
 )
 from ppafo.walking.reacting_wearer import LONGEST_STEP, start_of_body
 from ppafo.walking.wearer import Build, leg_parameters
@@ -86,7 +87,7 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     course = None if planned is None else planned.course
     walk = Walk(
         leg=leg,
-        share=device_share(bare, leg),
+        share=device_share(bare, leg.gravity),
         gait=person.series,
         timing=person.timing,
         sensors=sensors,
@@ -131,7 +132,7 @@ def _plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     assert wearer is not None, "a wearer who reacts comes here"
     bare, sensors, start = plant_parameters(device), gait_sensors_of(scenario), start_of_body(wearer)
     walk = ReactingWalk(
-        share=DeviceShare(bare.inertia, bare.viscous_damping, bare.gravity_torque / STANDARD_GRAVITY),
+        share=device_share(bare, STANDARD_GRAVITY),
         body=wearer.row(),
         sensors=sensors,
         initial=start.walk,
@@ -144,7 +145,7 @@ def _plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     delay = _of_each(longest_delay, sensors) * scenario.control.period
     run = compose_run(
         _pieces_of_walk(scenario, device, controller, settings, delay),
-        bare._replace(gravity_torque=0.0, external_torque=0.0),
+        without_leg(bare),
         lambda plant: walk_steps(scenario, plant),
         lambda plant: vented_state(plant, start.ankle, 0.0),
         walk,

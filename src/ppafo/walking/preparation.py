@@ -42,12 +42,12 @@ def rocker_on_heel(flat: float, rise: float, half: float, heel_lever: float) -> 
     return HeelRocker(flat=bounded, raised=min(max(bounded + rise, bounded), heel_lever), half=half)
 
 
-def device_share(plant: PlantParameters, leg: LegParameters) -> DeviceShare:
-    """What a device, of which ``plant`` is the bare one, adds to a leg."""
+def device_share(plant: PlantParameters, gravity: float) -> DeviceShare:
+    """What a device, of which ``plant`` is the bare one under ``gravity`` [m/s^2], adds to a leg."""
     return DeviceShare(
         inertia=plant.inertia,
         viscous_damping=plant.viscous_damping,
-        mass_moment=plant.gravity_torque / leg.gravity,
+        mass_moment=plant.gravity_torque / gravity,
     )
 
 
@@ -59,6 +59,11 @@ def with_leg(plant: PlantParameters, leg: LegParameters) -> PlantParameters:
         gravity_torque=0.0,
         external_torque=0.0,
     )
+
+
+def without_leg(plant: PlantParameters) -> PlantParameters:
+    """The plant of a device whose foot belongs to a body: its own gravity is accounted for there."""
+    return plant._replace(gravity_torque=0.0, external_torque=0.0)
 
 
 def smallest_chamber(plant: PlantParameters) -> float:

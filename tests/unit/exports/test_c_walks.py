@@ -25,7 +25,7 @@ from ppafo.exports.c_library.files import Setting, c_identifier
 from ppafo.exports.c_library.walk_preparation import settings_of_walk
 from ppafo.loading import load_scenario
 from ppafo.simulation.scenario import Scenario, worn_kind
-from ppafo.walking import list_led_walks, load_walk
+from ppafo.walking import list_walks, load_walk
 from ppafo.walking.loading import FILE
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk
@@ -54,7 +54,7 @@ THERMAL = (
 SLOW = ("valve.spool_frequency=30 Hz", "valve.slew_limit=20 1/s", "timing.kind=estimated")
 EVERYTHING = (*SEEN, *FAULTY, *THERMAL, *SLOW, "controller.rate=330 Hz", "run.step=0.4 ms")
 VARIED: tuple[tuple[str, tuple[str, ...]], ...] = (
-    *((name, ()) for name in list_led_walks()),
+    *((name, ()) for name in list_walks()),
     ("proportional-regulators", EVERYTHING),
     ("proportional", ("course=first-steps",)),
 )
@@ -101,7 +101,8 @@ def drawn(settings: tuple[Setting, ...], draw: np.random.Generator) -> Values:
     values["sensors.seed"] = float(draw.integers(1, 1000))
     values["run.duration"] = float(draw.uniform(0.5, 2.0))
     values["run.output_interval"] = float(draw.choice([0.1, 1.0, 2.6]) * values["run.output_interval"])
-    values["run.step"] = float(np.clip(draw.choice([0.3, 1.0, 1.4]) * values["run.step"], 1e-6, 0.01))
+    longest = next(item.quantity.maximum for item in settings if item.path == "run.step")
+    values["run.step"] = float(np.clip(draw.choice([0.3, 1.0, 1.4]) * values["run.step"], 1e-6, min(longest, 0.01)))
     return values
 
 

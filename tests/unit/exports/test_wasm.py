@@ -17,7 +17,7 @@ from ppafo.loading import load_scenario
 from ppafo.running import simulate
 from ppafo.simulation.loading import list_scenarios
 from ppafo.simulation.numbers import with_numbers
-from ppafo.walking import list_led_walks, load_walk
+from ppafo.walking import list_walks, load_walk
 from scripts.wasm_programs import FOLDER, shipped_programs
 from tests.modules_under_node import DIVERGED, REFUSED, assert_alike, assert_same, compared, drawn, drawn_walks, driven
 
@@ -40,7 +40,7 @@ def test_a_module_gives_the_bits_of_python(name: str) -> None:
 @needs_node
 @pytest.mark.long
 @pytest.mark.thorough
-@pytest.mark.parametrize("name", list_led_walks())
+@pytest.mark.parametrize("name", list_walks())
 def test_a_module_gives_the_bits_of_a_walk_in_python(name: str) -> None:
     module = module_of(load_walk(name))
     ended = Counter(compared(name, module, drawn_walks(module, WALKS)))
@@ -99,7 +99,7 @@ def test_what_would_need_another_program_is_said_and_refused() -> None:
 def test_the_programs_of_the_package_are_those_of_its_physics() -> None:
     """The texts are compared everywhere, the bytes where the compiler is the one that made them."""
     index = json.loads((FOLDER / wasm.INDEX).read_text())
-    shipped = (*list_scenarios(), *list_led_walks())
+    shipped = (*list_scenarios(), *list_walks())
     texts = {name: wasm.source_of(library_of(load_scenario(name))) for name in shipped}
     missing = [name for name, text in texts.items() if wasm.digest_of(text) not in index["programs"]]
     assert missing == [], "python scripts/wasm_programs.py builds them anew"

@@ -20,7 +20,7 @@ from ppafo.live.page import check_start, packed, packed_once
 from ppafo.live.workbench import DEFAULT, known_intervals, workbench
 from ppafo.simulation.loading import load_scenario
 from ppafo.units import parse_quantity
-from ppafo.walking import list_led_walks, load_walk
+from ppafo.walking import list_walks, load_walk
 from scripts.known_intervals import known_intervals as intervals_of_study
 from scripts.live_page import check_bits, check_damage, check_refusals, missing, opened, programs_by_tab
 from scripts.page_states import address_of, hard_states
@@ -90,7 +90,7 @@ def test_every_default_of_the_page_is_what_its_text_says() -> None:
     from ppafo.live.workbench import Simulated, program_content
 
     for name in DEFAULT:
-        scenario = load_walk(name) if name in list_led_walks() else load_scenario(name)
+        scenario = load_walk(name) if name in list_walks() else load_scenario(name)
         content = program_content(Simulated(scenario, module_of(scenario), name), "module", {})
         texts = {one["key"]: one for one in content["settings"] if one["text"]}
         assert "supply.pressure" in texts

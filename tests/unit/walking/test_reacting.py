@@ -30,7 +30,6 @@ from ppafo.translation.native import translated_text
 from ppafo.validation.measured import check_recording
 from ppafo.validation.replay import replay_recording, start_of
 from ppafo.walking import load_walk, walk, walk_population
-from ppafo.walking.loading import list_led_walks, list_walks
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.walk import with_device_off
@@ -228,10 +227,6 @@ def test_what_needs_a_prescribed_gait_refuses_in_one_line() -> None:
             refused()
     assert "lowest_toes is over the ground" in lacking(scenario, METRICS["toe_clearance"])
     assert "it needs a wearer who reacts (wearer.reacts)" in lacking(load_walk("solenoid"), METRICS["fall_time"])
-
-
-def test_the_led_walks_are_those_without_a_wearer_who_reacts() -> None:
-    assert set(list_walks()) - set(list_led_walks()) == {WALK}
 
 
 def test_a_wearer_file_beside_the_walk_is_found(tmp_path: Path) -> None:

@@ -369,12 +369,23 @@ def words_of_walk(configuration: Scenario, links: Graph, failing: "Mapping[str, 
     from ppafo.walking.motion import walk_of
     from ppafo.walking.planning import has_ideal_sensors
 
-    gait, course = walk_of(configuration).gait, walk_of(configuration).course
-    way = "stride after equal stride" if course is None else f"the course `{course.name}`, which stays as it is"
+    motion = walk_of(configuration)
+    if motion.reacts is None:
+        gait, course = motion.gait, motion.course
+        way = "stride after equal stride" if course is None else f"the course `{course.name}`, which stays as it is"
+        led = [
+            f"the gait, `{gait.name}`: its series, its events and its stride of "
+            f"{gait.stride_time:.4g} s are numbers in the source",
+            f"how it is walked: {way}",
+        ]
+        precomputed = "the gait alone" if course is None else "the gait and its course alone"
+    else:
+        led = [
+            f"the wearer, `{motion.reacts.name}`: its body and muscles are numbers in the source, its gains settings"
+        ]
+        precomputed = "the body alone"
     fixed = [
-        f"the gait, `{gait.name}`: its series, its events and its stride of "
-        f"{gait.stride_time:.4g} s are numbers in the source",
-        f"how it is walked: {way}",
+        *led,
         f"the valve, `{configuration.device.valve.kind}`, and the controller, `{configuration.control.kind}`",
         *_fixed_of_device(
             configuration.device, configuration.thermal is not None, configuration.supply_lines is not None
@@ -384,7 +395,7 @@ def words_of_walk(configuration: Scenario, links: Graph, failing: "Mapping[str, 
     ]
     return {
         "fixed": _listed(fixed),
-        "precomputed": "the gait alone" if course is None else "the gait and its course alone",
+        "precomputed": precomputed,
         "traps": f"{_followers(links)}\n{_TRAPS_OF_WALK}",
         "metrics_said": _METRICS_OF_WALK,
     }

@@ -1,7 +1,7 @@
 """From settings to the numbers of a run: how that function is written for any device, and what a scenario needs."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, final
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
@@ -9,7 +9,7 @@ from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.engine.lane_rows import indent
 from ppafo.engine.lanes import RECORDED_ANGLE, Segment
 from ppafo.engine.program import LaneResult, LaneTiming, Program
-from ppafo.engine.rows import leaf_paths, numbers, row_expression
+from ppafo.engine.rows import leaf_paths, leaves, numbers, row_expression
 from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
 from ppafo.engine.scheme.motion import Pace
 from ppafo.engine.source_text import Collector, woven
@@ -93,6 +93,44 @@ def _term(term: Term, rows: list[str], collector: Collector) -> str:
     return f"{collector.add(term.function)}({given})"
 
 
+@dataclass(frozen=True, slots=True)
+class Written:
+    """A number of which the source has the text: what Python makes of one is written, operation by operation."""
+
+    text: str
+
+    def __mul__(self, other: "Written | float") -> "Written":
+        """The product."""
+        return self._with("*", other)
+
+    def __rmul__(self, other: float) -> "Written":
+        """The product."""
+        return Written(repr(float(other)))._with("*", self)
+
+    def __add__(self, other: "Written | float") -> "Written":
+        """The sum."""
+        return self._with("+", other)
+
+    def __radd__(self, other: float) -> "Written":
+        """The sum."""
+        return Written(repr(float(other)))._with("+", self)
+
+    def __rsub__(self, other: float) -> "Written":
+        """A number less this one."""
+        return Written(repr(float(other)))._with("-", self)
+
+    def __rtruediv__(self, other: float) -> "Written":
+        """A number over this one."""
+        return Written(repr(float(other)))._with("/", self)
+
+    def sqrt(self) -> "Written":
+        """The root, by the name under which NumPy looks for it."""
+        return Written(f"math.sqrt({self.text})")
+
+    def _with(self, sign: str, other: "Written | float") -> "Written":
+        return Written(f"({self.text} {sign} {other.text if isinstance(other, Written) else repr(float(other))})")
+
+
 @final
 class Writing:
     """Writes lines for one device and program; what they call is gathered by ``add``."""
@@ -141,9 +179,9 @@ class Writing:
         return {name: c_identifier(f"{section}.{name}") for name in names}
 
     def constant(self, row: Any, path: str) -> str:
-        """A NamedTuple of numbers that are known."""
-        cells = dict(zip(leaf_paths(type(row), path), map(repr, numbers(row)), strict=True))
-        return row_expression(type(row), path, cells, self.add)
+        """A NamedTuple of numbers that are known, or ``Written``."""
+        texts = (item.text if isinstance(item, Written) else repr(float(item)) for item in leaves(row))
+        return row_expression(type(row), path, dict(zip(leaf_paths(type(row), path), texts, strict=True)), self.add)
 
     def kind(self, name: str, kind: Any, given: Iterable[str]) -> str:
         """Parameters of a controller or profile, of numbers in the order of its quantities."""

@@ -1,18 +1,20 @@
 """From the settings of a walk to the numbers of a run: one composed function, which calls those of the planning.
 
-What a gait comes to (series, events, how its heel rolls) and a course in time are numbers written out.
+What a gait comes to (series, events, how its heel rolls) and a course in time are numbers written out, and so are the
+body of a wearer who reacts and the pose in which it begins.
 """
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
+from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control.walking.catalog import walking_controllers
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import Collector
 from ppafo.errors import ScenarioError
 from ppafo.exports.c_library.boundary import Boundary
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
-from ppafo.exports.c_library.preparation import SAID, Writing, declared_settings
+from ppafo.exports.c_library.preparation import SAID, Writing, Written, declared_settings
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait import gait_at
 from ppafo.model.plant_faults import POWERED
@@ -26,7 +28,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.walking.course import flat_foot
 from ppafo.walking.declaration import PERSON, STEP, fault_numbers
 from ppafo.walking.gait_series import fit_rocker, gait_series, gait_timing
-from ppafo.walking.motion import check_led, record_interval, walk_of
+from ppafo.walking.motion import interval_of, walk_of
 from ppafo.walking.planning import NO_REFERENCE, course_of_walk, failing_of, law_of, sensor_settings
 from ppafo.walking.preparation import (
     DISTORTED,
@@ -46,7 +48,9 @@ from ppafo.walking.preparation import (
     walk_from_strike,
     walk_step_counts,
     with_leg,
+    without_leg,
 )
+from ppafo.walking.reacting_wearer import LONGEST_STEP, REACTIONS, ReactingWearer, start_of_body
 from ppafo.walking.wearer import WEARER, leg_parameters
 
 _FORCES = ("force_bandwidth", "force_noise", "force_resolution", "lost_share")
@@ -76,7 +80,6 @@ _RELATIONS = (
 
 def check_can_leave(configuration: Scenario) -> None:
     """Raise ScenarioError for a walk that has no exported form."""
-    check_led(configuration, "a model in C")
     if walk_of(configuration).person:
         raise ScenarioError(
             f"{configuration.name}: wearer.person is drawn in Python, so a walk with one cannot be exported: leave it "
@@ -103,14 +106,16 @@ def _numbers(configuration: Scenario) -> dict[str, tuple[Quantity, float]]:
     of_run = {
         "run.duration": duration,
         "run.step": configuration.time_step,
-        "run.output_interval": record_interval(duration),
+        "run.output_interval": interval_of(configuration)(duration),
     }
     times, control = of_run | {"controller.period": configuration.control.period}, _control(configuration)
-    declared = declared_settings(configuration) | control | {f"run.{item.name}": item for item in (*RUN, STEP)}
+    reacts = walk_of(configuration).reacts is not None
+    step = replace(STEP, maximum=LONGEST_STEP) if reacts else STEP
+    declared = declared_settings(configuration) | control | {f"run.{item.name}": item for item in (*RUN, step)}
     # What fails of the plant, with its shut-off valve, is written out in the source; persons are drawn in Python.
     fixed = ("shut_off.", *(f"faults.{part}." for part in walk_of(configuration).broken), f"wearer.{PERSON.name}")
     # The structures of libraries have the times behind the device.
-    wearer = (f"wearer.{item.name}" for item in WEARER)
+    wearer = (f"wearer.{item.name}" for item in (REACTIONS if reacts else WEARER))
     paths = dict.fromkeys((*device_numbers(configuration.device), *of_run, *wearer, *times, *control, *declared))
     return {
         path: (declared[path], times[path] if path in times else number_at(configuration, path))
@@ -135,7 +140,7 @@ def _control(configuration: Scenario) -> dict[str, Quantity]:
 def links_of_walk(configuration: Scenario) -> Graph:
     """What follows other settings of a walk as long as nobody changes it."""
     known = _numbers(configuration)
-    recorded = {"run.output_interval": (Follows((Term(("run.duration",), record_interval),)),)}
+    recorded = {"run.output_interval": (Follows((Term(("run.duration",), interval_of(configuration)),)),)}
     # A plant alone has no settings of the controller that its walk had.
     links = {path: links for path, links in {**configuration.graph, **recorded}.items() if path in known}
     return holding(links, lambda path: known[path][1])
@@ -161,15 +166,17 @@ def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:
 def preparation_of_walk(configuration: Scenario, program: Program, collector: Collector, boundary: Boundary) -> str:
     """The composed function ``prepare`` of a walk, once everything it calls is gathered."""
     writing = Writing(configuration.device, configuration.supply_lines, program, collector)
+    reacts = walk_of(configuration).reacts
     lines = [
         *writing.plant("bare", "0.0"),
-        *_leg(configuration, writing),
+        *(_leg(configuration, writing) if reacts is None else _body(reacts, writing)),
         *_gait_sensors(configuration, writing),
         *_plant_faults(configuration, writing),
         *_steps(configuration, writing),
         *writing.timing("signal_delay"),
         *_pieces(configuration, writing),
-        *_start(configuration, writing),
+        *(_start(configuration, writing) if reacts is None else _body_at_start(reacts, writing)),
+        *writing.start(),
     ]
     return writing.text(settings_of_walk(configuration), lines, boundary)
 
@@ -181,7 +188,7 @@ def _leg(configuration: Scenario, writing: Writing) -> Iterator[str]:
     fitted = ", ".join(map(repr, fit))
     yield f"rocker = {add(rocker_on_heel)}({fitted}, wearer_heel_lever)"
     yield f"leg = {add(leg_parameters)}(wearer, rocker)"
-    yield f"share = {add(device_share)}(bare, leg)"
+    yield f"share = {add(device_share)}(bare, leg.gravity)"
     yield f"plant = {add(with_leg)}(bare, leg)"
     yield f"gait = {writing.constant(gait_series(walk_of(configuration).gait), 'gait')}"
     yield f"gait_timing = {writing.constant(gait_timing(walk_of(configuration).gait), 'gait_timing')}"
@@ -256,4 +263,26 @@ def _start(configuration: Scenario, writing: Writing) -> Iterator[str]:
         yield f"walk = {add(walk_from_standing)}({add(standing_on)}({given}))"
     yield f"gait_seen = {writing.constant(NOTHING_SEEN, 'gait_seen')}"
     yield f"state = {add(vented_state)}(plant, walk.now.ankle, walk.now.ankle_rate)"
-    yield from writing.start()
+
+
+def _body(reacts: ReactingWearer, writing: Writing) -> Iterator[str]:
+    """Lines that make the body of a wearer who reacts, its share of the device and the plant without a leg."""
+    add = writing.add
+    yield f"share = {add(device_share)}(bare, {STANDARD_GRAVITY!r})"
+    yield f"plant = {add(without_leg)}(bare)"
+    yield f"wearer = {writing.constant(_as_settings(reacts).row(), 'wearer')}"
+
+
+def _as_settings(reacts: ReactingWearer) -> ReactingWearer:
+    """The wearer whose numbers are those that the settings of a library have."""
+    return replace(reacts, settings={name: Written(c_identifier(f"wearer.{name}")) for name in reacts.settings})
+
+
+def _body_at_start(reacts: ReactingWearer, writing: Writing) -> Iterator[str]:
+    """Lines that make the states at the start of a wearer who reacts."""
+    add, start = writing.add, start_of_body(_as_settings(reacts))
+    rows = {"walk": start.walk, "walker": start.walker, "reflexes": start.reflexes, "nerves": start.nerves}
+    for name, row in rows.items():
+        yield f"{name} = {writing.constant(row, name)}"
+    yield f"gait_seen = {writing.constant(NOTHING_SEEN, 'gait_seen')}"
+    yield f"state = {add(vented_state)}(plant, {start.ankle!r}, 0.0)"

@@ -24,7 +24,7 @@ from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.question import Solved
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.walking import list_led_walks
+from ppafo.walking import list_walks
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk
@@ -68,7 +68,7 @@ _TIMING_ROWS, _RESULT_ROWS = 5, 4
 
 def names() -> tuple[str, ...]:
     """Return the names of all runs."""
-    return (*list_scenarios(), *VARIED, *list_led_walks(), *COURSES)
+    return (*list_scenarios(), *VARIED, *list_walks(), *COURSES)
 
 
 def plain_batch(name: str) -> Batch:

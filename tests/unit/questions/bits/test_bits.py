@@ -14,7 +14,7 @@ from ppafo.engine.lanes import BatchResult, run_batch
 from ppafo.errors import SimulationError
 from ppafo.questions.bits import solve
 from ppafo.simulation.loading import list_scenarios
-from ppafo.walking import list_led_walks
+from ppafo.walking import list_walks
 
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
 CHEAP = "torque-task-proportional"
@@ -23,7 +23,7 @@ CHEAP = "torque-task-proportional"
 def test_every_scenario_and_walk_has_golden_hashes_and_the_quick_ones_are_among_them() -> None:
     golden = solve.golden_hashes()
     assert set(golden) == set(solve.names())
-    assert {*list_scenarios(), *list_led_walks(), *solve.QUICK} <= set(golden)
+    assert {*list_scenarios(), *list_walks(), *solve.QUICK} <= set(golden)
     assert all(0 < hashes["failed"] < solve.DRAWS // 2 for hashes in golden.values())
     assert len({hashes["draws"] for hashes in golden.values()}) == len(golden)
 
