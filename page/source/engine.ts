@@ -89,10 +89,11 @@ export class Engine {
       if (columns === 0 || metrics === 0 || good === 0) return failedRun("no memory", ENDING_TEXTS["no memory"]);
       const ending = ENDINGS[exports.run(settings, columns, metrics, good)] ?? "refused";
       const { buffer } = exports.memory;
-      const length = new Int32Array(buffer, good, 1)[0] ?? 0;
+      const done = new Int32Array(buffer, good, 1)[0] ?? 0;
       const table = new Float64Array(buffer, columns, count * rows).slice();
-      const column = (place: number) => table.subarray(place * count, place * count + length);
       const found = new Float64Array(buffer, metrics, program.metrics.length);
+      const length = samplesUntilFall(table.subarray(0, done), found[program.metrics.findIndex(({ name }) => name === "fall_time")]);
+      const column = (place: number) => table.subarray(place * count, place * count + length);
       const beyond = beyondStops(program, values, column(0), column(1 + program.channels.findIndex(({ name }) => name === "angle")));
       if (beyond !== "") return failedRun("refused", beyond);
       return {
@@ -150,6 +151,12 @@ export class Engine {
       this.exports.release(before);
     }
   }
+}
+
+/** Samples before a wearer falls [s]: what comes after is not counted. All of them where nobody falls. */
+function samplesUntilFall(time: Float64Array, fall: number | undefined): number {
+  const place = fall === undefined ? -1 : time.findIndex((at) => at >= fall);
+  return place < 0 ? time.length : Math.max(1, place);
 }
 
 /** What a scenario file may not have: a vane that is led beyond its stops. */

@@ -19,7 +19,6 @@ from ppafo.metrics.metric import Readings
 from ppafo.metrics.strides import PER_STRIDE, SETTLING
 from ppafo.metrics.wearer import METER, WearerTotals
 from ppafo.metrics.wearer import METRICS as OF_WEARER
-from ppafo.model.plant import chamber_pressures
 from ppafo.model.wearer.muscle import Fibre
 from ppafo.model.wearer.segments import Limb
 from ppafo.model.wearer.walker import Fibres, Joints, Wearer, end_of_joint, joints, pull
@@ -27,6 +26,8 @@ from ppafo.signals import Channel, Recording
 from ppafo.signals.meter import WearerSample
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import gas_channels
+from ppafo.walking.channels import Channels, actuator_channels, controller_channels, valve_and_ground_channels
+from ppafo.walking.strides import counts_of_strides, first_less_help
 
 FELL = "walk.fall_time"
 """Row of the time of a fall [s], below 0 before one."""
@@ -42,18 +43,15 @@ def recording_of_reacting(
     """The recording of a wearer who reacts [SI] from rows (samples,) by path, with the channels of a bottle."""
     assert run.reacting is not None, "of a wearer who reacts"
     body, weight = run.reacting.body.body, run.reacting.body.weight
-    angle, rate = record["state.angle"], record["state.angular_velocity"]
-    pressure_1, pressure_2 = chamber_pressures(run.plant, angle, record["state.mass_1"], record["state.mass_2"])
-    external = record["walk.external_torque"]
     left, right = (angles_of(record, side) for side in ("left", "right"))
     ankle_height = (
         record["walker.pose.y"]
         - body.thigh.length * np.cos(record["walker.pose.left.thigh"])
         - body.shank.length * np.cos(record["walker.pose.left.shank"])
     )
-    channels: dict[str, tuple[Any, str]] = {
-        "angle": (angle, "rad"),
-        "angular_velocity": (rate, "rad/s"),
+    channels: Channels = {
+        "angle": (record["state.angle"], "rad"),
+        "angular_velocity": (record["state.angular_velocity"], "rad/s"),
         "shank_angle": (record["walk.now.shank"], "rad"),
         "knee_angle": (left.knee, "rad"),
         "hip_angle": (left.hip, "rad"),
@@ -65,24 +63,15 @@ def recording_of_reacting(
         "hip_position": (record["walker.pose.x"], "m"),
         "ground_force": (weight * record["walk.load"], "N"),
         "other_ground_force": (weight * record["walk.other_load"], "N"),
-        "pressure_1": (pressure_1, "Pa"),
-        "pressure_2": (pressure_2, "Pa"),
-        "torque": (run.plant.torque_constant * np.subtract(pressure_1, pressure_2), "N m"),
-        "external_torque": (external, "N m"),
-        "device_power": (external * rate, "W"),
+        **actuator_channels(run, record),
         "toe_height": (ankle_height + body.foot.length * np.sin(record["walker.pose.left.foot"]), "m"),
-        "command": (record["result.command"], "-"),
-        "contact": (record["walk.contact"], "-"),
-        "heel_force": (record["walk.heel_force"], "N"),
-        "toe_force": (record["walk.toe_force"], "N"),
-        "supplied_mass": (record["state.supplied_mass"], "kg"),
-        "vented_mass": (record["state.vented_mass"], "kg"),
+        **valve_and_ground_channels(record),
         "ankle_moment": (ankle_moments(run.reacting.body, record, left), "N m"),
         "muscle_work": (record["walk.muscle_work"], "J"),
     }
     for name in Fibres._fields:
         channels[f"{name}_activation"] = (record[f"walker.left.fibres.{name}.activation"], "-")
-    channels |= gas_channels(configuration.device.gas, run, record) | dict(of_bottle)
+    channels |= gas_channels(configuration.device.gas, run, record) | dict(of_bottle) | controller_channels(record)
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
     return Recording(f"walk, {configuration.name}", time, values, kind="simulated")
 
@@ -123,7 +112,7 @@ def sample_at(time: Floats, record: Mapping[str, Floats], place: int) -> WearerS
 
 
 def reacting_metrics(
-    time: Floats,
+    recording: Recording,
     record: Mapping[str, Floats],
     starts: NDArray[np.intp],
     strides: Mapping[str, Floats],
@@ -134,7 +123,7 @@ def reacting_metrics(
 
     ``starts`` are the samples after each strike, ``strides`` numbers of each whole stride, ``helped`` those with help.
     """
-    counted = np.arange(helped.size) >= SETTLING
+    time, counted = recording.time, np.arange(helped.size) >= SETTLING
     # Read as a study reads them, from the samples that its meter keeps.
     now = sample_at(time, record, -1)._replace(fall_time=fall_time)
     first, last = (sample_at(time, record, starts[place]) for place in (SETTLING, -1)) if counted.any() else (now, now)
@@ -156,9 +145,5 @@ def reacting_metrics(
         own = own[own < 0.0] if name == "slap_rate" else own
         if own.size and name != "toe_clearance":
             found[name] = Metric(float(own.mean()), item.unit, f"{item.summary}, mean")
-    gas = record["state.supplied_mass"]
-    found["strides"] = Metric(float(helped.size), "-", "whole strides of the walk")
-    found["helped_strides"] = Metric(float(helped.sum()), "-", "whole strides with help from strike to strike")
     found["counted_strides"] = Metric(float((counted & helped).sum()), "-", "strides over which the means are taken")
-    found["total_gas"] = Metric(float(gas[-1] - gas[0]), "kg", "gas taken from the supply in the whole walk")
-    return found
+    return found | counts_of_strides(recording, helped) | first_less_help(recording)

@@ -15,25 +15,16 @@ from ppafo.metrics import METRICS, Metric, evaluate
 from ppafo.metrics.metric import LED, LED_SHANK, REACTS, REQUEST, STEADY, MetricKind, Metrics
 from ppafo.model.contact import SWING
 from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix, passive_torque
-from ppafo.model.plant import chamber_pressures
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 from ppafo.simulation.simulate import Status, gas_channels
 from ppafo.storage.opensim import opensim_recording, write_opensim
 from ppafo.walking.bottle import UNITS, SupplyCourse
+from ppafo.walking.channels import Channels, actuator_channels, controller_channels, valve_and_ground_channels
 from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.course import PlannedCourse, pace_in_time
-from ppafo.walking.events import (
-    EVENT_ROW,
-    FRACTION_ROW,
-    PHASE_ROW,
-    REQUEST_ROW,
-    SAFE_ROW,
-    SafetyEvent,
-    clock_row,
-    safety_events,
-)
+from ppafo.walking.events import SAFE_ROW, SafetyEvent, safety_events
 from ppafo.walking.gait_series import AnklePath, ankle_path, truncate
 from ppafo.walking.motion import walk_of
 from ppafo.walking.person import as_drawn
@@ -70,42 +61,24 @@ def recording_of_walk(
     """The recording of a walk [SI] from its rows (samples,) by path, at these times [s]; with its bottle's course."""
     run = run if supply is None else _with_cold_gas(run, supply, time)
     assert run.walk is not None, "a walk has a leg"
-    angle, rate = record["state.angle"], record["state.angular_velocity"]
-    pressure_1, pressure_2 = chamber_pressures(run.plant, angle, record["state.mass_1"], record["state.mass_2"])
-    external = record["walk.external_torque"]
+    angle = record["state.angle"]
     path = ankle_path(walk_of(configuration).gait, run.walk.timing, walk_of(configuration).wearer)
-    channels: dict[str, tuple[Any, str]] = {
+    channels: Channels = {
         "angle": (angle, "rad"),
-        "angular_velocity": (rate, "rad/s"),
+        "angular_velocity": (record["state.angular_velocity"], "rad/s"),
         "shank_angle": (record["walk.now.shank"], "rad"),
         "healthy_angle": (record["walk.now.ankle"], "rad"),
-        "pressure_1": (pressure_1, "Pa"),
-        "pressure_2": (pressure_2, "Pa"),
-        "torque": (run.plant.torque_constant * np.subtract(pressure_1, pressure_2), "N m"),
-        "external_torque": (external, "N m"),
-        "device_power": (external * rate, "W"),
+        **actuator_channels(run, record),
         "swing_knee_torque": (swing_knee_torque(run, time, record), "N m"),
         "toe_height": (path.toe_height(record["walk.now.phase"], record["walk.now.shank"], angle), "m"),
-        "command": (record["result.command"], "-"),
-        "contact": (record["walk.contact"], "-"),
-        "heel_force": (record["walk.heel_force"], "N"),
-        "toe_force": (record["walk.toe_force"], "N"),
-        "supplied_mass": (record["state.supplied_mass"], "kg"),
-        "vented_mass": (record["state.vented_mass"], "kg"),
+        **valve_and_ground_channels(record),
     }
     if run.walk.leg.keeps_gait >= 0.5:
         channels["dorsiflexor_moment"] = (dorsiflexor_moment(run, record), "N m")
     channels |= gas_channels(configuration.device.gas, run, record)
     if supply is not None:
         channels |= supply_channels(supply, time, record)
-    if PHASE_ROW in record:
-        channels["controller_phase"] = (record[PHASE_ROW], "-")
-        channels["safe_state"] = (record[SAFE_ROW], "-")
-    if REQUEST_ROW in record:
-        channels["reference"] = (record[REQUEST_ROW], "N m")
-    fraction, event = clock_row(record, FRACTION_ROW), clock_row(record, EVENT_ROW)
-    if fraction is not None and event is not None:
-        channels["gait_fraction"], channels["gait_event"] = (fraction, "-"), (event, "-")
+    channels |= controller_channels(record)
     if run.walk.course is not None:
         channels |= _course_channels(configuration, run, path, time, record)
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
@@ -361,7 +334,7 @@ def _reacting_result(
     starts = stride_starts(rows["walk.strides"])
     strides = per_stride(rows, starts)
     helped = helped_strides(rows.get(SAFE_ROW, np.zeros(recording.time.size)), starts)
-    metrics = reacting_metrics(recording.time, rows, starts, strides, helped, fall_time)
+    metrics = reacting_metrics(recording, rows, starts, strides, helped, fall_time)
     if fall_time >= 0.0 and status.is_completed:
         status = Status("completed", None, f"completed: the wearer fell at t = {fall_time:.4g} s")
     return WalkResult(

@@ -101,19 +101,21 @@ def walk_metrics(
     ``starts`` are the samples after each heel strike, ``helped`` tells which strides had help and ``counted`` which of
     all are for means. ``averages`` are those of the counted strides with help.
     """
-    counts = (
-        Metric(float(helped.size), "-", "whole strides of the walk"),
-        Metric(float(helped.sum()), "-", "whole strides with help from strike to strike"),
-        Metric(
-            float((~helped).sum()),
-            "-",
-            "whole strides with less help (lifted only, paused or stopped) in at least a part of them",
-        ),
-        Metric(float(np.ptp(recording["supplied_mass"][[0, -1]])), "kg", "gas taken from the supply in the whole walk"),
-    )
     found = stride_metrics(configuration, strides, averages, helped & counted)
-    found |= dict(zip(("strides", "helped_strides", "vented_strides", "total_gas"), counts, strict=True))
-    return found | _tracking(recording, starts, helped & counted) | _safety(recording)
+    found |= counts_of_strides(recording, helped)
+    return found | _tracking(recording, starts, helped & counted) | first_less_help(recording)
+
+
+def counts_of_strides(recording: Recording, helped: NDArray[np.bool_]) -> dict[str, Metric]:
+    """How many whole strides there are, and the gas of the whole walk; ``helped`` is (strides,)."""
+    gas = float(np.ptp(recording["supplied_mass"][[0, -1]]))
+    less = "whole strides with less help (lifted only, paused or stopped) in at least a part of them"
+    return {
+        "strides": Metric(float(helped.size), "-", "whole strides of the walk"),
+        "helped_strides": Metric(float(helped.sum()), "-", "whole strides with help from strike to strike"),
+        "vented_strides": Metric(float((~helped).sum()), "-", less),
+        "total_gas": Metric(gas, "kg", "gas taken from the supply in the whole walk"),
+    }
 
 
 def settled(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -179,7 +181,7 @@ def _tracking(recording: Recording, starts: NDArray[np.intp], chosen: NDArray[np
     return {"push_off_error": Metric(rms, "N m", "RMS of requested torque less actuator torque in push-off")}
 
 
-def _safety(recording: Recording) -> dict[str, Metric]:
+def first_less_help(recording: Recording) -> dict[str, Metric]:
     """When the controller first helped less; nothing where it never did."""
     if "safe_state" not in recording or not recording["safe_state"].any():
         return {}

@@ -14,7 +14,6 @@ from ppafo.engine.run import Run, batch_of
 from ppafo.engine.scheme import reacting
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers
 from ppafo.errors import PpafoError, ScenarioError
-from ppafo.exports.c_library import walk_library
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import REACTS
 from ppafo.model.plant import PlantState
@@ -218,7 +217,6 @@ def test_a_gait_or_course_of_an_option_is_refused_as_one_of_the_file_is(path: st
 def test_what_needs_a_prescribed_gait_refuses_in_one_line() -> None:
     scenario, line = load_walk(WALK), "needs a prescribed gait, and its wearer reacts"
     for refused in (
-        lambda: walk_library(scenario),
         lambda: walk_population(scenario, 0.1, 8),
         lambda: walking_task(WALK),
         lambda: event_timing(WALK),

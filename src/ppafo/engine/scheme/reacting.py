@@ -253,28 +253,38 @@ def advance_reacting(
     falls = stood and not (pose.y > FALLEN * leg)
     work = 0.5 * (given + walk.external_torque) * turned if contact == TOE and stood else 0.0
     stride_time = walk.since if strikes and walk.strides > 0.5 else walk.stride_time
-    slap_rates = walk.slap_rates + (rates.left.foot if slaps else 0.0)
+    muscle_work = walk.muscle_work + (body.work if stood else 0.0)
+    toes_first = (1.0 if touches_first else 0.0) if strikes else walk.toes_first
+    on_toes = 1.0 if strikes and touches_first else 0.0
+    struck = 1.0 if strikes else 0.0
+    slapped = 1.0 if slaps else 0.0
+    slap_rate = rates.left.foot if slaps else 0.0
+    external_torque = given if stood else 0.0
+    clearance = NO_CLEARANCE if strikes else lowest
+    cleared = lowest if strikes else 0.0
+    fall_time = time if falls else walk.fall_time
+    # Numba compiles no call of so many names with a choice inside.
     return ReactingState(
         contact=contact,
         now=WalkNow(min(since / stride_time, 1.0), pose.left.shank),
-        external_torque=given if stood else 0.0,
+        external_torque=external_torque,
         heel_force=walk.heel_force + (heel - walk.heel_force) * follows,
         toe_force=walk.toe_force + (ball - walk.toe_force) * follows,
-        toes_first=(1.0 if touches_first else 0.0) if strikes else walk.toes_first,
+        toes_first=toes_first,
         lands=lands,
-        clearance=NO_CLEARANCE if strikes else lowest,
+        clearance=clearance,
         since=since,
         stride_time=stride_time,
-        strides=walk.strides + (1.0 if strikes else 0.0),
-        landings=walk.landings + (1.0 if slaps else 0.0),
-        toe_landings=walk.toe_landings + (1.0 if strikes and touches_first else 0.0),
-        slap_rates=slap_rates,
-        clearances=walk.clearances + (lowest if strikes else 0.0),
+        strides=walk.strides + struck,
+        landings=walk.landings + slapped,
+        toe_landings=walk.toe_landings + on_toes,
+        slap_rates=walk.slap_rates + slap_rate,
+        clearances=walk.clearances + cleared,
         push_off_work=walk.push_off_work + work,
         load=load,
         other_load=body.right_felt.load,
-        muscle_work=walk.muscle_work + (body.work if stood else 0.0),
-        fall_time=time if falls else walk.fall_time,
+        muscle_work=muscle_work,
+        fall_time=fall_time,
     )
 
 
