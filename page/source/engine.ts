@@ -92,7 +92,10 @@ export class Engine {
       const done = new Int32Array(buffer, good, 1)[0] ?? 0;
       const table = new Float64Array(buffer, columns, count * rows).slice();
       const found = new Float64Array(buffer, metrics, program.metrics.length);
-      const length = samplesUntilFall(table.subarray(0, done), found[program.metrics.findIndex(({ name }) => name === "fall_time")]);
+      const read = new Map(program.metrics.map((metric, place) => [metric.name, found[place] ?? NaN]));
+      // What comes after a fall is not counted.
+      const fallen = table.subarray(0, done).findIndex((at) => at >= (read.get("fall_time") ?? NaN));
+      const length = fallen > 0 ? fallen : done;
       const column = (place: number) => table.subarray(place * count, place * count + length);
       const beyond = beyondStops(program, values, column(0), column(1 + program.channels.findIndex(({ name }) => name === "angle")));
       if (beyond !== "") return failedRun("refused", beyond);
@@ -100,7 +103,7 @@ export class Engine {
         ending,
         time: column(0),
         channels: new Map(program.channels.map((channel, place) => [channel.name, column(place + 1)])),
-        metrics: new Map(program.metrics.map((metric, place) => [metric.name, found[place] ?? NaN])),
+        metrics: read,
         fault: ENDING_TEXTS[ending],
       };
     });
@@ -151,12 +154,6 @@ export class Engine {
       this.exports.release(before);
     }
   }
-}
-
-/** Samples before a wearer falls [s]: what comes after is not counted. All of them where nobody falls. */
-function samplesUntilFall(time: Float64Array, fall: number | undefined): number {
-  const place = fall === undefined ? -1 : time.findIndex((at) => at >= fall);
-  return place < 0 ? time.length : Math.max(1, place);
 }
 
 /** What a scenario file may not have: a vane that is led beyond its stops. */

@@ -43,7 +43,13 @@ def still_of(
         return f"{_TOP + high * (up[-1] - value) / (up[-1] - up[0]):.1f}"
 
     def line(curve: Sequence[tuple[float, float]], look: str) -> str:
-        return f'<polyline fill="none" {look} points="{" ".join(f"{x(time)},{y(value)}" for time, value in curve)}"/>'
+        places = [(x(time), y(value)) for time, value in curve]
+        # Of a level stretch its two ends are enough.
+        levels = [up for _, up in places]
+        same = zip(levels, levels[1:], levels[2:], strict=False)
+        kept = [True, *(not before == here == after for before, here, after in same), True]
+        shown = " ".join(f"{across},{up}" for (across, up), is_kept in zip(places, kept, strict=False) if is_kept)
+        return f'<polyline fill="none" {look} points="{shown}"/>'
 
     def text(words: str, where: str) -> str:
         return f"<text {where}>{escape(words)}</text>"
