@@ -34,7 +34,7 @@ from ppafo.walking.planning import plan_walk
 from ppafo.walking.walk import with_device_off
 
 WALK, STEP = "reacting", 1.0e-4
-WEAK = "wearer.tibialis_strength=0.3"
+WEAK = "wearer.tibialis_strength=0.1"
 METERS = [name for name, kind in METRICS.items() if REACTS in kind.needs]
 
 
@@ -110,7 +110,7 @@ def test_faults_and_a_shut_off_valve_are_translated_to_c_as_well() -> None:
 @pytest.mark.long
 def test_rows_of_an_ensemble_are_single_walks_to_the_bit() -> None:
     scenario = with_duration(load_walk(WALK), 6.0)
-    strength, speed = np.array([0.2, 0.3, 0.5, 0.9, 1.0]), np.array([1.2, 1.3, 1.3, 1.4, 1.2])
+    strength, speed = np.array([0.2, 0.1, 0.5, 0.9, 1.0]), np.array([1.2, 1.3, 1.3, 1.4, 1.2])
     columns = {"wearer.tibialis_strength": strength, "wearer.start_speed": speed}
     together = run_ensemble(scenario, columns, [*METERS, "gas", "strides"])
     for row in range(strength.size):
@@ -232,6 +232,6 @@ def test_a_wearer_file_beside_the_walk_is_found(tmp_path: Path) -> None:
     text = (shipped / "wearers" / "files" / "geyer-herr.toml").read_text()
     (tmp_path / "me.toml").write_text(text.replace('"geyer-herr"', '"me"', 1))
     walked = (shipped / "walking" / "configurations" / "reacting.toml").read_text()
-    (tmp_path / "mine.toml").write_text(walked.replace('"geyer-herr"', '"me.toml"'))
+    (tmp_path / "mine.toml").write_text(walked.replace('"healthy-128"', '"me.toml"'))
     found = load_walk(tmp_path / "mine.toml")
     assert "me" in found.motion.label

@@ -64,7 +64,7 @@ def test_a_search_that_was_cut_in_the_middle_of_a_line_ends_with_the_same_bits(t
     assert contents[0] == contents[1]
     wearer = find_wearer(cut / "wearer-1.toml")
     assert (wearer.left_gains, wearer.right_gains) == found.gains_of(found.restarts[0].gains)
-    assert wearer.found == "by search: from geyer-herr seed 1 restart 1 2 generations of 4 towards 1.3 m/s"
+    assert wearer.found == "by search: from healthy-128 seed 1 restart 1 2 generations of 4 towards 1.3 m/s"
     with pytest.raises(StudyError, match=r"holds another search \(seed\)"):
         adapt_into_folder("reacting", cut, restarts=1, generations=2, population=4, seed=2, overrides=SHORT)
     lines = content.splitlines(keepends=True)
