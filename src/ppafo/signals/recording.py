@@ -95,7 +95,9 @@ CHANNELS: dict[str, ChannelKind] = {
     "hip_position": ChannelKind("m", "hip in front of where it started"),
     "ground_force": ChannelKind("N", "vertical force of the ground on the foot with the device"),
     "other_ground_force": ChannelKind("N", "vertical force of the ground on the other foot"),
-    "ankle_moment": ChannelKind("N m", "moment of the wearer on the ankle without the device, plantarflexion above 0"),
+    "wearer_ankle_moment": ChannelKind(
+        "N m", "moment of the wearer on the ankle without the device, plantarflexion above 0"
+    ),
     "muscle_work": ChannelKind("J", "work of all muscles as they shorten since the start"),
     **{
         f"{name}_activation": ChannelKind(PLAIN_NUMBER, f"activation of the {name} of the leg with the device")

@@ -66,7 +66,7 @@ def recording_of_reacting(
         **actuator_channels(run, record),
         "toe_height": (ankle_height + body.foot.length * np.sin(record["walker.pose.left.foot"]), "m"),
         **valve_and_ground_channels(record),
-        "ankle_moment": (ankle_moments(run.reacting.body, record, left), "N m"),
+        "wearer_ankle_moment": (ankle_moments(run.reacting.body, record, left), "N m"),
         "muscle_work": (record["walk.muscle_work"], "J"),
     }
     for name in Fibres._fields:

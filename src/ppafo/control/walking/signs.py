@@ -218,7 +218,7 @@ SAFETY_QUANTITIES = (
         "flat_from", "1", "from this fraction of a steady stride on, heel and toes are both loaded", 0.16, 0.05, 0.6
     ),
     Quantity("flat_to", "1", "and until this fraction", 0.24, 0.05, 0.6),
-    Quantity("lowest_pressure", "Pa_a", "a chamber pressure below this is not a valid reading", 4.5e4, 0.0, 1.0e5),
+    Quantity("lowest_pressure", "Pa_a", "a chamber pressure below this is not a valid reading", 3.0e4, 0.0, 1.0e5),
     Quantity("highest_pressure", "Pa_a", "a chamber pressure above this is not a valid reading", 2.0e6, 1.1e5, 1.0e8),
     Quantity(
         "filled_pressure", "Pa_a", "a filled chamber has a higher pressure, a vented one a lower", 1.25e5, 1.0e4, 1.0e8

@@ -72,7 +72,7 @@ _COMPARED = (
     ("ground_force", "vertical_force", "Vertical ground force (body weights)"),
     ("angle", "ankle_angle", "Ankle angle (deg)"),
     ("shank_angle", "shank_angle", "Shank angle (deg)"),
-    ("ankle_moment", "ankle_moment", "Ankle moment (N m/kg)"),
+    ("wearer_ankle_moment", "ankle_moment", "Ankle moment (N m/kg)"),
 )
 """Channel of the wearer, curve of the gait, and title with unit."""
 MOST_LAG = 10
@@ -155,7 +155,7 @@ class Likeness:
 def likeness(walked: WalkResult) -> dict[str, Likeness]:
     """Return how alike the mean stride is to the measured gait that is shipped, by curve; {} without strides."""
     gait, wearer = load_gait(), wearer_of_walk(walked.scenario)
-    over = {"ground_force": wearer.weight, "ankle_moment": wearer.mass}
+    over = {"ground_force": wearer.weight, "wearer_ankle_moment": wearer.mass}
     found = {}
     for channel, curve, _ in _COMPARED:
         measured = getattr(gait, curve)

@@ -45,7 +45,7 @@ def test_the_moment_on_the_ankle_is_that_of_the_ground_under_a_flat_foot() -> No
     scenario = with_duration(load_walk("reacting", ["wearer.reacts=healthy-128"]), 6.0)
     record = walk(replace(scenario, output_interval=1e-3)).recording
     foot = 0.16 * record["toe_force"] - 0.04 * record["heel_force"]
-    given = record["ankle_moment"] + record["external_torque"]
+    given = record["wearer_ankle_moment"] + record["external_torque"]
     flat = (record["contact"] == FLAT) & (record.time > 1.0)
     assert flat.sum() > 500
     assert np.corrcoef(foot[flat], given[flat])[0, 1] > 0.95
