@@ -267,7 +267,8 @@ def _suggestion(design: Design) -> Iterator[Section]:
         stem = "suggested" if number == 1 else f"suggested-{number}"
         yield Section(
             "The suggestion, run once more" if number == 1 else "",
-            remarks=(f"in '{rerun.task}': {numbers}", f"again: {rerun.command}"),
+            remarks=(f"in '{rerun.task}': {numbers}; this command repeats the run",),
+            code=rerun.command,
         )
         caption = f"The suggestion in the task '{rerun.task}'."
         yield Section(f"The run in '{rerun.task}'", figure=Figure(stem, caption, rerun.result.plot), is_detail=True)

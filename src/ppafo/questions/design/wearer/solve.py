@@ -375,7 +375,6 @@ def _sections(wish: Wish, device: Device) -> tuple[Section, ...]:
     remarks = [
         *electrical_sentences(device.electrical),
         who_walks(walk_of(walked.scenario).wearer, walk_of(walked.scenario).gait, "as requested"),
-        f"again: {device.command}",
     ]
     if not low <= wish.mass <= high:
         remarks.append(f"the gait is known of {low:.0f} to {high:.0f} kg: beyond, torque and gas are a guess")
@@ -384,7 +383,7 @@ def _sections(wish: Wish, device: Device) -> tuple[Section, ...]:
     figure = Figure("bottle", caption, lambda: bottle_figure(walked))
     masses = tuple((name, quantity_text(mass, "part mass", ".0f")) for name, mass in device.masses.items())
     return (
-        Section("The walk on its bottle", table=Table((), facts), remarks=tuple(remarks)),
+        Section("The walk on its bottle", table=Table((), facts), remarks=tuple(remarks), code=device.command),
         Section("What it weighs", table=Table((), masses)),
         Section("The bottle over the walk", figure=figure, is_detail=True),
     )
