@@ -194,7 +194,7 @@ def _likeness_section(comparison: Comparison) -> tuple[Section, ...]:
                 f"{item.delayed_r:.2f}",
             ]
         rows.append((title, *cells))
-    return (Section("As people walk?", (_LIKENESS,), Table(tuple(head), tuple(rows)), is_detail=True),)
+    return (Section("Compared with a measured gait", (_LIKENESS,), Table(tuple(head), tuple(rows)), is_detail=True),)
 
 
 def wearer_of_walk(scenario: Scenario) -> ReactingWearer:
@@ -221,8 +221,9 @@ def fall_remarks(comparison: Comparison) -> list[str]:
         ("with the device", comparison.with_device),
         ("with the device off", comparison.without_device),
     ):
-        fall = walked.metrics.get("fall_time")
-        found += [] if fall is None else [f"{words}: the wearer falls at {fall.value:.1f} s"]
+        fall, strides = walked.metrics.get("fall_time"), walked.metrics["counted_strides"].value
+        means = f", and the means are of {strides:.0f} stride{'s' if strides > 1 else ''} before that" if strides else ""
+        found += [] if fall is None else [f"{words}: the wearer falls at {fall.value:.1f} s{means}"]
     return found
 
 
