@@ -222,7 +222,9 @@ def fall_remarks(comparison: Comparison) -> list[str]:
         ("with the device off", comparison.without_device),
     ):
         fall, strides = walked.metrics.get("fall_time"), walked.metrics["counted_strides"].value
-        means = f", and the means are of {strides:.0f} stride{'s' if strides > 1 else ''} before that" if strides else ""
+        means = (
+            f", and the means are of {strides:.0f} stride{'s' if strides > 1 else ''} before that" if strides else ""
+        )
         found += [] if fall is None else [f"{words}: the wearer falls at {fall.value:.1f} s{means}"]
     return found
 
