@@ -376,11 +376,13 @@ def _row(name: str, values: dict[str, str]) -> str:
 def _stride_values(rows: Rows) -> dict[str, str]:
     """Where a walk is in its stride."""
     totals = ("strides", "push_off_work", "slap_rates", "clearances", "toe_landings")
+    level = _of_state(rows, TRACED_IN_WALKS["safe_state"])
     return {
         "supplied_mass": "state.supplied_mass",
         **{name: f"walk.{name}" for name in totals},
         "phase": _of_state(rows, TRACED_IN_WALKS["controller_phase"]),
-        "level": _of_state(rows, TRACED_IN_WALKS["safe_state"]),
+        # What a controller does after a fall is not counted.
+        "level": f"{level} if walk.fall_time < 0.0 else 0.0" if rows.program.reacts else level,
         "time": "next_record * (timing.step * interval)",
     }
 
