@@ -244,6 +244,7 @@ _OF_LENGTH = {
     "heel_lever": heel_lever_of,
     "toe_lever": toe_lever_of,
 }
+# These too follow the stature, which comes first in their terms: a link waits until its first source is given.
 _OF_BOTH = {
     "shank_mass": shank_mass_of,
     "foot_mass": foot_mass_of,

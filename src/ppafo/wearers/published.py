@@ -203,6 +203,7 @@ def start_of(wearer: Wearer, speed: float) -> Walker:
     lowest = ankle + min(-body.heel * math.sin(left.foot), body.foot.length * math.sin(left.foot))
     still = Limb(0.0, 0.0, 0.0)
     return Walker(
+        # The lower end of the foot is 3 mm in the ground.
         pose=Pose(x=0.0, y=-lowest - 0.003, lean=START_LEAN, left=left, right=right),
         rates=Pose(x=speed, y=0.0, lean=0.0, left=still, right=still),
         left=_leg_at_start(wearer.left, joints(left, START_LEAN)),

@@ -101,34 +101,39 @@ class Written:
 
     def __mul__(self, other: "Written | float") -> "Written":
         """The product."""
-        return self._with("*", other)
+        return _joined(self, "*", other)
 
     def __rmul__(self, other: float) -> "Written":
         """The product."""
-        return Written(repr(float(other)))._with("*", self)
+        return _joined(other, "*", self)
 
     def __add__(self, other: "Written | float") -> "Written":
         """The sum."""
-        return self._with("+", other)
+        return _joined(self, "+", other)
 
     def __radd__(self, other: float) -> "Written":
         """The sum."""
-        return Written(repr(float(other)))._with("+", self)
+        return _joined(other, "+", self)
 
     def __rsub__(self, other: float) -> "Written":
         """A number less this one."""
-        return Written(repr(float(other)))._with("-", self)
+        return _joined(other, "-", self)
 
     def __rtruediv__(self, other: float) -> "Written":
         """A number over this one."""
-        return Written(repr(float(other)))._with("/", self)
+        return _joined(other, "/", self)
 
     def sqrt(self) -> "Written":
         """The root, by the name under which NumPy looks for it."""
         return Written(f"math.sqrt({self.text})")
 
-    def _with(self, sign: str, other: "Written | float") -> "Written":
-        return Written(f"({self.text} {sign} {other.text if isinstance(other, Written) else repr(float(other))})")
+
+def _joined(first: Written | float, sign: str, second: Written | float) -> Written:
+    return Written(f"({_text(first)} {sign} {_text(second)})")
+
+
+def _text(number: Written | float) -> str:
+    return number.text if isinstance(number, Written) else repr(float(number))
 
 
 @final
@@ -180,8 +185,8 @@ class Writing:
 
     def constant(self, row: Any, path: str) -> str:
         """A NamedTuple of numbers that are known, or ``Written``."""
-        texts = (item.text if isinstance(item, Written) else repr(float(item)) for item in leaves(row))
-        return row_expression(type(row), path, dict(zip(leaf_paths(type(row), path), texts, strict=True)), self.add)
+        cells = dict(zip(leaf_paths(type(row), path), map(_text, leaves(row)), strict=True))
+        return row_expression(type(row), path, cells, self.add)
 
     def kind(self, name: str, kind: Any, given: Iterable[str]) -> str:
         """Parameters of a controller or profile, of numbers in the order of its quantities."""

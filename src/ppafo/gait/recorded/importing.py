@@ -367,7 +367,7 @@ def _with_subject(
 ) -> tuple[ImportSettings, list[str]]:
     """Return the settings with body mass and stature that a C3D file states; what the user states wins.
 
-    That nobody states the mass is added to ``wrong``.
+    A body mass that is stated nowhere is added to ``wrong``.
     """
     masses, statures = (
         [(table.file, value) for table in tables if table.trial and (value := getattr(table.trial, name)) is not None]
