@@ -193,7 +193,12 @@ export class Controls {
       if (!control.isTyped && (fault.hidden || !isSame)) {
         blame(control, "");
         const text = `${different.join(" | ")}${unit === "" || unit === "-" || different.length > 2 ? "" : ` ${unit}`}`;
-        if (value.value !== text) value.value = text;
+        if (value.value !== text) {
+          // Who has come to the field by keyboard has all of it selected, and what is typed next replaces it whole.
+          const isSelected = document.activeElement === value && value.selectionStart === 0 && value.selectionEnd === value.value.length;
+          value.value = text;
+          if (isSelected) value.select();
+        }
       }
       const place = String(placeOf(setting, Number(texts[0])));
       if (document.activeElement !== slider && slider.value !== place) slider.value = place;

@@ -444,6 +444,15 @@ def test_everything_can_be_reached_and_changed_by_keyboard_alone(chromium: Any, 
     page.get_by_label("Supply pressure", exact=True).fill("3 bar_g")
     page.keyboard.press("Enter")
     assert page.evaluate("workbench.values(0)")["supply.pressure"] == parse_quantity("3 bar_g", "Pa_a")
+    # A value that changes while its field is selected whole stays selected: what is typed then replaces it.
+    page.locator("[data-key='supply.pressure'] input:not([type=range])").select_text()
+    page.locator("[data-key='supply.pressure'] input[type=range]").evaluate(
+        "slider => { slider.value = '500'; slider.dispatchEvent(new Event('change')); }"
+    )
+    page.wait_for_function("workbench.values(0)['supply.pressure'] !== 401325.0")
+    page.keyboard.insert_text("3 bar_g")
+    page.keyboard.press("Enter")
+    assert page.evaluate("workbench.values(0)")["supply.pressure"] == parse_quantity("3 bar_g", "Pa_a")
 
 
 @has_browser
