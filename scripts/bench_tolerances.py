@@ -21,12 +21,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from benchmarks.intervals.planted import NOISE
+from benchmarks.intervals.planted import NOISE, exact_recording
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.identification.trajectory import Experiment, FreeParameter, Search, TrajectoryProblem, fit
 from ppafo.identification.trajectory.problem import number_at, with_numbers
 from ppafo.identification.trajectory.tolerances import Tolerances, tolerance_parameters
-from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import FreeMotion, Scenario
@@ -91,7 +90,7 @@ def recorded(
             for path in ("supply.pressure", "supply.dorsiflexion_pressure")
         }
         changed["motion.external_torque"] = scenario.motion.external_torque * (1.0 + even(tolerances.load))
-        clean = simulate(with_numbers(scenario, {**changed, **(truth or {})})).recording
+        clean = exact_recording(with_numbers(scenario, {**changed, **(truth or {})}))
         rest = {"angle": 0.0}
         atmosphere = scenario.device.supply.atmospheric_pressure
         channels = {"command": clean.channels["command"]} if "command" in clean else {}

@@ -21,18 +21,15 @@ import numpy as np
 
 from benchmarks.intervals.made_by import check_code, code_now
 from benchmarks.intervals.noise_kinds import NOISE_KINDS, noise_kind
-from benchmarks.intervals.planted import Planted, planted_problem, two_step_responses
+from benchmarks.intervals.planted import Planted, exact_recording, planted_problem, two_step_responses
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory import FreeParameter, Prior, Search, TrajectoryFit, fit
 from ppafo.identification.trajectory.fitting import residuals_of
 from ppafo.identification.trajectory.information import directions_for, inverse_with_root
 from ppafo.identification.trajectory.problem import full_path, with_numbers
-from ppafo.identification.trajectory.residuals import FIT_TOLERANCE, Floats, Residuals, prior_coordinates
+from ppafo.identification.trajectory.residuals import Floats, Residuals, prior_coordinates
 from ppafo.identification.trajectory.search import is_at_bound
 from ppafo.signals.recording import Channel, Recording
-from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.simulate import results_of
 
 FIVE_PARAMETERS = (
     "valve.discharge_coefficient",
@@ -48,7 +45,6 @@ PRIOR = 0.1
 """Standard deviation of the prior over its mean, where truths are drawn."""
 
 _CODE = "code"
-_EXACT = 0.25 * FIT_TOLERANCE
 _AWAY = 0.01
 _STEP = 1.0e-3
 _SINGLE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
@@ -207,12 +203,7 @@ def _planted() -> Planted:
 
 @lru_cache(maxsize=1)
 def _clean() -> tuple[Recording, ...]:
-    return tuple(_exact_recording(scenario) for scenario in _planted().scenarios)
-
-
-def _exact_recording(scenario: Scenario) -> Recording:
-    """Return the recording of a run that is more exact than those of the fit, whose error is then its own."""
-    return results_of(scenario, [replace(plan_run(scenario), tolerance=_EXACT)])[0].recording
+    return tuple(exact_recording(scenario) for scenario in _planted().scenarios)
 
 
 def _drawn(path: str, mean: float, random: np.random.Generator) -> float:
@@ -222,7 +213,7 @@ def _drawn(path: str, mean: float, random: np.random.Generator) -> float:
 
 
 def _recordings(planted: Planted, kind: str, random: np.random.Generator) -> tuple[Recording, ...]:
-    clean = _clean() if planted is _planted() else tuple(map(_exact_recording, planted.scenarios))
+    clean = _clean() if planted is _planted() else tuple(map(exact_recording, planted.scenarios))
     noise, white = noise_kind(kind), noise_kind("white")
     made = []
     for number, recording in enumerate(clean):
