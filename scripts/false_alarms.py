@@ -13,7 +13,7 @@ import json
 import sys
 from pathlib import Path
 
-from ppafo.walking.course import list_courses
+from ppafo.walking.course import led_courses
 from ppafo.walking.loading import load_walk
 from ppafo.walking.walk import walk_population
 
@@ -67,7 +67,7 @@ def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--wearers", type=int, default=1000, help="wearers of each course and configuration")
     parser.add_argument("--out", type=Path, default=Path("out/false-alarms"), help="folder of what is done")
-    parser.add_argument("--course", nargs="*", default=list_courses(), choices=list_courses(), help="which courses")
+    parser.add_argument("--course", nargs="*", default=led_courses(), choices=led_courses(), help="which courses")
     parser.add_argument("--sensors", nargs="*", default=["ideal"], choices=list(SENSORS), help="which good sensors")
     parser.add_argument("--who", default="impaired", choices=list(WEARERS), help="whose foot it is")
     parser.add_argument("--configuration", nargs="*", default=CONFIGURATIONS, help="which walks of the package")

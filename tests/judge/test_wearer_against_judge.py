@@ -19,8 +19,9 @@ from ppafo.model.wearer.muscle import Fibre, next_fibre
 from ppafo.model.wearer.reflexes import Balance, Felt, Gait, stimulation
 from ppafo.model.wearer.segments import Damping, Limb, Pose, accelerations, circle, freed, leg_matrix
 from ppafo.model.wearer.walker import Assist, Fibres, Joints, Walker, Wearer, next_walker, pull
+from ppafo.model.wearer.way import LEVEL, Piece, Way, footing
 from ppafo.wearers.loading import find_wearer, wearer_of, with_strengths
-from ppafo.wearers.published import first_answer, on_slope, start_of
+from ppafo.wearers.published import first_answer, start_of
 from tests.judge import wearer as judge
 from tests.judge.wearer_comparison import STEPS, Columns, by_judge, by_package, gap, strides_of
 
@@ -69,9 +70,8 @@ def body_of_judge(wearer: Wearer, device: judge.Device = judge.NONE) -> tuple[An
     return model, mujoco.MjData(model)
 
 
-@pytest.mark.parametrize("slope", [0.0, 0.1])
-def test_mujoco_accelerates_the_body_as_the_package_does(slope: float) -> None:
-    wearer, device = on_slope(WEARER, slope), judge.Device(inertia=0.0084)
+def test_mujoco_accelerates_the_body_as_the_package_does() -> None:
+    wearer, device = WEARER, judge.Device(inertia=0.0084)
     model, data = body_of_judge(wearer, device)
     draw = np.random.default_rng(1)
     for _ in range(100):
@@ -80,6 +80,10 @@ def test_mujoco_accelerates_the_body_as_the_package_does(slope: float) -> None:
         data.qpos[:], data.qvel[:] = to_joints(pose, 1.0), to_joints(rates, 0.0)
         data.qfrc_applied[:] = [0.0, 0.0, 0.0, *torques[0], *torques[1]]
         mujoco.mj_fwdPosition(model, data)
+        push, trunk = float(draw.uniform(-300.0, 300.0)), model.body("trunk").id
+        mujoco.mj_applyFT(
+            model, data, np.array([push, 0.0, 0.0]), np.zeros(3), data.xipos[trunk], trunk, data.qfrc_applied
+        )
         for site in range(4):
             body, force = (
                 model.site_bodyid[site],
@@ -92,11 +96,11 @@ def test_mujoco_accelerates_the_body_as_the_package_does(slope: float) -> None:
             ((pose.left, rates.left, device.inertia), (pose.right, rates.right, 0.0))
         ):
             hip, knee, ankle = torques[number].tolist()
-            none = Damping(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, inertia)
+            none = Damping(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, inertia)
             given = Limb(-knee - hip, ankle + knee, -ankle)
             forces = points[number].ravel().tolist()
             legs.append(freed(leg_matrix(wearer.body, circle(limb), rate, given, *forces, none, 0.0)))
-        found = accelerations(wearer.body, pose.lean, rates.lean, -float(torques[:, 0].sum()), *legs)
+        found = accelerations(wearer.body, pose.lean, rates.lean, -float(torques[:, 0].sum()), push, *legs)
         expected = np.array(data.qacc)
         assert to_joints(found, 0.0) == pytest.approx(expected, rel=1e-9, abs=1e-9 * np.abs(expected).max())
 
@@ -157,22 +161,43 @@ def test_reflexes_answer_as_those_of_the_judge() -> None:
     assert len(drawn) == 14, "every muscle is answered between its limits, in stance and in swing"
 
 
+def way_with_slope(slope: float) -> Way:
+    """Ground that rises through the origin."""
+    first = Piece(-10.0, -10.0 * slope, slope, 1.0 / math.hypot(1.0, slope))
+    return LEVEL._replace(pieces=(first, *LEVEL.pieces[1:]))
+
+
 def test_the_ground_pushes_as_that_of_the_judge() -> None:
     draw, ground = np.random.default_rng(4), judge.numbers_of(WEARER).ground
     seen = set()
     for _ in range(300):
-        state, point = np.zeros(2), Point(0.0, 0.0, 0.0)
+        state, point = np.zeros(2), Point(0.0, 0.0, 0.0, 0.0)
+        # The judge has level ground; a slope is its coordinates turned.
+        angle = float(draw.uniform(-0.2, 0.2))
+        sine, cosine = math.sin(angle), math.cos(angle)
         x, speed = 0.0, float(draw.normal() * 10.0 ** draw.uniform(-3.0, 0.0))
         for _ in range(20):
             z, rise = float(draw.uniform(-0.02, 0.002)), float(draw.normal() * 0.02)
             speed += float(draw.normal() * 0.01)
             x += 0.01 * speed
-            on_foot = contact(WEARER.ground, point, x, z, speed, rise)
+            under = footing(way_with_slope(math.tan(angle)), cosine * x - sine * z)
+            on_foot = contact(
+                WEARER.ground,
+                under,
+                point,
+                cosine * x - sine * z,
+                sine * x + cosine * z,
+                cosine * speed - sine * rise,
+                sine * speed + cosine * rise,
+            )
             along, up = judge.ground_force(ground, state, x, z, speed, rise, True)
             # A point that comes to rest sticks at once before the judge, and from the next step on in the package.
             rests = point.touches > 0.5 and point.sticks < 0.5 and abs(speed) < WEARER.ground.rest_speed
-            assert up == pytest.approx(on_foot.up, rel=1e-12, abs=1e-12)
-            assert rests or along == pytest.approx(on_foot.along, rel=1e-12, abs=1e-12)
+            pressed = cosine * on_foot.force_y - sine * on_foot.force_x
+            assert pressed == pytest.approx(on_foot.normal, rel=1e-9, abs=1e-9)
+            assert up == pytest.approx(on_foot.normal, rel=1e-9, abs=1e-9)
+            held = cosine * on_foot.force_x + sine * on_foot.force_y
+            assert rests or along == pytest.approx(held, rel=1e-9, abs=1e-6)
             seen.add(float(state[0]))
             point = on_foot.after
     assert seen == {judge.AIR, judge.STICKS, judge.SLIDES}
@@ -206,7 +231,7 @@ def drift(step: float, seconds: float) -> tuple[float, np.ndarray]:
             energies.append(float(data.energy.sum()))
             linear = data.subtree_linvel[1] * model.body_subtreemass[1]
             momenta.append([linear[0], linear[2] + weight * number * step, data.subtree_angmom[1][1]])
-        walker = next_walker(wearer, walker, ordered.to_left, ordered.to_right, free, free, step).after
+        walker = next_walker(wearer, walker, ordered.to_left, ordered.to_right, free, free, 0.0, step).after
     return float(np.ptp(energies)), np.ptp(momenta, axis=0)
 
 

@@ -126,7 +126,6 @@ class Numbers(NamedTuple):
     ankle_stiffness: Floats
     ankle_rest: Floats
     weight: float
-    upright: float
     device_damping: float
     device_friction: float
     device_creep: float
@@ -181,7 +180,7 @@ def body_file(body: Any, device: Device = NONE) -> str:
 
     return f"""<mujoco>
   <compiler angle="radian" autolimits="false"/>
-  <option gravity="{-float(body.gravity_along)!r} 0 {-float(body.gravity)!r}">
+  <option gravity="0 0 {-float(body.gravity)!r}">
     <flag contact="disable" constraint="disable" energy="enable"/>
   </option>
   <worldbody><body name="trunk">
@@ -224,7 +223,6 @@ def numbers_of(wearer: Any, device: Device = NONE) -> Numbers:
         ankle_stiffness=np.array([leg.ankle_stiffness for leg in legs]),
         ankle_rest=np.array([leg.ankle_rest for leg in legs]),
         weight=wearer.weight,
-        upright=wearer.body.upright,
         device_damping=device.damping,
         device_friction=device.friction,
         device_creep=device.creep,
@@ -515,7 +513,7 @@ def derivative(
             turn += (z - h.centre[foot, 2]) * along - (x - h.centre[foot, 0]) * up
         h.on_bodies[foot, 0], h.on_bodies[foot, 2], h.on_bodies[foot, 4] = forces[side, 0], forces[side, 1], turn
         felt[13 * side + LOAD] = forces[side, 1] / n.weight
-    felt[LEAN], felt[LEAN_RATE] = y[2] - n.upright, y[MOVES + 2]
+    felt[LEAN], felt[LEAN_RATE] = y[2], y[MOVES + 2]
     accelerate_segments(h.model, h.data)
     for k in range(MOVES):
         dy[k], dy[MOVES + k] = y[MOVES + k], h.qacc[k]

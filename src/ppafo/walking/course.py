@@ -40,6 +40,10 @@ CONTACT = Quantity("contact", "s", "how long the toes touch the ground in the sw
 TIME = Quantity("time", "1", "time of the stride over that of the others", 0.75, 0.6, 1.6)
 LENGTH = Quantity("length", "1", "length in the middle of the stride over that of the others", 0.6, 0.2, 1.4)
 SLOPE = Quantity("slope", "rad", "slope of the ground, above 0 uphill; level unless given", None, -0.175, 0.175)
+DISTANCE = Quantity("distance", "m", "length of the way, of a wearer who reacts", None, 0.2, 1.0e4)
+HEIGHT = Quantity("height", "m", "height of the step, below 0 down", None, -0.1, 0.1)
+FORCE = Quantity("force", "N", "push on the trunk, forward above 0", None, -1000.0, 1000.0)
+PUSH_DURATION = Quantity("duration", "s", "how long it lasts", 0.1, 1.0e-3, 10.0)
 RADIUS = Quantity("radius", "m", "radius of the turn; below 0 where the device is on the outer leg", 1.0, -10.0, 10.0)
 
 _PACE = (SPEED, CADENCE, WALKED_FOR, STRIDES)
@@ -47,19 +51,21 @@ KINDS: dict[str, tuple[str, tuple[Quantity, ...]]] = {
     "stand": ("stands on both feet", (DURATION,)),
     "rest": ("sits, the foot flat on the ground and nearly unloaded", (DURATION,)),
     "start": ("starts to walk", (SPEED, CADENCE, ONE_STRIDE)),
-    "walk": ("walks", (*_PACE, SLOPE)),
+    "walk": ("walks", (*_PACE, SLOPE, DISTANCE)),
     "ramp": ("changes the speed evenly", _PACE),
     "turn": ("walks along a curve: the inner leg takes shorter steps than the outer one", (*_PACE, RADIUS)),
     "stop": ("stops and stands", (ONE_STRIDE,)),
     "stairs": ("climbs: the toes meet the ground before the heel", _PACE),
     "scuff": ("one stride in which the toes touch the ground in mid-swing", (CONTACT,)),
     "stumble": ("one stride of another time, shorter or longer in its middle", (TIME, LENGTH)),
+    "step": ("a step of the ground, for a wearer who reacts", (HEIGHT,)),
+    "push": ("a push on the trunk, for a wearer who reacts", (FORCE, PUSH_DURATION)),
 }
 """Kinds of segment: what the wearer does, and the values that it takes."""
 
 _STANDING = ("stand", "rest", "stop")
 _NEED_WALKING = ("stop", "scuff", "stumble")
-_OPTIONAL = (*_PACE, SLOPE)
+_OPTIONAL = (*_PACE, SLOPE, DISTANCE)
 """Values that may be left out."""
 
 Numbers = Any
@@ -102,9 +108,9 @@ class WalkingCourse:
         return ScenarioError(f"{self.file}: segment {number + 1} ({self.segments[number].kind}): {reason}")
 
 
-def list_courses() -> tuple[str, ...]:
-    """Return the names of the courses that come with the package."""
-    return FILE.names()
+def led_courses() -> tuple[str, ...]:
+    """Return the names of the courses of the package that a wearer with a prescribed gait can walk."""
+    return tuple(name for name in FILE.names() if _only_of_reflexes(load_course(name)) is None)
 
 
 def load_course(name_or_path: str | Path) -> WalkingCourse:
@@ -152,11 +158,54 @@ def _contradictions(segments: Iterable[Segment]) -> Iterator[tuple[int, str]]:
             yield index, "give either speed or cadence, not both"
         if "radius" in values and abs(values["radius"]) < TIGHTEST:
             yield index, f"radius must be at least {TIGHTEST:g} m, either way"
-        if segment.kind in ("walk", "ramp", "stairs", "turn") and ("duration" in values) == ("strides" in values):
-            yield index, "give either duration or strides" + (", not both" if "strides" in values else "")
+        lengths = [name for name in ("duration", "strides", "distance") if name in values]
+        if segment.kind in ("walk", "ramp", "stairs", "turn") and len(lengths) != 1:
+            yield index, "give either duration or strides" + (", not both" if lengths else "")
         if segment.kind == "ramp" and not {"speed", "cadence"} & values.keys():
             yield index, "give the speed or the cadence at its end"
         walks = segment.kind not in _STANDING
+
+
+_REFLEXES = ("walk", "step", "push")
+"""What a wearer who reacts can do, or what can be done to one."""
+_LEVEL_START = 1.0
+"""Way [m] on level ground with which a course of a wearer who reacts begins."""
+
+
+def check_led_course(course: WalkingCourse) -> None:
+    """Raise ScenarioError for what a wearer with a prescribed gait cannot do."""
+    index = _only_of_reflexes(course)
+    if index is not None:
+        kind = course.segments[index].kind
+        what = "distance" if kind == "walk" else f"a {kind}"
+        raise course.refusal(
+            index, f"{what} is for a wearer who reacts, and this gait is prescribed: set wearer.reacts"
+        )
+
+
+def _only_of_reflexes(course: WalkingCourse) -> int | None:
+    """The first segment, from 0, that only a wearer who reacts takes, None where there is none."""
+    only = (segment.kind in _REFLEXES[1:] or DISTANCE.name in segment.values for segment in course.segments)
+    return next((index for index, is_so in enumerate(only) if is_so), None)
+
+
+def check_reacting_course(course: WalkingCourse) -> None:
+    """Raise ScenarioError for what a wearer who reacts cannot do."""
+    for index, segment in enumerate(course.segments):
+        if segment.kind not in _REFLEXES:
+            raise course.refusal(
+                index,
+                "a wearer who reacts walks on, for the reflexes know nothing else; such a course has walk (with "
+                "distance and slope), step and push",
+            )
+        others = [name for name in segment.values if segment.kind == "walk" and name not in ("distance", "slope")]
+        if others:
+            raise course.refusal(
+                index, f"{others[0]}: the reflexes set the pace of a wearer who reacts: give distance, and slope"
+            )
+    first = course.segments[0]
+    if first.kind != "walk" or first.values["distance"] < _LEVEL_START or first.values.get("slope"):
+        raise course.refusal(0, f"a wearer who reacts begins with a level walk of {_LEVEL_START:g} m or more")
 
 
 @functools.cache

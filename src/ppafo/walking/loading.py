@@ -39,7 +39,7 @@ from ppafo.simulation.numbers import device_number_at
 from ppafo.simulation.scenario import Assumption, Control, MotionKind, Origin, Scenario, Sensors
 from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk, rules
-from ppafo.walking.course import load_course
+from ppafo.walking.course import check_led_course, check_reacting_course, load_course
 from ppafo.walking.declaration import (
     ARITHMETIC,
     DURATION,
@@ -70,12 +70,15 @@ from ppafo.walking.motion import (
 from ppafo.walking.nominal import nominal_terms
 from ppafo.walking.planning import NO_REFERENCE, course_of_walk, noise, plan_walks, switches, walking_valve
 from ppafo.walking.preparation import FaultSettings, SensorSettings
-from ppafo.walking.reacting_wearer import LONGEST_STEP, read_reacting
+from ppafo.walking.reacting_wearer import LONGEST_STEP, REACTS, START_SPEED, read_reacting
 from ppafo.walking.result import lacks, measured
+from ppafo.walking.way import length_of
 from ppafo.walking.wearer import links_of_stature, read_wearer, wearer_origin
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 DEFAULT_PERIOD = 1.0e-3
+SHORTEST_WAY = 6.0
+"""Shortest walk [s] of a wearer who reacts on a course, unless given."""
 DEFAULT_DURATION, BOTTLE_DURATION = 60.0, 600.0
 """Length of a walk [s], and of one on a bottle, unless given or ended by the bottle before."""
 
@@ -165,13 +168,16 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     law = walking_controllers()[kind_at(document, "controller")]
     hardware = read_hardware(reading, request, changed.device)
     device = _device(reading, hardware)
-    reacts = read_reacting(reading, request.folder, request.instead)
-    with _named_by("gait", reading, request, DataError):
-        walked = load_gait(_named_file("gait", request, document) or NORMATIVE)
-    is_named = "gait" in instead or "gait" in document
     named_course = _named_file("course", request, document)
     with _named_by("course", reading, request, ScenarioError):
         course = None if named_course is None else load_course(named_course)
+        if course is not None:
+            check = check_led_course if value_at(document, REACTS) is None else check_reacting_course
+            check(course)
+    reacts = read_reacting(reading, request.folder, request.instead, course)
+    with _named_by("gait", reading, request, DataError):
+        walked = load_gait(_named_file("gait", request, document) or NORMATIVE)
+    is_named = "gait" in instead or "gait" in document
     carried = read_bottle(reading, device, Path() if BOTTLE_NAME in instead else request.folder)
     lines = _lines(reading, document, device, carried)
     settings = _sensor_settings(reading)
@@ -188,7 +194,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         timing=timing_of(document),
         forces={name: number for name, number in settings.numbers.items() if name in FORCES},
         faults=settings.faults,
-        course=course,
+        course=course if reacts is None else None,
         bottle=carried,
         wearer_origin=wearer_origin(reading, walked, is_named),
         person=_person(reading),
@@ -267,6 +273,10 @@ def _duration(reading: Reading, scenario: Scenario) -> float:
         return duration
     if course is not None:
         return float(course.duration)
+    reacts = walk_of(scenario).reacts
+    if reacts is not None and reacts.course is not None:
+        # The reflexes set the pace: at the speed of the start, to the next whole second.
+        return max(SHORTEST_WAY, float(math.ceil(length_of(reacts.course) / reacts.settings[START_SPEED.name])))
     return DEFAULT_DURATION if walk_of(scenario).bottle is None else BOTTLE_DURATION
 
 

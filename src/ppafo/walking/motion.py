@@ -69,7 +69,10 @@ class WalkMotion:
     def label(self) -> str:
         """The motion in a few words."""
         if self.reacts is not None:
-            return f"a walk of a wearer who reacts, {self.reacts.name}"
+            way = self.reacts.course
+            return f"a walk of a wearer who reacts, {self.reacts.name}" + (
+                "" if way is None else f", course {way.name}"
+            )
         return f"a walk, gait {self.gait.name}" + ("" if self.course is None else f", course {self.course.name}")
 
 
@@ -140,6 +143,8 @@ def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
         kept |= {f"faults.{part}.{name}" for name in fault.numbers}
     kept |= {f"shut_off.{name}" for name in motion.shut_off}
     kept -= others_wearer(reacts=motion.reacts is not None)
+    if motion.reacts is not None:
+        kept -= {f"wearer.{item.name}" for item in REACTIONS if item.name not in motion.reacts.settings}
     # An object in charge has no settings, and a timing is one of a controller that has some.
     lost = {path for path in kept if path.startswith("timing.") and path.partition(".")[2] not in control.settings}
     return {path: item for path, item in known.items() if path in kept - lost}

@@ -22,6 +22,7 @@ from ppafo.metrics.wearer import METRICS as OF_WEARER
 from ppafo.model.wearer.muscle import Fibre
 from ppafo.model.wearer.segments import Limb
 from ppafo.model.wearer.walker import Fibres, Joints, Wearer, end_of_joint, joints, pull
+from ppafo.model.wearer.way import footing
 from ppafo.signals import Channel, Recording
 from ppafo.signals.meter import WearerSample
 from ppafo.simulation.scenario import Scenario
@@ -42,13 +43,8 @@ def recording_of_reacting(
 ) -> Recording:
     """The recording of a wearer who reacts [SI] from rows (samples,) by path, with the channels of a bottle."""
     assert run.reacting is not None, "of a wearer who reacts"
-    body, weight = run.reacting.body.body, run.reacting.body.weight
+    weight = run.reacting.body.weight
     left, right = (angles_of(record, side) for side in ("left", "right"))
-    ankle_height = (
-        record["walker.pose.y"]
-        - body.thigh.length * np.cos(record["walker.pose.left.thigh"])
-        - body.shank.length * np.cos(record["walker.pose.left.shank"])
-    )
     channels: Channels = {
         "angle": (record["state.angle"], "rad"),
         "angular_velocity": (record["state.angular_velocity"], "rad/s"),
@@ -64,7 +60,7 @@ def recording_of_reacting(
         "ground_force": (weight * record["walk.load"], "N"),
         "other_ground_force": (weight * record["walk.other_load"], "N"),
         **actuator_channels(run, record),
-        "toe_height": (ankle_height + body.foot.length * np.sin(record["walker.pose.left.foot"]), "m"),
+        "toe_height": (toe_heights(run.reacting.body, record), "m"),
         **valve_and_ground_channels(record),
         "wearer_ankle_moment": (ankle_moments(run.reacting.body, record, left), "N m"),
         "muscle_work": (record["walk.muscle_work"], "J"),
@@ -82,6 +78,17 @@ def angles_of(record: Mapping[str, Floats], side: str) -> Joints:
     limb = Limb(*angles)
     lean: Any = record["walker.pose.lean"]
     return joints(limb, lean)
+
+
+def toe_heights(wearer: Wearer, record: Mapping[str, Floats]) -> Floats:
+    """Height [m] of the left toes over the ground below them, sample by sample."""
+    body = wearer.body
+    thigh, shank, foot = (record[f"walker.pose.left.{name}"] for name in Limb._fields)
+    x = record["walker.pose.x"] + body.thigh.length * np.sin(thigh) + body.shank.length * np.sin(shank)
+    y = record["walker.pose.y"] - body.thigh.length * np.cos(thigh) - body.shank.length * np.cos(shank)
+    ground = [footing(wearer.way, at).height for at in (x + body.foot.length * np.cos(foot)).tolist()]
+    found: Floats = y + body.foot.length * np.sin(foot) - np.array(ground)
+    return found
 
 
 def ankle_moments(wearer: Wearer, record: Mapping[str, Floats], angles: Joints) -> Floats:

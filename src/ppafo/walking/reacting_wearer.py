@@ -18,9 +18,12 @@ from ppafo.model.wearer.nerves import Nerves, settled_nerves
 from ppafo.model.wearer.reflexes import Gains
 from ppafo.model.wearer.segments import Limb, Pose
 from ppafo.model.wearer.walker import Fibres, Walker, Wearer, joints
+from ppafo.model.wearer.way import NOT_PUSHED
 from ppafo.simulation.declaration import Reading, value_at
+from ppafo.walking.course import WalkingCourse
+from ppafo.walking.way import OF_THE_WAY, Stretch, stretches_of_course, stretches_of_settings, way_of
 from ppafo.wearers.loading import find_wearer, wearer_of, with_strengths
-from ppafo.wearers.published import felt_at, first_answer, on_slope, start_of, start_with_size, with_size
+from ppafo.wearers.published import felt_at, first_answer, start_of, start_with_size, with_size
 
 REACTS = "wearer.reacts"
 """Where the file of a walk names a wearer who reacts."""
@@ -59,8 +62,7 @@ MASS_RATIO = Quantity(
     "mass_ratio", "1", "masses of the body and forces of its muscles, over those of the wearer", 1.0, 0.3, 2.0
 )
 START_SPEED = Quantity("start_speed", "m/s", "speed with which the walk begins", 1.3, 0.5, 2.0)
-SLOPE = Quantity("slope", "1", "rise of the ground along the walk, above 0 uphill", 0.0, -0.2, 0.2)
-REACTIONS = (*STRENGTHS, *GAINS, *RATIOS, LENGTH_RATIO, MASS_RATIO, START_SPEED, SLOPE)
+REACTIONS = (*STRENGTHS, *GAINS, *RATIOS, LENGTH_RATIO, MASS_RATIO, START_SPEED, *OF_THE_WAY)
 """Numbers of a wearer who reacts."""
 
 LONGEST_STEP = 1.0e-4
@@ -74,12 +76,19 @@ FIRST_STRIDE = 1.0
 class ReactingWearer:
     """A wearer who reacts: name, body with muscles and gains of both healthy legs, and its numbers by name.
 
-    ``settings`` has the numbers of ``REACTIONS``; each may be an array (runs,).
+    ``settings`` has the numbers of ``REACTIONS``, without those of the way where there is a ``course``; each may be an
+    array (runs,).
     """
 
     name: str
     body: Wearer
     settings: Mapping[str, Any]
+    course: WalkingCourse | None = None
+
+    @property
+    def stretches(self) -> tuple[Stretch, ...]:
+        """What the wearer meets on the way, one after the other."""
+        return stretches_of_settings(self.settings) if self.course is None else stretches_of_course(self.course)
 
     @property
     def weight(self) -> Any:
@@ -99,7 +108,7 @@ class ReactingWearer:
             Gains._make(own[f"{side}_{name}"] * own[f"{name}_ratio"] for name in Gains._fields)
             for side in ("left", "right")
         )
-        body = on_slope(self.body._replace(left=muscles, left_gains=left, right_gains=right), own[SLOPE.name])
+        body = self.body._replace(left=muscles, left_gains=left, right_gains=right, way=way_of(self.stretches))
         return with_size(body, own[LENGTH_RATIO.name], own[MASS_RATIO.name])
 
 
@@ -146,6 +155,7 @@ def start_of_body(wearer: ReactingWearer) -> BodyStart:
         other_load=0.0,
         muscle_work=0.0,
         fall_time=STANDING,
+        pushed=NOT_PUSHED,
     )
     return BodyStart(
         ankle,
@@ -156,7 +166,9 @@ def start_of_body(wearer: ReactingWearer) -> BodyStart:
     )
 
 
-def read_reacting(reading: Reading, folder: Path, instead: Mapping[str, str]) -> ReactingWearer | None:
+def read_reacting(
+    reading: Reading, folder: Path, instead: Mapping[str, str], course: WalkingCourse | None
+) -> ReactingWearer | None:
     """Return the wearer who reacts of the file of a walk, None where its gait is prescribed.
 
     A relative path begins in ``folder``; ``instead`` has the files that options name in place of those of the
@@ -170,11 +182,13 @@ def read_reacting(reading: Reading, folder: Path, instead: Mapping[str, str]) ->
             if item.name in given:
                 raise reading.refusal(f"wearer.{item.name}", f'needs a wearer who reacts: give {REACTS} = "NAME"')
         return None
-    for path in ("gait", "course"):
-        if path in instead:
-            raise ScenarioError(f"{reading.file}: {path} '{instead[path]}' does not go with {REACTS} yet: leave it out")
-        if path in reading.document:
-            raise reading.refusal(path, f"does not go with {REACTS} yet: leave one of both out")
+    if "gait" in instead:
+        raise ScenarioError(f"{reading.file}: gait '{instead['gait']}' does not go with {REACTS} yet: leave it out")
+    if "gait" in reading.document:
+        raise reading.refusal("gait", f"does not go with {REACTS} yet: leave one of both out")
+    for item in OF_THE_WAY:
+        if course is not None and item.name in given:
+            raise reading.refusal(f"wearer.{item.name}", f"does not go with course '{course.name}', which has the way")
     known = {item.name for item in REACTIONS} | {"reacts"}
     for item in given:
         if item not in known:
@@ -184,5 +198,6 @@ def read_reacting(reading: Reading, folder: Path, instead: Mapping[str, str]) ->
     own = {f"left_{name}": value for name, value in file.left_gains._asdict().items()}
     own |= {f"right_{name}": value for name, value in file.right_gains._asdict().items()}
     own |= {START_SPEED.name: file.speed}
-    numbers = tuple(replace(item, default=own.get(item.name, item.default)) for item in REACTIONS)
-    return ReactingWearer(file.name, wearer_of(file), reading.section("wearer", numbers))
+    read = REACTIONS if course is None else tuple(item for item in REACTIONS if item not in OF_THE_WAY)
+    numbers = tuple(replace(item, default=own.get(item.name, item.default)) for item in read)
+    return ReactingWearer(file.name, wearer_of(file), reading.section("wearer", numbers), course)

@@ -7,8 +7,6 @@ IEEE Trans. Neural Syst. Rehabil. Eng. 18 (2010) 263, doi:10.1109/TNSRE.2010.204
 import math
 from typing import Any
 
-import numpy as np
-
 from ppafo.model.elementary import QUARTER_TURN
 from ppafo.model.wearer.ground import Ground, Point
 from ppafo.model.wearer.muscle import Fibre, Lever, Muscle
@@ -29,6 +27,7 @@ from ppafo.model.wearer.walker import (
     leg_now,
     pull,
 )
+from ppafo.model.wearer.way import LEVEL
 
 GRAVITY = 9.81
 """m/s^2, as the publication takes it."""
@@ -40,8 +39,6 @@ BODY = Body(
     foot=Segment(length=0.16, mass_centre=0.02, mass=1.25, inertia=0.005),
     heel=0.04,
     gravity=GRAVITY,
-    gravity_along=0.0,
-    upright=0.0,
 )
 """Trunk with head and arms, and segments of a leg; mass centres are printed from the distal end."""
 
@@ -98,22 +95,6 @@ GROUND = Ground(
     sliding=0.8,
     rest_speed=0.01,
 )
-
-
-def on_slope(wearer: Wearer, slope: Any) -> Wearer:
-    """Return a wearer on ground that rises by a slope [-] of -0.2 to 0.2, above 0 uphill; it may be an array (runs,).
-
-    Coordinates are then along the ground and normal to it.
-    """
-    cosine = 1.0 / np.sqrt(1.0 + slope * slope)
-    # The series of the arc tangent to 1e-11 at 0.2, the same on all platforms.
-    square = slope * slope
-    angle = slope * (
-        1.0 - square * (1 / 3 - square * (1 / 5 - square * (1 / 7 - square * (1 / 9 - square * (1 / 11)))))
-    )
-    gravity = wearer.body.gravity
-    body = wearer.body._replace(gravity=gravity * cosine, gravity_along=gravity * slope * cosine, upright=angle)
-    return wearer._replace(body=body)
 
 
 def with_size(wearer: Wearer, lengths: Any, masses: Any) -> Wearer:
@@ -183,6 +164,7 @@ def published_wearer(left: Gains, right: Gains) -> Wearer:
         right_gains=right,
         stop=STOP,
         ground=GROUND,
+        way=LEVEL,
         weight=WEIGHT,
     )
 
@@ -215,7 +197,7 @@ def _leg_at_start(muscles: Muscles, angles: Joints) -> LegState:
     """A leg that does not touch the ground yet, whose tendons are just without force."""
     fibre = Fibre(activation=0.05, length=0.1, velocity=0.0)
     wholes = pull(muscles, Fibres._make([fibre] * 7), angles, Joints(0.0, 0.0, 0.0), 0.0)
-    none = Point(0.0, 0.0, 0.0)
+    none = Point(anchor=0.0, anchor_height=0.0, sticks=0.0, touches=0.0)
     return LegState(
         Fibres(
             soleus=fibre._replace(length=wholes.soleus - muscles.soleus.slack),
@@ -243,4 +225,4 @@ def felt_at(wearer: Wearer, walker: Walker, step: float) -> tuple[Felt, Felt, Ba
     pose, rates = walker.pose, walker.rates
     left = leg_now(wearer, wearer.left, walker.left, pose, rates, pose.left, rates.left, none, step)
     right = leg_now(wearer, wearer.right, walker.right, pose, rates, pose.right, rates.right, none, step)
-    return left.felt, right.felt, Balance(pose.lean - wearer.body.upright, rates.lean)
+    return left.felt, right.felt, Balance(pose.lean, rates.lean)

@@ -146,7 +146,7 @@ def test_the_list_names_every_walk_and_every_course(capsys: pytest.CaptureFixtur
     names = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
     proportional = ("proportional", "proportional-learning", "proportional-regulators")
     assert names[:8] == ["off", *proportional, "reacting", "solenoid", "solenoid-recycling", "solenoid-regulators"]
-    assert names[8:] == ["corridor", "first-steps", "six-minutes", "stairs"]
+    assert names[8:] == ["corridor", "first-steps", "ramp-and-kerb", "six-minutes", "stairs"]
     assert main(["walk", "--list", "--json"]) == 0
     listed = json.loads(capsys.readouterr().out)["walks"]
     assert [item["kind"] for item in listed] == ["walk"] * 8 + ["course"] * 4

@@ -13,7 +13,7 @@ from ppafo.walking.course import (
     PlannedCourse,
     Segment,
     WalkingCourse,
-    list_courses,
+    led_courses,
     load_course,
     pace_in_time,
     turns_walked,
@@ -37,7 +37,7 @@ def at(course: Course, time: float) -> GaitNow:
     return gait_on_course(SERIES, course, TIMING, LEG, time)[0]
 
 
-@pytest.mark.parametrize("name", list_courses())
+@pytest.mark.parametrize("name", led_courses())
 def test_angles_rates_and_accelerations_are_continuous_at_every_knot(name: str) -> None:
     course = planned_course(load_course(name), GAIT).course
     knots = [part.start for part in course.parts if 0.0 < part.start < 1.0e5]
@@ -48,7 +48,7 @@ def test_angles_rates_and_accelerations_are_continuous_at_every_knot(name: str) 
             assert getattr(after, value) == pytest.approx(getattr(before, value), abs=2.0e-5), (knot, value)
 
 
-@pytest.mark.parametrize("name", list_courses())
+@pytest.mark.parametrize("name", led_courses())
 def test_phase_and_strides_per_second_are_continuous_at_every_knot(name: str) -> None:
     course = planned_course(load_course(name), GAIT).course
     parts = [part for part in course.parts if part.start < 1.0e5]
@@ -57,7 +57,7 @@ def test_phase_and_strides_per_second_are_continuous_at_every_knot(name: str) ->
         assert begins[:6] == pytest.approx(ends[:6], abs=1.0e-9)
 
 
-@pytest.mark.parametrize("name", list_courses())
+@pytest.mark.parametrize("name", led_courses())
 def test_rates_and_accelerations_are_the_derivatives_of_the_angles(name: str) -> None:
     course = planned_course(load_course(name), GAIT).course
     moments, step = np.random.default_rng(1).uniform(0.01, 45.0, 1500), 1.0e-3
@@ -172,7 +172,7 @@ def test_a_stumble_takes_one_stride_of_its_time() -> None:
     assert middle.stride == pytest.approx([1.0, 0.6, 1.0])
 
 
-@pytest.mark.parametrize("name", list_courses())
+@pytest.mark.parametrize("name", led_courses())
 def test_arrays_of_times_and_single_times_agree(name: str) -> None:
     course = planned_course(load_course(name), GAIT).course
     time = np.linspace(0.0, 60.0, 301)

@@ -15,7 +15,7 @@ from ppafo.model.plant import chamber_mass, chamber_volumes
 from ppafo.questions.endurance.draw import walk_gas
 from ppafo.questions.walk.course import course_sections
 from ppafo.walking import load_walk, walk, walk_population
-from ppafo.walking.course import WalkingCourse, list_courses, load_course
+from ppafo.walking.course import WalkingCourse, led_courses, load_course
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import plan_walk, planned_course
 from ppafo.walking.result import WalkResult, integral_of_a_stride
@@ -107,7 +107,7 @@ def test_a_walk_file_names_its_course_by_a_path_beside_it(tmp_path: Path) -> Non
     assert replaced.name == "stairs"
 
 
-@pytest.mark.parametrize("name", list_courses())
+@pytest.mark.parametrize("name", led_courses())
 def test_the_segments_of_a_course_follow_each_other_and_walk_whole_strides(name: str) -> None:
     planned = planned_course(load_course(name), GAIT)
     ends = [float(span.end) for span in planned.spans]

@@ -1,6 +1,5 @@
 """Wearer files: the shipped ones, those based on another, and what is wrong with a file in one line."""
 
-import math
 from pathlib import Path
 
 import pytest
@@ -9,7 +8,7 @@ from ppafo.engine.rows import numbers
 from ppafo.errors import DataError
 from ppafo.model.wearer.walker import Assist, next_walker
 from ppafo.wearers.loading import find_wearer, list_wearers, wearer_of
-from ppafo.wearers.published import felt_at, first_answer, on_slope, start_of, start_with_size, with_size
+from ppafo.wearers.published import felt_at, first_answer, start_of, start_with_size, with_size
 
 HEALTHY = ("healthy-98", "healthy-110", "healthy-123", "healthy-128", "healthy-138")
 
@@ -69,16 +68,6 @@ def test_a_wrong_file_is_refused_in_one_line(tmp_path: Path, text: str, said: st
     assert "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize("slope", [-0.2, -0.05, 0.0, 0.08, 0.2])
-def test_a_slope_turns_gravity_and_what_is_upright(slope: float) -> None:
-    level = wearer_of(find_wearer("healthy-128"))
-    body, angle = on_slope(level, slope).body, math.atan(slope)
-    assert body.gravity == pytest.approx(9.81 * math.cos(angle), rel=1e-14)
-    assert body.gravity_along == pytest.approx(9.81 * math.sin(angle), rel=1e-13)
-    assert body.upright == pytest.approx(angle, rel=1e-9)
-    assert (body == level.body) is (slope == 0.0)
-
-
 def test_who_is_heavier_by_all_masses_and_forces_moves_the_same_way() -> None:
     light = wearer_of(find_wearer("healthy-128"))
     heavy, free, ordered = with_size(light, 1.0, 1.3), Assist(0.0, 0.0, 0.0), first_answer()
@@ -86,7 +75,7 @@ def test_who_is_heavier_by_all_masses_and_forces_moves_the_same_way() -> None:
     for wearer in (light, heavy):
         walker = start_of(wearer, 1.3)
         for _ in range(300):
-            walker = next_walker(wearer, walker, ordered.to_left, ordered.to_right, free, free, 1e-4).after
+            walker = next_walker(wearer, walker, ordered.to_left, ordered.to_right, free, free, 0.0, 1e-4).after
         ends.append(walker)
     assert numbers(ends[1].pose) == pytest.approx(numbers(ends[0].pose), rel=1e-9, abs=1e-12)
     assert numbers(ends[1].left.fibres) == pytest.approx(numbers(ends[0].left.fibres), rel=1e-9, abs=1e-12)

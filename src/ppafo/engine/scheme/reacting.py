@@ -34,12 +34,13 @@ from ppafo.model.wearer.walker import (
     next_walker,
     rates_of_joints,
 )
+from ppafo.model.wearer.way import Pushed, footing, next_push, push_now
 
 CREEP = 0.02
 """Rate [rad/s] below which friction of the vane grows with it, so that a step can take it implicitly."""
 
 FALLEN = 0.6
-"""A wearer whose hip is lower than this share of the straight leg has fallen."""
+"""A wearer whose hip is lower over the ground than this share of the straight leg has fallen."""
 
 PASSING = 0.15
 """The toes must clear the ground while the swinging ankle is within this share of the leg's length of the hip."""
@@ -66,7 +67,8 @@ class ReactingState(NamedTuple):
 
     ``lands`` is 1 while the toes have yet to come down after the heel. ``since`` [s] the strike, ``stride_time`` [s] of
     the stride before. ``load`` and ``other_load`` [body weights] of both feet, ``muscle_work`` [J] that all muscles did
-    as they shortened, ``fall_time`` [s], below 0 before a fall. ``clearance`` [m] is over the ground.
+    as they shortened, ``fall_time`` [s], below 0 before a fall. ``clearance`` [m] is over the ground. ``pushed`` is
+    the push on the trunk.
     """
 
     contact: float
@@ -89,6 +91,7 @@ class ReactingState(NamedTuple):
     other_load: float
     muscle_work: float
     fall_time: float
+    pushed: Pushed
 
 
 class Reflexes(NamedTuple):
@@ -160,12 +163,13 @@ def work_of_leg(muscles: Muscles, before: Fibres, after: Fibres, pull: Pull) -> 
 
 
 def next_body(
-    wearer: Wearer, walker: Walker, reflexes: Reflexes, fall_time: float, assist: Assist, step: float
+    wearer: Wearer, walker: Walker, reflexes: Reflexes, walk: ReactingState, assist: Assist, step: float
 ) -> BodyEnd:
     """The wearer after a step [s]; one who has fallen lies still."""
-    moving = 0.0 if fall_time >= 0.0 else step
+    moving = 0.0 if walk.fall_time >= 0.0 else step
+    push = push_now(walk.pushed, step)
     ordered, free = reflexes.ordered, Assist(0.0, 0.0, 0.0)
-    stepped = next_walker(wearer, walker, ordered.to_left, ordered.to_right, assist, free, moving)
+    stepped = next_walker(wearer, walker, ordered.to_left, ordered.to_right, assist, free, push, moving)
     left: LegNow = stepped.left
     right: LegNow = stepped.right
     after = stepped.after
@@ -250,7 +254,7 @@ def advance_reacting(
     turned = after.angle - before.angle
     follows = follow_rate * step / (1.0 + follow_rate * step)
     since = 0.0 if strikes else walk.since + step
-    falls = stood and not (pose.y > FALLEN * leg)
+    falls = stood and not (pose.y - footing(wearer.way, pose.x).height > FALLEN * leg)
     work = 0.5 * (given + walk.external_torque) * turned if contact == TOE and stood else 0.0
     stride_time = walk.since if strikes and walk.strides > 0.5 else walk.stride_time
     muscle_work = walk.muscle_work + (body.work if stood else 0.0)
@@ -263,6 +267,7 @@ def advance_reacting(
     clearance = NO_CLEARANCE if strikes else lowest
     cleared = lowest if strikes else 0.0
     fall_time = time if falls else walk.fall_time
+    pushed = next_push(wearer.way, walk.pushed, pose.x, step)
     # Numba compiles no call of so many names with a choice inside.
     return ReactingState(
         contact=contact,
@@ -285,6 +290,7 @@ def advance_reacting(
         other_load=body.right_felt.load,
         muscle_work=muscle_work,
         fall_time=fall_time,
+        pushed=pushed,
     )
 
 
@@ -296,7 +302,7 @@ def find(_rows: Any) -> list[str]:
 def lead(rows: Any) -> Phases:
     """Phases before the gas: the body, and where few steps sample them, the nerves and the reflexes."""
     add = rows.add
-    stepped = f"{add(next_body)}(wearer, walker, reflexes, walk.fall_time, assist, length)"
+    stepped = f"{add(next_body)}(wearer, walker, reflexes, walk, assist, length)"
     ordered = f"{add(next_reflexes)}(wearer, nerves, reflexes, body)"
     passed_on = f"{add(next_nerves)}(nerves, body.left_felt, body.right_felt, body.balance)"
     waits = f"{add(Reflexes)}(reflexes.ordered, body.until, reflexes.umberger, reflexes.bhargava)"

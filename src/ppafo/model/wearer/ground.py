@@ -1,10 +1,13 @@
 """The ground under a point of the foot: springs that yield, with damping that a step takes implicitly, and friction.
 
 Contact of H. Geyer and H. Herr, IEEE Trans. Neural Syst. Rehabil. Eng. 18 (2010) 263: compressed by 1 cm under the
-body's weight, and by 10 cm along; no force pulls. A point sticks where it met the ground until friction lets go.
+body's weight, and by 10 cm along; no force pulls. A point sticks where it met the ground until friction lets go. On a
+slope forces are normal to the ground and along it; a point that passes to another piece has its normal at once.
 """
 
 from typing import NamedTuple
+
+from ppafo.model.wearer.way import Footing
 
 
 class Ground(NamedTuple):
@@ -23,45 +26,65 @@ class Ground(NamedTuple):
 
 
 class Point(NamedTuple):
-    """Where a point sticks [m], 1 while it does, and 1 while it touches the ground."""
+    """Where a point sticks, forward and up [m], 1 while it does, and 1 while it touches the ground."""
 
     anchor: float
+    anchor_height: float
     sticks: float
     touches: float
 
 
 class Contact(NamedTuple):
-    """Forces on a point [N] along and up, their damping [N s/m], and the point after it."""
+    """Force on a point [N], forward and up, that normal to the ground, damping [N s/m], and the point after it.
 
-    along: float
-    up: float
-    damping_along: float
-    damping_up: float
+    ``damping_xy`` is how much less force up there is for a speed forward [m/s], and the other way round.
+    """
+
+    force_x: float
+    force_y: float
+    normal: float
+    damping_xx: float
+    damping_xy: float
+    damping_yy: float
     after: Point
 
 
-def contact(ground: Ground, point: Point, x: float, y: float, speed_x: float, speed_y: float) -> Contact:
-    """Forces of the ground on a point at x, y [m] that moves [m/s]; y counts from the ground."""
-    depth = max(-y, 0.0)
-    touches = y < 0.0
-    bracket = 1.0 - speed_y / ground.relaxing
-    up = ground.stiffness * depth * max(bracket, 0.0)
-    damping_up = ground.stiffness * depth / ground.relaxing if bracket > 0.0 else 0.0
+def contact(
+    ground: Ground, under: Footing, point: Point, x: float, y: float, speed_x: float, speed_y: float
+) -> Contact:
+    """Forces of the ground on a point at x, y [m] that moves [m/s].
+
+    With c and s of the slope, a way (x, y) has c x + s y along the ground and c y - s x normal to it.
+    """
+    sine, cosine = under.sine, under.cosine
+    depth = max((under.height - y) * cosine, 0.0)
+    touches = y < under.height
+    speed = cosine * speed_x + sine * speed_y
+    rise = cosine * speed_y - sine * speed_x
+    bracket = 1.0 - rise / ground.relaxing
+    normal = ground.stiffness * depth * max(bracket, 0.0)
+    damping_normal = ground.stiffness * depth / ground.relaxing if bracket > 0.0 else 0.0
     anchor = point.anchor if point.touches > 0.5 else x
+    anchor_height = point.anchor_height if point.touches > 0.5 else y
     sticks = point.sticks > 0.5 or point.touches < 0.5
-    away = x - anchor
-    held = -ground.stiffness_along * (away + abs(away) * speed_x / ground.relaxing)
-    slides = ground.sliding * up / max(abs(speed_x), ground.rest_speed)
-    lets_go = sticks and abs(held) > ground.sticking * up
-    rests = not sticks and abs(speed_x) < ground.rest_speed
+    away = cosine * (x - anchor) + sine * (y - anchor_height)
+    held = -ground.stiffness_along * (away + abs(away) * speed / ground.relaxing)
+    slides = ground.sliding * normal / max(abs(speed), ground.rest_speed)
+    lets_go = sticks and abs(held) > ground.sticking * normal
+    rests = not sticks and abs(speed) < ground.rest_speed
     holds = sticks and not lets_go
+    along = held if holds else -slides * speed
+    damping_along = ground.stiffness_along * abs(away) / ground.relaxing if holds else slides
     return Contact(
-        along=held if holds else -slides * speed_x,
-        up=up,
-        damping_along=ground.stiffness_along * abs(away) / ground.relaxing if holds else slides,
-        damping_up=damping_up,
+        force_x=cosine * along - sine * normal,
+        force_y=cosine * normal + sine * along,
+        normal=normal,
+        damping_xx=cosine * cosine * damping_along + sine * sine * damping_normal,
+        damping_xy=cosine * sine * (damping_along - damping_normal),
+        damping_yy=cosine * cosine * damping_normal + sine * sine * damping_along,
         after=Point(
             anchor=anchor if holds else x,
+            anchor_height=anchor_height if holds else y,
             sticks=1.0 if (holds or rests) else 0.0,
             touches=1.0 if touches else 0.0,
         ),

@@ -1,8 +1,9 @@
 """Seven rigid segments in the sagittal plane: trunk, and thigh, shank and foot of both legs; a step of their motion.
 
-Coordinates: the hip (x forward, y up), the lean of the trunk from the vertical, forward above 0, and the angles of the
-segments of each leg: thigh and shank from the vertical, above 0 where the lower end is in front; the foot over the
-horizontal, above 0 with the toes up. The foot is a line from heel to ball through the ankle, without a height.
+Coordinates: the hip (x forward, y up, against gravity), the lean of the trunk from the vertical, forward above 0, and
+the angles of the segments of each leg: thigh and shank from the vertical, above 0 where the lower end is in front; the
+foot over the horizontal, above 0 with the toes up. The foot is a line from heel to ball through the ankle, without a
+height.
 
 Body: H. Geyer and H. Herr, IEEE Trans. Neural Syst. Rehabil. Eng. 18 (2010) 263, table of segments.
 """
@@ -25,8 +26,7 @@ class Body(NamedTuple):
     """Segments of a wearer, SI units.
 
     Of the foot ``length`` is from ankle to ball, and ``heel`` [m] is behind the ankle; the trunk begins at the hip.
-    On a slope x is along the ground: ``gravity`` is normal to it, ``gravity_along`` against x, above 0 uphill [m/s^2],
-    and ``upright`` is the lean [rad] at which the trunk is vertical.
+    ``gravity`` [m/s^2].
     """
 
     trunk: Segment
@@ -35,8 +35,6 @@ class Body(NamedTuple):
     foot: Segment
     heel: float
     gravity: float
-    gravity_along: float
-    upright: float
 
 
 class Limb(NamedTuple):
@@ -60,14 +58,16 @@ class Pose(NamedTuple):
 class Damping(NamedTuple):
     """Linear damping of a leg that a step takes implicitly.
 
-    Of the ground under heel and ball, along and normal to it [N s/m]; of ankle and knee [N m s/rad]; and the inertia
-    that a device adds to the ankle [kg m^2].
+    Of the ground under heel and ball, forward and up [N s/m], with what a speed one way damps the other; of ankle and
+    knee [N m s/rad]; and the inertia that a device adds to the ankle [kg m^2].
     """
 
-    heel_along: float
-    heel_normal: float
-    ball_along: float
-    ball_normal: float
+    heel_xx: float
+    heel_xy: float
+    heel_yy: float
+    ball_xx: float
+    ball_xy: float
+    ball_yy: float
     ankle: float
     knee: float
     ankle_inertia: float
@@ -168,52 +168,50 @@ def leg_matrix(
     y1, y2, y3 = l1 * turned.thigh_sine, l2 * turned.shank_sine, turned.foot_sine
     force_x, force_y = heel_force_x + ball_force_x, heel_force_y + ball_force_y
     moment_x, moment_y = heel * heel_force_x + ball * ball_force_x, heel * heel_force_y + ball * ball_force_y
-    # Damping of the ground: sums over heel and ball of the damping times levers.
-    dx0, dx1 = damping.heel_along + damping.ball_along, heel * damping.heel_along + ball * damping.ball_along
-    dx2 = heel * heel * damping.heel_along + ball * ball * damping.ball_along
-    dy0, dy1 = damping.heel_normal + damping.ball_normal, heel * damping.heel_normal + ball * damping.ball_normal
-    dy2 = heel * heel * damping.heel_normal + ball * ball * damping.ball_normal
+    # Damping of the ground: sums over heel and ball of the damping times levers; dc is what couples x and y.
+    dx0, dx1 = damping.heel_xx + damping.ball_xx, heel * damping.heel_xx + ball * damping.ball_xx
+    dx2 = heel * heel * damping.heel_xx + ball * ball * damping.ball_xx
+    dc0, dc1 = damping.heel_xy + damping.ball_xy, heel * damping.heel_xy + ball * damping.ball_xy
+    dc2 = heel * heel * damping.heel_xy + ball * ball * damping.ball_xy
+    dy0, dy1 = damping.heel_yy + damping.ball_yy, heel * damping.heel_yy + ball * damping.ball_yy
+    dy2 = heel * heel * damping.heel_yy + ball * ball * damping.ball_yy
     ankle = damping.ankle_inertia + step * damping.ankle
     knee = step * damping.knee
     return LegMatrix(
-        m11=p11 + step * (dx0 * x1 * x1 + dy0 * y1 * y1) + knee,
-        m12=p12 * c12 + step * (dx0 * x1 * x2 + dy0 * y1 * y2) - knee,
-        m13=p13 * c13 + step * (dx1 * x1 * x3 + dy1 * y1 * y3),
-        m22=p22 + step * (dx0 * x2 * x2 + dy0 * y2 * y2) + knee + ankle,
-        m23=p23 * c23 + step * (dx1 * x2 * x3 + dy1 * y2 * y3) - ankle,
-        m33=p33 + step * (dx2 * x3 * x3 + dy2 * y3 * y3) + ankle,
-        x1=s1 * turned.thigh_cosine + step * dx0 * x1,
-        x2=s2 * turned.shank_cosine + step * dx0 * x2,
-        x3=s3 * turned.foot_cosine + step * dx1 * x3,
-        y1=s1 * turned.thigh_sine + step * dy0 * y1,
-        y2=s2 * turned.shank_sine + step * dy0 * y2,
-        y3=s3 * turned.foot_sine + step * dy1 * y3,
+        m11=p11 + step * (dx0 * x1 * x1 + dy0 * y1 * y1 + 2.0 * dc0 * x1 * y1) + knee,
+        m12=p12 * c12 + step * (dx0 * x1 * x2 + dy0 * y1 * y2 + dc0 * (x1 * y2 + x2 * y1)) - knee,
+        m13=p13 * c13 + step * (dx1 * x1 * x3 + dy1 * y1 * y3 + dc1 * (x1 * y3 + x3 * y1)),
+        m22=p22 + step * (dx0 * x2 * x2 + dy0 * y2 * y2 + 2.0 * dc0 * x2 * y2) + knee + ankle,
+        m23=p23 * c23 + step * (dx1 * x2 * x3 + dy1 * y2 * y3 + dc1 * (x2 * y3 + x3 * y2)) - ankle,
+        m33=p33 + step * (dx2 * x3 * x3 + dy2 * y3 * y3 + 2.0 * dc2 * x3 * y3) + ankle,
+        x1=s1 * turned.thigh_cosine + step * dx0 * x1 + step * dc0 * y1,
+        x2=s2 * turned.shank_cosine + step * dx0 * x2 + step * dc0 * y2,
+        x3=s3 * turned.foot_cosine + step * dx1 * x3 + step * dc1 * y3,
+        y1=s1 * turned.thigh_sine + step * dy0 * y1 + step * dc0 * x1,
+        y2=s2 * turned.shank_sine + step * dy0 * y2 + step * dc0 * x2,
+        y3=s3 * turned.foot_sine + step * dy1 * y3 + step * dc1 * x3,
         b1=torques.thigh
         - p12 * s12 * w2
         - p13 * s13 * w3
-        - s1 * (body.gravity * turned.thigh_sine + body.gravity_along * turned.thigh_cosine)
+        - s1 * (body.gravity * turned.thigh_sine)
         + x1 * force_x
         + y1 * force_y,
         b2=torques.shank
         + p12 * s12 * w1
         - p23 * s23 * w3
-        - s2 * (body.gravity * turned.shank_sine + body.gravity_along * turned.shank_cosine)
+        - s2 * (body.gravity * turned.shank_sine)
         + x2 * force_x
         + y2 * force_y,
         b3=torques.foot
         + p13 * s13 * w1
         + p23 * s23 * w2
-        - s3 * (body.gravity * turned.foot_sine + body.gravity_along * turned.foot_cosine)
+        - s3 * (body.gravity * turned.foot_sine)
         + x3 * moment_x
         + y3 * moment_y,
         hip_xx=mass + step * dx0,
-        hip_xy=0.0,
+        hip_xy=step * dc0,
         hip_yy=mass + step * dy0,
-        force_x=force_x
-        - mass * body.gravity_along
-        + s1 * turned.thigh_sine * w1
-        + s2 * turned.shank_sine * w2
-        + s3 * turned.foot_sine * w3,
+        force_x=force_x + s1 * turned.thigh_sine * w1 + s2 * turned.shank_sine * w2 + s3 * turned.foot_sine * w3,
         force_y=force_y
         - mass * body.gravity
         - s1 * turned.thigh_cosine * w1
@@ -281,18 +279,23 @@ def turned_limb(leg: Freed, hip_x: float, hip_y: float) -> Limb:
     )
 
 
-def accelerations(body: Body, lean: float, lean_rate: float, torque: float, left: Freed, right: Freed) -> Pose:
-    """Accelerations of all coordinates [m/s^2], [rad/s^2], with a torque on the lean of the trunk [N m]."""
+def accelerations(
+    body: Body, lean: float, lean_rate: float, torque: float, push: float, left: Freed, right: Freed
+) -> Pose:
+    """Accelerations of all coordinates [m/s^2], [rad/s^2], with a torque on the lean of the trunk [N m].
+
+    ``push`` [N] acts forward on the trunk's mass centre.
+    """
     sine, cosine = sine_and_cosine_of_turns(lean * TURNS_OF_RADIAN)
     moment = body.trunk.mass * body.trunk.mass_centre
     inertia = body.trunk.inertia + moment * body.trunk.mass_centre
     along, upward = moment * cosine, -moment * sine
-    turning = torque + moment * (body.gravity * sine - body.gravity_along * cosine)
+    turning = torque + moment * (body.gravity * sine) + push * body.trunk.mass_centre * cosine
     whirl = moment * lean_rate * lean_rate
     xx = left.xx + right.xx + body.trunk.mass - along * along / inertia
     xy = left.xy + right.xy - along * upward / inertia
     yy = left.yy + right.yy + body.trunk.mass - upward * upward / inertia
-    x = left.x + right.x + whirl * sine - body.trunk.mass * body.gravity_along - along * turning / inertia
+    x = left.x + right.x + whirl * sine + push - along * turning / inertia
     y = left.y + right.y + whirl * cosine - body.trunk.mass * body.gravity - upward * turning / inertia
     determinant = xx * yy - xy * xy
     hip_x, hip_y = (x * yy - y * xy) / determinant, (y * xx - x * xy) / determinant

@@ -20,6 +20,7 @@ from ppafo.model.wearer.segments import (
     freed,
     leg_matrix,
 )
+from ppafo.model.wearer.way import Way, footing
 
 HALF_TURN = 3.141592653589793
 
@@ -62,7 +63,7 @@ class Stop(NamedTuple):
 
 
 class Wearer(NamedTuple):
-    """A wearer: body, muscles of both legs, gains of both legs, ends of joints, ground, weight [N]."""
+    """A wearer: body, muscles of both legs, gains of both legs, ends of joints, ground, way, weight [N]."""
 
     body: Body
     left: Muscles
@@ -71,6 +72,7 @@ class Wearer(NamedTuple):
     right_gains: Gains
     stop: Stop
     ground: Ground
+    way: Way
     weight: float
 
 
@@ -246,8 +248,8 @@ def rates_of_joints(limb: Limb, lean: float) -> Joints:
 class LegNow(NamedTuple):
     """A leg in a step: what it feels, its equations, the points on the ground after it, torque on the hip, and forces.
 
-    Forces of the ground [N]: along and up in all, and up under heel and ball. ``place`` is the ankle in front of the
-    hip [m], ``toes`` the height of the ball over the ground [m], both at the begin of the step.
+    Forces of the ground [N]: forward and up in all, and normal to it under heel and ball. ``place`` is the ankle in
+    front of the hip [m], ``toes`` the height of the ball over the ground below it [m], at the begin of the step.
     """
 
     pull: Pull
@@ -286,19 +288,23 @@ def leg_now(
     speed_y = rates.y + thigh_speed * turned.thigh_sine + shank_speed * turned.shank_sine
     # The foot's angle from the vertical is its angle over the ground plus 90 deg: its direction is (sine, -cosine).
     along, up = turned.foot_sine, -turned.foot_cosine
+    heel_x, ball_x, ball_y = x - body.heel * along, x + body.foot.length * along, y + body.foot.length * up
+    under_ball = footing(wearer.way, ball_x)
     heel = contact(
         ground,
+        footing(wearer.way, heel_x),
         state.heel,
-        x - body.heel * along,
+        heel_x,
         y - body.heel * up,
         speed_x + body.heel * up * limb_rates.foot,
         speed_y - body.heel * along * limb_rates.foot,
     )
     ball = contact(
         ground,
+        under_ball,
         state.ball,
-        x + body.foot.length * along,
-        y + body.foot.length * up,
+        ball_x,
+        ball_y,
         speed_x - body.foot.length * up * limb_rates.foot,
         speed_y + body.foot.length * along * limb_rates.foot,
     )
@@ -310,10 +316,12 @@ def leg_now(
     ankle = pulled.ankle + ankle_end.torque - stiff + assist.torque - assist.damping * rate.ankle
     knee, hip = pulled.knee + knee_end.torque, pulled.hip - hip_end
     damping = Damping(
-        heel_along=heel.damping_along,
-        heel_normal=heel.damping_up,
-        ball_along=ball.damping_along,
-        ball_normal=ball.damping_up,
+        heel_xx=heel.damping_xx,
+        heel_xy=heel.damping_xy,
+        heel_yy=heel.damping_yy,
+        ball_xx=ball.damping_xx,
+        ball_xy=ball.damping_xy,
+        ball_yy=ball.damping_yy,
         ankle=ankle_end.damping + assist.damping,
         knee=knee_end.damping,
         ankle_inertia=assist.inertia,
@@ -323,10 +331,10 @@ def leg_now(
         turned,
         limb_rates,
         Limb(-knee - hip, ankle + knee, -ankle),
-        heel.along,
-        heel.up,
-        ball.along,
-        ball.up,
+        heel.force_x,
+        heel.force_y,
+        ball.force_x,
+        ball.force_y,
         damping,
         step,
     )
@@ -346,18 +354,18 @@ def leg_now(
             gluteus=felt.gluteus,
             hamstring_length=felt.hamstring_length,
             flexor_length=felt.flexor_length,
-            load=(heel.up + ball.up) / wearer.weight,
+            load=(heel.normal + ball.normal) / wearer.weight,
         ),
         matrix=matrix,
         heel=heel.after,
         ball=ball.after,
         hip=hip,
-        force_x=heel.along + ball.along,
-        force_y=heel.up + ball.up,
-        heel_up=heel.up,
-        ball_up=ball.up,
+        force_x=heel.force_x + ball.force_x,
+        force_y=heel.force_y + ball.force_y,
+        heel_up=heel.normal,
+        ball_up=ball.normal,
         place=x - pose.x,
-        toes=y + body.foot.length * up,
+        toes=ball_y - under_ball.height,
     )
 
 
@@ -410,14 +418,18 @@ def next_walker(
     to_right: Stimulation,
     left_assist: Assist,
     right_assist: Assist,
+    push: float,
     step: float,
 ) -> Stepped:
-    """A wearer after a step [s] in which the muscles are stimulated so, and devices act on the ankles."""
+    """A wearer after a step [s] in which the muscles are stimulated so, and devices act on the ankles.
+
+    ``push`` [N] is on the trunk, forward above 0.
+    """
     pose, rates = walker.pose, walker.rates
     left = leg_now(wearer, wearer.left, walker.left, pose, rates, pose.left, rates.left, left_assist, step)
     right = leg_now(wearer, wearer.right, walker.right, pose, rates, pose.right, rates.right, right_assist, step)
     pushed = accelerations(
-        wearer.body, pose.lean, rates.lean, -left.hip - right.hip, freed(left.matrix), freed(right.matrix)
+        wearer.body, pose.lean, rates.lean, -left.hip - right.hip, push, freed(left.matrix), freed(right.matrix)
     )
     after = moved(rates, pushed, step)
     left_fibres = next_fibres(wearer.left, walker.left.fibres, to_left, left.pull, step)
@@ -433,7 +445,7 @@ def next_walker(
         right=right,
         left_felt=left.felt,
         right_felt=right.felt,
-        balance=Balance(pose.lean - wearer.body.upright, rates.lean),
+        balance=Balance(pose.lean, rates.lean),
     )
 
 

@@ -20,7 +20,7 @@ from ppafo.questions.question import Solved
 from ppafo.questions.timing.slap import FACTORS, Falls, SlapStudy, slap_study
 from ppafo.simulation.scenario import Scenario
 from ppafo.version import __version__
-from ppafo.walking.course import Segment, WalkingCourse, list_courses, load_course
+from ppafo.walking.course import Segment, WalkingCourse, led_courses, load_course
 from ppafo.walking.events import EVENTS, EventErrors, event_errors, known_events, true_events, within
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import check_led, walk_of
@@ -387,7 +387,7 @@ def ways_of(configuration: Scenario) -> dict[str, WalkingCourse | None]:
             "floats; remove it"
         )
     cadence = 2.0 / walk_of(configuration).gait.stride_time
-    return {STEADY: None, UNEVEN: uneven_course(cadence)} | {name: load_course(name) for name in list_courses()}
+    return {STEADY: None, UNEVEN: uneven_course(cadence)} | {name: load_course(name) for name in led_courses()}
 
 
 def uneven_course(cadence: float) -> WalkingCourse:

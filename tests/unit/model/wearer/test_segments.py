@@ -22,10 +22,8 @@ BODY = Body(
     foot=Segment(length=0.16, mass_centre=0.02, mass=1.25, inertia=0.005),
     heel=0.04,
     gravity=9.81,
-    gravity_along=0.0,
-    upright=0.0,
 )
-NONE = Damping(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NONE = Damping(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def pose_of(numbers: np.ndarray) -> Pose:
@@ -37,14 +35,16 @@ def numbers_of(pose: Pose) -> np.ndarray:
     return np.array([pose.x, pose.y, pose.lean, *pose.left, *pose.right])
 
 
-def moved(body: Body, q: np.ndarray, v: np.ndarray, damping: Damping = NONE, step: float = 0.0) -> np.ndarray:
+def moved(
+    body: Body, q: np.ndarray, v: np.ndarray, damping: Damping = NONE, step: float = 0.0, push: float = 0.0
+) -> np.ndarray:
     pose, rates = pose_of(q), pose_of(v)
     no = Limb(0.0, 0.0, 0.0)
     legs = [
         freed(leg_matrix(body, circle(limb), rate, no, 0.0, 0.0, 0.0, 0.0, damping, step))
         for limb, rate in ((pose.left, rates.left), (pose.right, rates.right))
     ]
-    return numbers_of(accelerations(body, pose.lean, rates.lean, 0.0, *legs))
+    return numbers_of(accelerations(body, pose.lean, rates.lean, 0.0, push, *legs))
 
 
 def masses(body: Body, q: np.ndarray) -> list[tuple[float, float, np.ndarray, float]]:
@@ -111,23 +111,23 @@ def test_gravity_alone_changes_momentum_in_the_air(seed: int) -> None:
     assert (ahead - behind) / (2 * small) == pytest.approx(expected, abs=1e-3 * mass * BODY.gravity)
 
 
-def test_on_a_slope_gravity_pulls_back_as_much_as_the_ground_rises() -> None:
+def test_a_push_changes_momentum_as_a_force_on_the_middle_of_the_trunk_does() -> None:
     q, v = drawn(3)
-    a = moved(BODY._replace(gravity=9.0, gravity_along=3.0), q, v)
-    small = 1e-4
-    _, ahead = motion(BODY, q + small * v + 0.5 * small**2 * a, v + small * a)
-    _, behind = motion(BODY, q - small * v + 0.5 * small**2 * a, v - small * a)
-    every = masses(BODY, q)
-    mass = sum(part for part, *_ in every)
-    turning = sum(part * (3.0 * place[1] - 9.0 * place[0]) for part, _, place, _ in every)
-    expected = [-3.0 * mass, -9.0 * mass, turning]
-    assert (ahead - behind) / (2 * small) == pytest.approx(expected, abs=1e-3 * mass * 9.81)
+    force, small = 800.0, 1e-4
+    added = np.zeros(3)
+    for push, sign in ((force, 1.0), (0.0, -1.0)):
+        a = moved(BODY, q, v, push=push)
+        _, ahead = motion(BODY, q + small * v + 0.5 * small**2 * a, v + small * a)
+        _, behind = motion(BODY, q - small * v + 0.5 * small**2 * a, v - small * a)
+        added += sign * (ahead - behind) / (2 * small)
+    height = masses(BODY, q)[0][2][1]
+    assert added == pytest.approx([force, 0.0, -force * height], abs=1e-4 * force)
 
 
 def test_damping_at_the_end_of_a_step_is_that_of_the_rates_there() -> None:
     """A step with damping D of the ball equals M (v' - v) = h (Q - J' D J v') solved with all matrices written out."""
     q, v = drawn(7)
-    damping, step = Damping(300.0, 2000.0, 500.0, 4000.0, 3.0, 5.0, 0.02), 1e-4
+    damping, step = Damping(300.0, -700.0, 2000.0, 500.0, 900.0, 4000.0, 3.0, 5.0, 0.02), 1e-4
     # Columns of M by unit accelerations are not at hand: they come from the kinetic energy, E = v' M v / 2.
     still = BODY._replace(gravity=0.0)
     unit = np.eye(9)
@@ -137,13 +137,14 @@ def test_damping_at_the_end_of_a_step_is_that_of_the_rates_there() -> None:
     free = matrix @ moved(BODY, q, v)
     added = np.zeros((9, 9))
     for first in (3, 6):
-        for behind, along, normal in ((-BODY.heel, 300.0, 2000.0), (BODY.foot.length, 500.0, 4000.0)):
+        for behind, xx, xy, yy in ((-BODY.heel, 300.0, -700.0, 2000.0), (BODY.foot.length, 500.0, 900.0, 4000.0)):
             thigh, shank, foot = q[first : first + 3]
             row_x, row_y = np.zeros(9), np.zeros(9)
             row_x[0] = row_y[1] = 1.0
             row_x[first : first + 3] = [0.5 * np.cos(thigh), 0.5 * np.cos(shank), -behind * np.sin(foot)]
             row_y[first : first + 3] = [0.5 * np.sin(thigh), 0.5 * np.sin(shank), behind * np.cos(foot)]
-            added += along * np.outer(row_x, row_x) + normal * np.outer(row_y, row_y)
+            added += xx * np.outer(row_x, row_x) + yy * np.outer(row_y, row_y)
+            added += xy * (np.outer(row_x, row_y) + np.outer(row_y, row_x))
         ankle, knee = np.zeros(9), np.zeros(9)
         ankle[first + 1 : first + 3] = [1.0, -1.0]
         knee[first : first + 2] = [-1.0, 1.0]

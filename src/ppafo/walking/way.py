@@ -1,0 +1,112 @@
+"""What a wearer who reacts meets on the way: slopes, steps and pushes, of a course or of settings; and the way of them.
+
+Any number may be an array (runs,), or one that an export writes down.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ppafo.errors import ScenarioError
+from ppafo.model.declaration import Quantity
+from ppafo.model.wearer.way import LEVEL, PIECES, PUSHES, UNUSED, UNUSED_PUSH, Piece, Push, Way
+from ppafo.walking.course import WalkingCourse
+
+EDGE = 0.01
+"""Length [m] of the steep piece that a step is: its edges are not sharp."""
+
+SLOPE = Quantity("slope", "1", "rise of the ground over the way, above 0 uphill", 0.0, -0.2, 0.2)
+STEP_HEIGHT = Quantity("step_height", "m", "height of one step of the ground, below 0 down", 0.0, -0.1, 0.1)
+GROUND_FROM = Quantity("ground_from", "m", "way on level ground before its slope and its step", 3.0, 1.0, 1.0e4)
+PUSH = Quantity("push", "N", "push on the trunk, forward above 0", 0.0, -1000.0, 1000.0)
+PUSH_FROM = Quantity("push_from", "m", "way before the push", 5.0, 0.0, 1.0e4)
+PUSH_DURATION = Quantity("push_duration", "s", "how long the push lasts", 0.1, 1.0e-3, 10.0)
+OF_THE_WAY = (SLOPE, STEP_HEIGHT, GROUND_FROM, PUSH, PUSH_FROM, PUSH_DURATION)
+"""Numbers of a way without a course."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """A part of the way: what it is (``walk``, ``step`` or ``push``), where it begins [m], and its numbers [SI]."""
+
+    kind: str
+    start: Any
+    values: Mapping[str, Any]
+
+    @property
+    def title(self) -> str:
+        """The stretch in words, of plain numbers."""
+        if self.kind == "walk":
+            slope = self.values["slope"]
+            return f"slope of {100.0 * slope:+.3g} %" if slope else "level ground"
+        if self.kind == "step":
+            return f"step of {100.0 * self.values['height']:+.3g} cm"
+        return f"push of {self.values['force']:+.3g} N for {self.values['duration']:.3g} s"
+
+
+def stretches_of_settings(settings: Mapping[str, Any]) -> tuple[Stretch, ...]:
+    """The way that the numbers of a wearer say: level, one step, a slope, and a push wherever it is."""
+    start, level = settings[GROUND_FROM.name], {"distance": settings[GROUND_FROM.name], "slope": 0.0}
+    push = {"force": settings[PUSH.name], "duration": settings[PUSH_DURATION.name]}
+    return (
+        Stretch("walk", 0.0, level),
+        Stretch("step", start, {"height": settings[STEP_HEIGHT.name]}),
+        Stretch("walk", start + EDGE, {"distance": math.inf, "slope": settings[SLOPE.name]}),
+        Stretch("push", settings[PUSH_FROM.name], push),
+    )
+
+
+def stretches_of_course(course: WalkingCourse) -> tuple[Stretch, ...]:
+    """The way of a course, which was checked to be one of a wearer who reacts."""
+    return tuple(_laid(course))
+
+
+def _laid(course: WalkingCourse) -> Iterator[Stretch]:
+    place = 0.0
+    for segment in course.segments:
+        values = dict(segment.values)
+        if segment.kind == "walk":
+            values["slope"] = math.tan(values.get("slope", 0.0))
+        yield Stretch(segment.kind, place, values)
+        place += EDGE if segment.kind == "step" else values.get("distance", 0.0)
+
+
+def length_of(course: WalkingCourse) -> float:
+    """Length of the way [m]."""
+    return sum(segment.values.get("distance", 0.0) for segment in course.segments)
+
+
+def way_of(stretches: Sequence[Stretch]) -> Way:
+    """The ground and the pushes of stretches, the first of which is level.
+
+    Each piece begins at the height at which the one before ends; behind a step the slope is that before it.
+    """
+    pieces, pushes, slope = [LEVEL.pieces[0]], [], 0.0
+    for stretch, after in zip(stretches[1:], (*stretches[2:], None), strict=True):
+        values = stretch.values
+        if stretch.kind == "push":
+            pushes.append(Push(stretch.start, values["force"], values["duration"]))
+        elif stretch.kind == "step":
+            pieces.append(_piece(pieces[-1], stretch.start, values["height"] * (1.0 / EDGE)))
+            if after is None or after.kind != "walk":
+                pieces.append(_piece(pieces[-1], stretch.start + EDGE, slope))
+        else:
+            slope = values["slope"]
+            pieces.append(_piece(pieces[-1], stretch.start, slope))
+    if len(pieces) > PIECES or len(pushes) > PUSHES:
+        raise ScenarioError(
+            f"the ground has {len(pieces)} pieces, {PIECES} at most, and there are {len(pushes)} pushes, {PUSHES} at "
+            "most: leave segments out"
+        )
+    return Way(
+        (*pieces, *(UNUSED,) * (PIECES - len(pieces))),
+        (*pushes, *(UNUSED_PUSH,) * (PUSHES - len(pushes))),
+    )
+
+
+def _piece(before: Piece, start: Any, slope: Any) -> Piece:
+    height = before.height + before.slope * (start + -1.0 * before.start)
+    return Piece(start=start, height=height, slope=slope, cosine=1.0 / np.sqrt(1.0 + slope * slope))
