@@ -149,7 +149,7 @@ def test_the_list_names_every_walk_and_every_course(capsys: pytest.CaptureFixtur
     assert names[8:] == ["corridor", "first-steps", "ramp-and-kerb", "six-minutes", "stairs"]
     assert main(["walk", "--list", "--json"]) == 0
     listed = json.loads(capsys.readouterr().out)["walks"]
-    assert [item["kind"] for item in listed] == ["walk"] * 8 + ["course"] * 4
+    assert [item["kind"] for item in listed] == ["walk"] * 8 + ["course"] * 5
 
 
 def test_a_course_writes_its_segments_and_its_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
