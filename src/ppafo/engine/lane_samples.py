@@ -281,8 +281,13 @@ def _meter_updates(rows: Rows) -> tuple[list[str], list[str]]:
     begin = [f"{group} = {add(kind.start)}(course, {_sample_for(kind)})" for group, kind in groups.items()]
     begin += [line for group in groups for line in rows.store(group)]
     update = [rows.load(group) for group in moving]
-    update += [f"{group} = {add(kind.update)}({group}, course, {_sample_for(kind)})" for group, kind in moving.items()]
-    update += [line for group in moving for line in rows.store(group)]
+    # What comes after a fall is not counted; of the wearer's own meter it is known when that was.
+    stopping = {group for group, kind in moving.items() if program.reacts and not kind.of_wearer}
+    update += ["stands = walk.fall_time < 0.0"] if stopping else []
+    for group, kind in moving.items():
+        later, flag = (f"{group}_later", "stands") if group in stopping else (group, "")
+        update += [f"{later} = {add(kind.update)}({group}, course, {_sample_for(kind)})"]
+        update += rows.store(group, later, flag)
     return begin, update
 
 
@@ -376,13 +381,11 @@ def _row(name: str, values: dict[str, str]) -> str:
 def _stride_values(rows: Rows) -> dict[str, str]:
     """Where a walk is in its stride."""
     totals = ("strides", "push_off_work", "slap_rates", "clearances", "toe_landings")
-    level = _of_state(rows, TRACED_IN_WALKS["safe_state"])
     return {
         "supplied_mass": "state.supplied_mass",
         **{name: f"walk.{name}" for name in totals},
         "phase": _of_state(rows, TRACED_IN_WALKS["controller_phase"]),
-        # What a controller does after a fall is not counted.
-        "level": f"{level} if walk.fall_time < 0.0 else 0.0" if rows.program.reacts else level,
+        "level": _of_state(rows, TRACED_IN_WALKS["safe_state"]),
         "time": "next_record * (timing.step * interval)",
     }
 

@@ -123,6 +123,18 @@ def test_rows_of_an_ensemble_are_single_walks_to_the_bit() -> None:
 
 
 @pytest.mark.long
+def test_a_study_counts_nothing_that_comes_after_a_fall_as_a_single_walk_does() -> None:
+    scenario = load_walk(
+        WALK, ["wearer.tibialis_strength=0.02", "supply.dorsiflexion_pressure=6 psi_g", "run.duration=8 s"]
+    )
+    single = ppafo.simulate(scenario).metrics
+    assert single["walked_time"].value < 6.0, "this one falls"
+    names = ["total_gas", "strides", "vented_strides", "mechanical_work", "largest_pressure"]
+    study = run_ensemble(scenario, {"wearer.tibialis_strength": np.array([0.02])}, names).metrics
+    assert {name: study[name][0] for name in names} == pytest.approx({name: single[name].value for name in names})
+
+
+@pytest.mark.long
 def test_a_weak_tibialis_falls_without_the_device_and_walks_on_with_it() -> None:
     pair = walk_with_and_without(load_walk(WALK, [WEAK]), 0.25)
     worn, bare = pair.comparison.with_device, pair.comparison.without_device
