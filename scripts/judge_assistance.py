@@ -30,7 +30,7 @@ TOE_OFF = 0.63
 """End of the push-off [fraction of the stride], about where the toes leave the ground."""
 
 NO_LIFT = "supply.dorsiflexion_pressure=6 psi_g"
-"""Those devices assisted plantarflexion alone; this one lifts the foot too, unless hardly any pressure is left for it."""
+"""Those devices assisted plantarflexion alone; this one lifts the foot too, unless it has hardly any pressure to."""
 
 WEARERS = 16
 TIBIALIS, CALF = (0.15, 0.6), (0.5, 0.9)
