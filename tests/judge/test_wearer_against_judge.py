@@ -96,7 +96,7 @@ def test_mujoco_accelerates_the_body_as_the_package_does() -> None:
             ((pose.left, rates.left, device.inertia), (pose.right, rates.right, 0.0))
         ):
             hip, knee, ankle = torques[number].tolist()
-            none = Damping(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, inertia)
+            none = Damping(*(0.0,) * 10, inertia)
             given = Limb(-knee - hip, ankle + knee, -ankle)
             forces = points[number].ravel().tolist()
             legs.append(freed(leg_matrix(wearer.body, circle(limb), rate, given, *forces, none, 0.0)))
@@ -189,6 +189,7 @@ def test_the_ground_pushes_as_that_of_the_judge() -> None:
                 sine * x + cosine * z,
                 cosine * speed - sine * rise,
                 sine * speed + cosine * rise,
+                0.0,
             )
             along, up = judge.ground_force(ground, state, x, z, speed, rise, True)
             # A point that comes to rest sticks at once before the judge, and from the next step on in the package.
@@ -213,7 +214,7 @@ def flying(height: float) -> tuple[Wearer, Walker]:
     )
     walker = start_of(wearer, 1.3)
     rates = Pose(1.3, 2.0, 1.0, Limb(3.0, -2.0, 4.0), Limb(-2.0, 1.0, -3.0))
-    return wearer, walker._replace(pose=walker.pose._replace(y=height), rates=rates)
+    return wearer, walker._replace(pose=walker.pose._replace(y=height), rates=rates, halfway=rates)
 
 
 def drift(step: float, seconds: float) -> tuple[float, np.ndarray]:
@@ -235,13 +236,13 @@ def drift(step: float, seconds: float) -> tuple[float, np.ndarray]:
     return float(np.ptp(energies)), np.ptp(momenta, axis=0)
 
 
-def test_in_the_air_energy_stays_and_gravity_alone_changes_momentum_to_first_order() -> None:
-    """The step is Euler's, rates first: what it adds in a second of tumbling halves with the step."""
-    (energy, momentum), (half_energy, half_momentum) = drift(2e-4, 1.0), drift(1e-4, 1.0)
-    assert energy == pytest.approx(2.0 * half_energy, rel=0.05)
-    assert momentum == pytest.approx(2.0 * half_momentum, rel=0.05, abs=1e-9)
-    assert half_energy < 1.0
-    assert (half_momentum < 0.005).all()
+def test_in_the_air_energy_stays_and_gravity_alone_changes_momentum_to_second_order() -> None:
+    """The step is a leap of the rates from the middle of one step to the next: half of it leaves a quarter."""
+    (energy, momentum), (half_energy, half_momentum) = drift(4e-4, 1.0), drift(2e-4, 1.0)
+    assert energy == pytest.approx(4.0 * half_energy, rel=0.05)
+    assert momentum == pytest.approx(4.0 * half_momentum, rel=0.05, abs=1e-9)
+    assert half_energy < 1e-5
+    assert (half_momentum < 1e-5).all()
 
 
 @pytest.fixture(scope="module")
@@ -251,16 +252,18 @@ def judged() -> Columns:
 
 
 def test_the_first_step_comes_to_that_of_the_judge_as_the_step_shortens(judged: Columns) -> None:
-    """Paths part at the first strike already; until then the error is of first order, and there is no other."""
+    """A quarter of the step leaves less than a tenth of the error; the load is that at the begin of a step."""
     far, _, near = (by_package("healthy-128", step, seconds=5.5) for step in STEPS)
-    for until, low, high in ((0.1, 3.0, 5.0), (0.3, 2.0, 8.0)):
-        for coarse, fine in zip(gap(far, judged, until), gap(near, judged, until), strict=True):
-            assert low < coarse / fine < high
+    coarse, fine = gap(far, judged, 0.3), gap(near, judged, 0.3)
+    assert coarse.hip > 10.0 * fine.hip
+    assert coarse.joints > 10.0 * fine.joints
+    assert coarse.activation > 10.0 * fine.activation
+    assert coarse.load > 4.0 * fine.load
     first = gap(far, judged, 0.1)
-    assert first.hip < 0.1
-    assert first.joints < 0.05
-    assert first.load < 0.05
-    assert first.activation < 0.005
+    assert first.hip < 0.005
+    assert first.joints < 0.005
+    assert first.load < 0.01
+    assert first.activation < 2e-4
 
 
 def test_the_judge_would_see_a_muscle_or_a_gain_that_is_wrong_by_two_in_a_thousand(judged: Columns) -> None:
@@ -281,15 +284,12 @@ def test_the_judge_has_nothing_of_the_package_but_the_numbers_of_wearers() -> No
 
 @pytest.mark.thorough
 def test_ten_strides_are_as_long_and_as_quick_as_those_of_the_judge() -> None:
-    """At the package's own step, whose half changes the mean stride by one percent too."""
+    """At the package's own step, means are within half a percent."""
     expected = strides_of(by_judge("healthy-128", 80, 11.6))
     walked = strides_of(by_package("healthy-128", STEPS[0], 11.6))
     assert walked.strikes[:2] == pytest.approx(expected.strikes[:2], abs=0.01)
     assert walked.lengths == pytest.approx(expected.lengths, rel=0.03)
-    assert walked.length == pytest.approx(expected.length, rel=0.02)
-    assert walked.time == pytest.approx(expected.time, rel=0.02)
-    assert walked.speed == pytest.approx(expected.speed, rel=0.01)
-    assert walked.stance == pytest.approx(expected.stance, abs=0.01)
+    assert walked[2:] == pytest.approx(expected[2:], rel=0.005)
     rows = re.findall(r"\| mean from stride 3 on, .*? \| ([\d.]+) \| ([\d.]+) \|", PAGE.read_text(encoding="utf-8"))
     by_page = np.array(rows[:4], dtype=float)
     assert expected[2:] == pytest.approx(by_page[:, 0], rel=1e-3)

@@ -133,7 +133,7 @@ def start_of_body(wearer: ReactingWearer) -> BodyStart:
     ankle = joints(leg, walker.pose.lean).ankle
     # At rest: what the legs feel in the pose of the start depends neither on the speed nor on their size, which may be
     # arrays; only the load does, for 20 ms.
-    nerves = settled_nerves(*felt_at(wearer.body, walker._replace(rates=_AT_REST), LONGEST_STEP))
+    nerves = settled_nerves(*felt_at(wearer.body, walker._replace(rates=_AT_REST, halfway=_AT_REST), LONGEST_STEP))
     walk = ReactingState(
         contact=FLAT,
         now=WalkNow(0.0, leg.shank),
@@ -160,7 +160,7 @@ def start_of_body(wearer: ReactingWearer) -> BodyStart:
     return BodyStart(
         ankle,
         start_with_size(walker, wearer.settings[LENGTH_RATIO.name]),
-        Reflexes(ordered=first_answer(), until=0.0, umberger=0.0, bhargava=0.0),
+        Reflexes(ordered=first_answer(), due=1.0, until=0.0, umberger=0.0, bhargava=0.0),
         nerves,
         walk,
     )

@@ -184,10 +184,13 @@ def start_of(wearer: Wearer, speed: float) -> Walker:
     ankle = -body.thigh.length * math.cos(left.thigh) - body.shank.length * math.cos(left.shank)
     lowest = ankle + min(-body.heel * math.sin(left.foot), body.foot.length * math.sin(left.foot))
     still = Limb(0.0, 0.0, 0.0)
+    rates = Pose(x=speed, y=0.0, lean=0.0, left=still, right=still)
     return Walker(
         # The lower end of the foot is 3 mm in the ground.
         pose=Pose(x=0.0, y=-lowest - 0.003, lean=START_LEAN, left=left, right=right),
-        rates=Pose(x=speed, y=0.0, lean=0.0, left=still, right=still),
+        rates=rates,
+        halfway=rates,
+        last=0.0,
         left=_leg_at_start(wearer.left, joints(left, START_LEAN)),
         right=_leg_at_start(wearer.right, joints(right, START_LEAN)),
     )
@@ -222,7 +225,7 @@ def first_answer() -> Answer:
 def felt_at(wearer: Wearer, walker: Walker, step: float) -> tuple[Felt, Felt, Balance]:
     """What both legs and the trunk feel in a state: what is on its way along the nerves at the start."""
     none = Assist(0.0, 0.0, 0.0)
-    pose, rates = walker.pose, walker.rates
-    left = leg_now(wearer, wearer.left, walker.left, pose, rates, pose.left, rates.left, none, step)
-    right = leg_now(wearer, wearer.right, walker.right, pose, rates, pose.right, rates.right, none, step)
+    pose, rates, halfway = walker.pose, walker.rates, walker.halfway
+    left = leg_now(wearer, wearer.left, walker.left, walker, pose.left, rates.left, halfway.left, none, step)
+    right = leg_now(wearer, wearer.right, walker.right, walker, pose.right, rates.right, halfway.right, none, step)
     return left.felt, right.felt, Balance(pose.lean, rates.lean)

@@ -69,15 +69,16 @@ def test_each_step_of_the_lanes_is_the_step_of_plain_python_to_the_bit() -> None
         held: HeldChambers = held_chambers(run.plant, state.angle)
         before = group(reacting.ReactingState, "walk", sample)
         reflexes, nerves = group(reacting.Reflexes, "reflexes", sample), group(Nerves, "nerves", sample)
-        assist = reacting.assist_of(run.plant, walk.share, state, held)
-        body = reacting.next_body(walk.body, group(Walker, "walker", sample), reflexes, before, assist, run.step)
+        assist, walker = reacting.assist_of(run.plant, walk.share, state, held), group(Walker, "walker", sample)
+        reflexes = reacting.next_reflexes(walk.body, nerves, reflexes, walker) if reflexes.due else reflexes
+        body = reacting.next_body(walk.body, walker, reflexes, before, assist, run.step)
         assert numbers(body.after) == numbers(group(Walker, "walker", sample + 1)), sample
         after: PlantState = group(PlantState, "state", sample + 1)
         ankle = reacting.ankle_of(run.plant, body, before.fall_time)
         assert (ankle.angle, ankle.rate) == (after.angle, after.angular_velocity)
-        later = reacting.next_reflexes(walk.body, nerves, reflexes, body) if body.due else None
-        if later is not None:
-            assert numbers(later) == numbers(group(reacting.Reflexes, "reflexes", sample + 1))
+        later = reacting.waiting_reflexes(reflexes, before.fall_time, run.step)
+        assert numbers(later) == numbers(group(reacting.Reflexes, "reflexes", sample + 1))
+        if body.due:
             passed_on = reacting.next_nerves(nerves, body.left_felt, body.right_felt, body.balance)
             assert numbers(passed_on) == numbers(group(Nerves, "nerves", sample + 1))
             sampled += 1

@@ -97,10 +97,12 @@ class ReactingState(NamedTuple):
 class Reflexes(NamedTuple):
     """What the reflexes have ordered, the phases of both legs, and the time until the nerves are sampled next [s].
 
-    Also the metabolic energy [J] of all muscles since the start by both models, sampled with the nerves.
+    ``due`` is 1 where they are sampled now. Also the metabolic energy [J] of all muscles since the start by both
+    models, sampled with the nerves.
     """
 
     ordered: Answer
+    due: float
     until: float
     umberger: float
     bhargava: float
@@ -109,9 +111,9 @@ class Reflexes(NamedTuple):
 class BodyEnd(NamedTuple):
     """A wearer after a step, and what was felt and acted at its begin.
 
-    ``due`` is 1 where the nerves are sampled, ``until`` [s] the sample after that. ``heel_up`` and ``ball_up`` [N]
-    under the foot with the device, ``place`` of its ankle in front of the hip and height of its ``toes`` [m], ``work``
-    of the muscles [J], ``given`` by both pressures [N m], ``damping`` of the vane with its friction [N m s/rad].
+    ``due`` is 1 where the nerves are sampled. ``heel_up`` and ``ball_up`` [N] under the foot with the device, ``place``
+    of its ankle in front of the hip and height of its ``toes`` [m], ``work`` of the muscles [J], ``given`` by both
+    pressures [N m], ``damping`` of the vane with its friction [N m s/rad].
     """
 
     after: Walker
@@ -119,7 +121,6 @@ class BodyEnd(NamedTuple):
     right_felt: Felt
     balance: Balance
     due: float
-    until: float
     heel_up: float
     ball_up: float
     place: float
@@ -147,7 +148,8 @@ def assist_of(plant: PlantParameters, share: DeviceShare, state: PlantState, hel
 
 def shortened(muscle: Muscle, before: Fibre, after: Fibre, whole: float) -> float:
     """Work [J] of a muscle that shortens in a step; none where it is drawn out."""
-    return muscle.force * tendon_force(muscle, whole - before.length) * max(before.length - after.length, 0.0)
+    halfway = 0.5 * (before.length + after.length)
+    return muscle.force * tendon_force(muscle, whole - halfway) * max(before.length - after.length, 0.0)
 
 
 def work_of_leg(muscles: Muscles, before: Fibres, after: Fibres, pull: Pull) -> float:
@@ -173,7 +175,6 @@ def next_body(
     left: LegNow = stepped.left
     right: LegNow = stepped.right
     after = stepped.after
-    is_due = reflexes.until <= SAME and moving > 0.0
     work = work_of_leg(wearer.left, walker.left.fibres, after.left.fibres, left.pull)
     work += work_of_leg(wearer.right, walker.right.fibres, after.right.fibres, right.pull)
     return BodyEnd(
@@ -181,8 +182,7 @@ def next_body(
         left_felt=stepped.left_felt,
         right_felt=stepped.right_felt,
         balance=stepped.balance,
-        due=1.0 if is_due else 0.0,
-        until=reflexes.until + (SAMPLE if is_due else 0.0) - moving,
+        due=reflexes.due,
         heel_up=left.heel_up,
         ball_up=left.ball_up,
         place=left.place,
@@ -202,18 +202,30 @@ def ankle_of(plant: PlantParameters, body: BodyEnd, fall_time: float) -> AnkleSt
     return AnkleStep(reached, rate if fall_time < 0.0 and reached == angle else 0.0)
 
 
-def next_reflexes(wearer: Wearer, nerves: Nerves, reflexes: Reflexes, body: BodyEnd) -> Reflexes:
-    """The reflexes after a sample of the nerves."""
+def waiting_reflexes(reflexes: Reflexes, fall_time: float, step: float) -> Reflexes:
+    """The reflexes after a step [s]; one who has fallen has none."""
+    until = reflexes.until - step
+    return Reflexes(
+        ordered=reflexes.ordered,
+        due=1.0 if until <= SAME and fall_time < 0.0 else 0.0,
+        until=until,
+        umberger=reflexes.umberger,
+        bhargava=reflexes.bhargava,
+    )
+
+
+def next_reflexes(wearer: Wearer, nerves: Nerves, reflexes: Reflexes, legs: Walker) -> Reflexes:
+    """The reflexes from a sample of the nerves on."""
     left: LegNerves = nerves.left
     right: LegNerves = nerves.right
     before = reflexes.ordered
     ordered = answer(wearer, before.left, before.right, arrived(left), arrived(right), balance_arrived(nerves), SAMPLE)
-    legs = body.after
     of_left = rates_of_leg(wearer.left, legs.left.fibres, before.to_left)
     of_right = rates_of_leg(wearer.right, legs.right.fibres, before.to_right)
     return Reflexes(
         ordered=ordered,
-        until=body.until,
+        due=reflexes.due,
+        until=reflexes.until + SAMPLE,
         umberger=reflexes.umberger + SAMPLE * (of_left.umberger + of_right.umberger),
         bhargava=reflexes.bhargava + SAMPLE * (of_left.bhargava + of_right.bhargava),
     )
@@ -303,10 +315,20 @@ def lead(rows: Any) -> Phases:
     """Phases before the gas: the body, and where few steps sample them, the nerves and the reflexes."""
     add = rows.add
     stepped = f"{add(next_body)}(wearer, walker, reflexes, walk, assist, length)"
-    ordered = f"{add(next_reflexes)}(wearer, nerves, reflexes, body)"
+    ordered = f"{add(next_reflexes)}(wearer, nerves, reflexes, walker)"
     passed_on = f"{add(next_nerves)}(nerves, body.left_felt, body.right_felt, body.balance)"
-    waits = f"{add(Reflexes)}(reflexes.ordered, body.until, reflexes.umberger, reflexes.bhargava)"
+    waits = f"{add(waiting_reflexes)}(reflexes, walk.fall_time, length)"
     return [
+        # Its answer counts from the sample on; what is felt there arrives later and waits for the body.
+        RarePhase(
+            [
+                *[rows.load(name) for name in ("wearer", "walker", "nerves", "reflexes")],
+                "is_due = reflexes.due > 0.5",
+                f"reflexes_after = {ordered}",
+                *rows.store("reflexes", "reflexes_after", "is_due"),
+            ],
+            rows.cells["reflexes.due"],
+        ),
         [
             *[rows.load(name) for name in ("wearer", "walker", "reflexes")],
             f"assist = {add(assist_of)}(plant, share, state, held)",
@@ -318,11 +340,9 @@ def lead(rows: Any) -> Phases:
         ],
         RarePhase(
             [
-                *[rows.load(name) for name in ("wearer", "nerves", "reflexes", "body")],
+                *[rows.load(name) for name in ("nerves", "body")],
                 "is_due = body.due > 0.5",
-                f"reflexes_after = {ordered}",
                 f"passed_on = {passed_on}",
-                *rows.store("reflexes", "reflexes_after", "is_due"),
                 *rows.store("nerves", "passed_on", "is_due"),
             ],
             rows.cells["body.due"],

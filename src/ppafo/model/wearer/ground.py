@@ -1,4 +1,4 @@
-"""The ground under a point of the foot: springs that yield, with damping that a step takes implicitly, and friction.
+"""The ground under a point of the foot: springs that yield, with damping and friction that a step takes implicitly.
 
 Contact of H. Geyer and H. Herr, IEEE Trans. Neural Syst. Rehabil. Eng. 18 (2010) 263: compressed by 1 cm under the
 body's weight, and by 10 cm along; no force pulls. A point sticks where it met the ground until friction lets go. On a
@@ -37,7 +37,8 @@ class Point(NamedTuple):
 class Contact(NamedTuple):
     """Force on a point [N], forward and up, that normal to the ground, damping [N s/m], and the point after it.
 
-    ``damping_xy`` is how much less force up there is for a speed forward [m/s], and the other way round.
+    ``damping_xy`` is how much less force forward there is for a speed up, ``damping_yx`` the other way round: friction
+    of a point that slides falls as it rises and presses less, and what it presses does not depend on how it slides.
     """
 
     force_x: float
@@ -45,16 +46,18 @@ class Contact(NamedTuple):
     normal: float
     damping_xx: float
     damping_xy: float
+    damping_yx: float
     damping_yy: float
     after: Point
 
 
 def contact(
-    ground: Ground, under: Footing, point: Point, x: float, y: float, speed_x: float, speed_y: float
+    ground: Ground, under: Footing, point: Point, x: float, y: float, speed_x: float, speed_y: float, last: float
 ) -> Contact:
     """Forces of the ground on a point at x, y [m] that moves [m/s].
 
-    With c and s of the slope, a way (x, y) has c x + s y along the ground and c y - s x normal to it.
+    With c and s of the slope, a way (x, y) has c x + s y along the ground and c y - s x normal to it. A point that
+    meets the ground did so within the ``last`` [s], and sticks where it was then.
     """
     sine, cosine = under.sine, under.cosine
     depth = max((under.height - y) * cosine, 0.0)
@@ -64,24 +67,28 @@ def contact(
     bracket = 1.0 - rise / ground.relaxing
     normal = ground.stiffness * depth * max(bracket, 0.0)
     damping_normal = ground.stiffness * depth / ground.relaxing if bracket > 0.0 else 0.0
-    anchor = point.anchor if point.touches > 0.5 else x
-    anchor_height = point.anchor_height if point.touches > 0.5 else y
+    since = min(depth / max(-rise, ground.rest_speed), last)
+    anchor = point.anchor if point.touches > 0.5 else x - since * speed_x
+    anchor_height = point.anchor_height if point.touches > 0.5 else y - since * speed_y
     sticks = point.sticks > 0.5 or point.touches < 0.5
     away = cosine * (x - anchor) + sine * (y - anchor_height)
     held = -ground.stiffness_along * (away + abs(away) * speed / ground.relaxing)
-    slides = ground.sliding * normal / max(abs(speed), ground.rest_speed)
+    quick = max(abs(speed), ground.rest_speed)
+    slides = ground.sliding * normal / quick
     lets_go = sticks and abs(held) > ground.sticking * normal
     rests = not sticks and abs(speed) < ground.rest_speed
     holds = sticks and not lets_go
     along = held if holds else -slides * speed
     damping_along = ground.stiffness_along * abs(away) / ground.relaxing if holds else slides
+    drag = 0.0 if holds else -ground.sliding * damping_normal * speed / quick
     return Contact(
         force_x=cosine * along - sine * normal,
         force_y=cosine * normal + sine * along,
         normal=normal,
-        damping_xx=cosine * cosine * damping_along + sine * sine * damping_normal,
-        damping_xy=cosine * sine * (damping_along - damping_normal),
-        damping_yy=cosine * cosine * damping_normal + sine * sine * damping_along,
+        damping_xx=cosine * (cosine * damping_along - sine * drag) + sine * sine * damping_normal,
+        damping_xy=cosine * (sine * (damping_along - damping_normal) + cosine * drag),
+        damping_yx=sine * (cosine * (damping_along - damping_normal) - sine * drag),
+        damping_yy=cosine * cosine * damping_normal + sine * (sine * damping_along + cosine * drag),
         after=Point(
             anchor=anchor if holds else x,
             anchor_height=anchor_height if holds else y,

@@ -58,15 +58,17 @@ class Pose(NamedTuple):
 class Damping(NamedTuple):
     """Linear damping of a leg that a step takes implicitly.
 
-    Of the ground under heel and ball, forward and up [N s/m], with what a speed one way damps the other; of ankle and
-    knee [N m s/rad]; and the inertia that a device adds to the ankle [kg m^2].
+    Of the ground under heel and ball, forward and up [N s/m], with what a speed up damps forward, ``xy``, and the other
+    way round; of ankle and knee [N m s/rad]; and the inertia that a device adds to the ankle [kg m^2].
     """
 
     heel_xx: float
     heel_xy: float
+    heel_yx: float
     heel_yy: float
     ball_xx: float
     ball_xy: float
+    ball_yx: float
     ball_yy: float
     ankle: float
     knee: float
@@ -85,16 +87,20 @@ class Circle(NamedTuple):
 
 
 class LegMatrix(NamedTuple):
-    """A leg in the equations of motion: its symmetric block, the columns that couple it to the hip, its forces.
+    """A leg in the equations of motion: its block, the columns and rows that couple it to the hip, its forces.
 
     1 is the thigh, 2 the shank, 3 the foot; ``hip_xx`` to ``hip_yy`` and ``force_x``, ``force_y`` go to the hip.
+    Columns are ``x`` and ``y``, rows ``along`` and ``up``: friction follows the normal force, and nothing answers it.
     """
 
     m11: float
     m12: float
     m13: float
+    m21: float
     m22: float
     m23: float
+    m31: float
+    m32: float
     m33: float
     x1: float
     x2: float
@@ -102,11 +108,18 @@ class LegMatrix(NamedTuple):
     y1: float
     y2: float
     y3: float
+    along1: float
+    along2: float
+    along3: float
+    up1: float
+    up2: float
+    up3: float
     b1: float
     b2: float
     b3: float
     hip_xx: float
     hip_xy: float
+    hip_yx: float
     hip_yy: float
     force_x: float
     force_y: float
@@ -137,12 +150,12 @@ def leg_matrix(
     ball_force_x: float,
     ball_force_y: float,
     damping: Damping,
-    step: float,
+    lag: float,
 ) -> LegMatrix:
     """The leg's part of (M + h J' D J) a = Q - c, with torques [N m] and forces of the ground [N] in Q.
 
     M and c are Lagrange's for a chain of links at a hip that moves. D is the damping of ground and joints, whose forces
-    at the rates of now are in Q: over a ``step`` h [s], v + h a is then the rate with the damping at its end.
+    at rates v are in Q: with a ``lag`` h [s] they are then those at the rates v + h a.
     """
     mass = body.thigh.mass + body.shank.mass + body.foot.mass
     below = body.shank.mass + body.foot.mass
@@ -168,28 +181,48 @@ def leg_matrix(
     y1, y2, y3 = l1 * turned.thigh_sine, l2 * turned.shank_sine, turned.foot_sine
     force_x, force_y = heel_force_x + ball_force_x, heel_force_y + ball_force_y
     moment_x, moment_y = heel * heel_force_x + ball * ball_force_x, heel * heel_force_y + ball * ball_force_y
-    # Damping of the ground: sums over heel and ball of the damping times levers; dc is what couples x and y.
+    # Damping of the ground: sums over heel and ball of the damping times levers; dc and dd are what couples x and y.
     dx0, dx1 = damping.heel_xx + damping.ball_xx, heel * damping.heel_xx + ball * damping.ball_xx
     dx2 = heel * heel * damping.heel_xx + ball * ball * damping.ball_xx
     dc0, dc1 = damping.heel_xy + damping.ball_xy, heel * damping.heel_xy + ball * damping.ball_xy
     dc2 = heel * heel * damping.heel_xy + ball * ball * damping.ball_xy
+    dd0, dd1 = damping.heel_yx + damping.ball_yx, heel * damping.heel_yx + ball * damping.ball_yx
+    dd2 = heel * heel * damping.heel_yx + ball * ball * damping.ball_yx
     dy0, dy1 = damping.heel_yy + damping.ball_yy, heel * damping.heel_yy + ball * damping.ball_yy
     dy2 = heel * heel * damping.heel_yy + ball * ball * damping.ball_yy
-    ankle = damping.ankle_inertia + step * damping.ankle
-    knee = step * damping.knee
+    ankle = damping.ankle_inertia + lag * damping.ankle
+    knee = lag * damping.knee
+    m12, m13 = (
+        p12 * c12 + lag * (dx0 * x1 * x2 + dy0 * y1 * y2) - knee,
+        p13 * c13 + lag * (dx1 * x1 * x3 + dy1 * y1 * y3),
+    )
+    m23 = p23 * c23 + lag * (dx1 * x2 * x3 + dy1 * y2 * y3) - ankle
+    along1, along2 = s1 * turned.thigh_cosine + lag * dx0 * x1, s2 * turned.shank_cosine + lag * dx0 * x2
+    along3 = s3 * turned.foot_cosine + lag * dx1 * x3
+    up1, up2 = s1 * turned.thigh_sine + lag * dy0 * y1, s2 * turned.shank_sine + lag * dy0 * y2
+    up3 = s3 * turned.foot_sine + lag * dy1 * y3
     return LegMatrix(
-        m11=p11 + step * (dx0 * x1 * x1 + dy0 * y1 * y1 + 2.0 * dc0 * x1 * y1) + knee,
-        m12=p12 * c12 + step * (dx0 * x1 * x2 + dy0 * y1 * y2 + dc0 * (x1 * y2 + x2 * y1)) - knee,
-        m13=p13 * c13 + step * (dx1 * x1 * x3 + dy1 * y1 * y3 + dc1 * (x1 * y3 + x3 * y1)),
-        m22=p22 + step * (dx0 * x2 * x2 + dy0 * y2 * y2 + 2.0 * dc0 * x2 * y2) + knee + ankle,
-        m23=p23 * c23 + step * (dx1 * x2 * x3 + dy1 * y2 * y3 + dc1 * (x2 * y3 + x3 * y2)) - ankle,
-        m33=p33 + step * (dx2 * x3 * x3 + dy2 * y3 * y3 + 2.0 * dc2 * x3 * y3) + ankle,
-        x1=s1 * turned.thigh_cosine + step * dx0 * x1 + step * dc0 * y1,
-        x2=s2 * turned.shank_cosine + step * dx0 * x2 + step * dc0 * y2,
-        x3=s3 * turned.foot_cosine + step * dx1 * x3 + step * dc1 * y3,
-        y1=s1 * turned.thigh_sine + step * dy0 * y1 + step * dc0 * x1,
-        y2=s2 * turned.shank_sine + step * dy0 * y2 + step * dc0 * x2,
-        y3=s3 * turned.foot_sine + step * dy1 * y3 + step * dc1 * x3,
+        m11=p11 + lag * (dx0 * x1 * x1 + dy0 * y1 * y1 + (dc0 + dd0) * x1 * y1) + knee,
+        m12=m12 + lag * (dc0 * x1 * y2 + dd0 * x2 * y1),
+        m13=m13 + lag * (dc1 * x1 * y3 + dd1 * x3 * y1),
+        m21=m12 + lag * (dc0 * x2 * y1 + dd0 * x1 * y2),
+        m22=p22 + lag * (dx0 * x2 * x2 + dy0 * y2 * y2 + (dc0 + dd0) * x2 * y2) + knee + ankle,
+        m23=m23 + lag * (dc1 * x2 * y3 + dd1 * x3 * y2),
+        m31=m13 + lag * (dc1 * x3 * y1 + dd1 * x1 * y3),
+        m32=m23 + lag * (dc1 * x3 * y2 + dd1 * x2 * y3),
+        m33=p33 + lag * (dx2 * x3 * x3 + dy2 * y3 * y3 + (dc2 + dd2) * x3 * y3) + ankle,
+        x1=along1 + lag * dd0 * y1,
+        x2=along2 + lag * dd0 * y2,
+        x3=along3 + lag * dd1 * y3,
+        y1=up1 + lag * dc0 * x1,
+        y2=up2 + lag * dc0 * x2,
+        y3=up3 + lag * dc1 * x3,
+        along1=along1 + lag * dc0 * y1,
+        along2=along2 + lag * dc0 * y2,
+        along3=along3 + lag * dc1 * y3,
+        up1=up1 + lag * dd0 * x1,
+        up2=up2 + lag * dd0 * x2,
+        up3=up3 + lag * dd1 * x3,
         b1=torques.thigh
         - p12 * s12 * w2
         - p13 * s13 * w3
@@ -208,9 +241,10 @@ def leg_matrix(
         - s3 * (body.gravity * turned.foot_sine)
         + x3 * moment_x
         + y3 * moment_y,
-        hip_xx=mass + step * dx0,
-        hip_xy=step * dc0,
-        hip_yy=mass + step * dy0,
+        hip_xx=mass + lag * dx0,
+        hip_xy=lag * dc0,
+        hip_yx=lag * dd0,
+        hip_yy=mass + lag * dy0,
         force_x=force_x + s1 * turned.thigh_sine * w1 + s2 * turned.shank_sine * w2 + s3 * turned.foot_sine * w3,
         force_y=force_y
         - mass * body.gravity
@@ -229,15 +263,15 @@ class Column(NamedTuple):
 
 
 def solved(leg: LegMatrix, first: float, second: float, third: float) -> Column:
-    """The leg's block times the result is the column given; by the factors L D L'."""
-    l21, l31 = leg.m12 / leg.m11, leg.m13 / leg.m11
-    d2 = leg.m22 - l21 * leg.m12
-    l32 = (leg.m23 - l31 * leg.m12) / d2
-    d3 = leg.m33 - l31 * leg.m13 - l32 * l32 * d2
+    """The leg's block times the result is the column given; by Gauss's elimination."""
+    l21, l31 = leg.m21 / leg.m11, leg.m31 / leg.m11
+    u22, u23 = leg.m22 - l21 * leg.m12, leg.m23 - l21 * leg.m13
+    l32 = (leg.m32 - l31 * leg.m12) / u22
+    u33 = leg.m33 - l31 * leg.m13 - l32 * u23
     z2 = second - l21 * first
-    z3 = (third - l31 * first - l32 * z2) / d3
-    z2 = z2 / d2 - l32 * z3
-    return Column(first / leg.m11 - l21 * z2 - l31 * z3, z2, z3)
+    z3 = (third - l31 * first - l32 * z2) / u33
+    z2 = (z2 - u23 * z3) / u22
+    return Column((first - leg.m12 * z2 - leg.m13 * z3) / leg.m11, z2, z3)
 
 
 class Freed(NamedTuple):
@@ -248,6 +282,7 @@ class Freed(NamedTuple):
     upward: Column
     xx: float
     xy: float
+    yx: float
     yy: float
     x: float
     y: float
@@ -262,11 +297,12 @@ def freed(leg: LegMatrix) -> Freed:
         free=free,
         along=along,
         upward=upward,
-        xx=leg.hip_xx - (leg.x1 * along.first + leg.x2 * along.second + leg.x3 * along.third),
-        xy=leg.hip_xy - (leg.x1 * upward.first + leg.x2 * upward.second + leg.x3 * upward.third),
-        yy=leg.hip_yy - (leg.y1 * upward.first + leg.y2 * upward.second + leg.y3 * upward.third),
-        x=leg.force_x - (leg.x1 * free.first + leg.x2 * free.second + leg.x3 * free.third),
-        y=leg.force_y - (leg.y1 * free.first + leg.y2 * free.second + leg.y3 * free.third),
+        xx=leg.hip_xx - (leg.along1 * along.first + leg.along2 * along.second + leg.along3 * along.third),
+        xy=leg.hip_xy - (leg.along1 * upward.first + leg.along2 * upward.second + leg.along3 * upward.third),
+        yx=leg.hip_yx - (leg.up1 * along.first + leg.up2 * along.second + leg.up3 * along.third),
+        yy=leg.hip_yy - (leg.up1 * upward.first + leg.up2 * upward.second + leg.up3 * upward.third),
+        x=leg.force_x - (leg.along1 * free.first + leg.along2 * free.second + leg.along3 * free.third),
+        y=leg.force_y - (leg.up1 * free.first + leg.up2 * free.second + leg.up3 * free.third),
     )
 
 
@@ -294,11 +330,12 @@ def accelerations(
     whirl = moment * lean_rate * lean_rate
     xx = left.xx + right.xx + body.trunk.mass - along * along / inertia
     xy = left.xy + right.xy - along * upward / inertia
+    yx = left.yx + right.yx - along * upward / inertia
     yy = left.yy + right.yy + body.trunk.mass - upward * upward / inertia
     x = left.x + right.x + whirl * sine + push - along * turning / inertia
     y = left.y + right.y + whirl * cosine - body.trunk.mass * body.gravity - upward * turning / inertia
-    determinant = xx * yy - xy * xy
-    hip_x, hip_y = (x * yy - y * xy) / determinant, (y * xx - x * xy) / determinant
+    determinant = xx * yy - xy * yx
+    hip_x, hip_y = (x * yy - y * xy) / determinant, (y * xx - x * yx) / determinant
     return Pose(
         x=hip_x,
         y=hip_y,

@@ -97,10 +97,16 @@ class LegState(NamedTuple):
 
 
 class Walker(NamedTuple):
-    """State of a wearer, without what is on its way along the nerves."""
+    """State of a wearer, without what is on its way along the nerves.
+
+    ``halfway`` are the rates in the middle of the ``last`` step [s], from which the next step leaps; ``rates`` those at
+    the pose, by the accelerations of that step.
+    """
 
     pose: Pose
     rates: Pose
+    halfway: Pose
+    last: float
     left: LegState
     right: LegState
 
@@ -270,16 +276,22 @@ def leg_now(
     wearer: Wearer,
     muscles: Muscles,
     state: LegState,
-    pose: Pose,
-    rates: Pose,
+    walker: Walker,
     limb: Limb,
     limb_rates: Limb,
+    limb_halfway: Limb,
     assist: Assist,
     step: float,
 ) -> LegNow:
     """Everything about one leg before the body moves."""
-    body, ground = wearer.body, wearer.ground
+    body, ground, pose, rates = wearer.body, wearer.ground, walker.pose, walker.rates
     angle, rate = joints(limb, pose.lean), rates_of_joints(limb_rates, rates.lean)
+    # How much faster all moves than halfway through the last step, where the implicit damping begins.
+    gained = Limb(
+        limb_rates.thigh - limb_halfway.thigh,
+        limb_rates.shank - limb_halfway.shank,
+        limb_rates.foot - limb_halfway.foot,
+    )
     turned = circle(limb)
     x = pose.x + body.thigh.length * turned.thigh_sine + body.shank.length * turned.shank_sine
     y = pose.y - body.thigh.length * turned.thigh_cosine - body.shank.length * turned.shank_cosine
@@ -290,6 +302,12 @@ def leg_now(
     along, up = turned.foot_sine, -turned.foot_cosine
     heel_x, ball_x, ball_y = x - body.heel * along, x + body.foot.length * along, y + body.foot.length * up
     under_ball = footing(wearer.way, ball_x)
+    thigh_gained, shank_gained = body.thigh.length * gained.thigh, body.shank.length * gained.shank
+    gained_x = rates.x - walker.halfway.x + thigh_gained * turned.thigh_cosine + shank_gained * turned.shank_cosine
+    gained_y = rates.y - walker.halfway.y + thigh_gained * turned.thigh_sine + shank_gained * turned.shank_sine
+    heel_gained_x, heel_gained_y = gained_x + body.heel * up * gained.foot, gained_y - body.heel * along * gained.foot
+    ball_gained_x = gained_x - body.foot.length * up * gained.foot
+    ball_gained_y = gained_y + body.foot.length * along * gained.foot
     heel = contact(
         ground,
         footing(wearer.way, heel_x),
@@ -298,6 +316,7 @@ def leg_now(
         y - body.heel * up,
         speed_x + body.heel * up * limb_rates.foot,
         speed_y - body.heel * along * limb_rates.foot,
+        walker.last,
     )
     ball = contact(
         ground,
@@ -307,22 +326,28 @@ def leg_now(
         ball_y,
         speed_x - body.foot.length * up * limb_rates.foot,
         speed_y + body.foot.length * along * limb_rates.foot,
+        walker.last,
     )
     pulled = pull(muscles, state.fibres, angle, rate, 0.5 * step)
     ankle_end = end_of_joint(wearer.stop, wearer.stop.ankle_low, wearer.stop.ankle_high, angle.ankle, rate.ankle)
     knee_end = end_of_joint(wearer.stop, 0.0, wearer.stop.knee, angle.knee, rate.knee)
     hip_end = wearer.stop.stiffness * max(angle.hip - wearer.stop.hip, 0.0)
     stiff = muscles.ankle_stiffness * (angle.ankle - muscles.ankle_rest)
+    ankle_damping = ankle_end.damping + assist.damping
     ankle = pulled.ankle + ankle_end.torque - stiff + assist.torque - assist.damping * rate.ankle
-    knee, hip = pulled.knee + knee_end.torque, pulled.hip - hip_end
+    ankle += ankle_damping * (gained.shank - gained.foot)
+    knee = pulled.knee + knee_end.torque + knee_end.damping * (gained.shank - gained.thigh)
+    hip = pulled.hip - hip_end
     damping = Damping(
         heel_xx=heel.damping_xx,
         heel_xy=heel.damping_xy,
+        heel_yx=heel.damping_yx,
         heel_yy=heel.damping_yy,
         ball_xx=ball.damping_xx,
         ball_xy=ball.damping_xy,
+        ball_yx=ball.damping_yx,
         ball_yy=ball.damping_yy,
-        ankle=ankle_end.damping + assist.damping,
+        ankle=ankle_damping,
         knee=knee_end.damping,
         ankle_inertia=assist.inertia,
     )
@@ -331,12 +356,12 @@ def leg_now(
         turned,
         limb_rates,
         Limb(-knee - hip, ankle + knee, -ankle),
-        heel.force_x,
-        heel.force_y,
-        ball.force_x,
-        ball.force_y,
+        heel.force_x + heel.damping_xx * heel_gained_x + heel.damping_xy * heel_gained_y,
+        heel.force_y + heel.damping_yx * heel_gained_x + heel.damping_yy * heel_gained_y,
+        ball.force_x + ball.damping_xx * ball_gained_x + ball.damping_xy * ball_gained_y,
+        ball.force_y + ball.damping_yx * ball_gained_x + ball.damping_yy * ball_gained_y,
         damping,
-        step,
+        0.5 * walker.last,
     )
     felt = pulled.felt
     return LegNow(
@@ -423,21 +448,26 @@ def next_walker(
 ) -> Stepped:
     """A wearer after a step [s] in which the muscles are stimulated so, and devices act on the ankles.
 
-    ``push`` [N] is on the trunk, forward above 0.
+    ``push`` [N] is on the trunk, forward above 0. Rates leap from the middle of the last step to that of this one
+    (Stoermer and Verlet): what depends on the pose is then of second order as it is, and damping by the mean of both.
     """
-    pose, rates = walker.pose, walker.rates
-    left = leg_now(wearer, wearer.left, walker.left, pose, rates, pose.left, rates.left, left_assist, step)
-    right = leg_now(wearer, wearer.right, walker.right, pose, rates, pose.right, rates.right, right_assist, step)
+    pose, rates, halfway = walker.pose, walker.rates, walker.halfway
+    left = leg_now(wearer, wearer.left, walker.left, walker, pose.left, rates.left, halfway.left, left_assist, step)
+    right = leg_now(
+        wearer, wearer.right, walker.right, walker, pose.right, rates.right, halfway.right, right_assist, step
+    )
     pushed = accelerations(
         wearer.body, pose.lean, rates.lean, -left.hip - right.hip, push, freed(left.matrix), freed(right.matrix)
     )
-    after = moved(rates, pushed, step)
+    after = moved(halfway, pushed, 0.5 * (walker.last + step))
     left_fibres = next_fibres(wearer.left, walker.left.fibres, to_left, left.pull, step)
     right_fibres = next_fibres(wearer.right, walker.right.fibres, to_right, right.pull, step)
     return Stepped(
         after=Walker(
             pose=moved(pose, after, step),
-            rates=after,
+            rates=moved(after, pushed, 0.5 * step),
+            halfway=after,
+            last=step,
             left=LegState(left_fibres, left.heel, left.ball),
             right=LegState(right_fibres, right.heel, right.ball),
         ),

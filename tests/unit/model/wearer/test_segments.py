@@ -23,7 +23,7 @@ BODY = Body(
     heel=0.04,
     gravity=9.81,
 )
-NONE = Damping(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NONE = Damping(*(0.0,) * 11)
 
 
 def pose_of(numbers: np.ndarray) -> Pose:
@@ -36,12 +36,12 @@ def numbers_of(pose: Pose) -> np.ndarray:
 
 
 def moved(
-    body: Body, q: np.ndarray, v: np.ndarray, damping: Damping = NONE, step: float = 0.0, push: float = 0.0
+    body: Body, q: np.ndarray, v: np.ndarray, damping: Damping = NONE, lag: float = 0.0, push: float = 0.0
 ) -> np.ndarray:
     pose, rates = pose_of(q), pose_of(v)
     no = Limb(0.0, 0.0, 0.0)
     legs = [
-        freed(leg_matrix(body, circle(limb), rate, no, 0.0, 0.0, 0.0, 0.0, damping, step))
+        freed(leg_matrix(body, circle(limb), rate, no, 0.0, 0.0, 0.0, 0.0, damping, lag))
         for limb, rate in ((pose.left, rates.left), (pose.right, rates.right))
     ]
     return numbers_of(accelerations(body, pose.lean, rates.lean, 0.0, push, *legs))
@@ -127,7 +127,7 @@ def test_a_push_changes_momentum_as_a_force_on_the_middle_of_the_trunk_does() ->
 def test_damping_at_the_end_of_a_step_is_that_of_the_rates_there() -> None:
     """A step with damping D of the ball equals M (v' - v) = h (Q - J' D J v') solved with all matrices written out."""
     q, v = drawn(7)
-    damping, step = Damping(300.0, -700.0, 2000.0, 500.0, 900.0, 4000.0, 3.0, 5.0, 0.02), 1e-4
+    damping, step = Damping(300.0, -700.0, 200.0, 2000.0, 500.0, 900.0, 0.0, 4000.0, 3.0, 5.0, 0.02), 1e-4
     # Columns of M by unit accelerations are not at hand: they come from the kinetic energy, E = v' M v / 2.
     still = BODY._replace(gravity=0.0)
     unit = np.eye(9)
@@ -137,14 +137,17 @@ def test_damping_at_the_end_of_a_step_is_that_of_the_rates_there() -> None:
     free = matrix @ moved(BODY, q, v)
     added = np.zeros((9, 9))
     for first in (3, 6):
-        for behind, xx, xy, yy in ((-BODY.heel, 300.0, -700.0, 2000.0), (BODY.foot.length, 500.0, 900.0, 4000.0)):
+        for behind, xx, xy, yx, yy in (
+            (-BODY.heel, 300.0, -700.0, 200.0, 2000.0),
+            (BODY.foot.length, 500.0, 900.0, 0.0, 4000.0),
+        ):
             thigh, shank, foot = q[first : first + 3]
             row_x, row_y = np.zeros(9), np.zeros(9)
             row_x[0] = row_y[1] = 1.0
             row_x[first : first + 3] = [0.5 * np.cos(thigh), 0.5 * np.cos(shank), -behind * np.sin(foot)]
             row_y[first : first + 3] = [0.5 * np.sin(thigh), 0.5 * np.sin(shank), behind * np.cos(foot)]
             added += xx * np.outer(row_x, row_x) + yy * np.outer(row_y, row_y)
-            added += xy * (np.outer(row_x, row_y) + np.outer(row_y, row_x))
+            added += xy * np.outer(row_x, row_y) + yx * np.outer(row_y, row_x)
         ankle, knee = np.zeros(9), np.zeros(9)
         ankle[first + 1 : first + 3] = [1.0, -1.0]
         knee[first : first + 2] = [-1.0, 1.0]
