@@ -22,7 +22,7 @@ SLOPE = Quantity("slope", "1", "rise of the ground over the way, above 0 uphill"
 STEP_HEIGHT = Quantity("step_height", "m", "height of one step of the ground, below 0 down", 0.0, -0.1, 0.1)
 GROUND_FROM = Quantity("ground_from", "m", "way on level ground before its slope and its step", 3.0, 1.0, 1.0e4)
 PUSH = Quantity("push", "N", "push on the trunk, forward above 0", 0.0, -1000.0, 1000.0)
-PUSH_FROM = Quantity("push_from", "m", "way before the push", 5.0, 0.0, 1.0e4)
+PUSH_FROM = Quantity("push_from", "m", "way before the push", 5.0, 0.01, 1.0e4)
 PUSH_DURATION = Quantity("push_duration", "s", "how long the push lasts", 0.1, 1.0e-3, 10.0)
 OF_THE_WAY = (SLOPE, STEP_HEIGHT, GROUND_FROM, PUSH, PUSH_FROM, PUSH_DURATION)
 """Numbers of a way without a course."""
@@ -45,6 +45,27 @@ class Stretch:
         if self.kind == "step":
             return f"step of {100.0 * self.values['height']:+.3g} cm"
         return f"push of {self.values['force']:+.3g} N for {self.values['duration']:.3g} s"
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is level ground, or a step or push of nothing."""
+        return not any(self.values.get(name) for name in ("slope", "height", "force"))
+
+
+REACH = 0.6
+"""How far in front of the hip a foot meets the ground [m]."""
+
+
+def met_by(stretches: Sequence[Stretch], hip: float) -> str:
+    """Where a wearer of plain numbers is whose hip has come to a place [m]; an empty text before there is anything."""
+    met = [item for item in stretches if item.start <= hip + (0.0 if item.kind == "push" else REACH)]
+    last = next((item for item in reversed(met) if not item.is_plain), None)
+    if last is None:
+        return ""
+    if last.kind == "walk" and last is met[-1]:
+        return f"on the {last.title}"
+    beyond = hip - last.start
+    return f"on the {last.title}" if beyond < REACH else f"{beyond:.1f} m after the {last.title}"
 
 
 def stretches_of_settings(settings: Mapping[str, Any]) -> tuple[Stretch, ...]:

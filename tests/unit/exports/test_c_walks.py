@@ -57,8 +57,9 @@ VARIED: tuple[tuple[str, tuple[str, ...]], ...] = (
     *((name, ()) for name in list_walks()),
     ("proportional-regulators", EVERYTHING),
     ("proportional", ("course=first-steps",)),
+    ("reacting", ("course=ramp-and-kerb",)),
 )
-"""Every shipped walk, one with every further feature (sensors with faults, thermal gas, slow valve), and a course."""
+"""Every shipped walk, one with every further feature (sensors with faults, thermal gas, slow valve), and courses."""
 
 BY_NUMBA = ("proportional-regulators", EVERYTHING)
 """The walk whose lanes Numba compiles, so that no translator stands on both sides; it takes a minute."""

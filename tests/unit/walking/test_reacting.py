@@ -31,6 +31,7 @@ from ppafo.validation.replay import replay_recording, start_of
 from ppafo.walking import load_walk, walk, walk_population
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import plan_walk
+from ppafo.walking.reacting import toe_heights
 from ppafo.walking.walk import with_device_off
 
 WALK, STEP = "reacting", 1.0e-4
@@ -55,7 +56,7 @@ def every_step(scenario: Scenario, seconds: float) -> tuple[Run, BatchResult]:
 
 
 def test_each_step_of_the_lanes_is_the_step_of_plain_python_to_the_bit() -> None:
-    run, result = every_step(load_walk(WALK, [WEAK]), 0.05)
+    run, result = every_step(load_walk(WALK, [WEAK, "wearer.push=60 N", "wearer.push_from=1 cm"]), 0.05)
     walk = run.reacting
     assert walk is not None
     rows = row_numbers(run.program.state_rows())
@@ -111,6 +112,7 @@ def test_rows_of_an_ensemble_are_single_walks_to_the_bit() -> None:
     scenario = with_duration(load_walk(WALK), 6.0)
     strength, speed = np.array([0.2, 0.1, 0.5, 0.9, 1.0]), np.array([1.2, 1.3, 1.3, 1.4, 1.2])
     columns = {"wearer.tibialis_strength": strength, "wearer.start_speed": speed}
+    columns |= {"wearer.slope": np.array([0.0, 0.0, -0.05, 0.03, 0.0]), "wearer.push": np.array([0, 0, 0, 0, 90.0])}
     together = run_ensemble(scenario, columns, [*METERS, "gas", "strides"])
     for row in range(strength.size):
         own = {path: values[row : row + 1] for path, values in columns.items()}
@@ -183,6 +185,29 @@ def test_the_same_wearer_with_the_device_off_takes_columns_as_well() -> None:
     assert found["walked_time"].tolist() == pytest.approx([1.0, 1.0])
 
 
+@pytest.mark.long
+def test_the_answer_says_on_which_slope_a_wearer_falls_and_what_was_walked_before() -> None:
+    answer = answer_of(walk_with_and_without(load_walk(WALK, ["wearer.slope=0.2", "controller.kind=off"]), 0.15))
+    assert "with the device: the wearer falls on the slope of +20 % at" in str(answer.sections)
+    assert "level ground" in str(answer.sections)
+    assert not answer.passed
+
+
+def test_toes_are_over_the_ground_below_them() -> None:
+    """As the lanes find it: the lowest of a swing is what the recording has."""
+    _, result = every_step(load_walk(WALK, ["controller.kind=off"]), 0.01)
+    level = plan_walk(load_walk(WALK)).reacting
+    sloped = plan_walk(load_walk(WALK, ["wearer.slope=0.1", "wearer.ground_from=1 m"])).reacting
+    assert level is not None
+    assert sloped is not None
+    rows = row_numbers(plan_walk(load_walk(WALK)).program.state_rows())
+    record = {path: result.record[:3, row, 0] for path, row in rows.items() if path.startswith("walker.pose")}
+    record["walker.pose.x"] = np.array([0.0, 3.0, 5.0])
+    away = toe_heights(level.body, record) - toe_heights(sloped.body, record)
+    assert away[0] == 0.0
+    assert np.diff(away)[1] == pytest.approx(0.2, abs=1e-3)
+
+
 def test_a_ratio_changes_a_gain_of_both_legs() -> None:
     wearer = walk_of(load_walk(WALK, ["wearer.soleus_force_ratio=1.1", "wearer.left_soleus_force=1.0"])).reacts
     assert wearer is not None
@@ -196,6 +221,11 @@ def test_a_ratio_changes_a_gain_of_both_legs() -> None:
     [
         ({"wearer": {"tibialis_strength": 0.3}}, 'needs a wearer who reacts: give wearer.reacts = "NAME"'),
         ({"course": "stairs"}, "segment 1 (stand): a wearer who reacts walks on"),
+        (
+            {"course": "ramp-and-kerb", "wearer": {"reacts": "geyer-herr", "slope": 0.01}},
+            "wearer.slope = 0.01: does not go with course 'ramp-and-kerb'",
+        ),
+        ({"course": "ramp-and-kerb", "wearer": {}}, "segment 1 (walk): distance is for a wearer who reacts"),
         ({"gait": "normal"}, "does not go with wearer.reacts yet"),
         ({"wearer": {"reacts": "geyer-herr", "body_mass": "70 kg"}}, "is of a leg that a gait leads"),
         ({"wearer": {"reacts": "geyer-her"}}, "did you mean 'geyer-herr'"),

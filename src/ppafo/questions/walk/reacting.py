@@ -20,6 +20,7 @@ from ppafo.walking.reacting_wearer import ReactingWearer
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import Comparison
+from ppafo.walking.way import EDGE, met_by
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawn
@@ -104,6 +105,7 @@ def reacting_answer(comparison: Comparison) -> Answer:
         lead=(f"{scenario.name}: {wearer.name} {ended}, {strides}",),
         sections=(
             Section(table=reacting_table(comparison), remarks=tuple(remarks)),
+            *_way_section(comparison),
             *bottle_sections(worn),
             *_likeness_section(comparison),
             Section("How to read it", (_EXPLAINED, _EFFORT, _LIMITS), is_detail=True),
@@ -225,7 +227,9 @@ def fall_remarks(comparison: Comparison) -> list[str]:
         means = (
             f", and the means are of {strides:.0f} stride{'s' if strides > 1 else ''} before that" if strides else ""
         )
-        found += [] if fall is None else [f"{words}: the wearer falls at {fall.value:.1f} s{means}"]
+        if fall is not None:
+            place = met_by(wearer_of_walk(walked.scenario).stretches, float(walked.recording["hip_position"][-1]))
+            found.append(f"{words}: the wearer falls {place}{' ' if place else ''}at {fall.value:.1f} s{means}")
     return found
 
 
@@ -240,6 +244,29 @@ def reacting_table(comparison: Comparison) -> Table:
         found = (metrics.get(name) for metrics in columns)
         rows.append((head, *(None if one is None else rounded_text(one.value, quantity, digits) for one in found)))
     return Table((Column(""), Column("with"), Column("device off")), tuple(rows))
+
+
+def _way_section(comparison: Comparison) -> tuple[Section, ...]:
+    """Return what was walked on each stretch of the way, with the device and without; nothing on level ground."""
+    stretches = [item for item in wearer_of_walk(comparison.with_device.scenario).stretches if item.kind == "walk"]
+    met = [item for item in wearer_of_walk(comparison.with_device.scenario).stretches if not item.is_plain]
+    if not met:
+        return ()
+    head = [Column("On the way"), Column("from (m)")]
+    for words in ("with", "off"):
+        head += [Column(f"strides {words}"), Column("lowest toes (cm)")]
+    rows = []
+    for place, stretch in enumerate(stretches):
+        until = stretches[place + 1].start if place + 1 < len(stretches) else np.inf
+        own = [item.title for item in met if item.kind != "walk" and stretch.start <= item.start + EDGE < until]
+        cells: list[str | None] = []
+        for walked in (comparison.with_device, comparison.without_device):
+            begun = walked.recording["hip_position"][walked.starts[:-1]]
+            on_it = (begun >= stretch.start) & (begun < until)
+            toes = walked.strides["toe_clearance"][on_it]
+            cells += [str(int(on_it.sum())), f"{100.0 * float(toes.min()):.1f}" if toes.size else None]
+        rows.append((", ".join([*own, stretch.title]), f"{stretch.start:.2f}", *cells))
+    return (Section(table=Table(tuple(head), tuple(rows))),)
 
 
 def _curves(comparison: Comparison) -> tuple[Section, ...]:

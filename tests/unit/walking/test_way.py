@@ -7,7 +7,7 @@ import pytest
 
 from ppafo.errors import ScenarioError
 from ppafo.model.wearer.way import LEVEL, NOT_PUSHED, PIECES, Push, footing, next_push, push_now
-from ppafo.walking.way import EDGE, Stretch, way_of
+from ppafo.walking.way import EDGE, Stretch, met_by, way_of
 
 START = Stretch("walk", 0.0, {"distance": 4.0, "slope": 0.0})
 UP = Stretch("walk", 4.0, {"distance": 2.0, "slope": 0.08})
@@ -51,6 +51,18 @@ def test_a_push_begins_once_where_the_hip_comes_to_its_place_and_has_its_impulse
             x = number * step + 0.02 * math.sin(60.0 * number * step)
             pushed = next_push(way, pushed, x, step)
         assert impulse == pytest.approx(-80.0 * 0.15, rel=1e-9)
+
+
+def test_where_somebody_fell_is_said_of_what_was_met_last() -> None:
+    push = Stretch("push", 9.0, {"force": -50.0, "duration": 0.1})
+    way = (START, UP, STEP, ON, push)
+    assert met_by(way, 3.0) == ""
+    assert met_by(way, 3.5) == "on the slope of +8 %"
+    assert met_by(way, 5.0) == "on the slope of +8 %"
+    assert met_by((START, UP, STEP), 6.2) == "on the step of -3 cm"
+    assert met_by((START, UP, STEP), 8.0) == "2.0 m after the step of -3 cm"
+    assert met_by(way, 8.9) == "on the slope of -2 %"
+    assert met_by(way, 10.0) == "1.0 m after the push of -50 N for 0.1 s"
 
 
 def test_a_way_of_more_pieces_than_there_are_is_refused() -> None:
