@@ -55,6 +55,11 @@ def follow(rate: float, step: float, shown: float, before: float, now: float) ->
     return kept * shown + (mean - kept) * before + (1.0 - mean) * now if rate > 0.0 else now
 
 
+def follow_rate(rate: float, shown: float, now: float) -> float:
+    """Rate at which what a first-order sensor shows changes, in its own unit per second; ``rate`` [1/s] 0: never."""
+    return rate * (now - shown)
+
+
 def mix_bits(value: int) -> int:
     """A 32-bit integer that looks unrelated to ``value`` (0 to 2^32 - 1): xor, shift and multiply, thrice."""
     value = (value ^ (value >> 16)) * 0x7FEB352D & MASK

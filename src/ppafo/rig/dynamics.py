@@ -4,11 +4,11 @@ Beyond the identified model: energy of the gas and heat through the walls, a rea
 chamber with its own orifice, a laminar part of the leak, friction that grows with pressure, and slow sensors.
 """
 
-import math
 from typing import NamedTuple
 
 from ppafo.model.effects.seal_friction import SealFriction, pressed_at_rest, pressed_in_motion
 from ppafo.model.effects.second_virial import gas_enthalpy, real_density, real_pressure
+from ppafo.model.effects.stribeck import Stribeck, more_near_standstill
 from ppafo.model.gas import energy_rate, gas_temperature, heat_from_wall, temperature_flow_factor
 from ppafo.model.orifice import ExactOrifice, exact_flow
 from ppafo.model.plant import (
@@ -19,6 +19,7 @@ from ppafo.model.plant import (
     driving_torque,
     vane_acceleration,
 )
+from ppafo.model.sensors import follow_rate
 
 
 class RigPhysics(NamedTuple):
@@ -41,7 +42,7 @@ class RigPhysics(NamedTuple):
     line_volume: float
     laminar_conductance: float
     seal_friction: SealFriction
-    stribeck_velocity: float
+    stribeck: Stribeck
     angle_follow_rate: float
     pressure_follow_rate: float
     chambers_open: float
@@ -118,10 +119,6 @@ class Observables(NamedTuple):
     static_limit: float
 
 
-BREAKAWAY_DROP = 0.1
-"""Fraction of the fall from static to dynamic friction that happens as soon as the vane moves, so that it does move."""
-
-
 def gas_node(rig: RigPhysics, mass: float, energy: float, volume: float) -> Node:
     """Gas in a volume [m^3] from its mass [kg] and internal energy [J]."""
     temperature = gas_temperature(energy, mass, rig.heat_capacity)
@@ -165,21 +162,12 @@ def wall_heat(rig: RigPhysics, node: Node, volume: float) -> float:
     return heat_from_wall(node.temperature, rig.wall_temperature, rig.heat_transfer_coefficient, area)
 
 
-def static_limit(plant: PlantParameters, rig: RigPhysics, pressure_1: float, pressure_2: float) -> float:
-    """Largest friction torque at rest [N m] under two absolute pressures [Pa]."""
-    return pressed_at_rest(plant.static_torque, pressure_1, pressure_2, rig.seal_friction)
-
-
 def kinetic_friction(
     plant: PlantParameters, rig: RigPhysics, angular_velocity: float, pressure_1: float, pressure_2: float
 ) -> float:
     """Size of the friction torque in motion [N m]: dynamic, and near standstill more (Stribeck). Equation (10)."""
     dynamic = pressed_in_motion(plant.dynamic_torque, angular_velocity, pressure_1, pressure_2, rig.seal_friction)
-    if rig.stribeck_velocity <= 0.0:
-        return dynamic
-    limit = static_limit(plant, rig, pressure_1, pressure_2)
-    relative = angular_velocity / rig.stribeck_velocity
-    return dynamic + (1.0 - BREAKAWAY_DROP) * max(limit - dynamic, 0.0) * math.exp(-relative * relative)
+    return more_near_standstill(dynamic, angular_velocity, pressure_1, pressure_2, rig.stribeck)
 
 
 def chamber_nodes(plant: PlantParameters, rig: RigPhysics, state: RigState, angle: float) -> tuple[Node, Node]:
@@ -203,13 +191,8 @@ def observables(
         node_1=node_1,
         node_2=node_2,
         torque=torque,
-        static_limit=static_limit(plant, rig, node_1.pressure, node_2.pressure),
+        static_limit=pressed_at_rest(plant.static_torque, node_1.pressure, node_2.pressure, rig.seal_friction),
     )
-
-
-def sensor_rate(reading: float, true: float, rate: float) -> float:
-    """Rate at which a first-order sensor's reading changes, its unit per second [1/s]; 0 for an instant one."""
-    return rate * (true - reading)
 
 
 def droop_rate(rig: RigPhysics, drop: float, flow: float) -> float:
@@ -359,7 +342,7 @@ def rig_rates(
         enthalpy_in=gas * (side_1.enthalpy_in + side_2.enthalpy_in),
         work_done=gas * grows * (node_1.pressure - node_2.pressure),
         heat_in=gas * (heat_1 + heat_2 + side_1.line_heat + side_2.line_heat),
-        sensor_angle=sensor_rate(state.sensor_angle, angle, rig.angle_follow_rate),
-        sensor_pressure_1=sensor_rate(state.sensor_pressure_1, node_1.pressure, rig.pressure_follow_rate),
-        sensor_pressure_2=sensor_rate(state.sensor_pressure_2, node_2.pressure, rig.pressure_follow_rate),
+        sensor_angle=follow_rate(rig.angle_follow_rate, state.sensor_angle, angle),
+        sensor_pressure_1=follow_rate(rig.pressure_follow_rate, state.sensor_pressure_1, node_1.pressure),
+        sensor_pressure_2=follow_rate(rig.pressure_follow_rate, state.sensor_pressure_2, node_2.pressure),
     )

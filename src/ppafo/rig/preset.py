@@ -23,6 +23,7 @@ from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, refused_as
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity, range_rule
+from ppafo.model.effects import stribeck
 from ppafo.model.effects.kind import SECTION, Effect
 from ppafo.model.effects.seal_friction import SealFriction
 from ppafo.model.effects.second_virial import SECOND_VIRIAL
@@ -91,7 +92,7 @@ FRICTION = (
     ),
     Quantity("dynamic_per_pressure", "m^3", "dynamic friction per pressure difference", minimum=0.0, maximum=1e-2),
     Quantity(
-        "stribeck_velocity", "rad/s", "speed over which friction falls to its dynamic value", minimum=0.0, maximum=1e2
+        "stribeck_velocity", "rad/s", "speed at which half of the rise at standstill is left", minimum=0.0, maximum=1e2
     ),
     Quantity("scatter", "", "standard deviation of the static limit from reading to reading", minimum=0.0, maximum=0.5),
 )
@@ -348,6 +349,8 @@ def rig_physics(device: Device, preset: Preset) -> RigPhysics:
     gas, values = device.gas, preset.values
     constant = gas.specific_gas_constant
     droop, recovery = values["supply.droop"], values["supply.recovery_time"]
+    velocity = values["friction.stribeck_velocity"]
+    share = stribeck.EFFECT.defaults(gas.species)["share"] if velocity > 0.0 else 0.0
     if droop > 0.0 and recovery <= 0.0:
         raise ParameterError(f"preset '{preset.name}': supply.recovery_time must be above 0 s with a droop")
     return RigPhysics(
@@ -364,7 +367,7 @@ def rig_physics(device: Device, preset: Preset) -> RigPhysics:
         line_volume=values["line.volume"],
         laminar_conductance=values["leak.laminar_conductance"],
         seal_friction=SealFriction(values["friction.static_per_pressure"], values["friction.dynamic_per_pressure"]),
-        stribeck_velocity=values["friction.stribeck_velocity"],
+        stribeck=stribeck.prepare({"velocity": velocity, "share": share}, device),
         angle_follow_rate=TWO_PI * values["angle_sensor.bandwidth"],
         pressure_follow_rate=TWO_PI * values["pressure_sensor.bandwidth"],
         chambers_open=0.0,

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import Effect, Moment, State
 from ppafo.model.places import shown_signals
-from ppafo.model.sensors import follow
+from ppafo.model.sensors import follow, follow_rate
 
 
 class SensorRates(NamedTuple):
@@ -63,9 +63,9 @@ def advance(
 def slopes(bandwidth: SensorRates, bandwidth_state: SensorState, now: Moment) -> SensorState:
     """Rates of what the sensors show [rad/s, Pa/s]."""
     return SensorState(
-        angle=bandwidth.angle * (now.angle - bandwidth_state.angle),
-        pressure_1=bandwidth.pressure * (now.pressure_1 - bandwidth_state.pressure_1),
-        pressure_2=bandwidth.pressure * (now.pressure_2 - bandwidth_state.pressure_2),
+        angle=follow_rate(bandwidth.angle, bandwidth_state.angle, now.angle),
+        pressure_1=follow_rate(bandwidth.pressure, bandwidth_state.pressure_1, now.pressure_1),
+        pressure_2=follow_rate(bandwidth.pressure, bandwidth_state.pressure_2, now.pressure_2),
     )
 
 
