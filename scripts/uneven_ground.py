@@ -1,7 +1,7 @@
 """Print who of the shipped healthy wearers walks on over slopes and steps and after pushes, with the device and off.
 
 Each cell counts the walks of 20 s without a fall, of eight in which slope, step or push begins at another place within
-a stride. Some three minutes of one processor:
+a stride: with the device off, and with it. Some three minutes of one processor:
 
     python scripts/uneven_ground.py
 """
@@ -44,9 +44,9 @@ def main() -> None:
         print(f"| {title} | " + " | ".join(f"{factor * value:+g} {unit}" for value in values) + " |")
         print("|---" * (len(values) + 1) + "|")
         for wearer in parser.parse_args().wearers:
-            for is_off, words in ((True, "device off"), (False, "with")):
-                counts = staying(wearer, is_off, path, values)
-                print(f"| {wearer}, {words} | " + " | ".join(map(str, counts)) + " |", flush=True)
+            off, worn = (staying(wearer, is_off, path, values) for is_off in (True, False))
+            cells = (f"{bare}, {own}" for bare, own in zip(off, worn, strict=True))
+            print(f"| `{wearer}` | " + " | ".join(cells) + " |", flush=True)
         print()
 
 
