@@ -1,7 +1,7 @@
 """Proposes experiments once, then plants effects in what is recorded with them, and compares promised with reached.
 
-    python scripts/next_experiment.py --draws 30 --seed 51
-    python scripts/next_experiment.py --draws 30 --seed 51 --bench --out truths.jsonl
+    python scripts/next_experiment.py --draws 30 --seed 61
+    python scripts/next_experiment.py --draws 30 --seed 61 --bench --out truths.jsonl
 
 Two step responses are fitted and three further experiments proposed: that design is frozen. Then, for each effect,
 truths are drawn (five numbers up to 15 % off) with the effect at the size for which its visibility was promised. The
