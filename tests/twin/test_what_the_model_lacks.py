@@ -65,8 +65,9 @@ def test_an_effect_that_the_model_lacks_is_named_with_the_size_of_a_fit_with_it(
     # Only a fit that takes no form of the effect for granted has intervals that can be printed.
     assert first.refit.is_of_any_form == (extra.leak_opens > 0.0)
     assert all(("whatever its form" in one.explanation) == first.refit.is_of_any_form for one in held)
-    if first.refit.is_of_any_form:
-        # With one form for all leaks the area was off by 3 to 9 standard errors.
+    if first.refit.is_of_any_form or extra.heat == 60.0:
+        # With one form for all leaks the area was off by 3 to 9 standard errors, with differences over more than one
+        # standard error the flow of a warm gas by 4.
         for item, at, error in zip(found.optimum.residuals.ranges, first.refit.point, first.refit.errors, strict=True):
             assert abs(item.coordinate(PLANTED.truth(item.path)) - at) < 2.6 * error
 

@@ -7,11 +7,18 @@ the slope, as where time stamps are off, and the drift with the level, as that o
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.identification.noise.growing import growing_noises
+from ppafo.identification.noise.growing import (
+    JITTER,
+    LEAST_JITTER,
+    gain_noises,
+    jitter_noises,
+    score_of_jitter,
+)
 from ppafo.identification.noise.heavy_tails import gain_of_tails, heavy_autoregression, heavy_drift
 from ppafo.identification.noise.sensor_noise import (
     SAMPLES_FOR_EACH,
@@ -40,33 +47,123 @@ def sensor_noise(segments: Sequence[Floats], is_given: bool = False, courses: Se
 
     With the ``courses`` of its recordings it may grow with slope and level.
     """
-    whole = np.concatenate(segments)
-    white = from_reflections(np.zeros(0))
-    if float(np.mean(whole * whole)) < max(LEAST, 1.0 if is_given else 0.0):
-        level, count = 1.0 if is_given else math.sqrt(LEAST), len(whole)
-        likelihood = -0.5 * float(whole @ whole) / level**2 - count * (math.log(level) + 0.5 * math.log(2.0 * math.pi))
-        return SensorNoise(white, np.full(len(segments), level), is_fixed=True, likelihood=likelihood)
-    levels = _relative_levels(segments)
-    scaled = [one / level for one, level in zip(segments, levels, strict=True)]
-    is_shared = bool(np.all(levels == 1.0))
-    drift = max((_drift(scaled, is_zeroed) for is_zeroed in (False, True)), key=lambda one: one.likelihood)
-    plain = [_autoregression(scaled), drift]
-    growing = growing_noises(scaled, courses, levels, plain)
-    best = min((*plain, *growing), key=lambda one: criterion(one.likelihood, one.numbers, len(whole)))
-    candidates = [*plain, *growing]
-    if any(gain_of_tails(one, scaled) > _HEAVY for one in ([best] if best.grows else plain)):
-        candidates += [heavy_autoregression(scaled, plain[0]), heavy_drift(scaled, drift)]
-    count = len(whole)
+    return sensor_noises([Left(segments, is_given, courses)])[0]
 
-    def criterion_beside_drifts(one: SensorNoise) -> float:
-        # The best of so many orders is now and then better than a drift that is there, by chance, and intervals are
-        # then too narrow: a number that an autoregression has more than a drift costs what Schwarz's criterion takes.
+
+class Left(NamedTuple):
+    """What is left [-] of a sensor's recordings, whether its noise was given, and what it should show in each."""
+
+    segments: Sequence[Floats]
+    is_given: bool = False
+    courses: Sequence[Course] = ()
+
+
+def sensor_noises(sensors: Sequence[Left]) -> tuple[SensorNoise, ...]:
+    """Return the noise of sensors that one clock stamps, so that time stamps are off for all of them or for none."""
+    drafts = [_Draft.of(one) for one in sensors]
+    chosen, late = [one.normal for one in drafts], _late(drafts)
+    is_late = late is not None and _sum(drafts, late) < _sum(drafts, chosen)
+    if late is None or not is_late or any(map(_Draft.has_tails, drafts, late)):
+        chosen = [draft.with_tails(one) for draft, one in zip(drafts, chosen, strict=True)]
+    if late is not None and is_late and _sum(drafts, late) < _sum(drafts, chosen):
+        chosen = late
+    return tuple(draft.finish(one) for draft, one in zip(drafts, chosen, strict=True))
+
+
+@dataclass(frozen=True, slots=True)
+class _Draft:
+    """What is left of a sensor over the ``levels`` of its recordings, and normal noise for it, the likeliest last."""
+
+    given: Left
+    levels: Floats
+    scaled: list[Floats]
+    plain: tuple[SensorNoise, ...]
+    gains: tuple[SensorNoise, ...]
+    courses: tuple[Course, ...]
+
+    @classmethod
+    def of(cls, one: Left) -> "_Draft":
+        """Estimate normal noise whose stamps are right; noise that was given and is not exceeded stays as it is."""
+        whole = np.concatenate(one.segments)
+        if float(np.mean(whole * whole)) < max(LEAST, 1.0 if one.is_given else 0.0):
+            white, level = from_reflections(np.zeros(0)), 1.0 if one.is_given else math.sqrt(LEAST)
+            spread = math.log(level) + 0.5 * math.log(2.0 * math.pi)
+            likelihood = -0.5 * float(whole @ whole) / level**2 - len(whole) * spread
+            count = len(one.segments)
+            fixed = SensorNoise(white, np.full(count, level), is_fixed=True, likelihood=likelihood)
+            return cls(one, np.ones(count), [*one.segments], (fixed,), (), ())
+        levels = _relative_levels(one.segments)
+        scaled = [each / level for each, level in zip(one.segments, levels, strict=True)]
+        drift = max((_drift(scaled, is_zeroed) for is_zeroed in (False, True)), key=lambda each: each.likelihood)
+        plain = (_autoregression(scaled), drift)
+        courses = tuple(
+            Course(each.level / level, each.slope / level, each.first)
+            for each, level in zip(one.courses, levels, strict=False)
+        )
+        return cls(one, levels, scaled, plain, tuple(gain_noises(scaled, courses, plain)), courses)
+
+    @property
+    def normal(self) -> SensorNoise:
+        """The likeliest normal noise whose stamps are right."""
+        return min((*self.plain, *self.gains), key=self.criterion)
+
+    def criterion(self, one: SensorNoise) -> float:
+        """Return the criterion of a noise [-]; less is better.
+
+        The best of so many orders is now and then better than a drift that is there, by chance, and intervals are then
+        too narrow: a number that an autoregression has more than a drift costs what Schwarz's criterion takes.
+        """
+        count = sum(len(each) for each in self.scaled)
         more = max(0, one.shape.order - _NUMBERS_OF_DRIFT) if isinstance(one.shape, AutoRegression) else 0
         return criterion(one.likelihood, one.numbers, count) + (math.log(count) - 2.0) * more
 
-    best = min(candidates, key=criterion_beside_drifts)
-    likelihood = best.likelihood - sum(len(one) * math.log(level) for one, level in zip(segments, levels, strict=True))
-    return replace(best, levels=best.levels * levels, is_shared=is_shared, likelihood=likelihood)
+    def has_tails(self, one: SensorNoise) -> bool:
+        """Return whether a noise leaves samples that are thrown too far for normal tails."""
+        return not one.is_fixed and gain_of_tails(one, self.scaled) > _HEAVY
+
+    def with_tails(self, normal: SensorNoise) -> SensorNoise:
+        """Return the likeliest normal noise, or noise with heavy tails that is likelier."""
+        if not any(self.has_tails(one) for one in ([normal] if normal.grows else self.plain)):
+            return normal
+        heavy = heavy_autoregression(self.scaled, self.plain[0]), heavy_drift(self.scaled, self.plain[1])
+        return min((normal, *heavy), key=self.criterion)
+
+    def finish(self, best: SensorNoise) -> SensorNoise:
+        """Return noise in the units of what was left; a drift knows its courses, for it may be one of the gain."""
+        if best.is_fixed:
+            return best
+        logs = sum(len(one) * math.log(level) for one, level in zip(self.scaled, self.levels, strict=True))
+        return replace(
+            best,
+            levels=best.levels * self.levels,
+            is_shared=bool(np.all(self.levels == 1.0)),
+            likelihood=best.likelihood - logs,
+            courses=self.courses if isinstance(best.shape, Drift) else best.courses,
+        )
+
+
+def _sum(drafts: Sequence[_Draft], noises: Sequence[SensorNoise]) -> float:
+    return sum(draft.criterion(one) for draft, one in zip(drafts, noises, strict=True))
+
+
+def _late(drafts: Sequence[_Draft]) -> list[SensorNoise] | None:
+    """Return the likeliest noise of each sensor with time stamps that are off, None where nothing speaks for that."""
+    counted = [one for one in drafts if one.courses]
+    scores = [score_of_jitter(one.scaled, one.courses, one.normal) for one in counted]
+    spread = math.sqrt(sum(square for _, square in scores))
+    if spread == 0.0 or sum(score for score, _ in scores) <= JITTER * spread:
+        return None
+    found, times, known = [], 0.0, 0.0
+    weights = iter(scores)
+    for draft in drafts:
+        if not draft.courses:
+            found.append(draft.normal)
+            continue
+        rivals = jitter_noises(draft.scaled, draft.courses, (draft.plain[1], *draft.gains))
+        best, weight = min(rivals, key=draft.criterion), next(weights)[1]
+        found.append(best)
+        times, known = times + weight * best.jitter * float(best.levels[0]), known + weight
+    return found if times >= LEAST_JITTER * known else None
 
 
 def _relative_levels(segments: Sequence[Floats]) -> Floats:

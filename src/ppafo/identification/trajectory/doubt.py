@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ppafo.identification.estimate import limit_for
-from ppafo.identification.noise.choice import sensor_noise
+from ppafo.identification.noise.choice import Left, sensor_noises
 from ppafo.identification.noise.sensor_noise import SensorNoise
 from ppafo.identification.noise.shapes import Drift, from_reflections, reflections_of
 from ppafo.identification.trajectory.directions.catalogue import EFFECT_DIRECTIONS, EVERY_DIRECTION
@@ -311,7 +311,7 @@ def _findings(
     # A slow drift is more than a short autoregression can hold, and would look like a gain that drifts; so would time
     # stamps that are off, where the slope is large, like a late clock.
     pairs = list(zip(left_of_sensors(), found.sensors, strict=True))
-    likely = [sensor_noise(parts, sensor.is_given, sensor.courses) for parts, sensor in pairs]
+    likely = sensor_noises([Left(parts, sensor.is_given, sensor.courses) for parts, sensor in pairs])
     is_long = [isinstance(one.shape, Drift) or one.grows for one in likely]
     noises = [one if is_it else short for one, short, is_it in zip(likely, noises, is_long, strict=True)]
     rows = whiten(whole, noises, weights)

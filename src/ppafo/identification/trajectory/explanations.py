@@ -13,7 +13,7 @@ import numpy as np
 
 from ppafo.errors import PpafoError
 from ppafo.identification.estimate import limit_for
-from ppafo.identification.noise.choice import sensor_noise
+from ppafo.identification.noise.choice import Left, sensor_noises
 from ppafo.identification.noise.sensor_noise import Course, SensorNoise, course_of
 from ppafo.identification.trajectory.directions.catalogue import EFFECT_DIRECTIONS
 from ppafo.identification.trajectory.directions.changes import changes_by_size
@@ -223,7 +223,7 @@ class _Whole:
             parts.append(np.column_stack([options[which][:, run] for run, which in enumerate(better.tolist())]))
         return np.concatenate(parts)
 
-    def noises(self, left: Floats) -> list[SensorNoise]:
+    def noises(self, left: Floats) -> tuple[SensorNoise, ...]:
         """Return the noise of any kind that explains residuals [-] (samples,) of each channel best."""
         channels: dict[str, list[tuple[Floats, Course]]] = {}
         first = 0
@@ -233,10 +233,12 @@ class _Whole:
                 course = course_of(prepared.time, part + channel.values / channel.noise)
                 channels.setdefault(channel.name, []).append((part, course))
                 first += len(prepared.time)
-        return [
-            sensor_noise([part for part, _ in parts], is_given=True, courses=[course for _, course in parts])
-            for parts in channels.values()
-        ]
+        return sensor_noises(
+            [
+                Left([part for part, _ in parts], is_given=True, courses=[course for _, course in parts])
+                for parts in channels.values()
+            ]
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -306,9 +306,13 @@ def _with_memory(model: LinearModel, states: Sequence[_State], random: np.random
         longest = longest_memory(model.segments(model.residuals, sensor), state.noise.is_heavy)
         here = _noise_of(state.numbers, state.noise, longest)
         likelihood = _without_columns(model, others + state.products) - state.spread + (here[1] if here else 0.0)
-        for _ in range(_PROPOSALS):
-            numbers = state.numbers + state.step @ random.standard_normal(len(state.numbers))
-            tried = _noise_of(numbers, state.noise, longest)
+        for turn in range(_PROPOSALS + _may_be_gain(state.noise)):
+            numbers, kind = state.numbers, state.noise
+            if turn < _PROPOSALS:
+                numbers = numbers + state.step @ random.standard_normal(len(numbers))
+            else:
+                kind = _with_other_growth(kind, random)
+            tried = _noise_of(numbers, kind, longest)
             if tried is None:
                 continue
             noise = tried[0]
@@ -319,6 +323,18 @@ def _with_memory(model: LinearModel, states: Sequence[_State], random: np.random
                 state, likelihood = moved, other  # noqa: PLW2901
         found[sensor] = state
     return found
+
+
+def _may_be_gain(noise: SensorNoise) -> bool:
+    """Return whether a drift of a sensor could be one of its gain instead, and the other way round."""
+    return isinstance(noise.shape, Drift) and not noise.is_heavy and any(one.level.any() for one in noise.courses)
+
+
+def _with_other_growth(noise: SensorNoise, random: np.random.Generator) -> SensorNoise:
+    """Return a drift as one of the gain, or that of a gain as one of the sensor, which begins at 0 or anywhere."""
+    assert isinstance(noise.shape, Drift)
+    shape = replace(noise.shape, is_zeroed=bool(random.random() < 0.5))
+    return replace(noise, shape=shape, has_gain=not noise.has_gain)
 
 
 def _without_columns(model: LinearModel, products: Floats) -> float:

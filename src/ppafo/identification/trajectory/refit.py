@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ppafo.identification.noise.choice import sensor_noise
+from ppafo.identification.noise.choice import Left, sensor_noises
 from ppafo.identification.noise.heavy_tails import sample_weights
 from ppafo.identification.noise.sensor_noise import SensorNoise
+from ppafo.identification.noise.shapes import from_reflections
 from ppafo.identification.trajectory.directions.catalogue import EFFECT_DIRECTIONS
 from ppafo.identification.trajectory.directions.changes import (
     can_have,
@@ -21,7 +22,7 @@ from ppafo.identification.trajectory.directions.changes import (
 )
 from ppafo.identification.trajectory.directions.heat import HEAT
 from ppafo.identification.trajectory.directions.kind import Direction
-from ppafo.identification.trajectory.information import inverse_with_root, solution
+from ppafo.identification.trajectory.information import directions_for, inverse_with_root, solution
 from ppafo.identification.trajectory.posterior import LinearModel, whiten
 from ppafo.identification.trajectory.problem import Search, with_numbers
 from ppafo.identification.trajectory.residuals import (
@@ -38,7 +39,7 @@ from ppafo.identification.trajectory.search import WhitenedFit, descend
 from ppafo.simulation.numbers import number_at
 
 _STEP = 6.0e-4
-"""Step of a difference in coordinates: impacts bend, so that one of a percent would be another experiment."""
+"""Step of a difference in coordinates from afar: impacts bend, and one of a percent would be another experiment."""
 _OF_SIZE = 0.03
 """The same of a size, as a fraction of it."""
 _ROUNDS = 3
@@ -108,20 +109,28 @@ def likelihood_with(found: WhitenedFit, model: LinearModel, more: Floats) -> Lik
     The noise of each sensor may be of any kind.
     """
     whole = replace(model, columns=np.hstack([model.slopes, more, model.residuals[:, None]]))
-    noises, weights = found.noises, tuple(sensor.weights for sensor in found.sensors)
+    white = from_reflections(np.zeros(0))
+    of_one = [tuple(np.ones(place.stop - place.start) for place in places) for places in model.sensors]
+    # The noise of a fit without the effect may have taken up what it explains, and would lead back to itself.
+    begins = (
+        (found.noises, tuple(sensor.weights for sensor in found.sensors)),
+        (tuple(SensorNoise(white, np.ones(len(places))) for places in model.sensors), tuple(of_one)),
+    )
     pulled, best = len(model.pull), None
-    for _ in range(_ROUNDS):
-        move, covariance = _least(whole, noises, weights)
-        left = whole.residuals + whole.slopes @ move
-        parts = [whole.segments(left, place) for place in range(len(model.sensors))]
-        noises = tuple(
-            sensor_noise(own, one.is_given, one.courses) for own, one in zip(parts, found.sensors, strict=True)
-        )
-        weights = tuple(tuple(sample_weights(noise, own)) for noise, own in zip(noises, parts, strict=True))
-        of_priors = float(move[:pulled] @ (2.0 * model.pull + model.precision @ move[:pulled]))
-        value = 2.0 * sum(one.likelihood - one.numbers for one in noises) - of_priors
-        if best is None or value > best.value:
-            best = Likelihood(value, move, covariance, _excess(whole), len(whole.residuals))
+    for begin in begins:
+        noises, weights = begin
+        for _ in range(_ROUNDS):
+            move, covariance = _least(whole, noises, weights)
+            left = whole.residuals + whole.slopes @ move
+            parts = [whole.segments(left, place) for place in range(len(model.sensors))]
+            noises = sensor_noises(
+                [Left(own, one.is_given, one.courses) for own, one in zip(parts, found.sensors, strict=True)]
+            )
+            weights = tuple(tuple(sample_weights(noise, own)) for noise, own in zip(noises, parts, strict=True))
+            of_priors = float(move[:pulled] @ (2.0 * model.pull + model.precision @ move[:pulled]))
+            value = 2.0 * sum(one.likelihood - one.numbers for one in noises) - of_priors
+            if best is None or value > best.value:
+                best = Likelihood(value, move, covariance, _excess(whole), len(whole.residuals))
     assert best is not None
     return best
 
@@ -217,27 +226,33 @@ def _refit_from(found: WhitenedFit, starts: Floats, runs: "_Runs", begin: Floats
     low, high = (np.array([*ends, *of_forms[side], math.log(size)]) for side, (ends, size) in enumerate(bounds))
     expected = float(len(found.model.residuals))
     at, slow = begin, 0
+    steps, is_near = np.diag([*(_STEP for _ in range(kept)), *(_OF_SIZE for _ in range(kept, own + 1))]), False
     for turn in range(_TURNS):
-        near = _around(runs, at)
+        near = _around(runs, at, steps)
         if near is None:
             return None
         left, slopes = near
+        if is_near:
+            steps = _fine_steps(slopes, free, precision[:own, :own], (at <= low) | (at >= high))
         shift = at[:own] - first
         pull = pull_at.copy()
         pull[:own] += precision[:own, :own] @ shift
         if turn < _TURNS - 1 and slow < _PATIENCE:
-            moves = _damped_steps(slopes, free, left, pull[:own], precision[:own, :own])
-            tried = np.clip(at + moves, low, high)
-            values = runs.residuals(tried)
-            shifts = np.vstack([tried[:, :own] - first, shift])
-            of_priors = shifts @ (2.0 * pull_at[:own]) + np.einsum("ij,jk,ik->i", shifts, precision[:own, :own], shifts)
-            costs = np.array(_squares(np.column_stack([values, left]), free)) + of_priors
-            best = int(np.argmin(costs[:-1]))
-            fall = float(costs[-1] - costs[best])
+            priors = first, pull_at[:own], precision[:own, :own]
+            moved, cost, fall = _best_step(runs, at, (left, slopes, free), priors, (low, high))
             if fall > _SETTLED:
-                slow = slow + 1 if fall < _SLOW * max(float(costs[-1]) - expected, 0.0) else 0
-                at = tried[best]
+                slow = slow + 1 if fall < _SLOW * max(cost - expected, 0.0) else 0
+                at = moved
                 continue
+        if not is_near and turn < _TURNS - 1:
+            # Differences over more than a standard error make errors too small, and the end is not where they say.
+            steps = _fine_steps(slopes, free, precision[:own, :own], (at <= low) | (at >= high))
+            is_near, slow = True, 0
+            continue
+        near = _around(runs, at, steps)
+        if near is None:
+            return None
+        left, slopes = near
         columns = np.hstack([slopes[:, :own], hum, left[:, None]])
         model = replace(found.model, columns=columns, pull=pull, precision=precision)
         likely = likelihood_with(found, model, np.column_stack([slopes[:, own], starts]))
@@ -259,39 +274,79 @@ def _refit_from(found: WhitenedFit, starts: Floats, runs: "_Runs", begin: Floats
     raise AssertionError("the last turn returns")
 
 
+def _best_step(
+    runs: "_Runs",
+    at: Floats,
+    linear: tuple[Floats, Floats, Floats],
+    priors: tuple[Floats, Floats, Floats],
+    bounds: tuple[Floats, Floats],
+) -> tuple[Floats, float, float]:
+    """Return where the best of the damped steps from a point leads, the cost [-] at the point, and its fall.
+
+    ``linear`` are residuals, slopes and what is free at the point; ``priors`` the point that they are counted from,
+    their pull there and their precision; ``bounds`` the lowest and the highest coordinates.
+    """
+    (left, slopes, free), (first, pull, precision) = linear, priors
+    count = len(first)
+    shift = at[:count] - first
+    moves = _damped_steps(slopes, free, left, pull + precision @ shift, precision)
+    tried = np.clip(at + moves, *bounds)
+    shifts = np.vstack([tried[:, :count] - first, shift])
+    of_priors = 2.0 * shifts @ pull + np.einsum("ij,jk,ik->i", shifts, precision, shifts)
+    costs = np.array(_squares(np.column_stack([runs.residuals(tried), left]), free)) + of_priors
+    best = int(np.argmin(costs[:-1]))
+    return tried[best], float(costs[-1]), float(costs[-1] - costs[best])
+
+
 def _damped_steps(moving: Floats, free: Floats, left: Floats, pull: Floats, precision: Floats) -> Floats:
     """Return the steps (dampings, coordinates) of Levenberg and Marquardt along columns, what is free taken out.
 
     The last of ``moving`` (samples, coordinates) is the size, of which there is no prior; ``pull`` and ``precision``
     are those of the others.
     """
-    whole = np.column_stack([moving, left])
-    if free.shape[1]:
-        whole = whole - free @ np.linalg.lstsq(free, whole, rcond=1.0e-12)[0]
-    columns, count = whole[:, :-1], len(pull)
-    information, product = columns.T @ columns, columns.T @ whole[:, -1]
-    information[:count, :count] += precision
-    product[:count] += pull
+    information = _information(moving, free, precision)
+    product = moving.T @ _without(free, left[:, None])[:, 0]
+    product[: len(pull)] += pull
     own = np.diag(np.diag(information))
     return np.array([-solution(information + damping * own, product) for damping in _DAMPINGS])
+
+
+def _fine_steps(slopes: Floats, free: Floats, precision: Floats, is_fixed: Mask) -> Floats:
+    """Return steps of differences of one standard error along the principal directions."""
+    return directions_for(_information(slopes, free, precision), is_fixed)
+
+
+def _information(moving: Floats, free: Floats, precision: Floats) -> Floats:
+    """Return the information of columns with what is free taken out, and that of the priors of all but the last."""
+    columns, count = _without(free, moving), len(precision)
+    information = np.asarray(columns.T @ columns)
+    information[:count, :count] += precision
+    return information
+
+
+def _without(free: Floats, columns: Floats) -> Floats:
+    """Return columns (samples, columns) less what free ones explain of them."""
+    if not free.shape[1]:
+        return columns
+    return np.asarray(columns - free @ np.linalg.lstsq(free, columns, rcond=1.0e-12)[0])
 
 
 def _squares(values: Floats, free: Floats) -> list[float]:
     """Return the squares [-] that are left of columns with free ones as they suit best; infinite for a failed run."""
     is_run: Mask = np.asarray(np.isfinite(values).all(axis=0))
-    ran = np.where(is_run, values, 0.0)
-    left = ran - free @ np.linalg.lstsq(free, ran, rcond=1.0e-12)[0] if free.shape[1] else ran
+    left = _without(free, np.where(is_run, values, 0.0))
     return [float(one @ one) if ok else math.inf for one, ok in zip(left.T, is_run.tolist(), strict=True)]
 
 
-def _around(runs: "_Runs", at: Floats) -> tuple[Floats, Floats] | None:
-    """Return residuals [-] at a point and their slopes there (samples, coordinates); None for a failed run."""
-    steps = np.full(len(at), _OF_SIZE)
-    steps[: len(at) - 1 - len(runs.direction.forms)] = _STEP
-    values = runs.residuals(at + np.vstack([np.diag(steps), -np.diag(steps), np.zeros(len(at))]))
+def _around(runs: "_Runs", at: Floats, steps: Floats) -> tuple[Floats, Floats] | None:
+    """Return residuals [-] at a point and their slopes there (samples, coordinates); None for a failed run.
+
+    ``steps`` are those of the differences, in units of the coordinates, as columns.
+    """
+    values = runs.residuals(np.vstack([at + steps.T, at - steps.T, at]))
     if not np.isfinite(values).all():
         return None
-    return values[:, -1], (values[:, : len(at)] - values[:, len(at) : -1]) / (2.0 * steps)
+    return values[:, -1], 0.5 * (values[:, : len(at)] - values[:, len(at) : -1]) @ np.linalg.inv(steps)
 
 
 @dataclass(frozen=True, slots=True)

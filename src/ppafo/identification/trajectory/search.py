@@ -13,7 +13,7 @@ import numpy as np
 
 from ppafo.engine.lane_rows import LANES
 from ppafo.errors import IdentificationError
-from ppafo.identification.noise.choice import sensor_noise
+from ppafo.identification.noise.choice import Left, sensor_noise, sensor_noises
 from ppafo.identification.noise.heavy_tails import sample_weights
 from ppafo.identification.noise.sensor_noise import Course, SensorNoise, course_of, without_common_stamps
 from ppafo.identification.noise.shapes import errors_of, from_reflections, reflections_of
@@ -397,7 +397,7 @@ def weigh(found: Optimum, given: Sequence[frozenset[str]]) -> WhitenedFit:
     for number in range(1, MAXIMUM_ROUNDS + 1):
         if number <= ESTIMATED_ROUNDS:
             sensors = _with_courses(sensors, residuals.experiments, near.of_data)
-        sensors = tuple(_estimate_noise(one, near.of_data, number <= ESTIMATED_ROUNDS) for one in sensors)
+        sensors = _estimate_noise(sensors, near.of_data, number <= ESTIMATED_ROUNDS)
         model = _linear_model(near, sensors)
         step, information = _step(near, model, sensors)
         errors = np.sqrt(np.diag(inverse_with_root(information)[0]))
@@ -468,13 +468,22 @@ def _with_courses(
     )
 
 
-def _estimate_noise(sensor: Sensor, residuals: Floats, is_estimated: bool) -> Sensor:
-    """Return the sensor with its noise and hum estimated from residuals, or with its weights alone."""
-    segments = [residuals[place] for place in sensor.places]
-    hum = tuple(one / sensor.interval for one in hum_of(segments)) if is_estimated else sensor.hum
-    quiet = [without_hum(one, [frequency * sensor.interval for frequency in hum]) for one in segments]
-    noise = sensor_noise(quiet, sensor.is_given, sensor.courses) if is_estimated else sensor.noise
-    return replace(sensor, noise=noise, hum=hum, weights=tuple(sample_weights(noise, quiet)))
+def _estimate_noise(sensors: Sequence[Sensor], residuals: Floats, is_estimated: bool) -> tuple[Sensor, ...]:
+    """Return the sensors with their noise and hum estimated from residuals, or with their weights alone."""
+    quiet, hums = [], []
+    for sensor in sensors:
+        segments = [residuals[place] for place in sensor.places]
+        hum = tuple(one / sensor.interval for one in hum_of(segments)) if is_estimated else sensor.hum
+        quiet.append([without_hum(one, [frequency * sensor.interval for frequency in hum]) for one in segments])
+        hums.append(hum)
+    noises: Sequence[SensorNoise] = [sensor.noise for sensor in sensors]
+    if is_estimated:
+        parts = zip(quiet, sensors, strict=True)
+        noises = sensor_noises([Left(own, sensor.is_given, sensor.courses) for own, sensor in parts])
+    return tuple(
+        replace(sensor, noise=noise, hum=hum, weights=tuple(sample_weights(noise, own)))
+        for sensor, noise, hum, own in zip(sensors, noises, hums, quiet, strict=True)
+    )
 
 
 def _linear_model(near: Neighbourhood, sensors: Sequence[Sensor]) -> LinearModel:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ppafo.identification.estimate import Estimate, Verdict, interval_factor
-from ppafo.identification.noise.choice import sensor_noise
+from ppafo.identification.noise.choice import Left, sensor_noises
 from ppafo.identification.noise.sensor_noise import SensorNoise
 from ppafo.identification.noise.shapes import Drift
 from ppafo.identification.trajectory.information import (
@@ -169,11 +169,15 @@ def _fit_apart(
     columns[:, -1] -= columns[:, :-1] @ np.linalg.lstsq(whole[:, :-1], whole[:, -1], rcond=None)[0]
     # Parts take much of a slow drift with them. Its numbers are drawn without their columns, but from what they leave,
     # which may look white, the draws would not find it again.
+    likely = sensor_noises(
+        [
+            Left(apart.segments(apart.residuals, place), sensor.is_given, sensor.courses)
+            for place, sensor in enumerate(found.sensors)
+        ]
+    )
     noises = [
-        sensor.noise
-        if isinstance(sensor.noise.shape, Drift)
-        else sensor_noise(apart.segments(apart.residuals, place), sensor.is_given, sensor.courses)
-        for place, sensor in enumerate(found.sensors)
+        sensor.noise if isinstance(sensor.noise.shape, Drift) else one
+        for sensor, one in zip(found.sensors, likely, strict=True)
     ]
     return apart, tuple(noises)
 

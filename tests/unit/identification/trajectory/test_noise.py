@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.intervals.calibration import FIVE_PARAMETERS, Task, repetition
 from benchmarks.intervals.noise_kinds import NOISE_KINDS, noise_kind
-from ppafo.identification.noise.choice import sensor_noise
+from ppafo.identification.noise.choice import Left, sensor_noise, sensor_noises
 from ppafo.identification.noise.sensor_noise import Course, SensorNoise, course_of, without_common_stamps
 from ppafo.identification.noise.shapes import AutoRegression, Drift, from_coefficients, reflections_of
 from ppafo.identification.noise.t_distribution import t_likelihood, t_nodes
@@ -407,3 +407,30 @@ def test_noise_that_does_not_grow_is_not_said_to() -> None:
     courses = [course_of_a_rise(COUNT), course_of_a_rise(COUNT)]
     assert not any(sensor_noise(drawn("white", seed), courses=courses).grows for seed in range(30, 36))
     assert not any(sensor_noise(drawn("drift", seed), courses=courses).has_gain for seed in range(30, 36))
+
+
+def test_time_stamps_are_off_for_all_sensors_of_a_clock_or_for_none() -> None:
+    steep, flat = course_of_a_rise(), course_of_a_rise()
+    flat = Course(0.3 * flat.level, 0.3 * flat.slope)
+    alone, together = 0, 0
+    for seed in range(8):
+        random = np.random.default_rng(seed)
+        late = 8.0e-5 * random.standard_normal(200)
+        sensors = [Left([random.standard_normal(200) + one.slope * late], courses=[one]) for one in (steep, flat)]
+        found = sensor_noises(sensors)
+        assert len({one.jitter > 0.0 for one in found}) == 1
+        alone += sensor_noises(sensors[1:])[0].jitter > 0.0
+        together += found[1].jitter > 0.0
+    assert together > alone + 3
+
+
+@pytest.mark.parametrize("is_gain", [True, False])
+def test_a_drift_may_be_one_of_the_gain_whichever_was_found_first(is_gain: bool) -> None:
+    random, course = np.random.default_rng(3), course_of_a_rise(300)
+    walk = 0.35 * np.cumsum(random.standard_normal(300))
+    grown = course.level / math.sqrt(float(np.mean(course.level**2)))
+    left = random.standard_normal(300) + walk * (grown if is_gain else 1.0)
+    model = LinearModel(np.column_stack([np.ones(300), left]), ((slice(0, 300),),), np.zeros(1), np.zeros((1, 1)))
+    start = SensorNoise(Drift(0.1, 0.99), np.ones(1), has_gain=not is_gain, courses=(course,))
+    _, shown = draw_posterior(model, [start], 1, 1)
+    assert np.mean([one.noises[0].has_gain == is_gain for one in shown]) > 0.8
