@@ -45,7 +45,7 @@ def adapted(folder: Path, overrides: Sequence[str], arguments: argparse.Namespac
         restarts=restarts,
         generations=arguments.generations,
         seed=arguments.seed,
-        overrides=[f"wearer.reacts={arguments.wearer}", "run.duration=15 s", *overrides],
+        overrides=[f"wearer.reacts={arguments.wearer}", "run.duration=12 s", *overrides],
     )
 
 
@@ -130,10 +130,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Compare effort with a device with published trials")
     parser.add_argument("judge", choices=("timing", "trial"))
     parser.add_argument("--out", type=Path, required=True, help="folder of the searches")
-    parser.add_argument("--wearer", default="healthy-128", help="wearer to begin with")
+    parser.add_argument("--wearer", default="geyer-herr", help="wearer to begin with")
     parser.add_argument("--pressure", type=float, default=90.0, help="supply of push-off (psi_g), in 'timing'")
     parser.add_argument("--restarts", type=int, default=5, help="searches of a condition, in 'timing'")
-    parser.add_argument("--generations", type=int, default=25)
+    parser.add_argument("--generations", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
     {"timing": timing, "trial": trial}[arguments.judge](arguments)
