@@ -15,7 +15,15 @@ from ppafo.wearers.published import WEIGHT
 
 pytestmark = pytest.mark.long
 
-SPEEDS = {"healthy-98": 0.98, "healthy-110": 1.10, "healthy-123": 1.23, "healthy-128": 1.28, "healthy-138": 1.38}
+SPEEDS = {
+    "healthy-98": 0.98,
+    "healthy-110": 1.10,
+    "healthy-111": 1.11,
+    "healthy-123": 1.23,
+    "healthy-127": 1.27,
+    "healthy-128": 1.28,
+    "healthy-138": 1.38,
+}
 """Walking speeds [m/s] that the files state."""
 
 SETTLED = 5.0

@@ -10,7 +10,7 @@ from ppafo.model.wearer.walker import Assist, next_walker
 from ppafo.wearers.loading import find_wearer, list_wearers, wearer_of
 from ppafo.wearers.published import felt_at, first_answer, start_of, start_with_size, with_size
 
-HEALTHY = ("healthy-98", "healthy-110", "healthy-123", "healthy-128", "healthy-138")
+HEALTHY = ("healthy-98", "healthy-110", "healthy-111", "healthy-123", "healthy-127", "healthy-128", "healthy-138")
 
 
 def written(folder: Path, text: str) -> Path:
@@ -31,7 +31,7 @@ def test_every_shipped_wearer_says_how_it_was_found(name: str) -> None:
 
 def test_at_least_five_healthy_wearers_have_gains_of_their_own() -> None:
     gains = {find_wearer(name).left_gains for name in HEALTHY}
-    assert len(gains) == 5
+    assert len(gains) == len(HEALTHY) >= 5
     assert all(find_wearer(name).left_gains == find_wearer(name).right_gains for name in HEALTHY)
 
 
