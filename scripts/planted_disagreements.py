@@ -60,6 +60,7 @@ PLANTED = (
     Planted("atmosphere of 83 kPa under sensors of gauge pressure", ROOM, {ROOM: 83e3}, mistake="gauge"),
     Planted("kPa read as psi", "all pressures seem to be kPa read as psi", mistake="psi"),
     Planted("pressures swapped", "pressure_1 and pressure_2 seem to be swapped", mistake="swap"),
+    Planted("angle from the other end", "the angle seems to be counted from the other end", mistake="end"),
     Planted("pressure_1 3 ms late", "pressure_1 seems to be later", mistake="late"),
     Planted("inertia 30 % high", "foot_plate.inertia", {"foot_plate.inertia": 1.3}),
     Planted("leak opens at 20 kPa", "the leak seems to open", extra=Extra(leak_opens=2e4)),
@@ -86,6 +87,9 @@ def recorded(planted: Planted, seed: int) -> Recording:
     }
     if planted.mistake == "swap":
         channels["pressure_1"], channels["pressure_2"] = channels["pressure_2"], channels["pressure_1"]
+    if planted.mistake == "end":
+        ends = number_at(base, "actuator.angle_min") + number_at(base, "actuator.angle_max")
+        channels["angle"] = Channel(ends - channels["angle"].values, "rad")
     if planted.mistake == "late":
         late = np.interp(TIMES - 0.003, TIMES, channels["pressure_1"].values)
         channels["pressure_1"] = Channel(late, "Pa")

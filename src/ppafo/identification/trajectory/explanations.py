@@ -355,6 +355,8 @@ def _changes_of_record(
             "external_torque seems to have the wrong sign",
             lambda one: _negative(one, EXTERNAL_TORQUE),
         )
+    if ANGLE in names:
+        yield "end of angle", "the angle seems to be counted from the other end", _from_other_end
     supplies = [name for name in (SUPPLY, DORSIFLEXION_SUPPLY) if name in names]
     every = [*compared, *supplies]
     groups = [every, *([compared] if supplies else []), *([supplies] if supplies and compared else [])]
@@ -427,6 +429,14 @@ def _in_room(one: Experiment, higher: float) -> Experiment:
 
 def _negative(one: Experiment, name: str) -> Experiment:
     return replace(one, recording=_with(one.recording, **{name: -one.recording[name]}))
+
+
+def _from_other_end(one: Experiment) -> Experiment:
+    actuator, scenario = one.scenario.device.actuator, one.scenario
+    both_ends = actuator.angle_min + actuator.angle_max
+    if isinstance(scenario.motion, FreeMotion):
+        scenario = with_numbers(scenario, {"motion.angle": both_ends - number_at(scenario, "motion.angle")})
+    return replace(one, recording=_with(one.recording, **{ANGLE: both_ends - one.recording[ANGLE]}), scenario=scenario)
 
 
 def _swapped(one: Experiment) -> Experiment:
