@@ -96,6 +96,7 @@ def test_nothing_is_named_where_the_model_lacks_nothing() -> None:
 
 
 @pytest.mark.long
+@pytest.mark.thorough
 def test_a_gain_that_drifts_is_not_named_where_a_slow_drift_of_the_sensor_explains_as_much() -> None:
     found = fitted(Extra(), noise="heavy-drift", seed=7)
     assert found.doubt is not None
@@ -107,6 +108,8 @@ def test_a_gain_that_drifts_is_not_named_where_a_slow_drift_of_the_sensor_explai
     assert found.misfit == ""
 
 
+@pytest.mark.long
+@pytest.mark.thorough
 def test_a_zero_that_is_off_by_more_than_a_bench_has_is_named() -> None:
     random = np.random.default_rng(4)
     recordings = []
@@ -124,7 +127,8 @@ def test_a_zero_that_is_off_by_more_than_a_bench_has_is_named() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("fault", ["late stamps", pytest.param("wandering gain", marks=THOROUGH)])
+@pytest.mark.thorough
+@pytest.mark.parametrize("fault", ["late stamps", "wandering gain"])
 def test_intervals_hold_where_noise_grows_with_slope_or_level(fault: str) -> None:
     fine = np.arange(4001, dtype=np.float64) * 1e-4
     signals = [bench(one, [(0.0, one.control.settings["command"])], fine) for one in PLANTED.scenarios]

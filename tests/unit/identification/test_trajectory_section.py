@@ -212,6 +212,8 @@ def test_a_fit_that_contradicts_the_bench_says_so(solve: Solve) -> None:
     assert any("friction.viscous_damping: fitted to" in remark for remark in outcome.trajectory.remarks)
 
 
+@pytest.mark.long
+@pytest.mark.thorough
 def test_a_model_that_leaves_much_fails_its_check(solve: Solve, laboratory: Path) -> None:
     slow = 'scenario = "step-response"\noverrides = ["controller.command=0.1"]'
     wrong = FIT.replace('scenario = "step-response"', slow).replace("valve.discharge_coefficient", "actuator.leak.area")
