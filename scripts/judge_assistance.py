@@ -55,9 +55,10 @@ def cost(walked: Walked, model: str) -> float:
     return math.nan if power is None or speed is None else power / speed
 
 
-def costs(found: Adaptation, model: str) -> np.ndarray:
-    """Cost of transport [J/m] of each restart that walks on from every start."""
-    return np.array([cost(one.walked, model) for one in found.restarts if one.walked.share == 1.0])
+def costs(found: Adaptation) -> dict[str, np.ndarray]:
+    """Costs of transport [J/m] by model, of each restart that walks on from every start."""
+    walks_on = [one.walked for one in found.restarts if one.walked.share == 1.0]
+    return {model: np.array([cost(walked, model) for walked in walks_on]) for model, _ in MODELS}
 
 
 def change(these: np.ndarray, those: np.ndarray) -> tuple[float, float]:
@@ -85,17 +86,17 @@ def timing(arguments: argparse.Namespace) -> None:
     }
     print(f"| onset | searches that walk on | {' | '.join(words for _, words in MODELS)} | Malcolm 2013 | Galle 2017 |")
     print("|---|---|---|---|---|---|")
-    reference = {model: costs(off, model) for model, _ in MODELS}
-    print(f"| off | {reference[MODELS[0][0]].size} of {len(off.restarts)} | 0 | 0 | 0 | 0 |")
+    first, reference = MODELS[0][0], costs(off)
+    print(f"| off | {reference[first].size} of {len(off.restarts)} | 0 | 0 | 0 | 0 |")
     for onset, found in powered.items():
-        cells = []
-        for model, _ in MODELS:
-            mean, error = change(costs(found, model), reference[model])
+        own, cells = costs(found), []
+        for model, values in own.items():
+            mean, error = change(values, reference[model])
             cells.append(f"{mean:+.1f} +- {error:.1f} %" if math.isfinite(error) else "too few")
-        settled = f"{costs(found, MODELS[0][0]).size} of {len(found.restarts)}"
+        walk_on = f"{own[first].size} of {len(found.restarts)}"
         published = f"{MALCOLM[onset]:+.0f} %" if onset in MALCOLM else "-"
         others = f"{GALLE[onset]} %" if onset in GALLE else "-"
-        print(f"| {100.0 * onset:.0f} % | {settled} | {' | '.join(cells)} | {published} | {others} |")
+        print(f"| {100.0 * onset:.0f} % | {walk_on} | {' | '.join(cells)} | {published} | {others} |")
 
 
 def trial(arguments: argparse.Namespace) -> None:

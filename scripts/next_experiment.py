@@ -33,7 +33,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from benchmarks.intervals.made_by import check_code, code_now
+from benchmarks.intervals.made_by import check_code, code_now, whole_lines
 from benchmarks.intervals.planted import NOISE
 from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.identification.trajectory import Experiment, FreeParameter, Search, TrajectoryFit, TrajectoryProblem, fit
@@ -258,11 +258,10 @@ def main() -> None:
 
 
 def _kept(file: Path | None, study: dict[str, object]) -> dict[tuple[int, int], dict[str, Any]]:
-    """Return the truths of a study that a file has, by planted effect and number; a line cut short is not one."""
-    if file is None or not file.exists():
+    """Return the truths of a study that a file has, by planted effect and number; none of a line that was cut off."""
+    if file is None:
         return {}
-    whole = [json.loads(line) for line in file.read_text().splitlines(keepends=True) if line.endswith("\n")]
-    own = [line for line in whole if study.items() <= line.items()]
+    own = [line for line in map(json.loads, whole_lines(file)) if study.items() <= line.items()]
     return {(line["planted"], line["draw"]): line for line in own}
 
 

@@ -40,10 +40,11 @@ def main() -> None:
     """Print one table for each kind of condition."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("wearers", nargs="*", default=WEARERS)
+    wearers = parser.parse_args().wearers
     for path, (title, values, unit, factor) in CONDITIONS.items():
         print(f"| {title} | " + " | ".join(f"{factor * value:+g} {unit}" for value in values) + " |")
         print("|---" * (len(values) + 1) + "|")
-        for wearer in parser.parse_args().wearers:
+        for wearer in wearers:
             off, worn = (staying(wearer, is_off, path, values) for is_off in (True, False))
             cells = (f"{bare}, {own}" for bare, own in zip(off, worn, strict=True))
             print(f"| `{wearer}` | " + " | ".join(cells) + " |", flush=True)

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.intervals.made_by import check_code, code_now
+from benchmarks.intervals.made_by import check_code, code_now, whole_lines
 from benchmarks.intervals.noise_kinds import NOISE_KINDS, noise_kind
 from benchmarks.intervals.planted import Planted, exact_recording, planted_problem, two_step_responses
 from ppafo.errors import IdentificationError
@@ -272,14 +272,8 @@ def _read(file: Path) -> dict[tuple[str, int], tuple[Line, str]]:
 
     Lines of before this was kept do not say which code that was: an empty text.
     """
-    if not file.exists():
-        return {}
-    text = file.read_text(encoding="utf-8")
-    whole = text[: text.rfind("\n") + 1]
-    if whole != text:
-        file.write_text(whole, encoding="utf-8")
     found: dict[tuple[str, int], tuple[Line, str]] = {}
-    for one in whole.splitlines():
+    for one in whole_lines(file):
         document: Mapping[str, Any] = json.loads(one)
         parts: dict[str, Any] = {
             name: tuple(value) if isinstance(value, list) else value for name, value in document.items()

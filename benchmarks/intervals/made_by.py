@@ -38,3 +38,17 @@ def check_code(file: Path, codes: Sequence[str], missing: int, warn: Callable[[s
         warn(f"{file}: has {others}, this is {now}")
     if unknown:
         warn(f"{file}: which code made them is not said of {unknown} of {len(codes)} fits; they are counted")
+
+
+def whole_lines(file: Path) -> list[str]:
+    """Return the lines of a study's file, none where there is no file; a last line that was cut off is cut away.
+
+    What is added next then begins a line of its own.
+    """
+    if not file.exists():
+        return []
+    content = file.read_bytes()
+    whole = content[: content.rfind(b"\n") + 1]
+    if whole != content:
+        file.write_bytes(whole)
+    return whole.decode("utf-8").splitlines()

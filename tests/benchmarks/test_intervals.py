@@ -18,7 +18,7 @@ from benchmarks.intervals.calibration import (
     run_tasks,
     tasks_of,
 )
-from benchmarks.intervals.made_by import code_now
+from benchmarks.intervals.made_by import code_now, whole_lines
 from benchmarks.intervals.noise_kinds import NOISE_KINDS, noise_kind
 from benchmarks.intervals.planted import planted_problem
 from benchmarks.intervals.report import coverage_document, coverage_text, is_good, ranks_figure
@@ -64,6 +64,16 @@ def test_a_study_goes_on_where_it_was_stopped_and_gives_the_same(tmp_path: Path)
     assert again[0] == again[1]
     kept_lines = [json.loads(one) for one in file.read_text().splitlines()]
     assert [(one["number"], one["code"]) for one in kept_lines] == [(0, code_now()), (1, code_now())]
+
+
+def test_what_is_added_behind_a_line_that_was_cut_off_is_a_line_of_its_own(tmp_path: Path) -> None:
+    file = tmp_path / "truths.jsonl"
+    assert whole_lines(file) == []
+    file.write_bytes('{"draw": 0, "name": "µ"}\n{"draw": 1, "name": "µ'.encode()[:-1])
+    assert [json.loads(one)["draw"] for one in whole_lines(file)] == [0]
+    with file.open("a") as stream:
+        stream.write('{"draw": 1}\n')
+    assert [json.loads(one)["draw"] for one in whole_lines(file)] == [0, 1]
 
 
 def kept(file: Path, lines: list[Line], code: str | None) -> None:

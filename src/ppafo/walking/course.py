@@ -43,7 +43,7 @@ SLOPE = Quantity("slope", "rad", "slope of the ground, above 0 uphill; level unl
 DISTANCE = Quantity("distance", "m", "length of the way, of a wearer who reacts", None, 0.2, 1.0e4)
 HEIGHT = Quantity("height", "m", "height of the step, below 0 down", None, -0.1, 0.1)
 FORCE = Quantity("force", "N", "push on the trunk, forward above 0", None, -1000.0, 1000.0)
-PUSH_DURATION = Quantity("duration", "s", "how long it lasts", 0.1, 1.0e-3, 10.0)
+PUSHED_FOR = Quantity("duration", "s", "how long it lasts", 0.1, 1.0e-3, 10.0)
 RADIUS = Quantity("radius", "m", "radius of the turn; below 0 where the device is on the outer leg", 1.0, -10.0, 10.0)
 
 _PACE = (SPEED, CADENCE, WALKED_FOR, STRIDES)
@@ -59,7 +59,7 @@ KINDS: dict[str, tuple[str, tuple[Quantity, ...]]] = {
     "scuff": ("one stride in which the toes touch the ground in mid-swing", (CONTACT,)),
     "stumble": ("one stride of another time, shorter or longer in its middle", (TIME, LENGTH)),
     "step": ("a step of the ground, for a wearer who reacts", (HEIGHT,)),
-    "push": ("a push on the trunk, for a wearer who reacts", (FORCE, PUSH_DURATION)),
+    "push": ("a push on the trunk, for a wearer who reacts", (FORCE, PUSHED_FOR)),
 }
 """Kinds of segment: what the wearer does, and the values that it takes."""
 

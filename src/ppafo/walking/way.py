@@ -5,7 +5,7 @@ Any number may be an array (runs,), or one that an export writes down.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,17 +13,17 @@ import numpy as np
 from ppafo.errors import ScenarioError
 from ppafo.model.declaration import Quantity
 from ppafo.model.wearer.way import LEVEL, PIECES, PUSHES, UNUSED, UNUSED_PUSH, Piece, Push, Way
-from ppafo.walking.course import WalkingCourse
+from ppafo.walking.course import FORCE, HEIGHT, PUSHED_FOR, WalkingCourse
 
 EDGE = 0.01
 """Length [m] of the steep piece that a step is: its edges are not sharp."""
 
 SLOPE = Quantity("slope", "1", "rise of the ground over the way, above 0 uphill", 0.0, -0.2, 0.2)
-STEP_HEIGHT = Quantity("step_height", "m", "height of one step of the ground, below 0 down", 0.0, -0.1, 0.1)
+STEP_HEIGHT = replace(HEIGHT, name="step_height", summary="height of one step of the ground, below 0 down", default=0.0)
 GROUND_FROM = Quantity("ground_from", "m", "way on level ground before its slope and its step", 3.0, 1.0, 1.0e4)
-PUSH = Quantity("push", "N", "push on the trunk, forward above 0", 0.0, -1000.0, 1000.0)
+PUSH = replace(FORCE, name="push", default=0.0)
 PUSH_FROM = Quantity("push_from", "m", "way before the push", 5.0, 0.01, 1.0e4)
-PUSH_DURATION = Quantity("push_duration", "s", "how long the push lasts", 0.1, 1.0e-3, 10.0)
+PUSH_DURATION = replace(PUSHED_FOR, name="push_duration", summary="how long the push lasts")
 OF_THE_WAY = (SLOPE, STEP_HEIGHT, GROUND_FROM, PUSH, PUSH_FROM, PUSH_DURATION)
 """Numbers of a way without a course."""
 

@@ -115,19 +115,13 @@ def _numbers(configuration: Scenario) -> dict[str, tuple[Quantity, float]]:
     # What fails of the plant, with its shut-off valve, is written out in the source; persons are drawn in Python.
     fixed = ("shut_off.", *(f"faults.{part}." for part in walk_of(configuration).broken), f"wearer.{PERSON.name}")
     # The structures of libraries have the times behind the device.
-    wearer = (f"wearer.{item.name}" for item in (_reactions_of(configuration) if reacts else WEARER))
+    wearer = (f"wearer.{item.name}" for item in (REACTIONS if reacts else WEARER))
     paths = dict.fromkeys((*device_numbers(configuration.device), *of_run, *wearer, *times, *control, *declared))
     return {
         path: (declared[path], times[path] if path in times else number_at(configuration, path))
         for path in paths
         if path in declared and not path.startswith(fixed)
     }
-
-
-def _reactions_of(configuration: Scenario) -> tuple[Quantity, ...]:
-    """Numbers of a wearer who reacts; without those of the way where a course has it."""
-    reacts = walk_of(configuration).reacts
-    return tuple(item for item in REACTIONS if reacts is not None and item.name in reacts.settings)
 
 
 def sensors_that_fail(configuration: Scenario) -> dict[str, FaultSettings]:
