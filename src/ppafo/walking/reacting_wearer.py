@@ -22,7 +22,7 @@ from ppafo.model.wearer.way import NOT_PUSHED
 from ppafo.simulation.declaration import Reading, value_at
 from ppafo.walking.course import WalkingCourse
 from ppafo.walking.way import OF_THE_WAY, Stretch, stretches_of_course, stretches_of_settings, way_of
-from ppafo.wearers.loading import find_wearer, wearer_of, with_strengths
+from ppafo.wearers.loading import WearerFile, find_wearer, wearer_of, with_strengths
 from ppafo.wearers.published import felt_at, first_answer, start_of, start_with_size, with_size
 
 REACTS = "wearer.reacts"
@@ -74,16 +74,21 @@ FIRST_STRIDE = 1.0
 
 @dataclass(frozen=True, slots=True)
 class ReactingWearer:
-    """A wearer who reacts: name, body with muscles and gains of both healthy legs, and its numbers by name.
+    """A wearer who reacts: its file, the body with muscles and gains that this gives, and its numbers by name.
 
     ``settings`` has the numbers of ``REACTIONS``, without those of the way where there is a ``course``; each may be an
     array (runs,).
     """
 
-    name: str
+    file: WearerFile
     body: Wearer
     settings: Mapping[str, Any]
     course: WalkingCourse | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the wearer."""
+        return self.file.name
 
     @property
     def stretches(self) -> tuple[Stretch, ...]:
@@ -200,4 +205,4 @@ def read_reacting(
     own |= {START_SPEED.name: file.speed}
     read = REACTIONS if course is None else tuple(item for item in REACTIONS if item not in OF_THE_WAY)
     numbers = tuple(replace(item, default=own.get(item.name, item.default)) for item in read)
-    return ReactingWearer(file.name, wearer_of(file), reading.section("wearer", numbers), course)
+    return ReactingWearer(file, wearer_of(file), reading.section("wearer", numbers), course)

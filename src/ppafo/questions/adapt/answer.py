@@ -199,6 +199,7 @@ def remarks(found: Adaptation) -> list[str]:
 def wearer_text(found: Adaptation, restart: Restart) -> str:
     """Return the wearer file (TOML) of a restart."""
     left, right = found.gains_of(restart.gains)
+    file = found.search.wearer.file
     lines = [
         "schema_version = 1",
         f'name = "{found.search.wearer.name}-{restart.number}"',
@@ -220,7 +221,17 @@ def wearer_text(found: Adaptation, restart: Restart) -> str:
         *(f"{name} = {value!r}" for name, value in left._asdict().items()),
     ]
     other = [f"{name} = {value!r}" for name, value in right._asdict().items() if value != getattr(left, name)]
+    lines += _leg_text("left", file.left_quickness, file.left_ankle_stiffness, file.left_strengths)
+    lines += _leg_text("right", file.right_quickness, file.right_ankle_stiffness, file.right_strengths)
     return "\n".join([*lines, *(["", "[right.gains]", *other] if other else []), ""])
+
+
+def _leg_text(side: str, quickness: float, stiffness: float, strengths: Mapping[str, float]) -> list[str]:
+    """In what a leg differs from the published body: who is found is as weak as who was searched with."""
+    own = [f"quickness = {quickness!r}"] if quickness != 1.0 else []
+    own += [f'ankle_stiffness = "{stiffness!r} N m/rad"'] if stiffness else []
+    weak = [f"{name} = {value!r}" for name, value in strengths.items()]
+    return [*(["", f"[{side}]", *own] if own else []), *(["", f"[{side}.strength]", *weak] if weak else [])]
 
 
 def draw(found: Adaptation) -> "matplotlib.figure.Figure":

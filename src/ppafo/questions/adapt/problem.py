@@ -109,6 +109,12 @@ def search_of(
     }
     if adapts not in groups:
         raise StudyError(f"gains = {adapts!r}: must be one of {', '.join(groups)}")
+    own = motion.reacts.settings
+    unlike = [name for name in names if own[f"left_{name}"] != own[f"right_{name}"]]
+    if adapts == "alike" and unlike:
+        raise StudyError(
+            f"gains = 'alike': the legs of '{motion.reacts.name}' differ in {', '.join(unlike)}; take 'apart' or 'left'"
+        )
     for name, value, least, most in (
         ("restarts", restarts, 1, 100),
         ("generations", generations, 1, MOST_GENERATIONS),
@@ -116,9 +122,9 @@ def search_of(
     ):
         if not least <= value <= most:
             raise StudyError(f"{name} = {value}: must be at least {least} and at most {most:,}")
-    aim = float(motion.reacts.settings[START_SPEED.name]) if speed is None else speed
+    aim = float(own[START_SPEED.name]) if speed is None else speed
     low, high = START_SPEED.minimum / FRESH_STARTS[0], START_SPEED.maximum / FRESH_STARTS[-1]
     if not low <= aim <= high:
         raise StudyError(f"speed = {aim:g} m/s: must be at least {low:.2g} m/s and at most {high:.3g} m/s")
-    before = np.array([float(motion.reacts.settings[paths[0].removeprefix("wearer.")]) for paths in groups[adapts]])
+    before = np.array([float(own[paths[0].removeprefix("wearer.")]) for paths in groups[adapts]])
     return Search(scenario, motion.reacts, groups[adapts], before, aim, restarts, generations, population, seed, adapts)

@@ -9,10 +9,11 @@ import pytest
 from numpy.typing import NDArray
 
 from ppafo.errors import DataError, StudyError
+from ppafo.questions.adapt.answer import Adaptation, Restart, Walked, wearer_text
 from ppafo.questions.adapt.problem import search_of
 from ppafo.questions.adapt.solve import JOURNAL, METRICS, adapt, adapt_into_folder, costs_of
 from ppafo.studies.draws import Outcomes
-from ppafo.wearers.loading import find_wearer
+from ppafo.wearers.loading import find_wearer, wearer_of
 
 SHORT = ["run.duration=6 s"]
 
@@ -26,6 +27,10 @@ SHORT = ["run.duration=6 s"]
         ({"generations": 0}, "generations = 0: must be at least 1"),
         ({"speed": 4.0}, "speed = 4 m/s: must be at least"),
         ({"adapts": "both"}, "must be one of alike, left, apart"),
+        (
+            {"overrides": ["wearer.reacts=spastic-calf"]},
+            "differ in soleus_stretch, gastrocnemius_stretch; take 'apart'",
+        ),
     ],
 )
 def test_what_cannot_be_searched_is_refused_in_one_line(words: Mapping[str, object], told: str) -> None:
@@ -48,6 +53,16 @@ def test_a_later_fall_costs_less_and_every_walk_less_than_a_fall() -> None:
     well, late, early, fast = costs_of(search, model, np.tile(search.before, (4, 1)))
     assert well < fast < late < early
     assert well == pytest.approx(60.0 / (80.0 * 9.81 * 1.3))
+
+
+@pytest.mark.parametrize("name", ["elderly", "drop-foot", "stiff-ankle", "spastic-calf"])
+def test_who_is_found_has_the_muscles_and_joints_of_who_was_searched_with(name: str, tmp_path: Path) -> None:
+    search = search_of("reacting", 1.3, "apart", 1, 1, 4, 1, [*SHORT, f"wearer.reacts={name}"])
+    nowhere = Walked((), {})
+    restart = Restart(1, search.before, (1.0,), nowhere)
+    file = tmp_path / "found.toml"
+    file.write_text(wearer_text(Adaptation(search, nowhere, (restart,)), restart))
+    assert wearer_of(find_wearer(file)) == search.wearer.body
 
 
 @pytest.mark.long
