@@ -350,6 +350,9 @@ def sample_lines(rows: Rows, moment: str) -> list[str]:
     ]
 
 
+FELL = "walk.fall_time"
+"""Row of the time of a fall [s], below 0 before one."""
+
 WEARER_ROWS = {
     "strides": "walk.strides",
     "way": "walker.pose.x",
@@ -357,7 +360,7 @@ WEARER_ROWS = {
     "muscle_work": "walk.muscle_work",
     "umberger": "reflexes.umberger",
     "bhargava": "reflexes.bhargava",
-    "fall_time": "walk.fall_time",
+    "fall_time": FELL,
 }
 """The rows that the sample of a wearer who reacts is made of, beside its time."""
 

@@ -30,9 +30,6 @@ from ppafo.simulation.simulate import gas_channels
 from ppafo.walking.channels import Channels, actuator_channels, controller_channels, valve_and_ground_channels
 from ppafo.walking.strides import counts_of_strides, first_less_help
 
-FELL = "walk.fall_time"
-"""Row of the time of a fall [s], below 0 before one."""
-
 
 def recording_of_reacting(
     configuration: Scenario,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.engine.lane_samples import FELL
 from ppafo.engine.lanes import BatchResult, Floats
 from ppafo.engine.program import LaneResult
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run
@@ -29,7 +30,7 @@ from ppafo.walking.gait_series import AnklePath, ankle_path, truncate
 from ppafo.walking.motion import walk_of
 from ppafo.walking.person import as_drawn
 from ppafo.walking.planning import course_of_walk, law_of
-from ppafo.walking.reacting import FELL, reacting_metrics, recording_of_reacting
+from ppafo.walking.reacting import reacting_metrics, recording_of_reacting
 from ppafo.walking.strides import (
     Curves,
     SegmentResult,

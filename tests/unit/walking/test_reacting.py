@@ -1,5 +1,6 @@
 """A wearer who reacts under the device: body and gas step by step, falls, columns, and what refuses one."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 import ppafo
+from ppafo.cli.main import main
 from ppafo.engine.lanes import BatchResult, run_batch, write_source
 from ppafo.engine.rows import leaf_paths, numbers, rebuild, row_numbers
 from ppafo.engine.run import Run, batch_of
@@ -125,16 +127,43 @@ def test_rows_of_an_ensemble_are_single_walks_to_the_bit() -> None:
         assert (name not in single) if np.isnan(value) else single[name].value == pytest.approx(value, rel=1e-9), name
 
 
+FALLS = ("wearer.tibialis_strength=0.02", "supply.dorsiflexion_pressure=6 psi_g", "run.duration=8 s")
+STUDY = f"""
+schema_version = 1
+name = "falls"
+[[configurations]]
+name = "weak"
+scenario = "reacting"
+overrides = {json.dumps(FALLS)}
+[[vary]]
+path = "wearer.start_speed"
+kind = "list"
+values = ["1.3 m/s"]
+[outputs]
+metrics = "all"
+trajectories = ["pressure_1"]
+every = "5 ms"
+"""
+
+
 @pytest.mark.long
-def test_a_study_counts_nothing_that_comes_after_a_fall_as_a_single_walk_does() -> None:
-    scenario = load_walk(
-        WALK, ["wearer.tibialis_strength=0.02", "supply.dorsiflexion_pressure=6 psi_g", "run.duration=8 s"]
-    )
-    single = ppafo.simulate(scenario).metrics
-    assert single["walked_time"].value < 6.0, "this one falls"
-    names = ["total_gas", "strides", "vented_strides", "mechanical_work", "largest_pressure"]
-    study = run_ensemble(scenario, {"wearer.tibialis_strength": np.array([0.02])}, names).metrics
-    assert {name: study[name][0] for name in names} == pytest.approx({name: single[name].value for name in names})
+def test_a_study_counts_nothing_that_comes_after_a_fall_as_a_single_walk_does(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "falls.toml").write_text(STUDY)
+    assert main(["sweep", str(tmp_path / "falls.toml"), "--out", str(tmp_path / "study")]) == 0
+    capsys.readouterr()
+    changes = [word for change in (*FALLS, "wearer.start_speed=1.3 m/s") for word in ("--set", change)]
+    assert main(["simulate", WALK, *changes, "--out", str(tmp_path / "single"), "--json"]) == 0
+    single = {name: item["value"] for name, item in json.loads(capsys.readouterr().out)["metrics"].items()}
+    assert single["walked_time"] < 6.0, "this one falls"
+    study = ppafo.load_study_results(tmp_path / "study")
+    row = study.table()
+    assert {name: float(row[name][0]) for name in single} == pytest.approx(single, rel=1e-9)
+    assert {"gas_supplied", "gas_vented", "work_per_gas"} < set(single)
+    pressure, alone = study.trajectories("pressure_1")[0], ppafo.read_result(tmp_path / "single").recording["pressure_1"]
+    np.testing.assert_array_equal(pressure[: len(alone)], alone.astype(np.float32))
+    assert np.isnan(pressure[len(alone) :]).all(), "nothing is kept after the fall"
 
 
 @pytest.mark.long

@@ -97,7 +97,7 @@ class StudyResults(Solved):
         return dict(zip(self.configurations, np.split(values, len(self.configurations)), strict=True))
 
     def trajectories(self, channel: str) -> np.ndarray[Any, Any]:
-        """Return a kept channel of all runs, shape (runs, samples), nan where a run failed."""
+        """Return a kept channel of all runs, shape (runs, samples), nan where a run failed and after a fall."""
         kept = self.document["study"]["outputs"].get("trajectories", ())
         if channel not in kept:
             raise StudyError(

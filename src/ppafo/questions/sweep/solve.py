@@ -125,7 +125,7 @@ def bands_file(study: Study, results: StudyResults, bins: BinsOf) -> tuple[bytes
         ),
         "channel": TableColumn(encode_texts(joined.pop("channel"), study.outputs.bands), "-", "name of the channel"),
         "time": TableColumn(joined.pop("time"), "s", "time since the start"),
-        "runs": TableColumn(joined.pop("runs"), "-", "completed runs"),
+        "runs": TableColumn(joined.pop("runs"), "-", "completed runs, without a fall so far"),
         **{name: TableColumn(values, _si_of_channel(study), "quantile over runs") for name, values in joined.items()},
     }
     beyond = max(outside_fraction(counts) for counts in merged.values())

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 from typing import NamedTuple, final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.control.kind import PythonController
+from ppafo.engine.lane_samples import FELL
 from ppafo.engine.lane_samples import REQUEST as REQUEST_ROW
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import Batch, BatchResult, Floats, add_meters, group_of, meters_of, run_blocks
@@ -143,9 +145,10 @@ class Outcome:
             states[:, runs], ends[:, runs] = result.states, task.at_last_sample(result)
             for name, values in read_from_traces.items():
                 values[runs] = _read(task, name, task.readings(ends[:, runs], runs, result.record))
+            stood = task.stood(result)[:: task.band_stride]
             for name in self.request.bands:
                 trace = result.record[:: task.band_stride, batch.program.traced.index(name)]
-                self.traces[name][: len(trace), members[runs]] = trace
+                self.traces[name][: len(trace), members[runs]] = np.where(stood, trace, np.nan)
 
         if self.request.custom is None:
             run_blocks(batch, take, threads)
@@ -176,7 +179,7 @@ class Outcome:
 class _MeteredBatch:
     """A batch with its meters, the metrics that it can have, and the interval of its samples.
 
-    ``late_totals`` are paths of the state, traced where the last step goes on after the last sample.
+    ``late_totals`` are paths of the state, traced where a run goes on after the last sample that counts.
     """
 
     batch: Batch
@@ -192,9 +195,19 @@ class _MeteredBatch:
             return result.states
         program, states = self.batch.program, result.states.copy()
         rows = row_numbers(program.state_rows())
+        last, runs = self.stood(result).sum(axis=0) - 1, np.arange(states.shape[1])
         for path in self.late_totals:
-            states[rows[path]] = result.record[-1, program.traced.index(path)]
+            states[rows[path]] = result.record[last, program.traced.index(path), runs]
         return states
+
+    def stood(self, result: BatchResult) -> NDArray[np.bool_]:
+        """At which samples of the traces (samples, runs) nobody had fallen: a recording ends there."""
+        program = self.batch.program
+        if FELL not in program.traced:
+            return np.ones((result.record.shape[0], result.record.shape[2]), dtype=np.bool_)
+        stood: NDArray[np.bool_] = result.record[:, program.traced.index(FELL)] < 0.0
+        stood[0] = True
+        return stood
 
     def readings(self, states: Floats, runs: slice, record: Floats | None) -> Readings:
         """The readings of some runs from their states at the last sample and, if there are, their traces."""
@@ -280,17 +293,21 @@ def _meter_batch(plain: Batch, request: Request) -> _MeteredBatch:
     interval = intervals(plain)
     stride = _stride(interval, request) if request.bands else 1
     late = _late_totals(plain, available)
-    traced = sorted({*read_from_traces, *request.bands, *late})
-    every_sample = bool(read_from_traces or (late and request.bands))
+    falls = {FELL} if program.reacts and (late or request.bands) else set[str]()
+    traced = sorted({*read_from_traces, *request.bands, *late, *falls})
+    every_sample = bool(read_from_traces or (late and (falls or request.bands)))
     trace_every = 1 if every_sample else stride if request.bands else max(1, samples_of(plain) - 1)
     batch = add_meters(plain, [meter for _, meter in meters], traced, trace_every if traced else 0)
     return _MeteredBatch(batch, available, interval, samples_of(plain), stride if every_sample else 1, late)
 
 
 def _late_totals(plain: Batch, metrics: Mapping[str, MetricKind]) -> tuple[str, ...]:
-    """Paths of what totals are made of, where metrics need them and the last step goes on after the last sample."""
+    """Paths of what totals are made of, where metrics need them and a run goes on after the last sample that counts.
+
+    The last step may, and so does all that comes after a fall.
+    """
     clock, program = plain.clock, plain.program
-    ends_there = clock.record_every * (clock.samples - 1) >= clock.step_count - SAME_MOMENT
+    ends_there = clock.record_every * (clock.samples - 1) >= clock.step_count - SAME_MOMENT and not program.reacts
     needed = {channel for kind in metrics.values() for channel in kind.channels}
     if ends_there or needed.isdisjoint(ThermalTotals._fields):
         return ()
