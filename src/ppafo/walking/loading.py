@@ -151,9 +151,9 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
 
 
 def _walked_with(scenario: Scenario) -> tuple[Any, ...]:
-    """Return what a walk on another bottle shares with a walk."""
-    motion = walk_of(scenario)
-    return scenario.device, scenario.control, scenario.sensors, motion.wearer, motion.gait, motion.course, motion.broken
+    """Return what a walk on another bottle shares with a walk: all but how long it is and what it hangs on."""
+    hardware = scenario.device, scenario.supply_lines, scenario.thermal, scenario.sensors, scenario.control
+    return *hardware, scenario.time_step, replace(walk_of(scenario), bottle=None)
 
 
 def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenario:

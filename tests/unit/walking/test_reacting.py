@@ -161,7 +161,10 @@ def test_a_study_counts_nothing_that_comes_after_a_fall_as_a_single_walk_does(
     row = study.table()
     assert {name: float(row[name][0]) for name in single} == pytest.approx(single, rel=1e-9)
     assert {"gas_supplied", "gas_vented", "work_per_gas"} < set(single)
-    pressure, alone = study.trajectories("pressure_1")[0], ppafo.read_result(tmp_path / "single").recording["pressure_1"]
+    pressure, alone = (
+        study.trajectories("pressure_1")[0],
+        ppafo.read_result(tmp_path / "single").recording["pressure_1"],
+    )
     np.testing.assert_array_equal(pressure[: len(alone)], alone.astype(np.float32))
     assert np.isnan(pressure[len(alone) :]).all(), "nothing is kept after the fall"
 

@@ -30,6 +30,8 @@ from ppafo.simulation.numbers import with_numbers
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.walking import WalkResult, load_walk, walk
 from ppafo.walking.bottle import Schedule, SupplyBalance
+from ppafo.walking.loading import on_bottle
+from ppafo.walking.motion import walk_of, with_duration
 
 ACTUATOR = Actuator(0.35, 2.27, 5.1e-5, 2e-6, 2e-6)
 SMALL = ["bottle.gas_mass=20 g", "bottle.volume=30 cm^3"]
@@ -324,6 +326,24 @@ def test_a_walk_whose_numbers_were_changed_in_python_is_not_taken_for_that_of_it
     changed = walk(with_numbers(load_walk("solenoid"), {"valve.area": 1.0e-6}), 0.1)
     with pytest.raises(ScenarioError, match="give the bottle where the walk is loaded"):
         endurance_of_walk(changed)
+
+
+@pytest.mark.parametrize(
+    ("name", "numbers"),
+    [
+        ("reacting", {"wearer.tibialis_strength": 0.5}),
+        ("reacting", {"wearer.left_soleus_force": 1.0}),
+        ("solenoid", {"sensors.force_bandwidth": 20.0}),
+        ("solenoid-regulators", {"supply_line.plantarflexion.droop": 1.0e9}),
+    ],
+)
+def test_any_number_that_was_changed_in_python_is_noticed_and_another_length_is_none(
+    name: str, numbers: dict[str, float]
+) -> None:
+    whole = load_walk(name)
+    assert walk_of(on_bottle(with_duration(whole, 12.0), PAPER_BOTTLE)).bottle is not None
+    with pytest.raises(ScenarioError, match="a number was changed after it was loaded"):
+        on_bottle(with_numbers(whole, numbers), PAPER_BOTTLE)
 
 
 def test_the_folder_of_an_earlier_version_is_to_be_written_again(tmp_path: Path) -> None:
