@@ -1,7 +1,7 @@
 """Print who of the shipped healthy wearers walks on over slopes and steps and after pushes, with the device and off.
 
 Each cell counts the walks of 20 s without a fall, of eight in which slope, step or push begins at another place within
-a stride: with the device off, and with it. Some three minutes of one processor:
+a stride: with the device off, and with it. Some four minutes of one processor:
 
     python scripts/uneven_ground.py
 """
@@ -13,10 +13,11 @@ import numpy as np
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.walking import load_walk
 from ppafo.walking.walk import with_device_off
+from ppafo.wearers.loading import list_wearers
 
-WEARERS = ("geyer-herr", "healthy-98", "healthy-110", "healthy-123", "healthy-128", "healthy-138")
+WEARERS = tuple(name for name in list_wearers() if name.startswith(("geyer", "healthy")))
 PLACES = np.linspace(6.0, 7.2, 8)
-"""Where it begins [m]: after four strides or more, spread over one."""
+"""Where it begins [m]: after three strides or more, spread over most of one."""
 
 CONDITIONS = {
     "wearer.slope": ("slope", (-0.08, -0.06, -0.04, -0.02, 0.02, 0.04, 0.06, 0.08), "%", 100.0),

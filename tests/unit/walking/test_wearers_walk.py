@@ -11,20 +11,13 @@ from ppafo.gait.document import load_gait
 from ppafo.signals.recording import Recording
 from ppafo.walking import load_walk, walk
 from ppafo.walking.walk import with_device_off
+from ppafo.wearers.loading import list_wearers
 from ppafo.wearers.published import WEIGHT
 
 pytestmark = pytest.mark.long
 
-SPEEDS = {
-    "healthy-98": 0.98,
-    "healthy-110": 1.10,
-    "healthy-111": 1.11,
-    "healthy-123": 1.23,
-    "healthy-127": 1.27,
-    "healthy-128": 1.28,
-    "healthy-138": 1.38,
-}
-"""Walking speeds [m/s] that the files state."""
+SPEEDS = {name: int(name.removeprefix("healthy-")) / 100.0 for name in list_wearers() if name.startswith("healthy-")}
+"""Walking speeds [m/s] that the names of the files state."""
 
 SETTLED = 5.0
 

@@ -1,5 +1,8 @@
 """Wearer files: the shipped ones, those based on another, and what is wrong with a file in one line."""
 
+import re
+import shlex
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -10,7 +13,7 @@ from ppafo.model.wearer.walker import Assist, next_walker
 from ppafo.wearers.loading import find_wearer, list_wearers, wearer_of
 from ppafo.wearers.published import felt_at, first_answer, start_of, start_with_size, with_size
 
-HEALTHY = ("healthy-98", "healthy-110", "healthy-111", "healthy-123", "healthy-127", "healthy-128", "healthy-138")
+HEALTHY = tuple(name for name in list_wearers() if name.startswith("healthy-"))
 
 
 def written(folder: Path, text: str) -> Path:
@@ -25,7 +28,8 @@ def test_every_shipped_wearer_says_how_it_was_found(name: str) -> None:
     assert wearer.name == name
     assert wearer.title
     assert wearer.source
-    assert wearer.found == "published" or wearer.found.startswith("by search: from geyer-herr seed")
+    start = re.match("by search: from (.+) seed", wearer.found)
+    assert wearer.found == "published" or (start and start[1] in list_wearers())
     assert wearer_of(wearer).weight == pytest.approx(80.0 * 9.81)
 
 
@@ -33,6 +37,17 @@ def test_at_least_five_healthy_wearers_have_gains_of_their_own() -> None:
     gains = {find_wearer(name).left_gains for name in HEALTHY}
     assert len(gains) == len(HEALTHY) >= 5
     assert all(find_wearer(name).left_gains == find_wearer(name).right_gains for name in HEALTHY)
+
+
+@pytest.mark.parametrize("name", [name for name in list_wearers() if "ppafo adapt" in find_wearer(name).notes])
+def test_the_command_that_repeats_a_wearer_is_of_the_search_that_its_file_states(name: str) -> None:
+    wearer = find_wearer(name)
+    command = shlex.split(wearer.notes[wearer.notes.index("ppafo adapt") :])
+    given = dict(pairwise(command))
+    start = command[command.index("--set") + 1].removeprefix("wearer.reacts=")
+    stated = f"by search: from {start} seed {given['--seed']} restart [1-{given['--restarts']}] "
+    stated += f"{given['--generations']} generations of 16 towards {given['--speed']}"
+    assert re.fullmatch(stated, wearer.found)
 
 
 def test_a_disease_changes_one_leg_and_keeps_the_gains() -> None:
@@ -46,6 +61,9 @@ def test_a_disease_changes_one_leg_and_keeps_the_gains() -> None:
     old, young = wearer_of(find_wearer("elderly")), wearer_of(healthy)
     assert old.right.soleus.force == pytest.approx(0.7 * young.right.soleus.force)
     assert old.left.flexor.velocity == pytest.approx(0.8 * young.left.flexor.velocity)
+    adapted = wearer_of(find_wearer("elderly-adapted"))
+    assert (adapted.left, adapted.right) == (old.left, old.right)
+    assert adapted.left_gains != old.left_gains
 
 
 @pytest.mark.parametrize(
