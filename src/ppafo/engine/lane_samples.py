@@ -6,6 +6,7 @@ get the course of the reference too, which is looked at once before the first sa
 
 from ppafo.engine.lane_rows import LaneRows, Rows, indent
 from ppafo.engine.led_leg import GAIT_SHANK
+from ppafo.engine.pieces import OTHER
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, leaves
 from ppafo.engine.run_rows import RunRows
@@ -45,9 +46,18 @@ READINGS = {
 
 def control_loop(rows: Rows) -> list[str]:
     """Sense and control, at every sample; nothing where the caller sets the command."""
-    controller = rows.program.controller
-    if controller is None:
+    if rows.program.controller is None:
         return []
+    other = rows.of_other_leg()
+    devices = [rows] if other is None else [rows, other]
+    loops = [line for device in devices for line in device.over_lanes(sampled(device))]
+    return ["if step_index % steps_per_sample == 0:", *indent([*places(rows), *loops])]
+
+
+def sampled(rows: Rows) -> list[str]:
+    """What the controller of a device does at a sample."""
+    controller = rows.program.controller
+    assert controller is not None, "a controller takes samples"
     groups = ("timing", "plant", "state", "controller", "controller_state", "reference")
     lines = [
         *[rows.load(group) for group in groups],
@@ -60,7 +70,7 @@ def control_loop(rows: Rows) -> list[str]:
     ]
     if rows.program.fails:
         lines = [*lines[: len(groups)], *sampled_with_faults(rows, lines[len(groups) :])]
-    return ["if step_index % steps_per_sample == 0:", *indent([*places(rows), *rows.over_lanes(lines)])]
+    return lines
 
 
 def sampled_with_faults(rows: Rows, lines: list[str]) -> list[str]:
@@ -220,10 +230,12 @@ def remember_commands(rows: Rows) -> list[str]:
     """Keeps the command of every step, where the valve gets it late."""
     if not rows.program.late_commands:
         return []
+    other = rows.of_other_leg()
     lines = [
-        f"command_history[command_place, lane] = {rows.cells['result.command']}",
+        f"command_history[{device.first_command}command_place, lane] = {device.cells['result.command']}"
+        for device in ([rows] if other is None else [rows, other])
     ]
-    return ["command_place = step_index % command_history.shape[0]", *rows.over_lanes(lines)]
+    return [f"command_place = step_index % {rows.command_slots}", *rows.over_lanes(lines)]
 
 
 TRACED: dict[str, str] = {
@@ -246,6 +258,15 @@ TRACED_IN_WALKS: dict[str, str] = {
     "gait_fraction": "clock.fraction",
 }
 """Further ones of a walk: how the path of a number of its state ends, which not every controller has."""
+OF_OTHER = {
+    "other_ankle_angle": f"{OTHER}state.angle",
+    **{f"{OTHER}{name}": f"{OTHER}{name}" for name in ("pressure_1", "pressure_2", "torque")},
+    f"{OTHER}command": f"{OTHER}result.command",
+    **{f"{OTHER}{name}": f"{OTHER}walk.{name}" for name in ("external_torque", "contact", "heel_force", "toe_force")},
+}
+"""Those of a device on the other leg, and where a sample has them."""
+GAS_TOTALS = ("supplied_mass", "vented_mass", "leaked_mass")
+"""What is counted of both devices together where there are two."""
 REQUEST = "controller_state.request.torque"
 """Where a controller of walking keeps the torque that it wants, if it wants one."""
 TRUE_MASSES = {name: f"masses.{name}" for name in ("mass_1", "mass_2")}
@@ -328,10 +349,11 @@ def sample_lines(rows: Rows, moment: str) -> list[str]:
         "temperature_1": warm[0] if thermal else "0.0",
         "temperature_2": warm[1] if thermal else "0.0",
     }
-    groups: tuple[str, ...] = ()
+    groups: tuple[str, ...] = tuple(f"{OTHER}{name}" for name in ("state", "held", "result", "walk"))
+    groups = groups if program.devices == 2 else ()
     foot, stride, on_gait = _zeros(FootSample), _zeros(StrideSample), []
     if program.walks:
-        groups = ("walk", "controller_state")
+        groups += ("walk", "controller_state")
         wanted, stride = _of_state(rows, REQUEST), _stride_values(rows)
     if program.shank is GAIT_SHANK:
         groups = ("shank",)
@@ -343,11 +365,26 @@ def sample_lines(rows: Rows, moment: str) -> list[str]:
         *[rows.load(group) for group in ("timing", "plant", "state", "result", "reference", *of_gas, *groups)],
         *present_pressures(rows),
         torque_line(rows, "state.angle"),
+        *(torque_of_other(rows) if program.devices == 2 else []),
         f"wanted = {wanted}",
         *on_gait,
         f"sample = {_row(add(Sample), values)}",
         *(wearer_sample(rows) if any(kind.of_wearer for kind in program.meters) else []),
     ]
+
+
+def torque_of_other(rows: Rows) -> list[str]:
+    """Lines that make both pressures and the torque of a second device."""
+    first, second, torque = (f"{OTHER}{name}" for name in ("pressure_1", "pressure_2", "torque"))
+    return [
+        f"{first}, {second} = {rows.add(held_pressures)}({OTHER}held, {OTHER}state)",
+        f"{torque} = {rows.add(actuator_torque)}({first}, {second}, plant.torque_constant)",
+    ]
+
+
+def gas_total(program: Program, name: str) -> str:
+    """Expression for what is counted of the gas of all devices."""
+    return f"state.{name}" if program.devices == 1 else f"(state.{name} + {OTHER}state.{name})"
 
 
 FELL = "walk.fall_time"
@@ -385,7 +422,7 @@ def _stride_values(rows: Rows) -> dict[str, str]:
     """Where a walk is in its stride."""
     totals = ("strides", "push_off_work", "slap_rates", "clearances", "toe_landings")
     return {
-        "supplied_mass": "state.supplied_mass",
+        "supplied_mass": gas_total(rows.program, "supplied_mass"),
         **{name: f"walk.{name}" for name in totals},
         "phase": _of_state(rows, TRACED_IN_WALKS["controller_phase"]),
         "level": _of_state(rows, TRACED_IN_WALKS["safe_state"]),
@@ -406,12 +443,14 @@ def walk_traces(program: Program) -> dict[str, str]:
     found = {
         name: next((path for path in paths if path.endswith(ending)), "") for name, ending in TRACED_IN_WALKS.items()
     }
+    found |= OF_OTHER if program.devices == 2 else {}
     return {name: path for name, path in found.items() if path}
 
 
 def _traced_paths(program: Program) -> dict[str, str]:
     """Where a sample has channels that are no number of the state itself."""
-    return TRACED | walk_traces(program) | (TRUE_MASSES if program.has_true_masses else {})
+    totals = {name: gas_total(program, name) for name in GAS_TOTALS}
+    return TRACED | totals | walk_traces(program) | (TRUE_MASSES if program.has_true_masses else {})
 
 
 def _trace_lines(rows: LaneRows, moment: str) -> list[str]:

@@ -173,8 +173,7 @@ def join_results(results: Sequence[BatchResult]) -> BatchResult:
 
 def _run_block(module: ModuleType, batch: Batch, runs: slice, stop: threading.Event) -> BatchResult:
     """One block from beginning to end, in calls short enough for an interrupt to be seen between them."""
-    traced = len(batch.program.traced)
-    block = LaneBlock(module, batch.clock, batch.parameters[:, runs], batch.states[:, runs], traced)
+    block = LaneBlock(module, batch.program, batch.clock, batch.parameters[:, runs], batch.states[:, runs])
     steps = batch.clock.step_count
     for done in range(0, steps, STEPS_PER_CALL):
         if stop.is_set():
@@ -187,7 +186,7 @@ def _run_block(module: ModuleType, batch: Batch, runs: slice, stop: threading.Ev
 class LaneBlock:
     """One block of runs in progress; ``states`` (rows, runs) may be read and written between two ``advance``."""
 
-    def __init__(self, module: ModuleType, clock: Clock, parameters: Floats, states: Floats, traced: int = 0) -> None:
+    def __init__(self, module: ModuleType, program: Program, clock: Clock, parameters: Floats, states: Floats) -> None:
         self._module = module
         self._clock = clock
         self._width = states.shape[1]
@@ -197,9 +196,9 @@ class LaneBlock:
         records = clock.samples if clock.record_every else 0
         self._record = np.empty((records, states.shape[0], self._width))
         traces = (clock.samples - 1) // clock.trace_every + 1 if clock.trace_every else 0
-        self._trace = np.empty((traces, traced, self.states.shape[1]))
+        self._trace = np.empty((traces, len(program.traced), self.states.shape[1]))
         self._signals = np.zeros((SIGNAL_ROWS, clock.signal_delay + 2, self.states.shape[1]))
-        self._commands = np.zeros((clock.command_delay + 2, self.states.shape[1]))
+        self._commands = np.zeros((program.devices * (clock.command_delay + 2), self.states.shape[1]))
 
     def advance(self, step_count: int) -> None:
         """Go ``step_count`` steps on."""
@@ -245,8 +244,7 @@ def begin_block(batch: Batch) -> LaneBlock:
     runs, most = batch.states.shape[1], lanes_of(batch.program)
     if runs > most:
         raise ValueError(f"{runs} runs do not fit a block of {most}; the others would stand still")
-    module, traced = load_program(batch.program), len(batch.program.traced)
-    return LaneBlock(module, batch.clock, batch.parameters, batch.states, traced)
+    return LaneBlock(load_program(batch.program), batch.program, batch.clock, batch.parameters, batch.states)
 
 
 def _pad_columns(columns: Floats) -> Floats:

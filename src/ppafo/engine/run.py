@@ -35,6 +35,8 @@ Members = NDArray[np.intp]
 Floats = NDArray[np.float64]
 
 NEVER_FAILED = 1.0e300
+AT_REST = LaneResult(command=0.0, failure_time=NEVER_FAILED, too_many_parts=0.0)
+"""A device before its first step."""
 TOO_MANY_PARTS = (
     f"a step was cut into {MAXIMUM_PARTS:,} parts and was still not done: try a smaller run.step, and check the delays "
     "of the valve, the inertia and the volumes (ppafo audit)"
@@ -62,7 +64,10 @@ class Walk:
 
 @dataclass(frozen=True, slots=True)
 class ReactingWalk:
-    """What a wearer who reacts adds to a run: the device on the left leg, the body, and where all of it begins."""
+    """What a wearer who reacts adds to a run: the device on the left leg, the body, and where all of it begins.
+
+    ``on_both`` is true where a second device is on the right leg: an ``OtherDevice`` of the run.
+    """
 
     share: DeviceShare
     body: "Body"
@@ -72,6 +77,17 @@ class ReactingWalk:
     reflexes: "Reflexes"
     nerves: "Nerves"
     failing: tuple[PlantFaults, ShutOff] | None = None
+    on_both: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class OtherDevice:
+    """Where a second device begins, on the right leg of a wearer who reacts, and its sensors, which do not fail."""
+
+    initial: PlantState
+    walk: "ReactingState"
+    sensors: SensorParameters
+    gait_sensors: GaitSensors
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +134,7 @@ class Run:
     lines: Lines | None = None
     effects: tuple[Any, ...] = ()
     leg: LedLeg | None = None
+    other: OtherDevice | None = None
 
     @property
     def period(self) -> float:
@@ -152,13 +169,13 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     walk, walk_states = _walk_groups(run.walk) if run.reacting is None else _reacting_groups(run.reacting)
     lines, line_states = ([], []) if run.lines is None else ([run.lines.parameters], [run.lines.initial])
     leg = [] if run.leg is None else [run.leg.load, run.leg.shank]
-    rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, *leg, *run.effects]
+    other = [] if run.other is None else [run.other.sensors, run.other.gait_sensors]
+    rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, *leg, *run.effects, *other]
     parameters = table([timing, *plant, *valve, *rest], runs)
     controller_state = NoParameters() if program.controller is None else program.controller.initial
-    result = LaneResult(command=0.0, failure_time=NEVER_FAILED, too_many_parts=0.0)
-    further = [*walk_states, *line_states, *states_at_start(run)]
+    further = [*walk_states, *line_states, *states_at_start(run), *_states_of_other(run)]
     states = table(
-        [result, Pace(run.step), run.initial, gas_at_start(run), program.valve.initial(), controller_state, *further],
+        [AT_REST, Pace(run.step), run.initial, gas_at_start(run), program.valve.initial(), controller_state, *further],
         runs,
     )
     counts = np.empty((runs, 6))
@@ -284,6 +301,17 @@ def _reacting_groups(walk: ReactingWalk) -> tuple[list[Any], list[Any]]:
     failing = [] if walk.failing is None else [*walk.failing]
     states = [walk.initial, NOTHING_SEEN, walk.walker, walk.reflexes, walk.nerves]
     return [walk.share, walk.body, walk.sensors, *failing], [*states, *([POWERED] if failing else [])]
+
+
+def _states_of_other(run: Run) -> list[Any]:
+    """Initial states of a second device, in the order of ``Program``."""
+    if run.other is None:
+        return []
+    alike = replace(run, initial=run.other.initial)
+    controller = () if run.program.controller is None else run.program.controller.initial
+    lines = [] if run.lines is None else [run.lines.initial]
+    device = [run.other.initial, gas_at_start(alike), run.program.valve.initial(), controller]
+    return [AT_REST, *device, run.other.walk, NOTHING_SEEN, *lines, *states_at_start(alike)]
 
 
 def _members(group: Members, groups: int) -> list[Members]:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.metrics.metric import Floats, MetricKind, Readings
+from ppafo.metrics.metric import ONE_DEVICE, Floats, MetricKind, Readings
 from ppafo.model.columns import choose
 from ppafo.signals import Recording
 from ppafo.signals.meter import Course, MeterKind, Sample
@@ -216,7 +216,13 @@ METRICS = (
         read_gas_leaked,
     ),
     MetricKind(
-        "gas_imbalance", "kg", "supplied less vented less stored gas", _BALANCE, gas_imbalance, read_gas_imbalance
+        "gas_imbalance",
+        "kg",
+        "supplied less vented less stored gas",
+        _BALANCE,
+        gas_imbalance,
+        read_gas_imbalance,
+        needs=(ONE_DEVICE,),
     ),
     MetricKind(
         "energy_imbalance",
@@ -253,6 +259,24 @@ METRICS = (
         read_mechanical_work,
         (WORK,),
     ),
-    MetricKind("work_per_gas", "J/kg", "work per supplied gas", _EFFORT, work_per_gas, read_work_per_gas, (WORK,)),
-    MetricKind("gas_per_work", "kg/J", "supplied gas per work", _EFFORT, gas_per_work, read_gas_per_work, (WORK,)),
+    MetricKind(
+        "work_per_gas",
+        "J/kg",
+        "work per supplied gas",
+        _EFFORT,
+        work_per_gas,
+        read_work_per_gas,
+        (WORK,),
+        needs=(ONE_DEVICE,),
+    ),
+    MetricKind(
+        "gas_per_work",
+        "kg/J",
+        "supplied gas per work",
+        _EFFORT,
+        gas_per_work,
+        read_gas_per_work,
+        (WORK,),
+        needs=(ONE_DEVICE,),
+    ),
 )

@@ -183,10 +183,13 @@ _REACTING = "ppafo.engine.scheme.reacting:"
 
 def _leg_scheme(walk: Walk | ReactingWalk) -> str:
     """Return where the scheme of a walking leg is."""
+    fails = "" if walk.failing is None else "FAILING_"
     if isinstance(walk, ReactingWalk):
-        return f"{_REACTING}{'REACTING' if walk.failing is None else 'FAILING_REACTING'}"
+        if walk.on_both:
+            return f"{_REACTING}{fails}REACTING_ON_BOTH"
+        return f"{_REACTING}{fails}REACTING"
     which = "STRIDES" if walk.course is None else "COURSE"
-    return f"{_WALKING}{which}" if walk.failing is None else f"{_WALKING}FAILING_{which}"
+    return f"{_WALKING}{fails}{which}"
 
 
 def _gas_scheme(pieces: Pieces, effects: Sequence[Effect]) -> GasScheme:

@@ -31,10 +31,10 @@ class SampledRun:
         self._batch = batch
         self._block = LaneBlock(
             load_program(program) if module is None else module,
+            program,
             clock,
             batch.parameters,
             batch.states,
-            len(program.traced),
         )
         self._reference, self._step = _group(batch, "reference"), _group(batch, "timing").step
         self._see = (_gait_measurements if program.walks else _measurement_source)(batch, self._block)

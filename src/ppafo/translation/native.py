@@ -354,8 +354,7 @@ def run_native(program: ModuleType, batch: Batch) -> BatchResult:
     results = []
     for first in range(0, runs, lanes):
         own = slice(first, min(first + lanes, runs))
-        traced = len(batch.program.traced)
-        block = LaneBlock(program, batch.clock, batch.parameters[:, own], batch.states[:, own], traced)
+        block = LaneBlock(program, batch.program, batch.clock, batch.parameters[:, own], batch.states[:, own])
         block.advance(batch.clock.step_count)
         results.append(block.result())
     return join_results(results)

@@ -76,6 +76,9 @@ EndKind = Literal["walk's end", "empty", "too cold", "frozen", "iced", "too litt
 WALKED: EndKind = "walk's end"
 DIVERGED: EndKind = "diverged"
 
+REGULATED, _LINE = "line_state.regulated_mass", "line_state.mass_1"
+"""Rows of the gas that went through the regulator of a line, and of that in it [kg]."""
+
 _PARAMETERS = (
     "plant.gas_product",
     "plant.valve_conductance",
@@ -462,7 +465,8 @@ def _use_bottle(
     count = batch.clock.step_count
     block = begin_block(batch)
     states = row_numbers(batch.program.state_rows())
-    regulated, line = states["line_state.regulated_mass"], states["line_state.mass_1"]
+    # Where there are two devices, each hangs on the bottle by a line of its own.
+    regulated, lines = ([row for path, row in states.items() if path.endswith(end)] for end in (REGULATED, _LINE))
     every = max(1, round(supply.coupling / run.step))
     table, met, walked_before = supply.bottle.fluid.table, use.met, use.walked
     assert run.lines is not None, "a bottle feeds lines"
@@ -479,7 +483,7 @@ def _use_bottle(
     )
     window = max(2, math.ceil(_STRIDES * stride_time / (every * run.step))) * every
     gauges = [(0, 1.0)]
-    done, first = 0, float(batch.states[regulated, 0])
+    done, first = 0, float(batch.states[regulated, 0].sum())
     before, until_rest = first, count
     if schedule is not None and schedule.rest > 0.0:
         until_rest = max(1, round((schedule.walk - use.walked % schedule.walk) / run.step))
@@ -494,14 +498,15 @@ def _use_bottle(
         use.ending = _divergence(block.states, states["result.failure_time"], state, time)
         if use.ending is not None:
             break
-        mass, before = passed * (float(block.states[regulated, 0]) - before), float(block.states[regulated, 0])
+        now_regulated = float(block.states[regulated, 0].sum())
+        mass, before = passed * (now_regulated - before), now_regulated
         content = met[-1][2].content
         state = advance_supply(table, supply.line, supply.bottle.supply, state, content, mass, steps * run.step)
         now = supply.offers(state, content.temperature, mass)
         met.append((time, state, now))
         gauges = [
             *(old for old in gauges if old[0] > done - window),
-            (done, lanes.gauge(float(block.states[line, 0]), now)),
+            (done, min(lanes.gauge(float(block.states[line, 0]), now) for line in lines)),
         ]
         use.ending = _ending(supply, state, now, max(gauge for _, gauge in gauges), time)
         if schedule is not None and use.ending is None:

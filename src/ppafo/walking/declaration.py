@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
@@ -43,7 +43,7 @@ from ppafo.simulation.schema import (
     quantity_fields,
 )
 from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BOTTLE_NUMBERS, BOTTLE_OVERRIDES
-from ppafo.walking.reacting_wearer import REACTIONS, REACTS
+from ppafo.walking.reacting_wearer import DEVICE_ON, LEGS, REACTIONS, REACTS
 from ppafo.walking.wearer import WEARER
 
 THRESHOLDS = next(iter(TIMINGS))
@@ -53,6 +53,8 @@ REACTS_SUMMARY = (
     "name of a wearer who reacts, or the path of its file; the gait is prescribed unless given, and strengths of "
     "muscles, gains and the start speed are for a wearer who reacts alone"
 )
+
+DEVICE_ON_SUMMARY = "on which legs a wearer who reacts has a device: the left one, or one like it on both"
 
 ARITHMETIC = "controller.arithmetic"
 """Where a walk says whether its controller computes with floats or with whole numbers."""
@@ -201,7 +203,7 @@ def _texts(document: Mapping[str, Any]) -> tuple[str, ...]:
         "gas_model.kind",
         *(f"faults.{part}.kind" for part in (*FAULTY, *PLANT_FAULTS)),
     )
-    return (*TEXTS, "motion.kind", "gait", "course", REACTS, BOTTLE_NAME, *kinds, *arithmetic)
+    return (*TEXTS, "motion.kind", "gait", "course", REACTS, DEVICE_ON, BOTTLE_NAME, *kinds, *arithmetic)
 
 
 def others_wearer(reacts: bool) -> set[str]:
@@ -307,7 +309,12 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
         "timing": optional(_timing(), "how the controller knows the time in the stride; thresholds unless given"),
         "wearer": optional(
             table(
-                "Wearer", {"reacts": optional(str, REACTS_SUMMARY), **quantity_fields((*WEARER, PERSON, *REACTIONS))}
+                "Wearer",
+                {
+                    "reacts": optional(str, REACTS_SUMMARY),
+                    "device_on": optional(Literal[LEGS], DEVICE_ON_SUMMARY),
+                    **quantity_fields((*WEARER, PERSON, *REACTIONS)),
+                },
             ),
             "who walks; the subject of the gait that is named, else the paper's, unless given",
         ),

@@ -16,7 +16,7 @@ from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
 from ppafo.engine.lanes import Batch
 from ppafo.engine.rows import leaf_paths, leaves, rebuilt
-from ppafo.engine.run import ReactingWalk, Run, Walk, batches_of
+from ppafo.engine.run import OtherDevice, ReactingWalk, Run, Walk, batches_of
 from ppafo.engine.scheme.walking import WalkState
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
@@ -44,6 +44,7 @@ from ppafo.walking.preparation import (
     device_share,
     longest_delay,
     sensors_of,
+    sensors_of_other,
     smallest_chamber,
     vented_state,
     walk_from_standing,
@@ -52,7 +53,7 @@ from ppafo.walking.preparation import (
     with_leg,
     without_leg,
 )
-from ppafo.walking.reacting_wearer import LONGEST_STEP, start_of_body
+from ppafo.walking.reacting_wearer import BOTH, DEVICE_ON, LONGEST_STEP, start_of_body
 from ppafo.walking.wearer import Build, leg_parameters
 
 NO_REFERENCE = ProfileChoice("constant", {"level": 0.0})
@@ -140,6 +141,7 @@ def _plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         reflexes=start.reflexes,
         nerves=start.nerves,
         failing=failing_of(scenario),
+        on_both=wearer.on_both,
     )
     controller, settings, problems = controller_of(scenario)
     delay = _of_each(longest_delay, sensors) * scenario.control.period
@@ -150,7 +152,23 @@ def _plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         lambda plant: vented_state(plant, start.ankle, 0.0),
         walk,
     )
+    if wearer.on_both:
+        initial = vented_state(run.plant, start.other_ankle, 0.0)
+        alike = sensors_of_other(run.sensors)
+        run = replace(run, other=OtherDevice(initial, start.other_walk, alike, _sensors_without_faults(scenario)))
+        problems = (*problems, _lacks_both(scenario))
     return run, (too_many_steps(scenario, run.step, run.step_count), *problems, _too_long(scenario))
+
+
+def _lacks_both(scenario: Scenario) -> Problem:
+    """What does not go with a device on either leg."""
+    has_valve, is_outside = bool(walk_of(scenario).shut_off), scenario.control.kind == PYTHON_CONTROLLER
+    what = (
+        "a shut-off valve is in the line of one device"
+        if has_valve
+        else "a chip or a Python object commands one device"
+    )
+    return np.asarray(has_valve or is_outside), lambda _run: f"{DEVICE_ON} = {BOTH}: {what}; leave out one of both"
 
 
 def _too_long(scenario: Scenario) -> Problem:
@@ -213,7 +231,15 @@ def _of_each(function: Any, *rows: Any) -> Any:
 
 def gait_sensors_of(scenario: Scenario) -> GaitSensors:
     """The sensors of a walk with their faults, at the sample period of its controller."""
+    return _gait_sensors(scenario, sensor_settings(scenario))
+
+
+def _sensors_without_faults(scenario: Scenario) -> GaitSensors:
     settings = sensor_settings(scenario)
+    return _gait_sensors(scenario, replace(settings, faults=dict.fromkeys(settings.faults, FaultSettings())))
+
+
+def _gait_sensors(scenario: Scenario, settings: SensorSettings) -> GaitSensors:
     names, values = tuple(settings.numbers), [*settings.numbers.values()]
     faults = [(sensor, fault.kind, tuple(fault.numbers)) for sensor, fault in settings.faults.items()]
     values += [value for fault in settings.faults.values() for value in fault.numbers.values()]

@@ -57,7 +57,7 @@ VARIED: tuple[tuple[str, tuple[str, ...]], ...] = (
     *((name, ()) for name in list_walks()),
     ("proportional-regulators", EVERYTHING),
     ("proportional", ("course=first-steps",)),
-    ("reacting", ("course=ramp-and-kerb",)),
+    ("reacting", ("course=ramp-and-kerb", "wearer.device_on=both", *SEEN, *THERMAL)),
 )
 """Every shipped walk, one with every further feature (sensors with faults, thermal gas, slow valve), and courses."""
 
@@ -128,7 +128,7 @@ def numbers_in_c(library: ctypes.CDLL, values: Values, rows: tuple[int, int]) ->
 def batches(name: str, overrides: tuple[str, ...], settings: tuple[Setting, ...]) -> Iterator[tuple[Values, Batch]]:
     """Settings as they are, then drawn ones, each with what Python plans of them."""
     draw = np.random.default_rng(15)
-    kinds = [text for text in overrides if "kind=" in text or text.startswith("course")]
+    kinds = [text for text in overrides if "kind=" in text or text.startswith(("course", "wearer.device_on"))]
     values = {item.path: item.value for item in settings}
     while True:
         try:
@@ -179,8 +179,12 @@ def test_every_sample_of_drawn_settings_has_the_bits_of_the_lanes(
     item = walk_library(load_walk(name, overrides))
     library = built(load_walk(name, overrides), tmp_path)
     paths = {"angle": "state.angle", "angular_velocity": "state.angular_velocity", "command": "result.command"}
-    paths |= {"supplied_mass": "state.supplied_mass", "leaked_mass": "state.leaked_mass"}
-    paths |= walk_traces(item.program.program)
+    program = item.program.program
+    totals = {name: f"state.{name}" for name in ("supplied_mass", "leaked_mass")}
+    paths |= {} if program.devices == 2 else totals
+    paths |= {
+        output: path for output, path in walk_traces(program).items() if path in row_numbers(program.state_rows())
+    }
     for values, batch in itertools.islice(batches(name, overrides, item.settings), 1, 1 + RUNS):
         found = samples_in_c(library, item.name, values, len(item.program.outputs))
         record = run_batch(batch, 1).record[:, :, 0]
@@ -188,6 +192,9 @@ def test_every_sample_of_drawn_settings_has_the_bits_of_the_lanes(
         for output, path in paths.items():
             column = found[:, 1 + item.program.outputs.index(output)]
             assert column.tobytes() == record[:, rows[path]].tobytes(), output
+        for output, path in totals.items() if program.devices == 2 else ():
+            both = record[:, rows[path]] + record[:, rows[f"other_{path}"]]
+            assert found[:, 1 + item.program.outputs.index(output)].tobytes() == both.tobytes(), output
 
 
 def shown(folder: Path, name: str, *command: str) -> tuple[list[str], Samples, dict[str, float]]:

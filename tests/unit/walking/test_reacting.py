@@ -74,10 +74,11 @@ def test_each_step_of_the_lanes_is_the_step_of_plain_python_to_the_bit() -> None
         reflexes, nerves = group(reacting.Reflexes, "reflexes", sample), group(Nerves, "nerves", sample)
         assist, walker = reacting.assist_of(run.plant, walk.share, state, held), group(Walker, "walker", sample)
         reflexes = reacting.next_reflexes(walk.body, nerves, reflexes, walker) if reflexes.due else reflexes
-        body = reacting.next_body(walk.body, walker, reflexes, before, assist, run.step)
+        body = reacting.next_body(walk.body, walker, reflexes, before, assist, reacting.no_assist(), run.step)
         assert numbers(body.after) == numbers(group(Walker, "walker", sample + 1)), sample
         after: PlantState = group(PlantState, "state", sample + 1)
-        ankle = reacting.ankle_of(run.plant, body, before.fall_time)
+        pose, rates = body.after.pose, body.after.rates
+        ankle = reacting.ankle_of(run.plant, pose.left, rates.left, pose.lean, rates.lean, before.fall_time)
         assert (ankle.angle, ankle.rate) == (after.angle, after.angular_velocity)
         later = reacting.waiting_reflexes(reflexes, before.fall_time, run.step)
         assert numbers(later) == numbers(group(reacting.Reflexes, "reflexes", sample + 1))

@@ -7,7 +7,7 @@ step, which is 0.1 ms long. What sensors, faults, controllers and metrics read o
 
 from typing import Any, NamedTuple
 
-from ppafo.engine.pieces import LegScheme, Phases, RarePhase
+from ppafo.engine.pieces import OTHER, LegScheme, Phases, RarePhase
 from ppafo.engine.scheme.motion import clamp_angle, with_motion
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers, held_pressures
 from ppafo.engine.scheme.walking import NO_CLEARANCE, DeviceShare
@@ -20,6 +20,7 @@ from ppafo.model.wearer.metabolic import rates_of_leg
 from ppafo.model.wearer.muscle import Fibre, Muscle, tendon_force
 from ppafo.model.wearer.nerves import SAMPLE, LegNerves, Nerves, arrived, balance_arrived, next_nerves
 from ppafo.model.wearer.reflexes import Balance, Felt
+from ppafo.model.wearer.segments import Limb
 from ppafo.model.wearer.walker import (
     Answer,
     Assist,
@@ -108,12 +109,25 @@ class Reflexes(NamedTuple):
     bhargava: float
 
 
+class FootEnd(NamedTuple):
+    """A foot at the begin of a step, and what a device did to its ankle.
+
+    ``heel_up`` and ``ball_up`` [N] under it, ``place`` of its ankle in front of the hip and height of its ``toes`` [m],
+    torque ``given`` by both pressures [N m], ``damping`` of the vane with its friction [N m s/rad].
+    """
+
+    heel_up: float
+    ball_up: float
+    place: float
+    toes: float
+    given: float
+    damping: float
+
+
 class BodyEnd(NamedTuple):
     """A wearer after a step, and what was felt and acted at its begin.
 
-    ``due`` is 1 where the nerves are sampled. ``heel_up`` and ``ball_up`` [N] under the foot with the device, ``place``
-    of its ankle in front of the hip and height of its ``toes`` [m], ``work`` of the muscles [J], ``given`` by both
-    pressures [N m], ``damping`` of the vane with its friction [N m s/rad].
+    ``due`` is 1 where the nerves are sampled, ``work`` is that of the muscles [J].
     """
 
     after: Walker
@@ -121,13 +135,9 @@ class BodyEnd(NamedTuple):
     right_felt: Felt
     balance: Balance
     due: float
-    heel_up: float
-    ball_up: float
-    place: float
-    toes: float
     work: float
-    given: float
-    damping: float
+    left: FootEnd
+    right: FootEnd
 
 
 class AnkleStep(NamedTuple):
@@ -164,14 +174,37 @@ def work_of_leg(muscles: Muscles, before: Fibres, after: Fibres, pull: Pull) -> 
     return ankle + hip
 
 
+def no_assist() -> Assist:
+    """What is done to an ankle without a device."""
+    return Assist(0.0, 0.0, 0.0)
+
+
+def foot_end(leg: LegNow, assist: Assist) -> FootEnd:
+    """What is kept of a leg until the end of the step."""
+    return FootEnd(
+        heel_up=leg.heel_up,
+        ball_up=leg.ball_up,
+        place=leg.place,
+        toes=leg.toes,
+        given=assist.torque,
+        damping=assist.damping,
+    )
+
+
 def next_body(
-    wearer: Wearer, walker: Walker, reflexes: Reflexes, walk: ReactingState, assist: Assist, step: float
+    wearer: Wearer,
+    walker: Walker,
+    reflexes: Reflexes,
+    walk: ReactingState,
+    to_left: Assist,
+    to_right: Assist,
+    step: float,
 ) -> BodyEnd:
-    """The wearer after a step [s]; one who has fallen lies still."""
+    """The wearer after a step [s] with what devices do to the ankles; one who has fallen lies still."""
     moving = 0.0 if walk.fall_time >= 0.0 else step
     push = push_now(walk.pushed, step)
-    ordered, free = reflexes.ordered, Assist(0.0, 0.0, 0.0)
-    stepped = next_walker(wearer, walker, ordered.to_left, ordered.to_right, assist, free, push, moving)
+    ordered = reflexes.ordered
+    stepped = next_walker(wearer, walker, ordered.to_left, ordered.to_right, to_left, to_right, push, moving)
     left: LegNow = stepped.left
     right: LegNow = stepped.right
     after = stepped.after
@@ -183,21 +216,18 @@ def next_body(
         right_felt=stepped.right_felt,
         balance=stepped.balance,
         due=reflexes.due,
-        heel_up=left.heel_up,
-        ball_up=left.ball_up,
-        place=left.place,
-        toes=left.toes,
         work=work,
-        given=assist.torque,
-        damping=assist.damping,
+        left=foot_end(left, to_left),
+        right=foot_end(right, to_right),
     )
 
 
-def ankle_of(plant: PlantParameters, body: BodyEnd, fall_time: float) -> AnkleStep:
-    """The ankle to which the body led, as far as the vane can follow."""
-    after = body.after
-    angle = joints(after.pose.left, after.pose.lean).ankle
-    rate = rates_of_joints(after.rates.left, after.rates.lean).ankle
+def ankle_of(
+    plant: PlantParameters, limb: Limb, limb_rates: Limb, lean: float, lean_rate: float, fall_time: float
+) -> AnkleStep:
+    """The ankle to which the body led a leg, as far as the vane can follow."""
+    angle = joints(limb, lean).ankle
+    rate = rates_of_joints(limb_rates, lean_rate).ankle
     reached = clamp_angle(plant, angle)
     return AnkleStep(reached, rate if fall_time < 0.0 and reached == angle else 0.0)
 
@@ -236,6 +266,10 @@ def advance_reacting(
     share: DeviceShare,
     walk: ReactingState,
     body: BodyEnd,
+    foot: FootEnd,
+    limb: Limb,
+    limb_rates: Limb,
+    other_felt: Felt,
     before: PlantState,
     after: PlantState,
     follow_rate: float,
@@ -244,25 +278,26 @@ def advance_reacting(
 ) -> ReactingState:
     """What the sensors show and what adds up over the strides; ``time`` [s] is that at the end of the step [s].
 
-    A strike is the foot that stands after the toes came by; what touches before is a scuff.
+    ``foot`` and ``limb`` are of the leg with the device, ``other_felt`` of the other one. A strike is the foot that
+    stands after the toes came by; what touches before is a scuff.
     """
     stood = walk.fall_time < 0.0
     leg = wearer.body.thigh.length + wearer.body.shank.length
-    pose, rates = body.after.pose, body.after.rates
-    heel, ball = body.heel_up, body.ball_up
+    pose = body.after.pose
+    heel, ball = foot.heel_up, foot.ball_up
     contact = (FLAT if ball > 0.0 else HEEL) if heel > 0.0 else (TOE if ball > 0.0 else SWING)
     load = (heel + ball) / wearer.weight
     # The ankle in front of the hip grows in the swing and falls in stance.
-    forward = wearer.body.thigh.length * rates.left.thigh + wearer.body.shank.length * rates.left.shank > 0.0
-    watched = stood and forward and abs(body.place) < PASSING * leg
+    forward = wearer.body.thigh.length * limb_rates.thigh + wearer.body.shank.length * limb_rates.shank > 0.0
+    watched = stood and forward and abs(foot.place) < PASSING * leg
     passed = walk.clearance < NO_CLEARANCE
-    strikes = stood and passed and load > LOADED and body.place >= PASSING * leg
-    lowest = min(walk.clearance, body.toes if watched else walk.clearance)
+    strikes = stood and passed and load > LOADED and foot.place >= PASSING * leg
+    lowest = min(walk.clearance, foot.toes if watched else walk.clearance)
     touches_first = ball > heel
     slaps = walk.lands > 0.5 and ball > 0.0 and not strikes
     lands = (0.0 if touches_first else 1.0) if strikes else (0.0 if slaps or load <= 0.0 else walk.lands)
     acceleration = (after.angular_velocity - before.angular_velocity) / max(step, 1.0e-30)
-    given = body.given - body.damping * after.angular_velocity - share.inertia * acceleration
+    given = foot.given - foot.damping * after.angular_velocity - share.inertia * acceleration
     turned = after.angle - before.angle
     follows = follow_rate * step / (1.0 + follow_rate * step)
     since = 0.0 if strikes else walk.since + step
@@ -274,7 +309,7 @@ def advance_reacting(
     on_toes = 1.0 if strikes and touches_first else 0.0
     struck = 1.0 if strikes else 0.0
     slapped = 1.0 if slaps else 0.0
-    slap_rate = rates.left.foot if slaps else 0.0
+    slap_rate = limb_rates.foot if slaps else 0.0
     external_torque = given if stood else 0.0
     clearance = NO_CLEARANCE if strikes else lowest
     cleared = lowest if strikes else 0.0
@@ -283,7 +318,7 @@ def advance_reacting(
     # Numba compiles no call of so many names with a choice inside.
     return ReactingState(
         contact=contact,
-        now=WalkNow(min(since / stride_time, 1.0), pose.left.shank),
+        now=WalkNow(min(since / stride_time, 1.0), limb.shank),
         external_torque=external_torque,
         heel_force=walk.heel_force + (heel - walk.heel_force) * follows,
         toe_force=walk.toe_force + (ball - walk.toe_force) * follows,
@@ -299,7 +334,7 @@ def advance_reacting(
         clearances=walk.clearances + cleared,
         push_off_work=walk.push_off_work + work,
         load=load,
-        other_load=body.right_felt.load,
+        other_load=other_felt.load,
         muscle_work=muscle_work,
         fall_time=fall_time,
         pushed=pushed,
@@ -313,8 +348,12 @@ def find(_rows: Any) -> list[str]:
 
 def lead(rows: Any) -> Phases:
     """Phases before the gas: the body, and where few steps sample them, the nerves and the reflexes."""
-    add = rows.add
-    stepped = f"{add(next_body)}(wearer, walker, reflexes, walk, assist, length)"
+    add, has_other = rows.add, rows.program.of_other_leg is not None
+    others = [f"{OTHER}{name}" for name in ("state", "held")] if has_other else []
+    # What fails is the first device.
+    sound = rows.load("plant").replace("plant", "sound", 1)
+    to_other = f"{add(assist_of)}(sound, share, {', '.join(others)})" if has_other else f"{add(no_assist)}()"
+    stepped = f"{add(next_body)}(wearer, walker, reflexes, walk, assist, {OTHER}assist, length)"
     ordered = f"{add(next_reflexes)}(wearer, nerves, reflexes, walker)"
     passed_on = f"{add(next_nerves)}(nerves, body.left_felt, body.right_felt, body.balance)"
     waits = f"{add(waiting_reflexes)}(reflexes, walk.fall_time, length)"
@@ -330,11 +369,14 @@ def lead(rows: Any) -> Phases:
             rows.cells["reflexes.due"],
         ),
         [
-            *[rows.load(name) for name in ("wearer", "walker", "reflexes")],
+            *[rows.load(name) for name in ("wearer", "walker", "reflexes", *others)],
             f"assist = {add(assist_of)}(plant, share, state, held)",
+            *([sound] if has_other else []),
+            f"{OTHER}assist = {to_other}",
             f"body = {stepped}",
-            f"begun = {add(ankle_of)}(plant, body, walk.fall_time)",
+            f"begun = {_ankle(rows, 'plant', 'left')}",
             *rows.keep("body", "begun"),
+            *([f"{OTHER}begun = {_ankle(rows, 'sound', 'right')}", *rows.keep(f"{OTHER}begun")] if has_other else []),
             f"reflexes = {waits}",
             *rows.store("reflexes"),
         ],
@@ -348,6 +390,17 @@ def lead(rows: Any) -> Phases:
             rows.cells["body.due"],
         ),
     ]
+
+
+def _ankle(rows: Any, plant: str, side: str) -> str:
+    """Expression for the ankle of a leg to which the body led it."""
+    limb = f"body.after.pose.{side}, body.after.rates.{side}, body.after.pose.lean, body.after.rates.lean"
+    return f"{rows.add(ankle_of)}({plant}, {limb}, walk.fall_time)"
+
+
+def led_already(_rows: Any) -> Phases:
+    """No phases: the body is one, and those of the first device have moved it."""
+    return []
 
 
 def assume(rows: Any) -> list[str]:
@@ -366,33 +419,61 @@ def reach(_rows: Any, _fed: str) -> Phases:
 
 
 def end(rows: Any) -> list[str]:
-    """Lines that lead to the state ``after`` the step."""
+    """Lines that lead to the state ``after`` the step, with the device on the left leg."""
+    return [*_end_of_leg(rows, "left", "right"), "walker_after = body.after"]
+
+
+def end_of_other(rows: Any) -> list[str]:
+    """The same of a device on the right leg."""
+    return _end_of_leg(rows, "right", "left")
+
+
+def _end_of_leg(rows: Any, side: str, other: str) -> list[str]:
     follow = rows.cells["gait_sensors.follow_rate"]
-    given = f"wearer, share, walk, body, state, after, {follow}, time + length, length"
+    leg = f"body.{side}, body.after.pose.{side}, body.after.rates.{side}, body.{other}_felt"
+    given = f"wearer, share, walk, body, {leg}, state, after, {follow}, time + length, length"
     return [
         *[rows.load(name) for name in ("begun", "ahead", "body", "wearer")],
         "held = ahead",
         *rows.keep("held"),
         f"after = {rows.add(with_motion)}(fed, begun.angle, begun.rate)",
         f"walk_after = {rows.add(advance_reacting)}({given})",
-        "walker_after = body.after",
         *rows.program.gas.move(rows, "after", "begun.angle", "after.angle"),
     ]
 
 
-def _scheme(fails: bool) -> LegScheme:
+_OTHER_LEG = LegScheme(
+    takes_course=False,
+    parameters={"share": DeviceShare, "wearer": Wearer, "gait_sensors": GaitSensors},
+    states={
+        "walk": ReactingState,
+        "gait_seen": GaitSeen,
+        "walker": Walker,
+        "reflexes": Reflexes,
+        "nerves": Nerves,
+    },
+    loads=("share", "walk"),
+    stored={"walk": "walk_after"},
+    begun=AnkleStep,
+    led={"body": BodyEnd},
+    handed={},
+    ended={"ahead": HeldChambers},
+    find=find,
+    lead=led_already,
+    assume=assume,
+    reach=reach,
+    end=end_of_other,
+    reacts=True,
+)
+"""A second device, on the right leg of a wearer whose body moves with the first one."""
+
+
+def _scheme(fails: bool, on_both: bool = False) -> LegScheme:
     faults = {"plant_faults": PlantFaults, "shut_off": ShutOff} if fails else {}
     return LegScheme(
         takes_course=False,
         parameters={"share": DeviceShare, "wearer": Wearer, "gait_sensors": GaitSensors, **faults},
-        states={
-            "walk": ReactingState,
-            "gait_seen": GaitSeen,
-            "walker": Walker,
-            "reflexes": Reflexes,
-            "nerves": Nerves,
-            **({"unpowered": Unpowered} if fails else {}),
-        },
+        states={**_OTHER_LEG.states, **({"unpowered": Unpowered} if fails else {})},
         loads=("share", "walk", *faults, *(["unpowered"] if fails else [])),
         stored={"walk": "walk_after", "walker": "walker_after"},
         begun=AnkleStep,
@@ -406,8 +487,12 @@ def _scheme(fails: bool) -> LegScheme:
         end=end,
         fails=fails,
         reacts=True,
+        other=_OTHER_LEG if on_both else None,
     )
 
 
 REACTING, FAILING_REACTING = _scheme(fails=False), _scheme(fails=True)
 """A leg of a wearer who reacts, and the same with a plant that may fail, or whose line has a shut-off valve."""
+
+REACTING_ON_BOTH, FAILING_REACTING_ON_BOTH = _scheme(fails=False, on_both=True), _scheme(fails=True, on_both=True)
+"""Both legs of a wearer who reacts, with a device on each, of which the left one may fail."""

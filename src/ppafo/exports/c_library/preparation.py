@@ -8,6 +8,7 @@ from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.engine.lane_rows import indent
 from ppafo.engine.lanes import RECORDED_ANGLE, Segment
+from ppafo.engine.pieces import OTHER
 from ppafo.engine.program import LaneResult, LaneTiming, Program
 from ppafo.engine.rows import leaf_paths, leaves, numbers, row_expression
 from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
@@ -294,6 +295,21 @@ class Writing:
             yield f"at_start = {add(moment_at_start)}(plant, state)"
         for name, kind in program.stated.items():
             yield f"{name}_state = {add(kind.start)}({name}, at_start)"
+        if program.devices == 2:
+            yield from self._start_of_other()
+
+    def _start_of_other(self) -> Iterator[str]:
+        """Lines that make the states of a second device, once there is its own ``state``."""
+        program, add = self.program, self.add
+        alike = ["result", "valve_state", *(["controller_state"] if program.controller is not None else [])]
+        for name in (*alike, *(["line_state"] if program.has_lines else [])):
+            yield f"{OTHER}{name} = {name}"
+        if program.gas.start is not None:
+            yield f"{OTHER}masses = {add(program.gas.start)}(plant, {OTHER}state)"
+        if program.stated:
+            yield f"{OTHER}at_start = {add(moment_at_start)}(plant, {OTHER}state)"
+        for name, kind in program.stated.items():
+            yield f"{OTHER}{name}_state = {add(kind.start)}({name}, {OTHER}at_start)"
 
 
 SAID = {

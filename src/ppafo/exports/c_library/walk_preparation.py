@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control.walking.catalog import walking_controllers
+from ppafo.engine.pieces import OTHER
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import Collector
 from ppafo.errors import ScenarioError
@@ -41,6 +42,7 @@ from ppafo.walking.preparation import (
     gait_sensors,
     longest_delay,
     rocker_on_heel,
+    sensors_of_other,
     smallest_chamber,
     standing_on,
     vented_state,
@@ -203,6 +205,9 @@ def _gait_sensors(configuration: Scenario, writing: Writing) -> Iterator[str]:
     row = writing.row("SensorNumbers", writing.section("sensors", (*_FORCES, *_OTHERS)))
     faults = ", ".join(f"{sensor}_fault" for sensor in settings.faults)
     yield f"gait_sensors = {add(gait_sensors)}({row}, controller_period, {faults})"
+    if writing.program.devices == 2:
+        none = ", ".join([_fault(writing, "", {})] * len(settings.faults))
+        yield f"{OTHER}gait_sensors = {add(gait_sensors)}({row}, controller_period, {none})"
     yield f"signal_delay = {add(longest_delay)}(gait_sensors) * controller_period"
 
 
@@ -286,3 +291,8 @@ def _body_at_start(reacts: ReactingWearer, writing: Writing) -> Iterator[str]:
         yield f"{name} = {writing.constant(row, name)}"
     yield f"gait_seen = {writing.constant(NOTHING_SEEN, 'gait_seen')}"
     yield f"state = {add(vented_state)}(plant, {start.ankle!r}, 0.0)"
+    if reacts.on_both:
+        yield f"{OTHER}walk = {writing.constant(start.other_walk, f'{OTHER}walk')}"
+        yield f"{OTHER}gait_seen = gait_seen"
+        yield f"{OTHER}state = {add(vented_state)}(plant, {start.other_ankle!r}, 0.0)"
+        yield f"{OTHER}sensors = {add(sensors_of_other)}(sensors)"

@@ -48,8 +48,14 @@ ROWS = (
 
 _EXPLAINED = (
     "'Device off' is the same wearer with the same device and both chambers vented: it still rubs and has inertia. The "
-    "first two strides are left out of the means. The device is on the left leg, and a stride is one step of that leg."
+    "first two strides are left out of the means."
 )
+_WHERE = {
+    1: "The device is on the left leg, and a stride is one step of that leg.",
+    2: "A device is on each leg. Gas is that of both; strides, toes and work of the device are those of the left leg.",
+}
+"""Whose numbers they are, by how many devices there are."""
+
 _EFFORT = (
     "Power and metabolic rate are of one set of reflexes. Those that other searches find differ by some percent, which "
     "'ppafo adapt' prints: a difference between with and off that is smaller is none. The rate at rest is not in it, "
@@ -108,7 +114,11 @@ def reacting_answer(comparison: Comparison) -> Answer:
             *_way_section(comparison),
             *bottle_sections(worn),
             *_likeness_section(comparison),
-            Section("How to read it", (_EXPLAINED, _EFFORT, _LIMITS), is_detail=True),
+            Section(
+                "How to read it",
+                (f"{_EXPLAINED} {_WHERE[walk_of(scenario).devices]}", _EFFORT, _LIMITS),
+                is_detail=True,
+            ),
             *_curves(comparison),
         ),
         data={

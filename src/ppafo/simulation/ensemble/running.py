@@ -13,13 +13,14 @@ from ppafo.engine.lane_samples import REQUEST as REQUEST_ROW
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import Batch, BatchResult, Floats, add_meters, group_of, meters_of, run_blocks
 from ppafo.engine.led_leg import GAIT_SHANK
+from ppafo.engine.pieces import OTHER
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.errors import ScenarioError
 from ppafo.metrics import METRICS
 from ppafo.metrics.gas import ENERGIES
-from ppafo.metrics.metric import LED, LED_SHANK, REACTS, REQUEST, STEADY, WALK, MetricKind, Readings
+from ppafo.metrics.metric import LED, LED_SHANK, ONE_DEVICE, REACTS, REQUEST, STEADY, WALK, MetricKind, Readings
 from ppafo.model.gas import energy_per_content
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, TrueMasses
 from ppafo.simulation.sampled import run_in_turn
@@ -58,6 +59,15 @@ class ThermalTotals(NamedTuple):
 
 _OF_STATE = tuple(f"state.{name}" for name in Totals._fields)
 """Paths of the numbers that totals are made of, beside the true masses where there are any."""
+
+
+def with_gas_of(state: PlantState, other: PlantState) -> PlantState:
+    """A state with what a second device took, vented and leaked [kg]; its numbers may be arrays (runs,)."""
+    return state._replace(
+        supplied_mass=state.supplied_mass + other.supplied_mass,
+        vented_mass=state.vented_mass + other.vented_mass,
+        leaked_mass=state.leaked_mass + other.leaked_mass,
+    )
 
 
 def totals(state: PlantState) -> Totals:
@@ -227,9 +237,11 @@ class _MeteredBatch:
 
 
 def _totals(program: Program, parameters: Floats, states: Floats) -> dict[str, Floats]:
-    """Gas in the chambers and totals of each run, by channel."""
+    """Gas in the chambers and totals of each run, by channel; what two devices took and vented, together."""
     groups = program.state_rows()
     state = group_of("state", groups, states)
+    if program.devices == 2:
+        state = with_gas_of(state, group_of(f"{OTHER}state", groups, states))
     if not program.has_true_masses:
         return totals(state)._asdict()
     masses = group_of("masses", groups, states)
@@ -250,6 +262,7 @@ def has_channels(program: Program, kind: MetricKind) -> bool:
         STEADY: not program.takes_course,
         LED: not program.reacts,
         REACTS: program.reacts,
+        ONE_DEVICE: program.devices == 1,
         LED_SHANK: program.shank is GAIT_SHANK,
         REQUEST: REQUEST_ROW in row_numbers(program.state_rows()),
     }
@@ -311,7 +324,9 @@ def _late_totals(plain: Batch, metrics: Mapping[str, MetricKind]) -> tuple[str, 
     needed = {channel for kind in metrics.values() for channel in kind.channels}
     if ends_there or needed.isdisjoint(ThermalTotals._fields):
         return ()
-    return (*_OF_STATE, *(path for name, row in program.gas.states.items() for path in leaf_paths(row, name)))
+    others = [f"{OTHER}{path}" for path in _OF_STATE] if program.devices == 2 else []
+    of_gas = (path for name, row in program.gas.states.items() for path in leaf_paths(row, name))
+    return (*_OF_STATE, *others, *of_gas)
 
 
 def intervals(batch: Batch) -> Floats:
