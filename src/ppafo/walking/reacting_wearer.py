@@ -198,9 +198,9 @@ def read_reacting(
     name = value_at(reading.document, REACTS)
     given = reading.document.get("wearer", {})
     if name is None:
-        for item in (*(item.name for item in REACTIONS), DEVICE_ON.partition(".")[2]):
-            if item in given:
-                raise reading.refusal(f"wearer.{item}", f'needs a wearer who reacts: give {REACTS} = "NAME"')
+        for own_name in (*(item.name for item in REACTIONS), DEVICE_ON.partition(".")[2]):
+            if own_name in given:
+                raise reading.refusal(f"wearer.{own_name}", f'needs a wearer who reacts: give {REACTS} = "NAME"')
         return None
     if "gait" in instead:
         raise ScenarioError(f"{reading.file}: gait '{instead['gait']}' does not go with {REACTS} yet: leave it out")
