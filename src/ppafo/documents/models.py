@@ -112,10 +112,12 @@ def _unknown_kind(spot: _Spot, detail: ErrorDetails) -> str:
 
 
 def _wrong_name(spot: _Spot, detail: ErrorDetails) -> str:
-    """Say what a name may consist of; pydantic marks one that is the key of a table."""
+    """Say what a name or a quantity may consist of; pydantic marks a name that is the key of a table."""
     if detail["loc"][-1] == "[key]":
         table = one_line(".".join(map(str, detail["loc"][:-2])))
         return f"{table}: the name {quote(detail['input'])} must consist of letters, digits, '-' and '_'"
+    if detail["ctx"]["pattern"] == QUANTITY:
+        return f"{spot.path} = {quote(detail['input'])} does not start with a number; write for example '1.3 m/s'"
     return f"{spot.path} = {quote(detail['input'])} must consist of lower-case letters, digits, '-' and '_'"
 
 
@@ -156,6 +158,9 @@ Model = TypeVar("Model", bound=BaseModel)
 
 NAME = r"^[a-z0-9][a-z0-9_-]*$"
 """What the name of a set or scenario looks like."""
+
+QUANTITY = r"^\s*[+-]?(\d|\.\d)"
+"""How the text of a number with its unit begins."""
 
 
 class StrictTable(BaseModel):

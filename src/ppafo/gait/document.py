@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
-from ppafo.documents.models import NAME, make_schema, optional, table, validate
+from ppafo.documents.models import NAME, QUANTITY, make_schema, optional, table, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.gait.gait import CURVES, REQUIRED, Curve, Gait, plain_unit
@@ -42,7 +42,7 @@ _LIMITS = {
 @functools.cache
 def gait_file() -> type[BaseModel]:
     """Return the model of a gait file."""
-    text = Annotated[str, Field(pattern=r"^\s*[+-]?(\d|\.\d)")]
+    text = Annotated[str, Field(pattern=QUANTITY)]
     subject = {
         "body_mass": (text, Field(description="mass of the wearer, such as '62 kg'")),
         "stature": optional(text, "height of the wearer, such as '1.75 m', where it is known"),
@@ -81,7 +81,7 @@ def gait_file() -> type[BaseModel]:
 
 def _curve_table(name: str, unit: str) -> type[BaseModel]:
     units: Any = Literal["deg", "rad"] if unit == "rad" else Literal[unit]
-    number = Annotated[float, Field(allow_inf_nan=False, strict=False)]
+    number = Annotated[float, Field(allow_inf_nan=False)]
     series = Annotated[list[number], Field(min_length=1, max_length=_MAXIMUM_HARMONICS)]
     return table(
         "".join(part.capitalize() for part in name.split("_")),

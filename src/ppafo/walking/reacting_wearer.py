@@ -22,7 +22,16 @@ from ppafo.model.wearer.way import NOT_PUSHED
 from ppafo.simulation.declaration import Reading, value_at
 from ppafo.walking.course import WalkingCourse
 from ppafo.walking.way import OF_THE_WAY, Stretch, stretches_of_course, stretches_of_settings, way_of
-from ppafo.wearers.loading import WearerFile, find_wearer, wearer_of, with_strengths
+from ppafo.wearers.loading import (
+    FASTEST_START,
+    IN_RADIANS,
+    LARGEST_GAINS,
+    SLOWEST_START,
+    WearerFile,
+    find_wearer,
+    wearer_of,
+    with_strengths,
+)
 from ppafo.wearers.published import felt_at, first_answer, start_of, start_with_size, with_size
 
 REACTS = "wearer.reacts"
@@ -41,7 +50,6 @@ STRENGTHS = tuple(
     )
     for name in Fibres._fields
 )
-IN_RADIANS = ("knee_stop_angle", "lean_reference")
 GAINS = tuple(
     Quantity(
         f"{side}_{name}",
@@ -49,7 +57,7 @@ GAINS = tuple(
         f"reflex gain {name} of the {side} leg; that of the wearer unless given",
         0.0,
         0.0,
-        4.0 if name in IN_RADIANS else 100.0,
+        LARGEST_GAINS[name],
     )
     for side in ("left", "right")
     for name in Gains._fields
@@ -68,7 +76,7 @@ LENGTH_RATIO = Quantity(
 MASS_RATIO = Quantity(
     "mass_ratio", "1", "masses of the body and forces of its muscles, over those of the wearer", 1.0, 0.3, 2.0
 )
-START_SPEED = Quantity("start_speed", "m/s", "speed with which the walk begins", 1.3, 0.5, 2.0)
+START_SPEED = Quantity("start_speed", "m/s", "speed with which the walk begins", 1.3, SLOWEST_START, FASTEST_START)
 REACTIONS = (*STRENGTHS, *GAINS, *RATIOS, LENGTH_RATIO, MASS_RATIO, START_SPEED, *OF_THE_WAY)
 """Numbers of a wearer who reacts."""
 

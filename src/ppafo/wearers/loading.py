@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
-from ppafo.documents.models import NAME, make_schema, optional, read_model, table
-from ppafo.documents.toml_text import TomlKind
+from ppafo.documents.models import NAME, QUANTITY, make_schema, optional, quote, read_model, table
+from ppafo.documents.toml_text import TomlKind, beside
 from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.model.wearer.reflexes import Gains
 from ppafo.model.wearer.walker import Fibres, Muscles, Wearer
@@ -20,6 +20,13 @@ from ppafo.wearers.published import published_wearer
 NOT_PUBLISHED = ("soleus_stretch", "gastrocnemius_stretch")
 """Gains that a file may leave out: they are 0 but in a spastic leg."""
 
+IN_RADIANS = ("knee_stop_angle", "lean_reference")
+"""Gains that are angles."""
+
+LARGEST_GAINS = {name: 4.0 if name in IN_RADIANS else 100.0 for name in Gains._fields}
+SLOWEST_START, FASTEST_START = 0.5, 2.0
+"""Speeds [m/s] with which a walk may begin."""
+
 PUBLISHED = "geyer-herr"
 """The wearer that is taken where none is named."""
 
@@ -28,7 +35,7 @@ _FILE = TomlKind("wearer", "wearer", resources.files("ppafo") / "wearers" / "fil
 
 @dataclass(frozen=True)
 class WearerFile:
-    """A wearer who reacts: name, one line about him, source, notes, speed at the start [m/s], how the gains were found.
+    """A wearer who reacts: name, title in one line, source, notes, speed at the start [m/s], how the gains were found.
 
     Gains of both legs in the units of ``Gains``; strengths of the muscles of both legs, 1 healthy, those not named 1;
     their largest velocities as a factor, and the stiffness of the ankles beside muscles [N m/rad].
@@ -53,11 +60,10 @@ class WearerFile:
 @functools.cache
 def wearer_file() -> type[BaseModel]:
     """Return the model of a wearer file."""
-    number = Annotated[float, Field(allow_inf_nan=False, strict=False)]
-    gain = Annotated[number, Field(ge=0.0, le=100.0)]
+    number = Annotated[float, Field(allow_inf_nan=False)]
+    gains = {name: Annotated[number, Field(ge=0.0, le=largest)] for name, largest in LARGEST_GAINS.items()}
     strength = Annotated[number, Field(ge=0.0, le=3.0)]
     text = Annotated[str, Field(min_length=1)]
-    names = Gains._fields
     leg = table(
         "Leg",
         {
@@ -69,7 +75,7 @@ def wearer_file() -> type[BaseModel]:
                 "muscles that are weaker or stronger than the published ones, as a factor",
             ),
             "gains": optional(
-                table("GainsOfLeg", {name: optional(gain, "gain of this leg alone") for name in names}),
+                table("GainsOfLeg", {name: optional(gain, "gain of this leg alone") for name, gain in gains.items()}),
                 "gains in which this leg differs",
             ),
             "quickness": optional(
@@ -97,7 +103,7 @@ def wearer_file() -> type[BaseModel]:
             "source": (text, Field(description="where the numbers come from")),
             "notes": (str, Field("", description="further remarks")),
             "start_speed": (
-                Annotated[str, Field(pattern=r"^\s*[+-]?(\d|\.\d)")],
+                Annotated[str, Field(pattern=QUANTITY)],
                 Field(description="speed of the body at the start, such as '1.3 m/s'"),
             ),
             "found": optional(table("Found", found), "how the gains were found"),
@@ -108,7 +114,7 @@ def wearer_file() -> type[BaseModel]:
                         name: optional(gain, "gain of both legs")
                         if name in NOT_PUBLISHED
                         else (gain, Field(description="gain of both legs"))
-                        for name in names
+                        for name, gain in gains.items()
                     },
                 ),
                 Field(
@@ -116,7 +122,9 @@ def wearer_file() -> type[BaseModel]:
                     description="gains of the reflexes: forces in largest forces, lengths in optimum lengths, rad",
                 ),
             ),
-            "based_on": optional(str, "wearer of the package whose gains these are, instead of [gains] and [found]"),
+            "based_on": optional(
+                text, "wearer, by name or file, whose gains these are, instead of [gains] and [found]"
+            ),
             "both": optional(leg, "in what both legs differ from the published body"),
             "left": optional(leg, "in what the left leg differs"),
             "right": optional(leg, "in what the right leg differs"),
@@ -136,10 +144,14 @@ def find_wearer(name_or_path: str | Path = PUBLISHED) -> WearerFile:
     """
     model, file = read_model(_FILE, wearer_file(), name_or_path)
     document = model.model_dump(exclude_unset=True)
-    base = _base(document, file)
-    gains = {**dict.fromkeys(NOT_PUBLISHED, 0.0), **base["gains"]}
-    speed = _number(document, "start_speed", "m/s", 3.0, file)
-    left, right = ({**document.get("both", {}), **document.get(side, {})} for side in ("left", "right"))
+    folder = Path() if str(name_or_path) in list_wearers() else Path(name_or_path).parent
+    base = _base(document, file, folder)
+    speed = _number(document, "start_speed", "m/s", SLOWEST_START, FASTEST_START, file)
+    left, right = (_leg(document, side) for side in ("left", "right"))
+    left_gains, right_gains = (
+        {**dict.fromkeys(NOT_PUBLISHED, 0.0), **base["gains"], **_leg(base, side)["gains"], **leg["gains"]}
+        for side, leg in (("left", left), ("right", right))
+    )
     return WearerFile(
         name=document["name"],
         title=document.get("title", ""),
@@ -147,40 +159,46 @@ def find_wearer(name_or_path: str | Path = PUBLISHED) -> WearerFile:
         notes=document.get("notes", ""),
         speed=speed,
         found=_how_found(base["found"]),
-        left_gains=Gains(**{**gains, **left.get("gains", {})}),
-        right_gains=Gains(**{**gains, **right.get("gains", {})}),
-        left_strengths=left.get("strength", {}),
-        right_strengths=right.get("strength", {}),
+        left_gains=Gains(**left_gains),
+        right_gains=Gains(**right_gains),
+        left_strengths=left["strength"],
+        right_strengths=right["strength"],
         left_quickness=left.get("quickness", 1.0),
         right_quickness=right.get("quickness", 1.0),
-        left_ankle_stiffness=_number(left, "ankle_stiffness", "N m/rad", 500.0, file),
-        right_ankle_stiffness=_number(right, "ankle_stiffness", "N m/rad", 500.0, file),
+        left_ankle_stiffness=_number(left, "ankle_stiffness", "N m/rad", 0.0, 500.0, file),
+        right_ankle_stiffness=_number(right, "ankle_stiffness", "N m/rad", 0.0, 500.0, file),
     )
 
 
-def _base(document: dict[str, Any], file: str) -> dict[str, Any]:
+def _leg(document: Mapping[str, Any], side: str) -> dict[str, Any]:
+    """In what a leg differs: what both do, and what this one does."""
+    both, own = document.get("both", {}), document.get(side, {})
+    return {**both, **own, **{name: {**both.get(name, {}), **own.get(name, {})} for name in ("strength", "gains")}}
+
+
+def _base(document: dict[str, Any], file: str, folder: Path) -> dict[str, Any]:
     """The document that has the gains: this one, or that of the wearer on whom it is based."""
     given = [key for key in ("gains", "found", "based_on") if key in document]
     if given == ["gains", "found"]:
         return document
     if given != ["based_on"]:
         raise DataError(f"{file}: give [gains] and [found], or based_on alone with the name of a wearer")
-    model, other = read_model(_FILE, wearer_file(), document["based_on"])
-    base: dict[str, Any] = model.model_dump(exclude_unset=True)
-    if "based_on" in base:
-        raise DataError(
-            f"{file}: based_on = {document['based_on']!r} is not allowed; '{other}' has no gains of its own"
-        )
+    named = document["based_on"]
+    with refused_as(DataError, f"{file}: based_on = {quote(named)}", DataError):
+        model, other = read_model(_FILE, wearer_file(), beside(named, folder, list_wearers()))
+        base: dict[str, Any] = model.model_dump(exclude_unset=True)
+        if "gains" not in base or "found" not in base:
+            raise DataError(f"'{other}' has no gains of its own")
     return base
 
 
-def _number(table: Mapping[str, Any], key: str, unit: str, largest: float, file: str) -> float:
+def _number(table: Mapping[str, Any], key: str, unit: str, least: float, most: float, file: str) -> float:
     """A quantity of a table in SI, 0 where it is missing."""
     text = table.get(key, f"0 {unit}")
-    with refused_as(DataError, f"{file}: {key} = {text!r}", UnitError):
+    with refused_as(DataError, f"{file}: {key} = {quote(text)}", UnitError):
         value = parse_quantity(text, unit)
-    if not 0.0 <= value <= largest:
-        raise DataError(f"{file}: {key} = {text!r} is not allowed; it lies between 0 and {largest:g} {unit}")
+    if not least <= value <= most:
+        raise DataError(f"{file}: {key} = {quote(text)}: must be at least {least:g} and at most {most:g} {unit}")
     return value
 
 

@@ -71,10 +71,18 @@ def test_a_disease_changes_one_leg_and_keeps_the_gains() -> None:
     [
         ("", "give [gains] and [found], or based_on alone with the name of a wearer"),
         ('based_on = "healthy-128"\n[found]\nby = "search"\n', "give [gains] and [found], or based_on alone"),
-        ('based_on = "drop-foot"\n', "'drop-foot' has no gains of its own"),
+        ('based_on = "drop-foot"\n', "own.toml: based_on = 'drop-foot': 'drop-foot' has no gains of its own"),
+        ('based_on = "own.toml"\n', "own.toml' has no gains of its own"),
+        ('based_on = ""\n', "based_on = '': must have at least 1 character"),
+        ('based_on = "healthy-128"\n[left.gains]\nsoleus_force = true\n', "must be a valid number"),
+        ('based_on = "healthy-128"\n[left.gains]\nsoleus_force = "1.2"\n', "must be a valid number"),
+        ('based_on = "healthy-128"\n[left.gains]\nknee_stop_angle = 170\n', "must be less than or equal to 4"),
         ('based_on = "healthy-12"\n', "there is no wearer 'healthy-12', did you mean 'healthy-1"),
         ('based_on = "healthy-128"\n[left]\nankle_stiffness = "40 N"\n', "ankle_stiffness = '40 N'"),
-        ('based_on = "healthy-128"\n[left]\nankle_stiffness = "4 kN m/rad"\n', "it lies between 0 and 500 N m/rad"),
+        (
+            'based_on = "healthy-128"\n[left]\nankle_stiffness = "4 kN m/rad"\n',
+            "must be at least 0 and at most 500 N m/rad",
+        ),
         ('based_on = "healthy-128"\n[left.strength]\ntibials = 0.1\n', "tibialis"),
         ('based_on = "healthy-128"\n[left.strength]\ntibialis = -0.1\n', "tibialis"),
     ],
@@ -84,6 +92,38 @@ def test_a_wrong_file_is_refused_in_one_line(tmp_path: Path, text: str, said: st
         find_wearer(written(tmp_path, text))
     assert said in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("speed", "said"),
+    [("0.1 m/s", "must be at least 0.5 and at most 2 m/s"), ("nan m/s", "does not start with a number; write for")],
+)
+def test_a_start_speed_is_one_that_a_setting_can_have(tmp_path: Path, speed: str, said: str) -> None:
+    file = written(tmp_path, 'based_on = "healthy-128"\n')
+    file.write_text(file.read_text().replace("1.3 m/s", speed))
+    with pytest.raises(DataError, match=f"own.toml: start_speed = '{speed}'.* {said}"):
+        find_wearer(file)
+
+
+def test_a_leg_keeps_what_both_legs_have_and_a_base_beside_the_file_the_gains_of_each_leg(tmp_path: Path) -> None:
+    base = written(tmp_path, 'based_on = "healthy-128"\n').rename(tmp_path / "base.toml")
+    gains = "".join(f"{name} = {value!r}\n" for name, value in find_wearer("geyer-herr").left_gains._asdict().items())
+    legs = "[right.gains]\ntone = 0.02\n"
+    base.write_text(
+        base.read_text().replace('based_on = "healthy-128"', f'[found]\nby = "search"\n[gains]\n{gains}{legs}')
+    )
+    own = find_wearer(
+        written(
+            tmp_path,
+            'based_on = "base.toml"\n[both.strength]\nsoleus = 0.7\nflexor = 0.9\n'
+            "[left.strength]\ntibialis = 0.1\nflexor = 0.8\n[left.gains]\nlean = 2.0\n",
+        )
+    )
+    assert own.left_strengths == {"soleus": 0.7, "flexor": 0.8, "tibialis": 0.1}
+    assert own.right_strengths == {"soleus": 0.7, "flexor": 0.9}
+    published = find_wearer("geyer-herr").left_gains
+    assert own.left_gains == published._replace(lean=2.0)
+    assert own.right_gains == published._replace(tone=0.02)
 
 
 def test_who_is_heavier_by_all_masses_and_forces_moves_the_same_way() -> None:
