@@ -106,7 +106,7 @@ class MotionKind:
     ``noise`` is the sum of all levels of noise that its controller receives, ``switches`` are settings that are 0 for
     all runs of a program or for none. ``lacks(scenario, metric)`` says why it has not what a metric needs, an empty
     text where it has it. ``measured(scenario, run, times, rows)`` gives recording and metrics of rows (samples,) by
-    path.
+    path, and how a run that was completed ended, in words.
     """
 
     name: str

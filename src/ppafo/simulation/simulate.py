@@ -194,7 +194,8 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
         recording = _recording(scenario, run, times[kept], by_path)
         metrics: Mapping[str, Metric] = evaluate(recording)
     else:
-        recording, metrics = worn.measured(scenario, run, times[kept], by_path)
+        recording, metrics, ended = worn.measured(scenario, run, times[kept], by_path)
+        status = replace(status, message=ended) if status.is_completed else status
     return Result(
         scenario=scenario,
         recording=recording,

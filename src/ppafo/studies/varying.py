@@ -76,7 +76,8 @@ class VariedPath:
         """Return a value of the path as messages write it."""
         unit = WRITTEN_UNITS.get(self.quantity.unit, self.quantity.unit) if self.quantity.unit != "Pa_a" else "Pa_a"
         unit, zero = ("Pa_g", 0.0) if self.is_gauge else (unit, self.atmosphere)
-        return f"{from_si(value, unit, self.quantity.unit, zero):.6g} {unit}".rstrip()
+        said = "" if unit in declaration.PLAIN else unit
+        return f"{from_si(value, unit, self.quantity.unit, zero):.6g} {said}".rstrip()
 
     def _in_si(self, value: str | float, quantity: Quantity) -> float:
         if isinstance(value, str):

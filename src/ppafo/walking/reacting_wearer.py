@@ -11,7 +11,7 @@ from typing import Any
 
 from ppafo.engine.scheme.reacting import STANDING, ReactingState, Reflexes, WalkNow
 from ppafo.engine.scheme.walking import NO_CLEARANCE
-from ppafo.errors import ScenarioError
+from ppafo.errors import DataError, ScenarioError, refused_as
 from ppafo.model.contact import FLAT, SWING
 from ppafo.model.declaration import Quantity
 from ppafo.model.wearer.nerves import Nerves, settled_nerves
@@ -194,6 +194,15 @@ def _begun(contact: float, limb: Limb, force: Any, load: float, other_load: floa
     )
 
 
+def _check_way(reading: Reading, given: Mapping[str, Any], course: WalkingCourse) -> None:
+    """Raise ScenarioError for a course with more pieces than there are, or beside a way that the wearer has."""
+    with refused_as(ScenarioError, course.file, ScenarioError):
+        way_of(stretches_of_course(course))
+    for item in OF_THE_WAY:
+        if item.name in given:
+            raise reading.refusal(f"wearer.{item.name}", f"does not go with course '{course.name}', which has the way")
+
+
 def read_reacting(
     reading: Reading, folder: Path, instead: Mapping[str, str], course: WalkingCourse | None
 ) -> ReactingWearer | None:
@@ -214,15 +223,15 @@ def read_reacting(
         raise ScenarioError(f"{reading.file}: gait '{instead['gait']}' does not go with {REACTS} yet: leave it out")
     if "gait" in reading.document:
         raise reading.refusal("gait", f"does not go with {REACTS} yet: leave one of both out")
-    for item in OF_THE_WAY:
-        if course is not None and item.name in given:
-            raise reading.refusal(f"wearer.{item.name}", f"does not go with course '{course.name}', which has the way")
+    if course is not None:
+        _check_way(reading, given, course)
     known = {item.name for item in REACTIONS} | {"reacts", "device_on"}
     for item in given:
         if item not in known:
             words = f"{', '.join(item.name for item in (*STRENGTHS, START_SPEED))} and gains such as {GAINS[0].name}"
             raise reading.refusal(f"wearer.{item}", f"is of a leg that a gait leads; a wearer who reacts has {words}")
-    file = find_wearer(folder / name if Path(name).suffix == ".toml" else name)
+    with refused_as(DataError, reading.quote(REACTS), DataError):
+        file = find_wearer(folder / name if Path(name).suffix == ".toml" else name)
     own = {f"left_{name}": value for name, value in file.left_gains._asdict().items()}
     own |= {f"right_{name}": value for name, value in file.right_gains._asdict().items()}
     own |= {START_SPEED.name: file.speed}

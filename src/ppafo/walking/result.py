@@ -222,13 +222,13 @@ def result_of_walk(scenario: Scenario, run: Run, outcome: BatchResult, supply: S
 
 def measured(
     scenario: Scenario, run: Run, time: Floats, record: Mapping[str, Floats]
-) -> tuple[Recording, Mapping[str, Metric]]:
-    """Recording and metrics of a walk from its rows (samples,) by path, at these times [s]."""
+) -> tuple[Recording, Mapping[str, Metric], str]:
+    """Recording and metrics of a walk from its rows (samples,) by path, at these times [s]; and how it ended."""
     check_no_bottle(scenario)
-    result = _walk_result(scenario, run, time, record, Status("completed"), None)
+    result = _walk_result(scenario, run, time, record, Status("completed", None, "completed"), None)
     of_recording = evaluate(result.recording)
     offered = {name: metric for name, metric in of_recording.items() if not lacks(scenario, METRICS[name])}
-    return result.recording, {**offered, **result.metrics}
+    return result.recording, {**offered, **result.metrics}, result.status.message
 
 
 def lacks(scenario: Scenario, kind: MetricKind) -> str:

@@ -24,7 +24,7 @@ from ppafo.metrics.strides import PER_STRIDE
 from ppafo.model.leg import passive_torque
 from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
-from ppafo.walking.bottle import BottleLife, Schedule, life_on_bottle, run_on_bottle
+from ppafo.walking.bottle import WALKED, BottleLife, Schedule, life_on_bottle, run_on_bottle
 from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.course import turns_walked
 from ppafo.walking.declaration import THRESHOLDS
@@ -156,14 +156,14 @@ def compare_walks(configuration: Scenario, minutes: float | None = None, progres
     worn = walk(configuration, minutes, progress=progress)
     # Refuse a walk that its bottle ended within the first strides.
     shortest = SHORTEST_STRIDES * walk_of(worn.scenario).gait.stride_time
-    if worn.supply is not None and worn.supply.ending.time < shortest:
-        ending = worn.supply.ending
+    ending = None if worn.supply is None or worn.supply.ending.kind == WALKED else worn.supply.ending
+    if ending is not None and ending.time < shortest:
         raise SimulationError(
             f"{worn.scenario.name} on its bottle: {ending.message}, after {ending.time:.3g} s: fewer than "
             f"{SHORTEST_STRIDES} strides; take a fuller, larger or warmer bottle"
         )
-    # As long as the bottle lasted, where there is one.
-    as_long = minutes if worn.supply is None else float(worn.recording.time[-1]) / 60.0
+    # As long as the bottle lasted, where one ended the walk.
+    as_long = minutes if ending is None else float(worn.recording.time[-1]) / 60.0
     bare = walk(with_device_off(configuration), as_long, progress=progress)
     healthy = healthy_metrics(configuration) if walk_of(configuration).reacts is None else {}
     return Comparison(worn, bare, healthy)

@@ -15,12 +15,14 @@ from ppafo.engine.rows import leaf_paths, numbers, rebuild, row_numbers
 from ppafo.engine.run import Run, batch_of
 from ppafo.engine.scheme import reacting
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers
-from ppafo.errors import PpafoError, ScenarioError
+from ppafo.errors import DataError, PpafoError, ScenarioError
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import REACTS
 from ppafo.model.plant import PlantState
 from ppafo.model.wearer.nerves import Nerves
 from ppafo.model.wearer.walker import Walker
+from ppafo.questions.endurance.answer import Endurance
+from ppafo.questions.endurance.solve import endurance
 from ppafo.questions.league.walking.task import walking_task
 from ppafo.questions.timing.answer import event_timing
 from ppafo.questions.walk.answer import answer_of, walk_with_and_without
@@ -156,8 +158,10 @@ def test_a_study_counts_nothing_that_comes_after_a_fall_as_a_single_walk_does(
     capsys.readouterr()
     changes = [word for change in (*FALLS, "wearer.start_speed=1.3 m/s") for word in ("--set", change)]
     assert main(["simulate", WALK, *changes, "--out", str(tmp_path / "single"), "--json"]) == 0
-    single = {name: item["value"] for name, item in json.loads(capsys.readouterr().out)["metrics"].items()}
-    assert single["walked_time"] < 6.0, "this one falls"
+    printed = json.loads(capsys.readouterr().out)
+    single = {name: item["value"] for name, item in printed["metrics"].items()}
+    assert printed["status"]["message"] == f"completed: the wearer fell at t = {single['fall_time']:.4g} s"
+    assert single["walked_time"] < 6.0
     study = ppafo.load_study_results(tmp_path / "study")
     row = study.table()
     assert {name: float(row[name][0]) for name in single} == pytest.approx(single, rel=1e-9)
@@ -168,6 +172,23 @@ def test_a_study_counts_nothing_that_comes_after_a_fall_as_a_single_walk_does(
     )
     np.testing.assert_array_equal(pressure[: len(alone)], alone.astype(np.float32))
     assert np.isnan(pressure[len(alone) :]).all(), "nothing is kept after the fall"
+
+
+@pytest.mark.long
+def test_a_walk_on_a_bottle_ends_with_the_fall_and_strides_are_those_of_the_wearer(tmp_path: Path) -> None:
+    early = [*FALLS[:2], "wearer.soleus_strength=0.3", "run.duration=6 s", "bottle.name=paper-co2-9oz"]
+    pair = walk_with_and_without(load_walk(WALK, early))
+    worn, bare = pair.comparison.with_device, pair.comparison.without_device
+    assert worn.supply is not None
+    assert worn.metrics["fall_time"].value < worn.supply.ending.time < worn.metrics["fall_time"].value + 0.2 < 5.0
+    assert worn.supply.ending.message.startswith("the wearer fell, and 25")
+    assert bare.status.message.startswith("completed: the wearer fell"), "as long a walk, whoever fell in the other"
+    life = endurance(walk(load_walk(WALK), 0.1), overrides=["bottle.gas_mass=6 g", "bottle.volume=30 cm^3"])
+    assert isinstance(life, Endurance)
+    assert life.draw.step_time == pytest.approx(walk(load_walk(WALK), 0.1).metrics["stride_time"].value)
+    (tmp_path / "walk.json").write_text(json.dumps({"format": answer_of(pair).data["format"]}))
+    with pytest.raises(DataError, match="is the walk of a wearer who reacts: walk on the bottle"):
+        endurance(tmp_path)
 
 
 @pytest.mark.long

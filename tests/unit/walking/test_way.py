@@ -1,12 +1,14 @@
 """The ground before a wearer and pushes on the trunk: heights without gaps, normals, and impulses."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from ppafo.errors import ScenarioError
 from ppafo.model.wearer.way import LEVEL, NOT_PUSHED, PIECES, Push, footing, next_push, push_now
+from ppafo.walking import load_walk
 from ppafo.walking.way import EDGE, Stretch, met_by, way_of
 
 START = Stretch("walk", 0.0, {"distance": 4.0, "slope": 0.0})
@@ -69,3 +71,10 @@ def test_a_way_of_more_pieces_than_there_are_is_refused() -> None:
     steps = [Stretch("step", 4.0 + number, {"height": 0.02}) for number in range(PIECES)]
     with pytest.raises(ScenarioError, match=f"the ground has {2 * PIECES + 1} pieces, {PIECES} at most"):
         way_of((START, *steps))
+
+
+def test_a_course_of_too_many_pieces_is_refused_by_the_name_of_its_file(tmp_path: Path) -> None:
+    step = '[[segment]]\nkind = "walk"\ndistance = "3 m"\n[[segment]]\nkind = "step"\nheight = "1 cm"\n'
+    (tmp_path / "stairway.toml").write_text(f'schema_version = 1\nname = "stairway"\n{PIECES * step}')
+    with pytest.raises(ScenarioError, match=r"stairway\.toml: the ground has \d+ pieces"):
+        load_walk("reacting", course=tmp_path / "stairway.toml")

@@ -89,7 +89,6 @@ def adapt_into_folder(
                 file.truncate(content.rindex(b"\n") + 1)
     else:
         check_owned_folder(folder, kind)
-        write_marked_folder(folder, {JOURNAL: line_of(search.document())}, "adapt")
     try:
         found = _adapted(search, journal, known, threads, progress)
     except KeyboardInterrupt:
@@ -104,22 +103,27 @@ def _known(journal: Path, content: bytes, search: Search) -> dict[tuple[int, int
     lines = content.split(b"\n")[:-1]
     try:
         documents = [json.loads(line.decode()) for line in lines]
-        head = documents[0]
+        head = dict(documents[0])
         found = {
-            (int(item["restart"]), int(item["generation"])): (
-                str(item["drawn"]),
-                [float(cost) for cost in item["costs"]],
-            )
+            (int(item["restart"]), int(item["generation"])): (str(item["drawn"]), _finite(item["costs"]))
             for item in documents[1:]
         }
-    except (ValueError, LookupError, TypeError, RecursionError) as error:
+    except (ValueError, LookupError, TypeError, OverflowError, RecursionError) as error:
         raise DataError(f"{journal}: is damaged: delete its folder and search anew") from error
     requested = search.document()
-    changed = [name for name, value in requested.items() if not isinstance(head, dict) or head.get(name) != value]
+    changed = [name for name, value in requested.items() if head.get(name) != value]
     if changed:
         raise StudyError(
             f"{journal.parent}: holds another search ({', '.join(changed)}); choose another folder with --out"
         )
+    return found
+
+
+def _finite(costs: Sequence[float]) -> list[float]:
+    """Costs of a journal as floats; ValueError for one that no search has."""
+    found = [float(cost) for cost in costs]
+    if not np.isfinite(found).all():
+        raise ValueError("costs are finite")
     return found
 
 
@@ -183,6 +187,9 @@ def _generations(
             costs = costs_of(search, model, drawn)
             if journal is not None:
                 item = {"restart": restart, "generation": generation, "drawn": mark, "costs": costs.tolist()}
+                # Nothing is written for a search that cannot be begun.
+                if not journal.exists():
+                    write_marked_folder(journal.parent, {JOURNAL: line_of(search.document())}, "adapt")
                 with journal.open("ab") as file:
                     file.write(line_of(item))
         strategy.tell(list(zip(asked, costs.tolist(), strict=True)))

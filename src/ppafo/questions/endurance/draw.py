@@ -31,7 +31,7 @@ PEAK_WINDOW = 0.1
 _MAXIMUM_FALLEN = 0.1
 """Fraction of the gas used that may flow back: it waits in the line before the valve, and the next step takes it."""
 WALK_FILE = "walk.json"
-FORMAT = "ppafo walk"
+FORMAT, FORMAT_OF_REACTING = "ppafo walk", "ppafo walk of a wearer who reacts"
 _VOLUMES = ("volume_per_angle", "dead_volume_1", "dead_volume_2")
 _CHANNELS = ("angle", "pressure_1", "pressure_2", "supplied_mass")
 _LEAST = 1.0e-12
@@ -160,11 +160,13 @@ def walk_gas(result: WalkResult) -> WalkGas:
     configuration, course = result.scenario, walk_of(result.scenario).course
     gas = result.metrics.get("gas" if course is None else "course_gas")
     actuator = configuration.device.actuator
+    # A wearer who reacts sets the pace, and one who took gas made strides.
+    time = result.metrics.get("stride_time" if course is None else "course_time")
     return WalkGas(
         configuration.name,
         result.recording,
         0.0 if gas is None else gas.value,
-        walk_of(configuration).gait.stride_time if course is None else result.metrics["course_time"].value,
+        walk_of(configuration).gait.stride_time if time is None else time.value,
         Actuator(**{name: getattr(actuator, name) for name in Actuator.__slots__}),
         course="" if course is None else course.name,
         atmospheric_pressure=configuration.device.supply.atmospheric_pressure,
@@ -181,6 +183,11 @@ def read_walk_gas(folder: Path) -> WalkGas:
     """Return the gas of a walk from the folder that ``ppafo walk`` wrote; DataError where it says too little."""
     path = folder / WALK_FILE
     document = read_json(path)
+    if isinstance(document, dict) and document.get("format") == FORMAT_OF_REACTING:
+        raise DataError(
+            f"{path}: is the walk of a wearer who reacts: walk on the bottle, with 'ppafo walk --bottle', or give gas "
+            "and time of a stride, with --gas-per-step and --step-time"
+        )
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise DataError(f"{path}: is not the result of a ppafo walk (its 'format' is not '{FORMAT}')")
     status = _table(document, "status", path).get("kind", "completed")

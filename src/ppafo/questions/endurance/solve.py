@@ -252,6 +252,8 @@ def _walked_to_its_end(carried: Scenario, at_set_pressure: Draw, schedule: Sched
         check_reuse(reused, at_set_pressure.mass_per_step)
     saved = 0.0 if reused is None else reused.balance.returned_mass / at_set_pressure.mass_per_step
     life = bottle_life(carried, schedule, saved)
+    if walk_of(carried).reacts is not None:  # whose strides no gait sets
+        life = replace(life, repeats=life.walked / at_set_pressure.step_time)
     steps = max(life.repeats, 1.0e-9)
     step_time = life.walked / steps
     mass = life.course.regulated / steps

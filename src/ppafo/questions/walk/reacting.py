@@ -10,6 +10,7 @@ from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import display_values, rounded_text, title_with_unit
 from ppafo.answers.style import BLUE, GREY, VERMILION, house_style, mark_kind
 from ppafo.gait.document import load_gait
+from ppafo.questions.endurance.draw import FORMAT_OF_REACTING
 from ppafo.questions.walk.course import bottle_data, bottle_remark, bottle_sections
 from ppafo.simulation.scenario import UNITS, Scenario, plain
 from ppafo.storage.comma_separated import marked_csv_bytes
@@ -25,7 +26,7 @@ from ppafo.walking.way import EDGE, met_by
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawn
 
-FORMAT, SCHEMA_VERSION = "ppafo walk of a wearer who reacts", 1
+SCHEMA_VERSION = 1
 
 ROWS = (
     ("walked_time", "Walked until the end or a fall", "time", 1),
@@ -122,7 +123,7 @@ def reacting_answer(comparison: Comparison) -> Answer:
             *_curves(comparison),
         ),
         data={
-            "format": FORMAT,
+            "format": FORMAT_OF_REACTING,
             "schema_version": SCHEMA_VERSION,
             "units": UNITS,
             "status": plain(worn.status),

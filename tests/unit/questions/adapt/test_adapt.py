@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ppafo.errors import DataError, StudyError
+from ppafo.errors import DataError, PpafoError, StudyError
 from ppafo.questions.adapt.answer import Adaptation, Restart, Walked, wearer_text
-from ppafo.questions.adapt.problem import search_of
+from ppafo.questions.adapt.problem import line_of, search_of
 from ppafo.questions.adapt.solve import JOURNAL, METRICS, adapt, adapt_into_folder, costs_of
+from ppafo.storage.result_folder import write_marked_folder
 from ppafo.studies.draws import Outcomes
 from ppafo.wearers.loading import find_wearer, wearer_of
 
@@ -63,6 +64,22 @@ def test_who_is_found_has_the_muscles_and_joints_of_who_was_searched_with(name: 
     file = tmp_path / "found.toml"
     file.write_text(wearer_text(Adaptation(search, nowhere, (restart,)), restart))
     assert wearer_of(find_wearer(file)) == search.wearer.body
+
+
+def test_a_search_that_cannot_be_begun_leaves_no_folder(tmp_path: Path) -> None:
+    with pytest.raises(PpafoError, match="a walk on a bottle goes by 'ppafo walk' alone"):
+        adapt_into_folder("reacting", tmp_path / "out", overrides=[*SHORT, "bottle.name=paper-co2-9oz"])
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "line", ['"generation": 1e400, "costs": [1]', '"generation": 0, "costs": [NaN]', '"costs": [1]']
+)
+def test_a_line_that_no_search_wrote_is_damage(tmp_path: Path, line: str) -> None:
+    head = line_of(search_of("reacting", None, "alike", 1, 1, 4, 1, SHORT).document())
+    write_marked_folder(tmp_path, {JOURNAL: head + f'{{"restart": 0, "drawn": "", {line}}}\n'.encode()}, "adapt")
+    with pytest.raises(DataError, match="is damaged"):
+        adapt_into_folder("reacting", tmp_path, restarts=1, generations=1, population=4, overrides=SHORT)
 
 
 @pytest.mark.long
