@@ -247,7 +247,7 @@ def test_a_bottle_that_ends_a_walk_within_the_first_strides_is_named_with_its_ti
     small: WalkResult, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert small.supply is not None
-    ending = small.supply.ending._replace(time=3.1, message="the bottle is empty")
+    ending = small.supply.ending._replace(kind="empty", time=3.1, message="the bottle is empty")
     ended = replace(small, supply=replace(small.supply, ending=ending))
     monkeypatch.setitem(compare_walks.__globals__, "walk", lambda *_, **__: ended)
     with pytest.raises(SimulationError, match=r"the bottle is empty, after 3\.1 s: fewer than 5 strides"):
