@@ -16,7 +16,7 @@ from ppafo.metrics.tracking import ONE_INSTANT, settled_error
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.progress import Progress, Report
 from ppafo.simulation.ensemble import run_ensemble
-from ppafo.simulation.ensemble.running import lacking, offered
+from ppafo.simulation.ensemble.running import lacking, offered, reacts
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.loading import load_study
@@ -162,6 +162,8 @@ _RUNS_AT_ONCE = 16_384
 """Between two pieces of this size progress is reported and an interruption is heard."""
 _SLOW_RUNS_AT_ONCE = 32
 """The same where a Python object controls: about a second."""
+_REACTING_RUNS_AT_ONCE = 64
+"""The same where the wearer reacts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,7 +206,8 @@ def scenario_model(
     """
     check_metrics(metrics, scenario)
 
-    at_once = _RUNS_AT_ONCE if scenario.control.custom is None else _SLOW_RUNS_AT_ONCE
+    at_once = _REACTING_RUNS_AT_ONCE if reacts(scenario) else _RUNS_AT_ONCE
+    at_once = at_once if scenario.control.custom is None else _SLOW_RUNS_AT_ONCE
 
     def outcomes(columns: Mapping[str, Floats]) -> Outcomes:
         runs = len(next(iter(columns.values())))

@@ -31,6 +31,7 @@ from ppafo.documents.models import quote, validate
 from ppafo.engine.lanes import write_source
 from ppafo.errors import DataError, StudyError
 from ppafo.metrics import METRICS
+from ppafo.simulation.ensemble.running import reacts
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario, plain, scenario_document
 from ppafo.storage.places import Place, read_document
@@ -117,6 +118,8 @@ MAXIMUM_RUNS_OF_CHUNK = 65_536
 _FEWEST_RUNS_OF_CHUNK = 512
 _SLOW_RUNS_OF_CHUNK = 64
 """Where a Python object controls: some seconds, after which progress is said and nothing of it is lost."""
+_REACTING_RUNS_OF_CHUNK = 64
+"""Where the wearer reacts: a quarter of a minute of one processor, for walks of a minute."""
 _MAXIMUM_BYTES_OF_TRACES = 48_000_000
 ASKED_ABOVE = 10_000_000_000
 """Bytes above which a study is only started with ``--yes``."""
@@ -141,6 +144,8 @@ def chunk_size(study: Study) -> int:
         return study.runs_of_chunk
     if any(item.scenario.control.custom is not None for item in study.configurations):
         return _SLOW_RUNS_OF_CHUNK
+    if any(reacts(item.scenario) for item in study.configurations):
+        return _REACTING_RUNS_OF_CHUNK
     bytes_of_run = 8 * len(study.outputs.traces) * maximum_samples(study)
     size = MAXIMUM_RUNS_OF_CHUNK
     while size > _FEWEST_RUNS_OF_CHUNK and size * bytes_of_run > _MAXIMUM_BYTES_OF_TRACES:

@@ -45,6 +45,8 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _TRIAL_RUNS = 256
+_TRIED_RUNS = 8
+"""Of a study without bands: its paths are tried, and no bins are placed."""
 STATUSES = ("completed", "diverged", "refused")
 _PLAIN = "-"
 
@@ -161,7 +163,8 @@ def completed_rows(table: "pa.Table") -> NDArray[np.bool_]:
 def bins_of_trials(study: Study, threads: int | None) -> BinsOf:
     """Return the bins of the bands from trial runs spread evenly over each configuration; tries every path as well."""
     total = study.runs_of_configuration
-    runs = np.unique(np.linspace(0, total - 1, min(total, _TRIAL_RUNS)).astype(np.int64))
+    tried = min(total, _TRIAL_RUNS if study.outputs.bands else _TRIED_RUNS)
+    runs = np.unique(np.linspace(0, total - 1, tried).astype(np.int64))
     values = drawn_values(study, runs)
     bins: dict[str, dict[str, Bins]] = {}
     for number, configuration in enumerate(study.configurations):

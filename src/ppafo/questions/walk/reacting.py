@@ -12,6 +12,7 @@ from ppafo.answers.style import BLUE, GREY, VERMILION, house_style, mark_kind
 from ppafo.gait.document import load_gait
 from ppafo.questions.endurance.draw import FORMAT_OF_REACTING
 from ppafo.questions.walk.course import bottle_data, bottle_remark, bottle_sections
+from ppafo.questions.walk.muscle_timing import muscle_timing, muscle_timing_section
 from ppafo.simulation.scenario import UNITS, Scenario, plain
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
@@ -115,6 +116,7 @@ def reacting_answer(comparison: Comparison) -> Answer:
             *_way_section(comparison),
             *bottle_sections(worn),
             *_likeness_section(comparison),
+            *muscle_timing_section(comparison),
             Section(
                 "How to read it",
                 (f"{_EXPLAINED} {_WHERE[walk_of(scenario).devices]}", _EFFORT, _LIMITS),
@@ -134,6 +136,10 @@ def reacting_answer(comparison: Comparison) -> Answer:
             "metrics_off": plain(dict(bare.metrics)),
             "likeness": {
                 words: {name: plain(item) for name, item in likeness(walked).items()}
+                for words, walked in (("with", worn), ("off", bare))
+            },
+            "muscle_timing": {
+                words: {name: plain(item) for name, item in muscle_timing(walked).items()}
                 for words, walked in (("with", worn), ("off", bare))
             },
             **bottle_data(worn),

@@ -287,6 +287,11 @@ def lacking(scenario: Scenario, kind: MetricKind) -> str:
     return "its controller follows no reference" if is_open and REFERENCE in kind.channels else ""
 
 
+def reacts(scenario: Scenario) -> bool:
+    """True of a wearer who reacts, whose minute takes a fraction of a second where other runs take milliseconds."""
+    return not lacking(scenario, METRICS["fall_time"])
+
+
 def offered(scenario: Scenario) -> dict[str, MetricKind]:
     """The metrics that runs of a scenario have, for messages: those of walks are not for a vane, nor the reverse."""
     missing = frozenset() if scenario.thermal is not None else _WITH_ENERGY_BALANCE

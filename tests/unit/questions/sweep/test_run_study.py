@@ -399,3 +399,9 @@ def test_a_seed_takes_the_place_of_that_of_the_file(varying: Callable[..., Any])
 def test_a_loaded_study_is_not_changed_by_what_stands_beside_it(small: Any) -> None:
     with pytest.raises(StudyError, match="a loaded Study takes no overrides, draws or seed; give them to load_study"):
         sweep(load_study(small), draws=3)
+
+
+def test_a_thousand_wearers_who_react_are_kept_in_pieces_of_seconds() -> None:
+    study = load_study("weak-wearers-who-react", draws=1000)
+    assert study.runs == 3000
+    assert chunks_module.chunk_size(study) == 64
