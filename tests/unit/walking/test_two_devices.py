@@ -20,7 +20,16 @@ WALK, BOTH, SHORT = "reacting", "wearer.device_on=both", "run.duration=6 s"
 SIDES = (("left", "right"), ("right", "left"))
 pytestmark = pytest.mark.long
 
-SEEN = ("sensors.force_noise=5 N", "sensors.pressure_noise=0.1 psi_d")
+LATE = (
+    *(
+        "sensors.force_noise=5 N",
+        "sensors.pressure_noise=0.1 psi_d",
+        "device.valve=proportional",
+        "valve.delay=7.35 ms",
+    ),
+    *("supply_line.plantarflexion.volume=8 cm^3", "supply_line.dorsiflexion.volume=8 cm^3"),
+)
+"""Noise, commands that come late, and lines."""
 
 
 def mirrored_path(path: str, paths: dict[str, int]) -> str:
@@ -37,7 +46,7 @@ def mirrored(rows: Floats, paths: dict[str, int]) -> Floats:
     return rows[[paths[mirrored_path(path, paths)] for path in paths]]
 
 
-@pytest.mark.parametrize("further", [(), (*SEEN, "device.valve=proportional", "valve.delay=7.35 ms")])
+@pytest.mark.parametrize("further", [(), pytest.param(LATE, marks=pytest.mark.thorough)])
 def test_a_wearer_who_begins_mirrored_walks_mirrored_to_the_bit(further: tuple[str, ...]) -> None:
     batch = batch_of(plan_walk(load_walk(WALK, [BOTH, SHORT, *further])))
     states, parameters = (
@@ -71,6 +80,7 @@ def test_a_study_reads_what_a_walk_reads_and_gas_is_that_of_both() -> None:
     assert lacking(scenario, METRICS["work_per_gas"]) == "it is of one device, and there are two"
 
 
+@pytest.mark.thorough
 def test_a_fault_is_that_of_the_left_device_and_the_right_one_goes_on() -> None:
     stuck = ("faults.valve_1.kind=stuck", "faults.valve_1.time=2 s")
     result = walk(load_walk(WALK, [BOTH, SHORT, *stuck]))

@@ -317,12 +317,15 @@ def stride_figure(comparison: Comparison) -> "Drawn":
                 axes.fill_between(100.0 * PHASES, 2.0 * mean - spread, spread, color=color, alpha=0.2, linewidth=0)
             if channel == "toe_height":
                 axes.axhline(0.0, color=GREY, linewidth=0.8)
+            other = comparison.with_device.averages.get("other_torque") if channel == "torque" else None
+            if other is not None:
+                axes.plot(100.0 * PHASES, other.mean, color=BLUE, linewidth=1.2, linestyle="--", label="right leg")
             axes.set_ylabel(title_with_unit(title, quantity) if quantity else title, fontsize=9)
             axes.set_xlim(0.0, 100.0)
         for axes in figure.axes[3:]:
             axes.set_xlabel("Stride (%)", fontsize=9)
-        handles, labels = figure.axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.53, 1.0), ncols=2)
+        handles, labels = figure.axes[4].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.53, 1.0), ncols=3)
         scenario = comparison.with_device.scenario
         title = f"{scenario.name}: {wearer_of_walk(scenario).name}, who reacts"
         figure.text(0.012, 0.985, title, ha="left", va="top", fontweight="bold")
