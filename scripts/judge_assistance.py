@@ -1,6 +1,7 @@
 """Has published trials of powered ankles judge what a device does to the effort of a wearer who reacts and adapts.
 
     python scripts/judge_assistance.py timing --out out/timing
+    python scripts/judge_assistance.py timing --device-on both --out out/timing-both
     python scripts/judge_assistance.py trial --out out/trial
 
 ``timing`` moves the onset of push-off through the stride, as P. Malcolm et al. (PLoS One 8(2):e56137, 2013) and
@@ -20,6 +21,7 @@ import numpy as np
 
 from ppafo.questions.adapt.answer import Adaptation, Walked
 from ppafo.questions.adapt.solve import adapt_into_folder
+from ppafo.walking.reacting_wearer import LEFT, LEGS
 
 MODELS = (("metabolic_power_umberger", "Umberger 2010"), ("metabolic_power_bhargava", "Bhargava 2004"))
 MALCOLM = {0.13: -5.0, 0.23: -12.0, 0.34: -15.0, 0.43: -17.0, 0.54: -2.0}
@@ -45,7 +47,12 @@ def adapted(folder: Path, overrides: Sequence[str], arguments: argparse.Namespac
         restarts=restarts,
         generations=arguments.generations,
         seed=arguments.seed,
-        overrides=[f"wearer.reacts={arguments.wearer}", "run.duration=12 s", *overrides],
+        overrides=[
+            f"wearer.reacts={arguments.wearer}",
+            f"wearer.device_on={arguments.device_on}",
+            "run.duration=12 s",
+            *overrides,
+        ],
     )
 
 
@@ -132,6 +139,7 @@ def main() -> int:
     parser.add_argument("judge", choices=("timing", "trial"))
     parser.add_argument("--out", type=Path, required=True, help="folder of the searches")
     parser.add_argument("--wearer", default="geyer-herr", help="wearer to begin with")
+    parser.add_argument("--device-on", choices=LEGS, default=LEFT, help="legs with a device")
     parser.add_argument("--pressure", type=float, default=90.0, help="supply of push-off (psi_g), in 'timing'")
     parser.add_argument("--restarts", type=int, default=5, help="searches of a condition, in 'timing'")
     parser.add_argument("--generations", type=int, default=20)
