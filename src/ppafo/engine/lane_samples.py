@@ -263,6 +263,8 @@ OF_OTHER = {
     **{f"{OTHER}{name}": f"{OTHER}{name}" for name in ("pressure_1", "pressure_2", "torque")},
     f"{OTHER}command": f"{OTHER}result.command",
     **{f"{OTHER}{name}": f"{OTHER}walk.{name}" for name in ("external_torque", "contact", "heel_force", "toe_force")},
+    f"{OTHER}controller_phase": f"{OTHER}controller_state.phase.phase",
+    f"{OTHER}safe_state": f"{OTHER}controller_state.safety.level",
 }
 """Those of a device on the other leg, and where a sample has them."""
 GAS_TOTALS = ("supplied_mass", "vented_mass", "leaked_mass")
@@ -349,8 +351,9 @@ def sample_lines(rows: Rows, moment: str) -> list[str]:
         "temperature_1": warm[0] if thermal else "0.0",
         "temperature_2": warm[1] if thermal else "0.0",
     }
-    groups: tuple[str, ...] = tuple(f"{OTHER}{name}" for name in ("state", "held", "result", "walk"))
-    groups = groups if program.devices == 2 else ()
+    groups: tuple[str, ...] = ()
+    if program.devices == 2:
+        groups = tuple(f"{OTHER}{name}" for name in ("state", "held", "result", "walk", "controller_state"))
     foot, stride, on_gait = _zeros(FootSample), _zeros(StrideSample), []
     if program.walks:
         groups += ("walk", "controller_state")
@@ -425,9 +428,16 @@ def _stride_values(rows: Rows) -> dict[str, str]:
         "supplied_mass": gas_total(rows.program, "supplied_mass"),
         **{name: f"walk.{name}" for name in totals},
         "phase": _of_state(rows, TRACED_IN_WALKS["controller_phase"]),
-        "level": _of_state(rows, TRACED_IN_WALKS["safe_state"]),
+        "level": _least_help(rows),
         "time": "next_record * (timing.step * interval)",
     }
+
+
+def _least_help(rows: Rows) -> str:
+    """Level of help, of two devices that of the one that helps less."""
+    left = _of_state(rows, TRACED_IN_WALKS["safe_state"])
+    right = _of_state(rows, OF_OTHER[f"{OTHER}safe_state"])
+    return f"max({left}, {right})" if rows.program.devices == 2 else left
 
 
 def _of_state(rows: Rows, path: str) -> str:
@@ -443,7 +453,9 @@ def walk_traces(program: Program) -> dict[str, str]:
     found = {
         name: next((path for path in paths if path.endswith(ending)), "") for name, ending in TRACED_IN_WALKS.items()
     }
-    found |= OF_OTHER if program.devices == 2 else {}
+    if program.devices == 2:
+        # Expressions of a sample have no point, and paths of the state one.
+        found |= {name: path for name, path in OF_OTHER.items() if "." not in path or path in paths}
     return {name: path for name, path in found.items() if path}
 
 

@@ -22,6 +22,7 @@ from ppafo.model.actuators.vane import MODEL as VANE
 from ppafo.model.effects.kind import Effect, State, effect_problem, laws_in_order
 from ppafo.model.leg import FootLoad
 from ppafo.model.plant import PlantState
+from ppafo.model.plant_faults import PlantFaults
 from ppafo.model.sensors import GaitSensors, SensorParameters
 from ppafo.model.valves.kind import ValveModel
 from ppafo.signals.meter import Course, MeterKind
@@ -57,8 +58,8 @@ class LaneStart(NamedTuple):
     step: float
 
 
-OTHER_SENSORS = {f"{OTHER}sensors": SensorParameters, f"{OTHER}gait_sensors": GaitSensors}
-"""Groups of parameters that a second device has of its own: noise differs, and it has no faults."""
+OTHER_PARAMETERS = {f"{OTHER}sensors": SensorParameters, f"{OTHER}gait_sensors": GaitSensors}
+"""Groups of parameters that a second device has of its own: noise differs, and so do faults."""
 
 
 class NoParameters(NamedTuple):
@@ -118,7 +119,8 @@ class Program:
             **({} if self.feed is None else self.feed.parameters),
             **({} if self.shank is None else {"load": FootLoad, "shank": self.shank.parameters}),
             **{effect.name: effect.parameters for effect in self.effects},
-            **(OTHER_SENSORS if self.devices == 2 else {}),
+            **(OTHER_PARAMETERS if self.devices == 2 else {}),
+            **({f"{OTHER}plant_faults": PlantFaults} if self.devices == 2 and self.fails else {}),
         }
 
     @property
@@ -178,7 +180,8 @@ class Program:
         other = self.of_other_leg
         if other is None or other.leg is None:
             return {}
-        counted = {name: other.leg.states[name] for name in (*other.leg.stored, "gait_seen")}
+        powered = ["unpowered"] if other.leg.fails else []
+        counted = {name: other.leg.states[name] for name in (*other.leg.stored, "gait_seen", *powered)}
         lines = {} if self.feed is None else self.feed.states
         own = {"result": LaneResult, **self._device_states(), **counted, **lines, **self.effect_states}
         return {f"{OTHER}{name}": row for name, row in own.items()}

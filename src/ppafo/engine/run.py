@@ -82,12 +82,13 @@ class ReactingWalk:
 
 @dataclass(frozen=True, slots=True)
 class OtherDevice:
-    """Where a second device begins, on the right leg of a wearer who reacts, and its sensors, which do not fail."""
+    """Where a second device begins, on the right leg of a wearer who reacts; its sensors, and what fails of it."""
 
     initial: PlantState
     walk: "ReactingState"
     sensors: SensorParameters
     gait_sensors: GaitSensors
+    faults: PlantFaults | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +170,8 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     walk, walk_states = _walk_groups(run.walk) if run.reacting is None else _reacting_groups(run.reacting)
     lines, line_states = ([], []) if run.lines is None else ([run.lines.parameters], [run.lines.initial])
     leg = [] if run.leg is None else [run.leg.load, run.leg.shank]
-    other = [] if run.other is None else [run.other.sensors, run.other.gait_sensors]
+    other: list[Any] = [] if run.other is None else [run.other.sensors, run.other.gait_sensors]
+    other += [] if run.other is None or run.other.faults is None else [run.other.faults]
     rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, *leg, *run.effects, *other]
     parameters = table([timing, *plant, *valve, *rest], runs)
     controller_state = NoParameters() if program.controller is None else program.controller.initial
@@ -311,7 +313,8 @@ def _states_of_other(run: Run) -> list[Any]:
     controller = () if run.program.controller is None else run.program.controller.initial
     lines = [] if run.lines is None else [run.lines.initial]
     device = [run.other.initial, gas_at_start(alike), run.program.valve.initial(), controller]
-    return [AT_REST, *device, run.other.walk, NOTHING_SEEN, *lines, *states_at_start(alike)]
+    powered = [] if run.other.faults is None else [POWERED]
+    return [AT_REST, *device, run.other.walk, NOTHING_SEEN, *powered, *lines, *states_at_start(alike)]
 
 
 def _members(group: Members, groups: int) -> list[Members]:

@@ -231,6 +231,7 @@ METRICS = (
         ENERGIES,
         energy_imbalance,
         read_energy_imbalance,
+        needs=(ONE_DEVICE,),
     ),
     MetricKind(
         "largest_pressure",
@@ -240,6 +241,7 @@ METRICS = (
         largest_pressure,
         read_largest_pressure,
         (LARGEST_PRESSURE,),
+        needs=(ONE_DEVICE,),
     ),
     MetricKind(
         "lowest_temperature",
@@ -249,6 +251,7 @@ METRICS = (
         lowest_temperature,
         read_lowest_temperature,
         (LOWEST_TEMPERATURE,),
+        needs=(ONE_DEVICE,),
     ),
     MetricKind(
         "mechanical_work",
@@ -258,6 +261,7 @@ METRICS = (
         mechanical_work,
         read_mechanical_work,
         (WORK,),
+        needs=(ONE_DEVICE,),
     ),
     MetricKind(
         "work_per_gas",

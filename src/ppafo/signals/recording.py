@@ -96,6 +96,12 @@ CHANNELS: dict[str, ChannelKind] = {
     "other_external_torque": ChannelKind("N m", "torque of the device on the other leg on the wearer"),
     "other_command": ChannelKind(PLAIN_NUMBER, "command to the valve of the other leg, as the first", is_held=True),
     "other_contact": ChannelKind(PLAIN_NUMBER, "other foot and ground, as the first", is_held=True),
+    "other_controller_phase": ChannelKind(
+        PLAIN_NUMBER, "phase that the controller of the other leg sees, as the first", is_held=True
+    ),
+    "other_safe_state": ChannelKind(
+        PLAIN_NUMBER, "what the controller of the other leg has found, as the first", is_held=True
+    ),
     "other_heel_force": ChannelKind("N", "force under the other heel as its sensor follows it"),
     "other_toe_force": ChannelKind("N", "force under the other toes as its sensor follows it"),
     "trunk_lean": ChannelKind("rad", "lean of the trunk from the vertical, forward above 0"),

@@ -154,21 +154,24 @@ def _plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     )
     if wearer.on_both:
         initial = vented_state(run.plant, start.other_ankle, 0.0)
-        alike = sensors_of_other(run.sensors)
-        run = replace(run, other=OtherDevice(initial, start.other_walk, alike, _sensors_without_faults(scenario)))
+        shared = failing_of(scenario, SHARED)
+        other = OtherDevice(
+            initial=initial,
+            walk=start.other_walk,
+            sensors=sensors_of_other(run.sensors),
+            gait_sensors=_sensors_without_faults(scenario),
+            faults=None if shared is None else shared[0],
+        )
+        run = replace(run, other=other)
         problems = (*problems, _lacks_both(scenario))
     return run, (too_many_steps(scenario, run.step, run.step_count), *problems, _too_long(scenario))
 
 
 def _lacks_both(scenario: Scenario) -> Problem:
     """What does not go with a device on either leg."""
-    has_valve, is_outside = bool(walk_of(scenario).shut_off), scenario.control.kind == PYTHON_CONTROLLER
-    what = (
-        "a shut-off valve is in the line of one device"
-        if has_valve
-        else "a chip or a Python object commands one device"
-    )
-    return np.asarray(has_valve or is_outside), lambda _run: f"{DEVICE_ON} = {BOTH}: {what}; leave out one of both"
+    is_outside = scenario.control.kind == PYTHON_CONTROLLER
+    what = "a chip or a Python object commands one device; leave out one of both"
+    return np.asarray(is_outside), lambda _run: f"{DEVICE_ON} = {BOTH}: {what}"
 
 
 def _too_long(scenario: Scenario) -> Problem:
@@ -253,14 +256,20 @@ def _gait_sensors(scenario: Scenario, settings: SensorSettings) -> GaitSensors:
     return over_runs(made, scenario.control.period, *values)
 
 
-def failing_of(scenario: Scenario) -> tuple[PlantFaults, ShutOff] | None:
-    """What fails of the plant of a walk, and its shut-off valve; None where it has neither."""
+SHARED = ("regulator", "bottle")
+"""What the parts are called that two devices share: a fault of these is one of both."""
+
+
+def failing_of(scenario: Scenario, parts: tuple[str, ...] = ("",)) -> tuple[PlantFaults, ShutOff] | None:
+    """What fails of the plant of a walk, of parts whose names begin so, and its shut-off valve; None without both."""
     motion = walk_of(scenario)
     if not motion.broken and not motion.shut_off:
         return None
     names = leaf_paths(PlantFaults, "")
     numbers: dict[str, Any] = dict(zip((name.lstrip(".") for name in names), leaves(SOUND), strict=True))
     for part, fault in motion.broken.items():
+        if not part.startswith(parts):
+            continue
         declared = PLANT_FAULTS[part][fault.kind]
         numbers |= {declared.fields[name]: number for name, number in fault.numbers.items()}
     return rebuilt(PlantFaults, list(numbers.values())), _shut_off(motion.shut_off, scenario.device)

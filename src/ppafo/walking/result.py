@@ -25,12 +25,12 @@ from ppafo.walking.bottle import UNITS, SupplyCourse
 from ppafo.walking.channels import Channels, actuator_channels, controller_channels, valve_and_ground_channels
 from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.course import PlannedCourse, pace_in_time
-from ppafo.walking.events import SAFE_ROW, SafetyEvent, safety_events
+from ppafo.walking.events import SAFE_ROW, SafetyEvent, events_of_legs, safety_events
 from ppafo.walking.gait_series import AnklePath, ankle_path, truncate
 from ppafo.walking.motion import walk_of
 from ppafo.walking.person import as_drawn
 from ppafo.walking.planning import course_of_walk, law_of
-from ppafo.walking.reacting import gas_of_all, reacting_metrics, recording_of_reacting
+from ppafo.walking.reacting import gas_of_all, level_of_help, reacting_metrics, recording_of_reacting
 from ppafo.walking.strides import (
     Curves,
     SegmentResult,
@@ -335,7 +335,7 @@ def _reacting_result(
     )
     starts = stride_starts(rows["walk.strides"])
     strides = per_stride(rows, starts)
-    helped = helped_strides(rows.get(SAFE_ROW, np.zeros(recording.time.size)), starts)
+    helped = helped_strides(level_of_help(rows), starts)
     metrics = reacting_metrics(recording, rows, starts, strides, helped, fall_time)
     if fall_time >= 0.0 and status.is_completed:
         status = Status("completed", None, f"completed: the wearer fell at t = {fall_time:.4g} s")
@@ -349,7 +349,7 @@ def _reacting_result(
         starts=starts,
         helped=helped,
         vented_metrics={},
-        events=safety_events(scenario, recording.time, rows),
+        events=events_of_legs(scenario, recording.time, rows),
         supply=supply,
     )
 

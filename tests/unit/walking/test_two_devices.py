@@ -10,9 +10,11 @@ from ppafo.engine.lanes import Batch, Floats, run_batch
 from ppafo.engine.pieces import OTHER
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
+from ppafo.errors import DataError
 from ppafo.metrics import METRICS
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.ensemble.running import lacking
+from ppafo.storage.opensim import opensim_recording
 from ppafo.walking import load_walk, walk
 from ppafo.walking.planning import plan_walk
 
@@ -77,17 +79,44 @@ def test_a_study_reads_what_a_walk_reads_and_gas_is_that_of_both() -> None:
     left, right = (record[-1, rows[f"{side}state.supplied_mass"], 0] for side in ("", OTHER))
     assert min(left, right) > 1.0e-3
     assert result.metrics["total_gas"].value == pytest.approx(left + right, rel=1e-12)
-    assert lacking(scenario, METRICS["work_per_gas"]) == "it is of one device, and there are two"
+    for name in ("work_per_gas", "mechanical_work", "largest_pressure"):
+        assert lacking(scenario, METRICS[name]) == "it is of one device, and there are two"
+    with pytest.raises(DataError, match="a wearer who reacts walks on two legs"):
+        opensim_recording(result.recording)
 
 
 @pytest.mark.thorough
 def test_a_fault_is_that_of_the_left_device_and_the_right_one_goes_on() -> None:
-    stuck = ("faults.valve_1.kind=stuck", "faults.valve_1.time=2 s")
+    stuck = ("faults.valve_1.kind=stuck", "faults.valve_1.time=2 s", "shut_off.area=10 mm^2")
     result = walk(load_walk(WALK, [BOTH, SHORT, *stuck]))
     late = result.recording.time > 3.0
+    assert {event.leg for event in result.events} == {"left leg"}
     assert result.metrics["vented_strides"].value > 1.0
     assert np.ptp(result.recording["other_command"][late]) > 1.0
-    assert result.recording["pressure_1"][late].min() > 1.5 * result.recording["other_pressure_1"][late].min()
+    assert result.recording["pressure_1"][late].max() < 0.5 * result.recording["other_pressure_1"][late].max()
+
+
+@pytest.mark.thorough
+def test_an_empty_bottle_ends_the_help_on_both_legs() -> None:
+    empty = ("faults.bottle.kind=empty", "faults.bottle.time=2 s", "faults.bottle.lag=0.2 s")
+    result = walk(load_walk(WALK, [BOTH, SHORT, *empty]))
+    late = result.recording.time > 3.5
+    assert [event.leg for event in result.events] == ["left leg", "right leg"]
+    for channel in ("pressure_1", "other_pressure_1"):
+        assert result.recording[channel][late].max() < 1.3e5
+
+
+@pytest.mark.thorough
+def test_strides_with_less_help_are_those_of_either_leg() -> None:
+    """Noise of the sensors pauses the right controller alone."""
+    given = [BOTH, SHORT, "sensors.force_noise=40 N"]
+    result = walk(load_walk(WALK, given))
+    assert {event.leg for event in result.events} == {"right leg"}
+    assert not result.recording["safe_state"].any()
+    names = ["helped_strides", "vented_strides", "safe_state_time"]
+    assert result.metrics["vented_strides"].value > 0.0
+    outcome = run_ensemble(load_walk(WALK, given), {"wearer.start_speed": np.array([1.3])}, names)
+    assert [outcome.metrics[name][0] for name in names] == [result.metrics[name].value for name in names]
 
 
 @pytest.mark.thorough
@@ -108,10 +137,6 @@ def test_a_bottle_gives_what_both_devices_take() -> None:
             "wearer.device_on = 'right' is not allowed; allowed: left, both",
         ),
         (("walk", "solenoid", "--set", BOTH), 'needs a wearer who reacts: give wearer.reacts = "NAME"'),
-        (
-            ("walk", WALK, "--set", BOTH, "--set", "shut_off.area=10 mm^2"),
-            "a shut-off valve is in the line of one device",
-        ),
         (
             ("chip", WALK, "--set", BOTH, "--set", "controller.arithmetic=fixed"),
             "a chip or a Python object commands one",

@@ -5,6 +5,7 @@ pressures at its begin, and the ankle that the gas sees is the body's. Device an
 step, which is 0.1 ms long. What sensors, faults, controllers and metrics read of a walk has the same names in both.
 """
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from ppafo.engine.pieces import OTHER, LegScheme, Phases, RarePhase
@@ -14,7 +15,7 @@ from ppafo.engine.scheme.walking import NO_CLEARANCE, DeviceShare
 from ppafo.model.contact import FLAT, HEEL, SWING, TOE
 from ppafo.model.places import friction_in_motion
 from ppafo.model.plant import PlantParameters, PlantState, actuator_torque
-from ppafo.model.plant_faults import PlantFaults, ShutOff, Unpowered
+from ppafo.model.plant_faults import PlantFaults, ShutOff, Unpowered, failed_plant
 from ppafo.model.sensors import GaitSeen, GaitSensors
 from ppafo.model.wearer.metabolic import rates_of_leg
 from ppafo.model.wearer.muscle import Fibre, Muscle, tendon_force
@@ -350,9 +351,9 @@ def lead(rows: Any) -> Phases:
     """Phases before the gas: the body, and where few steps sample them, the nerves and the reflexes."""
     add, has_other = rows.add, rows.program.of_other_leg is not None
     others = [f"{OTHER}{name}" for name in ("state", "held")] if has_other else []
-    # What fails is the first device.
-    sound = rows.load("plant").replace("plant", "sound", 1)
-    to_other = f"{add(assist_of)}(sound, share, {', '.join(others)})" if has_other else f"{add(no_assist)}()"
+    plant_of_other = _plant_of_other(rows) if has_other else []
+    to_other = f"{add(assist_of)}({OTHER}plant, share, {', '.join(others)})" if has_other else f"{add(no_assist)}()"
+    begun_of_other = f"{OTHER}begun = {_ankle(rows, f'{OTHER}plant', 'right')}"
     stepped = f"{add(next_body)}(wearer, walker, reflexes, walk, assist, {OTHER}assist, length)"
     ordered = f"{add(next_reflexes)}(wearer, nerves, reflexes, walker)"
     passed_on = f"{add(next_nerves)}(nerves, body.left_felt, body.right_felt, body.balance)"
@@ -371,12 +372,12 @@ def lead(rows: Any) -> Phases:
         [
             *[rows.load(name) for name in ("wearer", "walker", "reflexes", *others)],
             f"assist = {add(assist_of)}(plant, share, state, held)",
-            *([sound] if has_other else []),
+            *plant_of_other,
             f"{OTHER}assist = {to_other}",
             f"body = {stepped}",
             f"begun = {_ankle(rows, 'plant', 'left')}",
             *rows.keep("body", "begun"),
-            *([f"{OTHER}begun = {_ankle(rows, 'sound', 'right')}", *rows.keep(f"{OTHER}begun")] if has_other else []),
+            *([begun_of_other, *rows.keep(f"{OTHER}begun")] if has_other else []),
             f"reflexes = {waits}",
             *rows.store("reflexes"),
         ],
@@ -390,6 +391,15 @@ def lead(rows: Any) -> Phases:
             rows.cells["body.due"],
         ),
     ]
+
+
+def _plant_of_other(rows: Any) -> list[str]:
+    """Lines that make the plant of a second device, with the faults that it has of its own."""
+    lines = [f"{OTHER}{rows.load('plant')}"]
+    if rows.program.fails:
+        failed = f"{rows.add(failed_plant)}({OTHER}plant, {OTHER}plant_faults, time)"
+        lines += [rows.load(f"{OTHER}plant_faults"), f"{OTHER}plant = {failed}"]
+    return lines
 
 
 def _ankle(rows: Any, plant: str, side: str) -> str:
@@ -442,38 +452,19 @@ def _end_of_leg(rows: Any, side: str, other: str) -> list[str]:
     ]
 
 
-_OTHER_LEG = LegScheme(
-    takes_course=False,
-    parameters={"share": DeviceShare, "wearer": Wearer, "gait_sensors": GaitSensors},
-    states={
-        "walk": ReactingState,
-        "gait_seen": GaitSeen,
-        "walker": Walker,
-        "reflexes": Reflexes,
-        "nerves": Nerves,
-    },
-    loads=("share", "walk"),
-    stored={"walk": "walk_after"},
-    begun=AnkleStep,
-    led={"body": BodyEnd},
-    handed={},
-    ended={"ahead": HeldChambers},
-    find=find,
-    lead=led_already,
-    assume=assume,
-    reach=reach,
-    end=end_of_other,
-    reacts=True,
-)
-"""A second device, on the right leg of a wearer whose body moves with the first one."""
-
-
-def _scheme(fails: bool, on_both: bool = False) -> LegScheme:
+def _scheme(fails: bool) -> LegScheme:
     faults = {"plant_faults": PlantFaults, "shut_off": ShutOff} if fails else {}
     return LegScheme(
         takes_course=False,
         parameters={"share": DeviceShare, "wearer": Wearer, "gait_sensors": GaitSensors, **faults},
-        states={**_OTHER_LEG.states, **({"unpowered": Unpowered} if fails else {})},
+        states={
+            "walk": ReactingState,
+            "gait_seen": GaitSeen,
+            "walker": Walker,
+            "reflexes": Reflexes,
+            "nerves": Nerves,
+            **({"unpowered": Unpowered} if fails else {}),
+        },
         loads=("share", "walk", *faults, *(["unpowered"] if fails else [])),
         stored={"walk": "walk_after", "walker": "walker_after"},
         begun=AnkleStep,
@@ -487,12 +478,16 @@ def _scheme(fails: bool, on_both: bool = False) -> LegScheme:
         end=end,
         fails=fails,
         reacts=True,
-        other=_OTHER_LEG if on_both else None,
     )
+
+
+def _on_both(leg: LegScheme) -> LegScheme:
+    """The same with a second device on the right leg, whose steps find the body moved."""
+    return replace(leg, other=replace(leg, stored={"walk": "walk_after"}, lead=led_already, end=end_of_other))
 
 
 REACTING, FAILING_REACTING = _scheme(fails=False), _scheme(fails=True)
 """A leg of a wearer who reacts, and the same with a plant that may fail, or whose line has a shut-off valve."""
 
-REACTING_ON_BOTH, FAILING_REACTING_ON_BOTH = _scheme(fails=False, on_both=True), _scheme(fails=True, on_both=True)
-"""Both legs of a wearer who reacts, with a device on each, of which the left one may fail."""
+REACTING_ON_BOTH, FAILING_REACTING_ON_BOTH = _on_both(REACTING), _on_both(FAILING_REACTING)
+"""Both legs of a wearer who reacts, with a device on each."""

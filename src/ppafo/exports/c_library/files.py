@@ -71,6 +71,8 @@ OUTPUTS |= {
             "contact",
             "heel_force",
             "toe_force",
+            "controller_phase",
+            "safe_state",
         )
     },
 }

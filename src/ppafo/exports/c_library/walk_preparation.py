@@ -30,7 +30,7 @@ from ppafo.walking.course import flat_foot
 from ppafo.walking.declaration import PERSON, STEP, fault_numbers
 from ppafo.walking.gait_series import fit_rocker, gait_series, gait_timing
 from ppafo.walking.motion import interval_of, walk_of
-from ppafo.walking.planning import NO_REFERENCE, course_of_walk, failing_of, law_of, sensor_settings
+from ppafo.walking.planning import NO_REFERENCE, SHARED, course_of_walk, failing_of, law_of, sensor_settings
 from ppafo.walking.preparation import (
     DISTORTED,
     FROZEN,
@@ -218,6 +218,10 @@ def _plant_faults(configuration: Scenario, writing: Writing) -> Iterator[str]:
         yield f"plant_faults = {writing.constant(failing[0], 'plant_faults')}"
         yield f"shut_off = {writing.constant(failing[1], 'shut_off')}"
         yield f"unpowered = {writing.constant(POWERED, 'unpowered')}"
+    shared = failing_of(configuration, SHARED) if writing.program.devices == 2 else None
+    if shared is not None:
+        yield f"{OTHER}plant_faults = {writing.constant(shared[0], f'{OTHER}plant_faults')}"
+        yield f"{OTHER}unpowered = unpowered"
 
 
 def _fault(writing: Writing, kind: str, names: Mapping[str, str]) -> str:

@@ -2,8 +2,8 @@
 
 Every fault of the plant, and faults of each sensor, begin at some instants of a stride, at two start speeds. Each is
 walked with the limits of the controller's checks as wide as they go, with those of the walk, and with a shut-off valve
-as well, where there is one device. A safe state vents the device: who cannot walk without it falls in the safe state
-too. Of two devices the left one fails.
+as well. A safe state vents the device: who cannot walk without it falls in the safe state too. Of two devices the left
+one fails, and what both share fails for both.
 """
 
 from collections.abc import Mapping
@@ -77,7 +77,7 @@ def falls_of_walk(configuration: Scenario, report: Report) -> Falls:
     motion = walk_of(configuration)
     level = with_duration(replace(configuration, motion=replace(motion, bottle=None)), FIRST + INSTANTS[-1] + AFTER)
     walks = {WITHOUT: _without_checks(level), WITH: level}
-    if not motion.shut_off and motion.devices == 1:
+    if not motion.shut_off:
         fitted = {item.name: item.default or 0.0 for item in SHUT_OFF} | {"area": AREA}
         walks[SHUT] = replace(level, motion=replace(walk_of(level), shut_off=fitted))
     causes = tuple(causes_of(level))

@@ -17,6 +17,7 @@ from ppafo.simulation.scenario import UNITS, Scenario, plain
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.version import __version__
+from ppafo.walking.events import event_lines
 from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.reacting_wearer import ReactingWearer
 from ppafo.walking.result import WalkResult
@@ -103,6 +104,7 @@ def reacting_answer(comparison: Comparison) -> Answer:
     wearer = wearer_of_walk(scenario)
     remarks = [*person_remarks(scenario), *weak_remarks(wearer), *fall_remarks(comparison)]
     remarks += [] if worn.supply is None else [bottle_remark(worn, [])]
+    remarks += event_lines(worn.events)
     stays = worn.metrics["stays_up"].value > 0.5
     strides = f"{worn.metrics['strides'].value:.0f} strides"
     ended = "walks to the end" if stays else f"falls after {worn.metrics['fall_time'].value:.1f} s"
