@@ -53,11 +53,12 @@ THERMAL = (
 )
 SLOW = ("valve.spool_frequency=30 Hz", "valve.slew_limit=20 1/s", "timing.kind=estimated")
 EVERYTHING = (*SEEN, *FAULTY, *THERMAL, *SLOW, "controller.rate=330 Hz", "run.step=0.4 ms")
+ON_BOTH = ("reacting", ("course=ramp-and-kerb", "wearer.device_on=both", *SEEN, *THERMAL))
 VARIED: tuple[tuple[str, tuple[str, ...]], ...] = (
     *((name, ()) for name in list_walks()),
     ("proportional-regulators", EVERYTHING),
     ("proportional", ("course=first-steps",)),
-    ("reacting", ("course=ramp-and-kerb", "wearer.device_on=both", *SEEN, *THERMAL)),
+    ON_BOTH,
 )
 """Every shipped walk, one with every further feature (sensors with faults, thermal gas, slow valve), and courses."""
 
@@ -170,7 +171,7 @@ def samples_in_c(library: ctypes.CDLL, name: str, values: Values, outputs: int) 
 
 @pytest.mark.parametrize(
     ("name", "overrides"),
-    [pytest.param(*one, marks=pytest.mark.thorough) if one == BY_NUMBA else one for one in VARIED],
+    [pytest.param(*one, marks=pytest.mark.thorough) if one in (BY_NUMBA, ON_BOTH) else one for one in VARIED],
 )
 def test_every_sample_of_drawn_settings_has_the_bits_of_the_lanes(
     name: str, overrides: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -34,13 +34,23 @@ class PublishedTiming(NamedTuple):
 
 
 PUBLISHED = (
-    PublishedTiming("soleus", "soleus", ((15, 55),), ((3, 52),)),
-    PublishedTiming("gastrocnemius", "gastrocnemius (measured: medial head)", ((20, 52),), ((6, 48),)),
-    PublishedTiming("tibialis", "tibialis anterior", ((62, 13),), ((54, 9),)),
-    PublishedTiming("vastus", "vastus (lateralis)", ((92, 25),), ((88, 15),)),
-    PublishedTiming("hamstring", "hamstrings (measured: medial; usual: semimembranosus)", ((85, 15),), ((81, 5),)),
-    PublishedTiming("gluteus", "gluteus maximus (usual: upper part)", None, ((94, 24),)),
-    PublishedTiming("flexor", "hip flexors (usual: iliacus)", None, ((60, 72),)),
+    PublishedTiming(name="soleus", title="soleus", measured=((15, 55),), usual=((3, 52),)),
+    PublishedTiming(
+        name="gastrocnemius",
+        title="gastrocnemius (measured: medial head)",
+        measured=((20, 52),),
+        usual=((6, 48),),
+    ),
+    PublishedTiming(name="tibialis", title="tibialis anterior", measured=((62, 13),), usual=((54, 9),)),
+    PublishedTiming(name="vastus", title="vastus (lateralis)", measured=((92, 25),), usual=((88, 15),)),
+    PublishedTiming(
+        name="hamstring",
+        title="hamstrings (measured: medial; usual: semimembranosus)",
+        measured=((85, 15),),
+        usual=((81, 5),),
+    ),
+    PublishedTiming(name="gluteus", title="gluteus maximus (usual: upper part)", measured=None, usual=((94, 24),)),
+    PublishedTiming(name="flexor", title="hip flexors (usual: iliacus)", measured=None, usual=((60, 72),)),
 )
 """Measured: Falisse et al. 2019, J R Soc Interface 16:20190402, subject 1 at 1.33 m/s, mean over 6 to 11 strides of
 right legs in ExperimentalData.mat of github.com/antoinefalisse/3dpredictsim; the hamstrings at the side are left out,
