@@ -70,7 +70,7 @@ from ppafo.walking.motion import (
 from ppafo.walking.nominal import nominal_terms
 from ppafo.walking.planning import NO_REFERENCE, course_of_walk, noise, plan_walks, switches, walking_valve
 from ppafo.walking.preparation import FaultSettings, SensorSettings
-from ppafo.walking.reacting_wearer import LONGEST_STEP, REACTS, START_SPEED, read_reacting
+from ppafo.walking.reacting_wearer import REACTS, START_SPEED, STEP_OF_BODY, read_reacting
 from ppafo.walking.result import lacks, measured
 from ppafo.walking.way import length_of
 from ppafo.walking.wearer import links_of_stature, read_wearer, wearer_origin
@@ -204,7 +204,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     )
     more = tuple(f"{path}={_absolute(item)}" for path, item in instead.items())
     supply = device.supply
-    step = reading.number("run.step", STEP if reacts is None else replace(STEP, default=LONGEST_STEP))
+    step = reading.number("run.step", STEP if reacts is None else STEP_OF_BODY)
     scenario = Scenario(
         name=document["name"],
         description=document.get("description", ""),

@@ -83,6 +83,8 @@ REACTIONS = (*STRENGTHS, *GAINS, *RATIOS, LENGTH_RATIO, MASS_RATIO, START_SPEED,
 LONGEST_STEP = 1.0e-4
 """Longest step [s] of a wearer who reacts, and the default: 0.2 ms is wrong by 4 % in the speed of walking."""
 
+STEP_OF_BODY = Quantity("step", "s", "largest step; 0.1 ms unless given", LONGEST_STEP, 1.0e-6, LONGEST_STEP)
+
 FIRST_STRIDE = 1.0
 """Time [s] that stands for the stride before the first one."""
 

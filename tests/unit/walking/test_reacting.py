@@ -283,7 +283,7 @@ def test_a_ratio_changes_a_gain_of_both_legs() -> None:
         ({"gait": "normal"}, "does not go with wearer.reacts yet"),
         ({"wearer": {"reacts": "geyer-herr", "body_mass": "70 kg"}}, "is of a leg that a gait leads"),
         ({"wearer": {"reacts": "geyer-her"}}, "did you mean 'geyer-herr'"),
-        ({"run": {"step": "0.2 ms"}}, "a wearer who reacts needs 0.0001 s or less"),
+        ({"run": {"step": "0.2 ms"}}, "at most 0.0001 s (largest step; 0.1 ms unless given)"),
     ],
 )
 def test_what_a_file_cannot_say_is_one_line(changes: dict[str, Any], words: str) -> None:

@@ -52,7 +52,7 @@ from ppafo.walking.preparation import (
     with_leg,
     without_leg,
 )
-from ppafo.walking.reacting_wearer import LONGEST_STEP, REACTIONS, ReactingWearer, start_of_body
+from ppafo.walking.reacting_wearer import REACTIONS, STEP_OF_BODY, ReactingWearer, start_of_body
 from ppafo.walking.wearer import WEARER, leg_parameters
 
 _FORCES = ("force_bandwidth", "force_noise", "force_resolution", "lost_share")
@@ -112,7 +112,7 @@ def _numbers(configuration: Scenario) -> dict[str, tuple[Quantity, float]]:
     }
     times, control = of_run | {"controller.period": configuration.control.period}, _control(configuration)
     reacts = walk_of(configuration).reacts is not None
-    step = replace(STEP, maximum=LONGEST_STEP) if reacts else STEP
+    step = STEP_OF_BODY if reacts else STEP
     declared = declared_settings(configuration) | control | {f"run.{item.name}": item for item in (*RUN, step)}
     # What fails of the plant, with its shut-off valve, is written out in the source; persons are drawn in Python.
     fixed = ("shut_off.", *(f"faults.{part}." for part in walk_of(configuration).broken), f"wearer.{PERSON.name}")
