@@ -1,8 +1,8 @@
 """The figure of a recording: one panel a quantity over a common time, each in the unit that the field uses."""
 
 import textwrap
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -104,8 +104,14 @@ PANELS = (
         _as_it_is,
         (Line("torque", "actuator", ACTUAL), Line("reference", "reference", REFERENCE)),
     ),
-    Panel("Valve command (-1 to 1)", 2.0, _as_it_is, (Line("command", "", ACTUAL, is_held=True),), (-1.0, 1.0)),
     Panel(
+        "Valve command (-1 to 1; 2 vents both chambers)",
+        2.0,
+        _as_it_is,
+        (Line("command", "", ACTUAL, is_held=True),),
+        (-1.0, 1.0),
+    ),
+    Panel(  # of all devices
         "Gas since the start (g)",
         0.01,
         _grams,
@@ -118,6 +124,24 @@ PANELS = (
 )
 
 
+_ANKLE_OF_OTHER = "other_ankle_angle"
+"""Not named as the rest: every wearer who reacts has it, with a device on that leg or without one."""
+
+
+def _panels_of_legs(recording: Recording) -> Iterator[Panel]:
+    """Yield each panel, and below it that of the other leg where a device is on each."""
+    are_two = "other_torque" in recording
+    for panel in PANELS:
+        yield panel
+        if are_two:
+            quantity, _, unit = panel.title.partition(" (")
+            own = (
+                replace(line, channel=_ANKLE_OF_OTHER if line.channel == "angle" else f"other_{line.channel}")
+                for line in panel.lines
+            )
+            yield replace(panel, title=f"{quantity}, other leg ({unit}", lines=tuple(own))
+
+
 def recording_figure(
     recording: Recording,
     title: str = "",
@@ -125,12 +149,12 @@ def recording_figure(
     atmosphere: float = STANDARD_ATMOSPHERE,
     valve: str = "",
 ) -> "Figure":
-    """Return the figure of a recording, with a panel for every quantity that it has.
+    """Return the figure of a recording, with a panel for every quantity that it has, and of each leg with a device.
 
     ``remark`` stands below the title, for example why a run stopped early. Gauge pressure counts from ``atmosphere``
     [Pa absolute]. ``valve`` is the kind of valve, in whose colour the device is drawn.
     """
-    panels = [panel for panel in PANELS if any(line.channel in recording for line in panel.lines)]
+    panels = [panel for panel in _panels_of_legs(recording) if any(line.channel in recording for line in panel.lines)]
     if not panels:
         drawn = ", ".join(line.channel for panel in PANELS for line in panel.lines)
         raise DataError(f"{recording.label}: has nothing to draw; a figure shows {drawn}")

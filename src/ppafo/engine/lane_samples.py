@@ -15,7 +15,7 @@ from ppafo.engine.scheme.motion import SAME_INSTANT
 from ppafo.engine.scheme.pneumatics import held_pressures
 from ppafo.model.gait import foot_in_gait
 from ppafo.model.places import shown_signals
-from ppafo.model.plant import actuator_torque, chamber_pressures
+from ppafo.model.plant import actuator_torque, chamber_pressures, with_gas_of
 from ppafo.model.plant_faults import is_dark, is_due, is_silenced, next_unpowered, runs_at
 from ppafo.model.sensors import GaitMeasurement, Measurement, late_measurement, measure, measure_gait, samples_late
 from ppafo.model.valves.kind import VENT
@@ -368,7 +368,7 @@ def sample_lines(rows: Rows, moment: str) -> list[str]:
         *[rows.load(group) for group in ("timing", "plant", "state", "result", "reference", *of_gas, *groups)],
         *present_pressures(rows),
         torque_line(rows, "state.angle"),
-        *(torque_of_other(rows) if program.devices == 2 else []),
+        *(sample_of_other(rows) if program.devices == 2 else []),
         f"wanted = {wanted}",
         *on_gait,
         f"sample = {_row(add(Sample), values)}",
@@ -376,18 +376,19 @@ def sample_lines(rows: Rows, moment: str) -> list[str]:
     ]
 
 
-def torque_of_other(rows: Rows) -> list[str]:
-    """Lines that make both pressures and the torque of a second device."""
+def sample_of_other(rows: Rows) -> list[str]:
+    """Lines that make both pressures and the torque of a second device, and ``all_gas`` that both took and vented."""
     first, second, torque = (f"{OTHER}{name}" for name in ("pressure_1", "pressure_2", "torque"))
     return [
         f"{first}, {second} = {rows.add(held_pressures)}({OTHER}held, {OTHER}state)",
         f"{torque} = {rows.add(actuator_torque)}({first}, {second}, plant.torque_constant)",
+        f"all_gas = {rows.add(with_gas_of)}(state, {OTHER}state)",
     ]
 
 
 def gas_total(program: Program, name: str) -> str:
     """Expression for what is counted of the gas of all devices."""
-    return f"state.{name}" if program.devices == 1 else f"(state.{name} + {OTHER}state.{name})"
+    return f"state.{name}" if program.devices == 1 else f"all_gas.{name}"
 
 
 FELL = "walk.fall_time"

@@ -174,10 +174,9 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     other += [] if run.other is None or run.other.faults is None else [run.other.faults]
     rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, *leg, *run.effects, *other]
     parameters = table([timing, *plant, *valve, *rest], runs)
-    controller_state = NoParameters() if program.controller is None else program.controller.initial
     further = [*walk_states, *line_states, *states_at_start(run), *_states_of_other(run)]
     states = table(
-        [AT_REST, Pace(run.step), run.initial, gas_at_start(run), program.valve.initial(), controller_state, *further],
+        [AT_REST, Pace(run.step), *_device_at_start(run), *further],
         runs,
     )
     counts = np.empty((runs, 6))
@@ -305,16 +304,22 @@ def _reacting_groups(walk: ReactingWalk) -> tuple[list[Any], list[Any]]:
     return [walk.share, walk.body, walk.sensors, *failing], [*states, *([POWERED] if failing else [])]
 
 
+def _device_at_start(run: Run) -> list[Any]:
+    """Initial states of plant, gas, valve and controller, in the order of ``Program``."""
+    program = run.program
+    controller = NoParameters() if program.controller is None else program.controller.initial
+    return [run.initial, gas_at_start(run), program.valve.initial(), controller]
+
+
 def _states_of_other(run: Run) -> list[Any]:
     """Initial states of a second device, in the order of ``Program``."""
     if run.other is None:
         return []
     alike = replace(run, initial=run.other.initial)
-    controller = () if run.program.controller is None else run.program.controller.initial
     lines = [] if run.lines is None else [run.lines.initial]
-    device = [run.other.initial, gas_at_start(alike), run.program.valve.initial(), controller]
     powered = [] if run.other.faults is None else [POWERED]
-    return [AT_REST, *device, run.other.walk, NOTHING_SEEN, *powered, *lines, *states_at_start(alike)]
+    counted = [run.other.walk, NOTHING_SEEN, *powered]
+    return [AT_REST, *_device_at_start(alike), *counted, *lines, *states_at_start(alike)]
 
 
 def _members(group: Members, groups: int) -> list[Members]:

@@ -185,9 +185,7 @@ def _leg_scheme(walk: Walk | ReactingWalk) -> str:
     """Return where the scheme of a walking leg is."""
     fails = "" if walk.failing is None else "FAILING_"
     if isinstance(walk, ReactingWalk):
-        if walk.on_both:
-            return f"{_REACTING}{fails}REACTING_ON_BOTH"
-        return f"{_REACTING}{fails}REACTING"
+        return f"{_REACTING}{fails}REACTING{'_ON_BOTH' if walk.on_both else ''}"
     which = "STRIDES" if walk.course is None else "COURSE"
     return f"{_WALKING}{fails}{which}"
 

@@ -15,6 +15,7 @@ from ppafo.control.walking import phases
 from ppafo.control.walking.signs import HELPS, LIFTS, PAUSED, SIGNS, STOPPED, Sign
 from ppafo.engine.lanes import Floats
 from ppafo.engine.pieces import OTHER
+from ppafo.engine.rows import behind
 from ppafo.model import contact as ground
 from ppafo.simulation.declaration import PLAIN, WRITTEN_UNITS
 from ppafo.simulation.scenario import Scenario
@@ -58,6 +59,8 @@ REQUEST_ROW = "controller_state.request.torque"
 _WORDS = {LIFTS: "lift-only (no push-off) from", PAUSED: "paused at", STOPPED: "stopped for good at"}
 _RETURNS = {HELPS: "help came back", LIFTS: "the foot is lifted again"}
 _NAMES = {HELPS: "help", LIFTS: "lift", PAUSED: "pause", STOPPED: "stop"}
+_NOTHING = 1.0e-12
+"""Readings and settings below this in SI units are nothing: a filtered force never quite comes to rest."""
 _UNITS = {"heel_force": "N", "toe_force": "N", "angle": "rad", "pressure_1": "Pa_a", "pressure_2": "Pa_a"}
 SHOWN = 5
 """Events that are listed one by one; of more the first ones are, and all are in the file."""
@@ -172,6 +175,7 @@ class SafetyEvent:
             "readings": dict(self.readings),
             "settings": dict(self.settings),
             "message": self.message,
+            **({"leg": self.leg} if self.leg else {}),
         }
 
 
@@ -198,9 +202,8 @@ def events_of_legs(configuration: Scenario, time: Floats, record: Mapping[str, F
     own = safety_events(configuration, time, record)
     if walk_of(configuration).devices == 1:
         return own
-    others = {path.removeprefix(OTHER): values for path, values in record.items() if path.startswith(OTHER)}
     found = [replace(event, leg="left leg") for event in own]
-    found += [replace(event, leg="right leg") for event in safety_events(configuration, time, others)]
+    found += [replace(event, leg="right leg") for event in safety_events(configuration, time, behind(OTHER, record))]
     return tuple(sorted(found, key=lambda event: event.time))
 
 
@@ -235,6 +238,7 @@ def _word(name: str) -> str:
 def _text(value: float, si_unit: str, atmosphere: float) -> str:
     """Return a value in SI as people write it, with three digits; gauge counts from ``atmosphere`` [Pa absolute]."""
     unit = WRITTEN_UNITS.get(si_unit, "" if si_unit in PLAIN else si_unit)
+    value = value if abs(value) > _NOTHING else 0.0
     return f"{from_si(value, unit, si_unit, atmosphere):.3g} {unit}".rstrip()
 
 

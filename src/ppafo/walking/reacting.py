@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ppafo.engine.lane_samples import FELL, GAS_TOTALS, OF_OTHER, WEARER_ROWS
 from ppafo.engine.lanes import Floats
 from ppafo.engine.pieces import OTHER
+from ppafo.engine.rows import behind
 from ppafo.engine.run import Run
 from ppafo.metrics import Metric
 from ppafo.metrics.gas import ENERGIES
@@ -87,7 +88,7 @@ def recording_of_reacting(
     of_gas = of_gas if run.other is None else {name: of_gas[name] for name in of_gas if name not in ENERGIES}
     channels |= of_gas | dict(of_bottle) | controller_channels(record)
     if run.other is not None:
-        of_other = {path.removeprefix(OTHER): values for path, values in record.items() if path.startswith(OTHER)}
+        of_other = behind(OTHER, record)
         on_right = (
             actuator_channels(run, of_other) | valve_and_ground_channels(of_other) | controller_channels(of_other)
         )

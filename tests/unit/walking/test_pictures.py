@@ -1,6 +1,7 @@
 """Pictures of a walk: what they show is what was walked."""
 
 import io
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from ppafo.answers.writing import text_of
+from ppafo.control.walking.signs import HELPS, PAUSED
 from ppafo.questions.walk.answer import comparison_table, wearers_answer
 from ppafo.signals import Channel, Recording
 from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk, walk_population
@@ -124,6 +126,16 @@ def test_the_walk_over_time_shows_the_fault_the_pause_and_how_long_it_helped() -
     assert [label.get_text() for label in phases.get_yticklabels()] == ["swing", "heel", "free", "push"]
     edges = [patch.get_x() for patch in level.patches]
     assert edges == pytest.approx([0.0, result.events[0].time])
+
+
+def test_a_device_on_each_leg_has_a_strip_of_its_own_over_time() -> None:
+    result = failing()
+    silent = np.where(result.recording.time < 5.0, HELPS, PAUSED)
+    figure = over_time_figure(replace(result, recording=result.recording.with_channel("other_safe_state", silent, "-")))
+    left, right = figure.axes[-2:]
+    assert [axes.get_ylabel() for axes in (left, right)] == ["Left", "Right"]
+    assert [patch.get_x() for patch in left.patches] == pytest.approx([0.0, result.events[0].time])
+    assert [patch.get_x() for patch in right.patches] == pytest.approx([0.0, 5.0])
 
 
 def test_the_table_has_a_cell_for_each_walk() -> None:

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from ppafo.engine.lane_samples import OF_OTHER
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import SIGNAL_ROWS
 from ppafo.engine.pieces import OTHER
@@ -62,18 +63,8 @@ OUTPUTS |= {
     f"{OTHER}ankle_angle": ("rad", "angle of the ankle of the other leg"),
     **{
         f"{OTHER}{name}": (OUTPUTS[name][0], f"{OUTPUTS[name][1]}; of the other leg")
-        for name in (
-            "pressure_1",
-            "pressure_2",
-            "torque",
-            "command",
-            "external_torque",
-            "contact",
-            "heel_force",
-            "toe_force",
-            "controller_phase",
-            "safe_state",
-        )
+        for name in OUTPUTS
+        if f"{OTHER}{name}" in OF_OTHER
     },
 }
 """Unit and meaning of what can be read at each sample."""

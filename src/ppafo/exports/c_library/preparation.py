@@ -284,32 +284,25 @@ class Writing:
         program, add = self.program, self.add
         yield f"result = {add(LaneResult)}(0.0, {NEVER_FAILED!r}, 0.0)"
         yield f"pace = {add(Pace)}(step)"
-        if program.gas.start is not None:
-            yield f"masses = {add(program.gas.start)}(plant, state)"
-        yield f"valve_state = {add(program.valve.initial)}()"
-        if program.controller is not None:
-            yield f"controller_state = {self.constant(program.controller.initial, 'controller_state')}"
-        if program.has_lines:
-            yield f"line_state = {add(lines_at_start)}(plant, lines)"
-        if program.stated:
-            yield f"at_start = {add(moment_at_start)}(plant, state)"
-        for name, kind in program.stated.items():
-            yield f"{name}_state = {add(kind.start)}({name}, at_start)"
+        yield from self._device_at_start("")
         if program.devices == 2:
-            yield from self._start_of_other()
+            yield f"{OTHER}result = result"
+            yield from self._device_at_start(OTHER)
 
-    def _start_of_other(self) -> Iterator[str]:
-        """Lines that make the states of a second device, once there is its own ``state``."""
+    def _device_at_start(self, own: str) -> Iterator[str]:
+        """Lines that make the states of a device, whose names begin with ``own``, once there is its ``state``."""
         program, add = self.program, self.add
-        alike = ["result", "valve_state", *(["controller_state"] if program.controller is not None else [])]
-        for name in (*alike, *(["line_state"] if program.has_lines else [])):
-            yield f"{OTHER}{name} = {name}"
         if program.gas.start is not None:
-            yield f"{OTHER}masses = {add(program.gas.start)}(plant, {OTHER}state)"
+            yield f"{own}masses = {add(program.gas.start)}(plant, {own}state)"
+        yield f"{own}valve_state = {add(program.valve.initial)}()"
+        if program.controller is not None:
+            yield f"{own}controller_state = {self.constant(program.controller.initial, 'controller_state')}"
+        if program.has_lines:
+            yield f"{own}line_state = {add(lines_at_start)}(plant, lines)"
         if program.stated:
-            yield f"{OTHER}at_start = {add(moment_at_start)}(plant, {OTHER}state)"
+            yield f"{own}at_start = {add(moment_at_start)}(plant, {own}state)"
         for name, kind in program.stated.items():
-            yield f"{OTHER}{name}_state = {add(kind.start)}({name}, {OTHER}at_start)"
+            yield f"{own}{name}_state = {add(kind.start)}({name}, {own}at_start)"
 
 
 SAID = {

@@ -29,6 +29,7 @@ from ppafo.exports.c_library.boundary import Arrays, Boundary, Structs, struct_o
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import WALK, MetricKind, Readings
 from ppafo.model.columns import over_runs
+from ppafo.model.plant import with_gas_of
 from ppafo.simulation.ensemble.running import (
     ThermalTotals,
     Totals,
@@ -36,7 +37,6 @@ from ppafo.simulation.ensemble.running import (
     real_totals,
     thermal_totals,
     totals,
-    with_gas_of,
 )
 from ppafo.translation.typed import FLOAT, INT, LIBRARY, Array, Row, Shared, Type
 

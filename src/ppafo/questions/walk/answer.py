@@ -29,6 +29,7 @@ from ppafo.questions.walk.course import (
     trust_remark,
 )
 from ppafo.questions.walk.falls import Falls, falls_of_walk
+from ppafo.questions.walk.less_help import over_time_sections, safety_remarks
 from ppafo.questions.walk.reacting import reacting_answer
 from ppafo.questions.walk.risks import Risks, risks_of_walk
 from ppafo.questions.walk.volumes import (
@@ -46,10 +47,8 @@ from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.version import __version__
 from ppafo.walking import course as courses
-from ppafo.walking.events import event_lines
 from ppafo.walking.figures.legs import animation, frames_figure, strip_figure
 from ppafo.walking.figures.mean_stride import walk_figure
-from ppafo.walking.figures.over_time import failures, over_time_figure
 from ppafo.walking.loading import FILE, load_walk
 from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
@@ -217,10 +216,6 @@ _MEAN = (
     "Mean over the strides with the standard deviation as a band. A deterministic walk on a perfectly regular gait "
     "has almost none."
 )
-_OVER_TIME = (
-    "Gas, toes and phases over the whole walk. The strip shows where the controller helps, lifts the foot only, "
-    "pauses and has stopped; a dashed line is where a sensor fails."
-)
 _LIMITS = (
     "The gait is prescribed: the device moves the ankle where the foot is free, and cannot change how the wearer walks."
 )
@@ -242,7 +237,7 @@ def _pair_answer(pair: WalkPair) -> Answer:
     remarks = [
         *person_remarks(configuration),
         _bottle(pair),
-        *_safety(worn),
+        *safety_remarks(worn),
         _slap(comparison),
         trust_remark(configuration),
     ]
@@ -259,7 +254,7 @@ def _pair_answer(pair: WalkPair) -> Answer:
             *bottle_sections(worn),
             *volumes_sections(pair.volumes),
             Section("How to read it", (_EXPLAINED, _LIMITS), is_detail=True),
-            *(_over_time(worn) if walked.course is None else ()),
+            *(over_time_sections(worn) if walked.course is None else ()),
             *(course_pictures(comparison) if walked.course is not None else _pictures(comparison)),
             *_assumptions_section({item.path: item.note for item in configuration.assumptions}),
         ),
@@ -351,41 +346,11 @@ def _pictures(comparison: Comparison) -> tuple[Section, ...]:
     )
 
 
-def _over_time(worn: WalkResult) -> tuple[Section, ...]:
-    """Return the walk over time, where something happened in it."""
-    if not worn.events and not failures(worn.scenario):
-        return ()
-    return (
-        Section(
-            "The walk over time", figure=Figure("over-time", _OVER_TIME, lambda: over_time_figure(worn)), is_detail=True
-        ),
-    )
-
-
 def _assumptions_section(assumed: Mapping[str, str]) -> tuple[Section, ...]:
     if not assumed:
         return ()
     table = Table((Column("value"), Column("why")), tuple(assumed.items()), left=2)
     return (Section("What is assumed", table=table, is_detail=True),)
-
-
-def _safety(worn: WalkResult) -> list[str]:
-    """Return what is fitted for safety, the pauses, the stop and the returns of help, and how many strides had help."""
-    fitted = shut_off_line(worn.scenario)
-    if not worn.events:
-        return fitted
-    helped, strides = int(worn.helped.sum()), worn.helped.size
-    counted = f"help in {helped} of {strides} strides"
-    return [*fitted, *event_lines(worn.events), counted if worn.is_helped else f"{counted}: fewer than half"]
-
-
-def shut_off_line(scenario: Scenario) -> list[str]:
-    """Return what a fitted shut-off valve weighs and takes."""
-    given = walk_of(scenario).shut_off
-    if not given:
-        return []
-    mass, power = 1.0e3 * float(given["mass"]), float(given["power"])
-    return [f"shut-off valve: {mass:.0f} g, {power:.2g} W as long as the device helps ({60.0 * power:.0f} J a minute)"]
 
 
 def _bottle(pair: WalkPair) -> str:

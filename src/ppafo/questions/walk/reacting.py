@@ -12,12 +12,12 @@ from ppafo.answers.style import BLUE, GREY, VERMILION, house_style, mark_kind
 from ppafo.gait.document import load_gait
 from ppafo.questions.endurance.draw import FORMAT_OF_REACTING
 from ppafo.questions.walk.course import bottle_data, bottle_remark, bottle_sections
+from ppafo.questions.walk.less_help import over_time_sections, safety_remarks
 from ppafo.questions.walk.muscle_timing import muscle_timing, muscle_timing_section
 from ppafo.simulation.scenario import UNITS, Scenario, plain
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.version import __version__
-from ppafo.walking.events import event_lines
 from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.reacting_wearer import ReactingWearer
 from ppafo.walking.result import WalkResult
@@ -104,7 +104,7 @@ def reacting_answer(comparison: Comparison) -> Answer:
     wearer = wearer_of_walk(scenario)
     remarks = [*person_remarks(scenario), *weak_remarks(wearer), *fall_remarks(comparison)]
     remarks += [] if worn.supply is None else [bottle_remark(worn, [])]
-    remarks += event_lines(worn.events)
+    remarks += safety_remarks(worn)
     stays = worn.metrics["stays_up"].value > 0.5
     strides = f"{worn.metrics['strides'].value:.0f} strides"
     ended = "walks to the end" if stays else f"falls after {worn.metrics['fall_time'].value:.1f} s"
@@ -124,6 +124,7 @@ def reacting_answer(comparison: Comparison) -> Answer:
                 (f"{_EXPLAINED} {_WHERE[walk_of(scenario).devices]}", _EFFORT, _LIMITS),
                 is_detail=True,
             ),
+            *over_time_sections(worn),
             *_curves(comparison),
         ),
         data={
@@ -136,6 +137,7 @@ def reacting_answer(comparison: Comparison) -> Answer:
             "wearer_numbers": plain(dict(wearer.settings)),
             "metrics": plain(dict(worn.metrics)),
             "metrics_off": plain(dict(bare.metrics)),
+            "events": [event.to_dict() for event in worn.events],
             "likeness": {
                 words: {name: plain(item) for name, item in likeness(walked).items()}
                 for words, walked in (("with", worn), ("off", bare))

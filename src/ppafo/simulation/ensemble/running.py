@@ -22,7 +22,7 @@ from ppafo.metrics import METRICS
 from ppafo.metrics.gas import ENERGIES
 from ppafo.metrics.metric import LED, LED_SHANK, ONE_DEVICE, REACTS, REQUEST, STEADY, WALK, MetricKind, Readings
 from ppafo.model.gas import energy_per_content
-from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, TrueMasses
+from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, TrueMasses, with_gas_of
 from ppafo.simulation.sampled import run_in_turn
 from ppafo.simulation.scenario import FreeMotion, Scenario, worn_kind
 from ppafo.simulation.simulate import OPEN_LOOP
@@ -59,15 +59,6 @@ class ThermalTotals(NamedTuple):
 
 _OF_STATE = tuple(f"state.{name}" for name in Totals._fields)
 """Paths of the numbers that totals are made of, beside the true masses where there are any."""
-
-
-def with_gas_of(state: PlantState, other: PlantState) -> PlantState:
-    """A state with what a second device took, vented and leaked [kg]; its numbers may be arrays (runs,)."""
-    return state._replace(
-        supplied_mass=state.supplied_mass + other.supplied_mass,
-        vented_mass=state.vented_mass + other.vented_mass,
-        leaked_mass=state.leaked_mass + other.leaked_mass,
-    )
 
 
 def totals(state: PlantState) -> Totals:
@@ -211,7 +202,7 @@ class _MeteredBatch:
         return states
 
     def stood(self, result: BatchResult) -> NDArray[np.bool_]:
-        """At which samples of the traces (samples, runs) nobody had fallen: a recording ends there."""
+        """Whether the wearer still stands at each sample of the traces (samples, runs); recordings end with a fall."""
         program = self.batch.program
         if FELL not in program.traced:
             return np.ones((result.record.shape[0], result.record.shape[2]), dtype=np.bool_)

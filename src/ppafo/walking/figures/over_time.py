@@ -40,7 +40,8 @@ if TYPE_CHECKING:
 
 _SIZE = (9.4, 5.6)
 _MARGINS = Margins(left=1.3, right=0.2, top=0.62, bottom=0.55, row_gap=0.16, label=0.6)
-_HEIGHTS = (1.0, 1.2, 1.0, 0.35)
+_HEIGHTS, _STRIP = (1.0, 1.2, 1.0), 0.35
+_STRIPS = {"safe_state": "Left", "other_safe_state": "Right"}
 _LEVELS = {
     HELPS: ("help", "#cfe3c9"),
     LIFTS: ("lift", "#e6e2a8"),
@@ -95,8 +96,10 @@ def over_time_figure(result: WalkResult) -> "Figure":
     scale, unit = (60.0, "min") if recording.time[-1] > _LONG else (1.0, "s")
     time = recording.time / scale
     with house_style():
-        figure, grid = figure_of_panels(_SIZE, _MARGINS, len(_HEIGHTS), heights=_HEIGHTS)
-        gas, toes, phases, level = (axes for (axes,) in grid)
+        strips = {name: text for name, text in _STRIPS.items() if name in recording}
+        heights = (*_HEIGHTS, *[_STRIP] * len(strips))
+        figure, grid = figure_of_panels(_SIZE, _MARGINS, len(heights), heights=heights)
+        gas, toes, phases, *levels = (axes for (axes,) in grid)
         gas.plot(time, GRAMS_PER_KILOGRAM * recording["supplied_mass"], color=BLUE)
         gas.set_ylabel("Gas\n(g)")
         toes.plot(time, 100.0 * recording["toe_height"], color=BLUE, linewidth=0.9)
@@ -107,9 +110,11 @@ def over_time_figure(result: WalkResult) -> "Figure":
         phases.set_ylim(-0.3, len(_PHASES) - 0.7)
         if "controller_phase" in result.recording:
             phases.step(time, acting_phase(result.recording), where="post", color=BLACK, linewidth=0.9)
-        _levels(level, result, time)
-        level.set_xlabel(f"Time ({unit})")
-        level.set_xlim(0.0, float(time[-1]))
+        for axes, (name, text) in zip(levels, strips.items(), strict=True):
+            _levels(axes, recording[name], time)
+            axes.set_ylabel(text if len(strips) > 1 else "")
+        grid[-1][0].set_xlabel(f"Time ({unit})")
+        grid[-1][0].set_xlim(0.0, float(time[-1]))
         _marks(grid[0][0], [row[0] for row in grid], result, scale)
         width, height = _SIZE
         title = f"{result.scenario.name}: the whole walk"
@@ -126,9 +131,8 @@ def acting_phase(recording: Recording) -> Floats:
     return np.where(is_idle, _FREE, seen)
 
 
-def _levels(axes: "Axes", result: WalkResult, time: Floats) -> None:
+def _levels(axes: "Axes", found: Floats, time: Floats) -> None:
     """Paint the strip of help, pause and stop, and name each stretch that is wide enough."""
-    found = result.recording["safe_state"] if "safe_state" in result.recording else np.zeros(time.size)
     edges = np.flatnonzero(np.diff(found, prepend=-1.0, append=-1.0))
     for first, last in pairwise(edges.tolist()):
         name, colour = _LEVELS[float(found[first])]

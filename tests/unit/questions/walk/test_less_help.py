@@ -1,0 +1,29 @@
+"""What the answer says where a wearer who reacts gets less help: the sign, how many strides had help, and the picture."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ppafo.control.walking.signs import LIFTS, NOT_FLAT, SIGNS
+from ppafo.questions.walk.reacting import reacting_answer
+from ppafo.walking import compare_walks, load_walk
+from ppafo.walking.events import SafetyEvent
+
+
+@pytest.mark.long
+def test_the_answer_of_a_wearer_who_reacts_says_and_shows_where_help_was_less() -> None:
+    compared = compare_walks(load_walk("reacting"), 0.1)
+    assert "The walk over time" not in {section.heading for section in reacting_answer(compared).sections}
+    sign = SIGNS[NOT_FLAT]
+    event = SafetyEvent(2.0, LIFTS, sign, {"heel_force": 6e-33, "toe_force": 319.4}, leg="right leg")
+    worn = compared.with_device
+    helped = np.arange(worn.helped.size) < 1
+    answer = reacting_answer(replace(compared, with_device=replace(worn, events=(event,), helped=helped)))
+    assert "The walk over time" in {section.heading for section in answer.sections}
+    first, second = answer.sections[0].remarks[-2:]
+    assert first.startswith("right leg: lift-only (no push-off) from 2.00 s: ")
+    assert first.endswith("; heel 0 N, toe 319 N")
+    assert second == f"help in 1 of {helped.size} strides: fewer than half"
+    (written,) = answer.data["events"]
+    assert (written["leg"], written["time"], written["sign"]) == ("right leg", 2.0, sign.name)
