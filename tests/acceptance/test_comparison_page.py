@@ -70,6 +70,7 @@ def test_a_section_that_searches_for_minutes_is_what_the_command_writes(title: s
     assert is_as_written(title)
 
 
+@pytest.mark.thorough
 @pytest.mark.long
 def test_the_ranges_of_the_readme_and_of_the_table_of_claims_are_those_of_make_reproduce(
     monkeypatch: pytest.MonkeyPatch,

@@ -304,6 +304,7 @@ def test_the_publication_of_the_page_is_judged(
     assert [(line[0], line[-1]) for line in printed] == [("torque_at_60_psig", "reproduced"), ("comfort", "testable")]
 
 
+@pytest.mark.thorough
 def test_the_commands_on_published_studies_run_and_recycling_saves_what_the_page_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -74,6 +74,7 @@ def test_errors_and_gas_of_a_table_are_those_of_a_run(heading: str) -> None:
         assert 1e3 * metrics["gas_supplied"].value == pytest.approx(gas, abs=6e-4), entrant.name
 
 
+@pytest.mark.thorough
 def test_errors_toes_and_gas_of_the_walking_table_are_those_of_a_walk() -> None:
     shown = table_after("## On a leg that walks")
     assert set(shown) == {entrant.name for entrant in WALKING_ENTRANTS}

@@ -27,6 +27,7 @@ def test_a_command_of_the_page_runs(command: str, tmp_path: Path, monkeypatch: p
     assert any((tmp_path / "out").iterdir())
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(bool(MISSING), reason=f"not on this machine: {', '.join(MISSING)}")
 @pytest.mark.parametrize("command", [line for line in COMMANDS if " chip " in line])
 def test_the_simulated_chip_decides_as_the_page_says(command: str, capsys: pytest.CaptureFixture[str]) -> None:

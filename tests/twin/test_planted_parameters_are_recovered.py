@@ -98,6 +98,7 @@ def test_scores_have_no_preferred_side(study: Coverage) -> None:
     assert np.abs(study.scores.mean(axis=0)).max() < 3.9 / math.sqrt(REPETITIONS)
 
 
+@pytest.mark.thorough
 def test_a_robust_fit_of_recordings_with_stray_samples_knows_its_uncertainty() -> None:
     from scipy.stats import chi2
 

@@ -39,8 +39,8 @@ def fitted(extra: Extra, directions: bool = True, noise: str = "white", seed: in
     ("extra", "words", "low", "high"),
     [
         (Extra(leak_opens=1.0e4), "the leak seems to open at", 3.0e3, 1.3e4),
-        (Extra(heat=60.0), "the gas seems to warm and cool", 1.0 / 64.0, 1.0 / 56.0),
-        (Extra(stribeck=0.3), "friction near standstill seems to be higher", 0.1, 0.4),
+        pytest.param(Extra(heat=60.0), "the gas seems to warm and cool", 1.0 / 64.0, 1.0 / 56.0, marks=THOROUGH),
+        pytest.param(Extra(stribeck=0.3), "friction near standstill seems to be higher", 0.1, 0.4, marks=THOROUGH),
         pytest.param(Extra(heat=6e3), "the gas seems to warm and cool", 1.5e-4, 1.9e-4, marks=THOROUGH),
         pytest.param(Extra(line=4e-6), "lines of 3.", 3.0e-6, 4.5e-6, marks=THOROUGH),
         pytest.param(Extra(virial=-4.04e-8), "the gas seems not to be ideal", 0.7, 0.9, marks=THOROUGH),

@@ -63,7 +63,9 @@ VARIED: tuple[tuple[str, tuple[str, ...]], ...] = (
 """Every shipped walk, one with every further feature (sensors with faults, thermal gas, slow valve), and courses."""
 
 BY_NUMBA = ("proportional-regulators", EVERYTHING)
-"""The walk whose lanes Numba compiles, so that no translator stands on both sides; it takes a minute."""
+"""The walk whose lanes Numba compiles, so that no translator stands on both sides; it takes a minute.
+
+What Numba makes of a walk without a device is compared in continuous integration (``unit/questions/bits``)."""
 
 
 def choose_compiler(name: str, overrides: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -223,7 +225,10 @@ def shortened(walked: Scenario, folder: Path, seconds: float) -> str:
     return name
 
 
-@pytest.mark.parametrize(("name", "overrides"), VARIED)
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [pytest.param(*one, marks=pytest.mark.thorough) if one == BY_NUMBA else one for one in VARIED],
+)
 def test_every_sample_of_a_walk_has_the_bits_of_python(
     name: str, overrides: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

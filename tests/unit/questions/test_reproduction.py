@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import math
-import sys
 
 import pytest
 
@@ -61,18 +60,6 @@ def test_a_claim_as_a_document_is_plain_data_with_all_that_a_reader_needs(reprod
     needed = {"id", "statement", "paper", "value", "unit", "verdict", "assumptions", "source"}
     assert all(needed <= set(claim) for claim in document)
     assert all(claim["verdict"] in VERDICTS and claim["source"] and claim["statement"] for claim in document)
-
-
-def test_without_the_rig_what_needs_a_measurement_has_no_value_but_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench_study.cache_clear()
-    monkeypatch.setitem(sys.modules, "sksundae.cvode", None)
-    bare = reproduce(completions=1000)
-    open_claims = [claim for claim in bare.claims if claim.verdict == "not_testable"]
-    assert {claim.id for claim in open_claims} == SYNTHETIC | {"large_and_heavy"}
-    open_claims = [claim for claim in open_claims if claim.id in SYNTHETIC]
-    assert all(claim.value is None and claim.note.startswith("Needs") for claim in open_claims)
-    assert all("pip install 'ppafo[reference]'" in claim.note for claim in open_claims)
-    assert not any(claim.is_synthetic for claim in bare.claims)
 
 
 def test_what_a_synthetic_measurement_tests_says_so_and_is_never_plainly_reproduced(reproduction: Reproduction) -> None:
@@ -247,6 +234,7 @@ def test_a_window_that_is_missed_contradicts_the_claim() -> None:
     assert {claim.verdict for claim in changed.missed} == {"contradicted"}
 
 
+@pytest.mark.thorough
 def test_a_task_without_a_ramp_has_nothing_to_oscillate_on() -> None:
     changed = reproduce(["reference.kind=constant", "reference.level=3 N m"])
     told = {item.id: item for item in changed.torque_observations}
@@ -274,6 +262,7 @@ def test_a_run_that_diverges_stops_the_reproduction_with_its_name(
         reproduce(completions=1000)
 
 
+@pytest.mark.thorough
 def test_every_experiment_is_told_of_before_it_runs() -> None:
     heard: list[str] = []
     reproduce(progress=lambda progress: heard.append(progress.activity), completions=1000)

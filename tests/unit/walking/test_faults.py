@@ -25,7 +25,10 @@ from ppafo.walking.planning import gait_sensors_of, plan_walk
 
 PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "let-it-walk.md").read_text(encoding="utf-8")
 SECTION = PAGE.partition("## When a sensor fails")[2].partition("\n## ")[0]
-CONFIGURATIONS = ("solenoid", "proportional", "solenoid-regulators", "proportional-regulators")
+CONFIGURATIONS = (
+    *("solenoid", "proportional"),
+    *(pytest.param(f"{valve}-regulators", marks=pytest.mark.thorough) for valve in ("solenoid", "proportional")),
+)
 PHASES = 20
 """Instants of a stride at which each fault begins."""
 FIRST_FAULT = 3.0

@@ -177,6 +177,7 @@ def test_the_posterior_is_a_tree_that_arviz_reads(right: list[TrajectoryFit]) ->
     assert told["ess_bulk"] > 80.0
 
 
+@pytest.mark.thorough
 def test_a_bench_richer_than_the_model_identifies_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("sksundae", reason="the virtual rig needs the extra 'reference'")
     monkeypatch.chdir(tmp_path)

@@ -299,7 +299,7 @@ def test_bounds_cut_the_interval_and_a_direction_that_nothing_fixes_stays_finite
     assert found.quantile(0, 0.025, -2.0, 3.0) == pytest.approx(-2.0 + 0.025 * 5.0, abs=0.01)
 
 
-@pytest.mark.parametrize("kind", ["slow", "heavy-drift"])
+@pytest.mark.parametrize("kind", ["slow", pytest.param("heavy-drift", marks=pytest.mark.thorough)])
 def test_intervals_hold_the_truth_under_noise_that_is_not_white(kind: str) -> None:
     from scipy.stats import binom
 

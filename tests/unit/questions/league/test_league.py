@@ -117,6 +117,7 @@ def test_a_run_that_diverged_counts_as_worst(small: League) -> None:
     assert all(standing.robustness and standing.robustness.failed == 0 for standing in small.standings)
 
 
+@pytest.mark.thorough
 def test_every_draw_has_noise_of_its_own_and_its_share_is_told() -> None:
     noisy = (*SHORT, "sensors.pressure_noise=5 kPa_d")
     one, other = (

@@ -1,4 +1,4 @@
-"""What the answer says where a wearer who reacts gets less help: the sign, how many strides had help, and the picture."""
+"""What the answer says where a wearer who reacts gets less help: sign, strides that had help, and the picture."""
 
 from dataclasses import replace
 
