@@ -32,6 +32,7 @@ def results(words: list[str], capsys: pytest.CaptureFixture[str]) -> dict[str, f
     return dict(json.loads(capsys.readouterr().out))
 
 
+@pytest.mark.thorough
 def test_the_commands_of_the_page_run_one_after_the_other_and_give_its_numbers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

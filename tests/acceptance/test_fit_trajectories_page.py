@@ -50,6 +50,7 @@ def test_the_page_records_twice_and_identifies_once() -> None:
     ]
 
 
+@pytest.mark.short
 def test_what_was_planted_in_the_rig_is_found(document: dict[str, Any]) -> None:
     estimates = {item["path"]: item for item in document["estimates"]}
     for path, planted in PLANTED.items():

@@ -167,6 +167,7 @@ def test_the_numbers_of_the_readme_are_those_of_a_run(reproduction: Reproduction
     ]
 
 
+@pytest.mark.short
 def test_the_table_of_claims_is_that_of_a_run(studies: Studies, reproduction: Reproduction) -> None:
     # Ranges of completions come from more of them than here: tests/acceptance/test_comparison_page.py.
     of_completions = {claim.id for claim in reproduction.claims if "completions" in claim.open_by}

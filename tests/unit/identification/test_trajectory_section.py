@@ -105,6 +105,7 @@ def both(solve: Solve) -> Identification:
     return solve(f"[trajectory]\n{asked}{PARAMETERS}{STEP}time_offset = '5 ms'\n{REPLAYED}{SLOW}")
 
 
+@pytest.mark.short
 def test_planted_values_are_found_from_a_scenario_and_from_a_recording_without_one(both: Identification) -> None:
     assert both.trajectory is not None
     truth = {"foot_plate.inertia": 0.010, "valves.proportional.discharge_coefficient": 0.13}
