@@ -111,7 +111,7 @@ PANELS = (
         (Line("command", "", ACTUAL, is_held=True),),
         (-1.0, 1.0),
     ),
-    Panel(  # of all devices
+    Panel(
         "Gas since the start (g)",
         0.01,
         _grams,
@@ -129,17 +129,19 @@ _ANKLE_OF_OTHER = "other_ankle_angle"
 
 
 def _panels_of_legs(recording: Recording) -> Iterator[Panel]:
-    """Yield each panel, and below it that of the other leg where a device is on each."""
-    are_two = "other_torque" in recording
-    for panel in PANELS:
-        yield panel
-        if are_two:
-            quantity, _, unit = panel.title.partition(" (")
-            own = (
-                replace(line, channel=_ANKLE_OF_OTHER if line.channel == "angle" else f"other_{line.channel}")
-                for line in panel.lines
-            )
-            yield replace(panel, title=f"{quantity}, other leg ({unit}", lines=tuple(own))
+    """Yield each panel, where a device is on each leg one for the left and one for the right; gas is of both."""
+    if "other_torque" not in recording:
+        yield from PANELS
+        return
+    for panel in PANELS[:-1]:
+        quantity, _, unit = panel.title.partition(" (")
+        other = (
+            replace(line, channel=_ANKLE_OF_OTHER if line.channel == "angle" else f"other_{line.channel}")
+            for line in panel.lines
+        )
+        yield replace(panel, title=f"{quantity}, left leg ({unit}")
+        yield replace(panel, title=f"{quantity}, right leg ({unit}", lines=tuple(other))
+    yield replace(PANELS[-1], title="Gas of both devices since the start (g)")
 
 
 def recording_figure(

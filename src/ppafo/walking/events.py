@@ -59,6 +59,7 @@ REQUEST_ROW = "controller_state.request.torque"
 _WORDS = {LIFTS: "lift-only (no push-off) from", PAUSED: "paused at", STOPPED: "stopped for good at"}
 _RETURNS = {HELPS: "help came back", LIFTS: "the foot is lifted again"}
 _NAMES = {HELPS: "help", LIFTS: "lift", PAUSED: "pause", STOPPED: "stop"}
+LEFT_LEG, RIGHT_LEG = "left leg", "right leg"
 _NOTHING = 1.0e-12
 """Readings and settings below this in SI units are nothing: a filtered force never quite comes to rest."""
 _UNITS = {"heel_force": "N", "toe_force": "N", "angle": "rad", "pressure_1": "Pa_a", "pressure_2": "Pa_a"}
@@ -202,8 +203,8 @@ def events_of_legs(configuration: Scenario, time: Floats, record: Mapping[str, F
     own = safety_events(configuration, time, record)
     if walk_of(configuration).devices == 1:
         return own
-    found = [replace(event, leg="left leg") for event in own]
-    found += [replace(event, leg="right leg") for event in safety_events(configuration, time, behind(OTHER, record))]
+    found = [replace(event, leg=LEFT_LEG) for event in own]
+    found += [replace(event, leg=RIGHT_LEG) for event in safety_events(configuration, time, behind(OTHER, record))]
     return tuple(sorted(found, key=lambda event: event.time))
 
 
@@ -248,4 +249,4 @@ def event_lines(events: Sequence[SafetyEvent]) -> list[str]:
     if len(lines) <= SHOWN:
         return lines
     between = len(lines) - SHOWN
-    return [*lines[: SHOWN - 1], f"... and {between} more pauses and returns of help", lines[-1]]
+    return [*lines[: SHOWN - 1], f"... and {between} more changes of help", lines[-1]]

@@ -41,9 +41,9 @@ def drawn(figure: "Figure", panel: int) -> list[list[float]]:
 def test_there_is_a_panel_for_each_quantity_that_was_recorded_and_no_other() -> None:
     assert titles(recording_figure(recording(torque=1.0, angle=1.0))) == ["Ankle angle (deg)", "Actuator torque (N m)"]
     whole = recording_figure(recording(**dict.fromkeys(CHANNELS, 1.0)))
-    assert titles(whole)[-1] == "Gas since the start (g)"
-    assert titles(whole)[:4:2] == ["Ankle angle (deg)", "Pressure (psig)"]
-    assert titles(whole)[1:4:2] == ["Ankle angle, other leg (deg)", "Pressure, other leg (psig)"]
+    assert titles(whole)[-1] == "Gas of both devices since the start (g)"
+    assert titles(whole)[:4:2] == ["Ankle angle, left leg (deg)", "Pressure, left leg (psig)"]
+    assert titles(whole)[1:4:2] == ["Ankle angle, right leg (deg)", "Pressure, right leg (psig)"]
     assert len(whole.axes) == 9
 
 

@@ -8,10 +8,13 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
 
 _OVER_TIME = (
-    "Gas, toes and phases over the whole walk. The strip shows where the controller helps, lifts the foot only, "
-    "pauses and has stopped; a dashed line is where a sensor fails."
+    "Gas, toes and phases over the whole walk. The strip at the bottom shows where the controller helps, only lifts "
+    "the foot, pauses or has stopped. A red line is where there is less help, a dashed one where something fails."
 )
-_OF_LEGS = " Toes and phases are those of the left leg, and gas is that of both devices."
+_OF_LEGS = (
+    " Gas is that of both devices, and so are the lines on it; each leg has a strip. Toes and phases are those of the "
+    "left leg."
+)
 
 
 def safety_remarks(worn: WalkResult) -> list[str]:
@@ -20,8 +23,10 @@ def safety_remarks(worn: WalkResult) -> list[str]:
     if not worn.events:
         return fitted
     helped, strides = int(worn.helped.sum()), worn.helped.size
-    counted = f"help in {helped} of {strides} strides"
-    return [*fitted, *event_lines(worn.events), counted if worn.is_helped else f"{counted}: fewer than half"]
+    counted = (
+        [f"help in {helped} of {strides} strides{'' if worn.is_helped else ': fewer than half'}"] if strides else []
+    )
+    return [*fitted, *event_lines(worn.events), *counted]
 
 
 def _shut_off_line(scenario: Scenario) -> list[str]:
@@ -30,7 +35,8 @@ def _shut_off_line(scenario: Scenario) -> list[str]:
     if not given:
         return []
     mass, power = 1.0e3 * float(given["mass"]), float(given["power"])
-    return [f"shut-off valve: {mass:.0f} g, {power:.2g} W as long as the device helps ({60.0 * power:.0f} J a minute)"]
+    where = "on each leg a shut-off valve" if walk_of(scenario).devices > 1 else "shut-off valve"
+    return [f"{where}: {mass:.0f} g, {power:.2g} W as long as the device helps ({60.0 * power:.0f} J a minute)"]
 
 
 def over_time_sections(worn: WalkResult) -> tuple[Section, ...]:

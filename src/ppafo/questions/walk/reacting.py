@@ -10,6 +10,7 @@ from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import display_values, rounded_text, title_with_unit
 from ppafo.answers.style import BLUE, GREY, VERMILION, house_style, mark_kind
 from ppafo.gait.document import load_gait
+from ppafo.metrics.strides import SETTLING
 from ppafo.questions.endurance.draw import FORMAT_OF_REACTING
 from ppafo.questions.walk.course import bottle_data, bottle_remark, bottle_sections
 from ppafo.questions.walk.less_help import over_time_sections, safety_remarks
@@ -45,13 +46,14 @@ ROWS = (
     ("push_off_work", "Work of the device in push-off", "energy", 2),
     ("gas", "Gas per stride", "gas mass", 3),
     ("total_gas", "Gas of the whole walk", "gas mass", 2),
-    ("counted_strides", "Strides with these means", "", 0),
+    ("counted_strides", "Strides with help, of gas and push-off", "", 0),
 )
 """Metric, title, kind of quantity and digits behind the point of each row."""
 
 _EXPLAINED = (
     "'Device off' is the same wearer with the same device and both chambers vented: it still rubs and has inertia. The "
-    "first two strides are left out of the means."
+    "first two strides are left out of the means, and those of gas, push-off and how the foot comes down also leave "
+    "out strides with less help."
 )
 _WHERE = {
     1: "The device is on the left leg, and a stride is one step of that leg.",
@@ -244,7 +246,7 @@ def fall_remarks(comparison: Comparison) -> list[str]:
         ("with the device", comparison.with_device),
         ("with the device off", comparison.without_device),
     ):
-        fall, strides = walked.metrics.get("fall_time"), walked.metrics["counted_strides"].value
+        fall, strides = walked.metrics.get("fall_time"), max(walked.metrics["strides"].value - SETTLING, 0.0)
         means = (
             f", and the means are of {strides:.0f} stride{'s' if strides > 1 else ''} before that" if strides else ""
         )
@@ -307,7 +309,7 @@ def stride_figure(comparison: Comparison) -> "Drawn":
     }
     with house_style():
         figure = Drawn(figsize=(9.4, 5.6))
-        figure.subplots_adjust(left=0.075, right=0.985, top=0.9, bottom=0.09, hspace=0.28, wspace=0.3)
+        figure.subplots_adjust(left=0.075, right=0.985, top=0.87, bottom=0.09, hspace=0.28, wspace=0.3)
         for axes, (channel, title, quantity) in zip(figure.subplots(2, 3).ravel(), _PANELS, strict=True):
             for label, (walked, color) in walks.items():
                 if channel not in walked.averages:
@@ -323,13 +325,20 @@ def stride_figure(comparison: Comparison) -> "Drawn":
                 axes.axhline(0.0, color=GREY, linewidth=0.8)
             other = comparison.with_device.averages.get("other_torque") if channel == "torque" else None
             if other is not None:
-                axes.plot(100.0 * PHASES, other.mean, color=BLUE, linewidth=1.2, linestyle="--", label="right leg")
+                axes.plot(
+                    100.0 * PHASES,
+                    other.mean,
+                    color=BLUE,
+                    linewidth=1.2,
+                    linestyle="--",
+                    label="with the device, right leg",
+                )
             axes.set_ylabel(title_with_unit(title, quantity) if quantity else title, fontsize=9)
             axes.set_xlim(0.0, 100.0)
         for axes in figure.axes[3:]:
             axes.set_xlabel("Stride (%)", fontsize=9)
         handles, labels = figure.axes[4].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.53, 1.0), ncols=3)
+        figure.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.53, 0.955), ncols=3)
         scenario = comparison.with_device.scenario
         title = f"{scenario.name}: {wearer_of_walk(scenario).name}, who reacts"
         figure.text(0.012, 0.985, title, ha="left", va="top", fontweight="bold")

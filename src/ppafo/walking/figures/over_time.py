@@ -28,6 +28,7 @@ from ppafo.gait.gait import clinical_angle
 from ppafo.model.source import Regulator
 from ppafo.signals.recording import Floats, Recording
 from ppafo.simulation.scenario import Scenario
+from ppafo.walking.events import RIGHT_LEG
 from ppafo.walking.figures.mean_stride import WITH, WITHOUT
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import gait_sensors_of
@@ -54,6 +55,9 @@ _LONG = 120.0
 """Time [s] above which the axis is in minutes."""
 
 _FAULT_SUFFIX = "_fault"
+_APART = 0.2
+"""Fraction of a walk within which failures have one label; others are in two rows in turn."""
+_LABEL_ROW = 0.15
 
 _COURSE_WIDTH = 9.4
 _COURSE_MARGINS = Margins(left=0.75, right=0.2, top=0.95, bottom=0.5, row_gap=0.32, label=0.55)
@@ -81,13 +85,15 @@ _BOTTLE_LONG = 120.0
 
 
 def failures(configuration: Scenario) -> dict[str, float]:
-    """Return when which sensor fails [s], by its name; {} where all are sound."""
+    """Return when which sensor or part of the plant fails [s], by its name, in this order; {} where all are sound."""
     sensors = gait_sensors_of(configuration)._asdict()
-    return {
+    found = {
         name.removesuffix(_FAULT_SUFFIX): fault.time
         for name, fault in sensors.items()
         if name.endswith(_FAULT_SUFFIX) and fault.time < NEVER
     }
+    found |= {part: fault.numbers["time"] for part, fault in walk_of(configuration).broken.items()}
+    return dict(sorted(found.items(), key=lambda item: item[1]))
 
 
 def over_time_figure(result: WalkResult) -> "Figure":
@@ -146,24 +152,36 @@ def _levels(axes: "Axes", found: Floats, time: Floats) -> None:
 
 
 def _marks(top: "Axes", rows: "list[Axes]", result: WalkResult, scale: float) -> None:
-    """Draw a line at each pause and stop, and a dashed one with its name where a sensor fails."""
+    """Draw a line at each pause and stop, and a dashed one with names where something fails.
+
+    Toes and phases are of the first device: lines of a second one are on its gas only.
+    """
     for event in result.events:
         if event.sign is not None:
-            for axes in rows[:3]:
+            for axes in rows[:1] if event.leg == RIGHT_LEG else rows[:3]:
                 axes.axvline(event.time / scale, color=VERMILION, linewidth=0.9)
-    for sensor, begin in failures(result.scenario).items():
-        if begin < result.recording.time[-1]:
-            for axes in rows[:3]:
-                axes.axvline(begin / scale, color=GREY, linestyle="--", linewidth=0.9)
-            top.annotate(
-                f"{sensor} fails",
-                (begin / scale, 1.02),
-                xycoords=("data", "axes fraction"),
-                ha="right",
-                va="bottom",
-                fontsize=8.5,
-                color=GREY,
-            )
+    end = float(result.recording.time[-1])
+    named: list[tuple[float, list[str]]] = []
+    for part, begin in failures(result.scenario).items():
+        if begin >= end:
+            continue
+        for axes in rows[:3]:
+            axes.axvline(begin / scale, color=GREY, linestyle="--", linewidth=0.9)
+        word = part.replace("_", " ")
+        if named and begin - named[-1][0] < _APART * end:
+            named[-1][1].append(word)
+        else:
+            named.append((begin, [word]))
+    for number, (begin, words) in enumerate(named):
+        top.annotate(
+            f"{', '.join(words)} {'fails' if len(words) == 1 else 'fail'}",
+            (begin / scale, 1.02 + _LABEL_ROW * (number % 2)),
+            xycoords=("data", "axes fraction"),
+            ha="left" if begin < 0.6 * end else "right",
+            va="bottom",
+            fontsize=8.5,
+            color=GREY,
+        )
 
 
 def course_figure(worn: WalkResult, bare: WalkResult) -> "Figure":

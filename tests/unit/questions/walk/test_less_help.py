@@ -25,5 +25,7 @@ def test_the_answer_of_a_wearer_who_reacts_says_and_shows_where_help_was_less() 
     assert first.startswith("right leg: lift-only (no push-off) from 2.00 s: ")
     assert first.endswith("; heel 0 N, toe 319 N")
     assert second == f"help in 1 of {helped.size} strides: fewer than half"
+    ends = {name for name, *_ in answer.sections[0].table.rows}  # type: ignore[union-attr]
+    assert "Strides with help, of gas and push-off" in ends
     (written,) = answer.data["events"]
     assert (written["leg"], written["time"], written["sign"]) == ("right leg", 2.0, sign.name)
