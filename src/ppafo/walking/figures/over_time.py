@@ -105,7 +105,8 @@ def over_time_figure(result: WalkResult) -> "Figure":
         strips = {name: text for name, text in _STRIPS.items() if name in recording}
         heights = (*_HEIGHTS, *[_STRIP] * len(strips))
         figure, grid = figure_of_panels(_SIZE, _MARGINS, len(heights), heights=heights)
-        gas, toes, phases, *levels = (axes for (axes,) in grid)
+        rows = [axes for (axes,) in grid]
+        gas, toes, phases, *levels = rows
         gas.plot(time, GRAMS_PER_KILOGRAM * recording["supplied_mass"], color=BLUE)
         gas.set_ylabel("Gas\n(g)")
         toes.plot(time, 100.0 * recording["toe_height"], color=BLUE, linewidth=0.9)
@@ -119,9 +120,9 @@ def over_time_figure(result: WalkResult) -> "Figure":
         for axes, (name, text) in zip(levels, strips.items(), strict=True):
             _levels(axes, recording[name], time)
             axes.set_ylabel(text if len(strips) > 1 else "")
-        grid[-1][0].set_xlabel(f"Time ({unit})")
-        grid[-1][0].set_xlim(0.0, float(time[-1]))
-        _marks(grid[0][0], [row[0] for row in grid], result, scale)
+        rows[-1].set_xlabel(f"Time ({unit})")
+        rows[-1].set_xlim(0.0, float(time[-1]))
+        _marks(rows[: len(_HEIGHTS)], result, scale)
         width, height = _SIZE
         title = f"{result.scenario.name}: the whole walk"
         figure.text(0.12 / width, 1.0 - 0.12 / height, title, ha="left", va="top", fontweight="bold")
@@ -151,21 +152,21 @@ def _levels(axes: "Axes", found: Floats, time: Floats) -> None:
     axes.grid(visible=False)
 
 
-def _marks(top: "Axes", rows: "list[Axes]", result: WalkResult, scale: float) -> None:
+def _marks(rows: "list[Axes]", result: WalkResult, scale: float) -> None:
     """Draw a line at each pause and stop, and a dashed one with names where something fails.
 
     Toes and phases are of the first device: lines of a second one are on its gas only.
     """
     for event in result.events:
         if event.sign is not None:
-            for axes in rows[:1] if event.leg == RIGHT_LEG else rows[:3]:
+            for axes in rows[:1] if event.leg == RIGHT_LEG else rows:
                 axes.axvline(event.time / scale, color=VERMILION, linewidth=0.9)
     end = float(result.recording.time[-1])
     named: list[tuple[float, list[str]]] = []
     for part, begin in failures(result.scenario).items():
         if begin >= end:
             continue
-        for axes in rows[:3]:
+        for axes in rows:
             axes.axvline(begin / scale, color=GREY, linestyle="--", linewidth=0.9)
         word = part.replace("_", " ")
         if named and begin - named[-1][0] < _APART * end:
@@ -173,7 +174,7 @@ def _marks(top: "Axes", rows: "list[Axes]", result: WalkResult, scale: float) ->
         else:
             named.append((begin, [word]))
     for number, (begin, words) in enumerate(named):
-        top.annotate(
+        rows[0].annotate(
             f"{', '.join(words)} {'fails' if len(words) == 1 else 'fail'}",
             (begin / scale, 1.02 + _LABEL_ROW * (number % 2)),
             xycoords=("data", "axes fraction"),
