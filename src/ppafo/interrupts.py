@@ -1,12 +1,13 @@
 """One way to end before the work is done: Ctrl-C, a request to end, a terminal that closes.
 
-Each raises KeyboardInterrupt where the main thread is, and is remembered: where it falls into a finaliser Python drops
-the exception, and a library may catch it. Work that goes in blocks reads the memory between two of them.
+Each raises KeyboardInterrupt where the main thread is, and is remembered: where it falls into a finaliser or into
+compiled code that hands no exceptions on, the exception is dropped, and a library may catch it. Work that goes in blocks
+reads the memory between two of them.
 """
 
 import signal
 import sys
-from types import FrameType
+from types import FrameType, TracebackType
 from typing import Any
 
 SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
@@ -20,7 +21,8 @@ def listen() -> None:
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
             signal.signal(number, _interrupt)
-    sys.unraisablehook = _without_interrupts
+    sys.unraisablehook = _without_dropped_interrupts
+    sys.excepthook = _without_interrupts
 
 
 def listen_no_more() -> None:
@@ -47,7 +49,13 @@ def _interrupt(number: int, _frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
-def _without_interrupts(dropped: Any) -> None:
-    """Say nothing of an interrupt that fell into a finaliser: it is remembered."""
+def _without_dropped_interrupts(dropped: Any) -> None:
+    """Say nothing of an interrupt that was dropped: it is remembered."""
     if not issubclass(dropped.exc_type, KeyboardInterrupt):
         sys.__unraisablehook__(dropped)
+
+
+def _without_interrupts(kind: type[BaseException], error: BaseException, traceback: TracebackType | None) -> None:
+    """Say nothing of an interrupt that Cython prints itself before it drops it, as in SciPy's Sobol sequence."""
+    if not issubclass(kind, KeyboardInterrupt):
+        sys.__excepthook__(kind, error, traceback)

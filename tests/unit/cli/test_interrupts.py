@@ -46,10 +46,27 @@ def caught():
     check()
 lanes.interrupts.check = caught
 """
+COMPILED = """
+import numpy
+from scipy.stats import qmc
+read = numpy.lib.npyio.NpzFile.__getitem__
+def interrupted(self, key):
+    os.kill(os.getpid(), signal.NAME)
+    return read(self, key)
+numpy.lib.npyio.NpzFile.__getitem__ = interrupted
+advance = lanes.LaneBlock.advance
+def sampled(self, step_count):
+    qmc.Sobol(2)
+    advance(self, step_count)
+lanes.LaneBlock.advance = sampled
+"""
+"""A signal while SciPy reads its direction numbers: Cython prints the exception that it raises, and drops it."""
 
 
 @pytest.mark.parametrize("name", SIGNALS)
-@pytest.mark.parametrize("middle", [LOST, CAUGHT], ids=["lost in a finaliser", "caught by a library"])
+@pytest.mark.parametrize(
+    "middle", [LOST, CAUGHT, COMPILED], ids=["lost in a finaliser", "caught by a library", "dropped by compiled code"]
+)
 def test_a_signal_whose_exception_got_lost_ends_the_run_all_the_same(middle: str, name: str, tmp_path: Path) -> None:
     code = START.replace("MIDDLE", middle.replace("NAME", name))
     words = [sys.executable, "-c", code, str(tmp_path / "run")]
