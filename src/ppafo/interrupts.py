@@ -1,8 +1,8 @@
 """One way to end before the work is done: Ctrl-C, a request to end, a terminal that closes.
 
-Each raises KeyboardInterrupt where the main thread is, and is remembered: where it falls into a finaliser or into
-compiled code that hands no exceptions on, the exception is dropped, and a library may catch it. Work that goes in blocks
-reads the memory between two of them.
+Each raises KeyboardInterrupt where the main thread is, and is remembered: a finaliser drops the exception, so does
+compiled code that hands none on, and a library may catch it. Work that goes in blocks reads the memory between two of
+them.
 """
 
 import signal

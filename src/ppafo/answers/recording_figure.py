@@ -43,9 +43,11 @@ _PANEL, _GAP, _TOP, _BOTTOM, _REMARK_LINE = 1.15, 0.42, 0.75, 0.55, 0.17
 _REMARK_WIDTH = 100
 _HEADROOM = 0.06
 _MAXIMUM_TICKS = 5
-_NO_ATMOSPHERE = 1e9
-"""Pa absolute."""
+_LARGEST = 1e9
+"""No atmosphere [Pa absolute] and no time [s] is as large."""
 _LONGEST_SHOWN = 60
+_END_OF_WALK = 5.0
+"""Of a walk the last seconds are drawn, some strides: a minute of them is a black bar."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,13 +179,26 @@ def draw_stored_result(stored: StoredResult) -> "Figure":
     DataError names the key of ``run.json`` that is of another form.
     """
     file, document = stored.folder / RUN_FILE, stored.document
-    status, name = _under(file, document, "status"), _under(file, document, "scenario").get("name", "")
-    remark = "" if status.get("kind") == "completed" else one_line(status.get("message", ""))
+    name = _under(file, document, "scenario").get("name", "")
     if not isinstance(name, str):
         raise _other_form(file, "scenario.name", name, "a text")
-    atmosphere = stated_atmosphere(file, document, "scenario", "device")
-    valve = _under(file, document, "scenario", "device", "valve").get("kind", "")
-    return recording_figure(stored.recording, one_line(name), remark, atmosphere, str(valve))
+    atmosphere, valve = stated_atmosphere(file, document, "scenario", "device"), _valve(file, document, "scenario")
+    return recording_figure(stored.recording, one_line(name), _ending(file, document), atmosphere, valve)
+
+
+def draw_stored_walk(file: Path, document: Mapping[str, Any], recording: Recording) -> "Figure":
+    """Return the figure of the last seconds of a saved walk, with the fall or failure that ended it.
+
+    ``document`` is that of ``file``, empty where there is none; DataError names the key that is of another form.
+    """
+    end = float(recording.time[-1])
+    part = f"the last {_END_OF_WALK:g} s of {end:.4g} s" if recording.duration > _END_OF_WALK else ""
+    fall = _positive(file, document, "a time in s", "metrics", "fall_time", "value")
+    fallen = "" if fall is None else f"the wearer falls at {fall:.1f} s"
+    remark = "; ".join(text for text in (_ending(file, document), fallen, part) if text)
+    atmosphere = stated_atmosphere(file, document, "configuration", "device")
+    shown = recording.between(end - _END_OF_WALK, end)
+    return recording_figure(shown, recording.label, remark, atmosphere, _valve(file, document, "configuration"))
 
 
 def stated_atmosphere(file: Path, document: Mapping[str, Any], *device: str) -> float:
@@ -191,10 +206,29 @@ def stated_atmosphere(file: Path, document: Mapping[str, Any], *device: str) -> 
 
     DataError names the key that is of another form.
     """
-    keys = (*device, "supply")
-    given = _under(file, document, *keys).get("atmospheric_pressure", STANDARD_ATMOSPHERE)
-    if isinstance(given, bool) or not isinstance(given, int | float) or not 0.0 < given < _NO_ATMOSPHERE:
-        raise _other_form(file, ".".join((*keys, "atmospheric_pressure")), given, "a pressure in Pa")
+    given = _positive(file, document, "a pressure in Pa", *device, "supply", "atmospheric_pressure")
+    return STANDARD_ATMOSPHERE if given is None else given
+
+
+def _valve(file: Path, document: Mapping[str, Any], scenario: str) -> str:
+    """Return the kind of the valve at a key of a file's document, empty where it says none."""
+    return str(_under(file, document, scenario, "device", "valve").get("kind", ""))
+
+
+def _ending(file: Path, document: Mapping[str, Any]) -> str:
+    """Return why a run stopped before its end, empty where it did not."""
+    status = _under(file, document, "status")
+    return "" if status.get("kind", "completed") == "completed" else one_line(status.get("message", ""))
+
+
+def _positive(file: Path, document: Mapping[str, Any], wanted: str, *keys: str) -> float | None:
+    """Return the number above 0 at some keys of a file's document, None where it has none; ``wanted`` is what it is."""
+    table = _under(file, document, *keys[:-1])
+    if keys[-1] not in table:
+        return None
+    given = table[keys[-1]]
+    if isinstance(given, bool) or not isinstance(given, int | float) or not 0.0 < given < _LARGEST:
+        raise _other_form(file, ".".join(keys), given, wanted)
     return float(given)
 
 

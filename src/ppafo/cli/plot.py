@@ -13,8 +13,6 @@ if TYPE_CHECKING:
 _FIGURE = "figure"
 _FORMATS = ("png", "svg")
 _PICTURES = (".png", ".gif")
-_END = 5.0
-"""Of a walk the last seconds are drawn, some strides: a minute of them is a black bar."""
 _NAMED = 6
 
 
@@ -90,7 +88,7 @@ def _draw_folder(folder: Path, names: list[str]) -> "dict[str, Figure]":
     if RIG_FILE in names:
         return _draw_rig(folder, names)
     if NETCDF_FILE in names and MARK in names:
-        return {_FIGURE: _draw_end(folder, names)}
+        return {_FIGURE: _draw_walk(folder, names)}
     return {}
 
 
@@ -109,21 +107,16 @@ def _draw_rig(folder: Path, names: list[str]) -> "dict[str, Figure]":
     }
 
 
-def _draw_end(folder: Path, names: list[str]) -> "Figure":
+def _draw_walk(folder: Path, names: list[str]) -> "Figure":
     """Return the figure of the end of a walk."""
-    from ppafo.answers.recording_figure import recording_figure, stated_atmosphere
-    from ppafo.constants import STANDARD_ATMOSPHERE
+    from ppafo.answers.recording_figure import draw_stored_walk
     from ppafo.questions.endurance.draw import WALK_FILE
     from ppafo.storage import read_recording
     from ppafo.storage.result_folder import NETCDF_FILE
 
-    recording = read_recording(folder / NETCDF_FILE)
-    end = float(recording.time[-1])
-    remark = f"the last {_END:g} s of {end:.4g} s" if recording.duration > _END else ""
-    zero, file = STANDARD_ATMOSPHERE, folder / WALK_FILE
-    if WALK_FILE in names:
-        zero = stated_atmosphere(file, _document(file), "configuration", "device")
-    return recording_figure(recording.between(end - _END, end), recording.label, remark, zero)
+    file = folder / WALK_FILE
+    document = _document(file) if WALK_FILE in names else {}
+    return draw_stored_walk(file, document, read_recording(folder / NETCDF_FILE))
 
 
 def _document(file: Path) -> dict[str, Any]:

@@ -1,6 +1,5 @@
 """A walk and its answer, of one wearer with and without the device, or of many wearers."""
 
-import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +27,7 @@ from ppafo.questions.walk.course import (
     course_sections,
     trust_remark,
 )
+from ppafo.questions.walk.document import versions, walk_data, walk_document
 from ppafo.questions.walk.falls import Falls, falls_of_walk
 from ppafo.questions.walk.less_help import over_time_sections, safety_remarks
 from ppafo.questions.walk.reacting import reacting_answer
@@ -45,14 +45,13 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import UNITS, Scenario, plain
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
-from ppafo.version import __version__
 from ppafo.walking import course as courses
 from ppafo.walking.figures.legs import animation, frames_figure, strip_figure
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.loading import FILE, load_walk
 from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
-from ppafo.walking.planning import law_of, sensor_settings
+from ppafo.walking.planning import law_of
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import OUTCOMES, SHOWN, TRAITS, Comparison, Number, Population, compare_walks, population_figure
@@ -132,7 +131,7 @@ def _wearers_data(population: Population) -> dict[str, Any]:
         },
         "outcomes": quantiles(population.outcomes, OUTCOMES),
         "traits": quantiles(population.traits, TRAITS),
-        "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
+        "versions": versions(),
         "configuration": walk_document(population.scenario),
     }
 
@@ -364,53 +363,14 @@ def _bottle(pair: WalkPair) -> str:
     return f"how long a bottle lasts: walk on it, --bottle {PAPER_BOTTLE}; here its supply pressure stays as it is set"
 
 
-def walk_document(scenario: Scenario) -> dict[str, Any]:
-    """Return a walk as data in SI units; its bottle by its values, not by the tables of its gas."""
-    motion, control, origin = walk_of(scenario), scenario.control, scenario.origin
-    lines = scenario.supply_lines
-    return {
-        "name": scenario.name,
-        "description": scenario.description,
-        "device": plain(scenario.device),
-        "gait": plain(motion.gait),
-        "wearer": plain(motion.wearer),
-        "controller": control.kind,
-        "arithmetic": control.arithmetic,
-        "timing": motion.timing,
-        "settings": plain(control.settings),
-        "period": control.period,
-        "step": scenario.time_step,
-        "sensors": plain(sensor_settings(scenario)) | {"seed": scenario.sensors.seed},
-        "supply_lines": None if lines is None else plain(lines._asdict()),
-        "thermal": plain(scenario.thermal),
-        "course": plain(motion.course),
-        "bottle": None if motion.bottle is None else motion.bottle.to_dict(),
-        "wearer_origin": motion.wearer_origin,
-        "assumed": {item.path: item.note for item in scenario.assumptions},
-        "file": origin.file,
-        "overrides": list(origin.overrides),
-        "content": origin.content,
-    }
-
-
 def _data(comparison: Comparison) -> dict[str, Any]:
-    configuration = comparison.with_device.scenario
-    return {
-        "format": FORMAT,
-        "schema_version": SCHEMA_VERSION,
-        "units": UNITS,
-        "status": plain(comparison.with_device.status),
-        "status_off": plain(comparison.without_device.status),
-        "minutes": float(comparison.with_device.recording.time[-1]) / 60.0,
-        "metrics": plain(dict(comparison.with_device.metrics)),
+    worn = comparison.with_device
+    return walk_data(FORMAT, SCHEMA_VERSION, comparison) | {
+        "minutes": float(worn.recording.time[-1]) / 60.0,
         **course_data(comparison),
-        **bottle_data(comparison.with_device),
-        "metrics_vented": plain(dict(comparison.with_device.vented_metrics)),
-        "events": [event.to_dict() for event in comparison.with_device.events],
-        "metrics_off": plain(dict(comparison.without_device.metrics)),
+        **bottle_data(worn),
+        "metrics_vented": plain(dict(worn.vented_metrics)),
         "healthy": plain(dict(comparison.healthy)),
-        "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
-        "configuration": walk_document(configuration),
     }
 
 

@@ -1,6 +1,7 @@
-"""What the answer of a walk says of less help: what is fitted for safety, pauses and stops, and the walk over time."""
+"""What the answer of a walk says of safety: what is fitted, chambers that the foot compresses, less help over time."""
 
 from ppafo.answers import Figure, Section
+from ppafo.answers.display_units import display_value
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.events import event_lines
 from ppafo.walking.figures.over_time import failures, over_time_figure
@@ -15,11 +16,13 @@ _OF_LEGS = (
     " Gas is that of both devices, and so are the lines on it; each leg has a strip. Toes and phases are those of the "
     "left leg."
 )
+_COMPRESSED = 2.0
+"""Pressure in a chamber over its supply, both absolute, from which it is said: that of the healthy wearers stays below."""
 
 
 def safety_remarks(worn: WalkResult) -> list[str]:
-    """Return what is fitted for safety, the pauses, the stop and the returns of help, and how many strides had help."""
-    fitted = _shut_off_line(worn.scenario)
+    """Return what is fitted, which chambers are compressed, pauses, stop and returns of help, and strides with help."""
+    fitted = [*_shut_off_line(worn.scenario), *_compressed_lines(worn)]
     if not worn.events:
         return fitted
     helped, strides = int(worn.helped.sum()), worn.helped.size
@@ -37,6 +40,28 @@ def _shut_off_line(scenario: Scenario) -> list[str]:
     mass, power = 1.0e3 * float(given["mass"]), float(given["power"])
     where = "on each leg a shut-off valve" if walk_of(scenario).devices > 1 else "shut-off valve"
     return [f"{where}: {mass:.0f} g, {power:.2g} W as long as the device helps ({60.0 * power:.0f} J a minute)"]
+
+
+def _compressed_lines(worn: WalkResult) -> list[str]:
+    """Return each chamber in which the foot compresses the gas far beyond its supply, by closing in on its end."""
+    supply, several = worn.scenario.device.supply, walk_of(worn.scenario).devices > 1
+    lines = []
+    for channel, words, given in (
+        ("pressure_1", "chamber 1", supply.pressure),
+        ("pressure_2", "chamber 2", supply.dorsiflexion_pressure),
+        ("other_pressure_1", "chamber 1 of the right leg", supply.pressure),
+        ("other_pressure_2", "chamber 2 of the right leg", supply.dorsiflexion_pressure),
+    ):
+        largest = float(worn.recording[channel].max()) if channel in worn.recording else 0.0
+        if largest < _COMPRESSED * given:
+            continue
+        where = f"{words} of the left leg" if several and channel.startswith("pressure") else words
+        reached, fed = (display_value(value, "pressure", supply.atmospheric_pressure) for value in (largest, given))
+        lines.append(
+            f"the foot compresses the gas in {where} to {reached:.0f} psi_g, far above its supply of {fed:.0f} psi_g: "
+            "actuator, valves and tubing must withstand that"
+        )
+    return lines
 
 
 def over_time_sections(worn: WalkResult) -> tuple[Section, ...]:

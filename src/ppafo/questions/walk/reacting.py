@@ -1,6 +1,5 @@
 """The answer of a walk of a wearer who reacts: with the device and with it off, until a fall where there is one."""
 
-import platform
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,12 +12,12 @@ from ppafo.gait.document import load_gait
 from ppafo.metrics.strides import SETTLING
 from ppafo.questions.endurance.draw import FORMAT_OF_REACTING
 from ppafo.questions.walk.course import bottle_data, bottle_remark, bottle_sections
+from ppafo.questions.walk.document import walk_data
 from ppafo.questions.walk.less_help import over_time_sections, safety_remarks
 from ppafo.questions.walk.muscle_timing import muscle_timing, muscle_timing_section
-from ppafo.simulation.scenario import UNITS, Scenario, plain
+from ppafo.simulation.scenario import Scenario, plain
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
-from ppafo.version import __version__
 from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.reacting_wearer import ReactingWearer
 from ppafo.walking.result import WalkResult
@@ -29,7 +28,7 @@ from ppafo.walking.way import EDGE, met_by
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawn
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 ROWS = (
     ("walked_time", "Walked until the end or a fall", "time", 1),
@@ -129,17 +128,8 @@ def reacting_answer(comparison: Comparison) -> Answer:
             *over_time_sections(worn),
             *_curves(comparison),
         ),
-        data={
-            "format": FORMAT_OF_REACTING,
-            "schema_version": SCHEMA_VERSION,
-            "units": UNITS,
-            "status": plain(worn.status),
-            "status_off": plain(bare.status),
-            "wearer": wearer.name,
-            "wearer_numbers": plain(dict(wearer.settings)),
-            "metrics": plain(dict(worn.metrics)),
-            "metrics_off": plain(dict(bare.metrics)),
-            "events": [event.to_dict() for event in worn.events],
+        data=walk_data(FORMAT_OF_REACTING, SCHEMA_VERSION, comparison)
+        | {
             "likeness": {
                 words: {name: plain(item) for name, item in likeness(walked).items()}
                 for words, walked in (("with", worn), ("off", bare))
@@ -149,10 +139,6 @@ def reacting_answer(comparison: Comparison) -> Answer:
                 for words, walked in (("with", worn), ("off", bare))
             },
             **bottle_data(worn),
-            "versions": {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
-            "file": scenario.origin.file,
-            "overrides": list(scenario.origin.overrides),
-            "content": scenario.origin.content,
         },
         passed=comparison.is_completed and stays and worn.is_helped,
         files={

@@ -1,0 +1,74 @@
+"""A walk as data: its set-up in SI units, and what ``walk.json`` says of every walk, whoever walks."""
+
+import platform
+from typing import Any
+
+import numpy as np
+
+from ppafo.simulation.scenario import UNITS, Scenario, plain
+from ppafo.version import __version__
+from ppafo.walking.motion import WalkMotion, walk_of
+from ppafo.walking.planning import sensor_settings
+from ppafo.walking.walk import Comparison
+
+
+def walk_data(name: str, version: int, comparison: Comparison) -> dict[str, Any]:
+    """Return what the file of every walk says, of a format with this name and version."""
+    worn, bare = comparison.with_device, comparison.without_device
+    return {
+        "format": name,
+        "schema_version": version,
+        "units": UNITS,
+        "status": plain(worn.status),
+        "status_off": plain(bare.status),
+        "metrics": plain(dict(worn.metrics)),
+        "metrics_off": plain(dict(bare.metrics)),
+        "events": [event.to_dict() for event in worn.events],
+        "versions": versions(),
+        "configuration": walk_document(worn.scenario),
+    }
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of what computed."""
+    return {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__}
+
+
+def walk_document(scenario: Scenario) -> dict[str, Any]:
+    """Return a walk as data in SI units; its bottle by its values, not by the tables of its gas."""
+    motion, control, origin = walk_of(scenario), scenario.control, scenario.origin
+    lines = scenario.supply_lines
+    return {
+        "name": scenario.name,
+        "description": scenario.description,
+        "device": plain(scenario.device),
+        **_who_walks(motion),
+        "controller": control.kind,
+        "arithmetic": control.arithmetic,
+        "timing": motion.timing,
+        "settings": plain(control.settings),
+        "period": control.period,
+        "step": scenario.time_step,
+        "sensors": plain(sensor_settings(scenario)) | {"seed": scenario.sensors.seed},
+        "supply_lines": None if lines is None else plain(lines._asdict()),
+        "thermal": plain(scenario.thermal),
+        "bottle": None if motion.bottle is None else motion.bottle.to_dict(),
+        "assumed": {item.path: item.note for item in scenario.assumptions},
+        "file": origin.file,
+        "overrides": list(origin.overrides),
+        "content": origin.content,
+    }
+
+
+def _who_walks(motion: WalkMotion) -> dict[str, Any]:
+    """Return the prescribed gait and body, or the name and numbers of a wearer who reacts, and the course of either."""
+    reacts = motion.reacts
+    if reacts is not None:
+        who = {"name": reacts.name, "numbers": plain(dict(reacts.settings))}
+        return {"wearer": who, "course": plain(reacts.course)}
+    return {
+        "gait": plain(motion.gait),
+        "wearer": plain(motion.wearer),
+        "wearer_origin": motion.wearer_origin,
+        "course": plain(motion.course),
+    }
