@@ -17,7 +17,7 @@ _OF_LEGS = (
     "left leg."
 )
 _COMPRESSED = 2.0
-"""Pressure in a chamber over its supply, both absolute, from which it is said: that of the healthy wearers stays below."""
+"""Pressure in a chamber over its supply, both absolute, from which it is said; healthy wearers stay below."""
 
 
 def safety_remarks(worn: WalkResult) -> list[str]:
