@@ -29,9 +29,9 @@ from ppafo.questions.walk.course import (
 )
 from ppafo.questions.walk.document import versions, walk_data, walk_document
 from ppafo.questions.walk.falls import Falls, falls_of_walk
-from ppafo.questions.walk.less_help import over_time_sections, safety_remarks
 from ppafo.questions.walk.reacting import reacting_answer
 from ppafo.questions.walk.risks import Risks, risks_of_walk
+from ppafo.questions.walk.safety import over_time_sections, safety_remarks
 from ppafo.questions.walk.volumes import (
     VolumeReading,
     volumes_data,

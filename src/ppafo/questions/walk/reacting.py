@@ -13,8 +13,8 @@ from ppafo.metrics.strides import SETTLING
 from ppafo.questions.endurance.draw import FORMAT_OF_REACTING
 from ppafo.questions.walk.course import bottle_data, bottle_remark, bottle_sections
 from ppafo.questions.walk.document import walk_data
-from ppafo.questions.walk.less_help import over_time_sections, safety_remarks
 from ppafo.questions.walk.muscle_timing import muscle_timing, muscle_timing_section
+from ppafo.questions.walk.safety import over_time_sections, safety_remarks
 from ppafo.simulation.scenario import Scenario, plain
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes

@@ -7,8 +7,8 @@ import pytest
 
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.control.walking.signs import LIFTS, NOT_FLAT, SIGNS
-from ppafo.questions.walk.less_help import safety_remarks
 from ppafo.questions.walk.reacting import reacting_answer
+from ppafo.questions.walk.safety import safety_remarks
 from ppafo.signals import Channel
 from ppafo.walking import compare_walks, load_walk
 from ppafo.walking.events import SafetyEvent
@@ -35,7 +35,7 @@ def test_the_answer_of_a_wearer_who_reacts_says_and_shows_where_help_was_less() 
 
 
 @pytest.mark.long
-def test_a_chamber_that_the_foot_compresses_is_named_with_its_pressure_and_leg() -> None:
+def test_a_pressure_far_above_the_supply_is_said_with_its_chamber_and_leg() -> None:
     """Of a healthy wearer none is; gauge pressure counts from the atmosphere of the device."""
     overrides = ["supply.atmospheric_pressure=80 kPa_a", "supply.dorsiflexion_pressure=30 psi_g"]
     worn = compare_walks(load_walk("reacting", overrides=overrides), 0.1).with_device
@@ -44,4 +44,4 @@ def test_a_chamber_that_the_foot_compresses_is_named_with_its_pressure_and_leg()
     for channel, words in (("pressure_2", "chamber 2"), ("other_pressure_2", "chamber 2 of the right leg")):
         channels = {**worn.recording.channels, channel: pressed}
         (said,) = safety_remarks(replace(worn, recording=replace(worn.recording, channels=channels)))
-        assert said.startswith(f"the foot compresses the gas in {words} to 100 psi_g, far above its supply of 30 psi_g")
+        assert said.startswith(f"the pressure in {words} reaches 100 psi_g, and its supply is set to 30 psi_g: ")

@@ -1,4 +1,4 @@
-"""What the answer of a walk says of safety: what is fitted, chambers that the foot compresses, less help over time."""
+"""What the answer of a walk says of safety: what is fitted, pressures far above the supply, less help over time."""
 
 from ppafo.answers import Figure, Section
 from ppafo.answers.display_units import display_value
@@ -16,13 +16,13 @@ _OF_LEGS = (
     " Gas is that of both devices, and so are the lines on it; each leg has a strip. Toes and phases are those of the "
     "left leg."
 )
-_COMPRESSED = 2.0
-"""Pressure in a chamber over its supply, both absolute, from which it is said; healthy wearers stay below."""
+_FAR_ABOVE = 2.0
+"""Largest pressure in a chamber over its supply, both absolute, above which it is said; healthy wearers stay below."""
 
 
 def safety_remarks(worn: WalkResult) -> list[str]:
-    """Return what is fitted, which chambers are compressed, pauses, stop and returns of help, and strides with help."""
-    fitted = [*_shut_off_line(worn.scenario), *_compressed_lines(worn)]
+    """Return what is fitted, pressures far above the supply, pauses, stop, returns of help and strides with help."""
+    fitted = [*_shut_off_line(worn.scenario), *_pressure_lines(worn)]
     if not worn.events:
         return fitted
     helped, strides = int(worn.helped.sum()), worn.helped.size
@@ -42,8 +42,8 @@ def _shut_off_line(scenario: Scenario) -> list[str]:
     return [f"{where}: {mass:.0f} g, {power:.2g} W as long as the device helps ({60.0 * power:.0f} J a minute)"]
 
 
-def _compressed_lines(worn: WalkResult) -> list[str]:
-    """Return each chamber in which the foot compresses the gas far beyond its supply, by closing in on its end."""
+def _pressure_lines(worn: WalkResult) -> list[str]:
+    """Return each chamber whose pressure comes far above its supply, as where the foot drives the vane to its end."""
     supply, several = worn.scenario.device.supply, walk_of(worn.scenario).devices > 1
     lines = []
     for channel, words, given in (
@@ -53,13 +53,13 @@ def _compressed_lines(worn: WalkResult) -> list[str]:
         ("other_pressure_2", "chamber 2 of the right leg", supply.dorsiflexion_pressure),
     ):
         largest = float(worn.recording[channel].max()) if channel in worn.recording else 0.0
-        if largest < _COMPRESSED * given:
+        if not largest > _FAR_ABOVE * given:
             continue
         where = f"{words} of the left leg" if several and channel.startswith("pressure") else words
         reached, fed = (display_value(value, "pressure", supply.atmospheric_pressure) for value in (largest, given))
         lines.append(
-            f"the foot compresses the gas in {where} to {reached:.0f} psi_g, far above its supply of {fed:.0f} psi_g: "
-            "actuator, valves and tubing must withstand that"
+            f"the pressure in {where} reaches {reached:.0f} psi_g, and its supply is set to {fed:.0f} psi_g: actuator, "
+            "valves and tubing must withstand that"
         )
     return lines
 
