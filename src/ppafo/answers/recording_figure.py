@@ -45,7 +45,7 @@ _HEADROOM = 0.06
 _MAXIMUM_TICKS = 5
 _LARGEST = 1e9
 """No atmosphere [Pa absolute] and no time [s] is as large."""
-_LONGEST_SHOWN = 60
+_LONGEST_SHOWN, _LONGEST_REMARK = 60, 500
 _END_OF_WALK = 5.0
 """Of a walk the last seconds are drawn, some strides: a minute of them is a black bar."""
 
@@ -218,7 +218,8 @@ def _valve(file: Path, document: Mapping[str, Any], scenario: str) -> str:
 def _ending(file: Path, document: Mapping[str, Any]) -> str:
     """Return why a run stopped before its end, empty where it did not."""
     status = _under(file, document, "status")
-    return "" if status.get("kind", "completed") == "completed" else one_line(status.get("message", ""))
+    message = one_line(status.get("message", ""))[:_LONGEST_REMARK]
+    return "" if status.get("kind", "completed") == "completed" else message
 
 
 def _positive(file: Path, document: Mapping[str, Any], wanted: str, *keys: str) -> float | None:

@@ -32,13 +32,9 @@ def is_nested_too_deeply(document: Any) -> bool:
     """Tell whether tables and lists lie in each other more than ``MAXIMUM_LEVELS`` deep, or in themselves."""
     level: list[Any] = [document]
     for _ in range(MAXIMUM_LEVELS + 1):
-        inside = {
-            id(item): item
-            for table in level
-            for item in (table.values() if isinstance(table, Mapping) else table)
-            if isinstance(item, Mapping | list | tuple)
-        }
-        level = list(inside.values())
+        level = [item for item in level if isinstance(item, Mapping | list | tuple)]
         if not level:
             return False
-    return True
+        inside = (item for table in level for item in (table.values() if isinstance(table, Mapping) else table))
+        level = list({id(item): item for item in inside}.values())
+    return any(isinstance(item, Mapping | list | tuple) for item in level)

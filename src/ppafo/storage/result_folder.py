@@ -87,8 +87,11 @@ def add_to_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
     for name in (MARK, RUN_FILE):
         document = read_json(folder / name) if (folder / name).is_file() else None
         if isinstance(document, dict) and document.get("format") in (_FORMAT, FORMAT) and _HASHES in document:
-            document[_HASHES] = dict(sorted({**document[_HASHES], **_hashes(contents)}.items()))
-            document["files"] = sorted({*document["files"], *contents})
+            hashes, stated = document[_HASHES], document.get("files")
+            if not isinstance(hashes, dict) or not isinstance(stated, list) or not all(type(x) is str for x in stated):
+                raise DataError(f"{folder / name}: does not state what its files are")
+            document[_HASHES] = dict(sorted({**hashes, **_hashes(contents)}.items()))
+            document["files"] = sorted({*stated, *contents})
             marks[name] = f"{json_text(document)}\n".encode()
     add_files(folder, {**contents, **marks})
 

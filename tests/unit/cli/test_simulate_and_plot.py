@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -220,6 +221,30 @@ def test_the_end_of_a_walk_is_drawn_in_the_look_of_its_valve_and_says_what_ended
     remark = "no gas; the wearer falls at 9.0 s; the last 5 s of 9 s"
     expected = recording_figure(recording.between(4.0, 9.0), "walk", remark, valve="solenoid")
     assert (tmp_path / "figure.png").read_bytes() == figure_files(expected)["figure.png"]
+
+
+def test_a_message_without_end_makes_no_picture_without_end(tmp_path: Path) -> None:
+    recording = Recording("walk", 0.1 * np.arange(11), {"torque": Channel(np.zeros(11), "N m")}, "simulated")
+    document = {"status": {"kind": "unsteady", "message": "no gas " * 10_000}}
+    files = {"recording.nc": netcdf_bytes(recording, None), "walk.json": json.dumps(document).encode()}
+    write_marked_folder(tmp_path, files, "walk")
+    assert main(["plot", str(tmp_path)]) == 0
+    assert int.from_bytes((tmp_path / "figure.png").read_bytes()[20:24], "big") < 1000, "height in pixels"
+
+
+@pytest.mark.parametrize("damage", [{"files": 3}, {"files": [3]}, {"sha256": [3]}])
+def test_a_mark_that_says_its_files_in_another_form_is_refused(
+    damage: dict[str, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording = Recording("walk", 0.1 * np.arange(11), {"torque": Channel(np.zeros(11), "N m")}, "simulated")
+    write_marked_folder(tmp_path, {"recording.nc": netcdf_bytes(recording, None)}, "walk")
+    mark = tmp_path / "ppafo.json"
+    document = json.loads(mark.read_text())
+    assert damage.keys() <= document.keys()
+    mark.write_text(json.dumps(document | damage))
+    assert main(["plot", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == f"ppafo: {mark}: does not state what its files are\n"
+    assert names(tmp_path) == ["ppafo.json", "recording.nc"]
 
 
 @pytest.mark.parametrize("value", ["true", '"late"', "[9]", "null", "-1", "NaN", "1" + "0" * 400])

@@ -9,9 +9,10 @@ import numpy as np
 
 from ppafo.answers import Column, Section, Table
 from ppafo.answers.style import BLUE, GREY, VERMILION, house_style
+from ppafo.errors import DataError
 from ppafo.identification.trajectory.doubt import title_of
 from ppafo.identification.trajectory.next_experiment import NextExperiments
-from ppafo.rig.experiments import RIG_FILE
+from ppafo.rig.experiments import FORMAT, RIG_FILE
 from ppafo.storage.result_folder import read_json
 from ppafo.units import percentage
 
@@ -57,15 +58,24 @@ class PlantedDevice:
 
 
 def planted_device(recordings: Iterable[Path]) -> PlantedDevice | None:
-    """Return the device that the virtual rig recorded all of these on, as its file beside them says; else None."""
+    """Return the device that the virtual rig recorded all of these on, as its file beside them says; else None.
+
+    DataError where the file is the rig's and says it in another form.
+    """
     found = set()
     for recording in recordings:
         notes = recording.parent / RIG_FILE
-        made = read_json(notes).get("recordings", {}).get(recording.name) if notes.is_file() else None
-        if made is None:
+        document = read_json(notes) if notes.is_file() else None
+        if not isinstance(document, dict) or document.get("format") != FORMAT:
             return None
-        changes = tuple(item for item in made["overrides"] if item.startswith(_OF_THE_DEVICE))
-        found.add(PlantedDevice(made["parameter_set"], changes))
+        try:
+            made = document["recordings"].get(recording.name)
+            if made is None:
+                return None
+            changes = tuple(str(item) for item in made["overrides"] if str(item).startswith(_OF_THE_DEVICE))
+            found.add(PlantedDevice(str(made["parameter_set"]), changes))
+        except (LookupError, TypeError, AttributeError) as error:
+            raise DataError(f"{notes}: does not state how '{recording.name}' was recorded") from error
     return found.pop() if len(found) == 1 else None
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ppafo.cli.main import main
+from ppafo.errors import DataError
 from ppafo.identification.problem import load_problem
 from ppafo.identification.trajectory.next_experiment import (
     NextExperiments,
@@ -109,6 +110,14 @@ def test_the_rig_records_on_the_device_of_earlier_recordings_and_else_on_the_set
     assert '--set "foot_plate.inertia=10 g m^2"' in first
     (tmp_path / "measured.csv").write_text("time [s],angle [rad]\n")
     assert planted_device([recording, tmp_path / "measured.csv"]) is None
+    notes = tmp_path / "there" / "rig.json"
+    for damaged in ("null", "[1]", '{"format": "another"}'):
+        notes.write_text(damaged)
+        assert planted_device([recording]) is None
+    for damaged in ("[]", '{"step-response.csv": 3}', '{"step-response.csv": {"overrides": []}}'):
+        notes.write_text(f'{{"format": "ppafo rig", "recordings": {damaged}}}')
+        with pytest.raises(DataError, match=r"does not state how 'step-response\.csv' was recorded"):
+            planted_device([recording])
 
 
 def test_the_section_and_the_figure_show_now_chosen_and_at_random() -> None:
