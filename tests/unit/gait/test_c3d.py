@@ -145,6 +145,17 @@ def test_a_missing_marker_is_named_with_the_nearest(written: Callable[..., Path]
         import_gait([written()], ImportSettings(62.0, side="left"))
 
 
+def test_a_label_of_two_points_refuses_nothing_but_itself(
+    written: Callable[..., Path], normative: Gait, walk: Recording
+) -> None:
+    nobody = np.zeros((3, np.arange(0.0, walk.duration, 0.01).size))
+    found = import_gait([written({"C1": nobody, "Other:C1": nobody})], ImportSettings(normative.body_mass))
+    assert same(found.gait, normative)
+    assert "points not read, for they share a label: 'C1'" in "\n".join(found.remarks)
+    with pytest.raises(DataError, match="share a label: 'RANK'"):
+        import_gait([written({"Other:RANK": nobody})], ImportSettings(normative.body_mass))
+
+
 def test_what_is_no_c3d_file_is_refused(tmp_path: Path) -> None:
     pytest.importorskip("ezc3d", reason="the extra c3d is not installed")
     path = tmp_path / "walk.c3d"

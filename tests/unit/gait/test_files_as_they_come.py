@@ -312,14 +312,24 @@ def test_a_real_trial_of_one_stride_and_two_plates_is_imported(real_trial: list[
 
 
 @pytest.mark.parametrize(
-    ("delimiter", "unit", "comma"), [(",", " (deg)", False), (";", " [deg]", True), ("\t", " (deg)", False)]
+    ("delimiter", "time", "unit", "comma"),
+    [
+        (",", "time", " (deg)", False),
+        (";", "time", " [deg]", True),
+        ("\t", "time", " (deg)", False),
+        (";", "time [s]", " [deg]", False),
+        ("\t", "time [s]", " [deg]", True),
+    ],
 )
-def test_a_plain_table_with_opensims_names_is_read(tmp_path: Path, delimiter: str, unit: str, comma: bool) -> None:
+def test_a_plain_table_with_opensims_names_is_read(
+    tmp_path: Path, delimiter: str, time: str, unit: str, comma: bool
+) -> None:
     columns = {f"{name}{unit}": values for name, values in angles(TIME).items()} | {"ground_force_r_vy": force(TIME)}
     rows = [delimiter.join(f"{cell:.6f}" for cell in row) for row in np.column_stack([TIME, *columns.values()])]
-    text = "\n".join([delimiter.join(["time", *columns]), *rows]) + "\n"
+    text = "\n".join([delimiter.join([time, *columns]), *rows]) + "\n"
     path = tmp_path / "walk.csv"
-    path.write_text(text.replace(".", ",") if comma else text)
+    path.write_text("# synthetic: a walk\n" + (text.replace(".", ",") if comma else text))
+    assert read_table(path).kind == "synthetic"
     assert_true(import_gait([path], PERSON).gait)
 
 

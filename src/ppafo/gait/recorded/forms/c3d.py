@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.errors import DataError, first_twice, one_line
+from ppafo.errors import DataError, one_line
 from ppafo.gait.recorded.form import GaitForm
 from ppafo.gait.recorded.forms.markers import PLATE, marker_convention
 from ppafo.gait.recorded.table import Events, MotionTable, Trial
@@ -58,17 +58,16 @@ def read_c3d(path: str | Path) -> MotionTable:
     group = parameters["POINT"]
     number = points.shape[1]
     labels = [_bare(label) for label in _texts(group, "LABELS")][:number]
-    twice = first_twice(labels)
-    if twice is not None or len(labels) != number:
-        what = f"two of {twice!r}" if twice is not None else f"{len(labels)} labels for {number} columns"
-        raise DataError(f"{path}: there are {what}; every point and channel needs a label of its own")
+    # Nobody can name a point whose label is not its own; all others can be used.
+    shared = sorted({label for label in labels if labels.count(label) > 1})
     frames = points.shape[2]
     columns = {
         f"{label}.{axis}": points[row, number, :]
         for number, label in enumerate(labels)
+        if label not in shared
         for row, axis in enumerate(_AXES)
     }
-    units = _units(parameters["POINT"], labels)
+    units = {name: unit for name, unit in _units(parameters["POINT"], labels).items() if name in columns}
     analogs: Floats = content["data"]["analogs"][0]
     if analogs.shape[0] and frames:
         for name, values, unit in _channels(parameters["ANALOG"], analogs, frames):
@@ -78,7 +77,8 @@ def read_c3d(path: str | Path) -> MotionTable:
     first = max(0, int(content["header"]["points"].get("first_frame", 0)))
     trial = _trial(parameters)
     time = (first + np.arange(frames)) / rate
-    return MotionTable(str(path), time, columns, units, remarks=trial.remarks, trial=trial)
+    said = [f"points not read, for they share a label: {', '.join(map(repr, shared))}"] if shared else []
+    return MotionTable(str(path), time, columns, units, remarks=(*trial.remarks, *said), trial=trial)
 
 
 def open_c3d(path: str | Path) -> Any:

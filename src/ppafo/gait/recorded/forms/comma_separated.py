@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Literal
 
 from ppafo.documents.regular_file import decoded
-from ppafo.errors import DataError, first_twice, one_line
+from ppafo.errors import DataError, first_twice, one_line, refused_as
 from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.mapping import Side, package_map
 from ppafo.gait.recorded.table import MotionTable
-from ppafo.storage.comma_separated import read_csv
+from ppafo.storage.comma_separated import kind_of_comments, read_csv
 from ppafo.storage.files import read_bytes
 from ppafo.storage.foreign import ColumnMap, MappedChannel, read_foreign
 
@@ -43,8 +43,9 @@ def _convention(_table: MotionTable, side: Side, _body_mass: float) -> Conventio
 
 
 def is_plain(path: str | Path) -> bool:
-    """Tell whether the first column of a CSV file has a header without its unit in square brackets."""
-    return "[" not in re.split(r"[,;\t]", _header(path))[0]
+    """Tell whether a CSV file has other delimiters than the package, or no unit in square brackets after its time."""
+    header = _header(path)
+    return _delimiter(header) != "," or "[" not in header.split(",")[0]
 
 
 def plain_names(path: str | Path) -> list[str]:
@@ -85,7 +86,9 @@ def read_plain_csv(path: str | Path) -> MotionTable:
     recording = read_foreign(path, mapped)
     columns = {name: recording[f"c{number}"] for number, name in enumerate(names) if number > 0}
     stated = dict(zip(names, units, strict=True))
-    return MotionTable(str(path), recording.time, columns, {name: stated[name] for name in columns})
+    with refused_as(DataError, str(path), DataError):
+        kind = kind_of_comments(line for line in _text(path).splitlines() if line.startswith("#"))
+    return MotionTable(str(path), recording.time, columns, {name: stated[name] for name in columns}, kind=kind)
 
 
 def _header(path: str | Path) -> str:

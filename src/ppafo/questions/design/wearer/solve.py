@@ -14,6 +14,7 @@ import numpy as np
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import quantity_text
 from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.control.walking.assistance import ASSISTANCE_QUANTITIES
 from ppafo.errors import ScenarioError, StudyError
 from ppafo.model.catalog import VALVES
 from ppafo.model.plant_faults import SHUT_OFF
@@ -38,6 +39,8 @@ WALKS = {"solenoid": "solenoid-regulators", "proportional": "proportional-regula
 """The walk, with its controller, of each kind of valve."""
 _REQUESTS = (1.0, 1.3, 1.7)
 """Torque that a torque controller is told, over the torque that is wanted: it lags behind its reference."""
+_LIMIT = next(item.default or 0.0 for item in ASSISTANCE_QUANTITIES if item.name == "largest_torque")
+"""Torque [N m] above which a controller of walking requests no more, unless it is told."""
 _FEW = 0.15
 """Minutes of the walks that are compared at a constant supply."""
 _DORSIFLEXION = 0.9
@@ -168,9 +171,12 @@ def _check(wish: Wish) -> None:
 
 
 def _wearer(wish: Wish) -> list[str]:
-    """Return the overrides of the person, of the paper's stature unless one is given."""
-    stature = paper_subject().stature if wish.stature is None else wish.stature
-    return [f"wearer.body_mass={wish.mass:.6g} kg", f"wearer.stature={stature:.6g} m"]
+    return [f"wearer.body_mass={wish.mass:.6g} kg", f"wearer.stature={_stature(wish):.6g} m"]
+
+
+def _stature(wish: Wish) -> float:
+    """Return the stature [m] of the wearer, that of the paper's subject unless one is given."""
+    return paper_subject().stature if wish.stature is None else wish.stature
 
 
 def _few_strides(wish: Wish, valve: Part, actuator: Part) -> list[Tried]:
@@ -189,7 +195,7 @@ def _few_strides(wish: Wish, valve: Part, actuator: Part) -> list[Tried]:
     requests = [min(factor * wish.torque, held) for factor in _REQUESTS] if valve.kind == "proportional" else [None]
     best = None
     for request in dict.fromkeys(requests):
-        chosen = tuple(overrides if request is None else [*overrides, f"controller.peak_torque={request:.4g} N m"])
+        chosen = tuple(overrides if request is None else [*overrides, *_requesting(request)])
         result = walk(load_walk(WALKS[valve.kind], chosen), _FEW)
         if not result.status.is_completed or not result.is_helped or not result.averages:
             continue
@@ -199,6 +205,12 @@ def _few_strides(wish: Wish, valve: Part, actuator: Part) -> list[Tried]:
         if torque >= wish.torque:
             break
     return [] if best is None else [best]
+
+
+def _requesting(torque: float) -> list[str]:
+    """Return the overrides that request a torque [N m] of a controller, whose limit follows where it would cut it."""
+    peak = f"controller.peak_torque={torque:.4g} N m"
+    return [peak] if torque <= _LIMIT else [peak, f"controller.largest_torque={torque:.4g} N m"]
 
 
 _OF_ACTUATOR = ("torque_constant", "volume_per_angle")
@@ -328,9 +340,9 @@ def answer_of(sizing: WearerSizing) -> Answer:
         for one in sorted(sizing.tried, key=lambda one: -one.torque)
     )
     tried = Section("What was walked with", table=Table(_HEAD, rows, left=2), is_detail=device is not None)
-    stature = "" if wish.stature is None else f" and {wish.stature:.4g} m"
+    stature = f"{_stature(wish):.4g} m{' (assumed: give --stature)' if wish.stature is None else ''}"
     lead = (
-        f"a wearer of {wish.mass:.4g} kg{stature}; {quantity_text(wish.torque, 'torque')} at "
+        f"a wearer of {wish.mass:.4g} kg and {stature}; {quantity_text(wish.torque, 'torque')} at "
         f"{quantity_text(wish.pressure, 'pressure')} for {wish.seconds / 60.0:.4g} min"
     )
     parts = [] if device is None else [device.tried.valve, device.tried.actuator, device.bottle, device.electrical.cell]

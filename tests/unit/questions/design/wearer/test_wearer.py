@@ -81,6 +81,18 @@ def test_where_nothing_does_it_the_answer_says_what_to_give_up() -> None:
     assert "fewer minutes: " in text_of(too_long.answer())
 
 
+def test_the_limit_of_the_controller_follows_the_wish_and_a_stature_that_is_assumed_is_said() -> None:
+    catalogue = load_catalogue()
+    valve, actuator = (
+        catalogue.part("valves", "enfield-ls-v05s"),
+        catalogue.part("actuators", "smc-crb2bw40-90d"),
+    )
+    wish = wearer.Wish(60.0, None, 5.0, 101325.0 + 60.0 * PSI, 60.0)
+    found = wearer._few_strides(wish, valve, actuator)
+    assert found[0].torque >= 5.0
+    assert "(assumed: give --stature)" in text_of(WearerSizing(wish, tuple(found), None, ()).answer())
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
