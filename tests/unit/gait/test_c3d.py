@@ -146,7 +146,7 @@ def test_a_missing_marker_is_named_with_the_nearest(written: Callable[..., Path]
 
 
 def test_a_label_of_two_points_refuses_nothing_but_itself(
-    written: Callable[..., Path], normative: Gait, walk: Recording
+    written: Callable[..., Path], normative: Gait, walk: Recording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     nobody = np.zeros((3, np.arange(0.0, walk.duration, 0.01).size))
     found = import_gait([written({"C1": nobody, "Other:C1": nobody})], ImportSettings(normative.body_mass))
@@ -154,6 +154,10 @@ def test_a_label_of_two_points_refuses_nothing_but_itself(
     assert "points not read, for they share a label: 'C1'" in "\n".join(found.remarks)
     with pytest.raises(DataError, match="share a label: 'RANK'"):
         import_gait([written({"Other:RANK": nobody})], ImportSettings(normative.body_mass))
+    content = open_c3d(written({"C1": nobody}))
+    content["parameters"]["POINT"]["LABELS"]["value"] = content["parameters"]["POINT"]["LABELS"]["value"][:-1]
+    monkeypatch.setattr("ppafo.gait.recorded.forms.c3d.open_c3d", lambda _path: content)
+    assert "points not read, for they have no label: 1" in read_table(written({"C1": nobody})).remarks
 
 
 def test_what_is_no_c3d_file_is_refused(tmp_path: Path) -> None:

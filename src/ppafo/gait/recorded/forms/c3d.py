@@ -78,6 +78,7 @@ def read_c3d(path: str | Path) -> MotionTable:
     trial = _trial(parameters)
     time = (first + np.arange(frames)) / rate
     said = [f"points not read, for they share a label: {', '.join(map(repr, shared))}"] if shared else []
+    said += [f"points not read, for they have no label: {number - len(labels)}"] if len(labels) < number else []
     return MotionTable(str(path), time, columns, units, remarks=(*trial.remarks, *said), trial=trial)
 
 
