@@ -54,8 +54,6 @@ if TYPE_CHECKING:
     from ppafo.questions.design.loading import load_design as load_design
     from ppafo.questions.design.profile.answer import Sizing as Sizing
     from ppafo.questions.design.solve import design as design
-    from ppafo.questions.devices.answer import DeviceSpread as DeviceSpread
-    from ppafo.questions.devices.solve import pool_devices as pool_devices
     from ppafo.questions.endurance.answer import Endurance as Endurance
     from ppafo.questions.endurance.solve import endurance as endurance
     from ppafo.questions.endurance.solve import endurance_of_walk as endurance_of_walk
@@ -136,8 +134,6 @@ _HOMES = {
     "ppafo.questions.design.loading": ("load_design",),
     "ppafo.questions.design.profile.answer": ("Sizing",),
     "ppafo.questions.design.solve": ("design",),
-    "ppafo.questions.devices.answer": ("DeviceSpread",),
-    "ppafo.questions.devices.solve": ("pool_devices",),
     "ppafo.questions.endurance.answer": ("Endurance",),
     "ppafo.questions.endurance.solve": ("endurance", "endurance_of_walk"),
     "ppafo.questions.find.solve": ("Found", "find"),

@@ -29,7 +29,6 @@ FOLDERS: dict[str, list[str]] = {
     "validate": ["ppafo2011", "bench.csv"],
     "rig": ["record", "step-response"],
     "identify": ["problem.toml"],
-    "devices": ["a.toml", "b.toml", "c.toml"],
     "gait": ["show", "falisse2019-subject1"],
     "gait import": ["import", "walk.mot", "--body-mass", "62 kg"],
     "endurance": ["--gas-per-step", "0.3 g"],

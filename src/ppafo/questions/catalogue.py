@@ -15,7 +15,6 @@ QUESTIONS: Kinds[Question] = Kinds(
         "unreported": "ppafo.questions.unreported:QUESTION",
         "parts": "ppafo.questions.parts:QUESTION",
         "identify": "ppafo.questions.identify:QUESTION",
-        "devices": "ppafo.questions.devices:QUESTION",
         "validate": "ppafo.questions.validate:QUESTION",
         "sweep": "ppafo.questions.sweep:QUESTION",
         "compare": "ppafo.questions.compare:QUESTION",
