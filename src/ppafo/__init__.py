@@ -76,8 +76,6 @@ if TYPE_CHECKING:
     from ppafo.questions.sweep.answer import StudyResults as StudyResults
     from ppafo.questions.sweep.results import load_study_results as load_study_results
     from ppafo.questions.sweep.solve import sweep as sweep
-    from ppafo.questions.timing.answer import Timing as Timing
-    from ppafo.questions.timing.answer import event_timing as event_timing
     from ppafo.questions.tune.answer import Tuning as Tuning
     from ppafo.questions.tune.problem import list_tunings as list_tunings
     from ppafo.questions.tune.problem import load_tuning as load_tuning
@@ -151,7 +149,6 @@ _HOMES = {
     "ppafo.questions.sweep.answer": ("StudyResults",),
     "ppafo.questions.sweep.results": ("load_study_results",),
     "ppafo.questions.sweep.solve": ("sweep",),
-    "ppafo.questions.timing.answer": ("Timing", "event_timing"),
     "ppafo.questions.tune.answer": ("Tuning",),
     "ppafo.questions.tune.problem": ("list_tunings", "load_tuning"),
     "ppafo.questions.tune.solve": ("tune",),

@@ -24,7 +24,6 @@ FOLDERS: dict[str, list[str]] = {
     "walk --wearers": ["--wearers", "2"],
     "league": [],
     "league --walk": ["--walk"],
-    "timing": ["--minutes", "0.2"],
     "adapt": ["reacting"],
     "validate": ["ppafo2011", "bench.csv"],
     "rig": ["record", "step-response"],

@@ -28,7 +28,6 @@ QUESTIONS: Kinds[Question] = Kinds(
         "league": "ppafo.questions.league:QUESTION",
         "walk": "ppafo.questions.walk:QUESTION",
         "adapt": "ppafo.questions.adapt:QUESTION",
-        "timing": "ppafo.questions.timing:QUESTION",
         "bits": "ppafo.questions.bits:QUESTION",
     },
 )

@@ -24,7 +24,6 @@ from ppafo.model.wearer.walker import Walker
 from ppafo.questions.endurance.answer import Endurance
 from ppafo.questions.endurance.solve import endurance
 from ppafo.questions.league.walking.task import walking_task
-from ppafo.questions.timing.answer import event_timing
 from ppafo.questions.walk.answer import answer_of, walk_with_and_without
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.ensemble.running import lacking
@@ -312,7 +311,6 @@ def test_what_needs_a_prescribed_gait_refuses_in_one_line() -> None:
     for refused in (
         lambda: walk_population(scenario, 0.1, 8),
         lambda: walking_task(WALK),
-        lambda: event_timing(WALK),
     ):
         with pytest.raises(ScenarioError, match=line):
             refused()

@@ -20,7 +20,7 @@ from ppafo.parameters.chamber_volumes import PRINTED_VOLUMES, ChamberVolumes, re
 from ppafo.parameters.publications.publication import FILE, PAPER, ClaimEntry, read_publication
 from ppafo.progress import Progress, Report
 from ppafo.questions.reproduce.claim import Verdict, range_text
-from ppafo.questions.timing.answer import WEARERS, rms_of, timed_events, uneven_course
+from ppafo.questions.reproduce.event_times import WEARERS, rms_of, timed_events, uneven_course
 from ppafo.units import from_si, parse_quantity
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of

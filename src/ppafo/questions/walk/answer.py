@@ -318,10 +318,7 @@ def _slap(comparison: Comparison) -> str:
     worn, bare = (side.metrics.get("slap_rate") for side in (comparison.with_device, comparison.without_device))
     if worn is None or bare is None or worn.value > bare.value - _SAME_RATE:
         return ""
-    return (
-        "remark: the foot comes down faster than without the device: it is lifted, and falls further; 'ppafo timing' "
-        "breaks down the causes"
-    )
+    return "remark: the foot comes down faster than without the device: it is lifted, and falls further"
 
 
 def _along(configuration: Scenario) -> str:
