@@ -40,9 +40,6 @@ LINES: dict[str, str] = {
     "endurance": "endurance --gas-per-step '0.3 g'",
     "design": "design push-off",
     "tune": "tune pid-gains",
-    "league": "league --draws 8",
-    "league-walk": "league --walk --minutes 0.1 --draws 8",
-    "unreported": "unreported --draws 8192",
     "sweep": "sweep torque-task-uncertainty --draws 256 --out {out}",
     "reproduce": "reproduce --out {out}",
 }

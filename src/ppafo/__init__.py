@@ -61,8 +61,6 @@ if TYPE_CHECKING:
     from ppafo.questions.find.solve import find as find
     from ppafo.questions.identify.answer import Identification as Identification
     from ppafo.questions.identify.solve import identify as identify
-    from ppafo.questions.league.answer import League as League
-    from ppafo.questions.league.solve import league as league
     from ppafo.questions.linearise.answer import LinearModel as LinearModel
     from ppafo.questions.linearise.solve import linearise as linearise
     from ppafo.questions.montecarlo.solve import MonteCarlo as MonteCarlo
@@ -80,7 +78,6 @@ if TYPE_CHECKING:
     from ppafo.questions.tune.problem import list_tunings as list_tunings
     from ppafo.questions.tune.problem import load_tuning as load_tuning
     from ppafo.questions.tune.solve import tune as tune
-    from ppafo.questions.unreported.solve import infer_settings as infer_settings
     from ppafo.questions.validate.solve import Validation as Validation
     from ppafo.questions.validate.solve import validate as validate
     from ppafo.running import simulate as simulate
@@ -137,8 +134,6 @@ _HOMES = {
     "ppafo.questions.find.solve": ("Found", "find"),
     "ppafo.questions.identify.answer": ("Identification",),
     "ppafo.questions.identify.solve": ("identify",),
-    "ppafo.questions.league.answer": ("League",),
-    "ppafo.questions.league.solve": ("league",),
     "ppafo.questions.linearise.answer": ("LinearModel",),
     "ppafo.questions.linearise.solve": ("linearise",),
     "ppafo.questions.montecarlo.solve": ("MonteCarlo", "monte_carlo"),
@@ -152,7 +147,6 @@ _HOMES = {
     "ppafo.questions.tune.answer": ("Tuning",),
     "ppafo.questions.tune.problem": ("list_tunings", "load_tuning"),
     "ppafo.questions.tune.solve": ("tune",),
-    "ppafo.questions.unreported.solve": ("infer_settings",),
     "ppafo.questions.validate.solve": ("Validation", "validate"),
     "ppafo.running": ("simulate",),
     "ppafo.signals": ("Channel", "Recording"),

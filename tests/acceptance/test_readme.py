@@ -59,7 +59,7 @@ def shown_claims() -> dict[str, list[str]]:
 @pytest.fixture(scope="module")
 def studies() -> Studies:
     """One run of every study, which the tests below only read."""
-    found = reproduce(completions=1000, study="all")
+    found = reproduce(study="all")
     assert isinstance(found, Studies)
     return found
 
@@ -118,7 +118,7 @@ def test_the_commands_of_the_pages_run_one_after_the_other_with_the_exit_codes_t
 
 def runs_elsewhere(words: list[str]) -> bool:
     """Whether a command takes half a minute and has tests of its own, or looks at what such a command has left."""
-    return words[0] in ("reproduce", "unreported") or words[-1] == "out/reproduce"
+    return words[0] == "reproduce" or words[-1] == "out/reproduce"
 
 
 def test_every_command_is_shown_or_named() -> None:
@@ -152,8 +152,7 @@ def test_the_table_of_bits_has_every_golden_hash_and_the_rows_that_the_script_pr
 
 
 def test_the_numbers_of_the_readme_are_those_of_a_run(reproduction: Reproduction) -> None:
-    # The ranges are those of all completions: tests/acceptance/test_comparison_page.py.
-    rows = re.findall(r"^\| [^|]+ \| ([\d.]+ \S+) \| ([\d.]+ \S+) \| [^|]+ \|$", README, re.MULTILINE)
+    rows = re.findall(r"^\| [^|]+ \| ([\d.]+ \S+) \| ([\d.]+ \S+) \|$", README, re.MULTILINE)
     claims = shown_claims()
     assert rows == [tuple(claims[name][:2]) for name in HEADLINES]
     verdicts = Counter(
@@ -169,15 +168,11 @@ def test_the_numbers_of_the_readme_are_those_of_a_run(reproduction: Reproduction
 
 @pytest.mark.short
 def test_the_table_of_claims_is_that_of_a_run(studies: Studies, reproduction: Reproduction) -> None:
-    # Ranges of completions come from more of them than here: tests/acceptance/test_comparison_page.py.
-    of_completions = {claim.id for claim in reproduction.claims if "completions" in claim.open_by}
     lines = [re.split(r" {2,}", line) for line in text_of(studies.answer()).splitlines()[1:-2]]
     testable, shown = {}, shown_claims()
     for study, name, published, ours, left_open, verdict in lines:
         if (study, verdict) != ("ppafo-2011", "not testable"):
-            left = shown[name][2] if name in of_completions else left_open
-            testable[name] = [published.removesuffix(" (own sum)"), ours, left, verdict]
-    assert len(of_completions) == 13
+            testable[name] = [published.removesuffix(" (own sum)"), ours, left_open, verdict]
     assert shown == testable
 
 

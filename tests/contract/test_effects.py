@@ -28,7 +28,6 @@ from ppafo.live.workbench import words
 from ppafo.model.catalog import EFFECTS
 from ppafo.parameters.building import build_device
 from ppafo.parameters.loading import json_schema, parse_parameter_set
-from ppafo.questions.league.walking.solver import STICKING_SPEED, largest_friction
 from ppafo.questions.linearise.solve import linearise
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
@@ -235,16 +234,3 @@ def test_it_walks_on_a_bottle_and_follows_the_temperature_of_its_gas(monkeypatch
     resistances = np.array([row["mesh.resistance"] for row in given])
     np.testing.assert_allclose(resistances / resistances[0], warmth[: len(given)] / warmth[0], rtol=1e-12)
     assert slower(with_mesh, walk(load_walk("proportional", [BOTTLE]), 0.1))
-
-
-def test_the_walking_leagues_programme_has_the_friction_of_effects() -> None:
-    casadi = pytest.importorskip("casadi", reason="the lower bound needs the extra 'optimal'")
-    texts = ("effects.seal_friction.static_per_pressure=2e-6 N m/Pa", "effects.stribeck.velocity=0.5 rad/s")
-    run = plan_walk(load_walk("proportional", texts))
-    rates, pressures = np.array([[0.0, 0.5, -3.0]]), np.array([[3e5, 2e5, 4e5], [1e5, 5e5, 1e5]])
-    found = largest_friction(run, casadi.DM(rates), casadi.DM(pressures), 1.0)
-    plant, rise = run.plant, 0.9 * (run.plant.static_torque - run.plant.dynamic_torque)
-    moving = plant.dynamic_torque + rise / (1.0 + (rates[0] / 0.5) ** 2)
-    resting = plant.static_torque + 2e-6 * np.abs(pressures[0] - pressures[1])
-    sticks = np.exp(-((rates[0] / STICKING_SPEED) ** 2))
-    np.testing.assert_allclose(np.array(found)[0], moving + (resting - moving) * sticks, rtol=1e-12)

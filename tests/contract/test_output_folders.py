@@ -12,7 +12,6 @@ from tests.virtual_wire import free_port, sending_bench
 FOLDERS: dict[str, list[str]] = {
     "reproduce": [],
     "simulate": ["step-response"],
-    "unreported": ["--draws", "64"],
     "sweep": ["pressure-and-area"],
     "compare": ["step-response"],
     "sensitivity": ["torque-task-uncertainty"],
@@ -22,8 +21,6 @@ FOLDERS: dict[str, list[str]] = {
     "linearise": ["torque-task-proportional"],
     "walk": ["--minutes", "0.1"],
     "walk --wearers": ["--wearers", "2"],
-    "league": [],
-    "league --walk": ["--walk"],
     "adapt": ["reacting"],
     "validate": ["ppafo2011", "bench.csv"],
     "rig": ["record", "step-response"],

@@ -12,7 +12,6 @@ QUESTIONS: Kinds[Question] = Kinds(
     Question,
     {
         "reproduce": "ppafo.questions.reproduce:QUESTION",
-        "unreported": "ppafo.questions.unreported:QUESTION",
         "parts": "ppafo.questions.parts:QUESTION",
         "identify": "ppafo.questions.identify:QUESTION",
         "validate": "ppafo.questions.validate:QUESTION",
@@ -25,7 +24,6 @@ QUESTIONS: Kinds[Question] = Kinds(
         "linearise": "ppafo.questions.linearise:QUESTION",
         "design": "ppafo.questions.design:QUESTION",
         "endurance": "ppafo.questions.endurance:QUESTION",
-        "league": "ppafo.questions.league:QUESTION",
         "walk": "ppafo.questions.walk:QUESTION",
         "adapt": "ppafo.questions.adapt:QUESTION",
         "bits": "ppafo.questions.bits:QUESTION",

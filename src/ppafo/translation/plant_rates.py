@@ -105,15 +105,14 @@ def gas_rates(
     angle: Any,
     rate: Any,
     pressures: tuple[Any, Any],
-    around: Around | None = None,
     compare: Compare = both_sides,
     acting: Acting | None = None,
 ) -> PlantRates:
     """Rates at an angle [rad] that is a symbol, its rate [rad/s] and absolute pressures [Pa]; gas of one temperature.
 
-    Equation (3) is differentiated, (6) to (9) are as the lanes have them. ``around`` and ``acting`` as in ``symbolic``.
+    Equation (3) is differentiated, (6) to (9) are as the lanes have them. ``acting`` as in ``symbolic``.
     """
-    flows = symbolic(gas_flows, PlantParameters, Openings, float, float, around=around, compare=compare, acting=acting)
+    flows = symbolic(gas_flows, PlantParameters, Openings, float, float, compare=compare, acting=acting)
     found = flows(plant, openings, *pressures)
     gained = found.mass_1, found.mass_2
     if any(gas_density in effect.laws for effect in acting or ()):

@@ -147,7 +147,6 @@ MANY = "9" * 5000
     "words",
     [
         ["compare", "step-response", "--draws", MANY],
-        ["unreported", "--seed", MANY],
         ["sweep", "pressure-and-area", "--threads", MANY],
         ["sweep", "pressure-and-area", "--threads", "1__0x"],
         ["design", "torque-task", "--seed", MANY],

@@ -8,11 +8,10 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.engine.rows import leaves
-from ppafo.errors import ParameterError, PpafoError, SimulationError
+from ppafo.errors import ParameterError, PpafoError
 from ppafo.model.actuators.table import bases_at, level_of
 from ppafo.parameters.actuator_table import read_actuator_table, table_of
 from ppafo.parameters.loading import load_device, load_parameter_set, parameter_set_toml, parse_parameter_set
-from ppafo.questions.league.bound import check_bounded
 from ppafo.questions.tune.solve import shortfall
 from ppafo.simulation.ensemble.planning import screen_columns
 from ppafo.simulation.loading import load_scenario
@@ -170,8 +169,6 @@ def test_of_another_actuator_no_torque_ceiling_and_no_lower_bound_is_known() -> 
     # The muscles give 25 N m at 20 deg, and 16 as the mean over the angles.
     scenario = load_scenario(EXAMPLE / "torque-task-muscles.toml", ["reference.level=20 N m"])
     assert shortfall(scenario).tolist() == [0.0]
-    with pytest.raises(SimulationError, match="the lower bound is for a vane, not 'muscle_pair'"):
-        check_bounded(scenario)
 
 
 def test_stops_beyond_what_was_measured_are_refused(tmp_path: Path) -> None:

@@ -259,11 +259,11 @@ def test_a_run_that_diverges_stops_the_reproduction_with_its_name(
 
     monkeypatch.setattr(study, "simulate", diverged)
     with pytest.raises(SimulationError, match="step-response: diverged at t"):
-        reproduce(completions=1000)
+        reproduce()
 
 
 @pytest.mark.thorough
 def test_every_experiment_is_told_of_before_it_runs() -> None:
     heard: list[str] = []
-    reproduce(progress=lambda progress: heard.append(progress.activity), completions=1000)
+    reproduce(progress=lambda progress: heard.append(progress.activity))
     assert [name for name in (STEP, SOLENOID, PROPORTIONAL) if not any(name in text for text in heard)] == []

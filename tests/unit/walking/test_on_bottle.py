@@ -10,9 +10,7 @@ from ppafo.engine.lanes import BatchResult, Floats
 from ppafo.engine.rows import row_numbers
 from ppafo.errors import ParameterError, ScenarioError, SimulationError
 from ppafo.parameters.bottles.bottle import FILE as BOTTLES
-from ppafo.questions.league.walking.task import walking_task
 from ppafo.walking import bottle, load_walk, walk, walk_population
-from ppafo.walking.loading import FILE
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.result import WalkResult
@@ -219,15 +217,6 @@ def test_what_is_named_twice_is_refused(path: str, value: str) -> None:
         ScenarioError, match=f"override '{own}': the {path} is given as '{value}' already; give it once"
     ):
         load_walk(WALK, [own], **{path: value})
-
-
-def test_who_compares_controllers_has_no_bottle(tmp_path: Path) -> None:
-    """It would have walked at the pressure of the first moment, and said nothing."""
-    file = tmp_path / "carried.toml"
-    shipped = Path(str(FILE.shipped)) / f"{WALK}.toml"
-    file.write_text(shipped.read_text(encoding="utf-8") + f'\n[bottle]\nname = "{BOTTLE}"\n', encoding="utf-8")
-    with pytest.raises(ScenarioError, match=r"carried\.toml: bottle: a league compares strides at one supply pressure"):
-        walking_task(file)
 
 
 def test_many_wearers_and_an_energy_balance_have_no_bottle() -> None:

@@ -23,7 +23,6 @@ from ppafo.model.wearer.nerves import Nerves
 from ppafo.model.wearer.walker import Walker
 from ppafo.questions.endurance.answer import Endurance
 from ppafo.questions.endurance.solve import endurance
-from ppafo.questions.league.walking.task import walking_task
 from ppafo.questions.walk.answer import answer_of, walk_with_and_without
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.ensemble.running import lacking
@@ -308,12 +307,8 @@ def test_a_gait_of_an_option_is_refused_as_one_of_the_file_is() -> None:
 
 def test_what_needs_a_prescribed_gait_refuses_in_one_line() -> None:
     scenario, line = load_walk(WALK), "needs a prescribed gait, and its wearer reacts"
-    for refused in (
-        lambda: walk_population(scenario, 0.1, 8),
-        lambda: walking_task(WALK),
-    ):
-        with pytest.raises(ScenarioError, match=line):
-            refused()
+    with pytest.raises(ScenarioError, match=line):
+        walk_population(scenario, 0.1, 8)
     assert "lowest_toes is over the ground" in lacking(scenario, METRICS["toe_clearance"])
     assert "it needs a wearer who reacts (wearer.reacts)" in lacking(load_walk("solenoid"), METRICS["fall_time"])
 

@@ -1,8 +1,7 @@
 """A publication as a file: every number and sentence that a simulation could contradict, and how firmly it is meant.
 
-What a publication says (``published``, ``words``) and what is arithmetic on it (``own``) are kept apart. The file of
-the paper that this package starts from names for each entry the experiment and the observable that it speaks of;
-claims, observations, the inference of unreported settings and the audit read it from there.
+What a publication says (``published``, ``words``) and what is arithmetic on it (``own``) are kept apart. Claims,
+observations and the audit read the file of the paper that this package starts from.
 """
 
 from collections.abc import Mapping
@@ -42,18 +41,8 @@ class ClaimEntry(StrictTable):
     source: str = Field("", description="publication, where it is not that of the file")
     computation: str = Field("", description="name of a computation of 'ppafo reproduce'")
     arguments: dict[str, str] = Field(default_factory=dict, description="arguments of the computation, with units")
-    experiment: str = Field("", description="experiment of the paper that it speaks of")
-    observable: str = Field("", description="what of the experiment it speaks of, by name")
     at_least: float | None = Field(None, allow_inf_nan=False, description="lowest value that agrees, in 'unit'")
     at_most: float | None = Field(None, allow_inf_nan=False, description="highest value that agrees, in 'unit'")
-    deviation: float | None = Field(
-        None,
-        ge=0.0,
-        allow_inf_nan=False,
-        description="standard deviation of the observable about the number, or beyond the limits; 0: limits are strict",
-    )
-    likelihood: str = Field("", description="why the deviation is what it is")
-    same_data: Texts = Field((), description="other entries that state the same measurement")
     assumed: Texts = Field((), description="what our number rests on beside what is published")
     note: str = Field("", description="why the verdict is what it is")
     not_testable: str = Field("", description="why nothing is computed, in place of a computation")

@@ -15,7 +15,7 @@ from ppafo.live.workbench import live_part
 from ppafo.metrics import Metric
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.audit import Finding
-from ppafo.parameters.publications.publication import ClaimEntry
+from ppafo.parameters.publications.publication import ClaimEntry, paper_entries
 from ppafo.questions.question import Solved
 from ppafo.questions.reproduce.bench import (
     IDEAL,
@@ -41,19 +41,8 @@ from ppafo.questions.reproduce.claim import (
 )
 from ppafo.questions.reproduce.drawing import device_figure
 from ppafo.questions.reproduce.figures import step_response_figure, torque_task_figure
-from ppafo.questions.reproduce.open_range import unread
 from ppafo.questions.reproduce.publication import ALL, SEED, Study
 from ppafo.questions.reproduce.step_response import Levels, StepEvents
-from ppafo.questions.unreported.answer import (
-    ERRORS,
-    Family,
-    conclusion_rows,
-    conclusions,
-    reach_sentence,
-    setting_rows,
-    unreported_figure,
-    within_reach,
-)
 from ppafo.simulation.simulate import Result
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.version import __version__
@@ -68,10 +57,7 @@ PROPORTIONAL = "torque-task-proportional"
 
 @dataclass(frozen=True, slots=True)
 class Reproduction(Solved):
-    """What came of it: claims in the order of the paper, what the text tells, runs, assumptions and audit findings.
-
-    ``family`` is what the paper's results imply about the settings it does not print; None where values were changed.
-    """
+    """What came of it: claims in the order of the paper, what the text tells, runs, assumptions and audit findings."""
 
     claims: tuple[Claim, ...]
     step_observations: tuple[Observation, ...]
@@ -87,13 +73,14 @@ class Reproduction(Solved):
     completed_set: str
     completed_findings: tuple[Finding, ...]
     overrides: tuple[str, ...]
-    family: Family | None
 
     @property
     def unread(self) -> list[ClaimEntry]:
-        """Statements of the paper that nothing here tests."""
-        observations = (*self.step_observations, *self.torque_observations)
-        return unread([*(claim.id for claim in self.claims), *(item.id for item in observations)])
+        """Statements of the paper that nothing here tests: no claim, no observation, no value of a set."""
+        of_sets = {entry.key.partition("/")[2] for entry in load_printed().parameter_set.numbers.values()}
+        observed = (item.id for item in (*self.step_observations, *self.torque_observations))
+        read = {*of_sets, *(claim.id for claim in self.claims), *observed}
+        return [entry for entry in paper_entries().values() if entry.id not in read]
 
     @property
     def missed(self) -> tuple[Claim, ...]:
@@ -151,7 +138,6 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
         "notes": _of_severity(printed, "note"),
         "kept": [finding for finding in reproduction.completed_findings if finding.severity != "note"],
         **_synthetic(reproduction, drawn.get(IDENTIFICATION_FIGURE)),
-        "unsaid": _unreported_data(reproduction, drawn.get(UNSAID_FIGURE)),
         "device_figure": inline_figure(drawn[DEVICE_FIGURE]),
         "step_figure": inline_figure(drawn[STEP_FIGURE]),
         "torque_figure": inline_figure(drawn[TORQUE_FIGURE]),
@@ -172,23 +158,6 @@ def holding_torque(result: Result) -> float:
     """Largest torque that a result's supply can hold [N m]; equation (2) with atmosphere in the other chamber."""
     device = result.scenario.device
     return device.actuator.torque_constant * (device.supply.pressure - device.supply.atmospheric_pressure)
-
-
-def _unreported_data(reproduction: Reproduction, figure: bytes | None) -> dict[str, Any] | None:
-    """Return the data of the settings that the paper does not print; None where they were not studied."""
-    family = reproduction.family
-    if family is None or figure is None:
-        return None
-    return {
-        "figure": inline_figure(figure),
-        "drawn": family.drawn,
-        "effective": f"{family.effective:.0f}",
-        "few": not family.is_enough,
-        "errors": ERRORS,
-        "settings": setting_rows(family),
-        "conclusions": conclusion_rows(conclusions(family)),
-        "within_reach": reach_sentence(within_reach(family)),
-    }
 
 
 def _summary(reproduction: Reproduction) -> dict[str, Any]:
@@ -319,7 +288,6 @@ DEVICE_FIGURE = "device"
 IDENTIFICATION_FIGURE = "figure-3-identification"
 STEP_FIGURE = "figure-7-step-response"
 TORQUE_FIGURE = "figure-8-torque-task"
-UNSAID_FIGURE = "unreported-settings"
 _HEAD = ("claim", "paper", "ours", "left open", "verdict")
 _PAPER = "'ppafo reproduce' without --study makes the page of these claims, with sources, figures and assumptions."
 _STUDIES_HEAD = ("study", "claim", "published", "ours", "left open", "verdict")
@@ -439,7 +407,7 @@ def _paper_rows(reproduction: Reproduction) -> tuple[tuple[str | None, ...], ...
 def _paper_answer(reproduction: Reproduction) -> Answer:
     """Return the answer; it has not passed where a number misses its window, unless values were changed.
 
-    Without the virtual rig there is no figure 3, with changed values no figure of what the paper leaves unsaid.
+    Without the virtual rig there is no figure 3.
     """
     table = Table(tuple(map(Column, _HEAD)), _paper_rows(reproduction), left=len(_HEAD))
     runs = (reproduction.step, reproduction.solenoid, reproduction.proportional)
@@ -482,15 +450,13 @@ def _override_remarks(overrides: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _left_open(reproduction: Reproduction) -> list[str]:
-    """Return what the column of ranges is, where there are any by completions, and what nothing tests."""
-    found = [
-        "left open: by the printed digits, or by an interval of the identification;",
-        "of experiments the 5 to 95 % of completions that agree with everything else that the paper says",
-        "*: ours is nearer to the published number than 95 % of that; the assumptions were chosen for this row",
-    ]
-    found += [f"{claim.id}: {claim.open_by}" for claim in reproduction.claims if claim.open_by and not claim.left_open]
+    """Return what the column of ranges is, and what nothing tests."""
     unread = [f"  {entry.id}: {entry.not_testable.rstrip('.')}" for entry in reproduction.unread]
-    return [*(found if reproduction.family is not None else []), "stated, and tested by nothing here:", *unread]
+    return [
+        "left open: by the printed digits, or by an interval of the identification",
+        "stated, and tested by nothing here:",
+        *unread,
+    ]
 
 
 def _missed_claims(reproduction: Reproduction) -> list[str]:
@@ -507,12 +473,10 @@ def _figures(reproduction: Reproduction) -> list[Figure]:
         Figure(STEP_FIGURE, "", partial(_step_figure, reproduction)),
         Figure(TORQUE_FIGURE, "", partial(_torque_figure, reproduction)),
     ]
-    evidence, family = reproduction.synthetic, reproduction.family
+    evidence = reproduction.synthetic
     if not isinstance(evidence, NoEvidence):
         bench = evidence.bench
         figures.append(Figure(IDENTIFICATION_FIGURE, "", partial(synthetic_figure_3, bench.torque, bench.decay)))
-    if family is not None:
-        figures.append(Figure(UNSAID_FIGURE, "", partial(unreported_figure, family)))
     return figures
 
 

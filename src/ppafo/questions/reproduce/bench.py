@@ -12,8 +12,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 
-import numpy as np
-
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import DataError, ParameterError, SimulationError
 from ppafo.identification.bench import (
@@ -38,12 +36,10 @@ from ppafo.parameters.publications.publication import paper_entries
 from ppafo.questions.reproduce.claim import PRINTED_DIGITS, Claim, Printed, Verdict, stated_claim
 from ppafo.rig import record
 from ppafo.signals import Recording
-from ppafo.signals.recording import Floats
 from ppafo.simulation.declaration import quantities
 from ppafo.simulation.loading import apply_overrides
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
 from ppafo.validation import RecordingAgreement, ReplaySettings, compare_recording
-from ppafo.validation.agreement import measured_values
 from ppafo.validation.measured import check_recording
 
 _NOT_OF_THE_PAPER = ("assumed", "derived")
@@ -409,27 +405,6 @@ def _step_error(item: _StepError, agreement: RecordingAgreement, rests_on: tuple
     )
 
 
-def step_error_values(times: Floats, traces: Mapping[str, Floats], agreement: RecordingAgreement) -> dict[str, Floats]:
-    """Return what claims on the errors of figure 7 come to with other simulated step responses (runs,), in their units.
-
-    ``traces`` (times, runs) have the vane angle and both pressures [SI]; the rig's delay is that of the agreement.
-    """
-    measured = agreement.measured
-    at = measured.time - measured.time[0] - agreement.delay.correction
-    known = {**traces, "pressure_difference": traces["pressure_1"] - traces["pressure_2"]}
-    found = {}
-    for item in _STEP_ERRORS:
-        recorded = measured_values(measured, item.channel)
-        assert recorded is not None, "the rig records every channel of figure 7"
-        simulated = np.array([np.interp(at, times, course) for course in known[item.channel].T])
-        found[item.id] = np.sqrt(((simulated - recorded) ** 2).mean(axis=1)) / item.scale
-    first, second, difference = (found[f"step_rms_{name}"] for name in _PRESSURES)
-    return found | {"step_error_correlation": (first**2 + second**2 - difference**2) / (2.0 * first * second)}
-
-
-_PRESSURES = ("pressure_1", "pressure_2", "pressure_difference")
-
-
 def _step_percentages() -> list[Claim]:
     """Return the printed percentages beside the printed errors over the printed ranges."""
     claims = []
@@ -448,7 +423,7 @@ def _step_percentages() -> list[Claim]:
 def _error_correlation(agreement: RecordingAgreement) -> Claim:
     """Return the correlation of the errors of both pressures on the rig, by the same arithmetic as the paper's."""
     entries, rms = paper_entries(), {channel.channel: channel.rms for channel in agreement.channels}
-    first, second, difference = (rms[name] for name in _PRESSURES)
+    first, second, difference = (rms[name] for name in ("pressure_1", "pressure_2", "pressure_difference"))
     value = (first**2 + second**2 - difference**2) / (2.0 * first * second)
     entry = entries["step_error_correlation"]
     holds = (entry.at_least or -1.0) <= value <= (entry.at_most or 1.0)

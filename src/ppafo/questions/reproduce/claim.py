@@ -31,9 +31,7 @@ class Claim:
     """A number that the paper states and ours, both in ``unit``; ``value`` None where there is nothing to compute.
 
     ``paper`` is None where the paper says it in ``words``, which are empty where only ``own`` arithmetic gives it.
-    ``left_open`` are the ends of what is open about our number, ``open_by`` says by what, or why there are none;
-    ``is_chosen`` marks that our assumptions were chosen for this very number: ours is nearer to it than to 95 % of what
-    they could give.
+    ``left_open`` are the ends of what is open about our number, ``open_by`` says by what.
 
     ``source`` is where the paper says it, ``assumptions`` what our number rests on beside the paper, ``note`` why the
     verdict is what it is. A claim that has to hold for this package to be sound has a window that it must fall into.
@@ -56,7 +54,6 @@ class Claim:
     own: str = ""
     left_open: tuple[float, float] | None = None
     open_by: str = ""
-    is_chosen: bool = False
 
     def __post_init__(self) -> None:
         if (self.is_synthetic and self.verdict.startswith("reproduced")) or (
@@ -78,8 +75,8 @@ class Claim:
 
     @property
     def open_range(self) -> str:
-        """What is open about our number, as it is shown, with the mark of a number whose assumptions were chosen."""
-        return range_text(self.left_open, self.unit) + (" *" if self.left_open and self.is_chosen else "")
+        """What is open about our number, as it is shown."""
+        return range_text(self.left_open, self.unit)
 
     @property
     def is_missed(self) -> bool:
@@ -99,7 +96,6 @@ class Claim:
             "value": self.value,
             "left_open": None if self.left_open is None else list(self.left_open),
             "open_by": self.open_by,
-            "chosen_for_this": self.is_chosen,
             "unit": self.unit,
             "verdict": self.verdict,
             "synthetic": self.is_synthetic,

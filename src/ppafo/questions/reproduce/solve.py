@@ -15,11 +15,9 @@ from ppafo.questions.reproduce.bench import (
     values_used_by,
 )
 from ppafo.questions.reproduce.claim import arithmetic_claims, load_printed
-from ppafo.questions.reproduce.open_range import with_open_ranges
 from ppafo.questions.reproduce.publication import ALL, SEED, check_study, run_studies
 from ppafo.questions.reproduce.step_response import Levels, step_events, step_observations
 from ppafo.questions.reproduce.torque_task import control_claims, torque_task_claims, torque_task_observations
-from ppafo.questions.unreported.solve import infer_settings
 from ppafo.simulation.declaration import value_at
 from ppafo.simulation.loading import (
     apply_overrides,
@@ -32,8 +30,6 @@ from ppafo.simulation.loading import (
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate
 
-COMPLETIONS = 40_960
-"""Completions of the experiments in the report; ``ppafo unreported`` takes more."""
 EXPERIMENTS = (STEP, SOLENOID, PROPORTIONAL)
 """Shipped scenarios that stand for the paper's experiments."""
 ORDER = (
@@ -73,7 +69,6 @@ ORDER = (
 def reproduce(
     overrides: Sequence[str] = (),
     progress: Report | None = None,
-    completions: int | None = None,
     study: Literal["ppafo-2011"] = "ppafo-2011",
 ) -> Reproduction: ...
 
@@ -82,7 +77,6 @@ def reproduce(
 def reproduce(
     overrides: Sequence[str] = (),
     progress: Report | None = None,
-    completions: int | None = None,
     study: str = SEED,
 ) -> Reproduction | Studies: ...
 
@@ -90,26 +84,24 @@ def reproduce(
 def reproduce(
     overrides: Sequence[str] = (),
     progress: Report | None = None,
-    completions: int | None = None,
     study: str = SEED,
 ) -> Reproduction | Studies:
     """Run the paper's experiments with the shipped scenarios and judge every claim, or those of other publications.
 
     ``overrides`` change the experiments (not the paper's printed numbers): a path of a scenario reaches those that
     have it, a path of the device all of them. The virtual rig stands in for the paper's measurements, where it can.
-    ``progress`` hears what is being done; ``completions`` of them (default COMPLETIONS) are weighed by
-    what the paper reports, none where values are changed. ``study`` is a publication, by name or by its file, or
-    ``all``. SimulationError where a run diverges, ScenarioError for a study that is none.
+    ``progress`` hears what is being done; ``study`` is a publication, by name or by its file, or ``all``.
+    SimulationError where a run diverges, ScenarioError for a study that is none.
     """
     report = progress or report_nothing
     check_study(study, overrides)
     if study == SEED:
-        return _reproduce_paper(overrides, report, completions)
-    seed = _reproduce_paper((), report, completions) if study == ALL else None
+        return _reproduce_paper(overrides, report)
+    seed = _reproduce_paper((), report) if study == ALL else None
     return Studies(run_studies(study, report), seed)
 
 
-def _reproduce_paper(overrides: Sequence[str], report: Report, completions: int | None) -> Reproduction:
+def _reproduce_paper(overrides: Sequence[str], report: Report) -> Reproduction:
     """Return what came of the paper's own experiments."""
     scenarios = _scenarios(overrides)
     runs = {name: _run(scenario, report) for name, scenario in scenarios.items()}
@@ -129,13 +121,8 @@ def _reproduce_paper(overrides: Sequence[str], report: Report, completions: int 
         *torque_task_claims(solenoid, proportional, values_used_by(assumed, SOLENOID, PROPORTIONAL)),
         *control_claims(solenoid, proportional),
     ]
-    events, supply, family = step_events(step.recording), step.scenario.device.supply, None
+    events, supply = step_events(step.recording), step.scenario.device.supply
     levels = Levels(supply.pressure, supply.atmospheric_pressure)
-    if not overrides:
-        count = completions or COMPLETIONS
-        report(Progress(f"drawing {count} completions of the experiments"))
-        family = infer_settings(count)
-        claims = with_open_ranges(claims, family, synthetic)
     return Reproduction(
         claims=tuple(sorted(claims, key=lambda claim: ORDER.index(claim.id))),
         step_observations=tuple(step_observations(step.recording, levels, events)),
@@ -151,7 +138,6 @@ def _reproduce_paper(overrides: Sequence[str], report: Report, completions: int 
         completed_set=completed.name,
         completed_findings=tuple(audit(completed)),
         overrides=tuple(overrides),
-        family=family,
     )
 
 

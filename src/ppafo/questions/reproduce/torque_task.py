@@ -1,22 +1,15 @@
 """The torque task: what the paper claims of it in numbers, of its control, and what its text tells of both valves.
 
-What of it is the law's and what the valve's is shown by other laws that play the same task on the same device, as in
-``ppafo league``.
+What of it is due to the control law and what to the valve is shown by other laws on the same task and device.
 """
 
-from collections.abc import Mapping, Sequence
-
-import numpy as np
+from collections.abc import Sequence
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.errors import ParameterError, ScenarioError, SimulationError
 from ppafo.parameters.publications.publication import paper_entries
-from ppafo.questions.league.sampled_bound import COMMANDS, best_decisions, sampled_problem
-from ppafo.questions.league.standing import ENTRANTS
 from ppafo.questions.reproduce.bench import AssumedValue
 from ppafo.questions.reproduce.claim import Claim, Observation, Verdict, observation, stated_claim
-from ppafo.questions.unreported.settings import METRICS, PROPORTIONAL, SOLENOID, Draws, Floats, columns
-from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import Result, simulate
 
@@ -108,28 +101,38 @@ def torque_task_observations(solenoid: Result, proportional: Result) -> list[Obs
     ]
 
 
-TUNED, DEAD_ZONE = "pid-tuned", "on_off_dead_zone-solenoid"
+TUNED = (
+    "controller.kind=pid",
+    "controller.rate=1 kHz",
+    "controller.proportional_gain=1.2 1/(N m)",
+    "controller.integral_gain=23 1/(N m s)",
+    "controller.derivative_gain=0.0095 s/(N m)",
+    "controller.derivative_filter=3.1 ms",
+    "controller.anti_windup=4.8 1/s",
+)
+"""Gains of a PID that were searched for the least error and gas, on an ideal and on a slow, late and noisy valve."""
+DEAD_ZONE = (
+    "controller.kind=on_off_dead_zone",
+    "controller.rate=20 Hz",
+    "controller.dead_zone=0.2 N m",
+    "controller.release=0.05 N m",
+    "controller.opening=1",
+)
+"""Narrower than what the solenoid pair can hold within one sample."""
 FASTER = ("controller.rate=100 Hz", "valve.switching_interval=10 ms")
 """Both: the set has the printed 20 Hz of the component as the shortest time between two switchings."""
-_BY_NAME = {entrant.name: entrant for entrant in ENTRANTS}
 
 
 def control_claims(solenoid: Result, proportional: Result) -> list[Claim]:
     """Return what the paper says of gains, dead zone, switching rate and improved control, and of size and weight."""
     pair, spool = (run.metrics["rms_error"].value for run in (solenoid, proportional))
     found = [
-        _compared("gains_minimise_error", spool, _with(proportional, _BY_NAME[TUNED].overrides), -1.0),
-        _compared("dead_zone_amplifies_delay", pair, _with(solenoid, _BY_NAME[DEAD_ZONE].overrides), 1.0),
+        _compared("gains_minimise_error", spool, _with(proportional, TUNED), -1.0),
+        _compared("dead_zone_amplifies_delay", pair, _with(solenoid, DEAD_ZONE), 1.0),
         _compared("limited_by_switching", pair, _with(solenoid, FASTER), -1.0),
     ]
-    problem = sampled_problem(solenoid.scenario)
-    best = problem or best_decisions(solenoid.scenario)[0]
-    heavy = paper_entries()["large_and_heavy"]
-    return [
-        *found,
-        _compared("beyond_improved_control", spool, best, 1.0),
-        stated_claim(heavy.id, None, "not_testable", heavy.not_testable),
-    ]
+    untested = (paper_entries()[name] for name in ("beyond_improved_control", "large_and_heavy"))
+    return [*found, *(stated_claim(entry.id, None, "not_testable", entry.not_testable) for entry in untested)]
 
 
 def _with(run: Result, overrides: tuple[str, ...]) -> float | str:
@@ -152,54 +155,3 @@ def _compared(identifier: str, error: float, other: float | str, sign: float) ->
     verdict: Verdict = "reproduced_with_assumptions" if holds else "contradicted"
     note = f"{entry.note} Simulated: {other:.3f} against {error:.3f} N m."
     return stated_claim(identifier, value, verdict, note, ("the torque task as completed here",))
-
-
-def control_values(draws: Draws) -> dict[str, Floats]:
-    """Return what the claims on control come to [%] in completions (draws,), by id.
-
-    Not that on improved control (``improved_control``). The tuned gains are those found for the task as completed here.
-    """
-
-    def error(valve: str, overrides: tuple[str, ...], changed: Mapping[str, Floats], left_out: str = " ") -> Floats:
-        varied = {path: item for path, item in columns(draws, valve).items() if not path.endswith(left_out)}
-        result = run_ensemble(load_scenario(f"torque-task-{valve}", overrides), {**varied, **changed}, METRICS)
-        return result.metrics["rms_error"]
-
-    count = next(iter(draws.values())).size
-    faster = {"controller.rate": np.full(count, 100.0), "valve.switching_interval": np.full(count, 0.01)}
-    pair, spool = error(SOLENOID, (), {}), error(PROPORTIONAL, (), {})
-    return {
-        "gains_minimise_error": _PERCENT * (1.0 - error(PROPORTIONAL, _BY_NAME[TUNED].overrides, {}, "_gain") / spool),
-        "dead_zone_amplifies_delay": _PERCENT * (error(SOLENOID, _BY_NAME[DEAD_ZONE].overrides, {}) / pair - 1.0),
-        "limited_by_switching": _PERCENT * (1.0 - error(SOLENOID, (), faster) / pair),
-    }
-
-
-BEAM = 100
-"""States that the search for the best decisions keeps in a completion: 25 found the same as 1000 in all 29 tried."""
-_UNITS = {
-    "motion.angle": "rad",
-    "reference.level": "N m",
-    "reference.start_level": "N m",
-    "reference.ramp_time": "s",
-    "run.duration": "s",
-    "controller.rate": "Hz",
-    "actuator.volume_per_angle": "m^3/rad",
-    **{f"supply.{name}": "Pa_a" for name in ("pressure", "dorsiflexion_pressure")},
-    **{f"valve.{name}": "s" for name in ("opening_delay", "closing_delay")},
-    **{f"actuator.dead_volume_{number}": "m^3" for number in (1, 2)},
-}
-
-
-def improved_control(draws: Draws, error: Floats, commands: Sequence[float] = COMMANDS) -> Floats:
-    """Return by how much [%] the best decisions of the solenoid pair exceed an error [N m], in completions (draws,).
-
-    ``error`` (draws,) is that of the proportional valve; ``commands`` are those that the pair may choose from, once a
-    sample. One search for each completion.
-    """
-    varied = columns(draws, SOLENOID)
-    found = []
-    for place in range(error.size):
-        words = [f"{path}={float(item[place])!r} {_UNITS.get(path, '')}".strip() for path, item in varied.items()]
-        found.append(best_decisions(load_scenario("torque-task-solenoid", words), commands, BEAM)[0])
-    return np.asarray(_PERCENT * (np.array(found) / error - 1.0))
