@@ -9,7 +9,7 @@ have no help back after two strides of steady walking.
 The second draws faults of the plant with a shut-off valve fitted, and prints how soon each is found, by which sign, and
 what is left on the wearer half a second later. The third prints how far a regulator that creeps shows in the residuals
 of the observer, beside walks without a fault. The controller believes in the nominal device, whatever device is drawn.
-They print tables of docs/walking-faults.md; all of it is simulated.
+All of it is simulated.
 """
 
 import argparse

@@ -5,7 +5,7 @@
 A stop on good sensors is a false alarm, and the exit code is then 1. A pause, and a foot that is lifted only, are for
 what walking does; they are counted apart, by the last sign of each wearer: who sat last, and the others. Every
 configuration and course that is done is kept in the folder, and a second call goes on where the first one ended. It
-prints a table of docs/walking-faults.md.
+prints a table.
 """
 
 import argparse

@@ -45,8 +45,6 @@ if TYPE_CHECKING:
     from ppafo.parameters.parts import Catalogue as Catalogue
     from ppafo.parameters.parts import Part as Part
     from ppafo.parameters.parts import load_catalogue as load_catalogue
-    from ppafo.questions.adapt.answer import Adaptation as Adaptation
-    from ppafo.questions.adapt.solve import adapt as adapt
     from ppafo.questions.bits.solve import bits as bits
     from ppafo.questions.compare.answer import Comparison as Comparison
     from ppafo.questions.compare.solve import compare as compare
@@ -120,8 +118,6 @@ _HOMES = {
     "ppafo.parameters.audit": ("audit",),
     "ppafo.parameters.device": ("Device",),
     "ppafo.parameters.parts": ("Catalogue", "Part", "load_catalogue"),
-    "ppafo.questions.adapt.answer": ("Adaptation",),
-    "ppafo.questions.adapt.solve": ("adapt",),
     "ppafo.questions.bits.solve": ("bits",),
     "ppafo.questions.compare.answer": ("Comparison",),
     "ppafo.questions.compare.solve": ("compare",),

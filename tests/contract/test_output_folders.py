@@ -21,7 +21,6 @@ FOLDERS: dict[str, list[str]] = {
     "linearise": ["torque-task-proportional"],
     "walk": ["--minutes", "0.1"],
     "walk --wearers": ["--wearers", "2"],
-    "adapt": ["reacting"],
     "validate": ["ppafo2011", "bench.csv"],
     "rig": ["record", "step-response"],
     "identify": ["problem.toml"],

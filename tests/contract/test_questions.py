@@ -25,7 +25,6 @@ from ppafo.questions.question import Solved, load_name
 NAMES = list(QUESTIONS)
 NO_VERB_OF_ITS_OWN = {
     "walk": "compare_walks and walk_population are its verbs",
-    "adapt": "the command also chooses the folder, in which it resumes; ppafo.adapt searches",
     "sweep": "the command also chooses the folder; ppafo.sweep is given it",
 }
 

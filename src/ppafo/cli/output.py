@@ -78,12 +78,8 @@ def blame_out_option() -> Iterator[None]:
 
 
 def _command(parsed: argparse.Namespace) -> str:
-    """Return the command with its action, such as ``gait show``.
-
-    The table of risks is kept for longer than a walk: a walk does not replace it.
-    """
-    risks = "--risks" if getattr(parsed, "risks", False) else None
-    return " ".join(word for word in (parsed.command, getattr(parsed, "action", None), risks) if word)
+    """Return the command with its action, such as ``gait show``."""
+    return " ".join(word for word in (parsed.command, getattr(parsed, "action", None)) if word)
 
 
 def deliver(

@@ -25,7 +25,6 @@ QUESTIONS: Kinds[Question] = Kinds(
         "design": "ppafo.questions.design:QUESTION",
         "endurance": "ppafo.questions.endurance:QUESTION",
         "walk": "ppafo.questions.walk:QUESTION",
-        "adapt": "ppafo.questions.adapt:QUESTION",
         "bits": "ppafo.questions.bits:QUESTION",
     },
 )

@@ -1,8 +1,6 @@
 """Wearer files: the shipped ones, those based on another, and what is wrong with a file in one line."""
 
 import re
-import shlex
-from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -37,17 +35,6 @@ def test_at_least_five_healthy_wearers_have_gains_of_their_own() -> None:
     gains = {find_wearer(name).left_gains for name in HEALTHY}
     assert len(gains) == len(HEALTHY) >= 5
     assert all(find_wearer(name).left_gains == find_wearer(name).right_gains for name in HEALTHY)
-
-
-@pytest.mark.parametrize("name", [name for name in list_wearers() if "ppafo adapt" in find_wearer(name).notes])
-def test_the_command_that_repeats_a_wearer_is_of_the_search_that_its_file_states(name: str) -> None:
-    wearer = find_wearer(name)
-    command = shlex.split(wearer.notes[wearer.notes.index("ppafo adapt") :])
-    given = dict(pairwise(command))
-    start = command[command.index("--set") + 1].removeprefix("wearer.reacts=")
-    stated = f"by search: from {start} seed {given['--seed']} restart [1-{given['--restarts']}] "
-    stated += f"{given['--generations']} generations of 16 towards {given['--speed']}"
-    assert re.fullmatch(stated, wearer.found)
 
 
 def test_a_disease_changes_one_leg_and_keeps_the_gains() -> None:

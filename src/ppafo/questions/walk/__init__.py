@@ -40,13 +40,6 @@ QUESTION = Question(
             ("--wearers",), "wearers", "number of different wearers to simulate instead of one", "N", counting_number
         ),
         Argument(("--seed",), "seed", "random seed of the wearers; default 1", "N", whole_number, 1),
-        Argument(
-            ("--risks",),
-            "risks",
-            "table of what can go wrong, in the form of ISO 14971, from simulated faults",
-            action="store_true",
-            default=False,
-        ),
         SET,
     ),
     library="ppafo.walking.loading:FILE",

@@ -28,9 +28,7 @@ from ppafo.questions.walk.course import (
     trust_remark,
 )
 from ppafo.questions.walk.document import versions, walk_data, walk_document
-from ppafo.questions.walk.falls import Falls, falls_of_walk
 from ppafo.questions.walk.reacting import reacting_answer
-from ppafo.questions.walk.risks import Risks, risks_of_walk
 from ppafo.questions.walk.safety import over_time_sections, safety_remarks
 from ppafo.questions.walk.volumes import (
     VolumeReading,
@@ -408,23 +406,19 @@ def walk_with_and_without(
     wearers: int | None = None,
     seed: int = 1,
     overrides: Sequence[str] = (),
-    risks: bool = False,
     progress: Report | None = None,
-) -> WalkPair | Wearers | Risks | Falls:
+) -> WalkPair | Wearers:
     """Walk with the device, with it switched off, and beside the healthy gait; or let many wearers walk with it.
 
     ``configuration`` is a walk file, its name or a loaded one; ``minutes`` the length of the walk [min], one or
     that of its course unless given; ``gait``, ``course`` and ``bottle`` stand in place of those of the configuration;
-    ``wearers`` the number of different wearers, drawn with ``seed``. With ``risks`` faults begin in the walk, and the
-    answer is a table of what they do, of a wearer who reacts by falls. ScenarioError for bad input; a walk that
-    diverges is an answer that has not passed.
+    ``wearers`` the number of different wearers, drawn with ``seed``. ScenarioError
+    for bad input; a walk that diverges is an answer that has not passed.
     """
     chosen = configuration
     if not isinstance(chosen, Scenario):
         chosen = load_walk(chosen, overrides, gait, course, bottle)
     report = progress or report_nothing
-    if risks:
-        return risks_of_walk(chosen) if walk_of(chosen).reacts is None else falls_of_walk(chosen, report)
     if wearers is not None:
         advance = _reporter(report, "walking", "wearers", 0.0)
         return Wearers(*wearers_by_volume(chosen, minutes, wearers, seed, advance))

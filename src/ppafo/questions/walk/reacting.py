@@ -13,7 +13,6 @@ from ppafo.metrics.strides import SETTLING
 from ppafo.questions.endurance.draw import FORMAT_OF_REACTING
 from ppafo.questions.walk.course import bottle_data, bottle_remark, bottle_sections
 from ppafo.questions.walk.document import walk_data
-from ppafo.questions.walk.muscle_timing import muscle_timing, muscle_timing_section
 from ppafo.questions.walk.safety import over_time_sections, safety_remarks
 from ppafo.simulation.scenario import Scenario, plain
 from ppafo.storage.comma_separated import marked_csv_bytes
@@ -61,9 +60,9 @@ _WHERE = {
 """Whose numbers they are, by how many devices there are."""
 
 _EFFORT = (
-    "Power and metabolic rate are of one set of reflexes. Those that other searches find differ by some percent, which "
-    "'ppafo adapt' prints: a difference between with and off that is smaller is none. The rate at rest is not in it, "
-    "and the two models differ by a factor of two."
+    "Power and metabolic rate are of one set of reflexes. Those that other searches find differ by some percent: a "
+    "difference between with and off that is smaller is none. The rate at rest is not in it, and the two models differ "
+    "by a factor of two."
 )
 _LIMITS = (
     "The gains of the reflexes are those of the wearer's file, with the device on and off: the wearer is unadapted. "
@@ -119,7 +118,6 @@ def reacting_answer(comparison: Comparison) -> Answer:
             *_way_section(comparison),
             *bottle_sections(worn),
             *_likeness_section(comparison),
-            *muscle_timing_section(comparison),
             Section(
                 "How to read it",
                 (f"{_EXPLAINED} {_WHERE[walk_of(scenario).devices]}", _EFFORT, _LIMITS),
@@ -132,10 +130,6 @@ def reacting_answer(comparison: Comparison) -> Answer:
         | {
             "likeness": {
                 words: {name: plain(item) for name, item in likeness(walked).items()}
-                for words, walked in (("with", worn), ("off", bare))
-            },
-            "muscle_timing": {
-                words: {name: plain(item) for name, item in muscle_timing(walked).items()}
                 for words, walked in (("with", worn), ("off", bare))
             },
             **bottle_data(worn),
