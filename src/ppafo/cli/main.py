@@ -39,7 +39,7 @@ SUBCOMMANDS: dict[str, dict[str, str]] = {
     },
     "decide": {},
     "walk": {
-        "gait": "list, show and import gaits; export recordings for OpenSim",
+        "gait": "list, show and import gaits",
     },
     "tools": {
         "export": "write a scenario or a walk for other tools: a library in C, an FMU, a controller for 'ppafo hil'",

@@ -32,7 +32,7 @@ from ppafo.simulation.plan import plan_run, profile_values
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, PrescribedMotion, Scenario
 from ppafo.simulation.simulate import simulate
-from ppafo.translation.plant_rates import check_without_opensim, gas_rates
+from ppafo.translation.plant_rates import gas_rates
 
 BOUNDED_VALVES = ("proportional", "solenoid")
 """Kinds of valves whose ways are known: full command one way, and the other."""
@@ -440,7 +440,6 @@ def check_bounded(scenario: Scenario) -> None:
     """Refuse a scenario that the bound cannot be computed for, with the reason; SimulationError."""
     if find_spec("casadi") is None:
         raise SimulationError(MISSING_EXTRA)
-    check_without_opensim()
     if scenario.device.actuator.kind != VANE:
         raise SimulationError(f"{scenario.name}: the lower bound is for a vane, not '{scenario.device.actuator.kind}'")
     if not isinstance(scenario.motion, PrescribedMotion):

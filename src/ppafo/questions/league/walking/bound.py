@@ -27,7 +27,6 @@ from ppafo.questions.league.walking.measures import Toes, course_of, measures, s
 from ppafo.questions.league.walking.solver import FREE, MODES, Guess, StrideOptimum, StrideSolver, guess_from_walk
 from ppafo.questions.league.walking.task import WalkingTask
 from ppafo.simulation.scenario import Scenario
-from ppafo.translation.plant_rates import check_without_opensim
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import plan_walk
 
@@ -234,7 +233,6 @@ def check_bounded(valve: str) -> None:
     """Refuse a valve that the bound cannot be computed for, with the reason; SimulationError."""
     if find_spec("casadi") is None:
         raise SimulationError(MISSING_EXTRA)
-    check_without_opensim()
     if valve not in BOUNDED_VALVES:
         raise SimulationError(f"no lower bound for valve '{valve}', only {', '.join(BOUNDED_VALVES)}")
 
