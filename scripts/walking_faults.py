@@ -4,10 +4,6 @@ Every kind of fault begins at 20 instants of a stride, with four configurations.
 pauses or stops and no harm is done from half a second later on, or where no harm is done at all. Harm is: toes lower in
 mid-swing than without the device, or more than 1 N m against the foot's way (plantarflexion on a loaded heel or in
 mid-swing, dorsiflexion on the toes). It prints the table of docs/walking-faults.md.
-
-``python scripts/walking_faults.py fixed`` runs the controller ``event_on_off`` with floats and on whole numbers through
-the same faults instead, and prints those in which they differ: in the verdict, or in the time until found. Floats that
-see the steps of the same converter run through them too: what these miss as well is the converter's, not the law's.
 """
 
 import sys
@@ -31,7 +27,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.walking.events import SAFE_ROW
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of, with_duration
-from ppafo.walking.planning import converter_of_walk, gait_sensors_of, plan_walk
+from ppafo.walking.planning import gait_sensors_of, plan_walk
 from ppafo.walking.walk import with_device_off
 
 CONFIGURATIONS = ("solenoid", "proportional", "solenoid-regulators", "proportional-regulators")
@@ -252,53 +248,6 @@ def toes_of_bare(configuration: Scenario) -> float:
     return float(judged(bare, record, state_row_numbers(bare), np.array([FIRST * stride]), stride)[2][0])
 
 
-def compare_arithmetics() -> None:
-    """Run ``event_on_off`` on either valve, with floats and on whole numbers, and print where they differ."""
-    stride = walk_of(load_walk("solenoid")).gait.stride_time
-    begins, every = (FIRST + np.arange(PHASES) / PHASES) * stride, kinds()
-    for valve in ("solenoid", "proportional"):
-        own = ("controller.kind=event_on_off", f"device.valve={valve}")
-        walks = [load_walk("solenoid", (*own, *further)) for further in ((), ("controller.arithmetic=fixed",))]
-        walks.append(load_walk("solenoid", (*own, *steps_of_converter(walks[1]))))
-        both = [run(configuration, list(every.values()), begins) for configuration in walks]
-        seen, found, coarse = (np.isfinite(one.found) for one in both)
-        later = np.zeros(seen.shape)
-        later[seen & found] = both[1].found[seen & found] - both[0].found[seen & found]
-        floor = toes_of_bare(walks[0]) - CLEARANCE
-        bad = [neither(one, floor) for one in both]
-        near = (np.abs(later[seen & found]) * stride < NEAR).sum()
-        print(
-            f"{valve}: {seen.size} runs, {seen.sum()} found with floats and {found.sum()} on whole numbers, neither "
-            f"found nor harmless {bad[0].sum()} and {bad[1].sum()}; later by {later.max():.2f} strides at most, within "
-            f"{NEAR * 1.0e3:g} ms of each other in {near}; floats with the converter's steps find {coarse.sum()}, of "
-            f"the {(seen & ~found).sum()} that only floats find {(seen & ~found & coarse).sum()}, of the "
-            f"{(found & ~seen).sum()} that only whole numbers find {(found & ~seen & coarse).sum()}"
-        )
-        for row, what in enumerate(every):
-            if (seen[row] != found[row]).any() or np.abs(later[row]).max() > LATER:
-                counts = f"{seen[row].sum()} and {found[row].sum()} of {PHASES} found, with steps {coarse[row].sum()}"
-                ends = [np.where(np.isfinite(one.found[row]), one.found[row], 0.0).max() for one in both[:2]]
-                harm = f"neither found nor harmless {bad[0][row].sum()} and {bad[1][row].sum()}"
-                print(f"  {what}: {counts}, within {ends[0]:.2f} and {ends[1]:.2f} strides, {harm}")
-
-
-def steps_of_converter(configuration: Scenario) -> tuple[str, ...]:
-    """Overrides that give the sensors of a walk the steps of its converter."""
-    converter = converter_of_walk(configuration)
-    return (
-        f"sensors.force_resolution={converter.force_step!r} N",
-        f"sensors.angle_resolution={converter.angle_step!r} rad",
-        f"sensors.pressure_resolution={converter.pressure_step!r} Pa_d",
-    )
-
-
-def neither(runs: Runs, floor: float) -> NDArray[np.bool_]:
-    """Where a fault is not found in time and does harm, (kinds, PHASES), for the lowest toes [m] that are none."""
-    harmless = (runs.torque <= TORQUE) & (runs.toes >= floor)
-    settled = np.isfinite(runs.found) & (runs.late_torque <= TORQUE) & (runs.late_toes >= floor)
-    return ~(harmless | settled)
-
-
 def main() -> None:
     """Run all and print the table."""
     stride = walk_of(load_walk("solenoid")).gait.stride_time
@@ -324,4 +273,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    compare_arithmetics() if sys.argv[1:] == ["fixed"] else main()
+    main()

@@ -43,8 +43,6 @@ FLOAT, FIXED = "float", "fixed"
 """The two arithmetics of a controller."""
 TARGETS = ("msp430f2013", "cortex-m0", "cortex-m4")
 """Processors that an integer controller can be written for."""
-WALK_TARGETS = ("msp430g2553",)
-"""And those that an integer controller of walking can be written for: the smallest has no room for it."""
 
 
 def sound_of(state: Any) -> int:
@@ -55,18 +53,17 @@ def sound_of(state: Any) -> int:
 
 @dataclass(frozen=True, slots=True)
 class FixedLaw:
-    """The integer form of a controller of the catalogue, of a torque task or of a walk.
+    """The integer form of a controller of the catalogue.
 
     ``kind`` runs it in the lanes: its update reads the converter, calls ``sample`` and gives the command back as a
-    number from -1 to 1, or ``VENT``. ``sample(numbers, state, readings)`` is the law itself, on whole numbers only: the
+    number from -1 to 1. ``sample(numbers, state, readings)`` is the law itself, on whole numbers only: the
     command in steps and the next state. ``numbers`` and ``readings`` are the NamedTuple classes of what it is given;
     ``number_quantities`` declare the numbers, in order. The state ``begins`` so, and ``state_ranges`` has lowest and
     highest of every number of it, by its own name; ``status`` is the word that a chip reports of it.
 
-    ``prepare`` makes the numbers: of a torque law ``(settings, period, torque_step)`` those after the limits of its
-    readings, of a walking law ``(settings, period, converter)`` all by name, which may not be within their ranges yet.
-    ``largest(settings, period, torque_step)`` is the largest part of its range that any number of a torque law takes,
-    above 1 where the settings cannot be held.
+    ``prepare(settings, period, torque_step)`` makes the numbers after the limits of its readings.
+    ``largest(settings, period, torque_step)`` is the largest part of its range that any number takes, above 1 where the
+    settings cannot be held.
     """
 
     kind: ControllerKind

@@ -109,10 +109,6 @@ def walk_library(configuration: "Scenario") -> Library:
     from ppafo.walking.planning import plan_walk
 
     check_can_leave(configuration)
-    if configuration.control.is_fixed:
-        raise ProgramError(
-            f"{configuration.name}: a controller on whole numbers has no library yet; 'ppafo firmware' writes it"
-        )
     program = exported(batch_of(plan_walk(configuration)).program)
     settings, links = settings_of_walk(configuration), links_of_walk(configuration)
     failing = sensors_that_fail(configuration)

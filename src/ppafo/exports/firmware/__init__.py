@@ -160,7 +160,7 @@ _TEMPLATES = ("Makefile", "README.md", "board.h", "board_simulated.c", "controll
 
 
 class ChipController(NamedTuple):
-    """The integer controller of a scenario or a walk: law, whole numbers by name, converter, ticks of a sample."""
+    """The integer controller of a scenario: law, whole numbers by name, converter, ticks of a sample."""
 
     law: FixedLaw
     numbers: Mapping[str, float]

@@ -44,7 +44,7 @@ Shown = TypeVar("Shown", bound=tuple[int, ...])
 
 
 class PythonChip:
-    """The integer controller of a scenario or a walk in Python, as the chip computes it."""
+    """The integer controller of a scenario in Python, as the chip computes it."""
 
     def __init__(self, chip: ChipController) -> None:
         self.law = chip.law
@@ -63,7 +63,7 @@ class PythonChip:
 
 
 class ChipLaw:
-    """The simulated chip as a controller of a scenario or a walk; it keeps the decision of every sample.
+    """The simulated chip as a controller of a scenario; it keeps the decision of every sample.
 
     ``shown`` makes the converter's readings of a reference and a measurement; ``at_zero`` is the command for no steps.
     """

@@ -381,11 +381,6 @@ def ways_of(configuration: Scenario) -> dict[str, WalkingCourse | None]:
         raise ScenarioError(f"{configuration.origin.file}: course: event timing uses its own courses; remove this one")
     if walk_of(configuration).bottle is not None:
         raise ScenarioError(f"{configuration.origin.file}: bottle: events are timed at one supply pressure; remove it")
-    if configuration.control.is_fixed:
-        raise ScenarioError(
-            f"{configuration.origin.file}: controller.arithmetic = 'fixed': events are timed for controllers in "
-            "floats; remove it"
-        )
     cadence = 2.0 / walk_of(configuration).gait.stride_time
     return {STEADY: None, UNEVEN: uneven_course(cadence)} | {name: load_course(name) for name in led_courses()}
 

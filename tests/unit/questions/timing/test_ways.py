@@ -9,7 +9,6 @@ from ppafo.questions.timing.answer import event_timing
 @pytest.mark.parametrize(
     ("override", "reason"),
     [
-        ("controller.arithmetic=fixed", "events are timed for controllers in floats"),
         ("course=corridor", "its own courses"),
     ],
 )
