@@ -45,9 +45,9 @@ FOLDERS: dict[str, list[str]] = {
     "export c": ["c", "step-response"],
     "export fmu": ["fmu", "step-response"],
     "export opensim": ["opensim", "solenoid", "--minutes", "0.05"],
-    "export controller": ["controller", "torque-task-solenoid", "--set", "controller.arithmetic=fixed"],
-    "firmware": ["torque-task-solenoid", "--set", "controller.arithmetic=fixed"],
-    "chip": ["torque-task-solenoid", "--set", "controller.arithmetic=fixed"],
+    "export controller": ["controller", "torque-task-solenoid"],
+    "firmware": ["torque-task-solenoid"],
+    "chip": ["torque-task-solenoid"],
     "hil": ["torque-task-solenoid", "--port", "udp:127.0.0.1:5000"],
 }
 """The words of every command that writes a folder; ``walk --wearers`` is ``walk`` with other words."""

@@ -293,7 +293,7 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
         "motion": optional(motion, "that it is a walk; gait and course may stand here"),
         **which,
         "controller": (
-            controller_table(walking_controllers(), "Walking", lambda _kind: ()),
+            controller_table(walking_controllers(), "Walking"),
             Field(description="what commands the valve"),
         ),
         "timing": optional(_timing(), "how the controller knows the time in the stride; thresholds unless given"),
