@@ -8,7 +8,7 @@ CORES := $(shell nproc 2>/dev/null || echo 2)
 QUICK_TESTS := tests/architecture tests/contract/test_command_words.py tests/contract/test_catalogs.py $(addprefix tests/unit/,\
 	test_public_interface.py test_units.py control documents gait metrics model parameters signals storage)
 
-.PHONY: reproduce gallery validation test test-long test-all coverage quick check format bench bits dist page site opensim lock clean
+.PHONY: reproduce gallery validation test test-long test-all coverage quick check format bench bits dist page site lock clean
 
 reproduce: $(LEAN)
 	$(BIN)/ppafo reproduce --out out/reproduce
@@ -97,22 +97,18 @@ $(READY): $(LEAN) requirements-dev.lock
 	$(call install,requirements-dev.lock)
 	touch $(READY)
 
-# OpenSim takes 280 MB, and a few tests skip without it.
-opensim: $(READY)
-	$(call install,requirements-opensim.lock)
-
 # uv installs in seconds what takes pip most of a minute; where it fails, for instance behind a proxy that only pip knows, pip tries too.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 install_with = PATH="$$PATH:$(BIN)" uv pip install --quiet --python $(BIN)/python $(1) || $(PIP) $(1)
 install = $(call install_with,--require-hashes --requirement $(1))
 
-# Writes the lock files anew (needs uv); everybody else only reads them. Each of the last four holds one extra, in versions that go with the others.
+# Writes the lock files anew (needs uv); everybody else only reads them. Each of the last three holds one extra, in versions that go with the others.
 COMPILE := uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header
 lock:
 	$(COMPILE) --extra checkout --output-file requirements.lock pyproject.toml
 	$(COMPILE) --extra checkout --extra dev --constraint requirements.lock --output-file requirements-dev.lock pyproject.toml
 	echo uv | $(COMPILE) --output-file requirements-uv.lock -
-	for extra in bench docs opensim release; do \
+	for extra in bench docs release; do \
 		$(COMPILE) --extra $$extra --constraint requirements-dev.lock --output-file requirements-$$extra.lock pyproject.toml || exit 1; done
 
 clean:

@@ -264,7 +264,7 @@ SECTIONS: Mapping[str, Mapping[str, Check]] = {
     "Published studies": {"claims": claims},
     "Walking": {"alarms": alarms},
     "The worlds of others": {
-        "worlds": tested("The device in Gymnasium, MuJoCo and OpenSim", "these; the lanes", "tests/unit/worlds"),
+        "worlds": tested("The device in Gymnasium", "Gymnasium; the lanes", "tests/unit/worlds"),
     },
 }
 

@@ -39,12 +39,12 @@ SUBCOMMANDS: dict[str, dict[str, str]] = {
     },
     "decide": {},
     "walk": {
-        "gait": "list, show and import gaits; export recordings for OpenSim",
+        "gait": "list, show and import gaits",
     },
     "tools": {
         "export": "write a scenario or a walk for other tools: a library in C, an FMU, a controller for 'ppafo hil'",
-        "firmware": "write the controller of a scenario or a walk as firmware for a small processor",
-        "chip": "run a scenario or a walk with its controller on the simulator of a small processor",
+        "firmware": "write the controller of a scenario as firmware for a small processor",
+        "chip": "run a scenario with its controller on the simulator of a small processor",
         "hil": "run a scenario's plant in real time against a controller at a serial port or over UDP",
         "cache": "show, compile or remove the compiled models of this computer",
         "schema": "print the JSON Schema of a file format",

@@ -15,8 +15,6 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.fixed.torque_laws import FIXED, FLOAT
-from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
 from ppafo.documents.models import first_problem, is_gap
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
@@ -52,6 +50,7 @@ from ppafo.simulation.declaration import (
     kind_at,
     line_entries,
     line_quantities,
+    no_arithmetic,
     quantities,
     quantity_text,
     value_at,
@@ -122,9 +121,18 @@ def apply_overrides(
                 _set(changed, path, text, file, declared)
             paths.add(path)
         if len(unknown) == len(waiting):
-            raise unknown_value(unknown[0], declared.paths(changed), f"{file} has")
+            raise _unknown_paths(unknown, changed, file, declared)
         waiting, before = unknown, frozenset(paths)
     return OverriddenDocument(changed, frozenset(paths), tuple(device))
+
+
+def _unknown_paths(overrides: list[str], document: Mapping[str, Any], file: str, declared: Declared) -> ScenarioError:
+    """Return the error for overrides of paths that the document cannot have."""
+    for override in overrides:
+        path, text = split_override(override)
+        if path == ARITHMETIC:
+            return ScenarioError(f"override '{override}': {no_arithmetic(kind_at(document, 'controller'), text)}")
+    return unknown_value(overrides[0], declared.paths(document), f"{file} has")
 
 
 def _with_one_path_each(document: Mapping[str, Any], file: str, declared: Declared) -> dict[str, Any]:
@@ -282,7 +290,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
     try:
         if scenario.thermal is not None:
             scenario.device.check_vane("gas with an energy balance")
-        if scenario.control.is_fixed:
+        if CONTROLLERS[scenario.control.kind].plan is not None:
             scenario.device.check_vane("a controller on whole numbers")
     except ParameterError as error:
         raise _of_device(reading, error) from error
@@ -371,12 +379,7 @@ def _reference(reading: Reading) -> ProfileChoice:
 
 def _control(reading: Reading, period: float) -> Control:
     kind = kind_at(reading.document, "controller")
-    arithmetic = value_at(reading.document, ARITHMETIC) or FLOAT
-    settings = reading.section("controller", controller_settings(kind, arithmetic))
-    for item in () if arithmetic == FIXED else CONVERTER:
-        if value_at(reading.document, f"controller.{item.name}") is not None:
-            raise reading.refusal(f"controller.{item.name}", f'needs {ARITHMETIC} = "{FIXED}"')
-    return Control(kind, settings, period, arithmetic=arithmetic)
+    return Control(kind, reading.section("controller", controller_settings(kind)), period)
 
 
 def _sensors(reading: Reading, clock: Clock) -> Sensors:

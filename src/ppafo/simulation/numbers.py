@@ -40,7 +40,6 @@ _TEXTS = (
     "supply.relieving",
     "motion.kind",
     "controller.kind",
-    declaration.ARITHMETIC,
     "reference.kind",
     "motion.profile.kind",
     "motion.shank.kind",
@@ -149,7 +148,7 @@ def _kinds(scenario: Scenario) -> dict[str, Any]:
         motion = {"kind": "leg", "shank": {"kind": scenario.motion.leg.shank.kind}}
     if isinstance(scenario.motion, PrescribedMotion):
         motion = {"kind": "prescribed", "profile": {"kind": scenario.motion.profile.kind}}
-    controller = {"kind": scenario.control.kind, "arithmetic": scenario.control.arithmetic}
+    controller = {"kind": scenario.control.kind}
     gas: dict[str, Any] = {} if scenario.thermal is None else {"gas_model": {"kind": declaration.THERMAL}}
     gas |= {} if scenario.supply_lines is None else {SUPPLY_LINE: {}}
     if scenario.control.kind == switching.CONSTANT.name:

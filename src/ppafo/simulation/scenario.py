@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
-from ppafo.control.fixed.torque_laws import FIXED, FLOAT
 from ppafo.control.kind import PythonController
 from ppafo.errors import ScenarioError
 from ppafo.model.gait import ShankSeries
@@ -177,26 +176,18 @@ class Sensors:
 class Control:
     """A sampled controller: kind in ``control.catalog.CONTROLLERS``, settings in SI units, sample period [s].
 
-    With kind ``python`` there are no settings and ``custom`` is asked sample by sample. With ``arithmetic`` ``fixed``
-    it is the integer form that runs, and the settings have those of its converter too.
+    With kind ``python`` there are no settings and ``custom`` is asked sample by sample.
     """
 
     kind: str
     settings: Mapping[str, float]
     period: float
     custom: PythonController | None = None
-    arithmetic: str = FLOAT
-
-    @property
-    def is_fixed(self) -> bool:
-        """True where the controller computes with whole numbers."""
-        return self.arithmetic == FIXED
 
     @property
     def label(self) -> str:
         """The controller in a few words."""
         name = self.kind if self.custom is None else f"{self.kind}, {type(self.custom).__name__}"
-        name = f"{name} on whole numbers" if self.is_fixed else name
         return f"{name}, every {self.period:g} s"
 
 

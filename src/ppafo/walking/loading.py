@@ -8,7 +8,6 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ppafo.control.fixed.torque_laws import FIXED, FLOAT
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
 from ppafo.documents.toml_text import TomlKind, label
@@ -41,7 +40,6 @@ from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk, rules
 from ppafo.walking.course import check_led_course, check_reacting_course, load_course
 from ppafo.walking.declaration import (
-    ARITHMETIC,
     DURATION,
     FAULTY,
     FORCES,
@@ -49,9 +47,7 @@ from ppafo.walking.declaration import (
     PERSON,
     SEED,
     STEP,
-    THRESHOLDS,
     WALK_SENSORS,
-    converter_settings,
     fault_numbers,
     timing_of,
     timing_settings,
@@ -325,10 +321,9 @@ def _control(
     sensors: SensorSettings,
     links: Graph,
 ) -> Control:
-    """Return the controller with its settings and those of its timing and its converter."""
-    settings = _settings(reading, law, device, lines, sensors, links) | _converter(reading, law)
-    arithmetic = value_at(reading.document, ARITHMETIC) or FLOAT
-    return Control(law.name, settings, _period(reading), arithmetic=arithmetic)
+    """Return the controller with its settings and those of its timing."""
+    settings = _settings(reading, law, device, lines, sensors, links)
+    return Control(law.name, settings, _period(reading))
 
 
 def _of_lines(lines: SupplyLines | None) -> dict[str, float]:
@@ -342,19 +337,6 @@ def _of_lines(lines: SupplyLines | None) -> dict[str, float]:
 def _followed(links: Graph, present: Mapping[str, Any]) -> set[str]:
     """Return the numbers of the device that settings follow."""
     return {source for found in links.values() for link in found for source in link.sources} - set(present)
-
-
-def _converter(reading: Reading, law: ControllerKind) -> dict[str, float]:
-    """Return the settings of the converter [SI] of a controller on whole numbers, none where it has floats."""
-    items = converter_settings(law.name)
-    if value_at(reading.document, ARITHMETIC) == FIXED:
-        if timing_of(reading.document) != THRESHOLDS:
-            raise reading.refusal(ARITHMETIC, f"whole numbers know the time in the stride by {THRESHOLDS} only")
-        return reading.section("controller", items)
-    for item in items:
-        if value_at(reading.document, f"controller.{item.name}") is not None:
-            raise reading.refusal(f"controller.{item.name}", f'needs {ARITHMETIC} = "{FIXED}"')
-    return {}
 
 
 def _device(reading: Reading, hardware: Hardware) -> Device:

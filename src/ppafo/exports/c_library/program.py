@@ -265,8 +265,8 @@ def _short(collector: SourceCollector) -> dict[str, str]:
 @cache
 def _names_around() -> frozenset[str]:
     """Names of functions in the files around a library, of which some take its source in, and of its own entries."""
-    folders = [files("ppafo.exports").joinpath(folder, "templates") for folder in ("c_library", "fmu", "mujoco")]
-    sources = [item for folder in folders for item in folder.iterdir() if item.name.endswith(".c")]
+    folders = [folder.joinpath("templates") for folder in files("ppafo.exports").iterdir()]
+    sources = [item for folder in folders if folder.is_dir() for item in folder.iterdir() if item.name.endswith(".c")]
     found = (_FUNCTION.findall(item.read_text(encoding="utf-8")) for item in sources)
     return frozenset(("advance", "metrics", "prepare", "follow")).union(*found)
 

@@ -38,7 +38,6 @@ from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.simulation.simulate import OPEN_LOOP
 from ppafo.translation.plant_rates import (
     PlantRates,
-    check_without_opensim,
     gas_rates,
     thermal_gas_rates,
     vane_acceleration,
@@ -406,7 +405,6 @@ def linearise(
     """
     if find_spec("casadi") is None:
         raise ScenarioError(MISSING_CASADI)
-    check_without_opensim()
     chosen = scenario_or_load(scenario, overrides)
     run = plan_run(chosen)
     if chosen.supply_lines is not None:

@@ -1,20 +1,14 @@
-"""The torque of a walk for OpenSim: a table in its names, zero and signs, and a script that puts it into a model.
-
-Nothing here needs OpenSim. Why a script and two forms of the torque: docs/decisions/0028-opensim.md.
-"""
+"""The torque of a walk for OpenSim: a table in its names, zero and signs. Nothing here needs OpenSim."""
 
 from collections.abc import Sequence
-from importlib.resources import files
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
 from ppafo.errors import ScenarioError
-from ppafo.exports import filled, template
 from ppafo.signals import Channel, Recording
 from ppafo.storage.opensim import opensim_bytes, opensim_recording
-from ppafo.version import __version__
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES
@@ -31,20 +25,7 @@ def opensim_files(result: WalkResult, side: Side = "right", strikes: Sequence[fl
     """
     torque = device_torque(result, side, strikes)
     named, _ = opensim_recording(result.recording, side, walk_of(result.scenario).wearer.body_mass)
-    laid = f"The mean stride of the walk lies on {len(strikes)} heel strikes." if strikes else "Times are the walk's."
-    words = {
-        "walk": result.scenario.name,
-        "version": __version__,
-        "coordinate": coordinate_of(side),
-        "span": f"{laid} The torque goes from {torque.time[0]:g} to {torque.time[-1]:g} s.",
-    }
-    folder = files("ppafo.exports.opensim")
-    return {
-        "README.md": filled(template("opensim", "README.md"), words).encode(),
-        "add_device.py": folder.joinpath("add_device.py").read_bytes(),
-        "device_torque.sto": opensim_bytes(torque),
-        "walk.sto": opensim_bytes(named),
-    }
+    return {"device_torque.sto": opensim_bytes(torque), "walk.sto": opensim_bytes(named)}
 
 
 def coordinate_of(side: Side) -> str:
