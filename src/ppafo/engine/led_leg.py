@@ -8,7 +8,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ppafo.control.kind import ProfileKind
+from ppafo.engine.over_samples import over_samples
 from ppafo.engine.program import Program
 from ppafo.model.gait import ShankSeries, shank_in_gait
 from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
@@ -37,6 +40,14 @@ def shank_at(kind: ProfileKind, shank: Any, time: float) -> ShankNow:
     if kind is GAIT_SHANK:
         return shank_in_gait(shank, time)
     angle, rate, acceleration = kind.value(shank, time)
+    return ShankNow(angle, rate, acceleration, knee_forward=0.0, knee_up=0.0)
+
+
+def shank_over_samples(kind: ProfileKind, shank: Any, times: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> Any:
+    """The shank at times [s]: a ``ShankNow`` of columns (samples,), or of one number where it is always the same."""
+    if kind is GAIT_SHANK:
+        return over_samples(shank_in_gait, shank, times)
+    angle, rate, acceleration = over_samples(kind.value, shank, times)
     return ShankNow(angle, rate, acceleration, knee_forward=0.0, knee_up=0.0)
 
 

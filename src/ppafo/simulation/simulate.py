@@ -12,8 +12,9 @@ import numpy as np
 from ppafo.control.profiles import CONSTANT
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
-from ppafo.engine.led_leg import GAIT_SHANK, shank_at
-from ppafo.engine.program import python_place
+from ppafo.engine.led_leg import GAIT_SHANK, shank_over_samples
+from ppafo.engine.over_samples import over_samples
+from ppafo.engine.program import place_over_samples
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together
 from ppafo.engine.scheme.actuators import pressures_of, torque_of, volumes_of
@@ -257,16 +258,15 @@ def _leg_channels(run: Run, times: Floats, angle: Floats) -> dict[str, tuple[Flo
     kind, leg = run.program.shank, run.leg
     if kind is None or leg is None or kind is CONSTANT:
         return {}
-    shank = np.array([shank_at(kind, leg.shank, float(time)).angle for time in times])
+    shank = np.broadcast_to(shank_over_samples(kind, leg.shank, times).angle, times.shape)
     if kind is not GAIT_SHANK:
         return {"shank_angle": (shank, "rad"), "foot_angle": (shank - angle + 0.5 * np.pi, "rad")}
-    feet = [foot_in_gait(leg.shank, time, place) for time, place in zip(times.tolist(), angle.tolist(), strict=True)]
-    own, measured, higher = np.array(feet).T
+    foot = over_samples(foot_in_gait, leg.shank, times, angle)
     return {
         "shank_angle": (shank, "rad"),
-        "foot_angle": (own, "rad"),
-        "measured_foot_angle": (measured, "rad"),
-        "toe_difference": (higher, "m"),
+        "foot_angle": (foot.angle, "rad"),
+        "measured_foot_angle": (foot.measured_angle, "rad"),
+        "toe_difference": (foot.toe_difference, "m"),
     }
 
 
@@ -306,7 +306,7 @@ def _external_torque(scenario: Scenario, run: Run, times: Floats, rows: Mapping[
         return np.full(times.size, plant.external_torque)
     acceleration = profile_values(scenario.motion.profile, times)[2]
     angle, rate = rows["state.angle"], rows["state.angular_velocity"]
-    friction = np.array([sliding_friction(float(value), 1.0) for value in rate]) * _sizes_of_friction(run, rows)
+    friction = over_samples(sliding_friction, rate, 1.0) * _sizes_of_friction(run, rows)
     gravity = gravity_torque(angle, plant.gravity_torque)
     return np.asarray(torque - gravity - friction - plant.viscous_damping * rate - plant.inertia * acceleration)
 
@@ -317,10 +317,8 @@ def _torque_on_leg(leg: Leg, run: Run, times: Floats, rows: Mapping[str, Floats]
     angle, rate, plant = rows["state.angle"], rows["state.angular_velocity"], run.plant
     foot = foot_load(0.0, 0.0, leg.foot_mass, leg.foot_mass_centre, leg.foot_inertia, leg.shank_length)
     kind = shank_kind(leg)
-    at = [shank_at(kind, run.leg.shank, float(time)) for time in times]
-    places = list(zip(at, angle.tolist(), strict=True))
-    added = np.array([torque_on_foot(run.leg.load, now, place) for now, place in places])
-    needed = np.array([torque_on_foot(foot, now, place) for now, place in places])
+    now = shank_over_samples(kind, run.leg.shank, times)
+    added, needed = (over_samples(torque_on_foot, load, now, angle) for load in (run.leg.load, foot))
     net = torque + added - plant.external_torque - plant.viscous_damping * rate
     net -= np.sign(rate) * _sizes_of_friction(run, rows)
     acceleration = np.where(rate != 0.0, net / plant.inertia, 0.0)
@@ -329,21 +327,17 @@ def _torque_on_leg(leg: Leg, run: Run, times: Floats, rows: Mapping[str, Floats]
 
 def _sizes_of_friction(run: Run, rows: Mapping[str, Floats]) -> Floats | float:
     """Size of the friction torque in motion [N m] at each sample, with the effects of a run."""
-    law = python_place(friction_in_motion, run.program.effects, run.effects)
+    law = place_over_samples(friction_in_motion, run.program.effects, run.effects)
     if law is None:
         return run.plant.dynamic_torque
     angle, masses = rows["state.angle"], (rows["state.mass_1"], rows["state.mass_2"])
     pressures = pressures_of(run.program.actuator, run.plant, angle, *masses)
     states = {
-        name: [rebuilt(row, values) for values in zip(*(rows[path] for path in leaf_paths(row, name)), strict=True)]
+        name: rebuilt(row, [rows[path] for path in leaf_paths(row, name)])
         for name, row in run.program.effect_states.items()
     }
-    return np.array(
-        [
-            law({name: of_samples[sample] for name, of_samples in states.items()}, run.plant.dynamic_torque, *given)
-            for sample, given in enumerate(zip(rows["state.angular_velocity"], *pressures, strict=True))
-        ]
-    )
+    sizes: Floats = law(states, run.plant.dynamic_torque, rows["state.angular_velocity"], *pressures)
+    return sizes
 
 
 def compile_models(scenarios: Iterable[Scenario]) -> None:
