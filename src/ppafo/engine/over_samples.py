@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.engine.plain_python import parse_module
 from ppafo.engine.rows import leaves, rebuilt
 from ppafo.engine.source_text import COMPILED_BUILTINS, SourceCollector
 from ppafo.errors import ProgramError
@@ -56,8 +57,8 @@ def _composed(function: Callable[..., Any]) -> tuple[SourceCollector, Callable[.
 def in_columns(text: str, name: str) -> Callable[..., Any] | None:
     """A function of a composed text for columns; None where it has no such form."""
     try:
-        tree = _Columns().visit(ast.parse(text))
-    except _NoForm:
+        tree = _Columns().visit(parse_module(text))
+    except ProgramError:
         return None
     scope: dict[str, Any] = {"namedtuple": namedtuple, **_OPERATIONS}
     exec(compile(ast.fix_missing_locations(tree), "<columns>", "exec"), scope)
@@ -141,12 +142,20 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
     "int": _without_fraction,
     "float": _as_float,
 }
-_SAME_IN_COLUMNS = frozenset({"abs", "range", *_OPERATIONS, "namedtuple"})
-_ELEMENTWISE = (ast.Add, ast.Sub, ast.Mult, ast.Div)
+_SAME_IN_COLUMNS = frozenset({"abs", "range", *_OPERATIONS})
 
 
-class _NoForm(Exception):
-    """A text for which there are no columns."""
+def _is_elementwise(node: ast.AST) -> bool:
+    if isinstance(node, ast.BinOp):
+        return isinstance(node.op, ast.Add | ast.Sub | ast.Mult | ast.Div)
+    if isinstance(node, ast.Compare):
+        return len(node.ops) == 1
+    if isinstance(node, ast.For) and isinstance(node.iter, ast.Call):
+        return all(isinstance(item, ast.Constant) for item in node.iter.args)
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+        return node.func.id not in COMPILED_BUILTINS - _SAME_IN_COLUMNS
+    # The last bits of NumPy's other functions are not those of ``math``.
+    return not isinstance(node, ast.Call) or ast.unparse(node.func) == "math.sqrt"
 
 
 def _call(name: str, *given: ast.expr) -> ast.expr:
@@ -160,15 +169,11 @@ def _later(value: ast.expr) -> ast.Lambda:
 class _Columns(ast.NodeTransformer):
     """Writes the operations of a composed text for columns."""
 
-    def visit_If(self, node: ast.If) -> ast.AST:
-        raise _NoForm
-
-    visit_While = visit_Starred = visit_AugAssign = visit_If
-
-    def visit_For(self, node: ast.For) -> ast.AST:
-        if isinstance(node.iter, ast.Call) and not all(isinstance(item, ast.Constant) for item in node.iter.args):
-            raise _NoForm
-        return self.generic_visit(node)
+    def visit(self, node: ast.AST) -> Any:
+        """Write a node. ProgramError for what has no such form."""
+        if isinstance(node, ast.If | ast.While | ast.Starred | ast.AugAssign) or not _is_elementwise(node):
+            raise ProgramError(f"'{ast.unparse(node)}' has no form for columns")
+        return super().visit(node)
 
     def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
         test, yes, no = (self.visit(part) for part in (node.test, node.body, node.orelse))
@@ -186,25 +191,10 @@ class _Columns(ast.NodeTransformer):
         return _call("_not", inner) if isinstance(node.op, ast.Not) else ast.UnaryOp(node.op, inner)
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
-        if not isinstance(node.op, _ELEMENTWISE):
-            raise _NoForm
         left, right = self.visit(node.left), self.visit(node.right)
         return _call("_quotient", left, right) if isinstance(node.op, ast.Div) else ast.BinOp(left, node.op, right)
 
-    def visit_Compare(self, node: ast.Compare) -> ast.AST:
-        if len(node.ops) > 1:
-            raise _NoForm
-        return self.generic_visit(node)
-
     def visit_Call(self, node: ast.Call) -> ast.AST:
-        called = node.func
-        if isinstance(called, ast.Attribute):
-            # NumPy's other functions have not the last bits of those of ``math``.
-            if ast.unparse(called) != "math.sqrt":
-                raise _NoForm
+        if isinstance(node.func, ast.Attribute):
             return _call("_root", *map(self.visit, node.args))
-        if isinstance(called, ast.Name) and called.id in COMPILED_BUILTINS and called.id not in _SAME_IN_COLUMNS:
-            raise _NoForm
-        if not isinstance(called, ast.Name):
-            raise _NoForm
         return self.generic_visit(node)

@@ -49,11 +49,11 @@ def _extremes(values: Floats) -> Floats:
     return moving[np.concatenate([[True], rises[1:] != rises[:-1], [True]])] if moving.size > 1 else moving
 
 
-def _oscillations(recording: Recording, part: Recording | None) -> float | None:
+def _oscillations(recording: Recording, part: slice | None) -> float | None:
     largest = float(np.max(np.abs(recording["reference"])))
     if part is None or largest == 0.0:
         return None
-    return float(reversals(part["torque"], OSCILLATION_THRESHOLD * largest))
+    return float(reversals(recording["torque"][part], OSCILLATION_THRESHOLD * largest))
 
 
 def oscillations_ramp(recording: Recording) -> float | None:

@@ -187,15 +187,16 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     times: Floats = np.arange(outcome.record.shape[0], dtype=np.float64) * (run.step * run.record_every)
     record = outcome.record[:, :, 0]
     status = _status(outcome, record, rows, times)
-    kept = times < (np.inf if status.time is None else status.time)
-    kept[0] = True
-    by_path = {path: record[kept, row] for path, row in rows.items()}
+    kept = times.size if status.time is None else max(1, int(np.searchsorted(times, status.time)))
+    times = times[:kept]
+    columns = np.ascontiguousarray(record[:kept].T)
+    by_path = {path: columns[row] for path, row in rows.items()}
     worn = worn_kind(scenario)
     if worn is None:
-        recording = _recording(scenario, run, times[kept], by_path)
+        recording = _recording(scenario, run, times, by_path)
         metrics: Mapping[str, Metric] = evaluate(recording)
     else:
-        recording, metrics, ended = worn.measured(scenario, run, times[kept], by_path)
+        recording, metrics, ended = worn.measured(scenario, run, times, by_path)
         status = replace(status, message=ended) if status.is_completed else status
     return Result(
         scenario=scenario,
