@@ -2,10 +2,10 @@
 
 import math
 import platform
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, final
 
 import numpy as np
 
@@ -77,16 +77,52 @@ class Status:
         return self.kind == "completed"
 
 
+@final
+class Measured:
+    """Recording and metrics of a run, made when they are first asked for and then kept."""
+
+    def __init__(self, make: Callable[[], tuple[Recording, Mapping[str, Metric]]]) -> None:
+        self._make = make
+
+    def __call__(self) -> tuple[Recording, Mapping[str, Metric]]:
+        """Return both."""
+        found = self._make()
+        self._make = lambda: found
+        return found
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Measured) and self() == other()
+
+    __hash__ = None  # type: ignore[assignment]  # arrays have no hash
+
+    def __reduce__(self) -> tuple[Callable[..., "Measured"], tuple[Any, ...]]:
+        """Copy and pickle what is made, not the program that it is made from."""
+        return _measured, self()
+
+
+def _measured(recording: Recording, metrics: Mapping[str, Metric]) -> Measured:
+    return Measured(lambda: (recording, metrics))
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Result:
     """A finished run. ``versions`` are those of the packages, ``engine`` the figures of the time stepping."""
 
     scenario: Scenario
-    recording: Recording
-    metrics: Mapping[str, Metric]
+    _measured: Measured
     status: Status
     versions: Mapping[str, str]
     engine: Mapping[str, float | int | str]
+
+    @property
+    def recording(self) -> Recording:
+        """The channels of the run in SI units, up to where it failed."""
+        return self._measured()[0]
+
+    @property
+    def metrics(self) -> Mapping[str, Metric]:
+        """Named numbers of the recording, in SI units."""
+        return self._measured()[1]
 
     def __repr__(self) -> str:
         """Return name, status, duration and one line a metric, in SI units."""
@@ -188,24 +224,33 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     record = outcome.record[:, :, 0]
     status = _status(outcome, record, rows, times)
     kept = times.size if status.time is None else max(1, int(np.searchsorted(times, status.time)))
-    times = times[:kept]
-    columns = np.ascontiguousarray(record[:kept].T)
-    by_path = {path: columns[row] for path, row in rows.items()}
     worn = worn_kind(scenario)
     if worn is None:
-        recording = _recording(scenario, run, times, by_path)
-        metrics: Mapping[str, Metric] = evaluate(recording)
+        measured = Measured(lambda: _measure(scenario, run, times[:kept], _by_path(record[:kept], rows)))
     else:
-        recording, metrics, ended = worn.measured(scenario, run, times, by_path)
+        recording, metrics, ended = worn.measured(scenario, run, times[:kept], _by_path(record[:kept], rows))
+        measured = _measured(recording, Metrics(metrics))
         status = replace(status, message=ended) if status.is_completed else status
     return Result(
-        scenario=scenario,
-        recording=recording,
-        metrics=Metrics(metrics),
-        status=status,
+        scenario,
+        measured,
+        status,
         versions={"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
         engine={"step": run.step, "steps": run.step_count, "steps_per_sample": run.steps_per_sample},
     )
+
+
+def _by_path(record: Floats, rows: Mapping[str, int]) -> dict[str, Floats]:
+    """Each row (samples,) of a record (samples, rows), which lies in one piece."""
+    columns = np.ascontiguousarray(record.T)
+    return {path: columns[row] for path, row in rows.items()}
+
+
+def _measure(
+    scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]
+) -> tuple[Recording, Mapping[str, Metric]]:
+    recording = _recording(scenario, run, times, rows)
+    return recording, Metrics(evaluate(recording))
 
 
 def _status(outcome: BatchResult, record: Floats, rows: dict[str, int], times: Floats) -> Status:
