@@ -56,6 +56,9 @@ REMEDY = (
     "and check the inertia, the volumes and the valve area (ppafo audit)"
 )
 
+_OF_STEPS = ("result.failure_time", "result.too_many_parts", "pace.", "valve_state.", "controller_state.")
+"""Rows of the time stepping of which no recording of a vane is made."""
+
 DRAWS = 4
 """Draws of what moves the measurements of sensors without noise."""
 ALLOWED_PARTING = 1.0e-2
@@ -226,7 +229,8 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     kept = times.size if status.time is None else max(1, int(np.searchsorted(times, status.time)))
     worn = worn_kind(scenario)
     if worn is None:
-        measured = Measured(lambda: _measure(scenario, run, times[:kept], _by_path(record[:kept], rows)))
+        shown = {path: row for path, row in rows.items() if not path.startswith(_OF_STEPS)}
+        measured = Measured(lambda: _measure(scenario, run, times[:kept], _by_path(record[:kept], shown)))
     else:
         recording, metrics, ended = worn.measured(scenario, run, times[:kept], _by_path(record[:kept], rows))
         measured = _measured(recording, Metrics(metrics))
@@ -241,9 +245,8 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
 
 
 def _by_path(record: Floats, rows: Mapping[str, int]) -> dict[str, Floats]:
-    """Each row (samples,) of a record (samples, rows), which lies in one piece."""
-    columns = np.ascontiguousarray(record.T)
-    return {path: columns[row] for path, row in rows.items()}
+    """Rows (samples,) of a record (samples, rows), each in one piece."""
+    return {path: np.ascontiguousarray(record[:, row]) for path, row in rows.items()}
 
 
 def _measure(
