@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from ppafo.control.kind import ProfileKind
+from ppafo.control.profiles import CONSTANT
 from ppafo.engine.over_samples import over_samples
 from ppafo.engine.program import Program
 from ppafo.model.gait import ShankSeries, shank_in_gait
-from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
+from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot, torque_on_resting_foot
 
 GAIT_SHANK = ProfileKind(
     name="gait",
@@ -62,6 +63,8 @@ def torque_lines(program: Program, add: Callable[..., str], time: str, angle: st
     kind = program.shank
     if kind is None:
         return ["added = 0.0"]
+    if kind is CONSTANT:
+        return [f"added = {add(torque_on_resting_foot)}(load, shank.level, {angle})"]
     if kind is GAIT_SHANK:
         lines = [f"shank_now = {add(kind.value)}(shank, {time})"]
     else:
