@@ -98,7 +98,7 @@ def phases(rows: Rows) -> Phases:
     error = [f"{rows.error} = gas_error"] if program.is_adaptive else []
     loaded = [rows.load("begun"), rows.load("change")]
     loaded += [f"gas_error = {rows.error}"] if program.is_adaptive else []
-    reached = [] if program.leg is None else program.leg.reach(rows, program.gas.add(rows))
+    reached = move_alone(rows) if program.leg is None else program.leg.reach(rows, program.gas.add(rows))
     return [*before, [*feed(rows), *rows.keep("change"), *error], *reached, [*loaded, *finish(rows)]]
 
 
@@ -252,16 +252,24 @@ def finish(rows: Rows) -> list[str]:
     ]
 
 
+def move_alone(rows: Rows) -> Phases:
+    """Two phases, because of a long row of divisions, that lead to the motion of a vane without ground."""
+    program, add = rows.program, rows.add
+    begin = [rows.load("begun"), rows.load("change"), program.gas.add(rows)]
+    torque = torque_lines(program, add, "time + length", "begun.next_angle")
+    slide = f"slid = {add(motion.slide_part)}(plant, fed, begun, added, length)"
+    end = f"moved = {add(motion.end_part)}(plant, fed, begun, slid, length)"
+    return [[*begin, *torque, slide, *rows.keep("slid")], [*begin, rows.load("slid"), end, *rows.keep("moved")]]
+
+
 def end_motion(rows: Rows) -> list[str]:
     """Lines that lead to the state ``after`` the step, and in parts to the ``error`` of the motion."""
     program, add = rows.program, rows.add
     if program.leg is not None:
         return program.leg.end(rows)
     if program.angle is None:
-        lines = torque_lines(program, add, "time + length", "begun.next_angle")
-        lines.append(f"angle, rate, error = {add(motion.end_part)}(plant, fed, begun, added, length)")
-        lines += program.gas.move(rows, "fed", "begun.next_angle", "angle")
-        return [*lines, f"after = {add(motion.with_motion)}(fed, angle, rate)"]
+        lines = [rows.load("moved"), *program.gas.move(rows, "fed", "begun.next_angle", "moved.angle")]
+        return [*lines, f"after = {add(motion.with_motion)}(fed, moved.angle, moved.rate)", "error = moved.error"]
     if program.is_held:
         return ["after = fed", "error = 0.0"]
     return [f"after = {add(motion.with_motion)}(fed, begun.next_angle, begun.next_rate)", "error = 0.0"]

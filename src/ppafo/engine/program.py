@@ -14,7 +14,7 @@ from ppafo.engine.over_samples import called_over_samples, in_columns
 from ppafo.engine.pieces import OTHER, Feed, GasScheme, LegScheme
 from ppafo.engine.scheme.actuators import links_of
 from ppafo.engine.scheme.isothermal_gas import ISOTHERMAL
-from ppafo.engine.scheme.motion import FreePart, Pace, PrescribedStep
+from ppafo.engine.scheme.motion import FreePart, Pace, PartEnd, PartSlide, PrescribedStep
 from ppafo.engine.scheme.pneumatics import HeldChambers, SlopedFlows, StageFlows
 from ppafo.engine.source_text import Collector, SourceCollector
 from ppafo.errors import ProgramError
@@ -293,6 +293,7 @@ class Program:
             "passing": StageFlows,
             "shown": shown,
             **({"change": self.gas.change} if self.angle is None else {}),
+            **({"slid": PartSlide, "moved": PartEnd} if self.angle is None and self.leg is None else {}),
             **({} if self.leg is None else self.leg.ended),
             **({"next_valve": self.valve.state} if self.is_parted else {}),
             **(

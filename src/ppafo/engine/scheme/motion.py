@@ -125,6 +125,22 @@ class FreePart(NamedTuple):
     meets_stop: float
 
 
+class PartSlide(NamedTuple):
+    """End of a part without an event: driving torque [N m], sizes of friction, angular velocity [rad/s]."""
+
+    torque: float
+    friction: Friction
+    angular_velocity: float
+
+
+class PartEnd(NamedTuple):
+    """Angle [rad] and angular velocity [rad/s] at the end of a part, and the error of the angle over what is allowed."""
+
+    angle: float
+    rate: float
+    error: float
+
+
 class PrescribedStep(NamedTuple):
     """Angle [rad] and angular velocity [rad/s] at the end of a prescribed step."""
 
@@ -229,20 +245,28 @@ def begin_part(
     ), length
 
 
-def end_part(
+def slide_part(
     plant: PlantParameters, state: PlantState, begun: FreePart, added_torque: float, length: float
-) -> tuple[float, float, float]:
-    """Angle [rad] and angular velocity [rad/s] at the end of a part, and the error of the angle over what is allowed.
+) -> PartSlide:
+    """Where a part leads a free vane that slides on.
 
     ``state`` has the new gas and the motion of the begin; ``added_torque`` [N m] is that at the end, where the part
     would lead without reversal.
     """
-    velocity, way = state.angular_velocity, begun.way
+    velocity = state.angular_velocity
     next_1, next_2 = chamber_pressures(plant, begun.next_angle, state.mass_1, state.mass_2)
     next_torque = driving_torque(plant, begun.next_angle, next_1, next_2) + added_torque
     friction = friction_now(plant, velocity + begun.acceleration * length, next_1, next_2)
-    sliding_torque = next_torque - way * friction.in_motion
+    sliding_torque = next_torque - begun.way * friction.in_motion
     full_velocity = next_velocity(plant, velocity, begun.acceleration, sliding_torque, length)
+    return PartSlide(torque=next_torque, friction=friction, angular_velocity=full_velocity)
+
+
+def end_part(plant: PlantParameters, state: PlantState, begun: FreePart, slid: PartSlide, length: float) -> PartEnd:
+    """Where a part leads a free vane, from where it would slide; ``state`` as in ``slide_part``."""
+    velocity, way = state.angular_velocity, begun.way
+    next_torque, friction, full_velocity = slid.torque, slid.friction, slid.angular_velocity
+    sliding_torque = next_torque - way * friction.in_motion
     slides = way != 0.0 and full_velocity * way > 0.0
 
     fall = velocity - full_velocity
@@ -264,7 +288,7 @@ def end_part(
     volume_1, volume_2 = chamber_volumes(plant, begun.next_angle)
     swept = plant.volume_per_angle * (plant.angle_max - plant.angle_min)
     allowed_volume = min(ALLOWED_OF_ANGLE * swept, ALLOWED_BY_GAS * min(volume_1, volume_2))
-    return angle, rate, (bent + missed) * plant.volume_per_angle / allowed_volume
+    return PartEnd(angle, rate, (bent + missed) * plant.volume_per_angle / allowed_volume)
 
 
 def rebound_velocity(plant: PlantParameters, angular_velocity: float, torque: float) -> float:
