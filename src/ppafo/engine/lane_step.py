@@ -16,7 +16,7 @@ from typing import get_type_hints
 from ppafo.engine.lane_rows import HANDED, LaneRows, Rows, count_lanes, indent
 from ppafo.engine.lane_samples import present_pressures, pressures_of, sense_end
 from ppafo.engine.led_leg import torque_lines
-from ppafo.engine.pieces import Phases
+from ppafo.engine.pieces import Phases, RarePhase
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.run_rows import RunRows
 from ppafo.engine.scheme import motion, pneumatics
@@ -253,13 +253,18 @@ def finish(rows: Rows) -> list[str]:
 
 
 def move_alone(rows: Rows) -> Phases:
-    """Two phases, because of a long row of divisions, that lead to the motion of a vane without ground."""
+    """Phases that lead to the motion of a vane without ground; few turn, or begin to move."""
     program, add = rows.program, rows.add
     begin = [rows.load("begun"), rows.load("change"), program.gas.add(rows)]
     torque = torque_lines(program, add, "time + length", "begun.next_angle")
-    slide = f"slid = {add(motion.slide_part)}(plant, fed, begun, added, length)"
-    end = f"moved = {add(motion.end_part)}(plant, fed, begun, slid, length)"
-    return [[*begin, *torque, slide, *rows.keep("slid")], [*begin, rows.load("slid"), end, *rows.keep("moved")]]
+    slide = f"slid, moved = {add(motion.slide_part)}(plant, fed, begun, added, length)"
+    depart = f"moved = {add(motion.depart_part)}(plant, fed, begun, slid, moved, length)"
+    return [
+        [*begin, *torque, slide, *rows.keep("slid", "moved")],
+        RarePhase(
+            [*begin, rows.load("slid"), rows.load("moved"), depart, *rows.keep("moved")], rows.cells["slid.departs"]
+        ),
+    ]
 
 
 def end_motion(rows: Rows) -> list[str]:
