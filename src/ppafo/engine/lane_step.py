@@ -16,7 +16,7 @@ from typing import get_type_hints
 from ppafo.engine.lane_rows import HANDED, LaneRows, Rows, count_lanes, indent
 from ppafo.engine.lane_samples import present_pressures, pressures_of, sense_end
 from ppafo.engine.led_leg import torque_lines
-from ppafo.engine.pieces import Phases
+from ppafo.engine.pieces import Phases, RarePhase
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.run_rows import RunRows
 from ppafo.engine.scheme import motion, pneumatics
@@ -98,7 +98,7 @@ def phases(rows: Rows) -> Phases:
     error = [f"{rows.error} = gas_error"] if program.is_adaptive else []
     loaded = [rows.load("begun"), rows.load("change")]
     loaded += [f"gas_error = {rows.error}"] if program.is_adaptive else []
-    reached = [] if program.leg is None else program.leg.reach(rows, program.gas.add(rows))
+    reached = move_alone(rows) if program.leg is None else program.leg.reach(rows, program.gas.add(rows))
     return [*before, [*feed(rows), *rows.keep("change"), *error], *reached, [*loaded, *finish(rows)]]
 
 
@@ -252,16 +252,29 @@ def finish(rows: Rows) -> list[str]:
     ]
 
 
+def move_alone(rows: Rows) -> Phases:
+    """Phases that lead to the motion of a vane without ground; few turn, or begin to move."""
+    program, add = rows.program, rows.add
+    begin = [rows.load("begun"), rows.load("change"), program.gas.add(rows)]
+    torque = torque_lines(program, add, "time + length", "begun.next_angle")
+    slide = f"slid, moved = {add(motion.slide_part)}(plant, fed, begun, added, length)"
+    depart = f"moved = {add(motion.depart_part)}(plant, fed, begun, slid, moved, length)"
+    return [
+        [*begin, *torque, slide, *rows.keep("slid", "moved")],
+        RarePhase(
+            [*begin, rows.load("slid"), rows.load("moved"), depart, *rows.keep("moved")], rows.cells["slid.departs"]
+        ),
+    ]
+
+
 def end_motion(rows: Rows) -> list[str]:
     """Lines that lead to the state ``after`` the step, and in parts to the ``error`` of the motion."""
     program, add = rows.program, rows.add
     if program.leg is not None:
         return program.leg.end(rows)
     if program.angle is None:
-        lines = torque_lines(program, add, "time + length", "begun.next_angle")
-        lines.append(f"angle, rate, error = {add(motion.end_part)}(plant, fed, begun, added, length)")
-        lines += program.gas.move(rows, "fed", "begun.next_angle", "angle")
-        return [*lines, f"after = {add(motion.with_motion)}(fed, angle, rate)"]
+        lines = [rows.load("moved"), *program.gas.move(rows, "fed", "begun.next_angle", "moved.angle")]
+        return [*lines, f"after = {add(motion.with_motion)}(fed, moved.angle, moved.rate)", "error = moved.error"]
     if program.is_held:
         return ["after = fed", "error = 0.0"]
     return [f"after = {add(motion.with_motion)}(fed, begun.next_angle, begun.next_rate)", "error = 0.0"]

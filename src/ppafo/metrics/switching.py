@@ -31,7 +31,7 @@ def reversals(values: Floats, swing: float) -> int:
     """
     count, direction = 0, 0
     lowest = highest = float(values[0])
-    for value in values.tolist():
+    for value in _extremes(values).tolist():
         if direction >= 0 and value < highest - swing:
             count += direction
             direction, lowest = -1, value
@@ -42,11 +42,18 @@ def reversals(values: Floats, swing: float) -> int:
     return count
 
 
-def _oscillations(recording: Recording, part: Recording | None) -> float | None:
+def _extremes(values: Floats) -> Floats:
+    """The first and the last value, and each between them at which a signal turns back."""
+    moving = values[np.flatnonzero(np.diff(values, prepend=np.nan))]
+    rises = np.diff(moving) > 0.0
+    return moving[np.concatenate([[True], rises[1:] != rises[:-1], [True]])] if moving.size > 1 else moving
+
+
+def _oscillations(recording: Recording, part: slice | None) -> float | None:
     largest = float(np.max(np.abs(recording["reference"])))
     if part is None or largest == 0.0:
         return None
-    return float(reversals(part["torque"], OSCILLATION_THRESHOLD * largest))
+    return float(reversals(recording["torque"][part], OSCILLATION_THRESHOLD * largest))
 
 
 def oscillations_ramp(recording: Recording) -> float | None:

@@ -14,6 +14,7 @@ from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.engine.led_leg import GAIT_SHANK, LedLeg
+from ppafo.engine.over_samples import over_samples
 from ppafo.engine.pieces import GasScheme
 from ppafo.engine.program import NoParameters, Program
 from ppafo.engine.rows import rebuilt
@@ -410,9 +411,10 @@ def profile_parameters(choice: ProfileChoice) -> Any:
 
 def profile_values(choice: ProfileChoice, times: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> np.ndarray:
     """Value, rate and second derivative of a profile at times [s], shape (3, times)."""
-    kind: ProfileKind = PROFILES[choice.kind]
-    parameters = profile_parameters(choice)
-    return np.array([kind.value(parameters, float(time)) for time in times]).T
+    found = np.empty((3, times.size))
+    for row, series in enumerate(over_samples(PROFILES[choice.kind].value, profile_parameters(choice), times)):
+        found[row] = series
+    return found
 
 
 def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> Any:

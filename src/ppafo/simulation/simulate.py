@@ -2,18 +2,19 @@
 
 import math
 import platform
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, final
 
 import numpy as np
 
 from ppafo.control.profiles import CONSTANT
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
-from ppafo.engine.led_leg import GAIT_SHANK, shank_at
-from ppafo.engine.program import python_place
+from ppafo.engine.led_leg import GAIT_SHANK, shank_over_samples
+from ppafo.engine.over_samples import over_samples
+from ppafo.engine.program import place_over_samples
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together
 from ppafo.engine.scheme.actuators import pressures_of, torque_of, volumes_of
@@ -55,6 +56,9 @@ REMEDY = (
     "and check the inertia, the volumes and the valve area (ppafo audit)"
 )
 
+_OF_STEPS = ("result.failure_time", "result.too_many_parts", "pace.", "valve_state.", "controller_state.")
+"""Rows of the time stepping of which no recording of a vane is made."""
+
 DRAWS = 4
 """Draws of what moves the measurements of sensors without noise."""
 ALLOWED_PARTING = 1.0e-2
@@ -76,16 +80,52 @@ class Status:
         return self.kind == "completed"
 
 
+@final
+class Measured:
+    """Recording and metrics of a run, made when they are first asked for and then kept."""
+
+    def __init__(self, make: Callable[[], tuple[Recording, Mapping[str, Metric]]]) -> None:
+        self._make = make
+
+    def __call__(self) -> tuple[Recording, Mapping[str, Metric]]:
+        """Return both."""
+        found = self._make()
+        self._make = lambda: found
+        return found
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Measured) and self() == other()
+
+    __hash__ = None  # type: ignore[assignment]  # arrays have no hash
+
+    def __reduce__(self) -> tuple[Callable[..., "Measured"], tuple[Any, ...]]:
+        """Copy and pickle what is made, not the program that it is made from."""
+        return _measured, self()
+
+
+def _measured(recording: Recording, metrics: Mapping[str, Metric]) -> Measured:
+    return Measured(lambda: (recording, metrics))
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Result:
     """A finished run. ``versions`` are those of the packages, ``engine`` the figures of the time stepping."""
 
     scenario: Scenario
-    recording: Recording
-    metrics: Mapping[str, Metric]
+    _measured: Measured
     status: Status
     versions: Mapping[str, str]
     engine: Mapping[str, float | int | str]
+
+    @property
+    def recording(self) -> Recording:
+        """The channels of the run in SI units, up to where it failed."""
+        return self._measured()[0]
+
+    @property
+    def metrics(self) -> Mapping[str, Metric]:
+        """Named numbers of the recording, in SI units."""
+        return self._measured()[1]
 
     def __repr__(self) -> str:
         """Return name, status, duration and one line a metric, in SI units."""
@@ -186,24 +226,34 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     times: Floats = np.arange(outcome.record.shape[0], dtype=np.float64) * (run.step * run.record_every)
     record = outcome.record[:, :, 0]
     status = _status(outcome, record, rows, times)
-    kept = times < (np.inf if status.time is None else status.time)
-    kept[0] = True
-    by_path = {path: record[kept, row] for path, row in rows.items()}
+    kept = times.size if status.time is None else max(1, int(np.searchsorted(times, status.time)))
     worn = worn_kind(scenario)
     if worn is None:
-        recording = _recording(scenario, run, times[kept], by_path)
-        metrics: Mapping[str, Metric] = evaluate(recording)
+        shown = {path: row for path, row in rows.items() if not path.startswith(_OF_STEPS)}
+        measured = Measured(lambda: _measure(scenario, run, times[:kept], _by_path(record[:kept], shown)))
     else:
-        recording, metrics, ended = worn.measured(scenario, run, times[kept], by_path)
+        recording, metrics, ended = worn.measured(scenario, run, times[:kept], _by_path(record[:kept], rows))
+        measured = _measured(recording, Metrics(metrics))
         status = replace(status, message=ended) if status.is_completed else status
     return Result(
-        scenario=scenario,
-        recording=recording,
-        metrics=Metrics(metrics),
-        status=status,
+        scenario,
+        measured,
+        status,
         versions={"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
         engine={"step": run.step, "steps": run.step_count, "steps_per_sample": run.steps_per_sample},
     )
+
+
+def _by_path(record: Floats, rows: Mapping[str, int]) -> dict[str, Floats]:
+    """Rows (samples,) of a record (samples, rows), each in one piece."""
+    return {path: np.ascontiguousarray(record[:, row]) for path, row in rows.items()}
+
+
+def _measure(
+    scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]
+) -> tuple[Recording, Mapping[str, Metric]]:
+    recording = _recording(scenario, run, times, rows)
+    return recording, Metrics(evaluate(recording))
 
 
 def _status(outcome: BatchResult, record: Floats, rows: dict[str, int], times: Floats) -> Status:
@@ -257,16 +307,15 @@ def _leg_channels(run: Run, times: Floats, angle: Floats) -> dict[str, tuple[Flo
     kind, leg = run.program.shank, run.leg
     if kind is None or leg is None or kind is CONSTANT:
         return {}
-    shank = np.array([shank_at(kind, leg.shank, float(time)).angle for time in times])
+    shank = np.broadcast_to(shank_over_samples(kind, leg.shank, times).angle, times.shape)
     if kind is not GAIT_SHANK:
         return {"shank_angle": (shank, "rad"), "foot_angle": (shank - angle + 0.5 * np.pi, "rad")}
-    feet = [foot_in_gait(leg.shank, time, place) for time, place in zip(times.tolist(), angle.tolist(), strict=True)]
-    own, measured, higher = np.array(feet).T
+    foot = over_samples(foot_in_gait, leg.shank, times, angle)
     return {
         "shank_angle": (shank, "rad"),
-        "foot_angle": (own, "rad"),
-        "measured_foot_angle": (measured, "rad"),
-        "toe_difference": (higher, "m"),
+        "foot_angle": (foot.angle, "rad"),
+        "measured_foot_angle": (foot.measured_angle, "rad"),
+        "toe_difference": (foot.toe_difference, "m"),
     }
 
 
@@ -306,7 +355,7 @@ def _external_torque(scenario: Scenario, run: Run, times: Floats, rows: Mapping[
         return np.full(times.size, plant.external_torque)
     acceleration = profile_values(scenario.motion.profile, times)[2]
     angle, rate = rows["state.angle"], rows["state.angular_velocity"]
-    friction = np.array([sliding_friction(float(value), 1.0) for value in rate]) * _sizes_of_friction(run, rows)
+    friction = over_samples(sliding_friction, rate, 1.0) * _sizes_of_friction(run, rows)
     gravity = gravity_torque(angle, plant.gravity_torque)
     return np.asarray(torque - gravity - friction - plant.viscous_damping * rate - plant.inertia * acceleration)
 
@@ -317,10 +366,8 @@ def _torque_on_leg(leg: Leg, run: Run, times: Floats, rows: Mapping[str, Floats]
     angle, rate, plant = rows["state.angle"], rows["state.angular_velocity"], run.plant
     foot = foot_load(0.0, 0.0, leg.foot_mass, leg.foot_mass_centre, leg.foot_inertia, leg.shank_length)
     kind = shank_kind(leg)
-    at = [shank_at(kind, run.leg.shank, float(time)) for time in times]
-    places = list(zip(at, angle.tolist(), strict=True))
-    added = np.array([torque_on_foot(run.leg.load, now, place) for now, place in places])
-    needed = np.array([torque_on_foot(foot, now, place) for now, place in places])
+    now = shank_over_samples(kind, run.leg.shank, times)
+    added, needed = (over_samples(torque_on_foot, load, now, angle) for load in (run.leg.load, foot))
     net = torque + added - plant.external_torque - plant.viscous_damping * rate
     net -= np.sign(rate) * _sizes_of_friction(run, rows)
     acceleration = np.where(rate != 0.0, net / plant.inertia, 0.0)
@@ -329,21 +376,17 @@ def _torque_on_leg(leg: Leg, run: Run, times: Floats, rows: Mapping[str, Floats]
 
 def _sizes_of_friction(run: Run, rows: Mapping[str, Floats]) -> Floats | float:
     """Size of the friction torque in motion [N m] at each sample, with the effects of a run."""
-    law = python_place(friction_in_motion, run.program.effects, run.effects)
+    law = place_over_samples(friction_in_motion, run.program.effects, run.effects)
     if law is None:
         return run.plant.dynamic_torque
     angle, masses = rows["state.angle"], (rows["state.mass_1"], rows["state.mass_2"])
     pressures = pressures_of(run.program.actuator, run.plant, angle, *masses)
     states = {
-        name: [rebuilt(row, values) for values in zip(*(rows[path] for path in leaf_paths(row, name)), strict=True)]
+        name: rebuilt(row, [rows[path] for path in leaf_paths(row, name)])
         for name, row in run.program.effect_states.items()
     }
-    return np.array(
-        [
-            law({name: of_samples[sample] for name, of_samples in states.items()}, run.plant.dynamic_torque, *given)
-            for sample, given in enumerate(zip(rows["state.angular_velocity"], *pressures, strict=True))
-        ]
-    )
+    sizes: Floats = law(states, run.plant.dynamic_torque, rows["state.angular_velocity"], *pressures)
+    return sizes
 
 
 def compile_models(scenarios: Iterable[Scenario]) -> None:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ppafo.metrics import METRICS, evaluate
-from ppafo.metrics.metric import hold_start
+from ppafo.metrics.metric import hold
 from ppafo.metrics.switching import reversals
 from ppafo.signals import CHANNELS, Channel, Recording
 
@@ -58,14 +58,14 @@ def test_the_rms_error_does_not_depend_on_how_densely_a_part_is_sampled() -> Non
 
 def test_ramp_and_hold_part_where_the_reference_reaches_the_level_it_keeps() -> None:
     torque = np.where(TIME < 1.0, RAMP - 2.0, RAMP - 1.0)
-    assert hold_start(recording(reference=RAMP)) == 1.0
+    assert hold(recording(reference=RAMP)) == slice(1000, None)
     assert value("rms_error_hold", reference=RAMP, torque=torque) == pytest.approx(1.0)
     assert value("rms_error_ramp", reference=RAMP, torque=torque) == pytest.approx(2.0, rel=1e-3)
 
 
 def test_a_reference_that_crosses_its_final_level_is_not_on_hold_yet() -> None:
     overshooting = np.where(TIME < 2.0, 8.0 * TIME / 2.0, 6.0)
-    assert hold_start(recording(reference=overshooting)) == 2.0
+    assert hold(recording(reference=overshooting)) == slice(2000, None)
 
 
 def test_a_reference_that_never_rests_has_neither_ramp_nor_hold() -> None:
