@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 from ppafo.control.fixed.torque_laws import FIXED, FLOAT
 from ppafo.control.kind import PythonController
+from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE
 from ppafo.errors import ScenarioError
 from ppafo.model.gait import ShankSeries
 from ppafo.model.regulator import SupplyLines
@@ -227,7 +228,8 @@ class Scenario:
     Times [s]: ``time_step`` is the largest step (the engine divides it where a chamber is faster) and divides
     ``duration``, ``output_interval`` and the sample period of ``control``. Initial pressures [Pa absolute]; the
     reference is a torque [N m]. Without ``thermal`` the gas keeps its temperature, without ``supply_lines`` the supply
-    pressures are constant, both as in the paper. ``links`` say which numbers follow others that are varied, beside
+    pressures are constant, both as in the paper. ``tolerance`` is the error of a pressure over the pressure range [-] that
+    the step size control keeps to. ``links`` say which numbers follow others that are varied, beside
     those of the device.
     """
 
@@ -247,6 +249,7 @@ class Scenario:
     origin: Origin
     thermal: Thermal | None = None
     supply_lines: SupplyLines | None = None
+    tolerance: float = KEPT_OF_PRESSURE
     links: Graph = field(default_factory=dict, compare=False)
 
     def __repr__(self) -> str:

@@ -13,7 +13,7 @@ from ppafo.cli.main import main
 from ppafo.errors import SimulationError
 from ppafo.model.sensors import Measurement
 from ppafo.running import simulate
-from ppafo.simulation.check import HALF_ERROR, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck
+from ppafo.simulation.check import FINER, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
@@ -75,14 +75,14 @@ def test_a_scenario_of_the_package_determines_all_its_metrics(name: str) -> None
 
 def test_every_repeat_of_a_run_really_differs_from_it(step_response: Scenario) -> None:
     rows = {row.name: row for row in simulate(step_response).check().metrics}
-    assert list(rows["mechanical_work"].changes) == [HALF_ERROR, MOVED_START]
+    assert list(rows["mechanical_work"].changes) == [FINER, MOVED_START]
     assert all(change != 0.0 for change in rows["mechanical_work"].changes.values())
 
 
 def test_a_chaotic_loop_is_found_with_the_time_at_which_its_runs_part(chaotic: Check) -> None:
     assert not chaotic.is_determined
     assert {"rms_error", "switchings"} <= {row.name for row in chaotic.metrics if not row.is_determined}
-    assert list(chaotic.metrics[0].changes) == [HALF_ERROR, MOVED_START, MOVED_MEASUREMENT]
+    assert list(chaotic.metrics[0].changes) == [FINER, MOVED_START, MOVED_MEASUREMENT]
     assert MOVED_MEASUREMENT in chaotic.metrics[0].changed_by
     assert chaotic.parts_at is not None
     assert 0.0 < chaotic.parts_at < 0.6
@@ -98,12 +98,12 @@ def test_the_same_kind_of_loop_with_another_sensor_and_a_fine_step_is_determined
 
 
 def test_what_only_the_error_changes_is_told_from_what_nobody_could_measure() -> None:
-    moved = NumberCheck("switchings", "-", 7.0, 7e-3, {HALF_ERROR: 1.0, MOVED_START: -2.0})
-    inexact = NumberCheck("rms_error", "N m", 1.0, 1e-3, {HALF_ERROR: -2e-3, MOVED_START: 1e-9})
-    firm = NumberCheck("peak_error", "N m", 1.0, 1e-3, {HALF_ERROR: 1e-3, MOVED_START: 1e-9})
-    gone = NumberCheck("gas_per_work", "kg/J", math.nan, 1e-3, {HALF_ERROR: 0.0, MOVED_START: math.inf})
-    assert (moved.changed_by, gone.changed_by) == ({HALF_ERROR, MOVED_START}, {MOVED_START})
-    assert inexact.changed_by == {HALF_ERROR}
+    moved = NumberCheck("switchings", "-", 7.0, 7e-3, {FINER: 1.0, MOVED_START: -2.0})
+    inexact = NumberCheck("rms_error", "N m", 1.0, 1e-3, {FINER: -2e-3, MOVED_START: 1e-9})
+    firm = NumberCheck("peak_error", "N m", 1.0, 1e-3, {FINER: 1e-3, MOVED_START: 1e-9})
+    gone = NumberCheck("gas_per_work", "kg/J", math.nan, 1e-3, {FINER: 0.0, MOVED_START: math.inf})
+    assert (moved.changed_by, gone.changed_by) == ({FINER, MOVED_START}, {MOVED_START})
+    assert inexact.changed_by == {FINER}
     sentence = Check("loop", (moved, inexact, firm), (), None, ()).sentence
     assert sentence.startswith("Not determined by this run: switchings: a start moved by 1e-07 of its range")
     assert "Nor: rms_error: half the error changes them. Take a smaller run.step" in sentence
@@ -119,7 +119,7 @@ def test_a_check_prints_each_metric_with_what_changed_and_marks_what_is_open(cha
     printed = {line.split("  ")[0]: line for line in lines[2:-2]}
     for row in (*chaotic.metrics, *chaotic.courses):
         assert printed[row.name].endswith("not determined") == (not row.is_determined)
-        change, _ = metric_change(row.changes[HALF_ERROR], row.unit)
+        change, _ = metric_change(row.changes[FINER], row.unit)
         assert (f" {change:+.1e} " if change else " 0 ") in printed[row.name]
     assert lines[-1] == chaotic.sentence
 
@@ -130,7 +130,7 @@ def test_a_check_prints_numbers_in_the_units_of_the_field(chaotic: Check) -> Non
     assert " psi " in printed["pressures over time"]
     gas = next(row for row in chaotic.metrics if row.name == "gas_supplied")
     assert f"{1e3 * gas.value:.4g} g " in printed["gas_supplied"]
-    assert f" {1e3 * gas.changes[HALF_ERROR]:+.1e} " in printed["gas_supplied"]
+    assert f" {1e3 * gas.changes[FINER]:+.1e} " in printed["gas_supplied"]
 
 
 def test_a_decision_by_a_hair_of_the_start_is_found(torque_task: Callable[[str], Scenario]) -> None:
@@ -176,7 +176,7 @@ def test_the_command_writes_and_prints_a_check_where_it_is_asked_for_one(
     printed = json.loads(capsys.readouterr().out)["check"]
     assert printed == json.loads((tmp_path / "check.json").read_text())
     assert printed["is_determined"] is True
-    assert printed["metrics"][0]["changes"].keys() == {HALF_ERROR, MOVED_START}
+    assert printed["metrics"][0]["changes"].keys() == {FINER, MOVED_START}
     assert main(["simulate", "step-response", "--out", str(tmp_path)]) == 0
     assert "Check" not in capsys.readouterr().out
     assert not (tmp_path / "check.json").exists()
