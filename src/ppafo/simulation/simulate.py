@@ -514,7 +514,7 @@ def _course(name: str, repeats: list[tuple[str, Result]], result: Result, pressu
         (repeat, float(np.max(_largest_differences(repeated.recording, result.recording, _COURSES[name]))))
         for repeat, repeated in repeats
     )
-    allowed_error = (LARGEST_OF_ANGLE if is_angle else LARGEST_OF_PRESSURE) * span
+    allowed_error = (LARGEST_OF_ANGLE if is_angle else LARGEST_OF_PRESSURE) * span / MARGIN
     return NumberCheck(name, unit, span, ALLOWED_PARTING * span, changes, allowed_error)
 
 
