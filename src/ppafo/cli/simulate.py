@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(parsed: argparse.Namespace) -> int:
-    """Run a scenario and say what came of it; 1 where the run diverged, or is numerically sensitive where that was checked."""
+    """Run a scenario and say what came of it; 1 where the run diverged, or a check finds it numerically sensitive."""
     if parsed.list:
         return _list(parsed)
     if parsed.scenario is None:
@@ -83,7 +83,7 @@ def run(parsed: argparse.Namespace) -> int:
 
 
 def _error(result: "Result") -> "ErrorEstimate | None":
-    """Return the estimated error of a vane alone, whose run again takes milliseconds; that of a walk is in its check."""
+    """Return the estimated error of a vane alone, which runs again in milliseconds; that of a walk is in its check."""
     from ppafo.simulation.scenario import worn_kind
 
     return result.error() if result.status.is_completed and worn_kind(result.scenario) is None else None

@@ -81,8 +81,8 @@ class Check:
         """What the check found, in plain words."""
         if self.is_determined:
             return (
-                f"All metrics are repeatable: none changes by more than {ALLOWED_CHANGE:.0e} of its value or its range. "
-                f"{self.error.sentence}"
+                f"All metrics are repeatable: none changes by more than {ALLOWED_CHANGE:.0e} of its value or its "
+                f"range. {self.error.sentence}"
             )
         lost = [row for row in (*self.metrics, *self.courses) if not row.is_determined]
         by_move = [row.name for row in lost if row.changed_by & _MOVES]

@@ -228,9 +228,9 @@ class Scenario:
     Times [s]: ``time_step`` is the largest step (the engine divides it where a chamber is faster) and divides
     ``duration``, ``output_interval`` and the sample period of ``control``. Initial pressures [Pa absolute]; the
     reference is a torque [N m]. Without ``thermal`` the gas keeps its temperature, without ``supply_lines`` the supply
-    pressures are constant, both as in the paper. ``tolerance`` is the error of a pressure over the pressure range [-] that
-    the step size control keeps to. ``links`` say which numbers follow others that are varied, beside
-    those of the device.
+    pressures are constant, both as in the paper. ``tolerance`` is the error of a pressure over the pressure range [-]
+    that the step size control keeps to. ``links`` say which numbers follow others that are varied, beside those of the
+    device.
     """
 
     name: str
