@@ -238,7 +238,8 @@ def finish(rows: Rows) -> list[str]:
         return [f"taken = {rows.remaining} > 0.0", *lines, *stored, *(add_up(rows) if program.devices == 1 else [])]
     return [
         *lines,
-        f"error = max({', '.join(['error', 'gas_error', *state_errors(rows)])}) / timing.tolerance",
+        f"missed = max({', '.join(['error', 'gas_error', *state_errors(rows)])})",
+        "error = missed / timing.tolerance",
         f"error = error if {positive(rows)} else {motion.MAXIMUM_ERROR!r}",
         f"refused = {add(motion.is_refused)}(error, length) and not result.failure_time <= time",
         f"next_length = {add(motion.next_pace)}(pace, error, length, refused, timing.step).length",
@@ -246,7 +247,7 @@ def finish(rows: Rows) -> list[str]:
         f"{rows.cells['pace.length']} = next_length if active else pace.length",
         "taken = active and not refused",
         *store_all(rows, "taken"),
-        *judge(rows, "taken"),
+        *judge(rows, "taken", f" and not missed > {motion.LOST!r}"),
         *sense_end(rows),
         *add_up(rows),
     ]
@@ -341,13 +342,13 @@ def store_all(rows: Rows, flag: str) -> list[str]:
     return lines
 
 
-def judge(rows: Rows, flag: str = "") -> list[str]:
-    """The first time at which a run left what is possible."""
+def judge(rows: Rows, flag: str = "", followed: str = "") -> list[str]:
+    """The first time at which a run left what is possible, or where ``followed`` says so what its parts can follow."""
     gas = ", ".join(masses_after(rows))
     waits = f"not {flag} or " if flag else ""
     return [
         f"possible = {waits}(abs(after.angular_velocity) < {IMPOSSIBLE_RATE} and min({gas}) > 0.0 "
-        f"and max({gas}) < {IMPOSSIBLE_MASS}{states_are_possible(rows)})",
+        f"and max({gas}) < {IMPOSSIBLE_MASS}{states_are_possible(rows)}{followed})",
         "failed = result.failure_time if possible else min(result.failure_time, time + length)",
         f"{rows.cells['result.failure_time']} = failed",
     ]

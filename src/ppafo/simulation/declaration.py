@@ -16,6 +16,7 @@ from typing import Any
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.catalog import CONTROLLERS, ON_CHIP, PROFILES
 from ppafo.documents.models import quote
+from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE
 from ppafo.errors import KindError, ScenarioError, UnitError, nearest_name, one_line, refused_as
 from ppafo.kinds import Kinds
 from ppafo.model.declaration import Quantity, range_rule
@@ -33,6 +34,10 @@ RUN = (
     Quantity("step", "s", "largest step; 1 ms unless given, less where a sample comes sooner", 1.0e-3, 1.0e-8, 1.0e3),
     Quantity("output_interval", "s", "time between two recorded samples; the step unless given", 1.0e-3, 1.0e-8, 1.0e6),
 )
+ACCURACY = Quantity(
+    "tolerance", "1", "error of a pressure to keep to, over the pressure range", KEPT_OF_PRESSURE, 1.0e-6, 0.1
+)
+"""With the default a pressure keeps to 1e-3 of the pressure range and the angle to 2e-4 of its own."""
 ANGLE = Quantity("angle", "rad", "angle of the vane, 90 deg neutral, growing in plantarflexion", None, -10.0, 10.0)
 FREE = (
     ANGLE,
@@ -176,7 +181,7 @@ def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
     motion = kind_at(document, "motion")
     # The settings of a kind of motion; a prescribed one has a profile instead.
     sections = {
-        "run": RUN,
+        "run": (*RUN, ACCURACY),
         "motion": {"free": FREE, "held": (ANGLE,), "leg": LEG}.get(motion, ()),
         "motion.profile": profile_settings(kind_at(document, "motion.profile"), ANGLE_LEVEL)
         if motion == "prescribed"

@@ -32,6 +32,7 @@ from ppafo.parameters.parameter_set import atmospheric_pressure, chosen_valve, e
 from ppafo.simulation import declaration
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock, read_clock
 from ppafo.simulation.declaration import (
+    ACCURACY,
     ARITHMETIC,
     AT_REST,
     INITIAL,
@@ -284,6 +285,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         origin=Origin(request.path, document["device"]["set"], hardware.valve, request.overrides, request.content),
         thermal=read_thermal(reading),
         supply_lines=read_supply_lines(reading, device),
+        tolerance=reading.number("run.tolerance", ACCURACY),
         links=_links_at_start(reading),
     )
     # Refuse what only a vane has.

@@ -31,7 +31,11 @@ _CHOSEN_VALVE = "valve."
 _DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 _OF_SENSORS = {"angle_resolution": "angle_quantum", "pressure_resolution": "pressure_quantum"}
 _OF_WALLS = {"wall_area_per_volume": "area_per_volume"}
-_INITIAL = {"initial.pressure_1": "initial_pressure_1", "initial.pressure_2": "initial_pressure_2"}
+_OF_SCENARIO = {
+    "initial.pressure_1": "initial_pressure_1",
+    "initial.pressure_2": "initial_pressure_2",
+    "run.tolerance": "tolerance",
+}
 _ORIFICES = {"actuator.leak": ("device", "actuator", "leak"), "valve": ("device", "valve", "orifice")}
 
 _TEXTS = (
@@ -168,8 +172,8 @@ def _place(path: str, scenario: Scenario) -> tuple[str, ...]:
     worn = worn_kind(scenario)
     if worn is not None and path in worn.places:
         return worn.places[path]
-    if path in _INITIAL:
-        return (_INITIAL[path],)
+    if path in _OF_SCENARIO:
+        return (_OF_SCENARIO[path],)
     if path == HELD_ANGLE and not isinstance(scenario.motion, FreeMotion):
         return ("motion", "profile", "settings", "level")
     if section.startswith(f"{SUPPLY_LINE}."):

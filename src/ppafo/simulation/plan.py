@@ -21,7 +21,7 @@ from ppafo.engine.rows import rebuilt
 from ppafo.engine.run import Lines, ReactingWalk, Run, Walk
 from ppafo.engine.scheme.actuators import volumes_of
 from ppafo.engine.scheme.isothermal_gas import ISOTHERMAL
-from ppafo.engine.scheme.pneumatics import is_slow
+from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE, is_slow
 from ppafo.errors import ScenarioError
 from ppafo.kinds import kind_at
 from ppafo.model.actuators.vane import KIND as VANE
@@ -111,7 +111,8 @@ class Pieces:
 class Steps:
     """Length of a step [s], how many there are, how many to a sample of the controller and of the recording.
 
-    ``needs_parts`` is true where the error decides about the parts of a step.
+    ``needs_parts`` is true where the error decides about the parts of a step; ``tolerance`` is the error over the one
+    that a run is allowed by default [-].
     """
 
     step: Any
@@ -119,6 +120,7 @@ class Steps:
     steps_per_sample: Any
     record_every: Any
     needs_parts: Any
+    tolerance: Any = 1.0
 
 
 StepRule = Callable[[PlantParameters], Steps]
@@ -163,6 +165,7 @@ def compose_run(
         signal_delay=pieces.signal_delay,
         command_delay=delay,
         needs_parts=steps.needs_parts,
+        tolerance=steps.tolerance,
         walk=walk if isinstance(walk, Walk) else None,
         reacting=walk if isinstance(walk, ReactingWalk) else None,
         lines=initial_lines(plant, pieces.supply_lines),
@@ -276,13 +279,20 @@ def _numbers_of_law(
 def scenario_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
     """The steps of a scenario: the largest that divides a sample of its controller, in parts where the error asks."""
     counts = step_counts(scenario.duration, scenario.time_step, scenario.output_interval, scenario.control.period)
+    tolerance = relative_tolerance(scenario.tolerance)
     return Steps(
         step=counts.step,
         step_count=whole(counts.step_count),
         steps_per_sample=whole(counts.steps_per_sample),
         record_every=counts.record_every,
-        needs_parts=is_adaptive(scenario, plant, counts.step),
+        needs_parts=is_adaptive(scenario, plant, counts.step / smaller(1.0, tolerance)),
+        tolerance=tolerance,
     )
+
+
+def relative_tolerance(tolerance: float) -> float:
+    """Allowed error of a pressure over the one that is allowed by default [-], from ``run.tolerance`` [-]."""
+    return tolerance / KEPT_OF_PRESSURE
 
 
 def outside_torque(motion: VaneMotion) -> Any:

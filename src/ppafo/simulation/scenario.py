@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 from ppafo.control.kind import PythonController
+from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE
 from ppafo.errors import ScenarioError
 from ppafo.model.gait import ShankSeries
 from ppafo.model.regulator import SupplyLines
@@ -218,8 +219,9 @@ class Scenario:
     Times [s]: ``time_step`` is the largest step (the engine divides it where a chamber is faster) and divides
     ``duration``, ``output_interval`` and the sample period of ``control``. Initial pressures [Pa absolute]; the
     reference is a torque [N m]. Without ``thermal`` the gas keeps its temperature, without ``supply_lines`` the supply
-    pressures are constant, both as in the paper. ``links`` say which numbers follow others that are varied, beside
-    those of the device.
+    pressures are constant, both as in the paper. ``tolerance`` is the error of a pressure over the pressure range [-]
+    that the step size control keeps to. ``links`` say which numbers follow others that are varied, beside those of the
+    device.
     """
 
     name: str
@@ -238,6 +240,7 @@ class Scenario:
     origin: Origin
     thermal: Thermal | None = None
     supply_lines: SupplyLines | None = None
+    tolerance: float = KEPT_OF_PRESSURE
     links: Graph = field(default_factory=dict, compare=False)
 
     def __repr__(self) -> str:

@@ -206,7 +206,10 @@ def _scenario_file(*_kinds: Any) -> type[BaseModel]:
     reference = _profile(declaration.TORQUE_LEVEL, "Reference")
     initial = table("Initial", quantity_fields(declaration.INITIAL, words))
     own: dict[str, Any] = {
-        "run": (table("Run", quantity_fields(declaration.RUN)), Field(description="times of the run")),
+        "run": (
+            table("Run", quantity_fields((*declaration.RUN, declaration.ACCURACY))),
+            Field(description="times of the run, and its accuracy"),
+        ),
         "motion": (_motion(), Field(description="what the vane does")),
         "initial": optional(initial, "state of the gas at the start; atmosphere unless given"),
         "controller": (

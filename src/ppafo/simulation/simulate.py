@@ -29,7 +29,8 @@ from ppafo.model.plant import gravity_torque, sliding_friction
 from ppafo.model.regulator import LineState, line_pressures
 from ppafo.parameters.device import Gas
 from ppafo.signals.recording import Channel, Recording
-from ppafo.simulation.check import ALLOWED_CHANGE, HALF_ERROR, MOVE, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck
+from ppafo.simulation.accuracy import LARGEST_OF_ANGLE, LARGEST_OF_PRESSURE, MARGIN, ErrorEstimate, finer
+from ppafo.simulation.check import ALLOWED_CHANGE, FINER, MOVE, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck
 from ppafo.simulation.plan import foot_load, plan_run, profile_values, shank_kind
 from ppafo.simulation.sampled import run_sampled, state_row_numbers
 from ppafo.simulation.scenario import (
@@ -145,12 +146,20 @@ class Result:
         valve = self.scenario.device.valve.kind
         return recording_figure(self.recording, self.scenario.name, remark, atmosphere, valve)
 
+    def error(self) -> ErrorEstimate:
+        """Return the estimated error [SI] of this run from its steps: it runs again with a sixteenth of it.
+
+        SimulationError for a run that diverged.
+        """
+        if not self.status.is_completed:
+            raise SimulationError(f"{self.scenario.name}: the run diverged, so its error cannot be estimated")
+        return _error(self, results_of(self.scenario, [finer(plan_run(self.scenario))])[0])
+
     def check(self) -> Check:
-        """Return what this run determines: it runs again with half the error, and with start and measurements moved.
+        """Return whether this run can be repeated: with finer steps, and with start and measurements moved.
 
         SimulationError for a run that diverged, and for a Python controller that gives a different run each time.
         """
-        # What a completed run determines; SimulationError for one that diverged, or that is never the same.
         scenario = self.scenario
         if not self.status.is_completed:
             raise SimulationError(f"{scenario.name}: the run diverged, so there is nothing to check")
@@ -169,6 +178,7 @@ class Result:
             scenario=scenario.name,
             metrics=_metrics(self, found, pressures),
             courses=courses,
+            error=_error(self, results[0]),
             parts_at=_time_of_parting([repeated for _, repeated in found], self, courses),
             failed=tuple(dict.fromkeys(name for name, repeated in found if not repeated.status.is_completed)),
             atmosphere=scenario.device.supply.atmospheric_pressure,
@@ -397,6 +407,18 @@ def compile_models(scenarios: Iterable[Scenario]) -> None:
         load_program(program)
 
 
+def _error(result: Result, fine: Result) -> ErrorEstimate:
+    """The estimated error of a result, from that of the same run with finer steps; inf where that diverged."""
+    if not fine.status.is_completed:
+        return ErrorEstimate(math.inf, math.inf, dict.fromkeys(result.metrics, math.inf))
+    angle, pressure = (
+        MARGIN * float(np.max(_largest_differences(fine.recording, result.recording, names)))
+        for names in _COURSES.values()
+    )
+    changes = {name: abs(_difference(_value(fine, name), _value(result, name))) for name in result.metrics}
+    return ErrorEstimate(angle, pressure, {name: MARGIN * change for name, change in changes.items()})
+
+
 def _check_repeatable(result: Result, run: Run) -> None:
     """Refuse a Python controller that gives a different run each time: every change would be its own."""
     controller = result.scenario.control.custom
@@ -412,22 +434,18 @@ def _check_repeatable(result: Result, run: Run) -> None:
 
 def _repeats(run: Run, pressures: float) -> list[tuple[str, Run]]:
     """The runs to compare with, by what is changed in them; moved ones in both directions."""
-    half = replace(
-        run,
-        tolerance=0.5 * run.tolerance,
-        step=0.5 * run.step,
-        step_count=2 * run.step_count,
-        steps_per_sample=2 * run.steps_per_sample,
-        record_every=2 * run.record_every,
-    )
-    repeats = [(HALF_ERROR, half), *((MOVED_START, _start_moved(run, move)) for move in (MOVE, -MOVE))]
+    starts = [_start_moved(run, move, apart) for apart in (1.0, -1.0) for move in (MOVE, -MOVE)]
+    repeats = [(FINER, finer(run)), *((MOVED_START, moved) for moved in starts)]
     if run.program.ideal_sensors:
         return repeats
     return [*repeats, *((MOVED_MEASUREMENT, moved) for moved in _measurements_moved(run, pressures))]
 
 
-def _start_moved(run: Run, move: float) -> Run:
-    """The run from a little more gas in both chambers, and where the vane is free from a little further on."""
+def _start_moved(run: Run, move: float, apart: float) -> Run:
+    """The run from a little more gas in both chambers, and where the vane is free from a little further on.
+
+    With ``apart`` -1 chamber 2 has a little less instead: a torque that is exactly the wanted one then is so no more.
+    """
     plant, start = run.plant, run.initial
     angle = start.angle
     if run.program.angle is None:
@@ -436,10 +454,8 @@ def _start_moved(run: Run, move: float) -> Run:
     actuator = run.program.actuator
     pressures = pressures_of(actuator, plant, start.angle, start.mass_1, start.mass_2)
     before, after = (volumes_of(actuator, plant, at, *pressures) for at in (start.angle, angle))
-    mass_1, mass_2 = (
-        mass * now / then * (1.0 + move)
-        for mass, now, then in zip((start.mass_1, start.mass_2), after, before, strict=True)
-    )
+    mass_1 = start.mass_1 * after[0] / before[0] * (1.0 + move)
+    mass_2 = start.mass_2 * after[1] / before[1] * (1.0 + apart * move)
     return replace(run, initial=start._replace(angle=angle, mass_1=mass_1, mass_2=mass_2))
 
 
@@ -472,7 +488,7 @@ def _metrics(result: Result, repeats: list[tuple[str, Result]], pressures: float
         value = _value(result, name)
         changes = _largest((repeat, _difference(_value(repeated, name), value)) for repeat, repeated in repeats)
         scale = max(abs(value) if math.isfinite(value) else 0.0, _metric_range(result, name, kind.unit, pressures))
-        rows.append(NumberCheck(name, kind.unit, value, ALLOWED_CHANGE * scale, changes))
+        rows.append(NumberCheck(name, kind.unit, value, ALLOWED_CHANGE * scale, changes, ALLOWED_CHANGE * scale))
     return tuple(rows)
 
 
@@ -541,7 +557,8 @@ def _course(name: str, repeats: list[tuple[str, Result]], result: Result, pressu
         (repeat, float(np.max(_largest_differences(repeated.recording, result.recording, _COURSES[name]))))
         for repeat, repeated in repeats
     )
-    return NumberCheck(name, unit, span, ALLOWED_PARTING * span, changes)
+    allowed_error = (LARGEST_OF_ANGLE if is_angle else LARGEST_OF_PRESSURE) * span / MARGIN
+    return NumberCheck(name, unit, span, ALLOWED_PARTING * span, changes, allowed_error)
 
 
 def _time_of_parting(repeats: list[Result], result: Result, courses: tuple[NumberCheck, ...]) -> float | None:

@@ -26,6 +26,8 @@ from ppafo.model.plant import (
 SAME_INSTANT = 1.0e-9
 SHORTEST_PART = 1.0e-6
 """A part [s] this short is taken as it is."""
+LOST = 1.0e5
+"""Error of a part over what is allowed by default beyond which a run is lost: a fifth of the range of the angle."""
 SAFETY = 0.81
 MINIMUM_ERROR = 0.2025
 MAXIMUM_ERROR = 20.25

@@ -19,6 +19,7 @@ from ppafo.exports.c_library.files import Relation, Setting, c_identifier
 from ppafo.exports.c_library.program import COUNTS
 from ppafo.model.actuators.kind import Range, mean_growth
 from ppafo.model.catalog import VALVES, device_effects
+from ppafo.model.columns import smaller
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait import ShankSeries
 from ppafo.model.gas import specific_gas_constant
@@ -46,6 +47,7 @@ from ppafo.simulation.plan import (
     foot_load,
     is_slow_held,
     lines_at_start,
+    relative_tolerance,
     shank_kind,
     state_at_start,
     state_with_volumes,
@@ -247,7 +249,7 @@ class Writing:
         made = self.row("SonicOrifice" if is_sonic else "Orifice", self.section(section, names))
         return f"{self.add(sonic_restriction if is_sonic else area_restriction)}({made}, gas, flow_linear_ratio)"
 
-    def timing(self, signal_delay: str) -> Iterator[str]:
+    def timing(self, signal_delay: str, tolerance: str = "1.0") -> Iterator[str]:
         """Lines that make the valve, delays in steps, and the timing, once there are ``counts_of_steps``."""
         add, model = self.add, self.program.valve
         names = [item.name for item in VALVES[self.device.valve.kind].quantities]
@@ -258,7 +260,7 @@ class Writing:
         yield f"command_steps, command_lag = {add(whole_and_rest)}(command_delay, step)"
         yield f"signal_steps, signal_lag = {add(whole_and_rest)}({signal_delay}, step)"
         period = "step * counts_of_steps.steps_per_sample"
-        yield f"timing = {add(LaneTiming)}(step, {period}, command_lag, signal_lag, 1.0)"
+        yield f"timing = {add(LaneTiming)}(step, {period}, command_lag, signal_lag, {tolerance})"
 
     def gas(self) -> Iterator[str]:
         """Lines that make the noise of the sensors, how the gas takes up heat, and the lines of the supply."""
@@ -414,12 +416,14 @@ def _steps(scenario: Scenario, writing: Writing) -> Iterator[str]:
     """Lines that make the steps, delays in them, and whether the error decides about their parts."""
     given = "run_duration, run_step, run_output_interval, controller_period"
     yield f"counts_of_steps = {writing.add(step_counts)}({given})"
-    yield from writing.timing("sensors_delay")
+    yield f"tolerance = {writing.add(relative_tolerance)}(run_tolerance)"
+    yield from writing.timing("sensors_delay", "tolerance")
     if scenario.supply_lines is not None or not writing.program.is_held or writing.program.has_shape:
         yield "needs_parts = True"
         return
     stiffness = "1.0" if scenario.thermal is None else "gas_heat_capacity_ratio"
-    yield f"needs_parts = not {writing.add(is_slow_held)}(plant, step, motion_angle, {stiffness})"
+    shortened = f"step / {writing.add(smaller)}(1.0, tolerance)"
+    yield f"needs_parts = not {writing.add(is_slow_held)}(plant, {shortened}, motion_angle, {stiffness})"
 
 
 def _pieces(scenario: Scenario, writing: Writing) -> Iterator[str]:

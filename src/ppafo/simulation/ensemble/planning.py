@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.engine.lanes import Batch, Floats
-from ppafo.engine.run import Members, batches_of
+from ppafo.engine.run import Members, Run, batches_of
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at
 from ppafo.model.declaration import Quantity, range_rule
 from ppafo.parameters.building import actuator_problem, beyond_pressures, consistency, growth_and_problem
 from ppafo.parameters.device import VANE
 from ppafo.parameters.plant import switches_of
+from ppafo.simulation.accuracy import unchanged
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock
 from ppafo.simulation.declaration import limits, quantity_text
 from ppafo.simulation.motion import TOLERANCE, profile_problem
@@ -168,24 +169,24 @@ class EnsemblePlan:
     reasons: dict[int, str]
 
 
-def plan_ensemble(columns: Columns) -> EnsemblePlan:
-    """Batches of all runs that can be; each run has the rows, bit for bit, that ``plan_run`` gives it alone."""
+def plan_ensemble(columns: Columns, change: Callable[[Run], Run] = unchanged) -> EnsemblePlan:
+    """Batches of all runs that can be; each has the rows, bit for bit, that ``plan_run`` gives it alone and changed."""
     screen = screen_columns(columns)
     batches: list[tuple[Members, Batch]] = []
     if screen.members.size:
         for places in _of_one_program(screen.scenario, screen.members.size):
-            batches += _plan_batches(screen, places)
+            batches += _plan_batches(screen, places, change)
     return EnsemblePlan(tuple(batches), screen.reasons)
 
 
-def _plan_batches(screen: Screen, places: Members) -> list[tuple[Members, Batch]]:
+def _plan_batches(screen: Screen, places: Members, change: Callable[[Run], Run]) -> list[tuple[Members, Batch]]:
     """Batches of some runs that ask for one program; what cannot be planned is refused."""
     part = screen.at(places)
     while part.members.size:
         run, problems = plan_runs(part.scenario)
         bad = [problem for problem in problems if np.any(problem[0])]
         if not bad:
-            return [(part.members[members], batch) for members, batch in batches_of(run, part.members.size)]
+            return [(part.members[members], batch) for members, batch in batches_of(change(run), part.members.size)]
         part.refuse(*bad[0])
     return []
 
