@@ -14,18 +14,12 @@ def start() -> int:
         code = main()
         interrupts.listen_no_more()
         return 130 if interrupts.is_interrupted() else code
-    except (KeyboardInterrupt, RuntimeError, ImportError) as error:
-        if not _is_interrupt(error):
+    except (KeyboardInterrupt, Exception) as error:
+        # Python wraps an interrupt that falls into the making of a class, pydantic makes another error of it.
+        if not (isinstance(error, KeyboardInterrupt) or interrupts.is_interrupted()):
             raise
         sys.stderr.write("ppafo: interrupted; nothing is half written\n")
         return 130
-
-
-def _is_interrupt(error: BaseException | None) -> bool:
-    """Tell whether an error comes of an interrupt: one that falls into the making of a class is wrapped by Python."""
-    while error is not None and not isinstance(error, KeyboardInterrupt):
-        error = error.__cause__ or error.__context__
-    return error is not None
 
 
 if __name__ == "__main__":
