@@ -1,5 +1,6 @@
 """Start of the command line, ``ppafo`` or ``python -m ppafo``; an interrupt while modules load is no traceback."""
 
+import os
 import sys
 
 from ppafo import interrupts
@@ -7,6 +8,10 @@ from ppafo import interrupts
 
 def start() -> int:
     """Run the command line and return its exit code, 130 after a signal to end."""
+    # The next file that is opened would take the number of a closed stream, and what is printed would go into it.
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: PTH123, SIM115
     try:
         interrupts.listen()
         from ppafo.cli.main import main
