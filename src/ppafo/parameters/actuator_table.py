@@ -28,7 +28,7 @@ from ppafo.model.actuators.table import (
     Rise,
     Table,
 )
-from ppafo.units import to_si
+from ppafo.units import number_text, to_si
 
 Floats = NDArray[np.float64]
 
@@ -151,7 +151,7 @@ _EXAMPLES = {"angle": "deg", "pressure": "kPa_g", "volume_1": "mL", "volume_2": 
 
 def _number(cell: str, name: str, where: str) -> float:
     try:
-        value = float(cell) if len(cell) <= _SHOWN and "_" not in cell else math.nan
+        value = float(number_text(cell)) if len(cell) <= _SHOWN else math.nan
     except ValueError:
         value = math.nan
     if not math.isfinite(value):

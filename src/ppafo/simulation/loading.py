@@ -67,7 +67,7 @@ from ppafo.simulation.scenario import (
     Thermal,
 )
 from ppafo.simulation.schema import scenario_file, whole_scenario_file
-from ppafo.units import format_quantity, split_quantity
+from ppafo.units import format_quantity, number_text, split_quantity
 
 _SECTION = "assumed"
 _NOTHING_TO_FOLLOW = ProfileChoice("constant", {"level": 0.0})
@@ -216,7 +216,7 @@ def _with_unit_of_gain(document: dict[str, Any], path: str, text: str, declared:
 
 def _seed(path: str, text: str) -> int:
     try:
-        return int(text)
+        return int(number_text(text))
     except ValueError as error:
         raise ScenarioError(f"override '{path}={text}': must be a whole number") from error
 

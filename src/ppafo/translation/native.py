@@ -38,7 +38,6 @@ from ppafo.translation.c99 import FLAGS, c_source
 from ppafo.translation.typed import FLOAT, INT, LIBRARY, Array, Scalar, Type
 from ppafo.translation.walk import entries_of, walk_module
 
-
 LONGEST_COMPILING = 300.0
 """Seconds after which a compiler is ended that has not ended by itself; the longest program takes a tenth of it."""
 _LONGEST_ANSWER = 10.0

@@ -91,6 +91,7 @@ def test_a_curve_is_a_cubic_where_the_volume_is_one(angles: int) -> None:
         (("angle [deg],angle [deg],volume_1 [mL]", "1,2,3"), "there are two columns 'angle'"),
         ((HEADER, "1,2"), "line 2: has 2 values, the header has 3"),
         ((HEADER, "1,2,nan"), "line 2: volume_1 = 'nan' is not a finite number"),
+        ((HEADER, "1,2,\uff13"), "line 2: volume_1 = '\uff13' is not a finite number"),
         ((HEADER, *GOOD, "100,90,1e9"), "line 8: volume_1 = 1e+09 mL is beyond"),
         ((HEADER, *GOOD[:-1]), "there is no line for 100 deg and 50 kPa_g"),
         ((HEADER, *GOOD, GOOD[0]), "there is more than one line for 20 deg and 0 kPa_g"),
