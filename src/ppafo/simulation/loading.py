@@ -17,7 +17,7 @@ from pydantic_core import ErrorDetails
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.fixed.torque_laws import FIXED, FLOAT
 from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
-from ppafo.documents.models import first_problem, is_gap
+from ppafo.documents.models import all_problems, is_gap
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
 from ppafo.model.catalog import EFFECTS, VALVES
@@ -611,4 +611,4 @@ def _problems(document: dict[str, Any], layout: Layout) -> list[ErrorDetails]:
 
 def _refuse(problems: list[ErrorDetails], file: str, layout: Layout) -> None:
     if problems:
-        raise ScenarioError(f"{file}: {first_problem(problems, layout.whole())}")
+        raise ScenarioError(f"{file}: {all_problems(problems, layout.whole())}")

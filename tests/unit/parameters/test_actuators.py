@@ -85,6 +85,7 @@ def test_a_curve_is_a_cubic_where_the_volume_is_one(angles: int) -> None:
         ((HEADER,), "no line of numbers"),
         (("angel [deg],pressure [kPa_g],volume_1 [mL]", "1,2,3"), "unknown column 'angel', did you mean 'angle'?"),
         (("angle [deg],pressure [kPa_g]", "1,2"), "column 'volume_1' is missing"),
+        (("angle [deg]", "1"), "columns 'pressure' and 'volume_1' are missing"),
         (("angle,pressure [kPa_g],volume_1 [mL]", "1,2,3"), "column 'angle' has no unit"),
         (("angle [deg],pressure [kPa],volume_1 [mL]", "1,2,3"), "give gauge, as in kPa_g"),
         (("angle [kg],pressure [kPa_g],volume_1 [mL]", "1,2,3"), "column 'angle'"),
