@@ -10,6 +10,7 @@ from typing import Any
 from ppafo.cli import output
 from ppafo.errors import DataError, ScenarioError, UnitError, refused_as
 from ppafo.questions.question import minutes
+from ppafo.units import number_text
 
 _C = "write a scenario or a walk as a library in C: header, source, example, make files"
 _UNIT = "write a scenario or a walk as a functional mock-up unit (FMU)"
@@ -188,7 +189,7 @@ def _walked(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
 def _times(text: str) -> tuple[float, ...]:
     """Return times [s] that are separated by commas; DataError for anything else."""
     try:
-        times = tuple(float(part) for part in text.split(","))
+        times = tuple(float(number_text(part)) for part in text.split(","))
     except ValueError:
         times = (math.nan,)
     if not all(map(math.isfinite, times)):

@@ -13,6 +13,7 @@ from functools import partial
 from itertools import takewhile
 from typing import TYPE_CHECKING, NoReturn, final
 
+from ppafo import interrupts
 from ppafo.cli.output import flush_output, printing
 from ppafo.errors import PpafoError, nearest_name, one_line
 from ppafo.questions.catalogue import QUESTIONS
@@ -284,6 +285,7 @@ def _run(words: list[str]) -> int:
         _check_each_set_once(getattr(parsed, "overrides", ()), getattr(parsed, "minutes", None))
         return int(parsed.run(parsed))
     except PpafoError as error:
+        interrupts.check()  # what an interrupt broke is no mistake of the user's
         lines = [f"{len(error.parts)} things are wrong:", *error.parts] if error.parts else [str(error)]
         print("ppafo: " + "\n  ".join(_readable(one_line(line)) for line in lines), file=sys.stderr)
         return EXIT_BAD_INPUT

@@ -149,8 +149,10 @@ def _number_from(text: str, least: int) -> int:
 
 def fraction(text: str) -> float:
     """Return a number from 0 to 1 from a text such as ``0.02`` or ``2%``; ArgumentTypeError for any other text."""
+    from ppafo.units import number_text
+
     try:
-        number = float(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
+        number = float(number_text(text.removesuffix("%"))) / (100.0 if text.endswith("%") else 1.0)
     except ValueError:
         number = math.nan
     if not 0.0 <= number <= 1.0:

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.documents.models import first_problem, is_gap
+from ppafo.documents.models import all_problems, is_gap
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
 from ppafo.model.catalog import EFFECTS, VALVES
@@ -67,7 +67,7 @@ from ppafo.simulation.scenario import (
     Thermal,
 )
 from ppafo.simulation.schema import scenario_file, whole_scenario_file
-from ppafo.units import format_quantity, split_quantity
+from ppafo.units import format_quantity, number_text, split_quantity
 
 _SECTION = "assumed"
 _NOTHING_TO_FOLLOW = ProfileChoice("constant", {"level": 0.0})
@@ -225,7 +225,7 @@ def _with_unit_of_gain(document: dict[str, Any], path: str, text: str, declared:
 
 def _seed(path: str, text: str) -> int:
     try:
-        return int(text)
+        return int(number_text(text))
     except ValueError as error:
         raise ScenarioError(f"override '{path}={text}': must be a whole number") from error
 
@@ -616,4 +616,4 @@ def _problems(document: dict[str, Any], layout: Layout) -> list[ErrorDetails]:
 
 def _refuse(problems: list[ErrorDetails], file: str, layout: Layout) -> None:
     if problems:
-        raise ScenarioError(f"{file}: {first_problem(problems, layout.whole())}")
+        raise ScenarioError(f"{file}: {all_problems(problems, layout.whole())}")

@@ -18,7 +18,7 @@ from pydantic import BaseModel, Field
 
 from ppafo.documents.models import NAME, make_schema, optional, read_model, table
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, refused_as
+from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, refused_as, said_missing
 from ppafo.model.cold_gas import ColdSupply, Passage
 from ppafo.model.declaration import Quantity, range_rule
 from ppafo.model.gas import SPECIES
@@ -324,7 +324,7 @@ def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
     """Return the bottle of these values, or report what is missing or cannot be."""
     missing = [path for path in NEEDED if path not in entries]
     if missing:
-        raise ParameterError(f"{file}: '{missing[0]}' is missing")
+        raise ParameterError(f"{file}: {said_missing(missing)}")
     values = {path: _in_si(path, entry, file) for path, entry in entries.items()}
     fluid = _fluid(parsed.gas.value, file)
     bottle = Bottle(
@@ -378,7 +378,7 @@ def _mass_of_fill(values: Mapping[str, float], fluid: Fluid, file: str) -> float
         return values["bottle.gas_mass"]
     missing = [path for path in by_pressure if path not in values]
     if missing:
-        raise ParameterError(f"{file}: '{missing[0]}' is missing beside {given[0]}")
+        raise ParameterError(f"{file}: {said_missing(missing)} beside {given[0]}")
     pressure, temperature = (values[path] for path in by_pressure)
     _check_temperature("bottle.fill_temperature", temperature, fluid, file)
     if fluid_pressure(fluid.table, temperature, math.inf) < pressure:
