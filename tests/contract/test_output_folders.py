@@ -35,7 +35,6 @@ FOLDERS: dict[str, list[str]] = {
     "audit": ["ppafo2011"],
     "schema": ["scenario"],
     "cache": [],
-    "bits": ["off"],
     "export c": ["c", "step-response"],
     "export fmu": ["fmu", "step-response"],
     "export opensim": ["opensim", "solenoid", "--minutes", "0.05"],

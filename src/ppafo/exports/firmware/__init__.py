@@ -195,7 +195,8 @@ def chip_controller(scenario: Scenario) -> ChipController:
     law = FIXED_LAWS[control.kind]
     row = plan_run(scenario).controller
     numbers = dict(zip((item.name for item in law.number_quantities), leaves(row.numbers), strict=True))
-    return ChipController(law, numbers, converter_with(row.steps, row.numbers.limits), ticks)
+    converter = converter_with(row.steps, row.numbers.limits)
+    return ChipController(law=law, numbers=numbers, converter=converter, ticks=ticks)
 
 
 def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
