@@ -20,7 +20,7 @@ from ppafo.live.words import label_of, words
 from ppafo.loading import load_scenario
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.simulation.declaration import OF_A_VANE, PRESSURE_WORDS
-from ppafo.simulation.loading import apply_overrides, is_of_device
+from ppafo.simulation.overrides import apply_overrides, is_of_device
 from ppafo.simulation.scenario import FreeMotion, Scenario, vane_motion, worn_kind
 from ppafo.units import conversion, from_si, to_si
 from ppafo.version import __version__

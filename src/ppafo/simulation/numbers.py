@@ -20,7 +20,7 @@ from ppafo.parameters.plant import all_settings
 from ppafo.simulation import declaration
 from ppafo.simulation.clock import Clock, read_clock
 from ppafo.simulation.declaration import SUPPLY_LINE, SUPPLY_LINES, Reading
-from ppafo.simulation.loading import apply_overrides
+from ppafo.simulation.overrides import apply_overrides
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, PrescribedMotion, Scenario, worn_kind
 
 HELD_ANGLE = "motion.angle"

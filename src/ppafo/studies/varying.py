@@ -17,7 +17,7 @@ from ppafo.parameters.graph import counts_from, gauge_link
 from ppafo.parameters.parameter_set import Entry, atmospheric_pressure, entry_in_si
 from ppafo.simulation import declaration
 from ppafo.simulation.declaration import WRITTEN_UNITS
-from ppafo.simulation.loading import is_of_device, set_name, split_override
+from ppafo.simulation.loading import set_name
 from ppafo.simulation.numbers import declared_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared

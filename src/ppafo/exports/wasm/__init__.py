@@ -97,7 +97,8 @@ from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, Term, itself
 from ppafo.parameters.parameter_set import SOURCE, Entry, atmospheric_pressure, entry_in_si
 from ppafo.simulation.declaration import SEED, value_at
-from ppafo.simulation.loading import is_of_device, set_name, split_override
+from ppafo.simulation.loading import set_name
+from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.numbers import HELD_ANGLE, TIMES
 from ppafo.simulation.scenario import Scenario, worn_kind
 from ppafo.translation.native import asked, complaint

@@ -32,7 +32,7 @@ from ppafo.questions.league.standing import (
     table_of,
     with_noise,
 )
-from ppafo.simulation.loading import load_scenario, split_override
+from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate, simulate_many
 from ppafo.studies.sampling import is_noisy, other_noise

@@ -40,7 +40,7 @@ from ppafo.rig import record
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.declaration import quantities
-from ppafo.simulation.loading import apply_overrides
+from ppafo.simulation.overrides import apply_overrides
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
 from ppafo.validation import RecordingAgreement, ReplaySettings, compare_recording
 from ppafo.validation.agreement import measured_values

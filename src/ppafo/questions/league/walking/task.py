@@ -10,7 +10,6 @@ from ppafo.control.walking.phases import PHASE_QUANTITIES
 from ppafo.control.walking.signs import SAFETY_QUANTITIES
 from ppafo.errors import ScenarioError, nearest_name, one_line
 from ppafo.simulation.declaration import PERIOD, RATE
-from ppafo.simulation.loading import split_override
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import check_led, walk_of
