@@ -64,14 +64,22 @@ def override_set(
 
 
 def over(
-    earlier: Iterable[str], later: Iterable[str], error: type[PpafoError] = ParameterError, forms: Forms = FORMS
+    earlier: Iterable[str],
+    later: Iterable[str],
+    error: type[PpafoError] = ParameterError,
+    same: Mapping[str, str] | None = None,
+    valve: str = "",
+    forms: Forms = FORMS,
 ) -> tuple[str, ...]:
-    """Return two layers as one set: what the later one gives replaces the value, and another form, of the earlier."""
+    """Return two layers as one set: what the later one gives replaces the value, and another form, of the earlier.
+
+    The other arguments are those of ``override_set``.
+    """
     first, second = tuple(earlier), tuple(later)
-    new = override_set(second, error, forms=forms)
+    old, new = (override_set(layer, error, same, valve, forms) for layer in (first, second))
     replaced = {other for path in new for other in (path, *other_forms(path, forms))}
-    kept = (text for text in first if split_override(text, error).typed not in replaced)
-    return (*kept, *second)
+    kept = {item for path, item in old.items() if path not in replaced}
+    return (*(text for text in first if split_override(text, error) in kept), *second)
 
 
 def one_path(path: str, valve: str) -> str:

@@ -19,7 +19,6 @@ from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
 from ppafo.documents.models import first_problem, is_gap
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
-from ppafo.model.catalog import EFFECTS
 from ppafo.model.declaration import Quantity
 from ppafo.model.regulator import SupplyLines
 from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set

@@ -15,7 +15,7 @@ from ppafo.model.catalog import EFFECTS, VALVES
 from ppafo.model.effects.kind import SECTION as EFFECTS_SECTION
 from ppafo.parameters.declaration import ORIFICE, RELIEVING_PATH, SECTIONS, SPECIES_PATH
 from ppafo.parameters.declaration import quantities as device_quantities
-from ppafo.parameters.overrides import Given, one_path, other_forms, override_set, split_override
+from ppafo.parameters.overrides import Given, other_forms, over, override_set, split_override
 from ppafo.simulation.declaration import OF_A_VANE, Declared, value_at
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -76,19 +76,18 @@ def over_layer(
     ``valve`` is the name of the one that is chosen unless the later ones choose another.
     """
     new = override_set(later, ScenarioError, declared.same)
-    valve = new[_VALVE].text if _VALVE in new else valve
-    new = override_set(later, ScenarioError, declared.same, valve)
-    old = override_set(earlier, ScenarioError, declared.same, valve)
-    replaced = {other for path in new for other in (path, *other_forms(path))}
-    kept = {path: item for path, item in old.items() if path not in replaced}
+    chosen = new[_VALVE].text if _VALVE in new else valve
+    both = over(earlier, later, ScenarioError, declared.same, chosen)
     choosing = {path for path in new if _is_choosing(path)}
-    if choosing:
-        changed = _with_one_path_each(content, file, declared)
-        _choose_kinds(changed, kept | new, file, declared)
-        known = frozenset(declared.paths(changed))
-        kept = {path: item for path, item in kept.items() if path in known or not _chosen_by(path, choosing)}
-    texts = {str(item) for item in kept.values()}
-    return (*(text for text in earlier if str(split_override(text)) in texts), *later)
+    if not choosing:
+        return both
+    every = override_set(both, ScenarioError, declared.same, chosen)
+    changed = _with_one_path_each(content, file, declared)
+    _choose_kinds(changed, every, file, declared)
+    known = frozenset(declared.paths(changed))
+    lost = {path for path in every if path not in known and path not in new and chosen_by(path, choosing)}
+    left = {item for path, item in every.items() if path not in lost}
+    return tuple(text for text in both if split_override(text, ScenarioError) in left)
 
 
 def _is_choosing(path: str) -> bool:
@@ -96,7 +95,7 @@ def _is_choosing(path: str) -> bool:
     return bool(section) and name in _CHOOSING
 
 
-def _chosen_by(path: str, choosing: Iterable[str]) -> list[str]:
+def chosen_by(path: str, choosing: Iterable[str]) -> list[str]:
     """Return the paths that decide whether there is a value at a path, the nearest one last."""
     found = (chosen for chosen in choosing if chosen != path and path.startswith(f"{chosen.rpartition('.')[0]}."))
     return sorted(found, key=len)
@@ -123,7 +122,7 @@ def _choose_kinds(
 
 def _unused(path: str, given: Mapping[str, Given], known: Iterable[str], file: str) -> ScenarioError:
     """Return the error for an override without use: beside a kind that is given, or in any case."""
-    choosing = _chosen_by(path, filter(_is_choosing, given))
+    choosing = chosen_by(path, filter(_is_choosing, given))
     if not choosing:
         return unknown_value(str(given[path]), tuple(known), f"{file} has")
     section = f"{choosing[-1].rpartition('.')[0]}."

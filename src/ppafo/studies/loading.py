@@ -2,6 +2,7 @@
 
 import copy
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -19,9 +20,10 @@ from ppafo.errors import (
     nearest_name,
     refused_as,
 )
-from ppafo.loading import load_scenario, placed
+from ppafo.loading import load_scenario, placed, reloaded
 from ppafo.metrics import METRICS
 from ppafo.parameters.graph import ATMOSPHERE_PATH
+from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import Above
 from ppafo.studies.sampling import MAXIMUM_SOBOL_DIMENSIONS, Factor, cholesky_factor, correlation_matrix, with_noise
@@ -57,7 +59,7 @@ def load_study(
     for table in tables if isinstance(tables, list | tuple) else ():
         if isinstance(table, dict) and "same_as" in table:
             table.setdefault("kind", "same_as")
-    changed = _apply_overrides(document, overrides, {"runs": draws, "seed": seed}, source.file)
+    changed = _apply_overrides(document, overrides, {"runs": draws, "seed": seed}, source)
     return _build(changed, source)
 
 
@@ -75,13 +77,15 @@ class _Source:
 
 
 def _apply_overrides(
-    document: dict[str, Any], overrides: Sequence[str], sample: Mapping[str, int | None], file: str
+    document: dict[str, Any], overrides: Sequence[str], sample: Mapping[str, int | None], source: _Source
 ) -> dict[str, Any]:
     """Return the document as if what the command line changes stood in the file."""
+    file = source.file
     parsed = _parse(document, file)
     if overrides:
-        for table in document["configurations"]:
-            table["overrides"] = [*table.get("overrides", []), *overrides]
+        for table, item in zip(document["configurations"], parsed.configurations, strict=True):
+            with _refused_in(item, source):
+                table["overrides"] = list(reloaded(_scenario(item, source), overrides).origin.overrides)
     given = {key: value for key, value in sample.items() if value is not None}
     if given and parsed.sample is None:
         raise StudyError(
@@ -146,9 +150,15 @@ def _check_set_or_varied(parsed: declared.StudyFile, source: _Source) -> None:
                 )
 
 
-def _scenario(item: declared.Configuration, source: _Source) -> Any:
-    with refused_as(source.refusal, f"configuration '{item.name}'", ScenarioError, ParameterError, DataError):
+def _scenario(item: declared.Configuration, source: _Source) -> Scenario:
+    with _refused_in(item, source):
         return load_scenario(placed(item.scenario, source.folder), item.overrides)
+
+
+def _refused_in(item: declared.Configuration, source: _Source) -> AbstractContextManager[None]:
+    """Return what names the configuration in errors about it."""
+    kinds = ScenarioError, ParameterError, DataError
+    return refused_as(source.refusal, f"configuration '{item.name}'", *kinds)
 
 
 def _check_requests(parsed: declared.StudyFile, source: _Source) -> None:

@@ -11,6 +11,7 @@ from ppafo.answers import Column
 from ppafo.answers.display_units import display_value, quantity_text, title_with_unit
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.metrics import METRICS
+from ppafo.parameters.overrides import over, split_override
 from ppafo.progress import Report
 from ppafo.questions.league.answer import League, Look, Presentation, TableColumn, measure, of_draws
 from ppafo.questions.league.bound import LowerBound, lower_bound, play_optimum
@@ -206,7 +207,7 @@ class TorqueContest:
 
     def scenario_of(self, entrant: Entrant) -> Scenario:
         """Return the scenario as an entrant plays it; ScenarioError or ParameterError where it cannot."""
-        return load_scenario(self.name, [*entrant.overrides, *self.overrides])
+        return load_scenario(self.name, over(entrant.overrides, self.overrides, ScenarioError))
 
     def evaluate(self, entrant: Entrant, draws: int, seed: int, _progress: Report) -> Standing:
         """Return how an entrant does, over draws too unless 0; a PpafoError states why it cannot play."""
@@ -214,7 +215,8 @@ class TorqueContest:
         learning = learn(task) if entrant.learns else None
         final = task if learning is None else learning.scenario
         learnt = [] if learning is None else [f"controller.{name}={value!r}" for name, value in table_of(final).items()]
-        words = [word for override in (*entrant.overrides, *learnt, *self.overrides) for word in ("--set", override)]
+        every = over(over(entrant.overrides, learnt, ScenarioError), self.overrides, ScenarioError)
+        words = [word for override in every for word in ("--set", override)]
         result = simulate(final)
         if not result.status.is_completed:
             raise SimulationError(result.status.message)
@@ -250,7 +252,7 @@ class TorqueContest:
 def torque_contest(scenario: str | Path = TASK, overrides: Sequence[str] = ()) -> TorqueContest:
     """Return the contest of a scenario by name or file; ScenarioError or ParameterError for one that is none."""
     for override in overrides:
-        path, _ = split_override(override)
+        path, _ = split_override(override, ScenarioError)
         if path.startswith(SPECIAL):
             raise ScenarioError(f"override '{override}': every controller of the league has its own settings and valve")
     task = load_scenario(scenario, overrides)

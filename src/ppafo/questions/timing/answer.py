@@ -15,6 +15,7 @@ from ppafo.engine.lanes import Floats, run_batch
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, batch_of
 from ppafo.errors import ScenarioError, SimulationError
+from ppafo.loading import reloaded
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.question import Solved
 from ppafo.questions.timing.slap import FACTORS, Falls, SlapStudy, slap_study
@@ -361,16 +362,17 @@ def event_timing(
         raise ScenarioError(f"{length:g} minutes: events are timed over 0.2 to {LONGEST:g} minutes")
     if any(text.partition("=")[0].strip() in ("timing.kind", "wearer.keeps_gait") for text in overrides):
         raise ScenarioError("timing.kind and wearer.keeps_gait: every timing and both wearers are tried")
-    ways = ways_of(load_walk(configuration, overrides, gait))
+    plain = load_walk(configuration, overrides, gait)
+    ways = ways_of(plain)
     found: list[TimedWay] = []
     for timing in TIMINGS:
         for wearer, own in WEARERS.items():
             for way, course in ways.items():
                 tell(Progress(f"{timing}, {wearer}, {way}", len(found), len(TIMINGS) * len(WEARERS) * len(ways)))
-                walk = load_walk(configuration, (*overrides, *own, f"timing.kind={timing}"), gait)
+                walk = reloaded(plain, (*own, f"timing.kind={timing}"))
                 walk = replace(walk, motion=replace(walk_of(walk), course=course))
                 found.append(TimedWay(wearer, way, timing, timed_events(walk, length)))
-    slap = slap_study(str(configuration), (*overrides, *WEARERS["impaired"]), gait, tell)
+    slap = slap_study(reloaded(plain, WEARERS["impaired"]), tell)
     return Timing(str(configuration), tuple(overrides), length, tuple(found), slap)
 
 

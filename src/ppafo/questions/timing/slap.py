@@ -10,7 +10,6 @@ import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import factorial
-from pathlib import Path
 
 import numpy as np
 
@@ -20,13 +19,14 @@ from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of, gas_by_path
 from ppafo.engine.scheme.walking import foot_direction
 from ppafo.errors import SimulationError
+from ppafo.loading import reloaded
 from ppafo.model.contact import foot_angle
 from ppafo.model.plant import chamber_mass, chamber_pressures, chamber_volumes
 from ppafo.parameters.device import Device, Orifice
+from ppafo.parameters.overrides import over
 from ppafo.progress import Progress, Report
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
-from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.result import REMEDY
@@ -139,20 +139,18 @@ FACTORS = (
 )
 
 
-def slap_study(file: str, overrides: Sequence[str], gait: str | Path | None, progress: Report) -> SlapStudy | None:
-    """Let the foot fall from one state with every combination of factors; None where it does not strike with its heel.
+def slap_study(walked: Scenario, progress: Report) -> SlapStudy | None:
+    """Let the foot of a walk fall from one state with every combination of factors; None where no heel strikes.
 
     SimulationError where a walk diverges.
     """
     chosen = [sub for size in range(len(FACTORS) + 1) for sub in itertools.combinations(FACTORS, size)]
-    base = _with((), file, overrides, gait)
+    base = _with((), walked)
     strikes = falls_of(base, ()).strikes
     walks = []
     for number, factors in enumerate(chosen):
         progress(Progress("slap, factors", number, len(chosen), noun="combinations"))
-        walks.append(
-            SlapWalk(tuple(one.name for one in factors), falls_of(_with(factors, file, overrides, gait), strikes))
-        )
+        walks.append(SlapWalk(tuple(one.name for one in factors), falls_of(_with(factors, walked), strikes)))
     slaps = {frozenset(one.factors): one.falls.imposed for one in walks}
     if not np.isfinite(list(slaps.values())).all():
         return None
@@ -179,9 +177,9 @@ def shares_of(values: Mapping[frozenset[str], float], names: Sequence[str]) -> t
     return tuple(found)
 
 
-def _with(factors: Sequence[Factor], file: str, overrides: Sequence[str], gait: str | Path | None) -> Scenario:
-    timing = tuple(text for factor in factors for text in factor.overrides)
-    configuration = load_walk(file, (*overrides, AS_IT_IS, *timing), gait)
+def _with(factors: Sequence[Factor], walked: Scenario) -> Scenario:
+    timing = over((AS_IT_IS,), (text for factor in factors for text in factor.overrides))
+    configuration = reloaded(walked, timing)
     numbers = [factor.numbers(configuration.device) for factor in factors]
     return with_numbers(configuration, {path: number for some in numbers for path, number in some.items()})
 

@@ -9,6 +9,7 @@ from ppafo.control.walking.catalog import WALKING_CONTROLLERS, keeps_time
 from ppafo.control.walking.phases import PHASE_QUANTITIES
 from ppafo.control.walking.signs import SAFETY_QUANTITIES
 from ppafo.errors import ScenarioError, nearest_name, one_line
+from ppafo.parameters.overrides import over, split_override
 from ppafo.simulation.declaration import PERIOD, RATE
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.loading import load_walk
@@ -54,14 +55,15 @@ class WalkingTask:
             _override_text(item.name, item.unit, value)
             for item, value in zip(PUSH_OFF_QUANTITIES, self.told, strict=True)
         ]
-        paths = [split_override(text)[0].partition(".") for text in (*wanted, *self.overrides)]
+        every = over(wanted, self.overrides, ScenarioError)
+        paths = [split_override(text).typed.partition(".") for text in every]
         has_time = keeps_time(WALKING_CONTROLLERS[kind])
         kept = [
             text
-            for text, (section, _, name) in zip((*wanted, *self.overrides), paths, strict=True)
+            for text, (section, _, name) in zip(every, paths, strict=True)
             if (section != "controller" or name in known) and (section != "timing" or has_time)
         ]
-        return (f"controller.kind={kind}", f"device.valve={valve}", *kept, *own)
+        return over((f"controller.kind={kind}", f"device.valve={valve}", *kept), own, ScenarioError)
 
     def configuration(self, kind: str, valve: str, own: Sequence[str] = ()) -> Scenario:
         """The walk of one controller on one valve; ScenarioError or ParameterError where it cannot be."""
@@ -84,9 +86,9 @@ def walking_task(
         _check(override)
     own = [override for override in overrides if not _is_desired(override)]
     desired = [override.replace(DESIRED, "controller", 1) for override in overrides if _is_desired(override)]
-    for_all = [override for override in own if split_override(override)[0] not in _PUSH_OFF]
+    for_all = [override for override in own if split_override(override).typed not in _PUSH_OFF]
     judged = _with_profile(file, [*for_all, *desired], gait)
-    told = _with_profile(file, [*desired, *own], gait)
+    told = _with_profile(file, over(desired, own, ScenarioError), gait)
     check_led(judged, "a league")
     if walk_of(judged).course is not None:
         raise ScenarioError(f"{file}: course: a league compares equal strides; leave the course away")
@@ -114,11 +116,11 @@ def _with_profile(file: str | Path, overrides: Sequence[str], gait: str | Path |
 
 
 def _is_desired(override: str) -> bool:
-    return split_override(override)[0].startswith(f"{DESIRED}.")
+    return split_override(override, ScenarioError).typed.startswith(f"{DESIRED}.")
 
 
 def _check(override: str) -> None:
-    path, _ = split_override(override)
+    path, _ = split_override(override, ScenarioError)
     section, _, name = path.partition(".")
     wanted = [item.name for item in PUSH_OFF_QUANTITIES]
     if section == DESIRED and name not in wanted:
