@@ -16,6 +16,7 @@ from ppafo.model.regulator import SupplyLines
 from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, members
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, holding, left, resolved
+from ppafo.parameters.overrides import either, in_two_forms, one_path
 from ppafo.parameters.plant import all_settings
 from ppafo.simulation import declaration
 from ppafo.simulation.clock import Clock, read_clock
@@ -27,7 +28,6 @@ HELD_ANGLE = "motion.angle"
 TIMES = ("run.duration", "run.step", "run.output_interval", "controller.rate", "controller.period")
 """Paths that decide the clock of a run."""
 
-_CHOSEN_VALVE = "valve."
 _DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 _OF_SENSORS = {"angle_resolution": "angle_quantum", "pressure_resolution": "pressure_quantum"}
 _OF_WALLS = {"wall_area_per_volume": "area_per_volume"}
@@ -52,8 +52,7 @@ _UNIT_OF_TIMES = {"controller.rate": "Hz"}
 
 def chosen_path(path: str, scenario: Scenario) -> str:
     """Return the path with ``valve.`` in place of ``valves.NAME.`` where that is the valve of the scenario."""
-    own = f"valves.{scenario.device.valve_name}."
-    return _CHOSEN_VALVE + path.removeprefix(own) if path.startswith(own) else path
+    return one_path(path, scenario.device.valve_name)
 
 
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
@@ -278,20 +277,15 @@ def _check_path(base: Scenario, given: str, path: str, declared: Mapping[str, Qu
 
 
 def _check_together(base: Scenario, values: Mapping[str, Floats]) -> None:
-    if {"controller.rate", "controller.period"} <= set(values):
-        raise ScenarioError(f"{base.name}: vary either controller.rate or controller.period, not both")
+    pair = in_two_forms(values)
+    if pair is not None:
+        raise ScenarioError(f"{base.name}: '{pair[0]}' and '{pair[1]}' vary: {either(pair[0])}")
     for section in ("valve", "actuator.leak"):
-        form = other_form(base.device, section)
-        given = [name for name in form if f"{section}.{name}" in values]
-        own = [
-            name
-            for name in ("area", "discharge_coefficient", "sonic_conductance", "critical_ratio")
-            if name not in form and f"{section}.{name}" in values
-        ]
-        if given and (len(given) < len(form) or own):
+        form = [f"{section}.{name}" for name in other_form(base.device, section)]
+        missing = [path for path in form if path not in values]
+        if missing and len(missing) < len(form):
             raise ScenarioError(
-                f"{base.name}: {section} is given in the other form; to vary {' or '.join(form)} give a column for "
-                f"both, and none for {' or '.join(own) or 'the other form'}"
+                f"{base.name}: {section} is given in the other form; to vary {' or '.join(form)} give a column for both"
             )
 
 
