@@ -147,7 +147,8 @@ def _kinds(scenario: Scenario) -> dict[str, Any]:
     if isinstance(scenario.motion, FreeMotion) and scenario.motion.leg is not None:
         motion = {"kind": "leg", "shank": {"kind": scenario.motion.leg.shank.kind}}
     if isinstance(scenario.motion, PrescribedMotion):
-        motion = {"kind": "prescribed", "profile": {"kind": scenario.motion.profile.kind}}
+        is_held = scenario.motion.kind == "held"
+        motion = {} if is_held else {"kind": "prescribed", "profile": {"kind": scenario.motion.profile.kind}}
     controller = {"kind": scenario.control.kind, "arithmetic": scenario.control.arithmetic}
     gas: dict[str, Any] = {} if scenario.thermal is None else {"gas_model": {"kind": declaration.THERMAL}}
     gas |= {} if scenario.supply_lines is None else {SUPPLY_LINE: {}}
@@ -157,9 +158,15 @@ def _kinds(scenario: Scenario) -> dict[str, Any]:
 
 
 def _angle_of_held_vane(scenario: Scenario) -> dict[str, Quantity]:
+    return {HELD_ANGLE: declaration.ANGLE} if path_of_held_angle(scenario) == HELD_ANGLE else {}
+
+
+def path_of_held_angle(scenario: Scenario) -> str | None:
+    """Return the path of the angle at which a vane stays, None where it moves."""
     motion = scenario.motion
-    is_held = isinstance(motion, PrescribedMotion) and motion.profile.kind == "constant"
-    return {HELD_ANGLE: declaration.ANGLE} if is_held else {}
+    if not isinstance(motion, PrescribedMotion) or motion.profile.kind != "constant":
+        return None
+    return HELD_ANGLE if motion.kind == "held" else "motion.profile.level"
 
 
 def _place(path: str, scenario: Scenario) -> tuple[str, ...]:
