@@ -31,7 +31,7 @@ from ppafo.parameters.device import (
     Valve,
 )
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph
-from ppafo.parameters.overrides import either, in_two_forms
+from ppafo.parameters.overrides import FORMS, either, in_two_forms
 from ppafo.parameters.parameter_set import (
     ParameterSet,
     atmospheric_pressure,
@@ -234,7 +234,7 @@ def _effects(parameter_set: ParameterSet, read: Callable[[str], float]) -> dict[
 
 def both_forms(parameter_set: ParameterSet, section: str) -> tuple[str, ...]:
     """Return the names by which an orifice is given in both forms at once, none where it is in one or in neither."""
-    given = [f"{section}.{item.name}" for item in declaration.ORIFICE]
+    given = [f"{section}.{name}" for form in FORMS["valve"] for name in sorted(form)]
     found = [path for path in given if path in parameter_set.numbers]
     return tuple(path.rpartition(".")[2] for path in found) if in_two_forms(found) else ()
 

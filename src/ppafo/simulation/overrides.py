@@ -49,7 +49,7 @@ def apply_overrides(
     of_device = {path: item for path, item in given.items() if path not in declared.appended and is_of_device(path)}
     own = {path: item for path, item in given.items() if path not in of_device}
     waiting = _choose_kinds(changed, own, file, declared)
-    known = frozenset(declared.paths(changed))
+    known = declared.paths(changed)
     for path in sorted(own):
         if path not in known:
             declared.find_kinds(changed, file)
@@ -120,13 +120,13 @@ def _choose_kinds(
     return tuple(path for path in sorted(given) if path not in done)
 
 
-def _unused(path: str, given: Mapping[str, Given], known: Iterable[str], file: str) -> ScenarioError:
+def _unused(path: str, given: Mapping[str, Given], known: tuple[str, ...], file: str) -> ScenarioError:
     """Return the error for an override without use: beside a kind that is given, or in any case."""
     choosing = chosen_by(path, filter(_is_choosing, given))
     if not choosing:
-        return unknown_value(str(given[path]), tuple(known), f"{file} has")
+        return unknown_value(str(given[path]), known, f"{file} has")
     section = f"{choosing[-1].rpartition('.')[0]}."
-    near = sorted(item for item in known if item.startswith(section))
+    near = [item for item in known if item.startswith(section)]
     hint = nearest_name(path, near) or f"; there it has {', '.join(near)}"
     return ScenarioError(
         f"overrides '{given[path]}' and '{given[choosing[-1]]}': with the latter {file} has no value '{path}'{hint}"
