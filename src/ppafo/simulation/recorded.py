@@ -247,7 +247,7 @@ def check_absolute(recording: Recording, atmosphere: float, file: str) -> None:
 
 def held_vane(angle: float) -> PrescribedMotion:
     """Return the motion of a vane that is held at an angle [rad]: both chambers are fixed volumes."""
-    return PrescribedMotion(ProfileChoice("constant", {"level": angle}))
+    return PrescribedMotion(ProfileChoice("constant", {"level": angle}), "held")
 
 
 def with_fixed_volume(device: Device, volume: float) -> Device:

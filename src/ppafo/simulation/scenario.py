@@ -82,9 +82,13 @@ class FreeMotion:
 
 @dataclass(frozen=True, slots=True)
 class PrescribedMotion:
-    """The angle of the vane [rad] is a given function of time; that of a held vane is a constant profile."""
+    """The angle of the vane [rad] is a given function of time; that of a held vane is a constant profile.
+
+    ``kind`` is the kind of motion that a file names, ``held`` or ``prescribed``.
+    """
 
     profile: ProfileChoice
+    kind: str = "prescribed"
 
     @property
     def label(self) -> str:

@@ -20,11 +20,11 @@ from ppafo.model.regulator import SupplyLines
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.graph import Follows, Graph, Term
+from ppafo.parameters.overrides import split_override
 from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE, SUPPLY_LINES, Reading, kind_at, line_paths, value_at
 from ppafo.simulation.loading import (
     Hardware,
     Layout,
-    OverriddenDocument,
     ScenarioRequest,
     assumed_lines,
     read_device,
@@ -32,9 +32,9 @@ from ppafo.simulation.loading import (
     read_supply_lines,
     read_thermal,
     scenario_of,
-    split_override,
 )
 from ppafo.simulation.numbers import device_number_at
+from ppafo.simulation.overrides import OverriddenDocument, over_layer
 from ppafo.simulation.scenario import Assumption, Control, MotionKind, Origin, Scenario, Sensors
 from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk, rules
@@ -106,7 +106,7 @@ def load_walk(
     instead = {path: str(item) for path, item in named.items() if item is not None}
     # Refuse an override beside another word for the same value, by path in ``others``.
     for override in given:
-        path, text = split_override(override)
+        path, text = split_override(override, ScenarioError)
         other = instead.get(OF_A_WALK.same.get(path, path))
         if other is not None:
             raise ScenarioError(
@@ -140,10 +140,8 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
         before = tuple(text for text in before if not text.startswith(f"{BOTTLE}."))
     changes = tuple(text if text.startswith(f"{BOTTLE}.") else f"{BOTTLE}.{text}" for text in overrides)
     instead = {} if bottle is None else {BOTTLE_NAME: str(bottle)}
-    return scenario_of(
-        replace(as_given, content=content, overrides=(*before, *changes), instead=instead),
-        WALKING,
-    )
+    every = over_layer(content, before, changes, scenario.name, WALKING.declared)
+    return scenario_of(replace(as_given, content=content, overrides=every, instead=instead), WALKING)
 
 
 def _walked_with(scenario: Scenario) -> tuple[Any, ...]:
@@ -413,8 +411,6 @@ def _shut_off(reading: Reading) -> dict[str, float]:
 def _period(reading: Reading) -> float:
     """Return the sample period [s] from a rate or a period, 1 ms where neither is given."""
     rate, period = (value_at(reading.document, f"controller.{name}") for name in ("rate", "period"))
-    if rate is not None and period is not None:
-        raise reading.refusal("controller.rate", "give either controller.rate or controller.period, not both")
     if rate is not None:
         return 1.0 / reading.number("controller.rate", RATE)
     return DEFAULT_PERIOD if period is None else reading.number("controller.period", PERIOD)

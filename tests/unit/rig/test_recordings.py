@@ -188,7 +188,7 @@ def test_the_truth_names_the_preset_with_overrides_and_the_device() -> None:
         ({"preset": "paper-bensh"}, "did you mean 'paper-bench'"),
         ({"seed": -1}, "seed = -1"),
         ({"device": "ppafo2012"}, "ppafo2011"),
-        ({"overrides": ["rig.friction.scater=0"]}, "did you mean 'friction.scatter'"),
+        ({"overrides": ["rig.friction.scater=0"]}, "did you mean 'rig.friction.scatter'"),
         ({"overrides": ["rig.friction.scatter=2"]}, "from 0 to 0.5"),
         ({"overrides": ["rig.line.volume=3 s"]}, "override 'rig.line.volume=3 s'"),
         ({"overrides": ["rig.line.volume=5 cm^3"]}, "must be below the dead volumes"),

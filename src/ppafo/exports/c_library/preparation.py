@@ -41,6 +41,7 @@ from ppafo.simulation.numbers import (
     links_that_hold,
     number_at,
     other_form,
+    path_of_held_angle,
     time_texts,
 )
 from ppafo.simulation.plan import (
@@ -313,7 +314,6 @@ SAID = {
     "controller.period": "time between two decisions of the controller",
 }
 """What some settings are where no file stands around them."""
-_LEVEL_OF_HELD = "motion.profile.level"
 
 
 def settings_of(scenario: Scenario) -> tuple[Setting, ...]:
@@ -358,9 +358,11 @@ def relations_of(scenario: Scenario) -> tuple[Relation, ...]:
         ("run.output_interval", "at most", "run.duration", 0.0),
         ("sensors.delay", "at most", "run.duration", 0.0),
     ]
-    if HELD_ANGLE in declared_settings(scenario):
-        rules.append((HELD_ANGLE, "at least", "actuator.angle_min", TOLERANCE))
-        rules.append((HELD_ANGLE, "at most", "actuator.angle_max", TOLERANCE))
+    # A vane that stays at an angle, or starts there.
+    stays = path_of_held_angle(scenario) or HELD_ANGLE
+    if stays in declared_settings(scenario):
+        rules.append((stays, "at least", "actuator.angle_min", TOLERANCE))
+        rules.append((stays, "at most", "actuator.angle_max", TOLERANCE))
     if scenario.supply_lines is not None:
         rules.append(("supply.dorsiflexion_pressure", "at most", "supply.pressure", 0.0))
     of_steps = (
@@ -376,10 +378,7 @@ def relations_of(scenario: Scenario) -> tuple[Relation, ...]:
 def declared_settings(scenario: Scenario) -> dict[str, Quantity]:
     """Declarations by path, without the form of an orifice that is not used, and without second names."""
     declared = used_numbers(scenario.device, declared_numbers(scenario))
-    unused = {"controller.rate"}
-    if HELD_ANGLE in declared and isinstance(scenario.motion, PrescribedMotion):
-        unused.add(_LEVEL_OF_HELD)
-    return {path: item for path, item in declared.items() if path not in unused}
+    return {path: item for path, item in declared.items() if path != "controller.rate"}
 
 
 def used_numbers(device: Device, declared: Mapping[str, Quantity]) -> dict[str, Quantity]:
@@ -422,8 +421,9 @@ def _steps(scenario: Scenario, writing: Writing) -> Iterator[str]:
         yield "needs_parts = True"
         return
     stiffness = "1.0" if scenario.thermal is None else "gas_heat_capacity_ratio"
+    angle = c_identifier(path_of_held_angle(scenario) or HELD_ANGLE)
     shortened = f"step / {writing.add(smaller)}(1.0, tolerance)"
-    yield f"needs_parts = not {writing.add(is_slow_held)}(plant, {shortened}, motion_angle, {stiffness})"
+    yield f"needs_parts = not {writing.add(is_slow_held)}(plant, {shortened}, {angle}, {stiffness})"
 
 
 def _pieces(scenario: Scenario, writing: Writing) -> Iterator[str]:
@@ -435,7 +435,7 @@ def _pieces(scenario: Scenario, writing: Writing) -> Iterator[str]:
     if program.angle is RECORDED_ANGLE:
         yield f"path = {writing.add(Segment)}(0.0, motion_angle, 0.0)"
     elif isinstance(scenario.motion, PrescribedMotion):
-        held = {"level": "motion_angle"} if program.is_held else {}
+        held = {"level": c_identifier(path_of_held_angle(scenario) or HELD_ANGLE)} if program.is_held else {}
         yield f"path = {_kind(writing, 'motion.profile', PROFILES[scenario.motion.profile.kind], held)}"
     yield from writing.gas()
 

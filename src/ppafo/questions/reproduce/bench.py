@@ -37,7 +37,7 @@ from ppafo.questions.reproduce.claim import PRINTED_DIGITS, Claim, Printed, Verd
 from ppafo.rig import record
 from ppafo.signals import Recording
 from ppafo.simulation.declaration import quantities
-from ppafo.simulation.loading import apply_overrides
+from ppafo.simulation.overrides import apply_overrides
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
 from ppafo.validation import RecordingAgreement, ReplaySettings, compare_recording
 from ppafo.validation.measured import check_recording

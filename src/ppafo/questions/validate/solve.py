@@ -35,6 +35,7 @@ from ppafo.identification.trajectory.prediction import Ranking
 from ppafo.identification.trajectory.problem import FITTED_CHANNELS, Experiment
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
+from ppafo.parameters.overrides import over
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.question import Solved
 from ppafo.questions.validate.several import (
@@ -142,7 +143,8 @@ def validate(
     report = progress or report_nothing
     sets = parse_sets(str(parameter_set), against)
     device = load_device(parameter_set, valve, overrides)
-    others = [load_device(one.parameter_set, valve, (*overrides, *one.overrides)) for one in sets[1:]]
+    words = [over(overrides, one.overrides, valve=valve or "") for one in sets[1:]]
+    others = [load_device(one.parameter_set, valve, own) for one, own in zip(sets[1:], words, strict=True)]
     device.check_vane("a replay of recordings")
     if volume is not None and not volume > 0.0:
         raise DataError(f"volume of {volume:g} m^3: must be above 0")

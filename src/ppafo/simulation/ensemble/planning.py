@@ -28,6 +28,7 @@ from ppafo.simulation.numbers import (
     TimeTexts,
     clock_of,
     clock_with,
+    path_of_held_angle,
     time_texts,
     varied_scenario,
 )
@@ -266,7 +267,8 @@ def _beyond_the_stops(scenario: Scenario) -> tuple[Problem, ...]:
 
         def angle_line(run: int) -> str:
             low, high = (quantity_text(at(stop, run), "rad") for stop in (actuator.angle_min, actuator.angle_max))
-            return f"{HELD_ANGLE} = {quantity_text(at(level, run), 'rad')}: must be between the stops, {low} to {high}"
+            path = path_of_held_angle(scenario) or HELD_ANGLE
+            return f"{path} = {quantity_text(at(level, run), 'rad')}: must be between the stops, {low} to {high}"
 
         return ((outside, angle_line),)
     # The bounds hold for all time; a run that may leave them is checked at its own times.
