@@ -22,6 +22,7 @@ from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batches_of
 from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import IdentificationError
+from ppafo.identification.linear_systems import inverse_of_steps
 from ppafo.identification.trajectory.problem import (
     GAIN_OF,
     TIME_OFFSET,
@@ -485,7 +486,7 @@ class Neighbourhood:
                 f"determined; give other bounds or another start"
             )
         change = np.where(use_above, above, centre) - np.where(use_below, below, centre)
-        return np.asarray((change / (1.0 * use_above + use_below)) @ np.linalg.inv(self.directions))
+        return np.asarray((change / (1.0 * use_above + use_below)) @ inverse_of_steps(self.directions))
 
     def jacobian(self) -> Floats:
         """Return the derivative of ``all_residuals`` [-] with respect to the coordinates."""
