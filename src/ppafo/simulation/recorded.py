@@ -9,7 +9,7 @@ import numpy as np
 from ppafo.engine.lanes import StepInputs, prescribe_recorded_angle
 from ppafo.engine.run import Run
 from ppafo.errors import DataError
-from ppafo.parameters.device import Device, Orifice
+from ppafo.parameters.device import VANE, Device, Orifice
 from ppafo.signals import Recording
 from ppafo.signals.faults import longest_gap
 from ppafo.signals.recording import Floats, between_samples
@@ -256,13 +256,14 @@ def held_vane(angle: float) -> PrescribedMotion:
 
 
 def with_fixed_volume(device: Device, volume: float) -> Device:
-    """Return the device with a fixed volume [m^3] in the place of chamber 1 and no vane: nothing leaks from it.
+    """Return the device with a fixed volume [m^3] in the place of chamber 1, whatever the actuator: nothing leaks.
 
-    It holds with the vane at the lower stop.
+    It is that of a vane at the lower stop.
     """
     leak = device.actuator.leak
     shut = replace(leak, area=0.0) if isinstance(leak, Orifice) else replace(leak, sonic_conductance=0.0)
-    return replace(device, actuator=replace(device.actuator, dead_volume_1=volume, leak=shut))
+    fixed = replace(device.actuator, dead_volume_1=volume, leak=shut, kind=VANE, settings={}, table=None)
+    return replace(device, actuator=fixed)
 
 
 def replay_scenario(
