@@ -189,8 +189,9 @@ def _explanations(
 ) -> Explanations:
     """Return what single change would explain all recordings better than the set does.
 
-    Recordings that were compared in no channel of a fit are left out, and channels of sensors that are dead or clipped. Where the vane follows the recorded angle nothing
-    is searched: a delay of the sensors is then one of an input as well.
+    Recordings that were compared in no channel of a fit are left out, and channels of sensors that are dead or clipped.
+    Where the vane follows the recorded angle nothing is searched: a delay of the sensors is then one of an input as
+    well.
     """
     if settings.motion == "measured":
         return Explanations((), 0.0, 0)
