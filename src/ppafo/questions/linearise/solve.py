@@ -333,6 +333,8 @@ class _Search:
             largest = float(np.max(np.abs(residual)))
             if largest < STEADY:
                 return values if abs(values["command"]) <= 1.0 + STEADY else None
+            if not (np.isfinite(largest) and np.isfinite(slopes).all()):
+                return None
             step = np.linalg.lstsq(slopes * self._sizes, -residual, rcond=None)[0] * self._sizes
             share = 1.0
             while share > 1.0e-6:
