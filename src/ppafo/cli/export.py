@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.cli import output
-from ppafo.errors import DataError, ScenarioError, UnitError, refused_as
+from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.questions.question import minutes
 from ppafo.units import number_text
 
@@ -16,8 +16,6 @@ _C = "write a scenario or a walk as a library in C: header, source, example, mak
 _UNIT = "write a scenario or a walk as a functional mock-up unit (FMU)"
 _TABLES = "write a walk, a recording or a result in the names and signs of OpenSim (.sto)"
 _CONTROLLER = "write a scenario's integer controller in C behind the protocol of 'ppafo hil'"
-_STEPS, _EXCHANGE = "co-simulation", "model-exchange"
-"""Kinds of FMU."""
 _FEW_STRIDES = 0.2
 """Minutes of a walk without a course for OpenSim, unless given."""
 _RECORDINGS = (".csv", ".nc")
@@ -32,12 +30,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     unit = actions.add_parser("fmu", help=_UNIT, description=f"{_UNIT[:1].upper()}{_UNIT[1:]}.")
     unit.add_argument("--fmi", type=int, choices=(2, 3), default=2, help="version of FMI (default: 2)")
-    unit.add_argument(
-        "--kind",
-        choices=(_STEPS, _EXCHANGE),
-        default=_STEPS,
-        help=f"who integrates: the unit itself, or the importing tool, for a plant on a fixture (default: {_STEPS})",
-    )
     for shown in (library, unit):
         shown.add_argument(
             "--interface",
@@ -115,14 +107,11 @@ def _controller(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
 
 
 def _unit(parsed: argparse.Namespace) -> tuple[Mapping[str, bytes], str]:
-    from ppafo.exports.fmu import closed_loop, functional_unit, plant_alone, plant_in_time
+    from ppafo.exports.fmu import closed_loop, functional_unit, plant_alone
     from ppafo.loading import load_scenario
 
-    if parsed.kind == _EXCHANGE and parsed.interface == "loop":
-        raise ScenarioError("--kind model-exchange is for the plant alone: add --interface plant")
     platforms = _platforms(parsed)
-    plant = plant_in_time if parsed.kind == _EXCHANGE else plant_alone
-    interface = {"loop": closed_loop, "plant": plant}[parsed.interface]
+    interface = {"loop": closed_loop, "plant": plant_alone}[parsed.interface]
     contents = functional_unit(interface(load_scenario(parsed.scenario, parsed.overrides)), parsed.fmi, platforms)
     return contents, f"fmpy simulate {shlex.quote(str(parsed.out / next(iter(contents))))} --show-plot"
 

@@ -17,7 +17,7 @@ from ppafo.engine.run import NEVER_FAILED
 from ppafo.engine.source_text import Collector
 from ppafo.exports import filled, in_comment, in_markdown, licence, template
 from ppafo.exports.c_library.boundary import Boundary
-from ppafo.exports.c_library.program import Entry, ExportedProgram, Further, c_text_of_run
+from ppafo.exports.c_library.program import ExportedProgram, Further, c_text_of_run
 from ppafo.metrics import METRICS
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
@@ -148,7 +148,6 @@ class Library:
     ``other_program`` has further conditions in C under which another would be needed. ``following`` adds the function
     that lets settings follow others, None where none does, and ``defaults`` names those whose default does so, which
     has no range; ``links`` say what follows what. ``words`` fill the page. ``surface`` is how it is called.
-    ``entries`` are functions beside those of a run.
     """
 
     title: str
@@ -164,7 +163,6 @@ class Library:
     defaults: frozenset[str] = frozenset()
     links: Graph = field(default_factory=dict)
     surface: Surface = LOOP
-    entries: tuple[Entry, ...] = ()
 
     @property
     def name(self) -> str:
@@ -196,7 +194,7 @@ def library_files(library: Library) -> dict[str, bytes]:
 
     settings = [item.name for item in library.settings]
     interface = "".join(filled(template("c_library", file), words) for file in ("interface.c", surface.source))
-    functions = c_text_of_run(program, title, name, settings, further if written else None, interface, library.entries)
+    functions = c_text_of_run(program, title, name, settings, further if written else None, interface)
     texts[f"{name}.c"] = f"{head}{functions}\n{interface}"
     return {file: text.encode() for file, text in sorted(texts.items())}
 
