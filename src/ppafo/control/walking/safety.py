@@ -118,11 +118,11 @@ RESTS = 0.05
 """Angle [rad] within which an ankle rests: who sits unloads heel and toes too, but does not turn the ankle, and a foot
 that steps has turned by more before its toes leave the ground."""
 
-SAME = 0.3
+SAME = 0.4
 """Of the larger force in a stance, by which heel and toes differ at least: a foot that rolls from one to the other has
-0.9 and more. Toes that show 0.75 of the heel still leave the ground late enough for a push that nothing brakes."""
+0.98 and more. Toes with 0.7 of the heel in them still leave the ground late enough for nothing to be braked."""
 
-CARRIES = 200.0
+CARRIES = 100.0
 """Force [N] in a stance below which nothing is known of the difference of heel and toes: the foot of who sits has less.
 """
 
