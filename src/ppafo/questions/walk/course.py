@@ -48,12 +48,12 @@ def bottle_sections(worn: WalkResult) -> tuple[Section, ...]:
     )
 
 
-def bottle_remark(worn: WalkResult, others: Sequence[WalkResult]) -> str:
-    """Return what ended a walk on its bottle, and when; ``others`` is the walk with other readings of its chambers."""
+def bottle_remark(worn: WalkResult, others: Sequence[SupplyCourse | None]) -> str:
+    """Return what ended a walk on its bottle, and when; ``others`` are bottles with other readings of its chambers."""
     supply = worn.supply
     assert supply is not None, "said of a walk on a bottle"
     time = lasted(supply)
-    times = [None if other.supply is None else lasted(other.supply) for other in others]
+    times = [None if other is None else lasted(other) for other in others]
     ended = "" if time is None else f"lasts {lasting_text(time, times)}: "
     return f"bottle {supply.supply.bottle.name}: {ended}{supply.ending.message}"
 
