@@ -104,6 +104,9 @@ RENAMED = {
 }
 """Options of version 0.1 and what they are called now."""
 
+STILL_READ = {"--gas-per-step": "--gas-per-stride", "--step-time": "--stride-time"}
+"""Options of 0.2 and their present names, under which they are read for one more version; then they are ``RENAMED``."""
+
 REMOVED = {"--config": "name what is run without it, as in 'ppafo walk solenoid'"}
 """Options of version 0.1 that are none any more, and what to write instead."""
 
@@ -166,6 +169,18 @@ def check_command(word: str | None) -> None:
         known = tuple(dict.fromkeys((*COMMANDS, *QUESTIONS)))
         hint = nearest_name(word, known)
         raise UsageError(f"there is no command '{word}'{hint}; available: {', '.join(known)}")
+
+
+def present_options(words: list[str], parser: CommandParser) -> list[str]:
+    """Return the words with options by their present names; one line for each that has another."""
+    known, present = parser.options(), list(words)
+    for place, word in enumerate(takewhile(lambda word: word != "--", words)):
+        name, equals, value = word.partition("=")
+        now = STILL_READ.get(name)
+        if now in known:
+            print(f"ppafo: {name} is now called {now}; the old name is read in this version only", file=sys.stderr)
+            present[place] = f"{now}{equals}{value}"
+    return present
 
 
 def check_options(words: Sequence[str], parser: CommandParser) -> None:
@@ -277,6 +292,7 @@ def _run(words: list[str]) -> int:
         chosen = next((word for word in words if not word.startswith("-")), None)
         check_command(chosen)
         parser = build_parser(chosen)
+        words = present_options(words, parser)
         check_options(words, parser)
         parsed = parser.parse_args(words)
         if parsed.command is None:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from ppafo.metrics import METRICS, evaluate
 from ppafo.metrics.metric import hold
 from ppafo.metrics.switching import reversals
+from ppafo.model.valves.kind import VENT
 from ppafo.signals import CHANNELS, Channel, Recording
 
 TIME = np.linspace(0.0, 3.0, 3001)
@@ -121,11 +122,19 @@ def test_work_per_gas_is_left_out_where_no_gas_was_taken() -> None:
     assert "work_per_gas" not in evaluate(recording(supplied_mass=np.zeros(3001), **motion))
 
 
-def test_a_command_that_rests_at_zero_between_two_signs_switches_once() -> None:
+def test_each_valve_that_a_command_switches_on_or_off_is_counted() -> None:
     command = np.zeros(3001)
     command[:1000], command[2000:] = 1.0, -1.0
-    assert value("switchings", command=command) == 1.0
-    assert value("switchings", command=np.sign(np.cos(2.0 * math.pi * TIME))) == 6.0
+    assert value("switchings", command=command) == 2.0
+    assert value("switchings", command=np.sign(np.cos(2.0 * math.pi * TIME))) == 2 * 6.0
+    on_or_off = np.where(np.arange(3001) // 15 % 2, 0.0, 1.0)
+    assert value("switchings", command=on_or_off) == 200.0
+
+
+def test_venting_switches_the_valves_off_as_a_command_of_zero_does() -> None:
+    command = np.zeros(3001)
+    command[100:200], command[200:300] = 0.4, VENT
+    assert value("switchings", command=command) == 2.0
 
 
 def test_oscillation_on_the_ramp_is_counted_there_and_not_on_the_hold() -> None:

@@ -351,7 +351,7 @@ def _bottle(pair: WalkPair) -> str:
     """Return how long the bottle of the walk lasts and what ended it, or how to see that; empty without gas."""
     worn = pair.comparison.with_device
     if worn.supply is not None:
-        return bottle_remark(worn, [one.result for one in pair.volumes[1:]])
+        return bottle_remark(worn, [one.on_bottle for one in pair.volumes[1:]])
     gas = worn.metrics.get("gas")
     if gas is None or gas.value <= 0.0:
         return ""

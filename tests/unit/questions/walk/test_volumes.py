@@ -90,7 +90,7 @@ def test_a_bottle_takes_the_folder_of_a_course_and_refuses_to_reuse_its_exhaust(
     assert isinstance(life, Endurance)
     time = course.comparison.with_device.metrics["course_time"].value
     assert life.discharge.walking_time == pytest.approx(30.0, abs=0.2)
-    assert life.discharge.steps == pytest.approx(life.discharge.walking_time / time, rel=1e-2)
+    assert life.discharge.strides == pytest.approx(life.discharge.walking_time / time, rel=1e-2)
     assert len(life.others) == 2
     with pytest.raises(DataError, match="the strides of course 'stairs' differ"):
         endurance(tmp_path, reuse=["reservoir_volume=50 cm^3"])
@@ -124,7 +124,7 @@ def test_a_run_is_run_again_from_its_folder_with_the_other_chambers(tmp_path: Pa
     again = ppafo.simulate(
         ppafo.load_scenario(scenario, ["run.duration=0.3 s", *volumes, "actuator.dead_volume_2=32 cm^3"])
     )
-    assert other.draw.mass_per_step == pytest.approx(again.recording["supplied_mass"][-1], rel=2e-3)
+    assert other.draw.mass_per_stride == pytest.approx(again.recording["supplied_mass"][-1], rel=2e-3)
     (tmp_path / "out" / "run.json").write_text(
         (tmp_path / "out" / "run.json").read_text(encoding="utf-8").replace("1.451e-05", "1.551e-05"), encoding="utf-8"
     )
