@@ -34,7 +34,8 @@ class Stance(NamedTuple):
     """Whether heel and toes were loaded (1) since the strike, how long [s] both have been, and only one on the ground.
 
     Both times end where the other one begins; the second one ends in the swing too. ``flat_angle`` [rad] is the ankle
-    angle while the heel carried last, 0 before the first sample; ``turned`` is 1 once the ankle has left it. ``largest``
+    angle while the heel carried last, 0 before the first sample; ``turned`` is 1 once the ankle has left it.
+    ``largest``
     [N] is the larger force at most, and ``difference`` [N] how far heel and toes were from each other at most.
     """
 
