@@ -35,8 +35,7 @@ class Stance(NamedTuple):
 
     Both times end where the other one begins; the second one ends in the swing too. ``flat_angle`` [rad] is the ankle
     angle while the heel carried last, 0 before the first sample; ``turned`` is 1 once the ankle has left it.
-    ``largest``
-    [N] is the larger force at most, and ``difference`` [N] how far heel and toes were from each other at most.
+    ``largest`` [N] is the larger force at most, ``difference`` [N] how far heel and toes were apart at most.
     """
 
     heel_seen: float

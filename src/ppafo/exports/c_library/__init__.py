@@ -75,7 +75,12 @@ def scenario_library(scenario: Scenario) -> Library:
         settings=settings,
         relations=relations_of(scenario),
         switches=_switches(scenario.device, of_sensors),
-        other_program=(f"({interval} != (double)(int64_t){interval}) != {_truth(program.program.samples_inside)}",),
+        other_program=(
+            (
+                f"({interval} != (double)(int64_t){interval}) != {_truth(program.program.samples_inside)}",
+                "run_output_interval",
+            ),
+        ),
         words=words_of(scenario, links),
         further=lambda collector, boundary: preparation_of(scenario, program.program, collector, boundary),
         following=_following(settings, links),
@@ -122,7 +127,9 @@ def walk_library(configuration: "Scenario") -> Library:
         settings=settings,
         relations=relations_of_walk(configuration),
         switches=_switches(configuration.device, of_readings),
-        other_program=(f"(prepared->counts.signal_delay > 0.0) != {_truth(program.program.late_readings)}",),
+        other_program=(
+            (f"(prepared->counts.signal_delay > 0.0) != {_truth(program.program.late_readings)}", "controller_period"),
+        ),
         words=words_of_walk(configuration, links, failing),
         further=lambda collector, boundary: preparation_of_walk(configuration, program.program, collector, boundary),
         following=_following(settings, links),

@@ -316,13 +316,6 @@ FLAGS = (*TARGET, *STRICT, *_FREESTANDING, *_LINKED)
 INDEX = "index.json"
 """File of the prebuilt programs that says of which text each was made, and by which version of the compiler."""
 _TITLE = "The functions that a run is made of, from ppafo."
-_RULES_OF_TIMES = (
-    ("run_output_interval", "is_whole({} / {})", ("run_duration", "run_output_interval")),
-    ("run_duration", "{} / {} <= 1.0e8", ("run_duration", "run_step")),
-    ("run_duration", "{} / {} <= 5.0e6", ("run_duration", "run_output_interval")),
-    ("sensors_delay", "{} / {} <= 1.0e5", ("sensors_delay", "run_step")),
-)
-"""What the file of a scenario must keep of its times too (``simulation/clock.py``): setting named, rule, of what."""
 _COMMENT = re.compile(r"\s*/\*.*?\*/\s*", re.DOTALL)
 _INSIDE = re.compile(r"(?:PPAFO_INLINE\s[\w\s*]*?\b|^\} )(\w+)(?=[(;])", re.MULTILINE)
 """Declarations of functions and types that are not visible outside a module."""
@@ -370,7 +363,7 @@ def _unit(library: Library, functions: str) -> str:
         "go_on": _chosen_loop(program, ""),
         "go_on_together": _chosen_loop(program, TOGETHER),
         "members": "\n".join(f"    double {name};" for name in names),
-        "conditions": "\n".join(refused.format(holds, name.upper()) for holds, name in _conditions(library)),
+        "conditions": "\n".join(refused.format(holds, name.upper()) for holds, name in conditions_of(library)),
     }
     return filled(template("wasm", "module.c"), words)
 
@@ -400,13 +393,6 @@ def _array_words(library: Library) -> dict[str, str]:
         "other_program": _COUNT.sub(lambda found: f"counts[COUNT_{found[1].upper()}]", other_program_of(library)),
     }
     return {**words, "prepared_run": filled(template("wasm", "prepared_run.c"), words)}
-
-
-def _conditions(library: Library) -> list[tuple[str, str]]:
-    """What settings must keep in C, with the one that is named where it is not kept."""
-    rules = () if library.program.program.walks else _RULES_OF_TIMES
-    of_times = [(rule.format(*(f"settings->{name}" for name in names)), named) for named, rule, names in rules]
-    return [*conditions_of(library), *of_times]
 
 
 def _chosen_loop(program: ExportedProgram, ending: str) -> str:

@@ -106,15 +106,16 @@ static bool prepare_unit(unit *item, prepared_run *prepared)
 {
     const char *bad;
     follow_inputs(item);
-    bad = @name@_bad_setting(&item->now.settings);
+    bad = wrong_setting(&item->now.settings);
     if (bad != NULL) {
         const char *path = path_of(bad);
         return is_hidden(path) ? refuse(item, "an input is out of range (it sets %s)", path)
                                : refuse(item, "parameter %s is out of range or contradicts another", path);
     }
     prepare_run(&item->now.settings, prepared);
-    if (is_other_program(&item->now.settings, prepared)) {
-        return refuse(item, "these parameters need other functions than the unit has: export it from ppafo with them");
+    bad = needs_other_program(&item->now.settings, prepared);
+    if (bad != NULL) {
+        return refuse(item, "parameter %s needs other functions than the unit has: export it from ppafo with it", path_of(bad));
     }
     return true;
 }
