@@ -11,6 +11,7 @@ from ppafo.errors import DataError
 from ppafo.questions.endurance.answer import Endurance
 from ppafo.questions.endurance.solve import endurance
 from ppafo.questions.walk.answer import WalkPair, Wearers, walk_with_and_without
+from ppafo.walking.bottle import minutes_text
 
 MINUTES = 0.1
 
@@ -55,6 +56,20 @@ def test_the_work_of_the_gas_is_that_of_its_energy_balance() -> None:
     work = own.result.recording["gas_work"]
     strides = own.result.starts.size - 3
     assert own.gas_work == pytest.approx((work[last] - work[first]) / strides, rel=0.01)
+
+
+def test_the_interval_of_a_bottle_has_the_chambers_that_outlast_the_walk() -> None:
+    small = ["bottle.gas_mass=6 g", "bottle.volume=30 cm^3"]
+    found = walk_with_and_without("solenoid", 0.25, bottle="paper-co2-9oz", overrides=small)
+    assert isinstance(found, WalkPair)
+    short = found.volumes[2]
+    assert short.result.supply is not None
+    assert short.result.supply.ending.kind == "walk's end"
+    assert short.on_bottle is not None
+    assert short.on_bottle.ending.kind == "empty"
+    assert 15.0 < short.on_bottle.ending.time < 20.0
+    lasts = minutes_text(short.on_bottle.ending.time)
+    assert f" to {lasts} depending on the volume of the chambers" in text_of(found.answer())
 
 
 def test_volumes_of_ones_own_and_a_walk_without_gas_have_no_other_rows() -> None:
