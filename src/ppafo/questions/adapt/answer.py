@@ -61,7 +61,7 @@ class Restart:
         return self.course[-1] < FALLS and earlier - self.course[-1] <= SETTLED * self.course[-1]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Adaptation(Solved):
     """What a search of reflexes found: how the wearer walks with the gains of before, and the restarts in their order.
 

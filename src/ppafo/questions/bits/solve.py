@@ -158,7 +158,7 @@ _DAMAGED = "golden.json of this installation of ppafo is damaged; install ppafo 
 Hashes = Mapping[str, Mapping[str, str | int]]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Bits(Solved):
     """Hashes of this computer and the golden ones, by name; what it is, what processor, and what compiled."""
 

@@ -81,7 +81,7 @@ class PooledNumber:
         return coefficient_of_variation(deviation) if self.is_logarithmic else deviation
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class DeviceSpread(Solved):
     """Several devices of one kind, number by number.
 

@@ -56,7 +56,7 @@ class Contest(Protocol):
         """Return the bound of a valve that these played with; SimulationError or ScenarioError where there is none."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class League(Solved):
     """All standings in order of their error; ``bounds`` by valve, or why there are none in ``without_bound``.
 

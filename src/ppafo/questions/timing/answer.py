@@ -57,7 +57,7 @@ def rms_of(parts: Sequence[Floats]) -> float:
     return float(np.sqrt(np.mean(every**2))) if every.size else float("nan")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Timing(Solved):
     """What every timing knows of the events, and what the slap comes from; ``minutes`` of each way at most."""
 

@@ -42,7 +42,7 @@ REPLICATES = 4
 ENOUGH = 100.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Family(Solved):
     """All completions that could be run: settings by name, metrics by valve and name, and how densely they were drawn.
 

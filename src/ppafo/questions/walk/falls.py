@@ -61,7 +61,7 @@ class Fall:
     soonest: Mapping[str, float | None]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Falls(Solved):
     """The faults of a walk by falls; ``walks`` of each, and how many fall without a fault, and with the device off."""
 

@@ -104,7 +104,7 @@ class _Instant:
     left: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Risks(Solved):
     """The risks of a walk; lowest toes [m] without the device, and with it where nothing fails, with its peak [N m]."""
 
