@@ -137,14 +137,11 @@ def _list(parsed: argparse.Namespace) -> int:
 
 
 def _text(result: "Result", error: "ErrorEstimate | None", check: "Check | None", folder: Path) -> str:
-    from ppafo.answers.display_units import metrics_lines
     from ppafo.simulation.scenario import worn_kind
 
-    head = f"{result.scenario.name}: {result.status.kind}"
     checked = [repr(check), ""] if check is not None else [] if error is None else [error.sentence, ""]
     files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", "report.html"]
     written = ", ".join(files if check is None else [*files, CHECK_FILE])
-    lines = metrics_lines(result.metrics, result.scenario.device.supply.atmospheric_pressure)
     walked = f"'ppafo walk {result.scenario.origin.file}' compares it with the device off and with a healthy ankle"
     beside = [] if worn_kind(result.scenario) is None else [walked]
-    return "\n".join([head, "", *lines, "", *checked, *beside, f"written: {folder} ({written})"])
+    return "\n".join([str(result), "", *checked, *beside, f"written: {folder} ({written})"])

@@ -66,6 +66,16 @@ class Solved:
         answer: Answer = sys.modules[type(self).__module__].answer_of(self)
         return answer
 
+    def __str__(self) -> str:
+        """Return what the command prints."""
+        from ppafo.answers.writing import text_of
+
+        return text_of(self.answer())
+
+    def __repr__(self) -> str:
+        """Return the class and the title of the answer."""
+        return f"<{type(self).__name__}: {self.answer().title}>"
+
     def to_dict(self) -> dict[str, Any]:
         """Return what ``--json`` prints, as plain data in SI."""
         return dict(self.answer().data)

@@ -137,6 +137,13 @@ class Result:
             [f"Result of '{scenario.name}', {scenario.duration:g} s: {status.message or status.kind}", *lines]
         )
 
+    def __str__(self) -> str:
+        """Return what ``ppafo simulate`` prints: status and metrics in the units that people are shown."""
+        from ppafo.answers.display_units import metrics_lines
+
+        head = f"{self.scenario.name}: {self.status.kind}"
+        return "\n".join([head, "", *metrics_lines(self.metrics, self.scenario.device.supply.atmospheric_pressure)])
+
     def plot(self) -> "Figure":
         """Return a figure of angle, pressures, torque, command and gas; ``.savefig(...)`` writes it."""
         from ppafo.answers.recording_figure import recording_figure

@@ -54,7 +54,7 @@ class Reuse:
         return reuse_balance(self.cycle)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Endurance(Solved):
     """The request and its result.
 
@@ -75,7 +75,7 @@ class Endurance(Solved):
     others: Mapping[str, "Endurance"] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Endurances(Solved):
     """Several gas uses on the same bottle, by name."""
 

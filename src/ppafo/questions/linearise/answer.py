@@ -68,7 +68,7 @@ class Delays:
     period: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class LinearModel(Solved):
     """The plant of a scenario near one point, x' = A x + B u, y = C x + D u, for differences from the point in SI.
 

@@ -225,7 +225,7 @@ class Look:
         return self.effective_size >= min(FEWEST_EFFECTIVE, 0.5 * (self.draws - self.missing))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class MonteCarlo(Solved):
     """The looks one after the other, whether the last one met the rule, and the values of the metric (draws,) [SI].
 

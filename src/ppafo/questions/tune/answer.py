@@ -117,7 +117,7 @@ class Setting:
         return self.is_feasible_in_search and self.violation[1] == 0.0 and self.without_value[1] == 0.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Tuning(Solved):
     """What a search came to. ``starts`` are best first; ``runs`` counts all simulated runs."""
 

@@ -87,7 +87,7 @@ LARGEST_DELAY = 1.0
 """Seconds; a recording that is later than this was not recorded with its command."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Validation(Solved):
     """A parameter set and what each recording reports of it."""
 

@@ -158,7 +158,7 @@ def _values(values: Floats) -> Floats:
     return np.quantile(values, QUANTILES) if values.size else np.zeros(0)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class WalkPair(Solved):
     """A walk with the device and without it.
 
@@ -169,7 +169,7 @@ class WalkPair(Solved):
     volumes: tuple[VolumeReading, ...]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Wearers(Solved):
     """What many wearers get; ``volumes`` is the same for fewer of them with other readings of the paper's chambers."""
 
