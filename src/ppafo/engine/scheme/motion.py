@@ -138,7 +138,7 @@ class PartSlide(NamedTuple):
 
 
 class PartEnd(NamedTuple):
-    """Angle [rad] and angular velocity [rad/s] at the end of a part, and the error of the angle over what is allowed."""
+    """Angle [rad] and angular velocity [rad/s] at the end of a part, and its error over what is allowed [-]."""
 
     angle: float
     rate: float
