@@ -1,10 +1,10 @@
-"""Print the licences of the run-time lock as a table: python scripts/licences.py, from what each package says of itself.
+"""Print the licences of the run-time lock as a table: ``python scripts/licences.py``.
 
 Name and version come from ``requirements.lock``, the licence from the metadata of the package that is installed.
 """
 
 import re
-from importlib.metadata import PackageNotFoundError, metadata
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
 _LOCK = Path(__file__).parents[1] / "requirements.lock"
@@ -23,13 +23,13 @@ def locked() -> dict[str, str]:
 def licence(name: str) -> str:
     """Return what a package says is its licence: the expression, else the classifier, else the text if it is short."""
     try:
-        said = metadata(name)
+        said = distribution(name).metadata
     except PackageNotFoundError:
         return "(not installed here)"
     classifiers = [item.rpartition(" :: ")[2] for item in said.get_all("Classifier") or () if "License" in item]
-    text = said.get("License") or ""
+    text = said["License"] or ""
     short = text if len(text) <= _LONGEST and "\n" not in text else ""
-    return said.get("License-Expression") or ", ".join(classifiers) or short or "(see the package)"
+    return said["License-Expression"] or ", ".join(classifiers) or short or "(see the package)"
 
 
 if __name__ == "__main__":
