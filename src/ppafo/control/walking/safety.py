@@ -35,7 +35,8 @@ class Stance(NamedTuple):
 
     Both times end where the other one begins; the second one ends in the swing too. ``flat_angle`` [rad] is the ankle
     angle while the heel carried last, 0 before the first sample; ``turned`` is 1 once the ankle has left it.
-    ``largest`` [N] is the larger force at most, ``difference`` [N] how far heel and toes were apart at most.
+    ``largest`` [N] is the larger force at most since the strike, ``on_toes`` [N] how far the toe force was above the
+    heel force at most since the heel carried last.
     """
 
     heel_seen: float
@@ -45,7 +46,7 @@ class Stance(NamedTuple):
     flat_angle: float = 0.0
     turned: float = 0.0
     largest: float = 0.0
-    difference: float = 0.0
+    on_toes: float = 0.0
 
 
 class Finding(NamedTuple):
@@ -118,13 +119,13 @@ RESTS = 0.05
 """Angle [rad] within which an ankle rests: who sits unloads heel and toes too, but does not turn the ankle, and a foot
 that steps has turned by more before its toes leave the ground."""
 
-SAME = 0.4
-"""Of the larger force in a stance, by which heel and toes differ at least: a foot that rolls from one to the other has
-0.98 and more. Toes with 0.7 of the heel in them still leave the ground late enough for nothing to be braked."""
+ROLLS = 0.4
+"""Of the largest force in a stance, that toes carry more than the heel before they leave the ground: 0.98 and more in
+walks without a fault, since the heel is off the ground by then. Two channels that read one sensor have 0, swapped ones
+less than 0."""
 
 CARRIES = 100.0
-"""Force [N] in a stance below which nothing is known of the difference of heel and toes: the foot of who sits has less.
-"""
+"""Force [N] in a stance below which that is not judged: the foot of who sits has less."""
 
 MINIMUM_OPENING = 0.1
 """Commands below this may lie within the overlap of a valve: they do not count as opening it."""
@@ -135,7 +136,7 @@ def next_stance(
 ) -> Stance:
     """The stance after a sample of ``period`` [s]; a strike begins a new one."""
     angle, heel_force, toe_force = measurement.angle, measurement.heel_force, measurement.toe_force
-    larger, difference = max(heel_force, toe_force), abs(heel_force - toe_force)
+    larger, more_on_toes = max(heel_force, toe_force), toe_force - heel_force
     heel, toe = phase.heel.loaded, phase.toe.loaded
     strikes = (before.phase == SWING) & (phase.phase != SWING)
     both = min(heel, toe) > 0.5
@@ -151,13 +152,13 @@ def next_stance(
         flat_angle=flat_angle,
         turned=1.0 if turns | ((last.turned > 0.5) & (not flat)) else 0.0,
         largest=larger if strikes else max(last.largest, larger),
-        difference=difference if strikes else max(last.difference, difference),
+        on_toes=more_on_toes if strikes | flat else max(last.on_toes, more_on_toes),
     )
 
 
-def told_apart(stance: Stance) -> bool:
-    """True where heel and toes were seen to differ since the strike, as no two readings of one sensor do."""
-    return stance.difference > SAME * stance.largest
+def rolls_over(stance: Stance) -> bool:
+    """True where the toes carry what the heel no longer does, which tells both sensors from each other."""
+    return stance.on_toes > ROLLS * stance.largest
 
 
 def gait_sign(rules: signs.SafetyRules, before: PhaseState, phase: PhaseState, stance: Stance) -> float:
@@ -169,7 +170,7 @@ def gait_sign(rules: signs.SafetyRules, before: PhaseState, phase: PhaseState, s
     skips_toes = (before.phase == LANDING) & (phase.phase == SWING) & (phase.strikes > 1.5)
     # Who sits has unloaded both alike, but does not turn the ankle.
     leaves = (phase.phase == SWING) & (stance.turned > 0.5) & (stance.largest > CARRIES)
-    found = signs.SAME_FORCES if leaves & (not told_apart(stance)) else signs.NO_SIGN
+    found = signs.NO_TOE_OFF if leaves & (not rolls_over(stance)) else signs.NO_SIGN
     found = signs.NO_TOES if skips_toes else found
     found = signs.RESTLESS if stays & returns else found
     return signs.ENDLESS_PHASE if endless else found
@@ -343,10 +344,10 @@ def feed_time(since: float, opening: float, period: float) -> float:
 def permits(state: SafetyState, phase: float) -> bool:
     """True where the device may act in a phase.
 
-    A push needs a heel that was loaded in this stance and has risen, and heel and toes that were told apart in it; a
-    foot that is lifted has left the ground by turning, for that of somebody who sits is unloaded where it stands.
+    A push needs a heel that was loaded in this stance and has risen, and toes that carry in its place; a foot that is
+    lifted has left the ground by turning, for that of somebody who sits is unloaded where it stands.
     """
-    pushes = (state.level < signs.LIFTS) & (state.stance.heel_seen > 0.5) & told_apart(state.stance)
+    pushes = (state.level < signs.LIFTS) & (state.stance.heel_seen > 0.5) & rolls_over(state.stance)
     steps = (phase > LANDING) | (state.stance.turned > 0.5)
     return (state.level < signs.PAUSED) & steps & (pushes | (phase != PUSH_OFF))
 

@@ -54,7 +54,7 @@ NO_TOES = 22.0
 NOT_FLAT = 23.0
 FLAT_ANGLE = 24.0
 SHORT_SWING = 25.0
-SAME_FORCES = 26.0
+NO_TOE_OFF = 26.0
 NO_HEEL = 27.0
 TOE_STRIDES = 28.0
 LATE_FORCES = 29.0
@@ -180,9 +180,9 @@ SIGNS: dict[float, Sign] = {
         ("lowest_flat_angle", "highest_flat_angle"),
     ),
     SHORT_SWING: Sign("short_swing", "a swing that is too short for its stride", FORCES, ("shortest_swing",)),
-    SAME_FORCES: Sign(
-        "same_forces",
-        "a step in which heel and toes show the same: both channels read one sensor",
+    NO_TOE_OFF: Sign(
+        "no_toe_off",
+        "a step that does not end on the toes: heel and toe sensors show the same, or are swapped",
         FORCES,
         (),
     ),
