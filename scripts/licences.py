@@ -1,4 +1,6 @@
-"""Print the licences of the run-time lock as a table: ``python scripts/licences.py``.
+"""Print the licences of the run-time lock as a table, from what each package says of itself.
+
+    python scripts/licences.py
 
 Name and version come from ``requirements.lock``, the licence from the metadata of the package that is installed.
 """
@@ -27,9 +29,9 @@ def licence(name: str) -> str:
     except PackageNotFoundError:
         return "(not installed here)"
     classifiers = [item.rpartition(" :: ")[2] for item in said.get_all("Classifier") or () if "License" in item]
-    text = said["License"] or ""
+    expression, text = ("".join(said.get_all(key) or ()) for key in ("License-Expression", "License"))
     short = text if len(text) <= _LONGEST and "\n" not in text else ""
-    return said["License-Expression"] or ", ".join(classifiers) or short or "(see the package)"
+    return expression or ", ".join(classifiers) or short or "(see the package)"
 
 
 if __name__ == "__main__":
