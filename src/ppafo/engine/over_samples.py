@@ -181,10 +181,10 @@ class _Columns(ast.NodeTransformer):
 
     def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
         name = "_all" if isinstance(node.op, ast.And) else "_any"
-        joined, *others = (self.visit(part) for part in node.values)
+        found: ast.expr
+        found, *others = (self.visit(part) for part in node.values)
         for other in others:
-            joined = _call(name, joined, other)
-        found: ast.AST = joined
+            found = _call(name, found, other)
         return found
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:

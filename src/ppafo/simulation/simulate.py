@@ -3,9 +3,10 @@
 import math
 import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, final
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -81,31 +82,8 @@ class Status:
         return self.kind == "completed"
 
 
-@final
-class Measured:
-    """Recording and metrics of a run, made when they are first asked for and then kept."""
-
-    def __init__(self, make: Callable[[], tuple[Recording, Mapping[str, Metric]]]) -> None:
-        self._make = make
-
-    def __call__(self) -> tuple[Recording, Mapping[str, Metric]]:
-        """Return both."""
-        found = self._make()
-        self._make = lambda: found
-        return found
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Measured) and self() == other()
-
-    __hash__ = None  # type: ignore[assignment]  # arrays have no hash
-
-    def __reduce__(self) -> tuple[Callable[..., "Measured"], tuple[Any, ...]]:
-        """Copy and pickle what is made, not the program that it is made from."""
-        return _measured, self()
-
-
-def _measured(recording: Recording, metrics: Mapping[str, Metric]) -> Measured:
-    return Measured(lambda: (recording, metrics))
+Measured = tuple[Recording, Mapping[str, Metric]]
+"""The channels of a run, and its metrics."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -113,20 +91,26 @@ class Result:
     """A finished run. ``versions`` are those of the packages, ``engine`` the figures of the time stepping."""
 
     scenario: Scenario
-    _measured: Measured
+    recording: Recording
+    metrics: Mapping[str, Metric]
     status: Status
     versions: Mapping[str, str]
     engine: Mapping[str, float | int | str]
 
-    @property
-    def recording(self) -> Recording:
-        """The channels of the run in SI units, up to where it failed."""
-        return self._measured()[0]
+    _measure: Callable[[], Measured] | None = field(default=None, init=False, repr=False, compare=False)
+    """What makes recording and metrics of a run until they are first asked for: many runs are never looked at."""
 
-    @property
-    def metrics(self) -> Mapping[str, Metric]:
-        """Named numbers of the recording, in SI units."""
-        return self._measured()[1]
+    def __getattr__(self, name: str) -> Any:
+        """Return recording or metrics where they were not made yet, and keep both."""
+        if name not in ("recording", "metrics"):
+            raise AttributeError(f"a result has no '{name}'", name=name, obj=self)
+        measure = self._measure
+        if measure is not None:
+            recording, metrics = measure()
+            object.__setattr__(self, "recording", recording)
+            object.__setattr__(self, "metrics", metrics)
+            object.__setattr__(self, "_measure", None)
+        return object.__getattribute__(self, name)
 
     def __repr__(self) -> str:
         """Return name, status, duration and one line a metric, in SI units."""
@@ -244,21 +228,20 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     record = outcome.record[:, :, 0]
     status = _status(outcome, record, rows, times)
     kept = times.size if status.time is None else max(1, int(np.searchsorted(times, status.time)))
+    versions = {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__}
+    engine = {"step": run.step, "steps": run.step_count, "steps_per_sample": run.steps_per_sample}
     worn = worn_kind(scenario)
-    if worn is None:
-        shown = {path: row for path, row in rows.items() if not path.startswith(_OF_STEPS)}
-        measured = Measured(lambda: _measure(scenario, run, times[:kept], _by_path(record[:kept], shown)))
-    else:
+    if worn is not None:
         recording, metrics, ended = worn.measured(scenario, run, times[:kept], _by_path(record[:kept], rows))
-        measured = _measured(recording, Metrics(metrics))
         status = replace(status, message=ended) if status.is_completed else status
-    return Result(
-        scenario,
-        measured,
-        status,
-        versions={"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
-        engine={"step": run.step, "steps": run.step_count, "steps_per_sample": run.steps_per_sample},
-    )
+        return Result(scenario, recording, Metrics(metrics), status, versions, engine)
+    shown = {path: row for path, row in rows.items() if not path.startswith(_OF_STEPS)}
+    result: Result = object.__new__(Result)
+    known = {"scenario": scenario, "status": status, "versions": versions, "engine": engine}
+    measure = partial(_measure, scenario, run, times[:kept], record[:kept], shown)
+    for name, value in {**known, "_measure": measure}.items():
+        object.__setattr__(result, name, value)
+    return result
 
 
 def _by_path(record: Floats, rows: Mapping[str, int]) -> dict[str, Floats]:
@@ -266,10 +249,8 @@ def _by_path(record: Floats, rows: Mapping[str, int]) -> dict[str, Floats]:
     return {path: np.ascontiguousarray(record[:, row]) for path, row in rows.items()}
 
 
-def _measure(
-    scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]
-) -> tuple[Recording, Mapping[str, Metric]]:
-    recording = _recording(scenario, run, times, rows)
+def _measure(scenario: Scenario, run: Run, times: Floats, record: Floats, rows: Mapping[str, int]) -> Measured:
+    recording = _recording(scenario, run, times, _by_path(record, rows))
     return recording, Metrics(evaluate(recording))
 
 

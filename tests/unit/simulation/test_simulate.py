@@ -1,7 +1,9 @@
 """From a scenario to a result: recordings, status, Python controllers, many at once."""
 
+import copy
 import dataclasses
 import math
+import pickle
 import signal
 import subprocess
 import sys
@@ -300,3 +302,13 @@ def test_runs_of_an_ensemble_and_walks_with_too_many_parts_say_so_too() -> None:
     outcome.too_many_parts[1] = True
     told = ensemble_result(SimpleNamespace(reasons={}), outcome, {}).reasons  # type: ignore[arg-type]
     assert told == {0: f"diverged at t = 1.5 s; {REMEDY}", 1: f"diverged at t = 1.5 s; {TOO_MANY_PARTS}"}
+
+
+def test_a_result_that_nobody_has_looked_at_is_copied_pickled_and_compared_as_any_other(
+    step_response: Scenario,
+) -> None:
+    first, other = simulate_many([step_response, step_response])
+    stored = pickle.loads(pickle.dumps(first))
+    assert stored.recording == other.recording
+    assert stored.metrics["angle_range"].value == other.metrics["angle_range"].value
+    assert copy.deepcopy(simulate(step_response)) == dataclasses.replace(first, status=other.status)
