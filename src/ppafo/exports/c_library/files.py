@@ -238,6 +238,7 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "relations": "\n".join(
             f'    if (!({holds})) {{\n        return "{name}";\n    }}' for holds, name in _relations(library)
         ),
+        "is_whole": _IS_WHOLE if _rules_of_times(library) else "",
         "needs_other": "\n".join(
             f'    if ({condition}) {{\n        return "{name}";\n    }}'
             for condition, name in _conditions_of_program(library)
@@ -317,12 +318,24 @@ RULES_OF_TIMES = (
 """What the file of a scenario must keep of its times (``simulation/clock.py``): setting named, rule, of what."""
 
 
+_IS_WHOLE = """
+/* True for a number that is a whole one but for rounding. */
+static bool is_whole(double count)
+{
+    return fabs(count - floor(count + 0.5)) <= 1.0e-9 * count;
+}
+"""
+
+
 def _relations(library: Library) -> list[tuple[str, str]]:
     """What settings must keep together, as text in C, with the setting that is named."""
-    has_times = library.keeps_times and not library.program.program.walks
-    rules = RULES_OF_TIMES if has_times else ()
-    of_times = [(rule.format(*(f"settings->{name}" for name in names)), named) for named, rule, names in rules]
-    return [*map(_related, library.relations), *of_times]
+    return [*map(_related, library.relations), *_rules_of_times(library)]
+
+
+def _rules_of_times(library: Library) -> list[tuple[str, str]]:
+    """What the times of a scenario must keep, as text in C, with the setting that is named."""
+    rules = RULES_OF_TIMES if library.keeps_times and not library.program.program.walks else ()
+    return [(rule.format(*(f"settings->{name}" for name in names)), named) for named, rule, names in rules]
 
 
 def _related(item: Relation) -> tuple[str, str]:

@@ -80,14 +80,7 @@ static const char *needs_other_program(const @name@_settings *settings, const pr
 @needs_other@
     return NULL;
 }
-
-/* True for a number of times that is whole but for rounding, as in a file. */
-static inline bool is_whole(double count)
-{
-    const double rest = count - floor(count + 0.5);
-    return (rest < 0.0 ? -rest : rest) <= 1.0e-9 * count;
-}
-
+@is_whole@
 static ppafo_array array_of(double *values, int64_t first, int64_t second, int64_t third)
 {
     const ppafo_array made = {values, {first, second, third}};
