@@ -152,9 +152,7 @@ def volumes_data(read: tuple[VolumeReading, ...]) -> list[Mapping[str, Any]]:
             "push_off_work": one.result.metrics["push_off_work"].value,
             "peak_torque": one.peak_torque,
             **(
-                {}
-                if one.on_bottle is None
-                else {"walking_time": _lasts(one), "ending": one.on_bottle.ending._asdict()}
+                {} if one.on_bottle is None else {"walking_time": _lasts(one), "ending": one.on_bottle.ending._asdict()}
             ),
         }
         for one in read
