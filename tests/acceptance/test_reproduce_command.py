@@ -124,19 +124,19 @@ def test_where_the_solver_of_the_rig_gives_up_the_report_has_no_figure_3_and_say
     bench_study.cache_clear()
 
     def gives_up(_run: object) -> RigSolution:
-        raise SimulationError("the rig's solver stopped")
+        raise SimulationError("the solver of the rig stopped")
 
     monkeypatch.setattr("ppafo.rig.experiments.solve_rig", gives_up)
     assert main(["reproduce", "--out", str(tmp_path)]) == 0
     assert not list(tmp_path.glob("figure-3*"))
-    assert "the rig's solver stopped" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "the solver of the rig stopped" in (tmp_path / "report.html").read_text(encoding="utf-8")
     whole, claims = (
         json.loads((folder / "claims.json").read_text(encoding="utf-8"))["claims"] for folder in (out, tmp_path)
     )
     open_claims = [claim for claim in claims if claim["verdict"] == "not_testable" and claim["id"] != "large_and_heavy"]
     assert {claim["id"] for claim in open_claims} == {claim["id"] for claim in whole if claim["synthetic"]}
     assert all(claim["value"] is None for claim in open_claims)
-    assert all("the rig's solver stopped" in claim["note"] for claim in open_claims)
+    assert all("the solver of the rig stopped" in claim["note"] for claim in open_claims)
     assert not any(claim["synthetic"] for claim in claims)
 
 

@@ -1,8 +1,8 @@
 """The experiments of the rig. To add one: a function ``Request -> Outcome`` and one line in ``EXPERIMENTS``.
 
 On the steady bench true values go in and what the instruments show comes out: static torque against pressure, flow of
-the open valve, its map, the leak across the vane. Experiments in time are solved by SciPy's LSODA: step response, torque task,
-free decay, leak between closed chambers.
+the open valve, its map, the leak across the vane. Experiments in time are solved by SciPy's LSODA: step response,
+torque task, free decay, leak between closed chambers.
 
 ``record`` does one: a synthetic recording and the truth behind it, in memory or in a folder that has one CSV for each
 experiment, and ``rig.json`` with the truth behind all of them.

@@ -1,4 +1,4 @@
-"""Integrates one run on the rig with SciPy's stiff solver, from event to event: samples, arriving commands, valve, stick-slip, stops.
+"""Integrates one run on the rig from event to event: samples, arriving commands, valve, stick-slip, stops.
 
 Friction is Coulomb's with a static limit and Stribeck's curve, both growing with pressure, and sticking is a mode that
 root functions begin and end, as in the reference solver. A bristle model would need no modes, but to agree with
@@ -18,9 +18,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.engine.continuous_time import SAME_TIME, Roots, after_stop, roots_at_rest, roots_sliding
 from ppafo.engine.led_leg import torque_of_leg
 from ppafo.engine.loading import ARRAY, FLOAT, HEADER, INLINE, entry_text, load_source, with_arrays
-from ppafo.engine.reference.solver import SAME_TIME, Roots, after_stop, roots_at_rest, roots_sliding
 from ppafo.engine.rows import leaf_paths, numbers, rebuild, row_expression
 from ppafo.engine.run import Run
 from ppafo.engine.source_text import SourceCollector
