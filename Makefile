@@ -83,7 +83,7 @@ page:
 	npm run --prefix page check
 	npm run --prefix page build
 
-# The environment of `make reproduce`: what a run needs, and the reference solver.
+# The environment of `make reproduce`: what a run needs.
 $(LEAN): requirements.lock requirements-uv.lock pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "ppafo needs Python 3.11 or newer; try: make PYTHON=python3.12")'
 	$(PYTHON) -m venv $(VENV)

@@ -17,9 +17,9 @@ from benchmarks.sampled_solvers import (
 from benchmarks.task import torque_task, torque_task_scenario
 from benchmarks.timing import Contender, Timing, time_in_turn
 from ppafo.engine.lanes import Floats, run_batch
-from ppafo.engine.reference.solver import chamber_pressures_of, plant_states, solve_reference
 from ppafo.engine.run import Run, batch_of
 from ppafo.simulation.simulate import simulate, simulate_many
+from tests.judge.reference_solver import chamber_pressures_of, plant_states, solve_reference
 
 GROUP = "One closed-loop run at 1 kHz"
 CALLS_PER_REPETITION = 20

@@ -55,9 +55,9 @@ Check = Callable[[Path], list[Line]]
 
 def against_reference(_long: Path) -> list[Line]:
     """Shipped scenarios against the reference solver."""
-    from ppafo.engine.reference.solver import compare_with_reference
     from ppafo.simulation.loading import list_scenarios, load_scenario
     from ppafo.simulation.plan import plan_run
+    from tests.judge.reference_solver import compare_with_reference
 
     found = [compare_with_reference(plan_run(load_scenario(name))) for name in list_scenarios()]
     limits = ((2e-4, "angle"), (1e-3, "worst_pressure"), (1e-4, "worst_rms"))

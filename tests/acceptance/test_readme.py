@@ -9,13 +9,13 @@ import pytest
 
 from ppafo.answers.writing import text_of
 from ppafo.cli.main import COMMANDS, build_parser, main
-from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.questions.reproduce.answer import Reproduction, Studies
 from ppafo.questions.reproduce.solve import reproduce
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from scripts.bits import TARGETS, title_of
 from scripts.golden_bits import golden_hashes
+from tests.judge.reference_solver import compare_with_reference
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -7,7 +7,7 @@ energy balance, vane. Only the sums of equation (9) and the state of the vane, w
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from ppafo.engine.reference.right_hand_side import free_motion, real_gas_rates
+from ppafo.engine.continuous_time import free_motion, real_gas_rates
 from ppafo.engine.scheme.thermal_gas import ThermalFlows, thermal_flows
 from ppafo.model.orifice import orifice_flow
 from ppafo.model.places import gas_density, way_across

@@ -16,7 +16,6 @@ import pytest
 
 from ppafo.engine import lane_step
 from ppafo.engine.lanes import write_source
-from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.sensors import Measurement
@@ -29,6 +28,7 @@ from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PrescribedMotion, ProfileChoice, Scenario
 from ppafo.simulation.simulate import REMEDY, simulate_many
 from ppafo.walking.result import _status as walk_status
+from tests.judge.reference_solver import compare_with_reference
 
 CHANNELS = {
     "angle",

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.metrics.gas import energy_imbalance, gas_imbalance
 from ppafo.model.orifice import orifice_flow
@@ -14,6 +13,7 @@ from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import scenario_document
+from tests.judge.reference_solver import compare_with_reference
 
 LINES = ("supply_line.plantarflexion.droop=3e6 Pa s/kg",)
 WARM = (

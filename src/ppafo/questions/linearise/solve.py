@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from ppafo.control.profiles import CONSTANT
+from ppafo.engine.continuous_time import mode_at_rest, torque_on_vane
 from ppafo.engine.lanes import Floats, run_batch
 from ppafo.engine.led_leg import LedLeg, shank_at, torque_of_leg
 from ppafo.engine.program import Program, python_place
-from ppafo.engine.reference.solver import mode_at_rest, torque_on_vane
 from ppafo.engine.rows import leaf_paths, leaves, numbers, rebuilt
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.errors import ScenarioError, SimulationError, UnitError, refused_as

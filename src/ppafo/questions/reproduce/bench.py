@@ -149,7 +149,7 @@ class BenchStudy:
 
 @cache
 def bench_study() -> BenchStudy:
-    """Identify the paper's parameters from synthetic recordings; SimulationError without the extra ``reference``."""
+    """Identify the paper's parameters from synthetic recordings; SimulationError where the rig gives up."""
     planted, gas = load_parameter_set(PLANTED_SET), load_device(PLANTED_SET).gas
     gas_at = GasAt(gas.molar_mass, gas.heat_capacity_ratio, gas.temperature)
 

@@ -4,32 +4,37 @@ First the sampled controller beside a solution in continuous time, with what it 
 and stops as the modes between which the solver switches; then the solution; last how far the lanes are from it.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.engine.continuous_time import (
+    SAME_TIME,
+    Roots,
+    after_stop,
+    mode_at_rest,
+    roots_at_rest,
+    roots_sliding,
+)
 from ppafo.engine.lanes import BatchResult, run_batch, samples_in
 from ppafo.engine.led_leg import torque_of_leg
 from ppafo.engine.loading import load_source, with_arrays
 from ppafo.engine.program import python_place
-from ppafo.engine.reference.right_hand_side import (
+from ppafo.engine.rows import leaf_paths, numbers, rebuild
+from ppafo.engine.run import Run, batch_of, states_at_start
+from ppafo.engine.scheme.actuators import driving_torque_of, measurement_of
+from ppafo.errors import SimulationError
+from ppafo.model.places import at_valve, friction_at_rest, shown_signals
+from ppafo.model.sensors import Measurement, measure
+from tests.judge.reference_slopes import (
     PLANT_UNKNOWNS,
     gas_unknowns,
     right_hand_side_source,
     unknowns_before_valve,
 )
-from ppafo.engine.rows import leaf_paths, numbers, rebuild
-from ppafo.engine.run import Run, batch_of, states_at_start
-from ppafo.engine.scheme.actuators import driving_torque_of, measurement_of
-from ppafo.errors import SimulationError
-from ppafo.model.places import at_valve, friction_at_rest, rebound, shown_signals
-from ppafo.model.plant import PlantParameters, chamber_pressures, driving_torque, holds_still
-from ppafo.model.sensors import Measurement, measure
-
-SAME_TIME = 1.0e-12
 
 Signals = tuple[float, float, float]
 """Angle [rad] and both absolute pressures [Pa]."""
@@ -114,49 +119,6 @@ def solve_segment(solver: Any, y: Floats, time: float, end: float, wanted: Float
     return solution
 
 
-SLOWEST_REBOUND = 1.0e-7
-
-
-class Roots(NamedTuple):
-    """Two root functions whose zeros end a mode; positive while the mode lasts."""
-
-    first: float
-    second: float
-
-
-def torque_on_vane(plant: PlantParameters, angle: float, mass_1: float, mass_2: float) -> float:
-    """Driving torque [N m] from the masses in the chambers."""
-    pressure_1, pressure_2 = chamber_pressures(plant, angle, mass_1, mass_2)
-    return driving_torque(plant, angle, pressure_1, pressure_2)
-
-
-def mode_at_rest(plant: PlantParameters, angle: float, torque: float) -> float:
-    """Direction in which a vane at ``angle`` [rad] sets off under ``torque`` [N m]: 1, -1, or 0 where it is held."""
-    if holds_still(torque, plant.static_torque, angle <= plant.angle_min, angle >= plant.angle_max):
-        return 0.0
-    return 1.0 if torque > 0.0 else -1.0
-
-
-def roots_at_rest(plant: PlantParameters, angle: float, torque: float) -> Roots:
-    """Distance of the torque from breakaway in both directions [N m]; a stop holds against any torque."""
-    towards_upper = 1.0 if angle >= plant.angle_max else plant.static_torque - torque
-    towards_lower = 1.0 if angle <= plant.angle_min else plant.static_torque + torque
-    return Roots(towards_upper, towards_lower)
-
-
-def roots_sliding(plant: PlantParameters, angle: float, angular_velocity: float, way: float) -> Roots:
-    """Speed along the way [rad/s] and distance from the stop ahead [rad]."""
-    ahead = plant.angle_max - angle if way > 0.0 else angle - plant.angle_min
-    return Roots(way * angular_velocity, ahead)
-
-
-def after_stop(run: Run, states: Mapping[str, Any], angular_velocity: float) -> float:
-    """Angular velocity [rad/s] after an impact on a stop; 0 where the rebound is not worth following."""
-    law = python_place(rebound, run.program.effects, run.effects)
-    thrown_back = 0.0 if law is None else float(law(states, angular_velocity))
-    return thrown_back if abs(thrown_back) > SLOWEST_REBOUND else 0.0
-
-
 MASS_TOLERANCE = 1e-15
 TOLERANCES = (1e-11, 1e-10, *(MASS_TOLERANCE,) * 5)
 VALVE_TOLERANCE = 1e-11
@@ -211,7 +173,7 @@ def load_right_hand_side(run: Run) -> RightHandSide:
 def solve_reference(run: Run, tolerance: float = 1e-10) -> ReferenceResult:
     """Solve a run to a relative tolerance [-]; the result [SI] is recorded at the run's record times.
 
-    SimulationError where the extra ``reference`` is not installed or the solver gives up.
+    SimulationError where scikit-sundae is not installed or the solver gives up.
     """
     if run.lines is not None:
         raise SimulationError(
@@ -250,7 +212,7 @@ class _Solution:
         try:
             from sksundae.cvode import CVODE
         except ImportError as error:
-            raise SimulationError("the reference solver needs scikit-sundae: pip install 'ppafo[reference]'") from error
+            raise SimulationError("the reference solver needs scikit-sundae, which a checkout has") from error
 
         given, found, fill = load_right_hand_side(self.run)
 

@@ -5,16 +5,16 @@ import re
 from collections.abc import Callable
 from typing import NamedTuple
 
+from ppafo.engine.continuous_time import free_motion, real_gas_rates
 from ppafo.engine.led_leg import torque_lines
 from ppafo.engine.loading import ARRAY, FLOAT, HEADER, INLINE, entry_text
 from ppafo.engine.program import NoParameters, Program, link_program
 from ppafo.engine.rows import leaf_paths, row_expression
-from ppafo.engine.scheme.real_gas import content_rate
 from ppafo.engine.source_text import SourceCollector, woven
 from ppafo.model.effects.kind import Moment
 from ppafo.model.leg import FootLoad
 from ppafo.model.orifice import ExactOrifice, exact_flow
-from ppafo.model.places import friction_in_motion, way_across, way_in, way_out
+from ppafo.model.places import way_across, way_in, way_out
 from ppafo.model.plant import (
     Openings,
     PlantParameters,
@@ -22,8 +22,6 @@ from ppafo.model.plant import (
     admitted_flow,
     chamber_pressures,
     chamber_volumes,
-    driving_torque,
-    vane_acceleration,
 )
 
 
@@ -80,24 +78,6 @@ def gas_rates(
         supplied=source_1 + source_2,
         vented=vent_1 + vent_2,
         leaked=abs(leak),
-    )
-
-
-def real_gas_rates(
-    plant: PlantParameters,
-    angle: float,
-    angular_velocity: float,
-    flow_1: float,
-    flow_2: float,
-    content_1: float,
-    content_2: float,
-) -> tuple[float, float]:
-    """Rates of both contents [kg/s] of gas that is not ideal, from the flows into its chambers. Equation (3)."""
-    volume_1, volume_2 = chamber_volumes(plant, angle)
-    growth = plant.volume_per_angle * angular_velocity
-    return (
-        content_rate(content_1, volume_1, growth, flow_1),
-        content_rate(content_2, volume_2, -growth, flow_2),
     )
 
 
@@ -192,26 +172,6 @@ def joined_thermal_rates(
         vented=gas.vented,
         leaked=gas.leaked + abs(across.mass),
     )
-
-
-def free_motion(
-    plant: PlantParameters,
-    angle: float,
-    angular_velocity: float,
-    pressure_1: float,
-    pressure_2: float,
-    added_torque: float,
-    way: float,
-) -> tuple[float, float]:
-    """Slopes of angle [rad/s] and angular velocity [rad/s^2] of a vane that slides towards ``way`` (0: it is held).
-
-    Equations (1), (2), (10). ``added_torque`` [N m] drives the vane beside what the plant has: that of a leg.
-    """
-    if way == 0.0:
-        return 0.0, 0.0
-    torque = driving_torque(plant, angle, pressure_1, pressure_2) + added_torque
-    friction = way * friction_in_motion(plant.dynamic_torque, angular_velocity, pressure_1, pressure_2)
-    return angular_velocity, vane_acceleration(torque, angular_velocity, friction, plant.viscous_damping, plant.inertia)
 
 
 PLANT_UNKNOWNS = 7
