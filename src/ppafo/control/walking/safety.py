@@ -34,9 +34,9 @@ class Stance(NamedTuple):
     """Whether heel and toes were loaded (1) since the strike, how long [s] both have been, and only one on the ground.
 
     Both times end where the other one begins; the second one ends in the swing too. ``flat_angle`` [rad] is the ankle
-    angle while the heel carried last, 0 before the first sample; ``turned`` is 1 once the ankle has left it. ``largest``
-    [N] is the larger force at most since the strike, ``on_toes`` [N] how far the toe force was above the heel force at
-    most since the heel carried last.
+    angle while the heel carried last, 0 before the first sample; ``turned`` is 1 once the ankle has left it.
+    ``largest`` [N] is the larger force at most since the strike, ``on_toes`` [N] how far the toe force was above the
+    heel force at most since the heel carried last.
     """
 
     heel_seen: float
@@ -136,7 +136,10 @@ def next_stance(
 ) -> Stance:
     """The stance after a sample of ``period`` [s]; a strike begins a new one."""
     angle, heel_force, toe_force = measurement.angle, measurement.heel_force, measurement.toe_force
-    larger, more_on_toes = max(heel_force, toe_force), toe_force - heel_force
+    # A strike is known some samples late: what loads the foot before belongs to the next stance.
+    swings = phase.phase == SWING
+    larger = last.largest if swings else max(heel_force, toe_force)
+    more_on_toes = last.on_toes if swings else toe_force - heel_force
     heel, toe = phase.heel.loaded, phase.toe.loaded
     strikes = (before.phase == SWING) & (phase.phase != SWING)
     both = min(heel, toe) > 0.5
