@@ -161,7 +161,7 @@ def next_stance(
 
 def rolls_over(stance: Stance) -> bool:
     """True where the toes carry what the heel no longer does, which tells both sensors from each other."""
-    return stance.on_toes > ROLLS * stance.largest
+    return stance.on_toes >= ROLLS * stance.largest
 
 
 def gait_sign(rules: signs.SafetyRules, before: PhaseState, phase: PhaseState, stance: Stance) -> float:
