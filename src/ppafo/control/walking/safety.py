@@ -136,7 +136,10 @@ def next_stance(
 ) -> Stance:
     """The stance after a sample of ``period`` [s]; a strike begins a new one."""
     angle, heel_force, toe_force = measurement.angle, measurement.heel_force, measurement.toe_force
-    larger, more_on_toes = max(heel_force, toe_force), toe_force - heel_force
+    # A strike is known some samples late: what loads the foot before belongs to the next stance.
+    swings = phase.phase == SWING
+    larger = last.largest if swings else max(heel_force, toe_force)
+    more_on_toes = last.on_toes if swings else toe_force - heel_force
     heel, toe = phase.heel.loaded, phase.toe.loaded
     strikes = (before.phase == SWING) & (phase.phase != SWING)
     both = min(heel, toe) > 0.5
@@ -158,7 +161,7 @@ def next_stance(
 
 def rolls_over(stance: Stance) -> bool:
     """True where the toes carry what the heel no longer does, which tells both sensors from each other."""
-    return stance.on_toes > ROLLS * stance.largest
+    return stance.on_toes >= ROLLS * stance.largest
 
 
 def gait_sign(rules: signs.SafetyRules, before: PhaseState, phase: PhaseState, stance: Stance) -> float:
