@@ -220,8 +220,6 @@ def _stands_for(name: str, option: str) -> bool:
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 _LONGEST_MESSAGE = 1000
-_SAME_VALUE = {"controller.period": "controller.rate"}
-"""Values that are given by either of two names."""
 _DURATION = "run.duration"
 
 OBJECTS_BETWEEN_COLLECTIONS = 1_000_000
@@ -298,7 +296,7 @@ def _run(words: list[str]) -> int:
         if parsed.command is None:
             print(FIRST_STEPS, file=sys.stderr)
             return EXIT_BAD_INPUT
-        _check_each_set_once(getattr(parsed, "overrides", ()), getattr(parsed, "minutes", None))
+        _check_duration_once(getattr(parsed, "overrides", ()), getattr(parsed, "minutes", None))
         return int(parsed.run(parsed))
     except PpafoError as error:
         interrupts.check()  # what an interrupt broke is no mistake of the user's
@@ -310,22 +308,10 @@ def _run(words: list[str]) -> int:
         return EXIT_INTERRUPTED
 
 
-def _check_each_set_once(overrides: Sequence[str], minutes: object) -> None:
-    """Refuse a value that is set twice, by its own name, that of the value it is the inverse of, or an option.
-
-    Gait, course and bottle are compared where a walk is loaded, ``minutes`` here.
-    """
-    given: dict[str, tuple[str, str]] = {}
-    for override in overrides:
-        path, _, value = (part.strip() for part in override.partition("="))
-        before, other = given.get(_SAME_VALUE.get(path, path), (None, ""))
-        if path == _DURATION and minutes is not None:
-            raise UsageError(f"--set {path}: the same as --minutes; leave one out")
-        if before == path:
-            raise UsageError(f"--set {path}: is given twice, as '{other}' and as '{value}'; leave one out")
-        if before is not None:
-            raise UsageError(f"--set {path}: the same as {before}, which is set to '{other}'; leave one out")
-        given[_SAME_VALUE.get(path, path)] = (path, value)
+def _check_duration_once(overrides: Sequence[str], minutes: object) -> None:
+    """Refuse a duration that is set beside an option for it."""
+    if minutes is not None and any(override.partition("=")[0].strip() == _DURATION for override in overrides):
+        raise UsageError(f"--set {_DURATION}: the same as --minutes; leave one out")
 
 
 def _readable(message: str) -> str:
