@@ -8,7 +8,7 @@ CORES := $(shell nproc 2>/dev/null || echo 2)
 QUICK_TESTS := tests/architecture tests/contract/test_command_words.py tests/contract/test_catalogs.py $(addprefix tests/unit/,\
 	test_public_interface.py test_units.py control documents gait metrics model parameters signals storage)
 
-.PHONY: reproduce gallery validation test test-long test-all coverage quick check format bench bits dist page site lock clean
+.PHONY: reproduce gallery validation test test-long test-all test-processors coverage quick check format bench bits dist page site lock clean
 
 reproduce: $(LEAN)
 	$(BIN)/ppafo reproduce --out out/reproduce
@@ -34,8 +34,14 @@ test-long: $(READY)
 test-all: check
 	$(TESTS)
 
+# The short tests of what fits and compares, with the linear algebra of other processors, older than that of this computer.
+PROCESSORS ?= Haswell Nehalem
+FITTING := tests/unit/identification tests/unit/validation tests/unit/studies tests/contract/test_bad_recordings.py
+test-processors: $(READY)
+	set -e; for kernel in $(PROCESSORS); do OPENBLAS_CORETYPE=$$kernel $(TESTS) -m "not long" $(FITTING); done
+
 # Kept as bytecode, tests and libraries begin at once in the next run, whatever the surroundings say of it.
-test test-long test-all quick coverage: export PYTHONDONTWRITEBYTECODE =
+test test-long test-all test-processors quick coverage: export PYTHONDONTWRITEBYTECODE =
 TESTS := $(BIN)/python -m pytest -n $(CORES) --dist loadfile --no-loadscope-reorder --costs show
 
 # The last line is branch coverage of the package in percent; `coverage report --sort=miss` says where it is not. Compiled code is not seen.

@@ -292,8 +292,8 @@ def regress(
         scores = np.zeros((groups, columns))
         np.add.at(scores, clusters, design * residuals[:, None])
         correction = groups / (groups - 1) * (count - 1) / (count - columns)
-        covariance = correction * inverse @ (scores.T @ scores) @ inverse
-        half_widths = quantile(confidence, groups - 1) * np.sqrt(np.diag(covariance))
+        errors = np.sqrt(correction * np.square(scores @ inverse).sum(axis=0))
+        half_widths = quantile(confidence, groups - 1) * errors
         candidates["scatter between repetitions"] = np.asarray(half_widths)
     counts = np.bincount(cells)
     if columns < counts.size < count:
