@@ -176,7 +176,7 @@ def test_rig_adds_an_experiment_and_replaces_nothing_of_others(
     (out / "step-response.csv").write_text("mine")
     capsys.readouterr()
     assert main(["rig", "record", "step-response", "--out", str(out)]) == 2
-    assert "has a stride-response.csv that the rig did not write" in capsys.readouterr().err
+    assert "has a step-response.csv that the rig did not write" in capsys.readouterr().err
     assert (out / "step-response.csv").read_text() == "mine"
 
 
