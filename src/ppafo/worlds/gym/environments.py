@@ -120,7 +120,8 @@ class World:
             seconds = lasting(walk, (WALKING_TIME if duration is None else duration) / 60.0).duration
             self.episodes = walk_episodes(walk, randomise, seconds)
         else:
-            words = words if duration is None else (*words, f"run.duration={float(duration)!r} s")
+            own = () if duration is None else (f"run.duration={float(duration)!r} s",)
+            words = over(words, own, ScenarioError)
             chosen = load_scenario(file, words)
             chosen.device.check_vane("an environment")
             self.episodes = scenario_episodes(chosen, randomise, varied, targets)
