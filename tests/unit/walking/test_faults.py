@@ -196,7 +196,7 @@ def test_wearers_whose_controller_paused_or_stopped_are_counted_with_the_sign() 
 
 def test_a_toe_channel_that_shows_the_heel_brakes_no_push_off() -> None:
     fault = ["faults.toe.kind=distorted", "faults.toe.time=0 s", "faults.toe.crosstalk=1"]
-    result = walk(load_walk("proportional", fault), 0.05)
+    result = walk(load_walk("proportional", fault), 0.09)
     on_toes = result.recording["contact"] == TOE
     assert -result.recording["torque"][on_toes].min() < 0.5
     assert [event.sign.name for event in result.events if event.sign is not None][:1] == ["no_toe_off"]

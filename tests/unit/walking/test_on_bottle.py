@@ -10,6 +10,7 @@ from ppafo.engine.lanes import BatchResult, Floats
 from ppafo.engine.rows import row_numbers
 from ppafo.errors import ParameterError, ScenarioError, SimulationError
 from ppafo.parameters.bottles.bottle import FILE as BOTTLES
+from ppafo.parameters.overrides import over
 from ppafo.walking import bottle, load_walk, walk, walk_population
 from ppafo.walking.bottle import Schedule
 from ppafo.walking.motion import walk_of, with_duration
@@ -193,7 +194,7 @@ MISTAKES = {
 @pytest.mark.parametrize("override", MISTAKES)
 def test_a_mistake_is_named_in_one_line(override: str) -> None:
     with pytest.raises((ScenarioError, ParameterError), match=MISTAKES[override]) as caught:
-        load_walk(WALK, ["bottle.name=paper-co2-9oz", override])
+        load_walk(WALK, over(["bottle.name=paper-co2-9oz"], [override]))
     assert "\n" not in str(caught.value)
 
 

@@ -447,7 +447,8 @@ def _explanation(evidence: Evidence, index: int, verdict: Verdict, fraction: flo
         factor = interval_factor(evidence.search.confidence)
         alone_half = factor * math.sqrt(evidence.inflation / information) if information > 0.0 else math.inf
         free = relative_half_width(evidence, index, alone_half)
-        if free > _FREED * fraction:
+        # What may be anything and moves with nothing shows in no residual.
+        if free > _FREED * fraction or (math.isinf(fraction) and not others):
             prior = "; no residual shows it, so it needs a prior" if fraction > evidence.search.weak else ""
             text = f"The recordings are hardly sensitive to it: they determine it only to {size}{prior}"
         else:
