@@ -31,7 +31,7 @@ def test_without_a_command_it_says_where_to_start(capsys: pytest.CaptureFixture[
     [
         (
             ["simulate", "step-response", "--set", "run.duration=1 s", "--set", "run.duration = 2 s"],
-            "overrides 'run.duration=1 s' and 'run.duration=2 s': the same value is given twice; omit one",
+            "overrides 'run.duration=2 s' and 'run.duration=1 s': the same value is given twice; omit one",
         ),
         (
             ["simulate", "step-response", "--set", "controller.rate=1 kHz", "--set", "controller.period=1 ms"],
