@@ -8,7 +8,7 @@ CORES := $(shell nproc 2>/dev/null || echo 2)
 QUICK_TESTS := tests/architecture tests/contract/test_command_words.py tests/contract/test_catalogs.py $(addprefix tests/unit/,\
 	test_public_interface.py test_units.py control documents gait metrics model parameters signals storage)
 
-.PHONY: reproduce gallery validation test test-long test-all coverage quick check format bench bits dist page site opensim lock clean
+.PHONY: reproduce gallery validation test test-long test-all test-processors coverage quick check format bench bits dist page site lock clean
 
 reproduce: $(LEAN)
 	$(BIN)/ppafo reproduce --out out/reproduce
@@ -34,8 +34,14 @@ test-long: $(READY)
 test-all: check
 	$(TESTS)
 
+# The short tests of what fits and compares, with the linear algebra of other processors, older than that of this computer.
+PROCESSORS ?= Haswell Nehalem
+FITTING := tests/unit/identification tests/unit/validation tests/unit/studies tests/contract/test_bad_recordings.py
+test-processors: $(READY)
+	set -e; for kernel in $(PROCESSORS); do OPENBLAS_CORETYPE=$$kernel $(TESTS) -m "not long" $(FITTING); done
+
 # Kept as bytecode, tests and libraries begin at once in the next run, whatever the surroundings say of it.
-test test-long test-all quick coverage: export PYTHONDONTWRITEBYTECODE =
+test test-long test-all test-processors quick coverage: export PYTHONDONTWRITEBYTECODE =
 TESTS := $(BIN)/python -m pytest -n $(CORES) --dist loadfile --no-loadscope-reorder --costs show
 
 # The last line is branch coverage of the package in percent; `coverage report --sort=miss` says where it is not. Compiled code is not seen.
@@ -83,7 +89,7 @@ page:
 	npm run --prefix page check
 	npm run --prefix page build
 
-# The environment of `make reproduce`: what a run needs, and the reference solver.
+# The environment of `make reproduce`: what a run needs.
 $(LEAN): requirements.lock requirements-uv.lock pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "ppafo needs Python 3.11 or newer; try: make PYTHON=python3.12")'
 	$(PYTHON) -m venv $(VENV)
@@ -97,22 +103,18 @@ $(READY): $(LEAN) requirements-dev.lock
 	$(call install,requirements-dev.lock)
 	touch $(READY)
 
-# OpenSim takes 280 MB, and a few tests skip without it.
-opensim: $(READY)
-	$(call install,requirements-opensim.lock)
-
 # uv installs in seconds what takes pip most of a minute; where it fails, for instance behind a proxy that only pip knows, pip tries too.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 install_with = PATH="$$PATH:$(BIN)" uv pip install --quiet --python $(BIN)/python $(1) || $(PIP) $(1)
 install = $(call install_with,--require-hashes --requirement $(1))
 
-# Writes the lock files anew (needs uv); everybody else only reads them. Each of the last four holds one extra, in versions that go with the others.
+# Writes the lock files anew (needs uv); everybody else only reads them. Each of the last three holds one extra, in versions that go with the others.
 COMPILE := uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header
 lock:
 	$(COMPILE) --extra checkout --output-file requirements.lock pyproject.toml
 	$(COMPILE) --extra checkout --extra dev --constraint requirements.lock --output-file requirements-dev.lock pyproject.toml
 	echo uv | $(COMPILE) --output-file requirements-uv.lock -
-	for extra in bench docs opensim release; do \
+	for extra in bench docs release; do \
 		$(COMPILE) --extra $$extra --constraint requirements-dev.lock --output-file requirements-$$extra.lock pyproject.toml || exit 1; done
 
 clean:

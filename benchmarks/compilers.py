@@ -21,7 +21,7 @@ from ppafo.engine.compilers import OFFERED
 from ppafo.engine.lanes import Batch, load_program, run_batch
 from ppafo.engine.loading import BACKEND_VARIABLE, NUMBA
 from ppafo.errors import SimulationError
-from ppafo.questions.bits.solve import digest, names, plain_batch
+from scripts.golden_bits import digest, names, plain_batch
 
 MODELS = ("torque-task-proportional", "step-response", "thermal-gas-behind-lines", "solenoid")
 """A held vane, a free one, one with an energy balance behind lines, and a walk."""

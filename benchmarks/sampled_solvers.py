@@ -9,11 +9,11 @@ from importlib.util import find_spec
 import numpy as np
 
 from ppafo.engine.lanes import Floats
-from ppafo.engine.reference.solver import load_right_hand_side
 from ppafo.engine.rows import numbers
 from ppafo.engine.run import Run
 from ppafo.model.plant import actuator_torque, chamber_pressures
 from ppafo.model.sensors import Measurement
+from tests.judge.reference_solver import load_right_hand_side
 
 PLANT_UNKNOWNS = 7
 TYPICAL_SIZES = (1.0, 1.0, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1.0)

@@ -14,15 +14,24 @@ from benchmarks.sampled_solvers import (
     lsoda_interval,
     solve_by_samples,
 )
-from benchmarks.task import torque_task
+from benchmarks.task import torque_task, torque_task_scenario
 from benchmarks.timing import Contender, Timing, time_in_turn
 from ppafo.engine.lanes import Floats, run_batch
-from ppafo.engine.reference.solver import chamber_pressures_of, plant_states, solve_reference
 from ppafo.engine.run import Run, batch_of
+from ppafo.simulation.simulate import simulate, simulate_many
+from tests.judge.reference_solver import chamber_pressures_of, plant_states, solve_reference
 
 GROUP = "One closed-loop run at 1 kHz"
 CALLS_PER_REPETITION = 20
 LSODA_TARGET = Target(100.0, at_least=True)
+
+
+MANY = 100
+_WHOLE = {
+    "simulate": ("ppafo.simulate of it, recording and metrics read", CALLS_PER_REPETITION),
+    "many": (f"a run of {MANY} by ppafo.simulate_many, nothing read, one thread", MANY),
+    "many_read": ("... with recording and metrics read", MANY),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +73,14 @@ def measure_single_run(duration: float, repetitions: int, say: Callable[[str], N
     run = torque_task(duration)
     present = [competitor for competitor in COMPETITORS if competitor.is_installed()]
     contenders = {"lanes": Contender(lambda: [lane_states(run) for _ in range(CALLS_PER_REPETITION)])}
+    scenario = torque_task_scenario(duration)
+    contenders |= {
+        "simulate": Contender(lambda: [simulate(scenario).metrics for _ in range(CALLS_PER_REPETITION)]),
+        "many": Contender(lambda: simulate_many([scenario] * MANY, threads=1)),
+        "many_read": Contender(lambda: [result.metrics for result in simulate_many([scenario] * MANY, threads=1)]),
+    }
+    for name in ("simulate", "many_read"):
+        contenders[name].run()
     contenders |= {competitor.id: _contender(run, competitor) for competitor in present}
     say("one run: warming up")
     states = {"lanes": lane_states(run)} | {
@@ -73,6 +90,9 @@ def measure_single_run(duration: float, repetitions: int, say: Callable[[str], N
     timings = time_in_turn(contenders, repetitions)
     lanes = Timing(tuple(seconds / CALLS_PER_REPETITION for seconds in timings["lanes"].seconds))
     lines = [_lane_line(duration, lanes)]
+    for name, (what, calls) in _WHOLE.items():
+        seconds = timings[name].best / calls
+        lines.append(Line(f"single_run_{name}", GROUP, what, 1e3 * seconds, "ms"))
     lines += [_ratio_line(competitor, lanes, timings.get(competitor.id)) for competitor in COMPETITORS]
     return lines + _error_lines(run, states, say)
 

@@ -11,6 +11,7 @@ from ppafo.engine.run import Run, batch_of
 from ppafo.model.plant import chamber_1_volume, chamber_2_volume, chamber_mass
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
+from ppafo.simulation.scenario import Scenario
 
 SCENARIO = "torque-task-proportional"
 SEED = 20110301
@@ -31,7 +32,12 @@ SUPPLY = (STANDARD_ATMOSPHERE + 40.0 * PSI, STANDARD_ATMOSPHERE + 70.0 * PSI)
 
 def torque_task(duration: float) -> Run:
     """The torque task over ``duration`` [s], recorded at every sample."""
-    return plan_run(load_scenario(SCENARIO, (f"run.duration={duration!r} s",)))
+    return plan_run(torque_task_scenario(duration))
+
+
+def torque_task_scenario(duration: float) -> Scenario:
+    """The scenario of that."""
+    return load_scenario(SCENARIO, (f"run.duration={duration!r} s",))
 
 
 def named_rows(groups: dict[str, type], values: Floats) -> dict[str, Floats]:

@@ -1,13 +1,15 @@
 """Whether every run has its golden bits: by Numba for several processors, by compilers of C, on other machines.
 
     python scripts/bits.py
+    python scripts/bits.py --targets here
     python scripts/bits.py --names torque-task-solenoid --targets numba:generic "gcc -O1 -fsanitize=address,undefined"
     python scripts/bits.py --renew
     python scripts/bits.py --translate 200
 
 Prints the table of ``docs/accuracy-and-speed.md``, a row for each target: the golden hashes that it found, and what it
-did not find. A target that cannot be run here says what is missing. The rows of the runs come from plans on this
-machine: only the time stepping is compared elsewhere. ``--renew`` writes the golden hashes anew.
+did not find; ``here`` is this computer as ``ppafo`` uses it. A target that cannot be run here says what is missing. The
+rows of the runs come from plans on this machine: only the time stepping is compared elsewhere.
+``--renew`` writes the golden hashes anew.
 
 ``--translate`` draws programs from the catalogues, takes each to C, and lets gcc compile it with warnings as errors.
 """
@@ -32,7 +34,9 @@ from ppafo.engine.lanes import Batch, run_batch
 from ppafo.engine.loading import BACKEND_VARIABLE, NUMBA
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import SimulationError
-from ppafo.questions.bits.solve import (
+from ppafo.translation.c99 import FLAGS, program_source, translated
+from ppafo.translation.native import build, compiler, run_native
+from scripts.golden_bits import (
     GOLDEN,
     Hashes,
     Runner,
@@ -45,14 +49,14 @@ from ppafo.questions.bits.solve import (
     new_golden_hashes,
     plain_batch,
 )
-from ppafo.translation.c99 import FLAGS, program_source, translated
-from ppafo.translation.native import build, compiler, run_native
 from scripts.other_machines import MACHINES, on_other_machine
 from tests.composed_programs import drawn_programs
 
 __all__ = ["digest", "drawn_batch", "failures", "plain_batch"]
 
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Werror")
+HERE = "here"
+"""This computer with the compiler that the package chooses."""
 PROCESSORS = ("generic", "haswell", "skylake-avx512", "host")
 INSTRUCTIONS = {"haswell": "avx2", "skylake-avx512": "avx512f"}
 """What a processor must have to run what is compiled for another."""
@@ -67,6 +71,8 @@ TARGETS = (
 
 def title_of(target: str) -> str:
     """Return a target in words."""
+    if target == HERE:
+        return "this computer"
     if target in MACHINES:
         return f"C by zig, {MACHINES[target].title}"
     kind, _, processor = target.partition(":")
@@ -75,6 +81,8 @@ def title_of(target: str) -> str:
 
 def missing_for(target: str) -> str:
     """Return what a target needs that is not here; empty where all is."""
+    if target == HERE:
+        return ""
     if target in MACHINES:
         return MACHINES[target].missing()
     kind, _, processor = target.partition(":")
@@ -114,7 +122,7 @@ def _from_c(batch: Batch, target: str) -> Runner:
 def hashes_on(target: str, chosen: Sequence[str]) -> Hashes:
     """Return the hashes of a target, found in a process of its own."""
     processor = target.partition(":")[2]
-    env = {BACKEND_VARIABLE: NUMBA}
+    env = {} if target == HERE else {BACKEND_VARIABLE: NUMBA}
     if processor not in ("", "host"):
         # Without a list of features Numba would add those of this machine.
         env |= {"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}
@@ -173,7 +181,7 @@ def main() -> int:
         "--targets",
         nargs="+",
         default=list(TARGETS),
-        help=f"numba:PROCESSOR, 'COMPILER FLAGS', {', '.join(MACHINES)}",
+        help=f"{HERE}, numba:PROCESSOR, 'COMPILER FLAGS', {', '.join(MACHINES)}",
     )
     parser.add_argument("--renew", action="store_true", help="write the golden hashes anew")
     parser.add_argument("--translate", metavar="COUNT", type=int, default=0, help="only translate drawn programs")
@@ -182,7 +190,7 @@ def main() -> int:
     if parsed.translate:
         return translate_drawn(parsed.translate)
     if parsed.renew:
-        Path(str(GOLDEN)).write_text(f"{json.dumps(new_golden_hashes(), indent=2)}\n", encoding="utf-8")
+        GOLDEN.write_text(f"{json.dumps(new_golden_hashes(), indent=2)}\n", encoding="utf-8")
         return 0
     chosen = parsed.names or list(names())
     if parsed.print_hashes is not None:

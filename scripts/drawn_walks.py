@@ -23,9 +23,10 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.control.walking import observer
+from ppafo.control.walking.observer import NominalDevice
 from ppafo.control.walking.signs import HELPS, PAUSED, STOPPED
+from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.errors import ScenarioError
-from ppafo.exports.firmware.walking import nominal_device
 from ppafo.model import contact as ground
 from ppafo.model.plant_faults import PLANT_FAULTS
 from ppafo.parameters.device import Orifice
@@ -257,6 +258,19 @@ def with_fault(valve: str, part: str, kind: str, count: int, seed: int) -> list[
     """Outcomes of drawn level walks in which a part fails at a drawn time, with a shut-off valve in the line."""
     draws = np.random.default_rng([seed, VALVES.index(valve), *map(ord, part + kind)])
     return [outcome(*failing_walk(valve, part, kind, draws)) for _ in range(count)]
+
+
+_OF_LINES = ("droop", "largest_flow", "volume")
+
+
+def nominal_device(configuration: Scenario) -> NominalDevice:
+    """The device that the controller of a walk believes in."""
+    names = (path.rpartition(".")[2] for path in leaf_paths(NominalDevice, ""))
+    given = configuration.control.settings
+    lines = {f"{name}_{line}": f"nominal_line_{name}_{line}" for name in _OF_LINES for line in (1, 2)}
+    lines["relieving"] = "nominal_line_relieving"
+    found: NominalDevice = rebuilt(NominalDevice, [given[lines.get(name, name)] for name in names])
+    return found
 
 
 def residual_peaks(result: WalkResult) -> tuple[np.ndarray, np.ndarray]:

@@ -200,8 +200,8 @@ class BuiltLibrary:
         flags = ["-std=c99", "-O0", "-ffp-contract=off", "-Dstatic=", "-Wl,-Bsymbolic", "-shared", "-fPIC", "-w"]
         subprocess.run(["gcc", *flags, str(folder / f"{name}.c"), "-o", str(made), "-lm"], check=True)
         self.c = ctypes.CDLL(str(made))
-        self.bad_setting, self.size = getattr(self.c, f"{name}_bad_setting"), getattr(self.c, f"{name}_size")
-        self.bad_setting.restype, self.size.restype = ctypes.c_char_p, ctypes.c_size_t
+        self.wrong_setting, self.size = self.c.wrong_setting, getattr(self.c, f"{name}_size")
+        self.wrong_setting.restype, self.size.restype = ctypes.c_char_p, ctypes.c_size_t
         self.places = {setting.path: place for place, setting in enumerate(self.library.settings)}
 
     def changed(self, numbers: Mapping[str, float]) -> np.ndarray:
@@ -215,7 +215,7 @@ class BuiltLibrary:
     def planned(self, settings: np.ndarray, alone: "Planned", follows: bool = True) -> "Planned | str":
         """What the library runs with some settings; ``alone`` says how many numbers there are."""
         pointer = settings.ctypes.data_as(ctypes.c_void_p)
-        bad = self.bad_setting(pointer)
+        bad = self.wrong_setting(pointer)
         if bad is not None:
             return f"{bad.decode()} is out of range or contradicts another"
         if not self.size(pointer):

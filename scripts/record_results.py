@@ -37,7 +37,7 @@ LINES: dict[str, str] = {
     "sensitivity": "sensitivity torque-task-uncertainty --configuration proportional --samples 256",
     "morris": "sensitivity torque-task-uncertainty --configuration proportional --samples 32 --method morris",
     "montecarlo": "montecarlo torque-task-uncertainty --configuration proportional --metric rms_error --draws 2048",
-    "endurance": "endurance --gas-per-step '0.3 g'",
+    "endurance": "endurance --gas-per-stride '0.3 g'",
     "design": "design push-off",
     "tune": "tune pid-gains",
     "sweep": "sweep torque-task-uncertainty --draws 256 --out {out}",

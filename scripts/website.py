@@ -26,7 +26,7 @@ from scripts.docstrings import KERNEL, restructured
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
-FRONT = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")
+FRONT = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md")
 LONG = 10
 """A section of the index with more pages than this has a page of its own in the table of contents."""
 ROOMS = ("control", "control.controllers", "control.profiles", "control.walking", "metrics", "model", "model.valves")

@@ -47,7 +47,7 @@ def drawn_programs(count: int, seed: int = 1) -> Iterator[Program]:
     draw = random.Random(seed)
     valves, walking_valves = valve_models(walks=False), valve_models(walks=True)
     laws, walking_laws, profiles = (
-        [None, *CONTROLLERS.values()],
+        [None, *(law for law in CONTROLLERS.values() if law.plan is None)],
         list(WALKING_CONTROLLERS.values()),
         list(PROFILES.values()),
     )

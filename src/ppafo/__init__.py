@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     from ppafo.parameters.parts import Catalogue as Catalogue
     from ppafo.parameters.parts import Part as Part
     from ppafo.parameters.parts import load_catalogue as load_catalogue
-    from ppafo.questions.bits.solve import bits as bits
     from ppafo.questions.compare.answer import Comparison as Comparison
     from ppafo.questions.compare.solve import compare as compare
     from ppafo.questions.design.front.answer import Design as Design
@@ -118,7 +117,6 @@ _HOMES = {
     "ppafo.parameters.audit": ("audit",),
     "ppafo.parameters.device": ("Device",),
     "ppafo.parameters.parts": ("Catalogue", "Part", "load_catalogue"),
-    "ppafo.questions.bits.solve": ("bits",),
     "ppafo.questions.compare.answer": ("Comparison",),
     "ppafo.questions.compare.solve": ("compare",),
     "ppafo.questions.design.front.answer": ("Design",),

@@ -1,5 +1,6 @@
 """Start of the command line, ``ppafo`` or ``python -m ppafo``; an interrupt while modules load is no traceback."""
 
+import os
 import sys
 
 from ppafo import interrupts
@@ -7,6 +8,10 @@ from ppafo import interrupts
 
 def start() -> int:
     """Run the command line and return its exit code, 130 after a signal to end."""
+    # The next file that is opened would take the number of a closed stream, and what is printed would go into it.
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: PTH123, SIM115
     try:
         interrupts.listen()
         from ppafo.cli.main import main
@@ -14,18 +19,12 @@ def start() -> int:
         code = main()
         interrupts.listen_no_more()
         return 130 if interrupts.is_interrupted() else code
-    except (KeyboardInterrupt, RuntimeError, ImportError) as error:
-        if not _is_interrupt(error):
+    except (KeyboardInterrupt, Exception) as error:
+        # Python wraps an interrupt that falls into the making of a class, pydantic makes another error of it.
+        if not (isinstance(error, KeyboardInterrupt) or interrupts.is_interrupted()):
             raise
         sys.stderr.write("ppafo: interrupted; nothing is half written\n")
         return 130
-
-
-def _is_interrupt(error: BaseException | None) -> bool:
-    """Tell whether an error comes of an interrupt: one that falls into the making of a class is wrapped by Python."""
-    while error is not None and not isinstance(error, KeyboardInterrupt):
-        error = error.__cause__ or error.__context__
-    return error is not None
 
 
 if __name__ == "__main__":

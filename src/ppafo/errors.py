@@ -94,6 +94,13 @@ def raise_noted(found: Sequence[PpafoError]) -> None:
         raise several
 
 
+def said_missing(names: Sequence[str]) -> str:
+    """Return what says that all of these are missing: ``'a', 'b' and 'c' are missing``."""
+    quoted = [f"'{name}'" for name in names]
+    listed = " and ".join(filter(None, (", ".join(quoted[:-1]), quoted[-1])))
+    return f"{listed} {'is' if len(quoted) == 1 else 'are'} missing"
+
+
 def nearest_name(name: str, allowed: Iterable[str]) -> str:
     """Return a hint such as ``, did you mean 'angle'?``, or an empty text where no allowed name is near.
 

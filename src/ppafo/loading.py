@@ -15,6 +15,7 @@ from ppafo.simulation import loading as of_vanes
 from ppafo.simulation import schema
 from ppafo.simulation.declaration import WALK, kind_at
 from ppafo.simulation.loading import ScenarioRequest
+from ppafo.simulation.overrides import over_layer
 from ppafo.simulation.scenario import Scenario
 
 _OF_A_VANE = ("motion", "initial", "reference")
@@ -92,12 +93,15 @@ def placed(name: str, folder: Path) -> str:
 
 
 def reloaded(scenario: Scenario, more: Iterable[str]) -> Scenario:
-    """Return a scenario read again from where it came from, with further overrides.
+    """Return a scenario read again from where it came from, with further overrides as a layer on top of its own.
 
     A Python object that controls it stays in charge.
     """
     origin, custom = scenario.origin, scenario.control.custom
-    every = (*origin.overrides, *more)
+    declared = _layout(origin.content).declared
+    every = over_layer(
+        origin.content, origin.overrides, tuple(more), scenario.name, declared, scenario.device.valve_name
+    )
     read = scenario_from_dict(origin.content, every) if origin.file is None else load_scenario(origin.file, every)
     return read if custom is None else read.controlled_by(custom)
 

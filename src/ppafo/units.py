@@ -98,6 +98,13 @@ def split_quantity(text: str) -> tuple[float, str]:
     return value, unit
 
 
+def number_text(text: str) -> str:
+    """Return a text for ``float`` or ``int``, which take digits of any script and ``1_000``; ValueError for those."""
+    if not text.isascii() or "_" in text:
+        raise ValueError(f"{_quote(text)} is not a number")
+    return text
+
+
 def parse_quantity(text: str, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
     """Return the value of a text in ``si_unit``; gauge pressure counts from ``atmosphere`` [Pa absolute]."""
     value, unit = split_quantity(text)

@@ -88,7 +88,7 @@ def compiler_of(target: str) -> str:
 
 def test_what_whole_numbers_cost_is_as_in_the_table() -> None:
     rows = dict(re.findall(r"^\| (.*?) \| ([\d.]+ N m \| [\d.]+ g) \|$", PAGE, re.MULTILINE))
-    fixed = "controller.arithmetic=fixed"
+    fixed = "controller.kind=pid_on_chip"
     for row, overrides in {
         "floats": (),
         "whole numbers, 12 bits": (fixed,),

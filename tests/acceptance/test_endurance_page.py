@@ -46,10 +46,10 @@ def test_the_commands_of_the_page_run_one_after_the_other_and_give_its_numbers(
             assert words[:2] != SEVERAL[:2] or said.splitlines() == shown_below(words)
         else:
             document = results(words, capsys)
-            steps.append(round(document["result"]["steps"]))  # type: ignore[index]
+            steps.append(round(document["result"]["strides"]))  # type: ignore[index]
             savings += [document["reuse"]["balance"]["returned_mass"]] if "reuse" in document else []  # type: ignore[index]
     for count in steps[:-1]:
-        assert re.search(rf"\b{count} (steps|tasks)", TEXT), count
+        assert re.search(rf"\b{count} (strides|tasks)", TEXT), count
     assert [f"{saved * 1e3:.3g}" for saved in savings] == re.findall(r"saves (\S+) g", TEXT)
     assert (tmp_path / "out" / "bottle" / "endurance.png").is_file()
     saved = results([*SEVERAL[:2], "--reuse", "reservoir_volume=50 cm^3"], capsys)
@@ -85,18 +85,18 @@ def test_the_lines_of_the_page_are_those_that_stand_in_for_them(tmp_path: Path) 
     assert not [item for item in given.assumptions if item.path.startswith("supply_line")]
 
 
-def test_steps_of_a_warm_bottle_are_those_of_the_page(capsys: pytest.CaptureFixture[str]) -> None:
-    warm = [results(words, capsys)["result"]["steps_when_warm"] for words in COMMANDS[:2]]  # type: ignore[index]
-    assert f"would give {warm[0]:.0f} and {warm[1]:.0f} steps" in TEXT
+def test_strides_of_a_warm_bottle_are_those_of_the_page(capsys: pytest.CaptureFixture[str]) -> None:
+    warm = [results(words, capsys)["result"]["strides_when_warm"] for words in COMMANDS[:2]]  # type: ignore[index]
+    assert f"would give {warm[0]:.0f} and {warm[1]:.0f} strides" in TEXT
 
 
-@pytest.mark.parametrize(("change", "steps", "ends"), ROWS)
+@pytest.mark.parametrize(("change", "strides", "ends"), ROWS)
 def test_a_row_of_the_table_is_what_comes_out(
-    change: str, steps: str, ends: str, capsys: pytest.CaptureFixture[str]
+    change: str, strides: str, ends: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    result = results(["endurance", "--gas-per-step", "0.4 g", "--set", change], capsys)["result"]
+    result = results(["endurance", "--gas-per-stride", "0.4 g", "--set", change], capsys)["result"]
     assert result["ending"]["kind"] == ends  # type: ignore[index]
-    assert round(result["steps"]) == int(steps)  # type: ignore[index]
+    assert round(result["strides"]) == int(strides)  # type: ignore[index]
 
 
 def test_the_table_has_rows() -> None:

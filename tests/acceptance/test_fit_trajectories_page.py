@@ -24,7 +24,6 @@ PLANTED = {
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The working folder after the commands of the page."""
-    pytest.importorskip("sksundae")
     home = tmp_path_factory.mktemp("page")
     toml = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)[0]
     (home / "problem.toml").write_text(toml)

@@ -31,7 +31,9 @@ def test_the_commands_and_the_python_of_the_page_run(
         *("my-gait.toml", "gait.json", "gait.txt", "gait.png", "gait.svg"),
         *("report.html", "ppafo.json"),
     }
-    assert {"ankle_angle_r", "ankle_angle_r_moment"} <= set(read_opensim(tmp_path / "out" / "walk.sto").columns)
+    assert {"ankle_angle_r", "ankle_angle_r_moment"} <= set(
+        read_opensim(tmp_path / "out" / "opensim" / "recording.sto").columns
+    )
     capsys.readouterr()
     names: dict[str, Any] = {}
     exec(blocks("python")[0], names)

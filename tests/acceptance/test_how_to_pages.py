@@ -21,7 +21,6 @@ from ppafo.cli.main import main
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.plain_python import mistake
-from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.sensors import Measurement
 from ppafo.model.valves.kind import VENT
@@ -32,6 +31,7 @@ from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.loading import scenario_from_dict
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PrescribedMotion
+from tests.judge.reference_solver import compare_with_reference
 from tests.scenario_text import parse_scenario
 
 PAGES = Path(__file__).parents[2] / "docs" / "how-to"

@@ -23,7 +23,7 @@ from ppafo.signals.recording import CHANNELS
 ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "src" / "ppafo"
 PAGES = [
-    *(ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")),
+    *(ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md")),
     *sorted((ROOT / "docs").rglob("*.md")),
 ]
 PAPER_EQUATIONS = tuple(range(1, 15))

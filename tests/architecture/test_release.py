@@ -2,6 +2,7 @@
 
 import json
 import re
+import runpy
 from pathlib import Path
 
 from ppafo import __version__
@@ -35,3 +36,11 @@ def test_the_citation_file_names_this_version_and_the_authors_and_proceedings_of
     assert re.findall(r'family-names: "(.+)"', stated) == list(paper.authors)
     assert "Proceedings of the ASME Dynamic Systems and Control Conference (DSCC)" in stated
     assert "Proceedings of the ASME Dynamic Systems and Control Conference (DSCC)" in paper.note
+
+
+def test_the_page_of_licences_lists_the_packages_of_the_lock() -> None:
+    locked = runpy.run_path(str(ROOT / "scripts" / "licences.py"))["locked"]()
+    rows = (ROOT / "docs" / "licences.md").read_text(encoding="utf-8").splitlines()
+    listed = {cells[1]: cells[2] for cells in (re.split(r" *\| *", row) for row in rows) if len(cells) == 5}
+    assert {name: version for name, version in listed.items() if name in locked} == locked, "scripts/licences.py"
+    assert set(listed) == {*locked, "package", "---"}

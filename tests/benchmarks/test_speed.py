@@ -17,8 +17,8 @@ from benchmarks.single_run import COMPETITORS, lane_states, measure_single_run, 
 from benchmarks.task import ensemble, named_rows, torque_task
 from benchmarks.timing import Contender, Timing, run_python, time_in_turn
 from ppafo.engine.lanes import run_batch
-from ppafo.engine.reference.solver import solve_reference
 from ppafo.metrics import gas, switching, tracking
+from tests.judge.reference_solver import solve_reference
 
 MACHINE = Machine("a processor", "an OS", 2, True, "3.11.0", {"numpy": "2.0", "jax": None})
 SHORT = 0.3

@@ -51,11 +51,20 @@ def settings(kind: Any, draw: random.Random) -> list[float]:
     return [draw.uniform(0.1, 1.0) if item.default is None else item.default for item in kind.quantities]
 
 
+def numbers_of(law: Any, draw: random.Random) -> list[float]:
+    """What a law computes with: its settings, or what its plan makes of them."""
+    found = settings(law, draw)
+    if law.plan is None:
+        return found
+    named = dict(zip((item.name for item in law.quantities), found, strict=True))
+    return list(law.plan(named, 2.0e-3, 1.451e-5, (-5.0, 5.0))[0].values())
+
+
 def controllers(draw: random.Random) -> Iterator[Entry]:
     """Laws of the torque task and of walking, each through a hundred samples of its own state."""
     for kind in [*CONTROLLERS.values(), *WALKING_CONTROLLERS.values()]:
         walks = kind.name in WALKING_CONTROLLERS
-        parameters, state, tried = rebuild(kind.parameters, settings(kind, draw)), kind.initial, []
+        parameters, state, tried = rebuild(kind.parameters, numbers_of(kind, draw)), kind.initial, []
         for sample in range(100):
             pressures = [draw.uniform(1.0e5, 4.5e5) for _ in range(2)]
             seen: Any = Measurement(draw.uniform(0.9, 1.8), *pressures, draw.uniform(-8.0, 8.0))

@@ -14,7 +14,6 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.engine.lanes import LaneBlock
-from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.exports.c_library import c_library, library_of
@@ -37,6 +36,7 @@ from ppafo.walking import load_walk
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.walk import walk
 from tests.built_once import shared_library
+from tests.judge.reference_solver import compare_with_reference
 from tests.modules_under_node import compared, drawn
 
 AREA = "effects.mesh.area"

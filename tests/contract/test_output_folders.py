@@ -26,7 +26,7 @@ FOLDERS: dict[str, list[str]] = {
     "identify": ["problem.toml"],
     "gait": ["show", "falisse2019-subject1"],
     "gait import": ["import", "walk.mot", "--body-mass", "62 kg"],
-    "endurance": ["--gas-per-step", "0.3 g"],
+    "endurance": ["--gas-per-stride", "0.3 g"],
     "design": ["torque-task"],
     "design of a profile": ["push-off"],
     "sets": [],
@@ -35,12 +35,12 @@ FOLDERS: dict[str, list[str]] = {
     "audit": ["ppafo2011"],
     "schema": ["scenario"],
     "cache": [],
-    "bits": ["off"],
     "export c": ["c", "step-response"],
     "export fmu": ["fmu", "step-response"],
-    "export controller": ["controller", "torque-task-solenoid", "--set", "controller.arithmetic=fixed"],
-    "firmware": ["torque-task-solenoid", "--set", "controller.arithmetic=fixed"],
-    "chip": ["torque-task-solenoid", "--set", "controller.arithmetic=fixed"],
+    "export opensim": ["opensim", "solenoid", "--minutes", "0.05"],
+    "export controller": ["controller", "torque-task-solenoid"],
+    "firmware": ["torque-task-solenoid"],
+    "chip": ["torque-task-solenoid"],
     "hil": ["torque-task-solenoid", "--port", "udp:127.0.0.1:5000"],
 }
 """The words of every command that writes a folder; ``walk --wearers`` is ``walk`` with other words."""
@@ -49,7 +49,6 @@ FILES = {
     "plot": (["{result}"], "figure.png"),
     "new scenario": (["mine"], "mine.toml"),
     "gait record": (["falisse2019-subject1", "--strides", "1"], "walk.csv"),
-    "gait export": (["{result}"], "walk.sto"),
     "workbench": (["step-response"], "page.html"),
     "record": (["--port", "udp:127.0.0.1:{port}"], "bench.csv"),
 }

@@ -6,10 +6,10 @@ from types import ModuleType
 
 import pytest
 
-from ppafo.engine.reference.solver import Agreement, compare_with_reference
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
+from tests.judge.reference_solver import Agreement, compare_with_reference
 
 LARGEST_ANGLE = 2.0e-4
 LARGEST_PRESSURE = 1.0e-3

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from ppafo import load_scenario
-from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.simulation.plan import plan_run
+from tests.judge.reference_solver import compare_with_reference
 
 EXAMPLE = Path(str(resources.files("ppafo") / "examples" / "actuators"))
 

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from ppafo.engine.lanes import run_batch
-from ppafo.engine.reference.solver import chamber_pressures_of, plant_states
 from ppafo.engine.run import batch_of
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
+from tests.judge.reference_solver import chamber_pressures_of, plant_states
 from tests.judge.simulator import judge
 
 K = 1.3

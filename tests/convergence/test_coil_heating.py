@@ -5,13 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.model.effects.coil_heating import COPPER, CoilRises, advance, opening_when_warm, prepare, slower
 from ppafo.model.effects.kind import Moment
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.simulate import simulate
+from tests.judge.reference_solver import compare_with_reference
 
 SETTINGS = {"steady_rise": 80.0, "time_constant": 0.2, "pull_in_share": 0.6}
 WARM = tuple(

@@ -2,12 +2,12 @@
 
 import pytest
 
-from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.model.effects.seal_friction import SealFriction, pressed_at_rest, pressed_in_motion
 from ppafo.model.effects.stribeck import Stribeck, more_near_standstill
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
+from tests.judge.reference_solver import compare_with_reference
 
 SEALS = (
     "effects.seal_friction.static_per_pressure=2e-6 N m/Pa",

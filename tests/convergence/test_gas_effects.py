@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.effects.leak_opening import LeakOpening, lifted
 from ppafo.model.effects.line_resistance import fed_through_line, prepare
@@ -15,6 +14,7 @@ from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.simulate import simulate
+from tests.judge.reference_solver import compare_with_reference
 
 OPENING = ("effects.leak_opening.pressure=150 kPa_d",)
 THERMAL = (

@@ -8,7 +8,6 @@ import pytest
 
 import ppafo
 from ppafo.engine.lanes import run_batch
-from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.engine.run import batch_of
 from ppafo.model.sensors import Measurement, decay_factors
 from ppafo.simulation.ensemble import run_ensemble
@@ -16,6 +15,7 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.sampled import state_row_numbers
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, PrescribedMotion, ProfileChoice
+from tests.judge.reference_solver import compare_with_reference
 
 SLOW = ("sensors.angle_bandwidth=20 Hz", "sensors.pressure_bandwidth=40 Hz")
 LATE = ("sensors.delay=2.3 ms",)

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from ppafo.engine.lanes import run_batch
-from ppafo.engine.reference.solver import chamber_pressures_of, compare_with_reference, plant_states
 from ppafo.engine.run import batch_of
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PrescribedMotion, ProfileChoice, Scenario, Thermal
+from tests.judge.reference_solver import chamber_pressures_of, compare_with_reference, plant_states
 
 LARGEST_ANGLE = 2.0e-4
 LARGEST_PRESSURE = 1.0e-3

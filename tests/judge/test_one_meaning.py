@@ -40,7 +40,7 @@ def test_ranges_of_an_environment_are_single_runs_with_the_same_words(name: str)
 @needs_gcc
 @pytest.mark.parametrize("name", ["torque-task-slow-valve", "proportional-learning"])
 def test_settings_of_a_library_are_single_runs_with_the_same_words(name: str) -> None:
-    found = at_library(name, 20, seed=13)
+    found = at_library(name, 24, seed=13)
     assert found.differing == []
     assert found.same > 8
 

@@ -8,12 +8,12 @@ import dataclasses
 
 import pytest
 
-from ppafo.engine.reference.solver import chamber_pressures_of, solve_reference
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from tests.judge.comparison import away_from_impacts, columns, differences, verdict
 from tests.judge.draws import FAMILIES, draw
+from tests.judge.reference_solver import chamber_pressures_of, solve_reference
 from tests.judge.simulator import judge
 
 SEED = 1

@@ -36,7 +36,6 @@ TRUTH = {"valves.proportional.discharge_coefficient": 0.12, "friction.viscous_da
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the recording."""
-    pytest.importorskip("sksundae")
     home = tmp_path_factory.mktemp("drooping")
     write_csv(home / "step.csv", record("step-response", "ideal-laboratory", 3, overrides=DROOPING).recording)
     return home

@@ -17,6 +17,7 @@ from ppafo.units import (
     format_quantity,
     from_si,
     known_units,
+    number_text,
     parse_quantity,
     split_quantity,
     to_si,
@@ -234,3 +235,12 @@ def test_a_number_that_would_become_0_is_refused(text: str) -> None:
 
 def test_a_0_stays_one_however_it_is_written() -> None:
     assert split_quantity("0e-400 m")[0] == split_quantity("-0.000 m")[0] == 0.0
+
+
+@pytest.mark.parametrize("text", ["\uff11", "\u0661", "1_000"])
+def test_only_digits_of_ascii_make_a_number(text: str) -> None:
+    assert float(text) in (1.0, 1000.0)  # Python takes them all
+    with pytest.raises(ValueError, match="is not a number"):
+        number_text(text)
+    with pytest.raises(UnitError, match=r"does not start with a number|is not a unit"):
+        split_quantity(f"{text} m")

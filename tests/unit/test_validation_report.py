@@ -9,7 +9,7 @@ from scripts import validation_report
 from scripts.validation_report import AGREES, DIFFERS, NOT_RUN, Line, alarms, intervals, main, report
 
 
-def line(verdict: str, command: str = "ppafo bits") -> Line:
+def line(verdict: str, command: str = "bits.py") -> Line:
     """A line of the table with a verdict."""
     return Line("bits", "golden hashes", "the same", "", verdict, command)
 
@@ -19,7 +19,7 @@ def test_the_report_counts_the_verdicts_and_numbers_the_commands() -> None:
     assert "Of 4 lines 1 agree, 1 differ, 1 not run here." in text
     assert "| bits | golden hashes | the same | - | agrees | 1 |" in text
     assert "| not run | 2 |" in text
-    assert "1. `ppafo bits`\n2. `make bits`\n" in text
+    assert "1. `bits.py`\n2. `make bits`\n" in text
     assert "## What was not judged" in text
 
 

@@ -24,6 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--parent", metavar="SET", help="show what changed against this set, in place of the one that the file names"
     )
+    parser.add_argument(
+        "--all", action="store_true", help="print what concerns no changed value too, of a set with a parent or --set"
+    )
     output.add_override_argument(parser)
     output.add_output_arguments(parser)
 
@@ -31,18 +34,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(parsed: argparse.Namespace) -> int:
     """Print changes and findings of one set, or a table of several; 1 where a finding is an error, else 0."""
     from ppafo.parameters import apply_overrides, load_parameter_set
-    from ppafo.parameters.audit import audit
+    from ppafo.parameters.audit import audit, changed_paths
 
     output.check_output(parsed)
     sets = [apply_overrides(load_parameter_set(name), parsed.overrides) for name in parsed.names]
-    found = [(parameter_set, audit(parameter_set)) for parameter_set in sets]
     parents = [_parent(parameter_set, parsed.parent) for parameter_set in sets]
+    found = [(one, audit(one, parent)) for one, parent in zip(sets, parents, strict=True)]
     documents = [
         _document(*one, parsed.overrides) | _changes_document(one[0], parent)
         for one, parent in zip(found, parents, strict=True)
     ]
     if len(found) == 1:
-        text = _text(*found[0])
+        compares = parents[0] is not None or bool(parsed.overrides)
+        changed = changed_paths(sets[0], parents[0]) if compares and not parsed.all else None
+        text = _text(*found[0], changed)
         if documents[0]["parent"] is not None:
             text = f"{_changes_text(documents[0])}\n\n{text}"
         output.deliver(f"audit-{sets[0].name}", text, documents[0], parsed)
@@ -107,10 +112,18 @@ def _verdict(finding: "Finding") -> str:
     return "accepted" if finding.accepted else finding.severity
 
 
-def _text(parameter_set: "ParameterSet", findings: "list[Finding]") -> str:
-    blocks, counts = ["\n".join(_lines(finding)) for finding in findings], _counts(findings)
+def _text(parameter_set: "ParameterSet", findings: "list[Finding]", changed: frozenset[str] | None) -> str:
+    """Return the errors and what concerns a ``changed`` value, all findings for None, then how many there are."""
+    shown = [one for one in findings if one.severity == "error" or _concerns(one, changed)]
+    counts = _counts(findings)
     summary = ", ".join(f"{count} {severity}{'' if count == 1 else 's'}" for severity, count in counts.items())
-    return "\n\n".join([*blocks, f"{parameter_set.name}: {summary}"])
+    left = len(findings) - len(shown)
+    rest = f"; {left} of them concern{'s' if left == 1 else ''} no changed value: --all" if left else ""
+    return "\n\n".join([*("\n".join(_lines(one)) for one in shown), f"{parameter_set.name}: {summary}{rest}"])
+
+
+def _concerns(finding: "Finding", changed: frozenset[str] | None) -> bool:
+    return changed is None or not finding.values or any(value.path in changed for value in finding.values)
 
 
 def _lines(finding: "Finding") -> list[str]:

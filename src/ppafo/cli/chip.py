@@ -1,4 +1,4 @@
-"""``ppafo chip``: a scenario or a walk with its controller on the simulator of a small processor."""
+"""``ppafo chip``: a scenario with its controller on the simulator of a small processor."""
 
 import argparse
 from collections.abc import Callable, Sequence
@@ -6,35 +6,25 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ppafo.cli import output
-from ppafo.control.fixed.torque_laws import TARGETS, WALK_TARGETS
+from ppafo.control.fixed.torque_laws import TARGETS
 from ppafo.errors import ScenarioError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ppafo.exports.firmware.lock_step import ChipRun, Comparison, Cost
-    from ppafo.exports.firmware.walking import WalkOnChip
     from ppafo.simulation.scenario import Scenario
 
 _SHOWN = {"rms_error": ("N m", 1.0), "gas_supplied": ("g", 1.0e3)}
 MOST_SAMPLES = 10_000_000
-WALK_MINUTES = 0.2
-"""How long a walk with the chip in charge is, ten strides at the usual pace."""
 SAMPLES_OF_TABLE = 1000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
+    parser.add_argument("scenarios", metavar="SCENARIO", nargs="*", help="names of scenarios, or .toml files")
     parser.add_argument(
-        "scenarios", metavar="SCENARIO", nargs="*", help="name of a scenario or a walk, or a .toml file; or scenarios"
-    )
-    parser.add_argument(
-        "--target",
-        choices=(*TARGETS, *WALK_TARGETS),
-        help=f"the processor (default: {TARGETS[0]}, of a walk {WALK_TARGETS[0]}; with --table all of scenarios)",
-    )
-    parser.add_argument(
-        "--minutes", metavar="MINUTES", type=float, help=f"length of a walk (default: {WALK_MINUTES:g}, ten strides)"
+        "--target", choices=TARGETS, help=f"the processor (default: {TARGETS[0]}; with --table all of them)"
     )
     parser.add_argument(
         "--samples",
@@ -55,10 +45,8 @@ def run(parsed: argparse.Namespace) -> int:
     """Run a scenario with the chip's simulator in charge of the valve; 1 where any decision differs."""
     if parsed.samples is not None and not 1 <= parsed.samples <= MOST_SAMPLES:
         raise ScenarioError(f"--samples {parsed.samples}: must be 1 to {MOST_SAMPLES}")
-    if parsed.table and (parsed.scenarios or parsed.overrides or parsed.minutes is not None):
-        raise ScenarioError("--table: takes no SCENARIO, --set or --minutes; its scenarios are given")
-    if parsed.table and parsed.target in WALK_TARGETS:
-        raise ScenarioError(f"--table: its scenarios run on {', '.join(TARGETS)}; {parsed.target} is for walks")
+    if parsed.table and (parsed.scenarios or parsed.overrides):
+        raise ScenarioError("--table: takes no SCENARIO or --set; its scenarios are given")
     if not parsed.table and not parsed.scenarios:
         raise ScenarioError("give a SCENARIO, or --table; see 'ppafo chip --help'")
     output.check_output(parsed)
@@ -78,21 +66,13 @@ class _Outcome:
 
 
 def _one(parsed: argparse.Namespace) -> _Outcome:
-    """Scenarios or one walk on one target."""
-    from ppafo.loading import load_scenario
-    from ppafo.simulation.scenario import worn_kind
+    """Scenarios on one target."""
+    from ppafo.simulation.loading import load_scenario
 
-    every = [load_scenario(name, parsed.overrides) for name in parsed.scenarios]
-    scenarios = [chosen for chosen in every if worn_kind(chosen) is None]
-    if len(every) == 1 and not scenarios:
-        return _walk(every[0], parsed)
-    if len(every) > 1 and (parsed.samples is not None or len(scenarios) < len(every)):
-        raise ScenarioError(
-            "several SCENARIOs: are run in turn and drawn in one figure; give one for a walk or --samples"
-        )
+    scenarios = [load_scenario(name, parsed.overrides) for name in parsed.scenarios]
+    if len(scenarios) > 1 and parsed.samples is not None:
+        raise ScenarioError("several SCENARIOs: are run in turn and drawn in one figure; give one for --samples")
     target = parsed.target or TARGETS[0]
-    if target not in TARGETS or parsed.minutes is not None:
-        raise ScenarioError(f"{scenarios[0].name}: {', '.join(WALK_TARGETS)} and --minutes are for walks")
     if parsed.samples is None:
         return _runs(scenarios, target)
     from ppafo.exports.firmware.lock_step import compare_drawn
@@ -149,38 +129,6 @@ def _drawn(found: "Comparison", name: str, period: float, about: dict[str, Any])
     return _Outcome("\n".join(lines), document, not found.differences)
 
 
-def _walk(configuration: "Scenario", parsed: argparse.Namespace) -> _Outcome:
-    """A walk on the chip."""
-    from ppafo.exports.firmware.walking import compare_drawn_walk, walk_on_chip
-
-    name, target = configuration.name, parsed.target or WALK_TARGETS[0]
-    if target not in WALK_TARGETS:
-        raise ScenarioError(f"{name}: a walk's controller runs on {', '.join(WALK_TARGETS)}, not on '{target}'")
-    about = {"walk": name, "target": target}
-    if parsed.samples is not None:
-        if parsed.minutes is not None:
-            raise ScenarioError("--minutes: drawn samples take the place of a walk; leave out one of both")
-        return _drawn(compare_drawn_walk(configuration, parsed.samples), name, configuration.control.period, about)
-    found = walk_on_chip(configuration, WALK_MINUTES if parsed.minutes is None else parsed.minutes)
-    lines = [
-        f"{name} with the controller on the chip's simulator, the lanes as the plant",
-        "",
-        *_cost_lines(found.cost, configuration.control.period),
-        *_compared_lines(found),
-        f"in the end  {('helps', 'lifts the foot only', 'pauses', 'has stopped')[found.level]}",
-        f"gas         {found.gas * 1.0e3:.4g} g",
-    ]
-    document = {
-        **about,
-        **_compared(found),
-        "same_bits": found.same_bits,
-        **_cost_document(found.cost),
-        "level": found.level,
-        "gas": found.gas,
-    }
-    return _Outcome("\n".join(lines), document, found.same_bits)
-
-
 def _table(parsed: argparse.Namespace) -> _Outcome:
     """Every controller on every target, as a table."""
     from ppafo.exports.firmware.lock_step import table_rows
@@ -204,11 +152,11 @@ def _table(parsed: argparse.Namespace) -> _Outcome:
     return _Outcome("\n".join(lines), {"rows": documents}, not any(item.get("differences") for item in documents))
 
 
-def _compared(found: "ChipRun | WalkOnChip | Comparison") -> dict[str, Any]:
+def _compared(found: "ChipRun | Comparison") -> dict[str, Any]:
     return {"samples": found.samples, "differences": found.differences}
 
 
-def _compared_lines(found: "ChipRun | WalkOnChip") -> list[str]:
+def _compared_lines(found: "ChipRun") -> list[str]:
     return [
         f"decisions   {found.samples}, {found.differences} other than those of the integer controller in the lanes",
         f"recording   {'the same bits' if found.same_bits else 'NOT the same bits'} as without the chip",

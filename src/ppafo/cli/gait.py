@@ -1,4 +1,4 @@
-"""``ppafo gait``: the gaits that there are, a gait from recorded files, and recordings for OpenSim."""
+"""``ppafo gait``: the gaits that there are, and a gait from recorded files."""
 
 import argparse
 from pathlib import Path
@@ -28,12 +28,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     recording.add_argument("--strides", metavar="N", default="10", help="number of strides; default 10")
     output.add_json_argument(recording)
     recording.add_argument("--out", metavar="FILE", type=Path, required=True, help="the .csv file to write")
-    exporting = _action(actions, "export", "write a recording or result as .sto for OpenSim")
-    exporting.add_argument("recording", metavar="RECORDING", type=Path, help="a .csv or .nc file, or a result folder")
-    exporting.add_argument("--body-mass", metavar="MASS", help="for moments and forces per mass, such as '62 kg'")
-    exporting.add_argument("--side", metavar="right|left", default="right", help="which foot it was; default right")
-    output.add_json_argument(exporting)
-    exporting.add_argument("--out", metavar="FILE", type=Path, required=True, help="the .sto file to write")
 
 
 def _action(
@@ -83,7 +77,7 @@ def _add_import_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(parsed: argparse.Namespace) -> int:
     """Run the action that was given."""
-    actions = {"list": _list, "show": _show, "import": _import, "record": _record, "export": _export}
+    actions = {"list": _list, "show": _show, "import": _import, "record": _record}
     return actions[parsed.action](parsed)
 
 
@@ -173,24 +167,4 @@ def _record(parsed: argparse.Namespace) -> int:
     write_csv(parsed.out, recording)
     document = {"file": str(parsed.out), "samples": len(recording), "channels": list(recording.names)}
     output.print_result(f"written: {parsed.out} ({len(recording)} samples, synthetic)", document, parsed.json)
-    return output.EXIT_GOOD
-
-
-def _export(parsed: argparse.Namespace) -> int:
-    from ppafo.storage import read_recording
-    from ppafo.storage.opensim import opensim_recording, write_opensim
-
-    _check_side(parsed.side)
-    mass = _optional("--body-mass", parsed.body_mass, "kg")
-    if parsed.out.suffix.lower() != ".sto":
-        raise DataError(f"--out {parsed.out}: the name must end in .sto")
-    output.check_new_file(parsed.out)
-    recording, missing = opensim_recording(read_recording(parsed.recording), parsed.side, mass)
-    write_opensim(parsed.out, recording)
-    names = list(recording.names)
-    document = {"file": str(parsed.out), "samples": len(recording), "channels": names, "left_out": list(missing)}
-    said = f"\nleft out: {', '.join(missing)}, which are per body mass: give --body-mass" if missing else ""
-    output.print_result(
-        f"written: {parsed.out} ({len(recording)} samples: {', '.join(names)}){said}", document, parsed.json
-    )
     return output.EXIT_GOOD

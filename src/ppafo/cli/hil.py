@@ -84,8 +84,7 @@ def run(parsed: argparse.Namespace) -> int:
     scenario = load_scenario(parsed.scenario, parsed.overrides)
     if worn_kind(scenario) is not None:
         raise ScenarioError(
-            f"'{scenario.name}' is a walk, and the wire carries no forces under the foot: give a scenario, or let a "
-            f"simulated chip walk with 'ppafo chip {scenario.name} --set controller.arithmetic=fixed'"
+            f"'{scenario.name}' is a walk, and the wire carries no forces under the foot: give a scenario"
         )
     folder = parsed.out if parsed.out is not None else Path("out") / f"{scenario.name}-hil"
     with output.blame_out_option():

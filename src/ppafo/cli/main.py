@@ -13,6 +13,7 @@ from functools import partial
 from itertools import takewhile
 from typing import TYPE_CHECKING, NoReturn, final
 
+from ppafo import interrupts
 from ppafo.cli.output import flush_output, printing
 from ppafo.errors import PpafoError, nearest_name, one_line
 from ppafo.questions.catalogue import QUESTIONS
@@ -39,12 +40,12 @@ SUBCOMMANDS: dict[str, dict[str, str]] = {
     },
     "decide": {},
     "walk": {
-        "gait": "list, show and import gaits; export recordings for OpenSim",
+        "gait": "list, show and import gaits",
     },
     "tools": {
         "export": "write a scenario or a walk for other tools: a library in C, an FMU, a controller for 'ppafo hil'",
-        "firmware": "write the controller of a scenario or a walk as firmware for a small processor",
-        "chip": "run a scenario or a walk with its controller on the simulator of a small processor",
+        "firmware": "write the controller of a scenario as firmware for a small processor",
+        "chip": "run a scenario with its controller on the simulator of a small processor",
         "hil": "run a scenario's plant in real time against a controller at a serial port or over UDP",
         "cache": "show, compile or remove the compiled models of this computer",
         "schema": "print the JSON Schema of a file format",
@@ -102,6 +103,9 @@ RENAMED = {
     "--least-strides": "--minimum-strides",
 }
 """Options of version 0.1 and what they are called now."""
+
+STILL_READ = {"--gas-per-step": "--gas-per-stride", "--step-time": "--stride-time"}
+"""Options of 0.2 and their present names, under which they are read for one more version; then they are ``RENAMED``."""
 
 REMOVED = {"--config": "name what is run without it, as in 'ppafo walk solenoid'"}
 """Options of version 0.1 that are none any more, and what to write instead."""
@@ -167,6 +171,18 @@ def check_command(word: str | None) -> None:
         raise UsageError(f"there is no command '{word}'{hint}; available: {', '.join(known)}")
 
 
+def present_options(words: list[str], parser: CommandParser) -> list[str]:
+    """Return the words with options by their present names; one line for each that has another."""
+    known, present = parser.options(), list(words)
+    for place, word in enumerate(takewhile(lambda word: word != "--", words)):
+        name, equals, value = word.partition("=")
+        now = STILL_READ.get(name)
+        if now in known:
+            print(f"ppafo: {name} is now called {now}; the old name is read in this version only", file=sys.stderr)
+            present[place] = f"{now}{equals}{value}"
+    return present
+
+
 def check_options(words: Sequence[str], parser: CommandParser) -> None:
     """Refuse an option that no part of the parser has, before argparse complains of what it finds missing besides."""
     known = sorted(parser.options())
@@ -204,8 +220,6 @@ def _stands_for(name: str, option: str) -> bool:
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 _LONGEST_MESSAGE = 1000
-_SAME_VALUE = {"controller.period": "controller.rate"}
-"""Values that are given by either of two names."""
 _DURATION = "run.duration"
 
 OBJECTS_BETWEEN_COLLECTIONS = 1_000_000
@@ -276,14 +290,16 @@ def _run(words: list[str]) -> int:
         chosen = next((word for word in words if not word.startswith("-")), None)
         check_command(chosen)
         parser = build_parser(chosen)
+        words = present_options(words, parser)
         check_options(words, parser)
         parsed = parser.parse_args(words)
         if parsed.command is None:
             print(FIRST_STEPS, file=sys.stderr)
             return EXIT_BAD_INPUT
-        _check_each_set_once(getattr(parsed, "overrides", ()), getattr(parsed, "minutes", None))
+        _check_duration_once(getattr(parsed, "overrides", ()), getattr(parsed, "minutes", None))
         return int(parsed.run(parsed))
     except PpafoError as error:
+        interrupts.check()  # what an interrupt broke is no mistake of the user's
         lines = [f"{len(error.parts)} things are wrong:", *error.parts] if error.parts else [str(error)]
         print("ppafo: " + "\n  ".join(_readable(one_line(line)) for line in lines), file=sys.stderr)
         return EXIT_BAD_INPUT
@@ -292,22 +308,10 @@ def _run(words: list[str]) -> int:
         return EXIT_INTERRUPTED
 
 
-def _check_each_set_once(overrides: Sequence[str], minutes: object) -> None:
-    """Refuse a value that is set twice, by its own name, that of the value it is the inverse of, or an option.
-
-    Gait, course and bottle are compared where a walk is loaded, ``minutes`` here.
-    """
-    given: dict[str, tuple[str, str]] = {}
-    for override in overrides:
-        path, _, value = (part.strip() for part in override.partition("="))
-        before, other = given.get(_SAME_VALUE.get(path, path), (None, ""))
-        if path == _DURATION and minutes is not None:
-            raise UsageError(f"--set {path}: the same as --minutes; leave one out")
-        if before == path:
-            raise UsageError(f"--set {path}: is given twice, as '{other}' and as '{value}'; leave one out")
-        if before is not None:
-            raise UsageError(f"--set {path}: the same as {before}, which is set to '{other}'; leave one out")
-        given[_SAME_VALUE.get(path, path)] = (path, value)
+def _check_duration_once(overrides: Sequence[str], minutes: object) -> None:
+    """Refuse a duration that is set beside an option for it."""
+    if minutes is not None and any(override.partition("=")[0].strip() == _DURATION for override in overrides):
+        raise UsageError(f"--set {_DURATION}: the same as --minutes; leave one out")
 
 
 def _readable(message: str) -> str:

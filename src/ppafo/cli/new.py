@@ -65,7 +65,7 @@ KINDS: dict[str, _NewFile] = {
         "bottle",
         "parameters/bottles/files",
         "ppafo.parameters.bottles.bottle:load_bottle",
-        "ppafo endurance --bottle FILE --gas-per-step '0.3 g' --out out/NAME",
+        "ppafo endurance --bottle FILE --gas-per-stride '0.3 g' --out out/NAME",
     ),
     "parts": _NewFile(
         "catalogue of parts",

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from ppafo.cli import output
 from ppafo.errors import ParameterError
+from ppafo.units import number_text
 
 _DEFAULT_OUT = Path("out") / "rig"
 
@@ -77,6 +78,6 @@ def _record(parsed: argparse.Namespace) -> int:
 
 def _whole_number(text: str) -> int:
     try:
-        return int(text)
+        return int(number_text(text))
     except ValueError as error:
         raise ParameterError(f"--seed {text}: must be a whole number") from error

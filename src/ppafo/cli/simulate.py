@@ -11,6 +11,7 @@ from ppafo.errors import ScenarioError
 
 if TYPE_CHECKING:
     from ppafo.answers import Answer
+    from ppafo.simulation.accuracy import ErrorEstimate
     from ppafo.simulation.check import Check
     from ppafo.simulation.simulate import Result
 
@@ -29,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--check",
         action="store_true",
-        help="run again with half the error and from a start moved by 1e-7, and report which metrics it determines",
+        help="run again with finer steps and from a start moved by 1e-7, and report which metrics can be repeated",
     )
     output.add_json_argument(parser)
     parser.add_argument(
@@ -38,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(parsed: argparse.Namespace) -> int:
-    """Run a scenario and say what came of it; 1 where the run diverged, or does not determine what was checked."""
+    """Run a scenario and say what came of it; 1 where the run diverged, or a check finds it numerically sensitive."""
     if parsed.list:
         return _list(parsed)
     if parsed.scenario is None:
@@ -54,6 +55,7 @@ def run(parsed: argparse.Namespace) -> int:
 
     result = simulate(scenario)
     check = result.check() if parsed.check and result.status.is_completed else None
+    error = _error(result) if check is None else check.error
     output.load_drawing()
     from ppafo.answers.recording_figure import figure_files
     from ppafo.answers.writing import REPORT, page_of
@@ -69,14 +71,22 @@ def run(parsed: argparse.Namespace) -> int:
         "scenario": result.scenario.name,
         "status": plain(result.status),
         "metrics": metrics,
+        **({} if error is None else {"error": plain(error)}),
         **({} if check is None else {"check": check.document()}),
         "folder": str(folder),
     }
-    output.print_result(_text(result, check, folder), document, parsed.json)
+    output.print_result(_text(result, error, check, folder), document, parsed.json)
     if result.status.is_completed:
         return output.EXIT_GOOD if check is None or check.is_determined else output.EXIT_CHECK_FAILED
     print(f"ppafo: {scenario.name}: {result.status.message}", file=sys.stderr)
     return output.EXIT_CHECK_FAILED
+
+
+def _error(result: "Result") -> "ErrorEstimate | None":
+    """Return the estimated error of a vane alone, which runs again in milliseconds; that of a walk is in its check."""
+    from ppafo.simulation.scenario import worn_kind
+
+    return result.error() if result.status.is_completed and worn_kind(result.scenario) is None else None
 
 
 def _answer(result: "Result", check: "Check | None") -> "Answer":
@@ -108,7 +118,7 @@ def _answer(result: "Result", check: "Check | None") -> "Answer":
                 "Metrics", table=Table((Column("Metric"), Column("Value"), Column("What it is")), tuple(rows), left=3)
             ),
             Section("Over time", figure=figure),
-            Section() if check is None else Section("What the run determines", code=repr(check)),
+            Section() if check is None else Section("What can be repeated", code=repr(check)),
         ),
         data={},
         live=lambda: live_part([scenario]),
@@ -126,15 +136,12 @@ def _list(parsed: argparse.Namespace) -> int:
     return output.EXIT_GOOD
 
 
-def _text(result: "Result", check: "Check | None", folder: Path) -> str:
-    from ppafo.answers.display_units import metrics_lines
+def _text(result: "Result", error: "ErrorEstimate | None", check: "Check | None", folder: Path) -> str:
     from ppafo.simulation.scenario import worn_kind
 
-    head = f"{result.scenario.name}: {result.status.kind}"
-    checked = [] if check is None else [repr(check), ""]
+    checked = [repr(check), ""] if check is not None else [] if error is None else [error.sentence, ""]
     files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", "report.html"]
     written = ", ".join(files if check is None else [*files, CHECK_FILE])
-    lines = metrics_lines(result.metrics, result.scenario.device.supply.atmospheric_pressure)
     walked = f"'ppafo walk {result.scenario.origin.file}' compares it with the device off and with a healthy ankle"
     beside = [] if worn_kind(result.scenario) is None else [walked]
-    return "\n".join([head, "", *lines, "", *checked, *beside, f"written: {folder} ({written})"])
+    return "\n".join([str(result), "", *checked, *beside, f"written: {folder} ({written})"])

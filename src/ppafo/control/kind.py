@@ -1,10 +1,14 @@
 """What a controller and a profile declare of themselves."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from ppafo.model.columns import Problem
 from ppafo.model.declaration import Quantity
+
+Plan = Callable[[Mapping[str, Any], Any, Any, tuple[Any, Any]], tuple[dict[str, Any], tuple[Problem, ...]]]
+"""What makes the numbers of a law from its settings."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +24,10 @@ class ControllerKind:
     another one begins (0), at a requested torque [N m]; without it the law begins anew there. A law that
     ``only_switches`` asks for full openings or none, so that it fits a pair of solenoid valves in walking. One without
     ``needs_reference`` never looks at the reference, so that a scenario may be without one.
+
+    A law with a ``plan`` has other numbers than its settings: ``plan(settings, period, torque_constant, reference)``
+    makes them, by name, from settings in SI units, a period [s], the device's torque constant [N m/Pa] and the lowest
+    and highest reference [N m], each of which may be an array (runs,), and says what may be wrong with them.
     """
 
     name: str
@@ -32,6 +40,7 @@ class ControllerKind:
     restart: Callable[..., Any] | None = None
     only_switches: bool = False
     needs_reference: bool = True
+    plan: Plan | None = None
 
 
 @dataclass(frozen=True, slots=True)

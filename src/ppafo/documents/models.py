@@ -13,28 +13,43 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 from pydantic_core import ErrorDetails
 
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import PpafoError, nearest_name, one_line
+from ppafo.errors import PpafoError, nearest_name, one_line, said_missing
 
 _LONGEST_VALUE = 60
-_NOT_THERE = frozenset({"missing", "union_tag_not_found"})
+_MAXIMUM_SAID = 5
+_MAXIMUM_HOMES = 3
 
 
 def is_gap(detail: ErrorDetails) -> bool:
     """Tell whether a problem is only that something is not there yet."""
-    return detail["type"] in _NOT_THERE
+    return detail["type"] in _GAPS
 
 
-def first_problem(details: list[ErrorDetails], model: type[BaseModel]) -> str:
-    """Return one problem as a sentence, and how many more there are; a misspelt key also makes another one missing."""
-    first = next((detail for detail in details if detail["type"] == "extra_forbidden"), details[0])
-    spot = _spot(model, first["loc"])
-    template = _TEMPLATES.get(first["type"])
-    if template is None:
-        sentence = _SENTENCES.get(first["type"], _any_other)(spot, first)
-    else:
-        sentence = template.format(path=spot.path, value=quote(first["input"]))
-    more = len(details) - 1
-    return f"{sentence} (and {more} more)" if more else sentence
+def all_problems(details: list[ErrorDetails], model: type[BaseModel]) -> str:
+    """Return what is wrong as one line: unknown keys first, which make others missing, then values, then all gaps.
+
+    Of the many reasons why a value is none of several types the first is said, and of many problems the first ones.
+    """
+    above = {item["loc"][:length] for item in details for length in range(len(item["loc"]))}
+    # What is wrong with a table or list because of something in it is said there.
+    spots = {item["loc"]: (_spot(model, item["loc"]), item) for item in details if item["loc"] not in above}
+    of_values = {spot.path: (spot, item) for spot, item in reversed(spots.values()) if not is_gap(item)}
+    ordered = sorted(reversed(of_values.values()), key=lambda found: found[1]["type"] != "extra_forbidden")
+    said = [_sentence(spot, item, model) for spot, item in ordered[:_MAXIMUM_SAID]]
+    if len(ordered) > _MAXIMUM_SAID:
+        said.append(f"and {len(ordered) - _MAXIMUM_SAID} more like these")
+    gaps = [f"{spot.path}{_GAPS[item['type']]}" for spot, item in spots.values() if is_gap(item)]
+    if gaps:
+        said.append(said_missing(gaps))
+    return "; ".join(said)
+
+
+def _sentence(spot: "_Spot", detail: ErrorDetails, model: type[BaseModel]) -> str:
+    if detail["type"] == "extra_forbidden":
+        return _unknown_key(spot, model)
+    if detail["type"] == "string_type":
+        return f"{spot.path} = {quote(detail['input'])} must be a text in quotation marks"
+    return _SENTENCES.get(detail["type"], _any_other)(spot, detail)
 
 
 def quote(value: object) -> str:
@@ -92,10 +107,35 @@ def _is_model(node: Any) -> bool:
     return isinstance(node, type) and issubclass(node, BaseModel)
 
 
-def _unknown_key(spot: _Spot, _detail: ErrorDetails) -> str:
-    allowed = list(spot.holder.model_fields)
-    hint = nearest_name(spot.path.rpartition(".")[2], allowed)
+def _unknown_key(spot: _Spot, model: type[BaseModel]) -> str:
+    allowed, key = list(spot.holder.model_fields), spot.path.rpartition(".")[2]
+    homes = _homes(model, key)
+    homes = homes if len(homes) <= _MAXIMUM_HOMES else []
+    hint = f", which belongs in {' or '.join(homes)}" if homes else nearest_name(key, allowed)
     return f"unknown key '{spot.path}'{hint}; allowed here: {', '.join(allowed)}"
+
+
+def _homes(model: Any, key: str) -> list[str]:
+    """Return the tables of a file that have this key, as the file writes them."""
+    found, left, seen = [], [("", model)], set()
+    while left:
+        path, node = left.pop(0)
+        members = [node] if _is_model(node) else _models_in(node)
+        for member in members:
+            if (path, member) in seen or len(path) > _LONGEST_VALUE:
+                continue
+            seen.add((path, member))
+            if key in member.model_fields and (table := f"[{path}]" if path else "the top of the file") not in found:
+                found.append(table)
+            left += [(f"{path}.{name}".strip("."), field.annotation) for name, field in member.model_fields.items()]
+    return found
+
+
+def _models_in(node: Any) -> list[Any]:
+    """Return the tables that a value of some type can be; those in a list or under free names have no place to name."""
+    if get_origin(node) is Annotated:
+        return _models_in(get_args(node)[0])
+    return [item for item in get_args(node) if _is_model(item)] if get_origin(node) in (Union, UnionType) else []
 
 
 def _unknown_choice(spot: _Spot, detail: ErrorDetails) -> str:
@@ -138,13 +178,9 @@ def _quoted_names(text: str) -> list[str]:
     return [name.strip(" '") for name in text.split(",")]
 
 
-_TEMPLATES = {
-    "missing": "'{path}' is missing",
-    "union_tag_not_found": "'{path}.kind' is missing",
-    "string_type": "{path} = {value} must be a text in quotation marks",
-}
+_GAPS = {"missing": "", "union_tag_not_found": ".kind"}
+"""Types of problems that are gaps, and what follows the path of what is missing."""
 _SENTENCES: dict[str, Callable[[_Spot, ErrorDetails], str]] = {
-    "extra_forbidden": _unknown_key,
     "literal_error": _unknown_choice,
     "string_pattern_mismatch": _wrong_name,
     "union_tag_invalid": _unknown_kind,
@@ -209,7 +245,7 @@ def validate(
     refusal: type[PpafoError],
     whole: Callable[[], type[Model]] | None = None,
 ) -> Model:
-    """Return a document as its model; ``refusal`` with the first problem where it has another layout.
+    """Return a document as its model; ``refusal`` with its problems where it has another layout.
 
     Where ``model`` has only the kinds that are loaded, ``whole`` gives the one with all, of which messages speak.
     """
@@ -218,7 +254,7 @@ def validate(
     except ValidationError as error:
         if whole is not None:
             return validate(whole(), document, file, refusal)
-        raise refusal(f"{file}: {first_problem(error.errors(include_url=False), model)}") from error
+        raise refusal(f"{file}: {all_problems(error.errors(include_url=False), model)}") from error
 
 
 def make_schema(model: type[BaseModel], title: str) -> dict[str, Any]:

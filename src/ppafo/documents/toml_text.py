@@ -1,6 +1,7 @@
 """From a name or a path to the document in a TOML file; every mistake is one clear line."""
 
 import copy
+import re
 import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -15,6 +16,12 @@ from ppafo.errors import PpafoError, nearest_name, one_line, reason
 
 _SUFFIX = ".toml"
 _LONGEST_LABEL, _KEPT_AT_EACH_END = 200, 60
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
+_DEEP_KEY = re.compile(
+    rf"(?:^[ \t]*+\[{{0,2}}+|[{{,])[ \t]*+(?>{_PART}\.[ \t]*+){{{MAXIMUM_LEVELS}}}", re.ASCII | re.MULTILINE
+)
+"""A key with too many dots, for which the parser takes time that grows with their square and more."""
+_TOO_DEEP = f"has tables nested deeper than {MAXIMUM_LEVELS} levels; a few are enough"
 
 
 def beside(name: str, folder: Path, known: Collection[str] = ()) -> str:
@@ -59,6 +66,8 @@ class TomlKind:
             raise self.error(f"{file}: is not a text file in UTF-8 (byte {error.start})") from error
         if not text.strip():
             raise self.error(f"{file}: is empty; 'ppafo schema {self.schema}' prints its format")
+        if _DEEP_KEY.search(text):
+            raise self.error(f"{file}: {_TOO_DEEP}")
         try:
             document = copy.deepcopy(_document(text))
         except tomllib.TOMLDecodeError as error:
@@ -71,7 +80,7 @@ class TomlKind:
     def check_depth(self, document: Mapping[str, Any], file: str) -> None:
         """Refuse tables that lie in each other too deep; ``file`` is what messages call the document."""
         if is_nested_too_deeply(document):
-            raise self.error(f"{file}: has tables nested deeper than {MAXIMUM_LEVELS} levels; a few are enough")
+            raise self.error(f"{file}: {_TOO_DEEP}")
 
 
 @lru_cache(maxsize=16)

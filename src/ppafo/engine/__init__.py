@@ -1,1 +1,1 @@
-"""Time stepping: the lane scheme that runs many devices at once, and the reference solver that judges it."""
+"""Time stepping: the lane scheme that runs many devices at once."""

@@ -16,7 +16,7 @@ from typing import get_type_hints
 from ppafo.engine.lane_rows import HANDED, LaneRows, Rows, count_lanes, indent
 from ppafo.engine.lane_samples import present_pressures, pressures_of, sense_end
 from ppafo.engine.led_leg import torque_lines
-from ppafo.engine.pieces import Phases
+from ppafo.engine.pieces import Phases, RarePhase
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.run_rows import RunRows
 from ppafo.engine.scheme import motion, pneumatics
@@ -98,7 +98,7 @@ def phases(rows: Rows) -> Phases:
     error = [f"{rows.error} = gas_error"] if program.is_adaptive else []
     loaded = [rows.load("begun"), rows.load("change")]
     loaded += [f"gas_error = {rows.error}"] if program.is_adaptive else []
-    reached = [] if program.leg is None else program.leg.reach(rows, program.gas.add(rows))
+    reached = move_alone(rows) if program.leg is None else program.leg.reach(rows, program.gas.add(rows))
     return [*before, [*feed(rows), *rows.keep("change"), *error], *reached, [*loaded, *finish(rows)]]
 
 
@@ -238,7 +238,8 @@ def finish(rows: Rows) -> list[str]:
         return [f"taken = {rows.remaining} > 0.0", *lines, *stored, *(add_up(rows) if program.devices == 1 else [])]
     return [
         *lines,
-        f"error = max({', '.join(['error', 'gas_error', *state_errors(rows)])}) / timing.tolerance",
+        f"missed = max({', '.join(['error', 'gas_error', *state_errors(rows)])})",
+        "error = missed / timing.tolerance",
         f"error = error if {positive(rows)} else {motion.MAXIMUM_ERROR!r}",
         f"refused = {add(motion.is_refused)}(error, length) and not result.failure_time <= time",
         f"next_length = {add(motion.next_pace)}(pace, error, length, refused, timing.step).length",
@@ -246,9 +247,24 @@ def finish(rows: Rows) -> list[str]:
         f"{rows.cells['pace.length']} = next_length if active else pace.length",
         "taken = active and not refused",
         *store_all(rows, "taken"),
-        *judge(rows, "taken"),
+        *judge(rows, "taken", f" and not missed > {motion.LOST!r}"),
         *sense_end(rows),
         *add_up(rows),
+    ]
+
+
+def move_alone(rows: Rows) -> Phases:
+    """Phases that lead to the motion of a vane without ground; few turn, or begin to move."""
+    program, add = rows.program, rows.add
+    begin = [rows.load("begun"), rows.load("change"), program.gas.add(rows)]
+    torque = torque_lines(program, add, "time + length", "begun.next_angle")
+    slide = f"slid, moved = {add(motion.slide_part)}(plant, fed, begun, added, length)"
+    depart = f"moved = {add(motion.depart_part)}(plant, fed, begun, slid, moved, length)"
+    return [
+        [*begin, *torque, slide, *rows.keep("slid", "moved")],
+        RarePhase(
+            [*begin, rows.load("slid"), rows.load("moved"), depart, *rows.keep("moved")], rows.cells["slid.departs"]
+        ),
     ]
 
 
@@ -258,10 +274,8 @@ def end_motion(rows: Rows) -> list[str]:
     if program.leg is not None:
         return program.leg.end(rows)
     if program.angle is None:
-        lines = torque_lines(program, add, "time + length", "begun.next_angle")
-        lines.append(f"angle, rate, error = {add(motion.end_part)}(plant, fed, begun, added, length)")
-        lines += program.gas.move(rows, "fed", "begun.next_angle", "angle")
-        return [*lines, f"after = {add(motion.with_motion)}(fed, angle, rate)"]
+        lines = [rows.load("moved"), *program.gas.move(rows, "fed", "begun.next_angle", "moved.angle")]
+        return [*lines, f"after = {add(motion.with_motion)}(fed, moved.angle, moved.rate)", "error = moved.error"]
     if program.is_held:
         return ["after = fed", "error = 0.0"]
     return [f"after = {add(motion.with_motion)}(fed, begun.next_angle, begun.next_rate)", "error = 0.0"]
@@ -328,13 +342,13 @@ def store_all(rows: Rows, flag: str) -> list[str]:
     return lines
 
 
-def judge(rows: Rows, flag: str = "") -> list[str]:
-    """The first time at which a run left what is possible."""
+def judge(rows: Rows, flag: str = "", followed: str = "") -> list[str]:
+    """The first time at which a run left what is possible, or where ``followed`` says so what its parts can follow."""
     gas = ", ".join(masses_after(rows))
     waits = f"not {flag} or " if flag else ""
     return [
         f"possible = {waits}(abs(after.angular_velocity) < {IMPOSSIBLE_RATE} and min({gas}) > 0.0 "
-        f"and max({gas}) < {IMPOSSIBLE_MASS}{states_are_possible(rows)})",
+        f"and max({gas}) < {IMPOSSIBLE_MASS}{states_are_possible(rows)}{followed})",
         "failed = result.failure_time if possible else min(result.failure_time, time + length)",
         f"{rows.cells['result.failure_time']} = failed",
     ]

@@ -139,7 +139,7 @@ def run_blocks(batch: Batch, take: Callable[[slice, BatchResult], None], threads
     runs = batch.states.shape[1]
     lanes = lanes_of(batch.program)
     starts = range(0, runs, lanes)
-    workers = min(len(starts), threads or os.cpu_count() or 1)
+    workers = 1 if len(starts) == 1 else min(len(starts), threads or os.cpu_count() or 1)
 
     waiting = iter(starts)
     stop = threading.Event()
@@ -249,10 +249,11 @@ def begin_block(batch: Batch) -> LaneBlock:
 
 def _pad_columns(columns: Floats) -> Floats:
     """A contiguous copy with a whole number of vectors of columns; the last one repeated where there are fewer."""
-    missing = -columns.shape[1] % VECTOR
-    if missing == 0:
-        return np.array(columns, dtype=np.float64, order="C")
-    return np.ascontiguousarray(np.pad(columns, ((0, 0), (0, missing)), mode="edge"), dtype=np.float64)
+    rows, width = columns.shape
+    padded = np.empty((rows, width + -width % VECTOR))
+    padded[:, :width] = columns
+    padded[:, width:] = columns[:, -1:]
+    return padded
 
 
 def add_meters(batch: Batch, meters: Sequence[MeterKind], traced: Sequence[str] = (), trace_every: int = 0) -> Batch:

@@ -8,10 +8,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ppafo.control.kind import ProfileKind
+from ppafo.control.profiles import CONSTANT
+from ppafo.engine.over_samples import over_samples
 from ppafo.engine.program import Program
 from ppafo.model.gait import ShankSeries, shank_in_gait
-from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
+from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot, torque_on_resting_foot
 
 GAIT_SHANK = ProfileKind(
     name="gait",
@@ -40,6 +44,14 @@ def shank_at(kind: ProfileKind, shank: Any, time: float) -> ShankNow:
     return ShankNow(angle, rate, acceleration, knee_forward=0.0, knee_up=0.0)
 
 
+def shank_over_samples(kind: ProfileKind, shank: Any, times: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> Any:
+    """The shank at times [s]: a ``ShankNow`` of columns (samples,), or of one number where it is always the same."""
+    if kind is GAIT_SHANK:
+        return over_samples(shank_in_gait, shank, times)
+    angle, rate, acceleration = over_samples(kind.value, shank, times)
+    return ShankNow(angle, rate, acceleration, knee_forward=0.0, knee_up=0.0)
+
+
 def torque_of_leg(program: Program, leg: LedLeg, time: float, angle: float) -> float:
     """Torque of a leg on the vane [N m] at a time [s] and an angle [rad], positive in plantarflexion."""
     assert program.shank is not None, "a leg has a shank"
@@ -51,6 +63,8 @@ def torque_lines(program: Program, add: Callable[..., str], time: str, angle: st
     kind = program.shank
     if kind is None:
         return ["added = 0.0"]
+    if kind is CONSTANT:
+        return [f"added = {add(torque_on_resting_foot)}(load, shank.level, {angle})"]
     if kind is GAIT_SHANK:
         lines = [f"shank_now = {add(kind.value)}(shank, {time})"]
     else:

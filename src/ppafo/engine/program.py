@@ -4,16 +4,17 @@ import math
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple, get_type_hints
 
 from ppafo.control.controllers import switching as constant_controller
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.control.profiles import CONSTANT
+from ppafo.engine.over_samples import called_over_samples, in_columns
 from ppafo.engine.pieces import OTHER, Feed, GasScheme, LegScheme
 from ppafo.engine.scheme.actuators import links_of
 from ppafo.engine.scheme.isothermal_gas import ISOTHERMAL
-from ppafo.engine.scheme.motion import FreePart, Pace, PrescribedStep
+from ppafo.engine.scheme.motion import FreePart, Pace, PartEnd, PartSlide, PrescribedStep
 from ppafo.engine.scheme.pneumatics import HeldChambers, SlopedFlows, StageFlows
 from ppafo.engine.source_text import Collector, SourceCollector
 from ppafo.errors import ProgramError
@@ -292,6 +293,7 @@ class Program:
             "passing": StageFlows,
             "shown": shown,
             **({"change": self.gas.change} if self.angle is None else {}),
+            **({"slid": PartSlide, "moved": PartEnd} if self.angle is None and self.leg is None else {}),
             **({} if self.leg is None else self.leg.ended),
             **({"next_valve": self.valve.state} if self.is_parted else {}),
             **(
@@ -351,24 +353,40 @@ def link_effects(effects: Sequence[Effect], collector: Collector, own: Mapping[A
 
 
 class Composed(NamedTuple):
-    """A function of the model as Python calls it with effects: before its own arguments it takes ``needed`` rows."""
+    """A function of the model as Python calls it with effects: before its own arguments it takes ``needed`` rows.
+
+    ``of_columns`` is the same over columns of samples, None where it has no such form.
+    """
 
     function: Callable[..., Any]
     needed: tuple[str, ...]
+    of_columns: Callable[..., Any] | None
 
 
 def composed_with(function: Callable[..., Any], effects: Sequence[Effect]) -> Composed | None:
     """Return a function of the model with the laws of effects in it; None where no effect acts in it."""
     if not effects:
         return None
+    collector, composed = _composed_with(function, tuple(effects))
+    if collector.is_current():
+        return composed
+    _composed_with.cache_clear()
+    return _composed_with(function, tuple(effects))[1]
+
+
+@lru_cache(maxsize=64)
+def _composed_with(
+    function: Callable[..., Any], effects: tuple[Effect, ...]
+) -> tuple[SourceCollector, Composed | None]:
     collector = SourceCollector("")
     link_effects(effects, collector)
     name = collector.add(function)
     if name not in collector.needs:
-        return None
+        return collector, None
     scope: dict[str, Any] = {"math": math, "namedtuple": namedtuple}
-    exec(collector.text(), scope)
-    return Composed(scope[name], tuple(collector.needs[name]))
+    text = collector.text()
+    exec(text, scope)
+    return collector, Composed(scope[name], tuple(collector.needs[name]), in_columns(text, name))
 
 
 def python_place(
@@ -382,9 +400,24 @@ def python_place(
     if composed is None:
         return None
     given = {effect.name: row for effect, row in zip(effects, rows, strict=True)}
-    function, needed = composed
 
     def called(states: Mapping[str, Any], *own: float) -> Any:
-        return function(*((given | dict(states))[row] for row in needed), *own)
+        return composed.function(*((given | dict(states))[row] for row in composed.needed), *own)
+
+    return called
+
+
+def place_over_samples(
+    place: Callable[..., Any], effects: Sequence[Effect], rows: Sequence[Any]
+) -> Callable[..., Any] | None:
+    """As ``python_place``, for states and arguments whose numbers are columns (samples,)."""
+    composed = composed_with(place, effects)
+    if composed is None:
+        return None
+    given = {effect.name: row for effect, row in zip(effects, rows, strict=True)}
+
+    def called(states: Mapping[str, Any], *own: Any) -> Any:
+        of_effects = ((given | dict(states))[row] for row in composed.needed)
+        return called_over_samples(composed.function, composed.of_columns, *of_effects, *own)
 
     return called

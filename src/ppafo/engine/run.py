@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.lane_step import MAXIMUM_PARTS
-from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_batch
+from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_blocks
 from ppafo.engine.led_leg import LedLeg
 from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program, composed_with
 from ppafo.engine.rows import leaf_paths, leaves, rebuilt, table
@@ -339,8 +339,11 @@ def run_together(runs: Sequence[Run], threads: int | None = None) -> list[BatchR
     for (program, clock), members in groups.items():
         parameters = np.concatenate([batches[index].parameters for index in members], axis=1)
         states = np.concatenate([batches[index].states for index in members], axis=1)
-        joint = run_batch(Batch(program, clock, parameters, states), threads)
-        for column, index in enumerate(members):
-            one = slice(column, column + 1)
-            results[index] = BatchResult(joint.states[:, one], joint.record[:, :, one])
+
+        def take(block: slice, found: BatchResult, members: list[int] = members) -> None:
+            for column, index in enumerate(members[block]):
+                one = slice(column, column + 1)
+                results[index] = BatchResult(found.states[:, one], found.record[:, :, one])
+
+        run_blocks(Batch(program, clock, parameters, states), take, threads)
     return [results[index] for index in range(len(runs))]

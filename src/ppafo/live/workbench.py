@@ -19,8 +19,9 @@ from ppafo.live.still import still_of
 from ppafo.live.words import label_of, words
 from ppafo.loading import load_scenario
 from ppafo.parameters.graph import ATMOSPHERE_PATH
+from ppafo.parameters.overrides import over
 from ppafo.simulation.declaration import OF_A_VANE, PRESSURE_WORDS
-from ppafo.simulation.loading import apply_overrides, is_of_device
+from ppafo.simulation.overrides import apply_overrides, is_of_device
 from ppafo.simulation.scenario import FreeMotion, Scenario, vane_motion, worn_kind
 from ppafo.units import conversion, from_si, to_si
 from ppafo.version import __version__
@@ -78,7 +79,8 @@ def program_content(item: Simulated, module: str, intervals: Mapping[str, Interv
         declared = OF_A_WALK
     changed = apply_overrides(described["document"], described["overrides"], described["name"], declared)
     document, own = changed.document, changed.device
-    overrides = [*document.get("device", {}).get("overrides", ()), *own]
+    of_file = document.get("device", {}).get("overrides", ())
+    overrides = list(over(of_file, own, valve=item.scenario.device.valve_name))
     document["device"] = {**document.get("device", {}), **({"overrides": overrides} if overrides else {})}
     return {
         "name": described["name"],

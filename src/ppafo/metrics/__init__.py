@@ -32,8 +32,9 @@ METRICS: Kinds[MetricKind] = Kinds(
 def evaluate(recording: Recording) -> dict[str, Metric]:
     """Return every metric that the channels of the recording allow; one sample alone allows none."""
     found: dict[str, Metric] = {}
+    names = frozenset(recording.names)
     for kind in METRICS.values():
-        if kind.compute is None or len(recording) < 2 or not set(kind.channels) <= set(recording.names):
+        if kind.compute is None or len(recording) < 2 or not names.issuperset(kind.channels):
             continue
         value = kind.compute(recording)
         if value is not None:

@@ -83,27 +83,25 @@ class MetricKind:
     needs: tuple[str, ...] = ()
 
 
-def hold_start(recording: Recording) -> float | None:
-    """Return the time [s] from which on the reference stays at its final level; None where it never rests there."""
+def hold_start(recording: Recording) -> int | None:
+    """Return the sample from which on the reference stays at its final level; None where it never rests there."""
     reference = recording["reference"]
     tolerance = SAME_LEVEL * float(np.max(np.abs(reference)))
     away = np.flatnonzero(np.abs(reference - reference[-1]) > tolerance)
     first = int(away[-1]) + 1 if away.size else 0
-    return float(recording.time[first]) if len(recording) - first >= 2 else None
+    return first if len(recording) - first >= 2 else None
 
 
-def ramp(recording: Recording) -> Recording | None:
-    """Return the recording until the reference reaches the level it keeps; None where there is no ramp or no hold."""
+def ramp(recording: Recording) -> slice | None:
+    """Return the samples until the reference reaches the level it keeps; None where there is no ramp or no hold."""
     start = hold_start(recording)
-    if start is None or start == recording.time[0]:
-        return None
-    return recording.between(float(recording.time[0]), start)
+    return slice(start + 1) if start else None
 
 
-def hold(recording: Recording) -> Recording | None:
-    """Return the recording from where the reference stays at its final level; None where it never does."""
+def hold(recording: Recording) -> slice | None:
+    """Return the samples from where the reference stays at its final level; None where it never does."""
     start = hold_start(recording)
-    return None if start is None else recording.between(start, float(recording.time[-1]))
+    return None if start is None else slice(start, None)
 
 
 def spans(readings: Readings) -> tuple[Floats, Floats]:

@@ -1,4 +1,11 @@
-"""How restless a task is: sign changes of the command and oscillations of the torque."""
+"""How restless a task is: changes of state of the valves and oscillations of the torque.
+
+The state of a valve is the one that the command orders, at the samples: valve A of a pair is on above 0, valve B below,
+both are off at 0 and where the command vents. Each change of each valve counts one, so a reversal of a pair counts two.
+A proportional valve has a way from the supply to either chamber, open or shut, which count as the valves of a pair do:
+how often the command leaves 0 or returns, not how far the spool moves. A coil whose ``switching_interval`` is longer
+than the time between two commands changes less often than ordered; so does a spool with a dead band.
+"""
 
 import math
 from typing import NamedTuple
@@ -7,20 +14,24 @@ import numpy as np
 
 from ppafo.metrics.metric import Floats, MetricKind, Readings, hold, ramp, spans
 from ppafo.model.columns import choose, larger, truncated
+from ppafo.model.valves.kind import VENTS_ABOVE
 from ppafo.signals import Recording
 from ppafo.signals.meter import Course, MeterKind, Sample, starts_hold
 
 OSCILLATION_THRESHOLD = 0.05
 """Smallest swing that counts as an oscillation, as a fraction of the largest absolute reference."""
 
+SHUT = 1.0e-6
+"""Command up to which a valve counts as off or shut: what rounding leaves at the start of a task opens nothing."""
+
 _NEEDED = ("torque", "reference")
 
 
 def switchings(recording: Recording) -> float:
-    """Number of times the command changes its sign; a command of 0 in between does not count."""
-    signs = np.sign(recording["command"])
-    signs = signs[signs != 0.0]
-    return float(np.count_nonzero(np.diff(signs)))
+    """Number of changes of state that the command orders, of both valves together."""
+    command = recording["command"]
+    positions_a, positions_b = (command > SHUT) & (command < VENTS_ABOVE), command < -SHUT
+    return float(np.count_nonzero(np.diff(positions_a)) + np.count_nonzero(np.diff(positions_b)))
 
 
 def reversals(values: Floats, swing: float) -> int:
@@ -31,7 +42,7 @@ def reversals(values: Floats, swing: float) -> int:
     """
     count, direction = 0, 0
     lowest = highest = float(values[0])
-    for value in values.tolist():
+    for value in _extremes(values).tolist():
         if direction >= 0 and value < highest - swing:
             count += direction
             direction, lowest = -1, value
@@ -42,11 +53,18 @@ def reversals(values: Floats, swing: float) -> int:
     return count
 
 
-def _oscillations(recording: Recording, part: Recording | None) -> float | None:
+def _extremes(values: Floats) -> Floats:
+    """The first and the last value, and each between them at which a signal turns back."""
+    moving = values[np.flatnonzero(np.diff(values, prepend=np.nan))]
+    rises = np.diff(moving) > 0.0
+    return moving[np.concatenate([[True], rises[1:] != rises[:-1], [True]])] if moving.size > 1 else moving
+
+
+def _oscillations(recording: Recording, part: slice | None) -> float | None:
     largest = float(np.max(np.abs(recording["reference"])))
     if part is None or largest == 0.0:
         return None
-    return float(reversals(part["torque"], OSCILLATION_THRESHOLD * largest))
+    return float(reversals(recording["torque"][part], OSCILLATION_THRESHOLD * largest))
 
 
 def oscillations_ramp(recording: Recording) -> float | None:
@@ -60,22 +78,29 @@ def oscillations_hold(recording: Recording) -> float | None:
 
 
 class Switchings(NamedTuple):
-    """Last command that was not 0, and changes of sign so far."""
+    """Positions of valves A and B, 1 where on, and changes of both so far."""
 
-    command: float
+    position_a: float
+    position_b: float
     changes: float
+
+
+def ordered_positions(command: float) -> tuple[float, float]:
+    """Positions [-] of valves A and B that a command orders: 1 on, 0 off."""
+    return (1.0 if command > SHUT and command < VENTS_ABOVE else 0.0), (1.0 if command < -SHUT else 0.0)
 
 
 def start_switchings(course: Course, sample: Sample) -> Switchings:
     """No change at the first sample."""
-    return Switchings(sample.command, 0.0)
+    position_a, position_b = ordered_positions(sample.command)
+    return Switchings(position_a, position_b, 0.0)
 
 
 def update_switchings(state: Switchings, course: Course, sample: Sample) -> Switchings:
-    """One more where the command has the other sign."""
-    was, now = state.command, sample.command
-    differs = (was > 0.0 and now < 0.0) or (was < 0.0 and now > 0.0)
-    return Switchings(now if now != 0.0 else was, state.changes + (1.0 if differs else 0.0))
+    """One more for each valve that the command orders to change."""
+    position_a, position_b = ordered_positions(sample.command)
+    changes = abs(position_a - state.position_a) + abs(position_b - state.position_b)
+    return Switchings(position_a, position_b, state.changes + changes)
 
 
 SWITCHINGS = MeterKind("switchings", Switchings, start_switchings, update_switchings)
@@ -138,7 +163,7 @@ OSCILLATIONS = MeterKind("oscillations", Oscillations, start_oscillations, updat
 
 
 def read_switchings(readings: Readings) -> Floats:
-    """``switchings``, the number of sign changes of the command."""
+    """``switchings``, the number of changes of state of both valves."""
     changes: Floats = readings.meters[SWITCHINGS.name].changes
     return changes
 
@@ -163,7 +188,13 @@ _REVERSALS = "torque reversals of more than 5 % of the largest reference"
 
 METRICS = (
     MetricKind(
-        "switchings", "-", "changes of sign of the command", ("command",), switchings, read_switchings, (SWITCHINGS,)
+        "switchings",
+        "-",
+        "valves switched on or off by the command, each of a pair counted: a reversal is 2",
+        ("command",),
+        switchings,
+        read_switchings,
+        (SWITCHINGS,),
     ),
     MetricKind(
         "oscillations_ramp",

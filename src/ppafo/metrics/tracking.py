@@ -22,22 +22,26 @@ def settled_error(final: Floats, on_hold: Floats, reversals: Floats) -> Floats:
     return np.where((reversals >= SUSTAINED) & (on_hold > final), on_hold, final)
 
 
+def _rms(recording: Recording, part: slice) -> float:
+    time, error = recording.time[part], (recording["reference"] - recording["torque"])[part]
+    return float(np.sqrt(np.trapezoid(error**2, time) / float(time[-1] - time[0])))
+
+
 def rms_error(recording: Recording) -> float:
     """Root of the time average of (reference - torque)^2 [N m], by the trapezoidal rule: any sampling will do."""
-    error = recording["reference"] - recording["torque"]
-    return float(np.sqrt(np.trapezoid(error**2, recording.time) / recording.duration))
+    return _rms(recording, slice(None))
 
 
 def rms_error_ramp(recording: Recording) -> float | None:
     """``rms_error`` [N m] until the reference reaches the level it keeps."""
     part = ramp(recording)
-    return None if part is None else rms_error(part)
+    return None if part is None else _rms(recording, part)
 
 
 def rms_error_hold(recording: Recording) -> float | None:
     """``rms_error`` [N m] from where the reference stays at its final level."""
     part = hold(recording)
-    return None if part is None else rms_error(part)
+    return None if part is None else _rms(recording, part)
 
 
 def peak_error(recording: Recording) -> float:

@@ -209,6 +209,12 @@ def torque_on_foot(load: FootLoad, now: ShankNow, angle: float) -> float:
     )
 
 
+def torque_on_resting_foot(load: FootLoad, shank: float, angle: float) -> float:
+    """As ``torque_on_foot`` [N m], to the bit, of a shank that rests at an angle [rad]: the weight alone is left."""
+    _, cosine_alpha = sine_and_cosine_of_turns((shank - angle) * TURNS_OF_RADIAN + 0.25)
+    return load.mass_moment * (cosine_alpha * load.gravity)
+
+
 def passive_torque(leg: LegParameters, angle: float) -> float:
     """Torque of tissue on the ankle [N m], positive in plantarflexion, without its damping."""
     return leg.ankle_stiffness * (leg.ankle_rest_angle - angle)

@@ -155,11 +155,7 @@ def sliding_friction(angular_velocity: float, dynamic_torque: float) -> float:
 
     The paper prints the opposite sign beside a friction that is subtracted too, which would drive the motion.
     """
-    if angular_velocity > 0.0:
-        return dynamic_torque
-    if angular_velocity < 0.0:
-        return -dynamic_torque
-    return 0.0
+    return dynamic_torque if angular_velocity > 0.0 else (-dynamic_torque if angular_velocity < 0.0 else 0.0)
 
 
 def holds_still(net_torque: float, static_torque: float, at_lower_stop: bool, at_upper_stop: bool) -> bool:

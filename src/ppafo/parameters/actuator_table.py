@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, decoded, read_regular_file
 from ppafo.documents.toml_text import label
-from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, reason, refused_as
+from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, reason, refused_as, said_missing
 from ppafo.model.actuators.table import (
     BENDS,
     MOST_ANGLES,
@@ -28,7 +28,7 @@ from ppafo.model.actuators.table import (
     Rise,
     Table,
 )
-from ppafo.units import to_si
+from ppafo.units import number_text, to_si
 
 Floats = NDArray[np.float64]
 
@@ -138,7 +138,7 @@ def _header(cells: Sequence[str], file: str) -> tuple[list[str], list[str]]:
         units.append(unit)
     missing = [name for name in ("angle", "pressure", "volume_1") if name not in names]
     if missing:
-        raise ParameterError(f"{file}: column '{missing[0]}' is missing")
+        raise ParameterError(f"{file}: column{'s' * (len(missing) > 1)} {said_missing(missing)}")
     return names, units
 
 
@@ -151,7 +151,7 @@ _EXAMPLES = {"angle": "deg", "pressure": "kPa_g", "volume_1": "mL", "volume_2": 
 
 def _number(cell: str, name: str, where: str) -> float:
     try:
-        value = float(cell) if len(cell) <= _SHOWN and "_" not in cell else math.nan
+        value = float(number_text(cell)) if len(cell) <= _SHOWN else math.nan
     except ValueError:
         value = math.nan
     if not math.isfinite(value):

@@ -31,6 +31,7 @@ from ppafo.parameters.device import (
     Valve,
 )
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph
+from ppafo.parameters.overrides import FORMS, either, in_two_forms
 from ppafo.parameters.parameter_set import (
     ParameterSet,
     atmospheric_pressure,
@@ -233,25 +234,18 @@ def _effects(parameter_set: ParameterSet, read: Callable[[str], float]) -> dict[
 
 def both_forms(parameter_set: ParameterSet, section: str) -> tuple[str, ...]:
     """Return the names by which an orifice is given in both forms at once, none where it is in one or in neither."""
-    area, sonic = (
-        _given_names(parameter_set, section, form) for form in (declaration.AREA_FORM, declaration.SONIC_FORM)
-    )
-    return (*area, *sonic) if area and sonic else ()
-
-
-def _given_names(parameter_set: ParameterSet, section: str, form: Iterable[Quantity]) -> list[str]:
-    return sorted(item.name for item in form if f"{section}.{item.name}" in parameter_set.numbers)
+    given = [f"{section}.{name}" for form in FORMS["valve"] for name in sorted(form)]
+    found = [path for path in given if path in parameter_set.numbers]
+    return tuple(path.rpartition(".")[2] for path in found) if in_two_forms(found) else ()
 
 
 def _uses_sonic_form(parameter_set: ParameterSet, section: str) -> bool:
     """Tell which form an orifice is given in; both at once would be two answers to one question."""
     both = both_forms(parameter_set, section)
     if both:
-        raise ParameterError(
-            f"{parameter_set.file}: {section} has {', '.join(both)}; "
-            f"give either area and discharge_coefficient or sonic_conductance and critical_ratio"
-        )
-    return bool(_given_names(parameter_set, section, declaration.SONIC_FORM))
+        wanted = either(f"{section}.{both[0]}")
+        raise ParameterError(f"{parameter_set.file}: {section} has {', '.join(both)}; {wanted}")
+    return any(f"{section}.{item.name}" in parameter_set.numbers for item in declaration.SONIC_FORM)
 
 
 def _check_complete(parameter_set: ParameterSet, valve: str) -> None:

@@ -9,12 +9,12 @@ from pydantic import Field
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.models import StrictTable, Text, Texts
-from ppafo.errors import ParameterError, UnitError, nearest_name, one_line
+from ppafo.errors import ParameterError, UnitError, nearest_name
 from ppafo.model.actuators.table import Table
 from ppafo.model.catalog import EFFECTS, find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.model.gas import SPECIES
-from ppafo.parameters.declaration import AREA_FORM, RELIEVING_PATH, SONIC_FORM, SPECIES_PATH, alternatives, quantities
+from ppafo.parameters.declaration import RELIEVING_PATH, SPECIES_PATH, alternatives, quantities
 from ppafo.parameters.graph import (
     ATMOSPHERE_PATH,
     PRESSURE_PATH,
@@ -25,6 +25,7 @@ from ppafo.parameters.graph import (
     follows,
     gauge_link,
 )
+from ppafo.parameters.overrides import CHOSEN_VALVE, NAMED_VALVE, Given, one_path, other_forms, override_set
 from ppafo.units import base_value, format_quantity, split_quantity, to_si
 
 Origin = Literal["published", "datasheet", "derived", "identified", "fitted", "assumed"]
@@ -243,62 +244,51 @@ def entry_text(entry: Entry | TextEntry | FlagEntry) -> str:
 
 SOURCE = "override"
 
-_CHOSEN = "valve."
-
-_AREA_NAMES = frozenset(quantity.name for quantity in AREA_FORM)
-_SONIC_NAMES = frozenset(quantity.name for quantity in SONIC_FORM)
-
 
 @dataclass(frozen=True, slots=True)
 class _Order:
-    """An override as it was typed, and the valve that ``valve`` means in it."""
+    """An override by its path in the set, as it was typed."""
 
-    typed: str
-    chosen: str
-    text: str
-
-    @property
-    def path(self) -> str:
-        """The path in the set."""
-        inside = self.typed.removeprefix(_CHOSEN)
-        return f"valves.{self.chosen}.{inside}" if self.typed.startswith(_CHOSEN) else self.typed
+    path: str
+    given: Given
 
     def typed_path(self, path: str) -> str:
         """Return a path of the set in the way in which this override was typed."""
-        own = f"valves.{self.chosen}."
-        return _CHOSEN + path.removeprefix(own) if self.typed.startswith(_CHOSEN) and path.startswith(own) else path
+        if not self.given.typed.startswith(CHOSEN_VALVE):
+            return path
+        return one_path(path, self.path.split(".")[1])
 
     def refusal(self, why: object) -> ParameterError:
         """Return the error that quotes the override as it was typed."""
-        return ParameterError(f"override '{self.typed}={self.text}': {why}")
+        return ParameterError(f"override '{self.given}': {why}")
 
 
 def apply_overrides(parameter_set: ParameterSet, overrides: Iterable[str], valve: str | None = None) -> ParameterSet:
-    """Return the set with values replaced; each override is a text such as ``valve.area=12.6mm^2``.
+    """Return the set with values replaced; each override is a text such as ``valve.area=12.6mm^2``, in any order.
 
     ``valve.X`` means the valve that is chosen (``valve``, else the set's default), ``valves.NAME.X`` one by name.
-    Naming another gas brings that gas's molar mass and heat capacity ratio, and a number of it that is given beside
-    counts in any order; giving an orifice in the form of ISO 6358 drops its area and discharge coefficient, and the
-    reverse. What follows a number (``links_of_set``) is set with it, unless it is given too. ParameterError for an
-    override that does not fit the set.
+    Naming another gas brings that gas's molar mass and heat capacity ratio, unless they are given too; giving an
+    orifice in the form of ISO 6358 drops its area and discharge coefficient, and the reverse. What follows a number
+    (``links_of_set``) is set with it, unless it is given too. ParameterError for an override that does not fit the set,
+    and for two that give one value.
     """
     chosen = chosen_valve(parameter_set, valve)
-    # A gas brings numbers, so it comes before those that are given.
-    orders = sorted(overrides, key=lambda override: override.partition("=")[0].strip() != SPECIES_PATH)
-    atmosphere = atmospheric_pressure(parameter_set) if orders else None
-    given = [override.partition("=")[0].strip() for override in orders]
-    for number, override in enumerate(orders):
-        on_one_line = one_line(override)
-        path, separator, text = (part.strip() for part in on_one_line.partition("="))
-        if not separator or not path or not text:
-            raise ParameterError(
-                f"override '{on_one_line}' is not of the form PATH=VALUE, for example valve.area=12.6mm^2"
-            )
-        change = _CHANGES.get(path, _with_number)
-        links = acting(links_of_set(parameter_set, given[:number], atmosphere), {path, *given[number + 1 :]})
-        parameter_set = change(parameter_set, _Order(path, chosen, text))
-        for follower in (follower for follower, link in links.items() if link.when_set and link.sources == (path,)):
-            parameter_set = _with_number(parameter_set, _Order(follower, chosen, text))
+    given = {
+        f"{NAMED_VALVE}{chosen}.{path.removeprefix(CHOSEN_VALVE)}" if path.startswith(CHOSEN_VALVE) else path: item
+        for path, item in override_set(overrides, valve=chosen).items()
+    }
+    if not given:
+        return parameter_set
+    followers = {
+        path: given[link.sources[0]]
+        for path, link in acting(links_of_set(parameter_set, given), given).items()
+        if link.when_set
+    }
+    # A gas brings numbers, and gauge pressures count from the atmosphere, so these two come first.
+    first = [path for path in (SPECIES_PATH, ATMOSPHERE_PATH) if path in given]
+    every = {**{path: given[path] for path in first}, **given, **followers}
+    for path, item in every.items():
+        parameter_set = _CHANGES.get(path, _with_number)(parameter_set, _Order(path, item))
     return parameter_set
 
 
@@ -308,27 +298,27 @@ def overridden_paths(parameter_set: ParameterSet) -> frozenset[str]:
 
 
 def _with_number(parameter_set: ParameterSet, order: _Order) -> ParameterSet:
-    path = order.path
+    path, given = order.path, order.given
     find_effects([path])
     declared = parameter_set.declarations()
     if path not in declared:
         EFFECTS.load_own()
         declared = parameter_set.declarations()
         allowed = [order.typed_path(known) for known in (*declared, SPECIES_PATH, RELIEVING_PATH)]
-        hint = nearest_name(order.typed, allowed) or f"; for example {', '.join(_neighbours(order.typed, allowed))}"
-        raise order.refusal(f"{parameter_set.file} has no value '{order.typed}'{hint}")
+        hint = nearest_name(given.typed, allowed) or f"; for example {', '.join(_neighbours(given.typed, allowed))}"
+        raise order.refusal(f"{parameter_set.file} has no value '{given.typed}'{hint}")
     try:
-        value, unit = split_quantity(order.text)
+        value, unit = split_quantity(given.text)
         entry = Entry(value=value, unit=unit, origin="assumed", source=SOURCE, note=_before(parameter_set, path))
         entry_in_si(entry, declared[path], atmospheric_pressure(parameter_set))
     except UnitError as error:
         raise order.refusal(error) from error
-    kept = {key: old for key, old in parameter_set.numbers.items() if key not in _other_form(path)}
+    kept = {key: old for key, old in parameter_set.numbers.items() if key not in other_forms(path)}
     return replace(parameter_set, numbers={**kept, path: entry})
 
 
 def _with_species(parameter_set: ParameterSet, order: _Order) -> ParameterSet:
-    path, text = order.path, order.text
+    path, text = order.path, order.given.text
     species = SPECIES.get(text)
     if species is None:
         raise order.refusal(f"unknown gas{nearest_name(text, SPECIES)}; available: {', '.join(SPECIES)}")
@@ -348,10 +338,10 @@ def _with_species(parameter_set: ParameterSet, order: _Order) -> ParameterSet:
 
 
 def _with_relieving(parameter_set: ParameterSet, order: _Order) -> ParameterSet:
-    if order.text not in _FLAGS:
+    if order.given.text not in _FLAGS:
         raise order.refusal(f"must be {' or '.join(_FLAGS)}")
     note = _before(parameter_set, order.path)
-    entry = FlagEntry(value=_FLAGS[order.text], origin="assumed", source=SOURCE, note=note)
+    entry = FlagEntry(value=_FLAGS[order.given.text], origin="assumed", source=SOURCE, note=note)
     return replace(parameter_set, flags={**parameter_set.flags, order.path: entry})
 
 
@@ -363,13 +353,6 @@ def _before(parameter_set: ParameterSet, path: str) -> str:
     """Return what stood at the path, so that an override never hides the value it replaces."""
     entry = parameter_set.entries().get(path)
     return f"the set has {entry_text(entry)} ({entry.origin}: {entry.source})" if entry else "the set has no value"
-
-
-def _other_form(path: str) -> frozenset[str]:
-    """Return the paths that no longer hold when an orifice is given in the form that ``path`` belongs to."""
-    section, _, name = path.rpartition(".")
-    other = _SONIC_NAMES if name in _AREA_NAMES else _AREA_NAMES if name in _SONIC_NAMES else frozenset()
-    return frozenset(f"{section}.{member}" for member in other)
 
 
 def _neighbours(path: str, allowed: list[str]) -> list[str]:

@@ -25,6 +25,5 @@ QUESTIONS: Kinds[Question] = Kinds(
         "design": "ppafo.questions.design:QUESTION",
         "endurance": "ppafo.questions.endurance:QUESTION",
         "walk": "ppafo.questions.walk:QUESTION",
-        "bits": "ppafo.questions.bits:QUESTION",
     },
 )

@@ -66,6 +66,16 @@ class Solved:
         answer: Answer = sys.modules[type(self).__module__].answer_of(self)
         return answer
 
+    def __str__(self) -> str:
+        """Return what the command prints."""
+        from ppafo.answers.writing import text_of
+
+        return text_of(self.answer())
+
+    def __repr__(self) -> str:
+        """Return the class and the title of the answer."""
+        return f"<{type(self).__name__}: {self.answer().title}>"
+
     def to_dict(self) -> dict[str, Any]:
         """Return what ``--json`` prints, as plain data in SI."""
         return dict(self.answer().data)
@@ -149,8 +159,10 @@ def _number_from(text: str, least: int) -> int:
 
 def fraction(text: str) -> float:
     """Return a number from 0 to 1 from a text such as ``0.02`` or ``2%``; ArgumentTypeError for any other text."""
+    from ppafo.units import number_text
+
     try:
-        number = float(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
+        number = float(number_text(text.removesuffix("%"))) / (100.0 if text.endswith("%") else 1.0)
     except ValueError:
         number = math.nan
     if not 0.0 <= number <= 1.0:

@@ -1,4 +1,4 @@
-"""The rig in continuous time: what CVODE integrates. Pure functions on floats, compiled as one program.
+"""The rig in continuous time: what the solver integrates. Pure functions on floats, compiled as one program.
 
 Beyond the identified model: energy of the gas and heat through the walls, a real-gas factor, a line between valve and
 chamber with its own orifice, a laminar part of the leak, friction that grows with pressure, and slow sensors.

@@ -1,8 +1,8 @@
 """The experiments of the rig. To add one: a function ``Request -> Outcome`` and one line in ``EXPERIMENTS``.
 
 On the steady bench true values go in and what the instruments show comes out: static torque against pressure, flow of
-the open valve, its map, the leak across the vane. Experiments in time are solved by CVODE: step response, torque task,
-free decay, leak between closed chambers.
+the open valve, its map, the leak across the vane. Experiments in time are solved by SciPy's LSODA: step response,
+torque task, free decay, leak between closed chambers.
 
 ``record`` does one: a synthetic recording and the truth behind it, in memory or in a folder that has one CSV for each
 experiment, and ``rig.json`` with the truth behind all of them.
@@ -447,7 +447,7 @@ def record(
     """Return what an experiment records on the rig; the same arguments give the same bytes.
 
     ``overrides`` are texts such as ``friction.static_torque=0.5 N m`` (device), ``run.duration=1 s`` (experiments in
-    time) or ``rig.pressure_sensor.noise=0 Pa_d`` (preset). SimulationError where the extra ``reference`` is missing.
+    time) or ``rig.pressure_sensor.noise=0 Pa_d`` (preset). SimulationError where the solver gives up.
     """
     chosen = find_experiment(experiment)
     # Raise ParameterError for a seed that is not a whole number from 0 to 4294967295.

@@ -33,6 +33,7 @@ from ppafo.model.plant import PlantParameters
 from ppafo.model.sensors import quantise
 from ppafo.parameters.declaration import is_within
 from ppafo.parameters.device import Device, SonicOrifice
+from ppafo.parameters.overrides import override_set
 from ppafo.parameters.plant import switches_of
 from ppafo.rig.dynamics import RigPhysics
 from ppafo.signals.recording import Recording
@@ -211,16 +212,13 @@ def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Pres
     """
     file = label(str(name_or_path))
     preset = _parse(_FILE.parse(_FILE.read(name_or_path), file), file)
-    for override in overrides:
-        path, separator, text = (part.strip() for part in one_line(override).partition("="))
-        if not separator or not path.startswith(PREFIX) or not text:
-            raise ParameterError(f"override '{one_line(override)}' is not of the form {PREFIX}PATH=VALUE")
-        path = path.removeprefix(PREFIX)
-        said = f"override '{PREFIX}{path}={text}'"
-        if path not in PATHS:
-            raise ParameterError(f"{said}: the rig has no value '{path}'{nearest_name(path, PATHS)}")
-        with refused_as(ParameterError, said, UnitError):
-            value = parse_quantity(text, PATHS[path].unit)
+    for typed, given in override_set(overrides).items():
+        path = typed.removeprefix(PREFIX)
+        if path not in PATHS or not typed.startswith(PREFIX):
+            hint = nearest_name(typed, [f"{PREFIX}{known}" for known in PATHS])
+            raise ParameterError(f"override '{given}': the rig has no value '{typed}'{hint}")
+        with refused_as(ParameterError, f"override '{given}'", UnitError):
+            value = parse_quantity(given.text, PATHS[path].unit)
         preset = preset.with_value(path, value, "override")
     return preset
 

@@ -1,8 +1,8 @@
-"""Integrates one run on the rig with CVODE, from event to event: samples, arriving commands, valve, stick-slip, stops.
+"""Integrates one run on the rig from event to event: samples, arriving commands, valve, stick-slip, stops.
 
 Friction is Coulomb's with a static limit and Stribeck's curve, both growing with pressure, and sticking is a mode that
 root functions begin and end, as in the reference solver. A bristle model would need no modes, but to agree with
-equation (10) to 1e-3 of the angle range its stiffness must be some 1e7 N m/rad, and CVODE would crawl through every
+equation (10) to 1e-3 of the angle range its stiffness must be some 1e7 N m/rad, and a solver would crawl through every
 reversal; with modes no kink lies inside a step, and without the extra terms the rig is equation (10) exactly.
 
 The right-hand side is compiled from the same source text as all compiled physics. The valve and a path of the vane stay
@@ -18,9 +18,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.engine.continuous_time import SAME_TIME, Roots, after_stop, roots_at_rest, roots_sliding
 from ppafo.engine.led_leg import torque_of_leg
 from ppafo.engine.loading import ARRAY, FLOAT, HEADER, INLINE, entry_text, load_source, with_arrays
-from ppafo.engine.reference.solver import SAME_TIME, Roots, after_stop, roots_at_rest, roots_sliding, solve_segment
 from ppafo.engine.rows import leaf_paths, numbers, rebuild, row_expression
 from ppafo.engine.run import Run
 from ppafo.engine.source_text import SourceCollector
@@ -32,6 +32,7 @@ from ppafo.model.sensors import Measurement
 from ppafo.parameters.device import Device
 from ppafo.rig.dynamics import RigPhysics, RigState, observables, rig_rates
 from ppafo.rig.preset import Sensor
+from ppafo.rig.stiff import solve_stretch
 
 Floats = NDArray[np.float64]
 
@@ -134,8 +135,6 @@ def _function(name: str, output: str, lines: list[str]) -> str:
     return entry_text(name, arrays | {"direction": FLOAT}, lines)
 
 
-TOLERANCE = 1.0e-8
-MAXIMUM_STEPS = 100_000
 _TOLERANCES = {
     "angle": 1e-10,
     "angular_velocity": 1e-9,
@@ -149,27 +148,8 @@ _MASS_TOLERANCE, _ENERGY_TOLERANCE, _VALVE_TOLERANCE = 1e-13, 1e-8, 1e-10
 
 
 def solve_rig(rig_run: RigRun) -> RigSolution:
-    """Solve a run; SimulationError where the extra ``reference`` is not installed or the solver gives up."""
+    """Solve a run; SimulationError where the solver gives up."""
     return _Rig(rig_run).solve()
-
-
-def make_solver(slopes: Any, tolerances: Floats, roots: Any) -> Any:
-    """Return CVODE for these slopes with absolute tolerances [SI], and with two root functions or none.
-
-    SimulationError where the extra ``reference`` is not installed.
-    """
-    try:
-        from sksundae.cvode import CVODE
-    except ImportError as error:
-        raise SimulationError("the virtual rig needs scikit-sundae: pip install 'ppafo[reference]'") from error
-    return CVODE(
-        slopes,
-        rtol=TOLERANCE,
-        atol=tolerances,
-        eventsfn=roots,
-        num_events=0 if roots is None else 2,
-        max_num_steps=MAXIMUM_STEPS,
-    )
 
 
 class _Rig:
@@ -201,24 +181,26 @@ class _Rig:
         self.recorded = 0
         count = rig_run.sample_times.size
         self.result = RigSolution(np.empty((count, UNKNOWNS)), np.empty((count, 2)), np.zeros(count))
-        self.solver = make_solver(self.slopes, self.tolerances(), self.root_function())
+        self.tolerances = self.absolute_tolerances()
         if self.is_free:
             self.direction = float(np.sign(self.y[1])) if self.y[1] != 0.0 else self.rest_mode()
 
-    def tolerances(self) -> Floats:
+    def absolute_tolerances(self) -> Floats:
         """Absolute tolerances of all unknowns."""
         plain = [
             _TOLERANCES.get(name, _MASS_TOLERANCE if "mass" in name else _ENERGY_TOLERANCE) for name in RigState._fields
         ]
         return np.array(plain + [_VALVE_TOLERANCE] * (self.y.size - UNKNOWNS))
 
-    def slopes(self, t: float, y: Floats, slopes: Floats) -> None:
+    def slopes(self, t: float, y: Floats) -> Floats:
         """Right-hand side; the valve is asked anew only while it moves."""
+        slopes = np.empty_like(y)
         slopes[UNKNOWNS:] = self.ask_valve(y) if self.valve_moves else 0.0
         self.place_vane(t, y)
         self.present[:] = y[:UNKNOWNS]
         self.fill(self.direction)
         slopes[:UNKNOWNS] = self.rates
+        return slopes
 
     def ask_valve(self, y: Floats) -> list[float]:
         """Put the valve's openings into the inputs and return the slopes of its state."""
@@ -232,19 +214,6 @@ class _Rig:
         if leg is not None:
             self.inputs[ADDED] = torque_of_leg(self.run.program, leg, t, float(y[0]))
         self.inputs[ANGLE], self.inputs[RATE] = (y[0], 0.0) if path is None else path.value(self.run.path, t)[:2]
-
-    def root_function(self) -> Any:
-        """Two root functions that belong to the present mode; none for a vane whose angle is prescribed."""
-        if not self.is_free:
-            return None
-
-        def write_roots(t: float, y: Floats, events: Floats) -> None:
-            events[:] = self.roots(t, y)
-
-        function: Any = write_roots
-        function.terminal = [True, True]
-        function.direction = [-1, -1]
-        return function
 
     def roots(self, t: float, y: Floats) -> Roots:
         """Distance from breakaway, or from standstill and the stop ahead."""
@@ -338,7 +307,8 @@ class _Rig:
         # A valve whose slopes are 0 stays where it is, because they depend on nothing but its state and the command.
         self.valve_moves = any(self.ask_valve(self.y))
         times = self.rig_run.sample_times[self.recorded :]
-        solution = solve_segment(self.solver, self.y, self.time, end, times, "the rig's solver")
+        roots = self.roots if self.is_free else None
+        solution = solve_stretch(self.slopes, self.tolerances, roots, self.y, self.time, end, times)
         self.record_until(float(solution.t[-1]) + SAME_TIME, solution)
         self.time = float(solution.t[-1])
         self.y = np.array(solution.y[-1])

@@ -361,9 +361,9 @@ def _check_channel(recording: Recording, name: str) -> None:
 
 
 def _check_finite(recording: Recording, name: str, values: Floats) -> None:
-    bad = np.flatnonzero(~np.isfinite(values))
-    if bad.size:
-        index = int(bad[0])
+    finite = np.isfinite(values)
+    if not finite.all():
+        index = int(np.argmin(finite))
         raise DataError(f"{recording.label}: {name} is {values[index]} at sample {index + 1}, not a finite number")
 
 

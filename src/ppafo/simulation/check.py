@@ -1,7 +1,7 @@
-"""Whether a run determines what it says: it runs again with less error, and with start and measurements moved a little.
+"""Whether a run can be repeated: it runs again with less error, and with start and measurements moved a little.
 
 A loop with coarse sensors or repeated impacts may amplify a difference that is too small to measure into other results.
-Then its metrics are those of one run among many, and a check says so.
+Then its metrics are numerically sensitive: those of one run among many, and a check says so.
 """
 
 from collections.abc import Callable, Mapping
@@ -12,6 +12,7 @@ from typing import Any
 from ppafo.answers.display_units import metric_change, metric_level
 from ppafo.answers.writing import align_columns
 from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.simulation.accuracy import ErrorEstimate
 from ppafo.simulation.scenario import plain
 
 MOVE = 1.0e-7
@@ -19,7 +20,7 @@ MOVE = 1.0e-7
 ALLOWED_CHANGE = 1.0e-3
 """Largest change of a metric that counts as none, as a fraction of its value or of the range of its quantity."""
 
-HALF_ERROR, MOVED_START, MOVED_MEASUREMENT = "half the error", "start moved", "measurement moved"
+FINER, MOVED_START, MOVED_MEASUREMENT = "finer steps", "start moved", "measurement moved"
 _MOVES = frozenset({MOVED_START, MOVED_MEASUREMENT})
 
 
@@ -28,7 +29,7 @@ class NumberCheck:
     """A number in SI units and how much it changed in each repeat, by name; inf where a repeat has no such number.
 
     ``value`` is a metric, or the range of an angle or a pressure whose ``changes`` are the largest over time;
-    ``allowed`` is the largest change that counts as none.
+    ``allowed`` is the largest change that counts as none, ``allowed_error`` that of the run with finer steps.
     """
 
     name: str
@@ -36,6 +37,7 @@ class NumberCheck:
     value: float
     allowed: float
     changes: Mapping[str, float]
+    allowed_error: float
 
     @property
     def is_determined(self) -> bool:
@@ -45,13 +47,18 @@ class NumberCheck:
     @property
     def changed_by(self) -> frozenset[str]:
         """The repeats that changed it by more than is allowed."""
-        return frozenset(name for name, change in self.changes.items() if not abs(change) <= self.allowed)
+        return frozenset(
+            name
+            for name, change in self.changes.items()
+            if not abs(change) <= (self.allowed_error if name == FINER else self.allowed)
+        )
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Check:
     """What of a run is determined: its metrics, and its angle and pressures over time.
 
+    ``error`` is the estimated error of the run from its steps, of which the one with finer steps has a sixteenth.
     ``parts_at`` is the first time [s] at which a repeat is elsewhere by more than 1e-2 of a range, None where none is;
     ``failed`` names the repeats that diverged. Pressures are shown above ``atmosphere`` [Pa absolute].
     """
@@ -59,6 +66,7 @@ class Check:
     scenario: str
     metrics: tuple[NumberCheck, ...]
     courses: tuple[NumberCheck, ...]
+    error: ErrorEstimate
     parts_at: float | None
     failed: tuple[str, ...]
     atmosphere: float = STANDARD_ATMOSPHERE
@@ -73,7 +81,8 @@ class Check:
         """What the check found, in plain words."""
         if self.is_determined:
             return (
-                f"All metrics are determined: none changes by more than {ALLOWED_CHANGE:.0e} of its value or its range."
+                f"All metrics are repeatable: none changes by more than {ALLOWED_CHANGE:.0e} of its value or its "
+                f"range. {self.error.sentence}"
             )
         lost = [row for row in (*self.metrics, *self.courses) if not row.is_determined]
         by_move = [row.name for row in lost if row.changed_by & _MOVES]
@@ -87,14 +96,14 @@ class Check:
             ),
             (
                 by_error,
-                "half the error changes them. Take a smaller run.step and check again; what still changes is not "
-                "determined.",
+                "finer steps with a sixteenth of the error change them. Take a smaller run.tolerance and check again; "
+                "what still changes cannot be repeated.",
             ),
             (("how it ends",) if self.failed else (), f"the run with {' and that with '.join(self.failed)} diverged."),
         ]
         found = [f"{', '.join(names)}: {cause}" for names, cause in causes if names]
         parting = [] if self.parts_at is None else [f"The runs part at t = {self.parts_at:.4g} s."]
-        return " ".join([f"Not determined by this run: {' Nor: '.join(found)}", *parting])
+        return " ".join([f"Numerically sensitive: {' Also: '.join(found)}", self.error.sentence, *parting])
 
     def __repr__(self) -> str:
         """Return the table of all changes in the units that people are shown, and the sentence."""
@@ -118,4 +127,4 @@ class Check:
 def _cells(row: NumberCheck, names: list[str], level: Callable[[float, str], tuple[float, str]]) -> list[str]:
     value, unit = level(row.value, row.unit)
     changes = [f"{metric_change(row.changes[name], row.unit)[0]:+.1e}" if row.changes[name] else "0" for name in names]
-    return [row.name, f"{value:.4g} {unit}".rstrip(), *changes, "" if row.is_determined else "not determined"]
+    return [row.name, f"{value:.4g} {unit}".rstrip(), *changes, "" if row.is_determined else "sensitive"]

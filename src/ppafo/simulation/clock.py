@@ -109,8 +109,6 @@ def _check_size(reading: Reading, clock: Clock) -> None:
 def _read_period(reading: Reading) -> float:
     """Return the sample period."""
     rate, period = (value_at(reading.document, path) for path in (_RATE_PATH, _PERIOD_PATH))
-    if rate is not None and period is not None:
-        raise reading.refusal(_RATE_PATH, f"give either {_RATE_PATH} or {_PERIOD_PATH}, not both")
     if rate is not None:
         return 1.0 / reading.number(_RATE_PATH, RATE)
     if period is not None:

@@ -14,10 +14,9 @@ from importlib import resources
 from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.control.catalog import CONTROLLERS, PROFILES
-from ppafo.control.fixed.torque_laws import FIXED, FIXED_LAWS
-from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
+from ppafo.control.catalog import CONTROLLERS, ON_CHIP, PROFILES
 from ppafo.documents.models import quote
+from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE
 from ppafo.errors import KindError, ScenarioError, UnitError, nearest_name, one_line, refused_as
 from ppafo.kinds import Kinds
 from ppafo.model.declaration import Quantity, range_rule
@@ -35,6 +34,10 @@ RUN = (
     Quantity("step", "s", "largest step; 1 ms unless given, less where a sample comes sooner", 1.0e-3, 1.0e-8, 1.0e3),
     Quantity("output_interval", "s", "time between two recorded samples; the step unless given", 1.0e-3, 1.0e-8, 1.0e6),
 )
+ACCURACY = Quantity(
+    "tolerance", "1", "error of a pressure to keep to, over the pressure range", KEPT_OF_PRESSURE, 1.0e-6, 0.1
+)
+"""With the default a pressure keeps to 1e-3 of the pressure range and the angle to 2e-4 of its own."""
 ANGLE = Quantity("angle", "rad", "angle of the vane, 90 deg neutral, growing in plantarflexion", None, -10.0, 10.0)
 FREE = (
     ANGLE,
@@ -96,6 +99,7 @@ RATE = Quantity("rate", "Hz", "samples per second; or give the period", None, 1.
 PERIOD = Quantity("period", "s", "time between two samples; or give the rate", None, 1.0e-8, 1.0e6)
 SAMPLING = (RATE, PERIOD)
 ARITHMETIC = "controller.arithmetic"
+"""What integer controllers were once chosen by."""
 
 TORQUE_LEVEL = Quantity("level", "N m", "", None, -1.0e4, 1.0e4)
 ANGLE_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
@@ -152,10 +156,9 @@ class Declared:
         return (*self.texts(document), *self.quantities(document), *self.appended)
 
 
-def controller_settings(kind: str, arithmetic: object = None) -> tuple[Quantity, ...]:
-    """Return the settings of a controller of the catalogue, none where it is unknown; ``fixed`` adds a converter."""
-    converter = CONVERTER if arithmetic == FIXED and kind in FIXED_LAWS else ()
-    return (*CONTROLLERS[kind].quantities, *converter) if kind in CONTROLLERS else ()
+def controller_settings(kind: str) -> tuple[Quantity, ...]:
+    """Return the settings of a controller of the catalogue, none where it is unknown."""
+    return CONTROLLERS[kind].quantities if kind in CONTROLLERS else ()
 
 
 def profile_settings(kind: str, prescribed: Quantity) -> tuple[Quantity, ...]:
@@ -178,14 +181,14 @@ def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
     motion = kind_at(document, "motion")
     # The settings of a kind of motion; a prescribed one has a profile instead.
     sections = {
-        "run": RUN,
+        "run": (*RUN, ACCURACY),
         "motion": {"free": FREE, "held": (ANGLE,), "leg": LEG}.get(motion, ()),
         "motion.profile": profile_settings(kind_at(document, "motion.profile"), ANGLE_LEVEL)
         if motion == "prescribed"
         else (),
         "motion.shank": shank_settings(kind_at(document, "motion.shank")) if motion == "leg" else (),
         "initial": INITIAL,
-        "controller": SAMPLING + controller_settings(kind_at(document, "controller"), value_at(document, ARITHMETIC)),
+        "controller": SAMPLING + controller_settings(kind_at(document, "controller")),
         "reference": profile_settings(kind_at(document, "reference"), TORQUE_LEVEL),
         "sensors": (*SENSORS, SEED),
         "gas_model": gas_settings(kind_at(document, "gas_model")),
@@ -197,7 +200,6 @@ def quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
 def texts(document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the paths of every text that a document can hold."""
     kinds = ["motion.kind", "controller.kind", "reference.kind", "gas_model.kind"]
-    kinds += [ARITHMETIC] if kind_at(document, "controller") in FIXED_LAWS else []
     motion = kind_at(document, "motion")
     kinds += ["motion.profile.kind"] if motion == "prescribed" else []
     kinds += ["motion.shank.kind"] if motion == "leg" else []
@@ -218,10 +220,25 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
     )
     motion = kind_at(document, "motion")
     check_motion_kind(motion, f"{file}: motion.kind")
+    old = value_at(document, ARITHMETIC)
+    if old is not None:
+        said = no_arithmetic(kind_at(document, "controller"), old)
+        raise ScenarioError(f"{file}: {ARITHMETIC} = {quote(old)}: {said}")
     check_known_motion(motion, file)
     for section, kinds in sections:
         with refused_as(ScenarioError, f"{file}: {section}.kind", KindError):
             kinds.get(kind_at(document, section))
+
+
+def no_arithmetic(kind: str, text: object) -> str:
+    """Return what to write in the place of ``controller.arithmetic``, which ``text`` was once given for."""
+    if text == "float":
+        return "is no setting any more; leave it out: every controller but those on a chip computes with floats"
+    integer = kind if kind.endswith(ON_CHIP) else f"{kind}{ON_CHIP}"
+    if integer in CONTROLLERS:
+        return f'is no setting any more; leave it out and write controller.kind = "{integer}"'
+    known = ", ".join(name for name in CONTROLLERS if name.endswith(ON_CHIP))
+    return f"is no setting any more, and '{kind}' has no form on whole numbers; those that are: {known}"
 
 
 def check_known_motion(kind: str, file: str) -> None:

@@ -4,7 +4,6 @@ First what makes a Scenario of a document with overrides, and says what no sourc
 """
 
 import copy
-import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from importlib import resources
@@ -15,26 +14,21 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.fixed.torque_laws import FIXED, FLOAT
-from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
-from ppafo.documents.models import first_problem, is_gap
+from ppafo.documents.models import all_problems, is_gap
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
-from ppafo.model.catalog import EFFECTS, VALVES
 from ppafo.model.declaration import Quantity
-from ppafo.model.effects.kind import SECTION as EFFECTS_SECTION
 from ppafo.model.regulator import SupplyLines
 from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set
 from ppafo.parameters import apply_overrides as apply_device_overrides
-from ppafo.parameters.declaration import ORIFICE, RELIEVING_PATH, SECTIONS, SPECIES_PATH
-from ppafo.parameters.declaration import quantities as device_quantities
+from ppafo.parameters.declaration import RELIEVING_PATH
 from ppafo.parameters.device import Device, Supply
 from ppafo.parameters.graph import Follows, Graph, follows, gauge_link
+from ppafo.parameters.overrides import FORMS, either, in_two_forms, split_override
 from ppafo.parameters.parameter_set import atmospheric_pressure, chosen_valve, entry_text, links_of_set
-from ppafo.simulation import declaration
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock, read_clock
 from ppafo.simulation.declaration import (
-    ARITHMETIC,
+    ACCURACY,
     AT_REST,
     INITIAL,
     OF_A_VANE,
@@ -57,6 +51,7 @@ from ppafo.simulation.declaration import (
     value_at,
 )
 from ppafo.simulation.motion import read_motion, read_profile
+from ppafo.simulation.overrides import OverriddenDocument, apply_overrides, device_paths, scenario_paths
 from ppafo.simulation.scenario import (
     Assumption,
     Control,
@@ -71,154 +66,6 @@ from ppafo.units import format_quantity, split_quantity
 
 _SECTION = "assumed"
 _NOTHING_TO_FOLLOW = ProfileChoice("constant", {"level": 0.0})
-
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-_SEED = "sensors.seed"
-_ONE_OR_OTHER = {"controller.rate": "period", "controller.period": "rate"}
-_OWN_KEYS = {"controller": frozenset({"kind", "rate", "period"})}
-
-
-@dataclass(frozen=True, slots=True)
-class OverriddenDocument:
-    """A document with overrides in it: paths that were set, and the overrides that belong to the device."""
-
-    document: dict[str, Any]
-    paths: frozenset[str]
-    device: tuple[str, ...]
-
-
-def apply_overrides(
-    document: Mapping[str, Any], overrides: Iterable[str], file: str, declared: Declared = OF_A_VANE
-) -> OverriddenDocument:
-    """Return a changed copy of a document; ``file`` is what messages call it.
-
-    Naming another kind of motion, controller, timing or profile drops the settings that only the old kind has; giving a
-    rate drops the period, and the reverse. A gain on the torque may leave out its unit. A setting may come before the
-    kind that has it. ScenarioError for a path that is neither ``declared`` nor of the device.
-    """
-    changed = _with_one_path_each(document, file, declared)
-    paths: set[str] = set()
-    device: list[str] = []
-    waiting, before = list(overrides), frozenset[str]()
-    while waiting:
-        unknown: list[str] = []
-        for override in waiting:
-            given, text = split_override(override)
-            path = declared.same.get(given, given)
-            if path in declared.appended:
-                section, own = declared.appended[path]
-                changed.setdefault(section, {}).setdefault("overrides", []).append(f"{own}={text}")
-            elif is_of_device(path):
-                device.append(override)
-                continue
-            elif path not in declared.paths(changed):
-                unknown.append(override)
-                continue
-            elif path in before:
-                continue  # what came behind the kind counts
-            else:
-                if path == "motion.kind":
-                    declared.check_motion(text, f"override '{override}'")
-                _set(changed, path, text, file, declared)
-            paths.add(path)
-        if len(unknown) == len(waiting):
-            raise unknown_value(unknown[0], declared.paths(changed), f"{file} has")
-        waiting, before = unknown, frozenset(paths)
-    return OverriddenDocument(changed, frozenset(paths), tuple(device))
-
-
-def _with_one_path_each(document: Mapping[str, Any], file: str, declared: Declared) -> dict[str, Any]:
-    """Return a copy of a document where each value stands at the one path that the document keeps."""
-    changed = copy.deepcopy(dict(document))
-    for path, kept in declared.same.items():
-        section, _, name = path.rpartition(".")
-        table = value_at(changed, section)
-        if not isinstance(table, dict) or name not in table:
-            continue
-        if kept in changed:
-            raise ScenarioError(f"{file}: give either {path} or {kept}, not both")
-        changed[kept] = table.pop(name)
-    return changed
-
-
-def split_override(override: str) -> tuple[str, str]:
-    """Return path and value of a text such as ``run.duration=1 s``. ScenarioError for any other text."""
-    on_one_line = one_line(override)
-    path, separator, text = (part.strip() for part in on_one_line.partition("="))
-    if not separator or not path or not text:
-        raise ScenarioError(f"override '{on_one_line}' is not of the form PATH=VALUE, as valve.area=12.6mm^2 is")
-    return path, text
-
-
-def scenario_paths(document: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return every path of the scenario that an override can set, for the kinds that the document names."""
-    return OF_A_VANE.paths(document)
-
-
-def device_paths() -> tuple[str, ...]:
-    """Return every path of the device that an override can set, with ``valve`` for the one that is chosen."""
-    sections = [path for path in device_quantities({}) if not path.startswith("reported.")]
-    valve = [*ORIFICE, *(item for kind in VALVES.values() for item in kind.quantities)]
-    return (*sections, SPECIES_PATH, RELIEVING_PATH, *(f"valve.{item.name}" for item in valve))
-
-
-def is_of_device(path: str) -> bool:
-    """Tell whether a path begins in the device, which then has the say about the rest of it."""
-    return path.partition(".")[0] in {*SECTIONS, EFFECTS_SECTION, "valve", "valves"}
-
-
-def unknown_value(override: str, known: tuple[str, ...], who_has: str) -> ScenarioError:
-    """Return the error for a path that is neither known nor of the device; ``who_has`` begins as ``task.toml has``."""
-    path, _ = split_override(override)
-    EFFECTS.load_own()
-    allowed = [*known, *device_paths()]
-    section = path.partition(".")[0]
-    near = [name for name in known if name.startswith(f"{section}.")]
-    hint = nearest_name(path, allowed) or f"; for example {', '.join(near[:6] or known[:6])}"
-    return ScenarioError(f"override '{one_line(override)}': {who_has} no value '{path}'{hint}")
-
-
-def _set(document: dict[str, Any], path: str, text: str, file: str, declared: Declared) -> None:
-    section, _, name = path.rpartition(".")
-    table = document
-    for part in section.split(".") if section else ():
-        table = table.setdefault(part, {})
-        if not isinstance(table, dict):
-            raise ScenarioError(f"override '{path}={text}': {file} has no table [{section}]")
-    if name == "kind" and table.get("kind") != text:
-        _drop_settings_of_old_kind(document, section, text, declared)
-    table.pop(_ONE_OR_OTHER.get(path, ""), None)
-    table[name] = _seed(path, text) if path == _SEED else _with_unit_of_gain(document, path, text, declared)
-
-
-def _drop_settings_of_old_kind(document: dict[str, Any], section: str, kind: str, declared: Declared) -> None:
-    table = declaration.value_at(document, section)
-    before = _setting_names(document, section, declared)
-    table["kind"] = kind
-    after = _setting_names(document, section, declared)
-    for name in before - after - _OWN_KEYS.get(section, frozenset()):
-        table.pop(name, None)
-
-
-def _setting_names(document: dict[str, Any], section: str, declared: Declared) -> frozenset[str]:
-    """Return the keys that a section can have beside its kind."""
-    prefix = f"{section}."
-    paths = [path.removeprefix(prefix) for path in declared.paths(document) if path.startswith(prefix)]
-    return frozenset(path.partition(".")[0] for path in paths) - {"kind"}
-
-
-def _with_unit_of_gain(document: dict[str, Any], path: str, text: str, declared: Declared) -> str:
-    """Return the text with the SI unit of a gain on the torque where it has none: papers print gains without units."""
-    quantity = declared.quantities(document).get(path)
-    is_gain = quantity is not None and path.startswith("controller.") and "(N m" in quantity.unit
-    return f"{text} {quantity.unit}" if quantity is not None and is_gain and _NUMBER.fullmatch(text) else text
-
-
-def _seed(path: str, text: str) -> int:
-    try:
-        return int(text)
-    except ValueError as error:
-        raise ScenarioError(f"override '{path}={text}': must be a whole number") from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,13 +123,14 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         origin=Origin(request.path, document["device"]["set"], hardware.valve, request.overrides, request.content),
         thermal=read_thermal(reading),
         supply_lines=read_supply_lines(reading, device),
+        tolerance=reading.number("run.tolerance", ACCURACY),
         links=_links_at_start(reading),
     )
     # Refuse what only a vane has.
     try:
         if scenario.thermal is not None:
             scenario.device.check_vane("gas with an energy balance")
-        if scenario.control.is_fixed:
+        if CONTROLLERS[scenario.control.kind].plan is not None:
             scenario.device.check_vane("a controller on whole numbers")
     except ParameterError as error:
         raise _of_device(reading, error) from error
@@ -301,7 +149,7 @@ def read_hardware(reading: Reading, request: ScenarioRequest, overrides: tuple[s
         raise _of_device(reading, error) from error
     before = atmospheric_pressure(parameter_set) if overrides else None
     changed = apply_device_overrides(parameter_set, overrides, valve)
-    given = {split_override(text)[0] for text in overrides}
+    given = {split_override(text, ScenarioError).typed for text in overrides}
     return Hardware(changed, name, links_of_set(changed, given, before))
 
 
@@ -371,12 +219,7 @@ def _reference(reading: Reading) -> ProfileChoice:
 
 def _control(reading: Reading, period: float) -> Control:
     kind = kind_at(reading.document, "controller")
-    arithmetic = value_at(reading.document, ARITHMETIC) or FLOAT
-    settings = reading.section("controller", controller_settings(kind, arithmetic))
-    for item in () if arithmetic == FIXED else CONVERTER:
-        if value_at(reading.document, f"controller.{item.name}") is not None:
-            raise reading.refusal(f"controller.{item.name}", f'needs {ARITHMETIC} = "{FIXED}"')
-    return Control(kind, settings, period, arithmetic=arithmetic)
+    return Control(kind, reading.section("controller", controller_settings(kind)), period)
 
 
 def _sensors(reading: Reading, clock: Clock) -> Sensors:
@@ -405,7 +248,7 @@ def read_assumptions(
 
     ScenarioError for a path that has no value.
     """
-    replaced = frozenset(split_override(text)[0] for text in overrides)
+    replaced = frozenset(split_override(text, ScenarioError).typed for text in overrides)
     notes: Mapping[str, str] = reading.document.get(_SECTION, {})
     assumptions = []
     for path, note in notes.items():
@@ -594,7 +437,16 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
     changed = apply_overrides(request.content, request.overrides, request.file, declared)
     declared.find_kinds(changed.document, request.file)
     _refuse(_problems(changed.document, layout), request.file, layout)
+    _check_forms(Reading(request.file, changed.document, changed.paths))
     return layout.build(request, changed)
+
+
+def _check_forms(reading: Reading) -> None:
+    """Refuse what a document gives in two forms."""
+    paths = [f"{section}.{name}" for section in FORMS for name in value_at(reading.document, section) or ()]
+    pair = in_two_forms(paths)
+    if pair is not None:
+        raise reading.refusal(pair[1], either(pair[1]))
 
 
 def _problems(document: dict[str, Any], layout: Layout) -> list[ErrorDetails]:
@@ -611,4 +463,4 @@ def _problems(document: dict[str, Any], layout: Layout) -> list[ErrorDetails]:
 
 def _refuse(problems: list[ErrorDetails], file: str, layout: Layout) -> None:
     if problems:
-        raise ScenarioError(f"{file}: {first_problem(problems, layout.whole())}")
+        raise ScenarioError(f"{file}: {all_problems(problems, layout.whole())}")

@@ -48,7 +48,7 @@ def read_motion(
     if not (device.actuator.angle_min - TOLERANCE <= angle <= device.actuator.angle_max + TOLERANCE):
         raise reading.refusal(_ANGLE_PATH, f"must be between the stops of {device.name}, {_range_text(_stops(device))}")
     if kind == "held":
-        return PrescribedMotion(ProfileChoice("constant", {"level": angle}))
+        return PrescribedMotion(ProfileChoice("constant", {"level": angle}), kind)
     if kind == "leg":
         numbers = reading.section("motion", LEG)
         start, rate = numbers.pop("angle"), numbers.pop("angular_velocity")

@@ -16,22 +16,26 @@ from ppafo.model.regulator import SupplyLines
 from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, members
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, holding, left, resolved
+from ppafo.parameters.overrides import either, in_two_forms, one_path
 from ppafo.parameters.plant import all_settings
 from ppafo.simulation import declaration
 from ppafo.simulation.clock import Clock, read_clock
 from ppafo.simulation.declaration import SUPPLY_LINE, SUPPLY_LINES, Reading
-from ppafo.simulation.loading import apply_overrides
+from ppafo.simulation.overrides import apply_overrides
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, PrescribedMotion, Scenario, worn_kind
 
 HELD_ANGLE = "motion.angle"
 TIMES = ("run.duration", "run.step", "run.output_interval", "controller.rate", "controller.period")
 """Paths that decide the clock of a run."""
 
-_CHOSEN_VALVE = "valve."
 _DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 _OF_SENSORS = {"angle_resolution": "angle_quantum", "pressure_resolution": "pressure_quantum"}
 _OF_WALLS = {"wall_area_per_volume": "area_per_volume"}
-_INITIAL = {"initial.pressure_1": "initial_pressure_1", "initial.pressure_2": "initial_pressure_2"}
+_OF_SCENARIO = {
+    "initial.pressure_1": "initial_pressure_1",
+    "initial.pressure_2": "initial_pressure_2",
+    "run.tolerance": "tolerance",
+}
 _ORIFICES = {"actuator.leak": ("device", "actuator", "leak"), "valve": ("device", "valve", "orifice")}
 
 _TEXTS = (
@@ -40,7 +44,6 @@ _TEXTS = (
     "supply.relieving",
     "motion.kind",
     "controller.kind",
-    declaration.ARITHMETIC,
     "reference.kind",
     "motion.profile.kind",
     "motion.shank.kind",
@@ -52,8 +55,7 @@ _UNIT_OF_TIMES = {"controller.rate": "Hz"}
 
 def chosen_path(path: str, scenario: Scenario) -> str:
     """Return the path with ``valve.`` in place of ``valves.NAME.`` where that is the valve of the scenario."""
-    own = f"valves.{scenario.device.valve_name}."
-    return _CHOSEN_VALVE + path.removeprefix(own) if path.startswith(own) else path
+    return one_path(path, scenario.device.valve_name)
 
 
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
@@ -148,8 +150,9 @@ def _kinds(scenario: Scenario) -> dict[str, Any]:
     if isinstance(scenario.motion, FreeMotion) and scenario.motion.leg is not None:
         motion = {"kind": "leg", "shank": {"kind": scenario.motion.leg.shank.kind}}
     if isinstance(scenario.motion, PrescribedMotion):
-        motion = {"kind": "prescribed", "profile": {"kind": scenario.motion.profile.kind}}
-    controller = {"kind": scenario.control.kind, "arithmetic": scenario.control.arithmetic}
+        is_held = scenario.motion.kind == "held"
+        motion = {} if is_held else {"kind": "prescribed", "profile": {"kind": scenario.motion.profile.kind}}
+    controller = {"kind": scenario.control.kind}
     gas: dict[str, Any] = {} if scenario.thermal is None else {"gas_model": {"kind": declaration.THERMAL}}
     gas |= {} if scenario.supply_lines is None else {SUPPLY_LINE: {}}
     if scenario.control.kind == switching.CONSTANT.name:
@@ -158,9 +161,15 @@ def _kinds(scenario: Scenario) -> dict[str, Any]:
 
 
 def _angle_of_held_vane(scenario: Scenario) -> dict[str, Quantity]:
+    return {HELD_ANGLE: declaration.ANGLE} if path_of_held_angle(scenario) == HELD_ANGLE else {}
+
+
+def path_of_held_angle(scenario: Scenario) -> str | None:
+    """Return the path of the angle at which a vane stays, None where it moves."""
     motion = scenario.motion
-    is_held = isinstance(motion, PrescribedMotion) and motion.profile.kind == "constant"
-    return {HELD_ANGLE: declaration.ANGLE} if is_held else {}
+    if not isinstance(motion, PrescribedMotion) or motion.profile.kind != "constant":
+        return None
+    return HELD_ANGLE if motion.kind == "held" else "motion.profile.level"
 
 
 def _place(path: str, scenario: Scenario) -> tuple[str, ...]:
@@ -169,8 +178,8 @@ def _place(path: str, scenario: Scenario) -> tuple[str, ...]:
     worn = worn_kind(scenario)
     if worn is not None and path in worn.places:
         return worn.places[path]
-    if path in _INITIAL:
-        return (_INITIAL[path],)
+    if path in _OF_SCENARIO:
+        return (_OF_SCENARIO[path],)
     if path == HELD_ANGLE and not isinstance(scenario.motion, FreeMotion):
         return ("motion", "profile", "settings", "level")
     if section.startswith(f"{SUPPLY_LINE}."):
@@ -278,20 +287,15 @@ def _check_path(base: Scenario, given: str, path: str, declared: Mapping[str, Qu
 
 
 def _check_together(base: Scenario, values: Mapping[str, Floats]) -> None:
-    if {"controller.rate", "controller.period"} <= set(values):
-        raise ScenarioError(f"{base.name}: vary either controller.rate or controller.period, not both")
+    pair = in_two_forms(values)
+    if pair is not None:
+        raise ScenarioError(f"{base.name}: '{pair[0]}' and '{pair[1]}' vary: {either(pair[0])}")
     for section in ("valve", "actuator.leak"):
-        form = other_form(base.device, section)
-        given = [name for name in form if f"{section}.{name}" in values]
-        own = [
-            name
-            for name in ("area", "discharge_coefficient", "sonic_conductance", "critical_ratio")
-            if name not in form and f"{section}.{name}" in values
-        ]
-        if given and (len(given) < len(form) or own):
+        form = [f"{section}.{name}" for name in other_form(base.device, section)]
+        missing = [path for path in form if path not in values]
+        if missing and len(missing) < len(form):
             raise ScenarioError(
-                f"{base.name}: {section} is given in the other form; to vary {' or '.join(form)} give a column for "
-                f"both, and none for {' or '.join(own) or 'the other form'}"
+                f"{base.name}: {section} is given in the other form; to vary {' or '.join(form)} give a column for both"
             )
 
 

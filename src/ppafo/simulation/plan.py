@@ -12,17 +12,16 @@ import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control.catalog import CONTROLLERS, PROFILES
-from ppafo.control.fixed.torque_laws import FIXED_LAWS
-from ppafo.control.fixed.whole_numbers import SETTINGS, Converter, converter_of
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.engine.led_leg import GAIT_SHANK, LedLeg
+from ppafo.engine.over_samples import over_samples
 from ppafo.engine.pieces import GasScheme
 from ppafo.engine.program import NoParameters, Program
-from ppafo.engine.rows import leaves, rebuilt
+from ppafo.engine.rows import rebuilt
 from ppafo.engine.run import Lines, ReactingWalk, Run, Walk
 from ppafo.engine.scheme.actuators import volumes_of
 from ppafo.engine.scheme.isothermal_gas import ISOTHERMAL
-from ppafo.engine.scheme.pneumatics import is_slow
+from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE, is_slow
 from ppafo.errors import ScenarioError
 from ppafo.kinds import kind_at
 from ppafo.model.actuators.vane import KIND as VANE
@@ -51,7 +50,6 @@ from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice
 from ppafo.parameters.plant import effect_rows, effects_of, orifice_conductance, plant_parameters
-from ppafo.simulation.declaration import short_quantity_text
 from ppafo.simulation.scenario import (
     PYTHON_CONTROLLER,
     FreeMotion,
@@ -113,7 +111,8 @@ class Pieces:
 class Steps:
     """Length of a step [s], how many there are, how many to a sample of the controller and of the recording.
 
-    ``needs_parts`` is true where the error decides about the parts of a step.
+    ``needs_parts`` is true where the error decides about the parts of a step; ``tolerance`` is the error over the one
+    that a run is allowed by default [-].
     """
 
     step: Any
@@ -121,6 +120,7 @@ class Steps:
     steps_per_sample: Any
     record_every: Any
     needs_parts: Any
+    tolerance: Any = 1.0
 
 
 StepRule = Callable[[PlantParameters], Steps]
@@ -165,6 +165,7 @@ def compose_run(
         signal_delay=pieces.signal_delay,
         command_delay=delay,
         needs_parts=steps.needs_parts,
+        tolerance=steps.tolerance,
         walk=walk if isinstance(walk, Walk) else None,
         reacting=walk if isinstance(walk, ReactingWalk) else None,
         lines=initial_lines(plant, pieces.supply_lines),
@@ -242,17 +243,13 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         return planned
     device, motion, control = scenario.device, vane_motion(scenario), scenario.control
     plant = plant_parameters(device, outside_torque(motion))
-    in_lanes = control.kind != PYTHON_CONTROLLER
-    fixed = (
-        fixed_controller(scenario, plant.torque_constant, profile_bounds(scenario.reference))
-        if control.is_fixed
-        else None
-    )
+    law = None if control.kind == PYTHON_CONTROLLER else CONTROLLERS[control.kind]
+    numbers, problems = _numbers_of_law(law, scenario, plant.torque_constant)
     pieces = Pieces(
         device=device,
         valve=VALVES[device.valve.kind].choose({name: first(value) for name, value in device.valve.settings.items()}),
-        controller=(CONTROLLERS[control.kind] if fixed is None else fixed.kind) if in_lanes else None,
-        settings=control.settings if fixed is None else fixed.numbers,
+        controller=law,
+        settings=numbers,
         reference=scenario.reference,
         path=None if isinstance(motion, FreeMotion) else motion.profile,
         sensors=sensor_parameters(scenario),
@@ -266,20 +263,36 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
     run = compose_run(
         pieces, plant, lambda fed: scenario_steps(scenario, fed), lambda fed: initial_state(scenario, fed)
     )
-    further = () if fixed is None else fixed.problems
-    return run, (too_many_steps(scenario, run.step, run.step_count), *further)
+    return run, (too_many_steps(scenario, run.step, run.step_count), *problems)
+
+
+def _numbers_of_law(
+    law: ControllerKind | None, scenario: Scenario, torque_constant: Any
+) -> tuple[Mapping[str, Any], tuple[Problem, ...]]:
+    """Return the numbers of a law by name, which are its settings unless it has a plan, and what may be wrong."""
+    control = scenario.control
+    if law is None or law.plan is None:
+        return control.settings, ()
+    return law.plan(control.settings, control.period, torque_constant, profile_bounds(scenario.reference))
 
 
 def scenario_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
     """The steps of a scenario: the largest that divides a sample of its controller, in parts where the error asks."""
     counts = step_counts(scenario.duration, scenario.time_step, scenario.output_interval, scenario.control.period)
+    tolerance = relative_tolerance(scenario.tolerance)
     return Steps(
         step=counts.step,
         step_count=whole(counts.step_count),
         steps_per_sample=whole(counts.steps_per_sample),
         record_every=counts.record_every,
-        needs_parts=is_adaptive(scenario, plant, counts.step),
+        needs_parts=is_adaptive(scenario, plant, counts.step / smaller(1.0, tolerance)),
+        tolerance=tolerance,
     )
+
+
+def relative_tolerance(tolerance: float) -> float:
+    """Allowed error of a pressure over the one that is allowed by default [-], from ``run.tolerance`` [-]."""
+    return tolerance / KEPT_OF_PRESSURE
 
 
 def outside_torque(motion: VaneMotion) -> Any:
@@ -392,8 +405,12 @@ def sensor_parameters(scenario: Scenario) -> SensorParameters:
 
 
 def controller_parameters(kind: ControllerKind, settings: Mapping[str, Any]) -> Any:
-    """The NamedTuple of a controller, nested ones filled in the order of its quantities; settings may be arrays."""
-    return rebuilt(kind.parameters, [settings[item.name] for item in kind.quantities])
+    """The NamedTuple of a controller, nested ones filled in the order of its quantities; settings may be arrays.
+
+    Of a controller with a plan ``settings`` are the numbers that this made, in their order.
+    """
+    given = settings.values() if kind.plan is not None else [settings[item.name] for item in kind.quantities]
+    return rebuilt(kind.parameters, given)
 
 
 def profile_parameters(choice: ProfileChoice) -> Any:
@@ -404,9 +421,10 @@ def profile_parameters(choice: ProfileChoice) -> Any:
 
 def profile_values(choice: ProfileChoice, times: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> np.ndarray:
     """Value, rate and second derivative of a profile at times [s], shape (3, times)."""
-    kind: ProfileKind = PROFILES[choice.kind]
-    parameters = profile_parameters(choice)
-    return np.array([kind.value(parameters, float(time)) for time in times]).T
+    found = np.empty((3, times.size))
+    for row, series in enumerate(over_samples(PROFILES[choice.kind].value, profile_parameters(choice), times)):
+        found[row] = series
+    return found
 
 
 def is_adaptive(scenario: Scenario, plant: PlantParameters, step: float) -> Any:
@@ -538,76 +556,3 @@ def lines_at_start(plant: PlantParameters, lines: SupplyLines) -> LineState:
         mass_2=chamber_mass(plant.dorsiflexion_pressure, lines.volume_2, plant.gas_product),
         regulated_mass=0.0,
     )
-
-
-@dataclass(frozen=True, slots=True)
-class FixedController:
-    """An integer controller for the lanes: its kind, its numbers by name (whole ones in floats), what may be wrong."""
-
-    kind: ControllerKind
-    numbers: Mapping[str, Any]
-    problems: tuple[Problem, ...]
-
-
-def fixed_controller(scenario: Scenario, torque_constant: Any, reference: tuple[Any, Any]) -> FixedController:
-    """The integer form of the controller; any number may be an array (runs,).
-
-    It needs the device's torque constant [N m/Pa], and the lowest and highest ``reference`` [N m].
-    """
-    control = scenario.control
-    law = FIXED_LAWS[control.kind]
-    bits, pressure_range = (control.settings[item.name] for item in SETTINGS)
-    converter: Converter = over_runs(converter_of, bits, pressure_range, torque_constant)
-    names = tuple(control.settings)
-
-    def settings_of(values: tuple[float, ...]) -> dict[str, float]:
-        return dict(zip(names, values, strict=True))
-
-    def prepared(period: float, torque_step: float, *values: float) -> tuple[float, ...]:
-        found: tuple[float, ...] = law.prepare(settings_of(values), period, torque_step)
-        return found
-
-    def largest(period: float, torque_step: float, *values: float) -> float:
-        return law.largest(settings_of(values), period, torque_step)
-
-    given = (control.period, converter.torque_step, *control.settings.values())
-    every = (*leaves(converter), *over_runs(prepared, *given))
-    numbers = dict(zip((item.name for item in law.kind.quantities), every, strict=True))
-    size = over_runs(largest, *given)
-    return FixedController(
-        law.kind, numbers, (_broken_bit(bits), _too_large(size, control.kind), _reference(reference, converter))
-    )
-
-
-def _broken_bit(bits: Any) -> Problem:
-    """A number of bits that is not whole."""
-    return np.asarray(bits % 1.0 != 0.0), lambda run: f"controller.converter_bits = {at(bits, run):g}: must be whole"
-
-
-def _too_large(size: Any, kind: str) -> Problem:
-    """A setting beyond what 15 bits and the range of the converter can hold."""
-
-    def line(run: int) -> str:
-        return (
-            f"controller: a gain of '{kind}' on whole numbers is {at(size, run):.3g} times the largest: take more "
-            f"converter_bits, a smaller converter_range, or a smaller gain"
-        )
-
-    return np.asarray(size > 1.0), line
-
-
-def _reference(bounds: tuple[Any, Any], converter: Converter) -> Problem:
-    """A reference that the converter cannot show."""
-    lowest, highest = bounds
-    low, high = -converter.middle * converter.torque_step, (converter.top - converter.middle) * converter.torque_step
-
-    def line(run: int) -> str:
-        shown, wanted = (
-            (short_quantity_text(at(end, run), "N m") for end in ends) for ends in ((low, high), (lowest, highest))
-        )
-        return (
-            f"reference: from {' to '.join(wanted)}, and the converter shows {' to '.join(shown)} only: "
-            "take a larger controller.converter_range"
-        )
-
-    return np.logical_or(lowest < low - _ROUNDING, highest > high + _ROUNDING), line

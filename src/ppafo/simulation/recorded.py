@@ -9,7 +9,7 @@ import numpy as np
 from ppafo.engine.lanes import StepInputs, prescribe_recorded_angle
 from ppafo.engine.run import Run
 from ppafo.errors import DataError
-from ppafo.parameters.device import Device, Orifice
+from ppafo.parameters.device import VANE, Device, Orifice
 from ppafo.signals import Recording
 from ppafo.signals.faults import longest_gap
 from ppafo.signals.recording import Floats, between_samples
@@ -48,6 +48,8 @@ _FEWEST_ON_LINE = 8
 _SEEN_SLOPE = 4.0
 """Standard errors from which something moves: white noise at rest is that far off once in 16,000 times."""
 _ROUNDING, _SPREAD_OF_MEDIAN = 1.0e-9, 1.4826
+_LEAST_RANK = 1.0e-6
+"""Singular value over the largest from which powers of time count as independent of each other."""
 
 PRESSURES = ("pressure_1", "pressure_2", SUPPLY, DORSIFLEXION_SUPPLY)
 
@@ -202,6 +204,9 @@ def _is_seen(columns: Floats, values: Floats) -> bool:
 
     By the median of second differences, which neither a slope nor a jump changes.
     """
+    # Samples that lie together in time, but for one, tell no bend from a slope.
+    if np.linalg.matrix_rank(columns, rtol=_LEAST_RANK) < columns.shape[1]:
+        return False
     found = np.linalg.lstsq(columns, values)[0]
     noise = _SPREAD_OF_MEDIAN * float(np.median(np.abs(np.diff(values, n=2)))) / math.sqrt(6.0)
     error = noise * math.sqrt(float(np.linalg.inv(columns.T @ columns)[0, 0]))
@@ -247,17 +252,18 @@ def check_absolute(recording: Recording, atmosphere: float, file: str) -> None:
 
 def held_vane(angle: float) -> PrescribedMotion:
     """Return the motion of a vane that is held at an angle [rad]: both chambers are fixed volumes."""
-    return PrescribedMotion(ProfileChoice("constant", {"level": angle}))
+    return PrescribedMotion(ProfileChoice("constant", {"level": angle}), "held")
 
 
 def with_fixed_volume(device: Device, volume: float) -> Device:
-    """Return the device with a fixed volume [m^3] in the place of chamber 1 and no vane: nothing leaks from it.
+    """Return the device with a fixed volume [m^3] in the place of chamber 1, whatever the actuator: nothing leaks.
 
-    It holds with the vane at the lower stop.
+    It is that of a vane at the lower stop.
     """
     leak = device.actuator.leak
     shut = replace(leak, area=0.0) if isinstance(leak, Orifice) else replace(leak, sonic_conductance=0.0)
-    return replace(device, actuator=replace(device.actuator, dead_volume_1=volume, leak=shut))
+    fixed = replace(device.actuator, dead_volume_1=volume, leak=shut, kind=VANE, settings={}, table=None)
+    return replace(device, actuator=fixed)
 
 
 def replay_scenario(

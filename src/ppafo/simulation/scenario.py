@@ -11,8 +11,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
-from ppafo.control.fixed.torque_laws import FIXED, FLOAT
 from ppafo.control.kind import PythonController
+from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE
 from ppafo.errors import ScenarioError
 from ppafo.model.gait import ShankSeries
 from ppafo.model.regulator import SupplyLines
@@ -82,9 +82,13 @@ class FreeMotion:
 
 @dataclass(frozen=True, slots=True)
 class PrescribedMotion:
-    """The angle of the vane [rad] is a given function of time; that of a held vane is a constant profile."""
+    """The angle of the vane [rad] is a given function of time; that of a held vane is a constant profile.
+
+    ``kind`` is the kind of motion that a file names, ``held`` or ``prescribed``.
+    """
 
     profile: ProfileChoice
+    kind: str = "prescribed"
 
     @property
     def label(self) -> str:
@@ -177,26 +181,18 @@ class Sensors:
 class Control:
     """A sampled controller: kind in ``control.catalog.CONTROLLERS``, settings in SI units, sample period [s].
 
-    With kind ``python`` there are no settings and ``custom`` is asked sample by sample. With ``arithmetic`` ``fixed``
-    it is the integer form that runs, and the settings have those of its converter too.
+    With kind ``python`` there are no settings and ``custom`` is asked sample by sample.
     """
 
     kind: str
     settings: Mapping[str, float]
     period: float
     custom: PythonController | None = None
-    arithmetic: str = FLOAT
-
-    @property
-    def is_fixed(self) -> bool:
-        """True where the controller computes with whole numbers."""
-        return self.arithmetic == FIXED
 
     @property
     def label(self) -> str:
         """The controller in a few words."""
         name = self.kind if self.custom is None else f"{self.kind}, {type(self.custom).__name__}"
-        name = f"{name} on whole numbers" if self.is_fixed else name
         return f"{name}, every {self.period:g} s"
 
 
@@ -227,8 +223,9 @@ class Scenario:
     Times [s]: ``time_step`` is the largest step (the engine divides it where a chamber is faster) and divides
     ``duration``, ``output_interval`` and the sample period of ``control``. Initial pressures [Pa absolute]; the
     reference is a torque [N m]. Without ``thermal`` the gas keeps its temperature, without ``supply_lines`` the supply
-    pressures are constant, both as in the paper. ``links`` say which numbers follow others that are varied, beside
-    those of the device.
+    pressures are constant, both as in the paper. ``tolerance`` is the error of a pressure over the pressure range [-]
+    that the step size control keeps to. ``links`` say which numbers follow others that are varied, beside those of the
+    device.
     """
 
     name: str
@@ -247,6 +244,7 @@ class Scenario:
     origin: Origin
     thermal: Thermal | None = None
     supply_lines: SupplyLines | None = None
+    tolerance: float = KEPT_OF_PRESSURE
     links: Graph = field(default_factory=dict, compare=False)
 
     def __repr__(self) -> str:

@@ -6,14 +6,12 @@ which keys there can be.
 
 import functools
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, WithJsonSchema
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
-from ppafo.control.fixed.torque_laws import FIXED_LAWS
-from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
 from ppafo.control.kind import ControllerKind
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table
 from ppafo.model.declaration import Quantity
@@ -116,21 +114,14 @@ def _shank() -> Any:
     )
 
 
-def controller_table(
-    kinds: Mapping[str, ControllerKind], suffix: str, converter: Callable[[str], tuple[Quantity, ...]]
-) -> Any:
-    """Return the section of the controller; ``converter`` has what a kind on whole numbers has beside, () for none."""
+def controller_table(kinds: Mapping[str, ControllerKind], suffix: str) -> Any:
+    """Return the section of the controller."""
     sampling = {item.name: optional(number_type(item), _description(item)) for item in declaration.SAMPLING}
-    said = "floats, or fixed: whole numbers as a small processor has them; float unless given"
-    whole = {"arithmetic": optional(Literal["float", "fixed"], said)}
     return one_of(
         [
             table(
                 f"{model_name(name)}{suffix}",
-                kind_field(name, kind.summary)
-                | sampling
-                | (whole | quantity_fields(converter(name)) if converter(name) else {})
-                | quantity_fields(kind.quantities),
+                kind_field(name, kind.summary) | sampling | quantity_fields(kind.quantities),
             )
             for name, kind in kinds.items()
         ]
@@ -215,11 +206,14 @@ def _scenario_file(*_kinds: Any) -> type[BaseModel]:
     reference = _profile(declaration.TORQUE_LEVEL, "Reference")
     initial = table("Initial", quantity_fields(declaration.INITIAL, words))
     own: dict[str, Any] = {
-        "run": (table("Run", quantity_fields(declaration.RUN)), Field(description="times of the run")),
+        "run": (
+            table("Run", quantity_fields((*declaration.RUN, declaration.ACCURACY))),
+            Field(description="times of the run, and its accuracy"),
+        ),
         "motion": (_motion(), Field(description="what the vane does")),
         "initial": optional(initial, "state of the gas at the start; atmosphere unless given"),
         "controller": (
-            controller_table(CONTROLLERS.loaded(), "Controller", lambda name: CONVERTER if name in FIXED_LAWS else ()),
+            controller_table(CONTROLLERS.loaded(), "Controller"),
             Field(description="what commands the valve"),
         ),
         "reference": optional(

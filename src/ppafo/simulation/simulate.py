@@ -2,8 +2,9 @@
 
 import math
 import platform
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,8 +13,9 @@ import numpy as np
 from ppafo.control.profiles import CONSTANT
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
-from ppafo.engine.led_leg import GAIT_SHANK, shank_at
-from ppafo.engine.program import python_place
+from ppafo.engine.led_leg import GAIT_SHANK, shank_over_samples
+from ppafo.engine.over_samples import over_samples
+from ppafo.engine.program import place_over_samples
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together
 from ppafo.engine.scheme.actuators import pressures_of, torque_of, volumes_of
@@ -28,7 +30,8 @@ from ppafo.model.plant import gravity_torque, sliding_friction
 from ppafo.model.regulator import LineState, line_pressures
 from ppafo.parameters.device import Gas
 from ppafo.signals.recording import Channel, Recording
-from ppafo.simulation.check import ALLOWED_CHANGE, HALF_ERROR, MOVE, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck
+from ppafo.simulation.accuracy import LARGEST_OF_ANGLE, LARGEST_OF_PRESSURE, MARGIN, ErrorEstimate, finer
+from ppafo.simulation.check import ALLOWED_CHANGE, FINER, MOVE, MOVED_MEASUREMENT, MOVED_START, Check, NumberCheck
 from ppafo.simulation.plan import foot_load, plan_run, profile_values, shank_kind
 from ppafo.simulation.sampled import run_sampled, state_row_numbers
 from ppafo.simulation.scenario import (
@@ -55,6 +58,9 @@ REMEDY = (
     "and check the inertia, the volumes and the valve area (ppafo audit)"
 )
 
+_OF_STEPS = ("result.failure_time", "result.too_many_parts", "pace.", "valve_state.", "controller_state.")
+"""Rows of the time stepping of which no recording of a vane is made."""
+
 DRAWS = 4
 """Draws of what moves the measurements of sensors without noise."""
 ALLOWED_PARTING = 1.0e-2
@@ -76,6 +82,10 @@ class Status:
         return self.kind == "completed"
 
 
+Measured = tuple[Recording, Mapping[str, Metric]]
+"""The channels of a run, and its metrics."""
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Result:
     """A finished run. ``versions`` are those of the packages, ``engine`` the figures of the time stepping."""
@@ -87,6 +97,21 @@ class Result:
     versions: Mapping[str, str]
     engine: Mapping[str, float | int | str]
 
+    _measure: Callable[[], Measured] | None = field(default=None, init=False, repr=False, compare=False)
+    """What makes recording and metrics of a run until they are first asked for: many runs are never looked at."""
+
+    def __getattr__(self, name: str) -> Any:
+        """Return recording or metrics where they were not made yet, and keep both."""
+        if name not in ("recording", "metrics"):
+            raise AttributeError(f"a result has no '{name}'", name=name, obj=self)
+        measure = self._measure
+        if measure is not None:
+            recording, metrics = measure()
+            object.__setattr__(self, "recording", recording)
+            object.__setattr__(self, "metrics", metrics)
+            object.__setattr__(self, "_measure", None)
+        return object.__getattribute__(self, name)
+
     def __repr__(self) -> str:
         """Return name, status, duration and one line a metric, in SI units."""
         scenario, status = self.scenario, self.status
@@ -95,6 +120,13 @@ class Result:
         return "\n".join(
             [f"Result of '{scenario.name}', {scenario.duration:g} s: {status.message or status.kind}", *lines]
         )
+
+    def __str__(self) -> str:
+        """Return what ``ppafo simulate`` prints: status and metrics in the units that people are shown."""
+        from ppafo.answers.display_units import metrics_lines
+
+        head = f"{self.scenario.name}: {self.status.kind}"
+        return "\n".join([head, "", *metrics_lines(self.metrics, self.scenario.device.supply.atmospheric_pressure)])
 
     def plot(self) -> "Figure":
         """Return a figure of angle, pressures, torque, command and gas; ``.savefig(...)`` writes it."""
@@ -105,12 +137,20 @@ class Result:
         valve = self.scenario.device.valve.kind
         return recording_figure(self.recording, self.scenario.name, remark, atmosphere, valve)
 
+    def error(self) -> ErrorEstimate:
+        """Return the estimated error [SI] of this run from its steps: it runs again with a sixteenth of it.
+
+        SimulationError for a run that diverged.
+        """
+        if not self.status.is_completed:
+            raise SimulationError(f"{self.scenario.name}: the run diverged, so its error cannot be estimated")
+        return _error(self, results_of(self.scenario, [finer(plan_run(self.scenario))])[0])
+
     def check(self) -> Check:
-        """Return what this run determines: it runs again with half the error, and with start and measurements moved.
+        """Return whether this run can be repeated: with finer steps, and with start and measurements moved.
 
         SimulationError for a run that diverged, and for a Python controller that gives a different run each time.
         """
-        # What a completed run determines; SimulationError for one that diverged, or that is never the same.
         scenario = self.scenario
         if not self.status.is_completed:
             raise SimulationError(f"{scenario.name}: the run diverged, so there is nothing to check")
@@ -129,6 +169,7 @@ class Result:
             scenario=scenario.name,
             metrics=_metrics(self, found, pressures),
             courses=courses,
+            error=_error(self, results[0]),
             parts_at=_time_of_parting([repeated for _, repeated in found], self, courses),
             failed=tuple(dict.fromkeys(name for name, repeated in found if not repeated.status.is_completed)),
             atmosphere=scenario.device.supply.atmospheric_pressure,
@@ -186,24 +227,31 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     times: Floats = np.arange(outcome.record.shape[0], dtype=np.float64) * (run.step * run.record_every)
     record = outcome.record[:, :, 0]
     status = _status(outcome, record, rows, times)
-    kept = times < (np.inf if status.time is None else status.time)
-    kept[0] = True
-    by_path = {path: record[kept, row] for path, row in rows.items()}
+    kept = times.size if status.time is None else max(1, int(np.searchsorted(times, status.time)))
+    versions = {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__}
+    engine = {"step": run.step, "steps": run.step_count, "steps_per_sample": run.steps_per_sample}
     worn = worn_kind(scenario)
-    if worn is None:
-        recording = _recording(scenario, run, times[kept], by_path)
-        metrics: Mapping[str, Metric] = evaluate(recording)
-    else:
-        recording, metrics, ended = worn.measured(scenario, run, times[kept], by_path)
+    if worn is not None:
+        recording, metrics, ended = worn.measured(scenario, run, times[:kept], _by_path(record[:kept], rows))
         status = replace(status, message=ended) if status.is_completed else status
-    return Result(
-        scenario=scenario,
-        recording=recording,
-        metrics=Metrics(metrics),
-        status=status,
-        versions={"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__},
-        engine={"step": run.step, "steps": run.step_count, "steps_per_sample": run.steps_per_sample},
-    )
+        return Result(scenario, recording, Metrics(metrics), status, versions, engine)
+    shown = {path: row for path, row in rows.items() if not path.startswith(_OF_STEPS)}
+    result: Result = object.__new__(Result)
+    known = {"scenario": scenario, "status": status, "versions": versions, "engine": engine}
+    measure = partial(_measure, scenario, run, times[:kept], record[:kept], shown)
+    for name, value in {**known, "_measure": measure}.items():
+        object.__setattr__(result, name, value)
+    return result
+
+
+def _by_path(record: Floats, rows: Mapping[str, int]) -> dict[str, Floats]:
+    """Rows (samples,) of a record (samples, rows), each in one piece."""
+    return {path: np.ascontiguousarray(record[:, row]) for path, row in rows.items()}
+
+
+def _measure(scenario: Scenario, run: Run, times: Floats, record: Floats, rows: Mapping[str, int]) -> Measured:
+    recording = _recording(scenario, run, times, _by_path(record, rows))
+    return recording, Metrics(evaluate(recording))
 
 
 def _status(outcome: BatchResult, record: Floats, rows: dict[str, int], times: Floats) -> Status:
@@ -257,16 +305,15 @@ def _leg_channels(run: Run, times: Floats, angle: Floats) -> dict[str, tuple[Flo
     kind, leg = run.program.shank, run.leg
     if kind is None or leg is None or kind is CONSTANT:
         return {}
-    shank = np.array([shank_at(kind, leg.shank, float(time)).angle for time in times])
+    shank = np.broadcast_to(shank_over_samples(kind, leg.shank, times).angle, times.shape)
     if kind is not GAIT_SHANK:
         return {"shank_angle": (shank, "rad"), "foot_angle": (shank - angle + 0.5 * np.pi, "rad")}
-    feet = [foot_in_gait(leg.shank, time, place) for time, place in zip(times.tolist(), angle.tolist(), strict=True)]
-    own, measured, higher = np.array(feet).T
+    foot = over_samples(foot_in_gait, leg.shank, times, angle)
     return {
         "shank_angle": (shank, "rad"),
-        "foot_angle": (own, "rad"),
-        "measured_foot_angle": (measured, "rad"),
-        "toe_difference": (higher, "m"),
+        "foot_angle": (foot.angle, "rad"),
+        "measured_foot_angle": (foot.measured_angle, "rad"),
+        "toe_difference": (foot.toe_difference, "m"),
     }
 
 
@@ -306,7 +353,7 @@ def _external_torque(scenario: Scenario, run: Run, times: Floats, rows: Mapping[
         return np.full(times.size, plant.external_torque)
     acceleration = profile_values(scenario.motion.profile, times)[2]
     angle, rate = rows["state.angle"], rows["state.angular_velocity"]
-    friction = np.array([sliding_friction(float(value), 1.0) for value in rate]) * _sizes_of_friction(run, rows)
+    friction = over_samples(sliding_friction, rate, 1.0) * _sizes_of_friction(run, rows)
     gravity = gravity_torque(angle, plant.gravity_torque)
     return np.asarray(torque - gravity - friction - plant.viscous_damping * rate - plant.inertia * acceleration)
 
@@ -317,10 +364,8 @@ def _torque_on_leg(leg: Leg, run: Run, times: Floats, rows: Mapping[str, Floats]
     angle, rate, plant = rows["state.angle"], rows["state.angular_velocity"], run.plant
     foot = foot_load(0.0, 0.0, leg.foot_mass, leg.foot_mass_centre, leg.foot_inertia, leg.shank_length)
     kind = shank_kind(leg)
-    at = [shank_at(kind, run.leg.shank, float(time)) for time in times]
-    places = list(zip(at, angle.tolist(), strict=True))
-    added = np.array([torque_on_foot(run.leg.load, now, place) for now, place in places])
-    needed = np.array([torque_on_foot(foot, now, place) for now, place in places])
+    now = shank_over_samples(kind, run.leg.shank, times)
+    added, needed = (over_samples(torque_on_foot, load, now, angle) for load in (run.leg.load, foot))
     net = torque + added - plant.external_torque - plant.viscous_damping * rate
     net -= np.sign(rate) * _sizes_of_friction(run, rows)
     acceleration = np.where(rate != 0.0, net / plant.inertia, 0.0)
@@ -329,21 +374,17 @@ def _torque_on_leg(leg: Leg, run: Run, times: Floats, rows: Mapping[str, Floats]
 
 def _sizes_of_friction(run: Run, rows: Mapping[str, Floats]) -> Floats | float:
     """Size of the friction torque in motion [N m] at each sample, with the effects of a run."""
-    law = python_place(friction_in_motion, run.program.effects, run.effects)
+    law = place_over_samples(friction_in_motion, run.program.effects, run.effects)
     if law is None:
         return run.plant.dynamic_torque
     angle, masses = rows["state.angle"], (rows["state.mass_1"], rows["state.mass_2"])
     pressures = pressures_of(run.program.actuator, run.plant, angle, *masses)
     states = {
-        name: [rebuilt(row, values) for values in zip(*(rows[path] for path in leaf_paths(row, name)), strict=True)]
+        name: rebuilt(row, [rows[path] for path in leaf_paths(row, name)])
         for name, row in run.program.effect_states.items()
     }
-    return np.array(
-        [
-            law({name: of_samples[sample] for name, of_samples in states.items()}, run.plant.dynamic_torque, *given)
-            for sample, given in enumerate(zip(rows["state.angular_velocity"], *pressures, strict=True))
-        ]
-    )
+    sizes: Floats = law(states, run.plant.dynamic_torque, rows["state.angular_velocity"], *pressures)
+    return sizes
 
 
 def compile_models(scenarios: Iterable[Scenario]) -> None:
@@ -352,6 +393,18 @@ def compile_models(scenarios: Iterable[Scenario]) -> None:
     load_programs(programs)
     for program in programs:
         load_program(program)
+
+
+def _error(result: Result, fine: Result) -> ErrorEstimate:
+    """The estimated error of a result, from that of the same run with finer steps; inf where that diverged."""
+    if not fine.status.is_completed:
+        return ErrorEstimate(math.inf, math.inf, dict.fromkeys(result.metrics, math.inf))
+    angle, pressure = (
+        MARGIN * float(np.max(_largest_differences(fine.recording, result.recording, names)))
+        for names in _COURSES.values()
+    )
+    changes = {name: abs(_difference(_value(fine, name), _value(result, name))) for name in result.metrics}
+    return ErrorEstimate(angle, pressure, {name: MARGIN * change for name, change in changes.items()})
 
 
 def _check_repeatable(result: Result, run: Run) -> None:
@@ -369,22 +422,18 @@ def _check_repeatable(result: Result, run: Run) -> None:
 
 def _repeats(run: Run, pressures: float) -> list[tuple[str, Run]]:
     """The runs to compare with, by what is changed in them; moved ones in both directions."""
-    half = replace(
-        run,
-        tolerance=0.5 * run.tolerance,
-        step=0.5 * run.step,
-        step_count=2 * run.step_count,
-        steps_per_sample=2 * run.steps_per_sample,
-        record_every=2 * run.record_every,
-    )
-    repeats = [(HALF_ERROR, half), *((MOVED_START, _start_moved(run, move)) for move in (MOVE, -MOVE))]
+    starts = [_start_moved(run, move, apart) for apart in (1.0, -1.0) for move in (MOVE, -MOVE)]
+    repeats = [(FINER, finer(run)), *((MOVED_START, moved) for moved in starts)]
     if run.program.ideal_sensors:
         return repeats
     return [*repeats, *((MOVED_MEASUREMENT, moved) for moved in _measurements_moved(run, pressures))]
 
 
-def _start_moved(run: Run, move: float) -> Run:
-    """The run from a little more gas in both chambers, and where the vane is free from a little further on."""
+def _start_moved(run: Run, move: float, apart: float) -> Run:
+    """The run from a little more gas in both chambers, and where the vane is free from a little further on.
+
+    With ``apart`` -1 chamber 2 has a little less instead: a torque that is exactly the wanted one then is so no more.
+    """
     plant, start = run.plant, run.initial
     angle = start.angle
     if run.program.angle is None:
@@ -393,10 +442,8 @@ def _start_moved(run: Run, move: float) -> Run:
     actuator = run.program.actuator
     pressures = pressures_of(actuator, plant, start.angle, start.mass_1, start.mass_2)
     before, after = (volumes_of(actuator, plant, at, *pressures) for at in (start.angle, angle))
-    mass_1, mass_2 = (
-        mass * now / then * (1.0 + move)
-        for mass, now, then in zip((start.mass_1, start.mass_2), after, before, strict=True)
-    )
+    mass_1 = start.mass_1 * after[0] / before[0] * (1.0 + move)
+    mass_2 = start.mass_2 * after[1] / before[1] * (1.0 + apart * move)
     return replace(run, initial=start._replace(angle=angle, mass_1=mass_1, mass_2=mass_2))
 
 
@@ -429,7 +476,7 @@ def _metrics(result: Result, repeats: list[tuple[str, Result]], pressures: float
         value = _value(result, name)
         changes = _largest((repeat, _difference(_value(repeated, name), value)) for repeat, repeated in repeats)
         scale = max(abs(value) if math.isfinite(value) else 0.0, _metric_range(result, name, kind.unit, pressures))
-        rows.append(NumberCheck(name, kind.unit, value, ALLOWED_CHANGE * scale, changes))
+        rows.append(NumberCheck(name, kind.unit, value, ALLOWED_CHANGE * scale, changes, ALLOWED_CHANGE * scale))
     return tuple(rows)
 
 
@@ -498,7 +545,8 @@ def _course(name: str, repeats: list[tuple[str, Result]], result: Result, pressu
         (repeat, float(np.max(_largest_differences(repeated.recording, result.recording, _COURSES[name]))))
         for repeat, repeated in repeats
     )
-    return NumberCheck(name, unit, span, ALLOWED_PARTING * span, changes)
+    allowed_error = (LARGEST_OF_ANGLE if is_angle else LARGEST_OF_PRESSURE) * span / MARGIN
+    return NumberCheck(name, unit, span, ALLOWED_PARTING * span, changes, allowed_error)
 
 
 def _time_of_parting(repeats: list[Result], result: Result, courses: tuple[NumberCheck, ...]) -> float | None:

@@ -133,7 +133,7 @@ _MARKS: dict[RecordingKind, str] = {
 _MARK = re.compile(r"#\s*(\w+):.*")
 _LONGEST_CELL = 40
 _UNDERSCORE = "_"
-"""Python takes 1_000 for a thousand; in a table it is a slip."""
+"""Python takes 1_000 for a thousand, and digits of any script; in a table they are a slip."""
 
 SPLIT_NUMBERS = (
     "commas seem to separate columns and decimals alike: write the file with decimal points, or with another delimiter "
@@ -252,7 +252,8 @@ def _table(header: list[str], rows: Iterable[list[str]], skipped: int) -> Floats
             values = [float(cell) for cell in row]
         except ValueError as error:
             raise _no_number(header, row, line) from error
-        if _UNDERSCORE in "".join(row) or not all(map(math.isfinite, values)):
+        whole = "".join(row)
+        if not whole.isascii() or _UNDERSCORE in whole or not all(map(math.isfinite, values)):
             raise _no_number(header, row, line)
         numbers.extend(values)
     return np.array(numbers).reshape(-1, len(header))
@@ -268,6 +269,6 @@ def _no_number(header: list[str], row: list[str], line: int) -> DataError:
 
 def _is_finite(cell: str) -> bool:
     try:
-        return math.isfinite(float(cell)) and _UNDERSCORE not in cell
+        return math.isfinite(float(cell)) and cell.isascii() and _UNDERSCORE not in cell
     except ValueError:
         return False

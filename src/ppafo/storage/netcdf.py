@@ -15,7 +15,7 @@ import numpy as np
 
 from ppafo.errors import DataError, one_line
 from ppafo.signals import CHANNELS, Channel, Recording, recording_kind
-from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT
+from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT, Floats
 from ppafo.storage.files import read_bytes, write_file
 
 if TYPE_CHECKING:
@@ -72,6 +72,9 @@ _CHECKSUM_ROOM = 64
 _PACKED = ("scale_factor", "add_offset")
 _GAPS = ("_FillValue", "missing_value")
 """Attributes of the NetCDF conventions by which the numbers of a file are not those that were recorded."""
+
+_LIMITS = {"valid_range": 2, "valid_min": 1, "valid_max": 1}
+"""Those by which a value outside is none, and how many numbers each has."""
 
 
 def write_netcdf(path: str | Path, recording: Recording, scenario: Mapping[str, Any] | None = None) -> Path:
@@ -199,11 +202,30 @@ def _channel(name: str, variable: Any) -> Channel:
     for key in _GAPS:
         if key in variable.attrs and np.isin(values, np.asarray(variable.attrs[key], dtype=np.float64)).any():
             raise DataError(f"'{name}' has gaps ('{key}'); fill them or cut the file there")
+    _check_valid(name, values, variable.attrs)
     # The channel itself refuses a word that is none.
     between: Any = _attribute(variable, _BETWEEN) or None
     # The unit that ``channel_attributes`` wrote as this text.
     text = _attribute(variable, "units")
     return Channel(values, PLAIN_NUMBER if text == _PLAIN_NUMBER_IN_NETCDF else text, between)
+
+
+def _check_valid(name: str, values: Floats, attributes: Mapping[str, Any]) -> None:
+    """Refuse values that are outside the limits which the file states for them."""
+    for key, count in _LIMITS.items():
+        if key not in attributes:
+            continue
+        limits = np.atleast_1d(np.asarray(attributes[key], dtype=np.float64))
+        if limits.size != count:
+            raise DataError(f"'{name}': its attribute '{key}' has {limits.size} numbers, it must have {count}")
+        is_below, is_above = values < limits[0], values > limits[-1]
+        outside = np.flatnonzero({"valid_min": is_below, "valid_max": is_above}.get(key, is_below | is_above))
+        if outside.size:
+            first = int(outside[0])
+            raise DataError(
+                f"'{name}' has {outside.size} values that are not valid ('{key}'), the first {values[first]:g} at row "
+                f"{first + 1}; correct them, cut the file there, or correct the attribute"
+            )
 
 
 def _attribute(place: Any, name: str) -> str:

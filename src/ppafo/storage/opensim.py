@@ -235,10 +235,19 @@ def _check_clock(time: Floats, first_line: int) -> None:
         raise DataError(f"line {first_line + index}: the clock {word}: {time[index]:g} s follows {time[index - 1]:g} s")
 
 
+_SIGNS = (
+    "signs=ankle_angle is 0 with the foot square to the shank and above 0 in dorsiflexion, moments along it too; "
+    "ankle_angle_moment is what the wearer gives, ankle_angle_device what the device gives the wearer; "
+    "ground_force_vy is above 0 upward; other columns have the signs of ppafo"
+)
+"""A line of the header; sides are left out of the names."""
+
+
 def opensim_bytes(recording: Recording) -> bytes:
     """Return a recording as a ``.sto`` file: SI units, angles in radians, labels ``time`` and the channels' names.
 
-    Units stand in the header, where OpenSim keeps them as text; so does the kind of a recording that nobody measured.
+    Units and signs stand in the header, where OpenSim keeps them as text; so does the kind of a recording that nobody
+    measured.
     """
     units = ", ".join(f"{name} [{recording.unit(name)}]" for name in recording.names)
     head = [
@@ -249,6 +258,7 @@ def opensim_bytes(recording: Recording) -> bytes:
         "inDegrees=no",
         f"kind={recording.kind}",
         f"units={units}",
+        _SIGNS,
         _END,
         "\t".join((TIME, *recording.names)),
     ]

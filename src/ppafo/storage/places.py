@@ -18,6 +18,7 @@ from ppafo.storage.files import LEFT_ASIDE, write_file
 
 _ADDRESS_MARK = "://"
 _MAXIMUM_BYTES_OF_DOCUMENT = 100_000_000
+_BLOCK = 1_000_000
 _LONGEST_WRITING = 86400.0
 """Nobody writes a file for longer [s]."""
 
@@ -61,10 +62,13 @@ class Place(Protocol):
 def read_document(place: Place, name: str) -> Any:
     """Return what a JSON file of ours holds, as plain data; OSError or ValueError where that is not possible."""
     with place.open(name) as file:
-        content = file.read(_MAXIMUM_BYTES_OF_DOCUMENT + 1)
+        content = bytearray()
+        # In blocks: Python takes the room for as much as is asked for.
+        while len(content) <= _MAXIMUM_BYTES_OF_DOCUMENT and (block := file.read(_BLOCK)):
+            content += block
     if len(content) > _MAXIMUM_BYTES_OF_DOCUMENT:
         raise ValueError(f"{name} is larger than {_MAXIMUM_BYTES_OF_DOCUMENT / 1e6:g} MB")
-    return json_document(content)
+    return json_document(bytes(content))
 
 
 def place_at(address: str | Path) -> Place:

@@ -162,6 +162,9 @@ class Outputs(StrictTable):
     metrics: Annotated[Texts | Literal["all"], Field(description="names of metrics, or 'all'")] = ()
     trajectories: Annotated[Texts, Field(description="channels kept for every run")] = ()
     bands: Annotated[Texts, Field(description="channels whose quantiles over all runs are kept")] = ()
+    errors: Annotated[
+        bool, Field(description="estimated error of each metric from the steps, in five times the time")
+    ] = False
     every: Annotated[Text, Field(description="time between two kept samples; default 10 ms")] = "10 ms"
     quantiles: Annotated[tuple[Annotated[float, Field(ge=0.0, le=1.0)], ...], Field(strict=False, min_length=1)] = (
         DEFAULT_QUANTILES

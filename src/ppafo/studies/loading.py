@@ -2,6 +2,7 @@
 
 import copy
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -19,9 +20,12 @@ from ppafo.errors import (
     nearest_name,
     refused_as,
 )
-from ppafo.loading import load_scenario, placed
+from ppafo.loading import load_scenario, placed, reloaded
 from ppafo.metrics import METRICS
 from ppafo.parameters.graph import ATMOSPHERE_PATH
+from ppafo.parameters.overrides import other_forms, override_set
+from ppafo.simulation.numbers import chosen_path
+from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import Above
 from ppafo.studies.sampling import MAXIMUM_SOBOL_DIMENSIONS, Factor, cholesky_factor, correlation_matrix, with_noise
@@ -57,7 +61,7 @@ def load_study(
     for table in tables if isinstance(tables, list | tuple) else ():
         if isinstance(table, dict) and "same_as" in table:
             table.setdefault("kind", "same_as")
-    changed = _apply_overrides(document, overrides, {"runs": draws, "seed": seed}, source.file)
+    changed = _apply_overrides(document, overrides, {"runs": draws, "seed": seed}, source)
     return _build(changed, source)
 
 
@@ -75,13 +79,15 @@ class _Source:
 
 
 def _apply_overrides(
-    document: dict[str, Any], overrides: Sequence[str], sample: Mapping[str, int | None], file: str
+    document: dict[str, Any], overrides: Sequence[str], sample: Mapping[str, int | None], source: _Source
 ) -> dict[str, Any]:
     """Return the document as if what the command line changes stood in the file."""
+    file = source.file
     parsed = _parse(document, file)
     if overrides:
-        for table in document["configurations"]:
-            table["overrides"] = [*table.get("overrides", []), *overrides]
+        for table, item in zip(document["configurations"], parsed.configurations, strict=True):
+            with _refused_in(item, source):
+                table["overrides"] = list(reloaded(_scenario(item, source), overrides).origin.overrides)
     given = {key: value for key, value in sample.items() if value is not None}
     if given and parsed.sample is None:
         raise StudyError(
@@ -105,7 +111,7 @@ def _build(document: dict[str, Any], source: _Source) -> Study:
         raise source.refusal(f"there are two configurations named '{repeated}'; give each its own name")
     configurations = tuple(Configuration(item.name, _scenario(item, source)) for item in parsed.configurations)
     _check_requests(parsed, source)
-    _check_set_or_varied(parsed, source)
+    _check_set_or_varied(parsed, configurations, source)
     places = {item.path: _place(item, configurations, parsed, source) for item in parsed.vary}
     moving = [item for item in parsed.vary if not isinstance(item, declared.SameAs)]
     varied = [_axis_or_drawn(item, places[item.path], configurations, source) for item in moving]
@@ -134,21 +140,34 @@ def _build(document: dict[str, Any], source: _Source) -> Study:
     )
 
 
-def _check_set_or_varied(parsed: declared.StudyFile, source: _Source) -> None:
-    """Refuse a value that is set in a configuration in which it also varies: it would not count."""
-    for each in parsed.configurations:
-        given = {text.partition("=")[0].strip() for text in each.overrides}
+def _check_set_or_varied(parsed: declared.StudyFile, configurations: Sequence[Configuration], source: _Source) -> None:
+    """Refuse a value that is set in a configuration in which it, or another form of it, also varies."""
+    for each, loaded in zip(parsed.configurations, configurations, strict=True):
+        given = override_set(each.overrides, StudyError, valve=loaded.scenario.device.valve_name)
         for item in parsed.vary:
-            if item.path in given and item.kind != "stated" and (not item.only or each.name in item.only):
-                raise source.refusal(
-                    f"configuration '{each.name}': '{item.path}' is both set and varied, so the set value would be "
-                    "ignored; omit one, or restrict the [[vary]] to the other configurations with 'only'"
-                )
+            path = chosen_path(item.path, loaded.scenario)
+            unused = [other for other in (path, *other_forms(path)) if other in given]
+            if (
+                not unused
+                or (item.kind == "stated" and unused[0] == path)
+                or (item.only and each.name not in item.only)
+            ):
+                continue
+            raise source.refusal(
+                f"configuration '{each.name}': '{given[unused[0]]}' is set and '{item.path}' is varied, so the set "
+                "value would be ignored; omit one, or restrict the [[vary]] to the other configurations with 'only'"
+            )
 
 
-def _scenario(item: declared.Configuration, source: _Source) -> Any:
-    with refused_as(source.refusal, f"configuration '{item.name}'", ScenarioError, ParameterError, DataError):
+def _scenario(item: declared.Configuration, source: _Source) -> Scenario:
+    with _refused_in(item, source):
         return load_scenario(placed(item.scenario, source.folder), item.overrides)
+
+
+def _refused_in(item: declared.Configuration, source: _Source) -> AbstractContextManager[None]:
+    """Return what names the configuration in errors about it."""
+    kinds = ScenarioError, ParameterError, DataError
+    return refused_as(source.refusal, f"configuration '{item.name}'", *kinds)
 
 
 def _check_requests(parsed: declared.StudyFile, source: _Source) -> None:

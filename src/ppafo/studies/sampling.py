@@ -131,11 +131,17 @@ def correlation_matrix(paths: Sequence[str], coefficients: Mapping[tuple[str, st
     return matrix
 
 
+_LEAST_SPREAD = 1.0e-6
+"""Standard deviation of a normal score that is left, the others given, from which it is not one of them once more."""
+
+
 def cholesky_factor(matrix: Floats) -> Factor | None:
-    """Return the lower factor, row by row; None where the matrix is not positive definite."""
+    """Return the lower factor of a correlation, row by row; None where it is not positive definite beyond rounding."""
     try:
         factor = np.linalg.cholesky(matrix)
     except np.linalg.LinAlgError:
+        return None
+    if float(np.min(np.diag(factor), initial=1.0)) < _LEAST_SPREAD:
         return None
     return tuple(tuple(float(number) for number in row) for row in factor)
 

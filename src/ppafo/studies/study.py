@@ -22,13 +22,17 @@ Refusal = Callable[[object], StudyError]
 
 @dataclass(frozen=True, slots=True)
 class Outputs:
-    """Metrics, channels kept for every run and as bands, time between two samples [s], quantiles from 0 to 1."""
+    """Metrics, channels kept for every run and as bands, time between two samples [s], quantiles from 0 to 1.
+
+    ``errors`` is true where the estimated error of each metric is kept as well.
+    """
 
     metrics: tuple[str, ...]
     trajectories: tuple[str, ...]
     bands: tuple[str, ...]
     every: float
     quantiles: tuple[float, ...]
+    errors: bool = False
 
     @property
     def traces(self) -> tuple[str, ...]:
@@ -58,6 +62,7 @@ def valid_outputs(outputs: declared.Outputs, scenarios: Sequence[Scenario], refu
         bands=outputs.bands,
         every=_interval(outputs, scenarios, refusal),
         quantiles=tuple(sorted(set(outputs.quantiles))),
+        errors=outputs.errors,
     )
 
 

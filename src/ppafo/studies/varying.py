@@ -14,11 +14,13 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters import apply_overrides, load_parameter_set
 from ppafo.parameters.declaration import alternatives, is_within
 from ppafo.parameters.graph import counts_from, gauge_link
+from ppafo.parameters.overrides import split_override
 from ppafo.parameters.parameter_set import Entry, atmospheric_pressure, entry_in_si
 from ppafo.simulation import declaration
 from ppafo.simulation.declaration import WRITTEN_UNITS
-from ppafo.simulation.loading import is_of_device, set_name, split_override
+from ppafo.simulation.loading import set_name
 from ppafo.simulation.numbers import declared_numbers
+from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import (
@@ -285,7 +287,7 @@ def _stated_entry(path: str, scenario: Scenario) -> tuple[Entry | None, float]:
     """Return what the set, with the overrides of the scenario, reports of a path, and the value in SI."""
     origin = scenario.origin
     folder = Path(origin.file).parent if origin.file is not None else Path()
-    own = [text for text in origin.overrides if is_of_device(split_override(text)[0])]
+    own = [text for text in origin.overrides if is_of_device(split_override(text).typed)]
     parameters = load_parameter_set(set_name(origin.parameter_set, folder))
     for given in (origin.content["device"].get("overrides", ()), own):
         parameters = apply_overrides(parameters, given, origin.valve)

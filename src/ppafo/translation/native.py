@@ -4,6 +4,7 @@ Handing an array to C costs Python about a microsecond, a number a twentieth of 
 packed into one block of memory, once where they stay the same.
 """
 
+import contextlib
 import ctypes
 import hashlib
 import importlib.util
@@ -14,6 +15,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
@@ -25,6 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo import interrupts
 from ppafo.engine.compilers import CompilerError
 from ppafo.engine.lane_rows import lanes_of
 from ppafo.engine.lane_source import COMPILED
@@ -35,21 +38,73 @@ from ppafo.translation.c99 import FLAGS, c_source
 from ppafo.translation.typed import FLOAT, INT, LIBRARY, Array, Scalar, Type
 from ppafo.translation.walk import entries_of, walk_module
 
+LONGEST_COMPILING = 300.0
+"""Seconds after which a compiler is ended that has not ended by itself; the longest program takes a tenth of it."""
+_LONGEST_ANSWER = 10.0
+"""Seconds that it has to say its version."""
+_PAUSE = 0.25
+
 
 def asked(
-    line: Sequence[str], remedy: str = "", folder: str | None = None, scratch: Path | None = None
+    line: Sequence[str],
+    remedy: str = "",
+    folder: str | None = None,
+    scratch: Path | None = None,
+    limit: float | None = None,
 ) -> "subprocess.CompletedProcess[str]":
     """What a compiler says and how it ends, run in ``folder``; CompilerError, with a remedy, if it cannot be run.
 
-    ``scratch`` is where it has its temporary files, which it leaves there when it is killed.
+    ``scratch`` is where it has its temporary files, which it leaves there when it is killed. CompilerError if it does
+    not end within ``limit`` [s], ``LONGEST_COMPILING`` unless given; it is ended then, with what it has started.
     """
-    kept = None if scratch is None else {**os.environ, **dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(scratch))}
+    temporary = {} if scratch is None else dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(scratch))
+    seconds = LONGEST_COMPILING if limit is None else limit
     try:
-        return subprocess.run(
-            line, cwd=folder, env=kept, capture_output=True, encoding="utf-8", errors="replace", check=False
+        process = subprocess.Popen(
+            line,
+            cwd=folder,
+            env={**os.environ, **_home(), **temporary},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            encoding="utf-8",
+            errors="replace",
+            process_group=0 if os.name == "posix" else None,
         )
     except OSError as error:
         raise CompilerError(f"{line[0]} cannot be run: {reason(error)}{remedy and '; '}{remedy}") from error
+    with process:
+        end = time.monotonic() + seconds
+        try:
+            while True:
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    said, complained = process.communicate(timeout=min(_PAUSE, seconds))
+                    return subprocess.CompletedProcess(line, process.returncode, said, complained)
+                interrupts.check()
+                if time.monotonic() > end:
+                    raise CompilerError(f"{Path(line[0]).name} did not end within {seconds:g} s and was stopped")
+        finally:
+            if process.poll() is None or process.returncode < 0:
+                _end_all(process)
+
+
+def _home() -> dict[str, str]:
+    """The home of this user where the environment does not say it: zig works with none else."""
+    if os.environ.get("HOME") or os.name != "posix":
+        return {}
+    try:
+        return {"HOME": str(Path("~").expanduser())}
+    except RuntimeError:
+        return {}
+
+
+def _end_all(process: "subprocess.Popen[str]") -> None:
+    """End a process and those that it has started, which would go on without it."""
+    with contextlib.suppress(OSError):
+        if os.name == "posix":
+            os.killpg(process.pid, signal.SIGKILL)
+        else:
+            process.kill()
 
 
 def complaint(done: "subprocess.CompletedProcess[str]") -> str:
@@ -181,6 +236,7 @@ _PASSING = (
     "cannot allocate memory",
     "out of memory",
     "killed signal",
+    "cache directory",
 )
 """What compilers say where the computer lacks something at that moment, in small letters."""
 _LANE_LOOP = entries_of(f"{COMPILED}\ndef advance(")
@@ -216,7 +272,11 @@ class CCompiler:
 
     def described(self) -> str:
         """Its name and version, as it says them."""
-        said = next(iter(asked([*self.command, "--version"]).stdout.splitlines()), "")
+        try:
+            answer = asked([*self.command, "--version"], limit=_LONGEST_ANSWER).stdout
+        except CompilerError as failure:
+            answer = str(failure)
+        said = next(iter(answer.splitlines()), "")
         return f"C by {self.name}: {said}" if said else f"C by {self.name}"
 
     def compile_text(self, source: str, path: str, module: ModuleType) -> None:

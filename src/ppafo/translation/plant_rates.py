@@ -4,13 +4,11 @@ What the lanes step and what is differentiated here are the same functions: port
 energy balance, vane. Only the sums of equation (9) and the state of the vane, which stands or slides, are said here.
 """
 
-import sys
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from ppafo.engine.reference.right_hand_side import free_motion, real_gas_rates
+from ppafo.engine.continuous_time import free_motion, real_gas_rates
 from ppafo.engine.scheme.thermal_gas import ThermalFlows, thermal_flows
-from ppafo.errors import SimulationError
 from ppafo.model.orifice import orifice_flow
 from ppafo.model.places import gas_density, way_across
 from ppafo.model.plant import (
@@ -28,14 +26,6 @@ from ppafo.model.plant import (
 from ppafo.translation.symbolic import Acting, Compare, both_sides, symbolic
 
 Around = Mapping[Any, Callable[..., Any]]
-
-
-def check_without_opensim() -> None:
-    """Refuse to load CasADi where OpenSim is, which brings another one; SimulationError."""
-    if "opensim" in sys.modules:
-        raise SimulationError(
-            "opensim is loaded in this process, and its CasADi breaks this one: use OpenSim in a process of its own"
-        )
 
 
 class GasFlows(NamedTuple):

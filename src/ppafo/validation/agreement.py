@@ -3,6 +3,7 @@
 How much later the measurement is than the model is the shift in time that leaves the smallest squares.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -16,11 +17,14 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded import SUPPLY, regular_interval, with_fixed_volume
 from ppafo.simulation.scenario import Leg
 from ppafo.validation.measured import (
+    ACCEPTABLE_FRACTION,
     ANGLE,
     COMPARED,
+    EXPLAINED_FRACTION,
     PRESSURE_1,
     PRESSURE_2,
     PRESSURE_DIFFERENCE,
+    Limit,
     Measured,
     Thresholds,
     parse_thresholds,
@@ -33,6 +37,8 @@ DEFAULT_LIMIT = 0.02
 
 LEAST_NOISE = 5.0e-4
 """Noise of samples over the full range that is taken at least: the engine keeps to twice that."""
+_WITHIN_NOISE = 1.5
+"""Size of white noise over its estimate up to which it may be noise."""
 _SHIFTS = 81
 _MAXIMUM_SAMPLES = 4000
 _MINIMUM_GAIN = 25.0
@@ -150,13 +156,15 @@ class ChannelAgreement:
 
     ``rms``, ``bias`` and ``largest`` (with its sign, at ``largest_time`` [s]); ``rms_unaligned`` is the RMS error
     without any shift; ``noise`` is that of its samples; ``delay`` [s] is what this channel alone would have;
-    ``delay_is_at_limit`` says that the search for it ended at its limit, so that it is none of a sensor. ``limit`` is
-    the largest fraction of ``full_range`` that passes.
+    ``delay_is_at_limit`` says that the search for it ended at its limit, so that it is none of a sensor. ``variation``
+    is the standard deviation of the signal without its noise. ``limit`` is the largest fraction of ``full_range`` that
+    passes.
     """
 
     channel: str
     unit: str
     full_range: float
+    variation: float
     noise: float
     rms: float
     rms_unaligned: float
@@ -206,12 +214,12 @@ class RecordingAgreement:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """One channel to compare: its curves, the unit of an error, and the maximum fraction of the full range."""
+    """One channel to compare: its curves, the unit of an error, and the limit that was given for it, if any."""
 
     channel: str
     unit: str
     curve: Curve
-    limit: float
+    limit: Limit | None
 
 
 def channel_agreement(item: Comparison, delay: float, longest_delay: float) -> ChannelAgreement:
@@ -221,11 +229,15 @@ def channel_agreement(item: Comparison, delay: float, longest_delay: float) -> C
     error = errors(curve, delay)
     worst = int(np.argmax(np.abs(error)))
     own = estimate_delay([curve], longest_delay)
+    noise = max(noise_of(curve.values), LEAST_NOISE * curve.full_range)
+    variation = variation_of(curve.values, weights, noise)
+    usual = acceptable_error(variation, noise, curve.full_range) / curve.full_range
     return ChannelAgreement(
         channel=item.channel,
         unit=item.unit,
         full_range=curve.full_range,
-        noise=max(noise_of(curve.values), LEAST_NOISE * curve.full_range),
+        variation=variation,
+        noise=noise,
         rms=_rms(error, weights),
         rms_unaligned=_rms(errors(curve, 0.0), weights),
         bias=float(weights @ error),
@@ -233,8 +245,23 @@ def channel_agreement(item: Comparison, delay: float, longest_delay: float) -> C
         largest_time=float(curve.times[worst]),
         delay=own.value,
         delay_is_at_limit=own.is_at_limit,
-        limit=item.limit,
+        limit=usual if item.limit is None else item.limit.fraction_of(curve.full_range),
     )
+
+
+def variation_of(values: Floats, weights: Floats, noise: float) -> float:
+    """Return the standard deviation of a signal about its mean [its unit], its white noise taken out."""
+    away = values - weights @ values
+    return math.sqrt(max(float(weights @ away**2) - noise * noise, 0.0))
+
+
+def acceptable_error(variation: float, noise: float, full_range: float) -> float:
+    """Return the largest RMS error [its unit] that passes: 10 % of full range or half of the variance, and noise.
+
+    What a zero of a sensor and the engine are off at most is accepted of a signal that does not move.
+    """
+    explained = min(ACCEPTABLE_FRACTION * full_range, math.sqrt(1.0 - EXPLAINED_FRACTION) * variation)
+    return math.hypot(max(explained, 2.0 * LEAST_NOISE * full_range), _WITHIN_NOISE * noise)
 
 
 def common_delay(items: Sequence[Comparison], longest_delay: float) -> Delay:
@@ -317,7 +344,7 @@ def _comparisons(measured: Measured, replayed: Replayed, device: Device, setting
         full_range = kind.full_range(device, gauge)
         model = replayed.recording
         curve = Curve(measured.recording.time, values, model.time, model[name], full_range)
-        items.append(Comparison(name, kind.unit, curve, settings.thresholds.limit(name).fraction_of(full_range)))
+        items.append(Comparison(name, kind.unit, curve, settings.thresholds.limit(name)))
     if not items:
         word = "pressure_1" if settings.volume is not None else "anything beside the prescribed angle"
         raise DataError(f"{measured.file}: has nothing to compare; it needs {word}")

@@ -69,6 +69,9 @@ A difference goes from full supply on one side to full supply on the other.
 ACCEPTABLE_FRACTION = 0.10
 """RMS error over full range that the paper calls acceptable (page with figure 7)."""
 
+EXPLAINED_FRACTION = 0.5
+"""Fraction of the variance of a signal that a model explains at least (R^2); its mean would explain none."""
+
 _FRACTION_UNITS = ("%", "percent")
 _EXAMPLES = "a threshold is written 'angle=10%', 'pressure_1=3.7 psi_d' or '5%' for all channels"
 
@@ -87,19 +90,19 @@ class Limit:
 
 @dataclass(frozen=True, slots=True)
 class Thresholds:
-    """The limit of every channel that has one of its own, and that of the others."""
+    """The limit of every channel that has one of its own, and that of the others; None where none was given."""
 
-    others: Limit
+    others: Limit | None
     channels: Mapping[str, Limit]
 
-    def limit(self, channel: str) -> Limit:
-        """The limit that holds for a channel."""
+    def limit(self, channel: str) -> Limit | None:
+        """The limit that was given for a channel; None for one that is judged by what its signal goes through."""
         return self.channels.get(channel, self.others)
 
 
 def parse_thresholds(texts: Iterable[str] = ()) -> Thresholds:
     """Return the thresholds of texts such as ``angle=10%``, ``pressure_1=3.7 psi_d`` or ``5%``; later ones win."""
-    others = Limit(ACCEPTABLE_FRACTION, is_fraction=True)
+    others = None
     channels: dict[str, Limit] = {}
     for text in texts:
         name, separator, value = text.rpartition("=")
@@ -273,6 +276,12 @@ def _gap_remarks(recording: Recording) -> tuple[str, ...]:
     first = float(recording.time[int(np.argmax(gaps > _REMARKED_GAP * usual))])
     noun = "gap" if count == 1 else "gaps"
     return (f"{count} {noun} in time, the first after {first:.6g} s; inputs were held across",)
+
+
+def shows_nothing(recording: Recording, name: str) -> bool:
+    """Return whether a channel that is compared never changes, or stays at a limit of its sensor: nothing to fit."""
+    values = recording[name]
+    return bool(values.max() == values.min()) or any(_is_at_limit(values, one, name) for one in plateaus(values))
 
 
 def _constant_remarks(recording: Recording) -> tuple[str, ...]:

@@ -9,8 +9,8 @@ import numpy as np
 
 from ppafo.engine.lanes import Floats, replay
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of
+from ppafo.engine.scheme.actuators import pressures_of, torque_of
 from ppafo.errors import DataError, SimulationError, UnitError, nearest_name, one_line, refused_as
-from ppafo.model.plant import chamber_pressures
 from ppafo.parameters.device import Device
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
@@ -127,14 +127,13 @@ def leg_of_fixture() -> Leg | None:
 def _recording(measured: Measured, run: Run, record: Floats) -> Recording:
     rows = state_row_numbers(run)
     angle, masses = record[:, rows["state.angle"]], (record[:, rows["state.mass_1"]], record[:, rows["state.mass_2"]])
-    pressure_1, pressure_2 = chamber_pressures(run.plant, angle, *masses)
-    difference = np.subtract(pressure_1, pressure_2)
+    pressure_1, pressure_2 = pressures_of(run.program.actuator, run.plant, angle, *masses)
     channels = {
         "angle": (angle, "rad"),
         "pressure_1": (pressure_1, "Pa"),
         "pressure_2": (pressure_2, "Pa"),
-        "pressure_difference": (difference, "Pa_d"),
-        "torque": (run.plant.torque_constant * difference, "N m"),
+        "pressure_difference": (np.subtract(pressure_1, pressure_2), "Pa_d"),
+        "torque": (torque_of(run.program.actuator, run.plant, angle, pressure_1, pressure_2), "N m"),
         "command": (record[:, rows["result.command"]], "-"),
     }
     interval = run.step * run.record_every

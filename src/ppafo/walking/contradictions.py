@@ -15,7 +15,7 @@ from ppafo.model.columns import Problem, at, larger, smaller
 from ppafo.simulation.declaration import Reading, short_quantity_text
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 from ppafo.walking.motion import walk_of
-from ppafo.walking.planning import controller_of, law_of, walking_valve
+from ppafo.walking.planning import law_of, walking_valve
 
 _NEWTON, _RADIAN, _SECOND, _METRE, _PASCAL = "N", "rad", "s", "m", "Pa_a"
 
@@ -37,9 +37,6 @@ def check_walk(scenario: Scenario, reading: Reading) -> None:
         if is_bad:
             said = reason(0)
             raise reading.refusal(path, said) if _is_given(reading, path) else _of_default(reading, path, said)
-    for is_bad, line in controller_of(scenario)[2]:
-        if is_bad:
-            raise ScenarioError(f"{reading.file}: {line(0)}")
 
 
 def rules(scenario: Scenario) -> tuple[Problem, ...]:

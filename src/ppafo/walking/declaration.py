@@ -7,8 +7,6 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.fixed.walking_law import SETTINGS as CONVERTER
-from ppafo.control.fixed.walking_numbers import FIXED_WALKS
 from ppafo.control.walking.catalog import (
     TIMINGS,
     WALKING_CONTROLLERS,
@@ -56,8 +54,6 @@ REACTS_SUMMARY = (
 
 DEVICE_ON_SUMMARY = "on which legs a wearer who reacts has a device: the left one, or one like it on both"
 
-ARITHMETIC = "controller.arithmetic"
-"""Where a walk says whether its controller computes with floats or with whole numbers."""
 
 LARGEST_SEED = 2**32 - 1
 SEED = Quantity("seed", "", "seed of noise and lost samples, a whole number", 1.0, 0.0, float(LARGEST_SEED))
@@ -142,11 +138,6 @@ def controller_settings(kind: str) -> tuple[Quantity, ...]:
     return known[kind].quantities if kind in known else ()
 
 
-def converter_settings(kind: str) -> tuple[Quantity, ...]:
-    """Return the settings of the converter of a walking controller on whole numbers, none where it has no form."""
-    return CONVERTER if kind in FIXED_WALKS else ()
-
-
 def timing_settings(kind: str) -> tuple[Quantity, ...]:
     """Return the settings of a way to know the time in the stride, none where it is unknown."""
     return TIMINGS[kind].quantities if kind in TIMINGS else ()
@@ -156,7 +147,7 @@ def quantities(controller: str, timing: str = THRESHOLDS) -> dict[str, Quantity]
     """Return the declaration of every number that a walk file with this controller and timing can hold, by path."""
     sections = {
         "wearer": (*WEARER, PERSON, *REACTIONS),
-        "controller": (RATE, PERIOD, *controller_settings(controller), *converter_settings(controller)),
+        "controller": (RATE, PERIOD, *controller_settings(controller)),
         "timing": timing_settings(timing),
         "sensors": (*WALK_SENSORS, SEED),
         "run": (DURATION, STEP),
@@ -194,16 +185,15 @@ def _check_motion(kind: object, place: str) -> None:
         )
 
 
-def _texts(document: Mapping[str, Any]) -> tuple[str, ...]:
+def _texts(_document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the paths of every text that a document can hold."""
-    arithmetic = (ARITHMETIC,) if kind_at(document, "controller") in FIXED_WALKS else ()
     kinds = (
         "controller.kind",
         "timing.kind",
         "gas_model.kind",
         *(f"faults.{part}.kind" for part in (*FAULTY, *PLANT_FAULTS)),
     )
-    return (*TEXTS, "motion.kind", "gait", "course", REACTS, DEVICE_ON, BOTTLE_NAME, *kinds, *arithmetic)
+    return (*TEXTS, "motion.kind", "gait", "course", REACTS, DEVICE_ON, BOTTLE_NAME, *kinds)
 
 
 def others_wearer(reacts: bool) -> set[str]:
@@ -303,7 +293,7 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
         "motion": optional(motion, "that it is a walk; gait and course may stand here"),
         **which,
         "controller": (
-            controller_table(walking_controllers(), "Walking", converter_settings),
+            controller_table(walking_controllers(), "Walking"),
             Field(description="what commands the valve"),
         ),
         "timing": optional(_timing(), "how the controller knows the time in the stride; thresholds unless given"),

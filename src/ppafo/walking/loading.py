@@ -8,7 +8,6 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ppafo.control.fixed.torque_laws import FIXED, FLOAT
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
 from ppafo.documents.toml_text import TomlKind, label
@@ -21,11 +20,11 @@ from ppafo.model.regulator import SupplyLines
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.graph import Follows, Graph, Term
+from ppafo.parameters.overrides import split_override
 from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE, SUPPLY_LINES, Reading, kind_at, line_paths, value_at
 from ppafo.simulation.loading import (
     Hardware,
     Layout,
-    OverriddenDocument,
     ScenarioRequest,
     assumed_lines,
     read_device,
@@ -33,15 +32,14 @@ from ppafo.simulation.loading import (
     read_supply_lines,
     read_thermal,
     scenario_of,
-    split_override,
 )
 from ppafo.simulation.numbers import device_number_at
+from ppafo.simulation.overrides import OverriddenDocument, over_layer
 from ppafo.simulation.scenario import Assumption, Control, MotionKind, Origin, Scenario, Sensors
 from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk, rules
 from ppafo.walking.course import check_led_course, check_reacting_course, load_course
 from ppafo.walking.declaration import (
-    ARITHMETIC,
     DURATION,
     FAULTY,
     FORCES,
@@ -49,9 +47,7 @@ from ppafo.walking.declaration import (
     PERSON,
     SEED,
     STEP,
-    THRESHOLDS,
     WALK_SENSORS,
-    converter_settings,
     fault_numbers,
     timing_of,
     timing_settings,
@@ -110,7 +106,7 @@ def load_walk(
     instead = {path: str(item) for path, item in named.items() if item is not None}
     # Refuse an override beside another word for the same value, by path in ``others``.
     for override in given:
-        path, text = split_override(override)
+        path, text = split_override(override, ScenarioError)
         other = instead.get(OF_A_WALK.same.get(path, path))
         if other is not None:
             raise ScenarioError(
@@ -144,10 +140,8 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
         before = tuple(text for text in before if not text.startswith(f"{BOTTLE}."))
     changes = tuple(text if text.startswith(f"{BOTTLE}.") else f"{BOTTLE}.{text}" for text in overrides)
     instead = {} if bottle is None else {BOTTLE_NAME: str(bottle)}
-    return scenario_of(
-        replace(as_given, content=content, overrides=(*before, *changes), instead=instead),
-        WALKING,
-    )
+    every = over_layer(content, before, changes, scenario.name, WALKING.declared)
+    return scenario_of(replace(as_given, content=content, overrides=every, instead=instead), WALKING)
 
 
 def _walked_with(scenario: Scenario) -> tuple[Any, ...]:
@@ -325,10 +319,9 @@ def _control(
     sensors: SensorSettings,
     links: Graph,
 ) -> Control:
-    """Return the controller with its settings and those of its timing and its converter."""
-    settings = _settings(reading, law, device, lines, sensors, links) | _converter(reading, law)
-    arithmetic = value_at(reading.document, ARITHMETIC) or FLOAT
-    return Control(law.name, settings, _period(reading), arithmetic=arithmetic)
+    """Return the controller with its settings and those of its timing."""
+    settings = _settings(reading, law, device, lines, sensors, links)
+    return Control(law.name, settings, _period(reading))
 
 
 def _of_lines(lines: SupplyLines | None) -> dict[str, float]:
@@ -342,19 +335,6 @@ def _of_lines(lines: SupplyLines | None) -> dict[str, float]:
 def _followed(links: Graph, present: Mapping[str, Any]) -> set[str]:
     """Return the numbers of the device that settings follow."""
     return {source for found in links.values() for link in found for source in link.sources} - set(present)
-
-
-def _converter(reading: Reading, law: ControllerKind) -> dict[str, float]:
-    """Return the settings of the converter [SI] of a controller on whole numbers, none where it has floats."""
-    items = converter_settings(law.name)
-    if value_at(reading.document, ARITHMETIC) == FIXED:
-        if timing_of(reading.document) != THRESHOLDS:
-            raise reading.refusal(ARITHMETIC, f"whole numbers know the time in the stride by {THRESHOLDS} only")
-        return reading.section("controller", items)
-    for item in items:
-        if value_at(reading.document, f"controller.{item.name}") is not None:
-            raise reading.refusal(f"controller.{item.name}", f'needs {ARITHMETIC} = "{FIXED}"')
-    return {}
 
 
 def _device(reading: Reading, hardware: Hardware) -> Device:
@@ -431,8 +411,6 @@ def _shut_off(reading: Reading) -> dict[str, float]:
 def _period(reading: Reading) -> float:
     """Return the sample period [s] from a rate or a period, 1 ms where neither is given."""
     rate, period = (value_at(reading.document, f"controller.{name}") for name in ("rate", "period"))
-    if rate is not None and period is not None:
-        raise reading.refusal("controller.rate", "give either controller.rate or controller.period, not both")
     if rate is not None:
         return 1.0 / reading.number("controller.rate", RATE)
     return DEFAULT_PERIOD if period is None else reading.number("controller.period", PERIOD)

@@ -26,7 +26,6 @@ from ppafo.walking.declaration import (
     FORCES,
     PERSON,
     controller_settings,
-    converter_settings,
     fault_numbers,
     others_wearer,
     quantities,
@@ -143,7 +142,7 @@ PLACES: Mapping[str, tuple[str, ...]] = {
 def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
     """The declaration of every number of a walk beside those of its device, by path."""
     motion, control = walk_of(scenario), scenario.control
-    own = controller_settings(control.kind) + (converter_settings(control.kind) if control.is_fixed else ())
+    own = controller_settings(control.kind)
     known = quantities(control.kind, motion.timing)
     kept = {f"controller.{item.name}" for item in own} | {"controller.rate", "controller.period"}
     kept |= {path for path in known if path.partition(".")[0] in ("wearer", "timing", "sensors", "run")}

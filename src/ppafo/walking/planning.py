@@ -1,6 +1,6 @@
 """From a scenario that is a walk to a run of the engine. Any number of it may be an array (runs,), one for each run."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -9,9 +9,6 @@ import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control.controllers import switching
-from ppafo.control.fixed.walking_law import SETTINGS as CONVERTER
-from ppafo.control.fixed.walking_law import GaitConverter, gait_converter
-from ppafo.control.fixed.walking_numbers import FIXED_WALKS
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
 from ppafo.engine.lanes import Batch
@@ -96,7 +93,7 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         course=course,
         failing=failing_of(scenario),
     )
-    controller, settings, problems = controller_of(_fitted(scenario, person))
+    controller, settings = controller_of(_fitted(scenario, person))
     pieces = _pieces_of_walk(scenario, device, controller, settings, _of_each(longest_delay, sensors) * period)
     run = compose_run(
         pieces,
@@ -105,7 +102,7 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         lambda plant: vented_state(plant, walk.initial.now.ankle, walk.initial.now.ankle_rate),
         walk,
     )
-    return run, (too_many_steps(scenario, run.step, run.step_count), *problems)
+    return run, (too_many_steps(scenario, run.step, run.step_count),)
 
 
 def _pieces_of_walk(
@@ -143,7 +140,7 @@ def _plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         failing=failing_of(scenario),
         on_both=wearer.on_both,
     )
-    controller, settings, problems = controller_of(scenario)
+    controller, settings = controller_of(scenario)
     delay = _of_each(longest_delay, sensors) * scenario.control.period
     run = compose_run(
         _pieces_of_walk(scenario, device, controller, settings, delay),
@@ -163,14 +160,14 @@ def _plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
             faults=None if shared is None else shared[0],
         )
         run = replace(run, other=other)
-        problems = (*problems, _lacks_both(scenario))
-    return run, (too_many_steps(scenario, run.step, run.step_count), *problems, _too_long(scenario))
+    lacks = (_lacks_both(scenario),) if wearer.on_both else ()
+    return run, (too_many_steps(scenario, run.step, run.step_count), *lacks, _too_long(scenario))
 
 
 def _lacks_both(scenario: Scenario) -> Problem:
     """What does not go with a device on either leg."""
     is_outside = scenario.control.kind == PYTHON_CONTROLLER
-    what = "a chip or a Python object commands one device; leave out one of both"
+    what = "a Python object commands one device; leave out one of both"
     return np.asarray(is_outside), lambda _run: f"{DEVICE_ON} = {BOTH}: {what}"
 
 
@@ -343,57 +340,10 @@ def law_of(scenario: Scenario) -> ControllerKind:
     return with_timing(walking_controllers()[scenario.control.kind], TIMINGS[walk_of(scenario).timing])
 
 
-def controller_of(scenario: Scenario) -> tuple[ControllerKind | None, Mapping[str, Any], tuple[Problem, ...]]:
-    """The controller of a walk for the lanes, its settings in SI units or as whole numbers, and what may be wrong."""
+def controller_of(scenario: Scenario) -> tuple[ControllerKind | None, Mapping[str, Any]]:
+    """The controller of a walk for the lanes, and its settings in SI units."""
     control = scenario.control
-    if control.kind == PYTHON_CONTROLLER:
-        return None, {}, ()
-    if not control.is_fixed:
-        return law_of(scenario), control.settings, ()
-    converter, numbers = converter_of_walk(scenario), numbers_of_walk(scenario)
-    law = FIXED_WALKS[control.kind]
-    return law.kind, converter._asdict() | numbers, (_broken_bit(scenario), *_beyond(scenario, numbers))
-
-
-def converter_of_walk(scenario: Scenario) -> GaitConverter:
-    """The converter of a walk whose controller computes with whole numbers."""
-    return over_runs(gait_converter, *(scenario.control.settings[item.name] for item in CONVERTER))
-
-
-def numbers_of_walk(scenario: Scenario) -> dict[str, Any]:
-    """The whole numbers of a walk's controller by name, in floats."""
-    law, control = FIXED_WALKS[scenario.control.kind], scenario.control
-    converter, names = converter_of_walk(scenario), tuple(control.settings)
-    count = len(converter)
-
-    def prepared(period: float, *given: float) -> tuple[float, ...]:
-        settings = dict(zip(names, given[count:], strict=True))
-        found = law.prepare(settings, period, rebuilt(GaitConverter, given[:count]))
-        return tuple(found[item.name] for item in law.number_quantities)
-
-    found = over_runs(prepared, control.period, *converter, *control.settings.values())
-    return dict(zip((item.name for item in law.number_quantities), found, strict=True))
-
-
-def _broken_bit(scenario: Scenario) -> Problem:
-    """A number of bits that is not whole."""
-    bits = scenario.control.settings["converter_bits"]
-    return bits % 1.0 != 0.0, lambda run: f"controller.converter_bits = {at(bits, run):g}: must be whole"
-
-
-def _beyond(scenario: Scenario, numbers: Mapping[str, Any]) -> Iterator[Problem]:
-    """Whole numbers that an integer controller cannot hold."""
-    for item in FIXED_WALKS[scenario.control.kind].number_quantities:
-        number = numbers[item.name]
-
-        def line(run: int, item: Any = item, number: Any = number) -> str:
-            return (
-                f"controller on whole numbers: {item.name} ({item.summary}) would be {at(number, run):.0f}, beyond "
-                f"{item.minimum:.0f} to {item.maximum:.0f}: take another range of the converter, a slower "
-                "controller.rate, or another setting"
-            )
-
-        yield np.logical_or(number < item.minimum, number > item.maximum), line
+    return (None, {}) if control.kind == PYTHON_CONTROLLER else (law_of(scenario), control.settings)
 
 
 def fed_device(scenario: Scenario) -> Device:

@@ -194,6 +194,13 @@ class WalkResult:
         head = f"Walk '{self.scenario.name}', {self.recording.time[-1] / 60.0:.3g} min: {self.status.message}"
         return "\n".join([head, *lines])
 
+    def __str__(self) -> str:
+        """Return what ``ppafo simulate`` prints: status and metrics in the units that people are shown."""
+        from ppafo.answers.display_units import metrics_lines
+
+        head = f"{self.scenario.name}: {self.status.kind}"
+        return "\n".join([head, "", *metrics_lines(self.metrics, self.scenario.device.supply.atmospheric_pressure)])
+
     def plot(self) -> "Figure":
         """Return a figure of the mean stride with the healthy gait beside it; ``.savefig(...)`` writes it."""
         from ppafo.walking.figures.mean_stride import walk_figure

@@ -22,6 +22,7 @@ from ppafo.errors import ScenarioError, SimulationError
 from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE
 from ppafo.model.leg import passive_torque
+from ppafo.simulation.plan import MAXIMUM_STEPS
 from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
 from ppafo.walking.bottle import WALKED, BottleLife, Schedule, life_on_bottle, run_on_bottle
@@ -106,6 +107,9 @@ def bottle_life(scenario: Scenario, schedule: Schedule, saved: float = 0.0, prog
     strides = math.ceil(schedule.longest / motion.gait.stride_time)
     seconds = float(planned.duration) if planned is not None else strides * motion.gait.stride_time
     unrecorded = 60.0 if planned is None else 1.0
+    if planned is None:  # no more steps than a run may take: what lasts longer begins again, as a course does
+        step = plan_walk(replace(with_duration(scenario, unrecorded), output_interval=unrecorded)).step
+        seconds = min(seconds, unrecorded * (MAXIMUM_STEPS * step // unrecorded))
     count = max(1, round(seconds / unrecorded))
     whole = with_duration(scenario, seconds if planned is not None else count * unrecorded)
     if planned is None:

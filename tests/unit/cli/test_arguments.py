@@ -31,11 +31,11 @@ def test_without_a_command_it_says_where_to_start(capsys: pytest.CaptureFixture[
     [
         (
             ["simulate", "step-response", "--set", "run.duration=1 s", "--set", "run.duration = 2 s"],
-            "--set run.duration: is given twice, as '1 s' and as '2 s'; leave one out",
+            "overrides 'run.duration=2 s' and 'run.duration=1 s': the same value is given twice; omit one",
         ),
         (
             ["simulate", "step-response", "--set", "controller.rate=1 kHz", "--set", "controller.period=1 ms"],
-            "--set controller.period: the same as controller.rate, which is set to '1 kHz'; leave one out",
+            "'controller.period=1 ms' and 'controller.rate=1 kHz': give either controller.rate or controller.period",
         ),
         (
             ["walk", "solenoid", "--set", "run.duration=0.1 min", "--minutes", "0.2"],

@@ -11,7 +11,7 @@ from ppafo.parameters.bottles.bottle import list_bottles
 from ppafo.signals import Channel, Recording
 from ppafo.storage.comma_separated import read_csv, write_csv
 
-QUICK = ["endurance", "--gas-per-step", "1 g", "--step-time", "1.1 s"]
+QUICK = ["endurance", "--gas-per-stride", "1 g", "--stride-time", "1.1 s"]
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def test_text_says_run_time_steps_and_why_it_ended(capsys: pytest.CaptureFixture
 
 
 def test_a_long_run_time_is_in_whole_minutes(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["endurance", "--gas-per-step", "0.001 g", "--step-time", "1.1 s"]) == 0
+    assert main(["endurance", "--gas-per-stride", "0.001 g", "--stride-time", "1.1 s"]) == 0
     assert "run time                           1440 min of walking" in capsys.readouterr().out
 
 
@@ -47,17 +47,17 @@ def test_json_is_in_si_and_says_simulated(capsys: pytest.CaptureFixture[str]) ->
     assert document["bottle"]["gas_mass"] == pytest.approx(0.1)
     assert document["bottle"]["values"]["bottle.gas_mass"]["source"] == "override"
     result = document["result"]
-    assert result["walking_time"] == pytest.approx(1.1 * result["steps"])
+    assert result["walking_time"] == pytest.approx(1.1 * result["strides"])
     assert "CoolProp" in document["bottle"]["properties"]
 
 
 def test_a_recording_is_repeated(walk: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["endurance", str(walk), "--step-time", "2 s", "--json"]) == 0
+    assert main(["endurance", str(walk), "--stride-time", "2 s", "--json"]) == 0
     repeated = json.loads(capsys.readouterr().out)
-    assert repeated["draw"]["mass_per_step"] == pytest.approx(1e-3)
-    assert main(["endurance", "--gas-per-step", "1 g", "--step-time", "2 s", "--json"]) == 0
+    assert repeated["draw"]["mass_per_stride"] == pytest.approx(1e-3)
+    assert main(["endurance", "--gas-per-stride", "1 g", "--stride-time", "2 s", "--json"]) == 0
     given = json.loads(capsys.readouterr().out)
-    assert repeated["result"]["steps"] == pytest.approx(given["result"]["steps"], rel=1e-6)
+    assert repeated["result"]["strides"] == pytest.approx(given["result"]["strides"], rel=1e-6)
 
 
 def test_the_folder_has_all_files_and_is_made_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -93,17 +93,29 @@ def test_a_folder_of_somebody_else_is_left_alone(tmp_path: Path, capsys: pytest.
     assert capsys.readouterr().err.count("\n") == 2
 
 
+def test_the_old_names_of_gas_and_time_of_a_stride_are_read_for_one_version_and_say_the_new(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(QUICK) == 0
+    now = capsys.readouterr()
+    assert main(["endurance", "--gas-per-step", "1 g", "--step-time=1.1 s"]) == 0
+    before = capsys.readouterr()
+    assert (before.out, now.err) == (now.out, "")
+    assert "--gas-per-step is now called --gas-per-stride" in before.err
+    assert "--step-time is now called --stride-time" in before.err
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ([], "give either a recording or --gas-per-step"),
-        (["--gas-per-step", "0.3"], "--gas-per-step 0.3: a number without a unit does not fit"),
-        (["--gas-per-step", "0.3 g", "--step-time", "1 m"], "--step-time 1 m"),
-        (["--gas-per-step", "0.3 g", "--peak-flow", "0.1 g/s"], "at least the mean flow"),
-        (["--gas-per-step", "0.3 g", "--bottle", "paper-co2"], "did you mean 'paper-co2-9oz'"),
-        (["--gas-per-step", "0.3 g", "--set", "room.temprature=0 degC"], "did you mean 'room.temperature'"),
-        (["--gas-per-step", "0.3 g", "--rest", "-1 min"], "rest must be at least 0 s"),
-        (["--gas-per-step", "0.3 g", "--reuse", "reservoir_volume=50 cm^3"], "more than the 0.3 g"),
+        ([], "give either a recording or --gas-per-stride"),
+        (["--gas-per-stride", "0.3"], "--gas-per-stride 0.3: a number without a unit does not fit"),
+        (["--gas-per-stride", "0.3 g", "--stride-time", "1 m"], "--stride-time 1 m"),
+        (["--gas-per-stride", "0.3 g", "--peak-flow", "0.1 g/s"], "at least the mean flow"),
+        (["--gas-per-stride", "0.3 g", "--bottle", "paper-co2"], "did you mean 'paper-co2-9oz'"),
+        (["--gas-per-stride", "0.3 g", "--set", "room.temprature=0 degC"], "did you mean 'room.temperature'"),
+        (["--gas-per-stride", "0.3 g", "--rest", "-1 min"], "rest must be at least 0 s"),
+        (["--gas-per-stride", "0.3 g", "--reuse", "reservoir_volume=50 cm^3"], "more than the 0.3 g"),
         ([*QUICK[1:], *("--reuse", "reservoir_volume=50 cm^3") * 2], "--reuse reservoir_volume: given twice"),
         (["."], ".: contains no result of a walk or a simulation"),
         (["absent.csv"], "absent.csv: cannot be read"),
@@ -119,7 +131,7 @@ def test_mistakes_are_one_line(words: list[str], said: str, capsys: pytest.Captu
 
 def test_a_largest_flow_beside_a_recording_is_refused(walk: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["endurance", str(walk), "--peak-flow", "5 g/s"]) == 2
-    assert "--peak-flow belongs to --gas-per-step" in capsys.readouterr().err
+    assert "--peak-flow belongs to --gas-per-stride" in capsys.readouterr().err
 
 
 def test_the_schema_of_a_bottle_is_printed(capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,7 +15,7 @@ from ppafo.cli.main import build_parser, main
 ROOT = Path(__file__).parents[3]
 EXAMPLES = load_examples()
 PYPROJECT = PurePosixPath("pyproject.toml")
-SCRIPTS = ("first-steps", "compare-controllers", "learn-a-controller", "mujoco", "opensim", "actuators")
+SCRIPTS = ("first-steps", "compare-controllers", "learn-a-controller", "actuators")
 """Examples that are no part of a page: scripts, which tests of their own run, and scenarios of actuators."""
 
 

@@ -62,11 +62,6 @@ def test_the_schemas_describe_a_gait_file_and_a_map(capsys: pytest.CaptureFixtur
         assert table in schema["properties"]
 
 
-def test_a_recording_is_exported_for_opensim(walk: Path, tmp_path: Path) -> None:
-    assert main(["gait", "export", str(walk), "--out", str(tmp_path / "walk.sto")]) == 0
-    assert "kind=synthetic" in (tmp_path / "walk.sto").read_text().splitlines()
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -89,7 +84,6 @@ def test_a_recording_is_exported_for_opensim(walk: Path, tmp_path: Path) -> None
             ["record", "falisse2019-subject1", "--strides", "0", "--out", "w.csv"],
             "the number of strides must be from 1 to 100000, not 0",
         ),
-        (["export", "WALK", "--out", "walk.mot"], "must end in .sto"),
         (["draw"], "invalid choice: 'draw'"),
     ],
 )

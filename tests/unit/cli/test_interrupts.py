@@ -61,6 +61,36 @@ def sampled(self, step_count):
 lanes.LaneBlock.advance = sampled
 """
 """A signal while SciPy reads its direction numbers: Cython prints the exception that it raises, and drops it."""
+MODEL = """
+from pydantic._internal import _model_construction
+from pydantic_core import SchemaValidator, core_schema
+class Value:
+    def __hash__(self):
+        os.kill(os.getpid(), signal.NAME)
+        return 0
+_model_construction.create_schema_validator = lambda *_, **__: SchemaValidator(core_schema.literal_schema([Value()]))
+"""
+"""A signal while pydantic builds a model: it makes an error of its own of the exception, which it drops."""
+REFUSED = """
+from ppafo.cli import simulate
+from ppafo.errors import ScenarioError
+def interrupted(parsed):
+    try:
+        os.kill(os.getpid(), signal.NAME)
+    except BaseException:
+        raise ScenarioError("file: is wrong") from None
+simulate.run = interrupted
+"""
+"""A signal of which somebody makes a mistake of the user."""
+
+
+@pytest.mark.parametrize("name", SIGNALS)
+@pytest.mark.parametrize("middle", [MODEL, REFUSED], ids=["while a model is built", "taken for a mistake"])
+def test_a_signal_that_became_another_error_is_one_line(middle: str, name: str, tmp_path: Path) -> None:
+    code = START.replace("MIDDLE", middle.replace("NAME", name))
+    words = [sys.executable, "-c", code, str(tmp_path / "run")]
+    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=120)
+    assert (done.returncode, done.stderr) == (130, "ppafo: interrupted; nothing is half written\n")
 
 
 @pytest.mark.parametrize("name", SIGNALS)

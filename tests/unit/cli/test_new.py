@@ -49,6 +49,27 @@ def test_the_set_of_the_template_passes_the_audit() -> None:
     assert load_device("bench.toml").valve.kind == "proportional"
 
 
+def test_what_a_copy_of_a_set_accepts_lapses_where_it_changes_a_value_of_the_finding(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    main(["new", "set", "own", "--from", "ppafo2011"])
+    same = {finding.id: finding.accepted for finding in audit(load_parameter_set("own.toml"))}
+    assert same["flow-of-solenoid"].startswith("As for the proportional valve")
+    text = Path("own.toml").read_text(encoding="utf-8")
+    Path("own.toml").write_text(text.replace("value = 12.6\n", "value = 5.0\n", 1), encoding="utf-8")
+    changed = {finding.id: finding for finding in audit(load_parameter_set("own.toml"))}
+    assert (changed["flow-of-solenoid"].severity, changed["flow-of-solenoid"].accepted) == ("error", "")
+    assert changed["flow-of-proportional"].accepted == same["flow-of-proportional"]
+    capsys.readouterr()
+    assert main(["audit", "own.toml"]) == 1
+    few = capsys.readouterr().out
+    assert "[flow-of-solenoid]" in few
+    assert "[flow-of-proportional]" not in few
+    assert "of them concern no changed value: --all" in few
+    assert main(["audit", "own.toml", "--all"]) == 1
+    assert "[flow-of-proportional]" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("device", ["ppafo2011", "my-device.toml"])
 def test_the_task_of_the_template_is_followed_smoothly_by_the_device_of_the_paper_and_by_that_of_the_template(
     device: str,

@@ -71,6 +71,7 @@ def test_device_and_overrides_reach_the_rig(tmp_path: Path, capsys: pytest.Captu
         (["static-torque", "--preset", "worn-seal"], "did you mean 'worn-seals'"),
         (["static-torque", "--preset", "mine.toml"], "mine.toml: cannot be read"),
         (["static-torque", "--seed", "one"], "--seed one: must be a whole number"),
+        (["static-torque", "--seed", "\uff11"], "--seed \uff11: must be a whole number"),
         (["static-torque", "--seed", "-3"], "seed = -3"),
         (["static-torque", "--device", "ppafo2010"], "did you mean 'ppafo2011'"),
         (["static-torque", "--set", "friction.static=1"], "friction.static"),

@@ -1,5 +1,6 @@
 """What the command line does to answer soon, and that nothing else notices."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -66,14 +67,18 @@ def test_main_leaves_the_garbage_collection_of_a_calling_program_alone() -> None
 
 
 INTERRUPTED = """
-import sys
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 class Interrupt:
     def find_spec(self, name, path=None, target=None):
         if name == MODULE:
-            if WRAPPED:
-                raise RuntimeError("Error calling __set_name__") from KeyboardInterrupt()
-            raise KeyboardInterrupt
+            try:
+                signal.raise_signal(signal.SIGINT)
+            except KeyboardInterrupt as interrupt:
+                if WRAPPED:
+                    raise RuntimeError("Error calling __set_name__") from interrupt
+                raise
 
 sys.meta_path.insert(0, Interrupt())
 sys.argv = ["ppafo", "schema", "scenario"]
@@ -100,3 +105,28 @@ def test_interrupt_while_modules_load_is_one_line(module: str, wrapped: bool) ->
 def test_package_can_be_started_as_a_module() -> None:
     done = subprocess.run([sys.executable, "-m", "ppafo", "--version"], capture_output=True, text=True, check=True)
     assert done.stdout.startswith("ppafo ")
+
+
+CLOSED = """
+import os, sys
+for number in NUMBERS:
+    os.close(number)
+os.execv(sys.executable, [sys.executable, "-m", "ppafo", *sys.argv[1:]])
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="streams are inherited in another way there")
+@pytest.mark.parametrize("numbers", [(1,), (2,), (0, 1, 2)], ids=["output", "errors", "all"])
+def test_closed_streams_take_neither_the_result_nor_the_exit_code(numbers: tuple[int, ...], tmp_path: Path) -> None:
+    code = CLOSED.replace("NUMBERS", repr(numbers))
+
+    def run(*words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=False)
+
+    done = run("sets", "--out", str(tmp_path / "sets"))
+    assert (done.returncode, done.stderr) == (0, "")
+    written = (tmp_path / "sets" / "sets.txt").read_text(encoding="utf-8")
+    assert done.stdout == ("" if 1 in numbers else written)
+    refused = run("sets", "nothing")
+    assert (refused.returncode, refused.stdout) == (2, "")
+    assert len(refused.stderr.splitlines()) == (2 not in numbers)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.fixed.torque_laws import FIXED_LAWS, PID, FixedLaw
+from ppafo.control.fixed.torque_laws import FIXED_LAWS, PID, FixedLaw, largest_pid
 from ppafo.control.fixed.whole_numbers import (
     COMMAND_STEPS,
     FRACTION_BITS,
@@ -37,9 +37,11 @@ CONVERTER = converter_of(BITS, RANGE, TORQUE_CONSTANT)
 
 def parameters(law: FixedLaw, **settings: float) -> Any:
     """Parameters of a law for the lanes, its defaults where nothing else is given."""
-    every = {item.name: float(item.default or 0.0) for item in CONTROLLERS[law.name].quantities} | settings
-    numbers = law.prepare(every, PERIOD, CONVERTER.torque_step)
-    return rebuilt(law.kind.parameters, [*CONVERTER, *numbers])
+    every = {item.name: float(item.default or 0.0) for item in law.kind.quantities} | settings
+    assert law.kind.plan is not None
+    numbers, problems = law.kind.plan(every, PERIOD, TORQUE_CONSTANT, (0.0, 0.0))
+    assert not any(is_bad for is_bad, _ in problems)
+    return rebuilt(law.kind.parameters, numbers.values())
 
 
 def seen(torque: float) -> Measurement:
@@ -79,7 +81,8 @@ def test_the_converter_rounds_and_stays_in_its_range() -> None:
 @pytest.mark.parametrize("law", FIXED_LAWS.values(), ids=list(FIXED_LAWS))
 def test_every_number_of_a_law_is_declared_in_the_order_of_its_rows(law: FixedLaw) -> None:
     names = [path.rpartition(".")[2] for path in leaf_paths(law.kind.parameters, "")]
-    assert [item.name for item in law.kind.quantities] == names
+    assert [item.name for item in law.kind.plan.quantities] == names
+    assert CONTROLLERS[law.name] is law.kind
     assert [item.name for item in law.number_quantities] == [
         path.rpartition(".")[2] for path in leaf_paths(law.numbers, "")
     ]
@@ -87,7 +90,7 @@ def test_every_number_of_a_law_is_declared_in_the_order_of_its_rows(law: FixedLa
 
 @pytest.mark.parametrize("law", FIXED_LAWS.values(), ids=list(FIXED_LAWS))
 def test_what_defaults_come_to_lies_within_what_is_declared(law: FixedLaw) -> None:
-    for item, number in zip(law.kind.quantities, leaves(parameters(law)), strict=True):
+    for item, number in zip(law.kind.plan.quantities, leaves(parameters(law)), strict=True):
         assert item.minimum <= number <= item.maximum
 
 
@@ -117,14 +120,14 @@ def test_pid_on_whole_numbers_follows_the_float_form(settings: dict[str, float])
 
 
 def test_on_off_switches_where_the_float_form_does() -> None:
-    law = FIXED_LAWS["on_off"]
+    law = FIXED_LAWS["on_off_on_chip"]
     for torque in (-1.0, 1.9, 2.1, 4.0):
         found, _ = law.kind.update(parameters(law), law.kind.initial, 2.0, seen(torque), PERIOD)
         assert found == CONTROLLERS["on_off"].update((), (), 2.0, seen(torque), PERIOD)[0]
 
 
 def test_a_dead_zone_has_hysteresis_and_an_opening() -> None:
-    law = FIXED_LAWS["on_off_dead_zone"]
+    law = FIXED_LAWS["on_off_dead_zone_on_chip"]
     given_numbers = parameters(law, dead_zone=0.5, release=0.1, opening=0.25)
     state, found = law.kind.initial, []
     for torque in (1.7, 1.4, 1.7, 1.95, 2.4, 2.6, 2.05):
@@ -151,9 +154,9 @@ def test_a_reading_at_an_end_of_its_range_commands_nothing_for_good(law: FixedLa
 
 def test_a_gain_beyond_its_number_is_told_from_one_within() -> None:
     settings = {item.name: float(item.default or 0.0) for item in CONTROLLERS["pid"].quantities}
-    assert PID.largest(settings, PERIOD, CONVERTER.torque_step) < 1.0
-    assert PID.largest(settings | {"derivative_gain": 10.0}, PERIOD, CONVERTER.torque_step) > 1.0
-    assert PID.largest(settings | {"anti_windup": 1001.0}, PERIOD, CONVERTER.torque_step) > 1.0
+    assert largest_pid(settings, PERIOD, CONVERTER.torque_step) < 1.0
+    assert largest_pid(settings | {"derivative_gain": 10.0}, PERIOD, CONVERTER.torque_step) > 1.0
+    assert largest_pid(settings | {"anti_windup": 1001.0}, PERIOD, CONVERTER.torque_step) > 1.0
 
 
 def test_a_full_command_is_as_many_steps_as_the_pulse_has_to_each_side() -> None:

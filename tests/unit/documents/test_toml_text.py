@@ -1,6 +1,7 @@
 """A document is read from its file: one that is changed by whoever asked for it is as written for the next."""
 
 import os
+import time
 import tracemalloc
 from importlib import resources
 from pathlib import Path
@@ -100,3 +101,18 @@ def test_a_number_that_would_become_0_is_refused() -> None:
     with pytest.raises(ScenarioError, match=r"mine.toml: is not valid TOML: 1e-400 is too small for a number"):
         KIND.parse(b"value = 1e-400", "mine.toml")
     assert KIND.parse(b"value = 0.0e-400", "mine.toml") == {"value": 0.0}
+
+
+@pytest.mark.parametrize("text", ["[{}]", "{} = 1", "mine = {{{} = 1}}", "[[ {} ]]"])
+@pytest.mark.parametrize("dot", [".", " . "])
+def test_a_key_of_very_many_dots_is_refused_at_once(text: str, dot: str) -> None:
+    key = dot.join(["a", '"b"'] * 25_000)
+    start = time.process_time()
+    with pytest.raises(ScenarioError, match=r"^mine.toml: has tables nested deeper than 50 levels; a few are enough$"):
+        KIND.parse(text.format(key).encode(), "mine.toml")
+    assert time.process_time() - start < 1.0
+
+
+def test_dots_that_are_no_key_are_read() -> None:
+    text = 'note = "' + "end. " * 100 + '" # ' + "." * 100
+    assert KIND.parse(text.encode(), "mine.toml") == {"note": "end. " * 100}

@@ -14,11 +14,11 @@ from ppafo.engine.cache import load_generated
 from ppafo.engine.lane_source import lane_source
 from ppafo.engine.numba_compiler import NumbaCompiler
 from ppafo.engine.program import Program
-from ppafo.engine.reference.right_hand_side import right_hand_side_source
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import SimulationError
 from ppafo.model import orifice
 from ppafo.model.valves.proportional import IDEAL
+from tests.judge.reference_slopes import right_hand_side_source
 
 START = """
 import sys, time

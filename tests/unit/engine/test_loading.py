@@ -17,6 +17,7 @@ from ppafo.engine.compilers import OFFERED
 from ppafo.engine.loading import BACKEND_VARIABLE, chosen_compiler, compilers_to_try, load_source
 from ppafo.errors import ProgramError, SimulationError
 from ppafo.translation import native
+from tests.compilers_here import compilers_here
 
 HEADER = "import math\nfrom numba import njit\n\n\n"
 ADVANCE = '@njit("void(float64[:, ::1])", cache=True)\ndef advance(x):\n    x[0, 0] = '
@@ -159,6 +160,7 @@ def test_a_folder_whose_libraries_cannot_be_loaded_is_reported_once_for_all_comp
         "echo 'gcc: fatal error: Killed signal terminated program cc1' >&2; exit 1",
         "echo 'Cannot create temporary file in /gone/: No such file or directory' >&2; kill -6 $$",
         "kill -9 $$",
+        "echo 'error: unable to resolve zig cache directory: AppDataDirUnavailable' >&2; exit 1",
     ],
 )
 def test_a_compiler_that_lacked_room_or_was_killed_is_tried_again_in_the_next_process(
@@ -173,6 +175,36 @@ def test_a_compiler_that_lacked_room_or_was_killed_is_tried_again_in_the_next_pr
     monkeypatch.setattr(loading, "_FAILED", set())
     forget()
     assert chosen_compiler().name == "gcc"
+
+
+@on_unix
+@needs_gcc
+def test_a_compiler_that_never_ends_is_stopped_with_what_it_started_and_the_next_one_compiles(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    only(("gcc", "numba"), monkeypatch)
+    started = tmp_path / "started"
+    compiler_that_fails("gcc", tmp_path / "bin", monkeypatch).write_text(
+        f"#!/bin/sh\nsleep 600 &\necho $! > {started}\nwait\n", encoding="utf-8"
+    )
+    monkeypatch.setattr(native, "LONGEST_COMPILING", 0.5)
+    assert result_of(text("x[0, 0] + 0.75")) == 2.75
+    assert caplog.messages[0] == (
+        "ppafo: gcc did not end within 0.5 s and was stopped; "
+        "models are compiled by numba instead for a day, or until 'ppafo cache --clear'"
+    )
+    # Whoever takes over what has lost its parent may not ask how it ended: then it is dead and still there.
+    state = Path(f"/proc/{started.read_text(encoding='utf-8').strip()}/stat")
+    assert not state.exists() or state.read_text(encoding="utf-8").rpartition(")")[2].split()[0] in "ZX"
+
+
+@on_unix
+@pytest.mark.skipif("zig" not in compilers_here(), reason="no zig on this machine")
+def test_zig_compiles_where_the_environment_has_no_home(monkeypatch: pytest.MonkeyPatch) -> None:
+    only(("zig",), monkeypatch)
+    monkeypatch.delenv("HOME", raising=False)
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    assert result_of(text("x[0, 0] + 0.375")) == 2.375
 
 
 @on_unix

@@ -245,6 +245,7 @@ def test_runs_do_not_know_of_each_other_and_a_copy_goes_on_as_the_first_would(st
         ("run_output_interval", 1.0e-4, "run_step"),
         ("controller_period", 1.0e-4, "run_step"),
         ("friction_dynamic_torque", 1.0e3, "friction_dynamic_torque"),
+        ("run_output_interval", 7.0e-3, "run_output_interval"),
     ],
 )
 def test_a_setting_that_no_file_could_have_is_refused_by_name(
@@ -259,7 +260,7 @@ def test_a_setting_that_no_file_could_have_is_refused_by_name(
 def test_settings_that_need_other_functions_are_refused(step: Loaded, setting: str, value: float) -> None:
     run = Run(step, **{setting: value})
     assert (run.size, run.status) == (0, OTHER_PROGRAM)
-    assert step.call("bad_setting", run.settings, returns=ctypes.c_char_p) is None
+    assert step.call("bad_setting", run.settings, returns=ctypes.c_char_p) == setting.encode()
     assert Run(step, valve_dead_band=0.1).status == GOING_ON
 
 
@@ -288,7 +289,7 @@ def test_what_a_scenario_says_is_plain_words_in_every_page_and_comment() -> None
     """Neither HTML, nor a heading, a link, or a mark that turns the direction of what follows in a source file."""
     hostile = "</p><script>alert(1)</script> `a` [x](javascript:b) ``` \\ \u202e \x1b[31m\n# Heading */"
     described = replace(load_scenario("torque-task-proportional"), description=hostile)
-    fixed = load_scenario("torque-task-proportional", ("controller.arithmetic=fixed",))
+    fixed = load_scenario("torque-task-proportional", ("controller.kind=pid_on_chip",))
     texts = {
         **c_library(described),
         **{f"plant/{name}": text for name, text in plant_library(described).items()},
@@ -298,7 +299,7 @@ def test_what_a_scenario_says_is_plain_words_in_every_page_and_comment() -> None
     assert len(said) == 3
     for page in said:
         (line,) = [line for line in page.splitlines() if "alert" in line]
-        assert re.search(r"(?<!\\)[<>`\[\]()#]", line.split("Controller `pid`")[0]) is None
+        assert re.search(r"(?<!\\)[<>`\[\]()#]", line.split("Controller `pid_on_chip`")[0]) is None
         assert "Heading" in line
     for text in texts.values():
         assert not any(mark in text.decode() for mark in "\u202e\x1b")

@@ -65,7 +65,7 @@ VARIED: tuple[tuple[str, tuple[str, ...]], ...] = (
 BY_NUMBA = ("proportional-regulators", EVERYTHING)
 """The walk whose lanes Numba compiles, so that no translator stands on both sides; it takes a minute.
 
-What Numba makes of a walk without a device is compared in continuous integration (``unit/questions/bits``)."""
+What Numba makes of a walk without a device is compared in continuous integration (``unit/test_golden_bits.py``)."""
 
 
 def choose_compiler(name: str, overrides: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,12 +28,16 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.widths import Interval
 
-FIXED = "controller.arithmetic=fixed"
 SCENARIOS = {
-    "pid": ("torque-task-proportional",),
-    "pid with all": ("torque-task-anti-windup", "controller.converter_bits=14", "controller.converter_range=1.2 MPa_a"),
-    "on_off": ("torque-task-solenoid",),
-    "on_off_dead_zone": ("torque-task-proportional", "controller.kind=on_off_dead_zone"),
+    "pid": ("torque-task-proportional", "controller.kind=pid_on_chip"),
+    "pid with all": (
+        "torque-task-anti-windup",
+        "controller.kind=pid_on_chip",
+        "controller.converter_bits=14",
+        "controller.converter_range=1.2 MPa_a",
+    ),
+    "on_off": ("torque-task-solenoid", "controller.kind=on_off_on_chip"),
+    "on_off_dead_zone": ("torque-task-proportional", "controller.kind=on_off_dead_zone_on_chip"),
 }
 MSP430, CORTEX_M0, CORTEX_M4 = CATALOG.values()
 
@@ -58,8 +62,7 @@ with_compiler = pytest.mark.skipif(
 def scenario_of(law: str, *overrides: str) -> Scenario:
     """A scenario with an integer controller."""
     name, *own = SCENARIOS[law]
-    kinds = [item for item in own if "kind" in item]
-    return load_scenario(name, (*kinds, FIXED, *(item for item in own if item not in kinds), *overrides))
+    return load_scenario(name, (*own, *overrides))
 
 
 @pytest.mark.parametrize("law", FIXED_LAWS.values(), ids=list(FIXED_LAWS))
@@ -71,19 +74,19 @@ def test_no_number_of_a_law_can_overflow_and_no_state_leaves_its_range(law: Fixe
 
 @pytest.mark.parametrize(("name", "low", "high"), [("integral", -(2**30), 2**30), ("slope", -(2**31), 2**31 - 1)])
 def test_a_state_with_a_wider_range_is_not_proved(name: str, low: int, high: int) -> None:
-    law = FIXED_LAWS["pid"]
+    law = FIXED_LAWS["pid_on_chip"]
     with pytest.raises(ProgramError, match="beyond 32 bits"):
         proof(replace(law, state_ranges={**law.state_ranges, name: (low, high)}))
 
 
 def test_a_state_that_may_leave_a_narrower_range_is_not_proved() -> None:
-    law = FIXED_LAWS["pid"]
+    law = FIXED_LAWS["pid_on_chip"]
     with pytest.raises(ProgramError, match="may leave their ranges"):
         proof(replace(law, state_ranges={**law.state_ranges, "error": (-1000, 1000)}))
 
 
 def test_a_converter_of_sixteen_bits_is_not_proved() -> None:
-    law = FIXED_LAWS["pid"]
+    law = FIXED_LAWS["pid_on_chip"]
     wider = [replace(item, maximum=item.maximum * 2.0 + 1.0) for item in law.number_quantities[:2]]
     with pytest.raises(ProgramError):
         proof(law, (*wider, *(replace(item, maximum=65535.0) for item in law.number_quantities[2:])))
@@ -219,9 +222,8 @@ def test_numbers_stand_in_a_header_with_range_and_origin() -> None:
 @pytest.mark.parametrize(
     ("name", "overrides", "said"),
     [
-        ("torque-task-proportional", (), "the controller computes with floats; set controller.arithmetic=fixed"),
         ("step-response", (), "'constant' has no form on whole numbers; those that have one: pid, on_off"),
-        ("torque-task-solenoid", (FIXED, "controller.rate=900 Hz"), r"a multiple of 0.125 ms, up to 2.05 s"),
+        ("torque-task-solenoid", ("controller.rate=900 Hz",), r"a multiple of 0.125 ms, up to 2.05 s"),
     ],
 )
 def test_what_has_no_firmware_is_refused(name: str, overrides: tuple[str, ...], said: str) -> None:

@@ -287,7 +287,8 @@ def test_a_tunable_parameter_changes_the_run_from_there_on_and_a_fixed_one_is_re
     ("name", "value", "said"),
     [
         ("valve.area", -1.0, "valve.area"),
-        ("valve.delay", 0.01, "other functions"),
+        ("valve.delay", 0.01, "valve.delay needs other functions"),
+        ("run.duration", 0.3005, "run.output_interval"),
         ("gas.temperature", float("nan"), "gas.temperature"),
     ],
 )

@@ -1,6 +1,5 @@
 """Units for other computers, built here by ziglang: under an emulator they have the bits of the lanes."""
 
-import io
 import os
 import shutil
 import subprocess
@@ -14,7 +13,7 @@ import pytest
 
 from ppafo.errors import SimulationError
 from ppafo.exports import fmu
-from ppafo.exports.fmu import PLATFORMS, closed_loop, compiler_for, functional_unit
+from ppafo.exports.fmu import closed_loop, compiler_for, functional_unit
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 
@@ -73,15 +72,6 @@ def test_a_unit_for_linux_asks_for_no_newer_c_library_than_that_of_2012(tmp_path
     versions = {word.strip("()").removeprefix("GLIBC_") for word in said.split() if "GLIBC_" in word}
     assert versions
     assert max(tuple(map(int, version.split("."))) for version in versions) <= (2, 17)
-
-
-def test_what_no_test_here_runs_is_marked_in_the_unit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ppafo.exports.fmu.build", lambda *given: given[0].encode())
-    ((_, content),) = functional_unit(closed_loop(load_scenario("step-response")), 2, ["win64", "darwin64"]).items()
-    with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        assert b"Not run: darwin64." in archive.read("modelDescription.xml")
-        assert b"<td>darwin64</td><td>not run</td>" in archive.read("documentation/index.html")
-    assert {name for name, item in PLATFORMS.items() if item.tried == "not run"} == {"darwin64", "darwin-aarch64"}
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the compilers that fail are shell scripts")

@@ -345,8 +345,3 @@ def test_without_pyserial_one_line_says_how_to_get_it(monkeypatch: pytest.Monkey
     monkeypatch.setitem(sys.modules, "serial", None)
     with pytest.raises(ScenarioError, match=r"needs pyserial: pip install 'ppafo\[hil\]'$"):
         open_port("serial:/dev/ttyACM0")
-
-
-def test_the_example_asks_for_a_controller_on_whole_numbers() -> None:
-    with pytest.raises(ScenarioError, match=r"set controller.arithmetic=fixed"):
-        example_controller(load_scenario(TASK))

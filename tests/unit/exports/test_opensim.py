@@ -1,4 +1,4 @@
-"""The torque of a walk for OpenSim: names, sign, times, and a script that reads it."""
+"""Walks and recordings for OpenSim: names, signs, times."""
 
 from pathlib import Path
 
@@ -8,7 +8,8 @@ import pytest
 from ppafo.cli.main import main
 from ppafo.errors import ScenarioError
 from ppafo.exports.opensim import device_torque, opensim_files
-from ppafo.exports.opensim.add_device import read_torque
+from ppafo.gait import load_gait, walk_recording
+from ppafo.storage import write_csv
 from ppafo.storage.opensim import read_opensim
 from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import walk
@@ -22,17 +23,18 @@ def walked() -> WalkResult:
 def test_the_whole_walk_is_in_opensims_sign(walked: WalkResult, tmp_path: Path) -> None:
     for name, content in opensim_files(walked, "left").items():
         (tmp_path / name).write_bytes(content)
-    name, times, torques = read_torque(tmp_path / "device_torque.sto")
-    assert name == "ankle_angle_l_device"
-    assert times == walked.recording.time.tolist()
-    assert torques == (-walked.recording["external_torque"]).tolist()
+    device = read_opensim(tmp_path / "device_torque.sto")
+    torques = device.columns["ankle_angle_l_device"]
+    assert np.array_equal(device.time, walked.recording.time)
+    assert np.array_equal(torques, -walked.recording["external_torque"])
     table = read_opensim(tmp_path / "walk.sto")
     assert table.kind == "simulated"
     assert np.array_equal(table.columns["ankle_angle_l_device_moment"], torques)
     # In push-off the device turns the toes down, which is below 0 in OpenSim.
-    pushing = walked.recording["command"] == 1.0
-    assert np.mean(np.array(torques)[pushing]) < -1.0
-    assert "ankle_angle_l_device" in (tmp_path / "README.md").read_text(encoding="utf-8")
+    assert np.mean(torques[walked.recording["command"] == 1.0]) < -1.0
+    for name in ("device_torque.sto", "walk.sto"):
+        head = (tmp_path / name).read_text(encoding="utf-8").partition("endheader")[0]
+        assert "above 0 in dorsiflexion" in head
 
 
 def test_the_mean_stride_lies_on_heel_strikes(walked: WalkResult) -> None:
@@ -52,30 +54,43 @@ def test_times_that_are_no_heel_strikes_are_refused(walked: WalkResult, strikes:
         device_torque(walked, "right", strikes)
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("", "has no line 'endheader'"),
-        ("a\nendheader\ntime\tx\n0\t1\n1\t2\n", "ends in '_device'"),
-        ("a\nendheader\ntime\tx_device\n0\t1\n", "is cut off"),
-        ("a\nendheader\ntime\tx_device\n0\t1\n1\n", "is cut off"),
-        ("a\nendheader\ntime\tx_device\n0\t1\n0\t2\n", "times must grow"),
-        ("a\nendheader\ntime\tx_device\n0\t1\n1\tnan\n", "must be finite"),
-    ],
-)
-def test_a_damaged_table_is_refused_by_the_script(tmp_path: Path, text: str, said: str) -> None:
-    (tmp_path / "torque.sto").write_text(text, encoding="utf-8")
-    with pytest.raises(ValueError, match=said):
-        read_torque(tmp_path / "torque.sto")
-
-
 def test_the_command_writes_the_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "for opensim"
     words = ["export", "opensim", "solenoid", "--minutes", "0.1", "--strikes", "0.5,1.6", "--out", str(folder)]
     assert main(words) == 0
-    names = {"README.md", "add_device.py", "device_torque.sto", "walk.sto", "ppafo.json"}
-    assert {path.name for path in folder.iterdir()} == names
-    assert "add_device.py' MODEL.osim --out with-device.osim" in capsys.readouterr().out
+    assert {path.name for path in folder.iterdir()} == {"device_torque.sto", "walk.sto", "ppafo.json"}
+    assert "load '" in capsys.readouterr().out
+
+
+def test_a_recording_is_written_with_what_it_has(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_csv(tmp_path / "walk.csv", walk_recording(load_gait("falisse2019-subject1"), 2))
+    words = ["export", "opensim", str(tmp_path / "walk.csv"), "--out", str(tmp_path / "out")]
+    assert main(words) == 0
+    assert "left out: ankle_moment, vertical_force" in capsys.readouterr().out
+    assert main([*words, "--body-mass", "62 kg"]) == 0
+    table = read_opensim(tmp_path / "out" / "recording.sto")
+    assert table.kind == "synthetic"
+    assert {"ankle_angle_r", "ankle_angle_r_moment", "ground_force_r_vy"} <= set(table.columns)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["RECORDING", "--minutes", "1"], "--minutes: is for a walk, not a recording"),
+        (["RECORDING", "--set", "wearer.keeps_gait=1"], "--set: is for a walk, not a recording"),
+        (["RECORDING", "--body-mass", "62"], "--body-mass '62': a number without a unit"),
+        (["solenoid", "--body-mass", "62 kg"], "--body-mass: is for a recording; a walk knows its wearer"),
+        (["absent.csv"], "absent.csv: cannot be read: no such file or directory"),
+    ],
+)
+def test_options_of_the_other_source_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], said: str
+) -> None:
+    write_csv(tmp_path / "walk.csv", walk_recording(load_gait("falisse2019-subject1"), 1))
+    given = [str(tmp_path / "walk.csv") if word == "RECORDING" else word for word in words]
+    assert main(["export", "opensim", *given, "--out", str(tmp_path / "out")]) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 COURSE = """schema_version = 1
@@ -96,7 +111,7 @@ def test_a_walk_is_as_long_as_its_course_unless_minutes_are_given(
     (tmp_path / "short.toml").write_text(COURSE, encoding="utf-8")
     words = ["export", "opensim", "solenoid", "--set", f"course={tmp_path / 'short.toml'}", *given]
     assert main([*words, "--out", str(tmp_path / "out")]) == 0, capsys.readouterr().err
-    _, times, _ = read_torque(tmp_path / "out" / "device_torque.sto")
+    times = read_opensim(tmp_path / "out" / "device_torque.sto").time
     # A segment is a whole number of strides.
     assert (times[0], times[-1]) == (0.0, pytest.approx(end, abs=0.6))
 
@@ -107,9 +122,8 @@ def test_a_motion_may_begin_below_0_s_and_the_help_says_how(tmp_path: Path, caps
     assert "--strikes=-0.4,0.8" in capsys.readouterr().out
     words = ["export", "opensim", "solenoid", "--minutes", "0.1", "--strikes=-0.4,0.8", "--out", str(tmp_path / "out")]
     assert main(words) == 0
-    _, times, _ = read_torque(tmp_path / "out" / "device_torque.sto")
+    times = read_opensim(tmp_path / "out" / "device_torque.sto").time
     assert (times[0], times[-1]) == (-0.4, 0.8)
-    assert "goes from -0.4 to 0.8 s" in (tmp_path / "out" / "README.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("times", ["", "a,b", "0.5", "0.5,nan", "1,2,1.5"])

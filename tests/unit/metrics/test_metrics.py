@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ppafo.metrics import METRICS, evaluate
-from ppafo.metrics.metric import hold_start
+from ppafo.metrics.metric import hold
 from ppafo.metrics.switching import reversals
+from ppafo.model.valves.kind import VENT
 from ppafo.signals import CHANNELS, Channel, Recording
 
 TIME = np.linspace(0.0, 3.0, 3001)
@@ -58,14 +59,14 @@ def test_the_rms_error_does_not_depend_on_how_densely_a_part_is_sampled() -> Non
 
 def test_ramp_and_hold_part_where_the_reference_reaches_the_level_it_keeps() -> None:
     torque = np.where(TIME < 1.0, RAMP - 2.0, RAMP - 1.0)
-    assert hold_start(recording(reference=RAMP)) == 1.0
+    assert hold(recording(reference=RAMP)) == slice(1000, None)
     assert value("rms_error_hold", reference=RAMP, torque=torque) == pytest.approx(1.0)
     assert value("rms_error_ramp", reference=RAMP, torque=torque) == pytest.approx(2.0, rel=1e-3)
 
 
 def test_a_reference_that_crosses_its_final_level_is_not_on_hold_yet() -> None:
     overshooting = np.where(TIME < 2.0, 8.0 * TIME / 2.0, 6.0)
-    assert hold_start(recording(reference=overshooting)) == 2.0
+    assert hold(recording(reference=overshooting)) == slice(2000, None)
 
 
 def test_a_reference_that_never_rests_has_neither_ramp_nor_hold() -> None:
@@ -121,11 +122,19 @@ def test_work_per_gas_is_left_out_where_no_gas_was_taken() -> None:
     assert "work_per_gas" not in evaluate(recording(supplied_mass=np.zeros(3001), **motion))
 
 
-def test_a_command_that_rests_at_zero_between_two_signs_switches_once() -> None:
+def test_each_valve_that_a_command_switches_on_or_off_is_counted() -> None:
     command = np.zeros(3001)
     command[:1000], command[2000:] = 1.0, -1.0
-    assert value("switchings", command=command) == 1.0
-    assert value("switchings", command=np.sign(np.cos(2.0 * math.pi * TIME))) == 6.0
+    assert value("switchings", command=command) == 2.0
+    assert value("switchings", command=np.sign(np.cos(2.0 * math.pi * TIME))) == 2 * 6.0
+    on_or_off = np.where(np.arange(3001) // 15 % 2, 0.0, 1.0)
+    assert value("switchings", command=on_or_off) == 200.0
+
+
+def test_venting_switches_the_valves_off_as_a_command_of_zero_does() -> None:
+    command = np.zeros(3001)
+    command[100:200], command[200:300] = 0.4, VENT
+    assert value("switchings", command=command) == 2.0
 
 
 def test_oscillation_on_the_ramp_is_counted_there_and_not_on_the_hold() -> None:

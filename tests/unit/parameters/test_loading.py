@@ -202,9 +202,16 @@ def test_a_newer_schema_version_is_refused() -> None:
     assert "schema_version" in problem_of(changed("schema_version = 1", "schema_version = 2"))
 
 
-def test_the_number_of_further_problems_is_told() -> None:
+def test_all_that_is_missing_is_named() -> None:
     text = changed('source = "recording 7"', "").replace('source = "page 2"', 'sorce = "page 2"')
-    assert re.search(r"\(and 2 more\)$", problem_of(text))
+    problem = problem_of(text)
+    assert re.search(r"unknown key '\S+\.sorce', did you mean 'source'\?; allowed here: ", problem)
+    assert re.search(r"; '\S+\.source' and '\S+\.source' are missing$", problem)
+
+
+def test_a_key_in_the_wrong_place_is_told_where_it_belongs() -> None:
+    problem = problem_of(changed("schema_version = 1", "schema_version = 1\nstatic_torque = 1"))
+    assert "unknown key 'static_torque', which belongs in [friction]; allowed here: " in problem
 
 
 def test_a_wrong_dimension_is_kept_for_the_audit_and_refused_for_a_device(tmp_path: Path) -> None:

@@ -1,5 +1,7 @@
 """Overrides by dotted path."""
 
+import itertools
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -9,6 +11,7 @@ from ppafo.model.catalog import EFFECTS
 from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.parameters import apply_overrides, load_device, load_parameter_set
 from ppafo.parameters.device import Orifice
+from ppafo.parameters.overrides import over
 from ppafo.parameters.parameter_set import number_in_si
 from ppafo.parameters.plant import settings_of
 
@@ -44,9 +47,36 @@ def test_an_override_leaves_the_original_set_as_it_was() -> None:
     assert COMPLETED.numbers["valves.proportional.area"].value == 31.6
 
 
-def test_the_last_of_two_overrides_counts() -> None:
-    changed = apply_overrides(COMPLETED, ["valve.area=1mm^2", "valve.area=2mm^2"])
-    assert changed.numbers["valves.proportional.area"].value == 2.0
+@pytest.mark.parametrize("other", ["valve.area=2mm^2", "valve.area=1mm^2", "valves.proportional.area=2mm^2"])
+def test_a_value_that_is_given_twice_is_refused_with_both_overrides(other: str) -> None:
+    for words in (["valve.area=1mm^2", other], [other, "valve.area=1mm^2"]):
+        with pytest.raises(ParameterError, match="the same value is given twice") as caught:
+            apply_overrides(COMPLETED, words)
+        assert all(f"'{word}'" in str(caught.value) for word in words)
+
+
+def test_an_orifice_in_two_forms_is_refused_with_both_overrides_in_any_order() -> None:
+    words = ["valve.area=1mm^2", "valve.sonic_conductance=1 L/(s bar)", "valve.critical_ratio=0.3"]
+    told = set()
+    for order in itertools.permutations(words):
+        with pytest.raises(ParameterError) as caught:
+            apply_overrides(COMPLETED, order)
+        told.add(str(caught.value))
+    assert told == {
+        "overrides 'valve.area=1mm^2' and 'valve.critical_ratio=0.3': give either valve.area and "
+        "valve.discharge_coefficient or valve.sonic_conductance and valve.critical_ratio, not both"
+    }
+
+
+def test_a_later_layer_replaces_values_and_forms_of_an_earlier_one() -> None:
+    earlier = (
+        "valve.area=1mm^2",
+        "valve.discharge_coefficient=0.6",
+        "supply.pressure=40 psi_g",
+        "controller.rate=1 kHz",
+    )
+    later = ("valves.solenoid.critical_ratio=0.3", "valve.sonic_conductance=1 L/(s bar)", "controller.period=2 ms")
+    assert over(earlier, later, valve="solenoid") == ("supply.pressure=40 psi_g", *later)
 
 
 def test_a_value_that_the_set_lacks_can_be_given() -> None:

@@ -27,9 +27,6 @@ def psi(gauge: float) -> float:
         (["supply.pressure=70 psi_g", "supply.dorsiflexion_pressure=45 psi_g"], 70.0, 45.0),
         (["supply.dorsiflexion_pressure=45 psi_g", "supply.pressure=70 psi_g"], 70.0, 45.0),
         (["supply.dorsiflexion_pressure=50 psi_g", "supply.pressure=70 psi_g"], 70.0, 50.0),
-        (["supply.pressure=70 psi_g", "supply.pressure=60 psi_g"], 60.0, 60.0),
-        (["supply.pressure=55 psi_g", "supply.dorsiflexion_pressure=55 psi_g", "supply.pressure=70 psi_g"], 70.0, 70.0),
-        (["supply.pressure=55 psi_g", "supply.dorsiflexion_pressure=45 psi_g", "supply.pressure=70 psi_g"], 70.0, 45.0),
     ],
 )
 def test_pressure_is_that_of_both_unless_the_second_is_given_apart(

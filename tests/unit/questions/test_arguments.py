@@ -4,7 +4,7 @@ import argparse
 
 import pytest
 
-from ppafo.questions.question import quantity
+from ppafo.questions.question import fraction, quantity
 
 
 @pytest.mark.parametrize(
@@ -19,3 +19,10 @@ def test_a_text_without_the_unit_is_refused_by_name(text: str) -> None:
     with pytest.raises(argparse.ArgumentTypeError) as caught:
         quantity("s")(text)
     assert str(caught.value).startswith(f"{text}: ")
+
+
+@pytest.mark.parametrize("text", ["\uff10.5", "\u0661%", "0_1", "1.5"])
+def test_a_fraction_is_written_in_the_digits_of_ascii(text: str) -> None:
+    assert fraction("50%") == 0.5
+    with pytest.raises(argparse.ArgumentTypeError, match="must be a number from 0 to 1"):
+        fraction(text)

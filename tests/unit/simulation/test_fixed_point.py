@@ -6,14 +6,14 @@ import pytest
 from ppafo.control.fixed.whole_numbers import Converter, read
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports.c_library import c_library
-from ppafo.exports.firmware import chip_controller
+from ppafo.exports.firmware import chip_controller, integer_form
 from ppafo.exports.firmware.lock_step import PythonChip
 from ppafo.model.sensors import Measurement
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 
-FIXED = "controller.arithmetic=fixed"
+FIXED = "controller.kind=pid_on_chip"
 
 
 class InPython:
@@ -31,9 +31,12 @@ class InPython:
         return self.chip.sample(read(self.converter, reference, measurement))[0] / 1000
 
 
-@pytest.mark.parametrize("name", ["torque-task-proportional", "torque-task-solenoid"])
-def test_whole_numbers_cost_less_than_one_percent_in_both_torque_tasks(name: str) -> None:
-    floats, fixed = (simulate(load_scenario(name, overrides)).metrics for overrides in ((), (FIXED,)))
+@pytest.mark.parametrize(
+    ("name", "kind"), [("torque-task-proportional", "pid_on_chip"), ("torque-task-solenoid", "on_off_on_chip")]
+)
+def test_whole_numbers_cost_less_than_one_percent_in_both_torque_tasks(name: str, kind: str) -> None:
+    overrides = (f"controller.kind={kind}",)
+    floats, fixed = (simulate(load_scenario(name, given)).metrics for given in ((), overrides))
     for metric in ("rms_error", "gas_supplied"):
         assert fixed[metric].value == pytest.approx(floats[metric].value, rel=0.01)
 
@@ -61,7 +64,7 @@ def test_fewer_bits_cost_more_and_can_be_a_column() -> None:
         (("controller.converter_bits=9.5",), r"controller.converter_bits = 9.5: must be whole"),
         (("controller.converter_bits=15",), "must be at least 8 and at most 14"),
         (("controller.converter_range=0.4 MPa_a",), "reference: from 0 N m to 6 N m, and the converter shows"),
-        (("controller.derivative_gain=20",), "a gain of 'pid' on whole numbers is .* times the largest"),
+        (("controller.derivative_gain=20",), "a gain of 'pid_on_chip' is .* times the largest"),
     ],
 )
 def test_what_whole_numbers_cannot_hold_is_refused(overrides: tuple[str, ...], said: str) -> None:
@@ -72,16 +75,36 @@ def test_what_whole_numbers_cannot_hold_is_refused(overrides: tuple[str, ...], s
 def test_a_converter_without_whole_numbers_is_refused() -> None:
     content = dict(load_scenario("torque-task-proportional").origin.content)
     content["controller"] = {**content["controller"], "converter_bits": 10}
-    with pytest.raises(ScenarioError, match=r'controller.converter_bits = 10: needs controller.arithmetic = "fixed"'):
+    with pytest.raises(ScenarioError, match=r"unknown key 'controller.converter_bits'"):
         scenario_from_dict(content)
 
 
-def test_a_law_without_whole_numbers_has_no_arithmetic_to_choose() -> None:
-    with pytest.raises(ScenarioError, match=r"no value 'controller.arithmetic'"):
-        load_scenario("step-response", (FIXED,))
-    assert not load_scenario("torque-task-proportional", (FIXED, "controller.kind=sliding_mode")).control.is_fixed
+@pytest.mark.parametrize(
+    ("name", "given", "said"),
+    [
+        ("torque-task-proportional", "fixed", r'write controller.kind = "pid_on_chip"'),
+        ("torque-task-solenoid", "fixed", r'write controller.kind = "on_off_on_chip"'),
+        ("torque-task-proportional", "float", "leave it out: every controller but those on a chip"),
+        ("step-response", "fixed", "'constant' has no form on whole numbers; those that are: pid_on_chip"),
+    ],
+)
+def test_a_file_with_the_old_arithmetic_is_told_the_kind_to_write(name: str, given: str, said: str) -> None:
+    content = dict(load_scenario(name).origin.content)
+    content["controller"] = {**content["controller"], "arithmetic": given}
+    with pytest.raises(ScenarioError, match=said) as caught:
+        scenario_from_dict(content)
+    assert "\n" not in str(caught.value)
+    with pytest.raises(ScenarioError, match=said):
+        load_scenario(name, (f"controller.arithmetic={given}",))
+
+
+def test_a_chip_takes_the_integer_form_of_a_controller_with_its_gains() -> None:
+    scenario = load_scenario("torque-task-proportional", ("controller.proportional_gain=0.1 1/(N m)",))
+    named = load_scenario("torque-task-proportional", (FIXED, "controller.proportional_gain=0.1 1/(N m)"))
+    assert integer_form(scenario).control == named.control
+    assert chip_controller(scenario).numbers == chip_controller(named).numbers
 
 
 def test_whole_numbers_have_no_exported_library() -> None:
     with pytest.raises(ProgramError, match="no library yet; 'ppafo firmware' writes it"):
-        c_library(load_scenario("torque-task-solenoid", (FIXED,)))
+        c_library(load_scenario("torque-task-solenoid", ("controller.kind=on_off_on_chip",)))

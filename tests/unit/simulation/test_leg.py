@@ -9,7 +9,6 @@ import pytest
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control.catalog import PROFILES
 from ppafo.control.profiles import Knot, Tabulated, smooth_bounds, smooth_value
-from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.engine.rows import rebuilt
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
@@ -25,6 +24,7 @@ from ppafo.simulation.numbers import check_columns
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.simulation.simulate import simulate
+from tests.judge.reference_solver import compare_with_reference
 
 GAIT = "falisse2019-subject1"
 OPEN = {"kind": "constant", "command": 1, "rate": "1 kHz"}

@@ -6,6 +6,7 @@ import pytest
 
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Orifice, SonicOrifice
+from ppafo.parameters.overrides import over
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.numbers import TIMES, declared_numbers, number_at, other_form, with_numbers
 from ppafo.simulation.scenario import scenario_document
@@ -27,8 +28,7 @@ def test_a_replaced_number_is_the_single_run_with_it(name: str) -> None:
         value = before * 0.999 if before else min(0.125, quantity.maximum)
         text = "3" if path == "sensors.seed" else f"{value!r} {quantity.unit}".removesuffix(" 1")
         changed = with_numbers(scenario, {path: 3.0 if path == "sensors.seed" else value})
-        same_place = path == "motion.profile.level" and "motion.angle" in paths
-        alone = load_scenario(name, [*given, f"{'motion.angle' if same_place else path}={text}"])
+        alone = load_scenario(name, over(given, [f"{path}={text}"]))
         assert {other: number_at(changed, other) for other in paths} == {
             other: number_at(alone, other) for other in paths
         }

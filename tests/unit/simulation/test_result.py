@@ -101,6 +101,12 @@ def test_a_plot_of_a_completed_run_has_no_remark_and_one_of_a_diverged_run_has(r
     assert not diverged.status.is_completed
 
 
+def test_the_ten_reversals_of_the_torque_task_switch_each_valve_of_the_pair_ten_times() -> None:
+    result = ppafo.simulate("torque-task-solenoid")
+    assert np.count_nonzero(np.diff(np.sign(result.recording["command"]))) == 10
+    assert result.metrics["switchings"].value == 20.0
+
+
 @pytest.mark.parametrize(
     ("name", "near"),
     [("switching", "switchings"), ("gas_suplied", "gas_supplied"), ("rms", "rms_error"), ("gas", "gas_supplied")],

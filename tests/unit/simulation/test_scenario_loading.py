@@ -99,7 +99,7 @@ def test_what_is_left_out_has_its_declared_value() -> None:
 
 
 def test_a_held_vane_is_led_along_a_constant_angle() -> None:
-    assert small().motion == PrescribedMotion(ProfileChoice("constant", {"level": math.radians(75.0)}))
+    assert small().motion == PrescribedMotion(ProfileChoice("constant", {"level": math.radians(75.0)}), "held")
 
 
 def test_words_stand_for_the_pressures_of_the_device() -> None:

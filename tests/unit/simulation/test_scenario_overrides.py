@@ -1,5 +1,6 @@
 """Changing single values of a scenario and of its device by dotted path."""
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -25,7 +26,7 @@ def test_values_of_scenario_and_device_are_changed_together() -> None:
     scenario = load_scenario(TASK, ["valve.area=12.6mm^2", "reference.level=5 N m", "motion.angle=80 deg"])
     assert scenario.device.valve.orifice.area == 12.6e-6  # type: ignore[union-attr]
     assert scenario.reference.settings["level"] == 5.0
-    assert scenario.motion == PrescribedMotion(ProfileChoice("constant", {"level": math.radians(80.0)}))
+    assert scenario.motion == PrescribedMotion(ProfileChoice("constant", {"level": math.radians(80.0)}), "held")
 
 
 def test_the_overrides_stay_visible_and_the_file_is_kept_as_it_was() -> None:
@@ -174,8 +175,7 @@ def test_a_setting_may_come_before_its_kind(words: list[str]) -> None:
     assert replace(last, origin=first.origin) == first
 
 
-def test_of_two_values_before_and_behind_a_kind_the_last_counts() -> None:
-    gain, kind = "controller.integral_gain={}".format, "controller.kind=pid"
-    reference = ("reference.kind=constant", "reference.level=2 N m")
-    for words in ([gain(1), kind, gain(2)], [gain(1), gain(2), kind], [kind, gain(1), gain(2)]):
-        assert load_scenario("step-response", [*words, *reference]).control.settings["integral_gain"] == 2.0
+def test_a_value_comes_before_or_behind_the_kind_that_has_it() -> None:
+    words = ["controller.integral_gain=2", "controller.kind=pid", "reference.kind=constant", "reference.level=2 N m"]
+    for order in itertools.permutations(words):
+        assert load_scenario("step-response", order).control.settings["integral_gain"] == 2.0

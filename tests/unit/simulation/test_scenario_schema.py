@@ -10,8 +10,6 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.control.catalog import CONTROLLERS, PROFILES
-from ppafo.control.fixed.torque_laws import FIXED_LAWS
-from ppafo.control.fixed.whole_numbers import SETTINGS as CONVERTER
 from ppafo.simulation.loading import list_scenarios
 from ppafo.simulation.schema import json_schema
 
@@ -51,8 +49,6 @@ def test_the_schema_knows_every_controller_and_profile_and_their_settings() -> N
     described = {(item["properties"].get("kind", {}).get("const"), frozenset(item["properties"])) for item in sections}
     for controller in CONTROLLERS.values():
         names = {"kind", "rate", "period", *(quantity.name for quantity in controller.quantities)}
-        if controller.name in FIXED_LAWS:
-            names |= {"arithmetic", *(quantity.name for quantity in CONVERTER)}
         assert (controller.name, frozenset(names)) in described
     for profile in PROFILES.values():
         assert (profile.name, frozenset({"kind", *(quantity.name for quantity in profile.quantities)})) in described

@@ -1,7 +1,9 @@
 """From a scenario to a result: recordings, status, Python controllers, many at once."""
 
+import copy
 import dataclasses
 import math
+import pickle
 import signal
 import subprocess
 import sys
@@ -14,11 +16,11 @@ import pytest
 
 from ppafo.engine import lane_step
 from ppafo.engine.lanes import write_source
-from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.sensors import Measurement
 from ppafo.running import simulate
+from ppafo.simulation.ensemble import COMPLETED, DIVERGED, run_ensemble
 from ppafo.simulation.ensemble import _result as ensemble_result
 from ppafo.simulation.ensemble.running import Outcome, Request
 from ppafo.simulation.loading import load_scenario
@@ -26,6 +28,7 @@ from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PrescribedMotion, ProfileChoice, Scenario
 from ppafo.simulation.simulate import REMEDY, simulate_many
 from ppafo.walking.result import _status as walk_status
+from tests.judge.reference_solver import compare_with_reference
 
 CHANNELS = {
     "angle",
@@ -265,6 +268,31 @@ def test_a_step_that_is_not_done_in_the_most_parts_ends_the_run_with_time_and_re
     assert all(np.isfinite(result.recording[name]).all() for name in result.recording.names)
 
 
+LIGHT = ["motion.kind=free", "foot_plate.inertia=1e-12 kg m^2"]
+
+
+def test_a_vane_too_light_to_follow_ends_with_time_and_remedy_at_every_door() -> None:
+    result = simulate("step-response", LIGHT)
+    assert result.status.kind == "diverged"
+    assert result.status.message.endswith(REMEDY)
+    assert "check the inertia" in REMEDY
+    # No sample that is kept has more than sources and compression can give.
+    supply = result.scenario.device.supply
+    assert max(result.recording[name].max() for name in ("pressure_1", "pressure_2")) < 1.01 * supply.pressure
+    base = load_scenario("step-response", ["motion.kind=free"])
+    rows = run_ensemble(base, {"foot_plate.inertia": np.array([1e-12, 1e-9])}, ["largest_pressure"])
+    assert rows.status.tolist() == [DIVERGED, COMPLETED]
+    assert rows.reasons[0].endswith(REMEDY)
+    assert rows.metrics["largest_pressure"][1] < 1.01 * supply.pressure
+
+
+def test_a_chamber_that_is_driven_far_above_its_supply_completes() -> None:
+    driven = ["motion.external_torque=30 N m", "motion.angle=120 deg", "controller.command=0"]
+    result = simulate("step-response", ["motion.kind=free", "actuator.dead_volume_1=1 cm^3", *driven])
+    assert result.status.is_completed
+    assert result.recording["pressure_1"].max() > 3.0 * result.scenario.device.supply.pressure
+
+
 def test_runs_of_an_ensemble_and_walks_with_too_many_parts_say_so_too() -> None:
     states = np.zeros((3, 1))
     assert walk_status(1.5, True, states).message.endswith(f"t = 1.5 s; {TOO_MANY_PARTS}")
@@ -272,5 +300,15 @@ def test_runs_of_an_ensemble_and_walks_with_too_many_parts_say_so_too() -> None:
     outcome = Outcome(2, Request({}, (), 1.0, np.empty(0)))
     outcome.failure_time[:] = 1.5
     outcome.too_many_parts[1] = True
-    told = ensemble_result(SimpleNamespace(reasons={}), outcome).reasons  # type: ignore[arg-type]
+    told = ensemble_result(SimpleNamespace(reasons={}), outcome, {}).reasons  # type: ignore[arg-type]
     assert told == {0: f"diverged at t = 1.5 s; {REMEDY}", 1: f"diverged at t = 1.5 s; {TOO_MANY_PARTS}"}
+
+
+def test_a_result_that_nobody_has_looked_at_is_copied_pickled_and_compared_as_any_other(
+    step_response: Scenario,
+) -> None:
+    first, other = simulate_many([step_response, step_response])
+    stored = pickle.loads(pickle.dumps(first))
+    assert stored.recording == other.recording
+    assert stored.metrics["angle_range"].value == other.metrics["angle_range"].value
+    assert copy.deepcopy(simulate(step_response)) == dataclasses.replace(first, status=other.status)

@@ -3,17 +3,18 @@
 import numpy as np
 import pytest
 
-from ppafo.engine.reference.solver import compare_with_reference
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.metrics.gas import energy_imbalance, gas_imbalance
 from ppafo.model.orifice import orifice_flow
 from ppafo.model.plant import chamber_volumes
 from ppafo.model.regulator import SupplyLines
+from ppafo.parameters.overrides import over
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import scenario_document
+from tests.judge.reference_solver import compare_with_reference
 
 LINES = ("supply_line.plantarflexion.droop=3e6 Pa s/kg",)
 WARM = (
@@ -53,7 +54,7 @@ def test_a_scenario_takes_the_section_of_a_walk_file_and_lists_what_it_leaves_to
 )
 def test_a_mistake_is_named_in_one_line(override: str, line: str) -> None:
     with pytest.raises(ScenarioError, match=line) as caught:
-        load_scenario("torque-task-proportional", [*LINES, override])
+        load_scenario("torque-task-proportional", over(LINES, [override]))
     assert "\n" not in str(caught.value)
 
 
@@ -132,7 +133,7 @@ def test_an_ensemble_over_the_droop_is_its_runs_to_the_last_bit_and_refuses_a_se
             f"supply_line.plantarflexion.droop={float(droops[run])!r} Pa s/kg",
             "supply.dorsiflexion_pressure=4e5 Pa_a",
         ]
-        alone = simulate("torque-task-proportional", [*SHORT, *LINES, *overrides])
+        alone = simulate("torque-task-proportional", over([*SHORT, *LINES], overrides))
         assert ensemble.metrics["gas_supplied"][run] == alone.metrics["gas_supplied"].value
     assert np.isnan(ensemble.metrics["gas_supplied"][2])
     with pytest.raises(ScenarioError, match=r"no number 'supply_line.*droop' that could vary"):

@@ -27,7 +27,6 @@ WALKS: dict[str, tuple[str, tuple[str, ...]]] = {
     "lines": ("proportional-regulators", ()),
     "lines, slow": ("solenoid-regulators", ("controller.rate=500 Hz",)),
     "timed": ("proportional", ("timing.kind=estimated", "sensors.pressure_bandwidth=40 Hz")),
-    "whole numbers": ("solenoid", ("controller.arithmetic=fixed",)),
     "course": ("proportional", ("course=first-steps",)),
     "late toes": ("solenoid", LATE),
     "thermal": ("proportional", (*THERMAL, "gas_model.wall_area_per_volume=100 1/m", "sensors.force_noise=2 N")),
@@ -109,7 +108,7 @@ def test_a_walk_that_contradicts_itself_is_refused_and_the_others_go_on() -> Non
     assert "must be below controller.load_threshold, which is 25 N" in found.reasons[1]
 
 
-@pytest.mark.parametrize("name", ["solenoid", "course", "whole numbers"])
+@pytest.mark.parametrize("name", ["solenoid", "course"])
 def test_a_person_of_the_population_walks_in_a_row_as_alone(name: str) -> None:
     file, words = WALKS[name]
     base = load_walk(file, [*words, *(() if "course" in name else ("run.duration=6 s",))])

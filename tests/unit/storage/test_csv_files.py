@@ -83,6 +83,8 @@ def test_windows_files_with_comments_and_a_byte_order_mark_are_read(tmp_path: Pa
             r"line 3, column 'angle \[rad\]': 'nan' is not a number, or not a finite one",
         ),
         ("time [s],angle [rad]\n0,1\n1,1_000\n", r"line 3, column 'angle \[rad\]': '1_000' is not a number"),
+        ("time [s],angle [rad]\n0,1\n1,\uff12\n", "line 3, column 'angle \\[rad\\]': '\uff12' is not a number"),
+        ("time [s],angle [rad]\n0,1\n1,\u0662\n", "line 3, column 'angle \\[rad\\]': '\u0662' is not a number"),
         ("time [s],angle [rad]\n0,1\n0,2\n", "line 3, column 'time': the clock stands still"),
         ("# a\ntime [s],angle [rad]\n1,1\n0,2\n", "line 4, column 'time': the clock goes backwards"),
         ("time [s],angle [rad]\n0,1\n0,2\n", "time must increase"),

@@ -200,3 +200,29 @@ def test_module_in_the_working_folder_is_not_run(tmp_path: Path, monkeypatch: py
     monkeypatch.chdir(tmp_path)
     assert len(read_recording("bench.nc")) == 3
     assert not (tmp_path / "sprung").exists()
+
+
+@pytest.mark.parametrize(
+    ("key", "limits", "first"),
+    [("valid_min", 0.5, 0.0), ("valid_max", 1.5, 2.0), ("valid_range", [0.5, 3.0], 0.0), ("valid_range", [0, 1], 2.0)],
+)
+def test_values_outside_the_valid_ones_of_the_file_are_refused(
+    key: str, limits: object, first: float, tmp_path: Path
+) -> None:
+    with h5py.File(tmp_path / "bench.nc", "w") as file:
+        file["time"] = np.arange(3.0)
+        file["time"].attrs["units"] = "s"
+        file["angle"] = np.arange(3.0)
+        file["angle"].attrs["units"] = "rad"
+        file["angle"].attrs[key] = limits
+    message = rf"'angle' has 1 values that are not valid \('{key}'\), the first {first:g} at row {first + 1:g}; "
+    with pytest.raises(DataError, match=message):
+        read_netcdf(tmp_path / "bench.nc")
+    with h5py.File(tmp_path / "bench.nc", "a") as file:
+        file["angle"].attrs["valid_min"], file["angle"].attrs["valid_max"] = 0.0, 2.0
+        file["angle"].attrs["valid_range"] = [0.0, 2.0]
+    assert read_netcdf(tmp_path / "bench.nc")["angle"].tolist() == [0.0, 1.0, 2.0]
+    with h5py.File(tmp_path / "bench.nc", "a") as file:
+        file["angle"].attrs["valid_range"] = [0.0, 2.0, 3.0]
+    with pytest.raises(DataError, match="'angle': its attribute 'valid_range' has 3 numbers, it must have 2"):
+        read_netcdf(tmp_path / "bench.nc")

@@ -75,9 +75,9 @@ def test_a_mark_without_hashes_removes_nothing(tmp_path: Path) -> None:
 
 
 def test_folders_inside_a_result_are_its_own_and_what_others_put_into_them_is_not(tmp_path: Path) -> None:
-    out, kind = tmp_path / "out", marked_folder("export mujoco")
-    write_marked_folder(out, {"README.md": b"", "sources/deep/engine.c": b"1"}, "export mujoco")
-    write_marked_folder(out, {"README.md": b"", "sources/deep/engine.c": b"2"}, "export mujoco")
+    out, kind = tmp_path / "out", marked_folder("export c")
+    write_marked_folder(out, {"README.md": b"", "sources/deep/engine.c": b"1"}, "export c")
+    write_marked_folder(out, {"README.md": b"", "sources/deep/engine.c": b"2"}, "export c")
     assert (out / "sources" / "deep" / "engine.c").read_bytes() == b"2"
     (out / "sources" / "deep" / "notes.txt").write_text("mine")
     with pytest.raises(DataError, match=r"\(sources/deep/notes\.txt\)"):

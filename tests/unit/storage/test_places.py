@@ -1,12 +1,13 @@
 """Folders on a disk and at addresses behave alike."""
 
 import os
+import tracemalloc
 from pathlib import Path
 
 import pytest
 
 from ppafo.errors import DataError
-from ppafo.storage.places import Place, place_at
+from ppafo.storage.places import Place, place_at, read_document
 
 
 @pytest.fixture(params=["disk", "memory"])
@@ -67,3 +68,13 @@ def test_an_address_without_the_extra_says_what_to_install(monkeypatch: pytest.M
     monkeypatch.setitem(__import__("sys").modules, "fsspec.core", None)
     with pytest.raises(DataError, match=r"pip install 'ppafo\[cluster\]'"):
         place_at("s3://bucket/study")
+
+
+def test_a_small_document_takes_little_memory(place: Place) -> None:
+    place.write("one.json", b'{"runs": 3}')
+    tracemalloc.start()
+    document = read_document(place, "one.json")
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert document == {"runs": 3}
+    assert most < 10_000_000

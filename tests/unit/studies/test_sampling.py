@@ -19,7 +19,7 @@ from ppafo.studies.distributions import (
     UniformBetween,
 )
 from ppafo.studies.loading import load_study
-from ppafo.studies.sampling import permute, uniform_numbers
+from ppafo.studies.sampling import cholesky_factor, permute, uniform_numbers
 from ppafo.studies.study import Sample
 
 SHARES = np.linspace(1e-6, 1.0 - 1e-6, 201)
@@ -192,3 +192,10 @@ def test_chunks_hold_every_run_once_and_never_two_configurations(small: Any) -> 
     runs = [(part.configuration, run) for part in parts for run in range(part.first, part.first + part.runs)]
     assert runs == [(configuration, run) for configuration in range(2) for run in range(16)]
     assert [part.runs for part in parts] == [5, 5, 5, 1, 5, 5, 5, 1]
+
+
+def test_scores_that_follow_from_others_but_for_rounding_have_no_factor() -> None:
+    nearly = np.array([[1.0, 1.0 - 1e-15], [1.0 - 1e-15, 1.0]])
+    assert np.isfinite(np.linalg.cholesky(nearly)).all()
+    assert cholesky_factor(nearly) is None
+    assert cholesky_factor(np.array([[1.0, 1.0 - 1e-9], [1.0 - 1e-9, 1.0]])) is not None

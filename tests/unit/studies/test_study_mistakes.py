@@ -142,7 +142,7 @@ def test_the_duration_varies_only_where_nothing_is_kept_over_time(small: Any) ->
     small["vary"].append({"path": "run.duration", "kind": "list", "values": ["0.1 s", "0.2 s"]})
     assert "'run.duration' cannot vary where trajectories or bands are kept" in refused(small)
     small["outputs"] = {"metrics": ["rms_error"]}
-    assert "'run.duration' is both set and varied" in refused(small)
+    assert "'run.duration=0.2 s' is set and 'run.duration' is varied" in refused(small)
     for table in small["configurations"]:
         table["overrides"] = [text for text in table["overrides"] if not text.startswith("run.duration")]
     assert load_study(small).runs == 64

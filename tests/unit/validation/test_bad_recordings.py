@@ -190,7 +190,7 @@ def test_thresholds_are_shares_or_errors_and_the_last_one_wins() -> None:
     assert thresholds.limit("torque").fraction_of(123.0) == 0.05
     assert thresholds.limit("pressure_1").fraction_of(1e5) == pytest.approx(0.07)
     assert thresholds.limit("angle").fraction_of(np.radians(110.0)) == pytest.approx(0.02)
-    assert parse_thresholds().limit("angle").fraction_of(1.0) == 0.10
+    assert parse_thresholds().limit("angle") is None
 
 
 @pytest.mark.parametrize("text", ["pressure_3=0 psi_g", "angle=3 psi_g", "pressure_1=3 psi", "pressure_1"])

@@ -13,6 +13,7 @@ from ppafo.parameters.device import Device
 from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
+from ppafo.validation.agreement import Comparison, Curve, channel_agreement
 from ppafo.validation.measured import parse_thresholds
 
 Agree = Callable[..., Any]
@@ -134,6 +135,52 @@ def test_full_ranges_are_those_of_the_paper(step: Step, agree: Agree) -> None:
     assert ranges["pressure_difference"] / psi == pytest.approx(110.0)
 
 
+def resting(chamber: np.ndarray) -> Recording:
+    """A vane on its lower stop with the valve closed, chamber 1 at rest and chamber 2 as it is given [Pa]."""
+    time = np.linspace(0.0, 1.0, chamber.size)
+    noise = np.random.default_rng(11).normal(0.0, 200.0, (2, chamber.size))
+    channels = {
+        "command": Channel(np.zeros(chamber.size), "-"),
+        "angle": Channel(np.full(chamber.size, np.radians(20.0)), "rad"),
+        "pressure_1": Channel(101325.0 + noise[0], "Pa"),
+        "pressure_2": Channel(chamber + noise[1], "Pa"),
+    }
+    return Recording("rest", time, channels)
+
+
+def tight() -> Device:
+    """The paper's device without a leak: at rest with closed valves no pressure changes."""
+    return load_device("ppafo2011", overrides=["actuator.leak.area=0 mm^2"])
+
+
+def test_a_constant_does_not_agree_with_a_chamber_that_loses_pressure(agree: Agree) -> None:
+    psi = 6894.757293168
+    lost = 4.0e5 - 1.4 * psi * np.linspace(0.0, 1.0, 500)
+    agreement = agree(resting(lost), tight(), motion="held")
+    chamber = next(one for one in agreement.channels if one.channel == "pressure_2")
+    assert chamber.fraction < 0.10
+    assert chamber.variation == pytest.approx(float(np.std(lost)), rel=0.05)
+    assert chamber.rms**2 > 2.0 * float(np.var(lost)), "a mean would explain more"
+    assert not chamber.passes
+
+
+def test_a_right_model_agrees_with_a_noisy_signal_that_moves_little_or_not_at_all(step: Step, agree: Agree) -> None:
+    device, recording = step
+    random = np.random.default_rng(5)
+    noisy = with_channels(
+        recording, pressure_2=recording["pressure_2"] + 2.0e4 * random.standard_normal(len(recording))
+    )
+    start = {"pressure_2": float(recording["pressure_2"][0])}
+    channels = {one.channel: one for one in agree(noisy, device, initial=start).channels}
+    assert channels["pressure_2"].in_noise == pytest.approx(1.0, abs=0.1)
+    assert channels["pressure_2"].passes
+    time, room = recording.time, np.full(len(recording), 101325.0)
+    seen = room + 200.0 * random.standard_normal(room.size)
+    still = channel_agreement(Comparison("pressure_1", "Pa_d", Curve(time, seen, time, room, 4.0e5), None), 0.0, 0.0)
+    assert still.variation < 100.0
+    assert still.passes
+
+
 def test_the_four_errors_of_the_paper_are_within_its_ten_percent_and_not_within_less(step: Step, agree: Agree) -> None:
     """2.1 deg, 3.7 psi, 1.4 psi and 4.8 psi as constant errors: 1.9, 6.8 (6.7), 2.6 (2.5) and 4.4 %."""
     device, recording = step
@@ -233,3 +280,15 @@ def test_a_channel_whose_own_delay_is_at_the_limit_is_flagged(step: Step, agree:
     assert "pressure_2" in late_ones
     assert "angle" not in late_ones
     assert any(remark.startswith("own delay of pressure_2") for remark in agreement.remarks)
+
+
+@pytest.mark.parametrize("name", ["cylinder-lever", "muscle-pair"])
+def test_another_actuator_is_replayed_with_its_own_pressures_and_torque(name: str, agree: Agree) -> None:
+    scenario = load_scenario("step-response", [f"device.set={name}", "motion.kind=free", "run.duration=0.2 s"])
+    recording = simulate(scenario).recording
+    agreement = agree(recording, scenario.device)
+    assert max(shares(agreement).values()) < 1e-12
+    constant = scenario.device.actuator.torque_constant * (recording["pressure_1"] - recording["pressure_2"])
+    assert not np.allclose(recording["torque"], constant, rtol=0.05)
+    friction = dataclasses.replace(scenario.device.friction, viscous_damping=2.0)
+    assert not agree(recording, dataclasses.replace(scenario.device, friction=friction)).passes

@@ -14,6 +14,7 @@ from ppafo.control.walking import signs
 from ppafo.engine.lanes import Batch, run_batch
 from ppafo.engine.rows import leaf_paths, numbers
 from ppafo.engine.run import batch_of
+from ppafo.model.contact import TOE
 from ppafo.model.plant import chamber_pressures
 from ppafo.model.sensors import Fault, GaitSensors
 from ppafo.simulation.sampled import state_row_numbers
@@ -22,6 +23,7 @@ from ppafo.walking import load_walk, walk_population
 from ppafo.walking.events import SAFE_ROW
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import gait_sensors_of, plan_walk
+from ppafo.walking.walk import walk
 
 PAGE = (Path(__file__).parents[3] / "docs" / "how-to" / "let-it-walk.md").read_text(encoding="utf-8")
 SECTION = PAGE.partition("## When a sensor fails")[2].partition("\n## ")[0]
@@ -190,3 +192,11 @@ def test_wearers_whose_controller_paused_or_stopped_are_counted_with_the_sign() 
     people = walk_population(configuration, 0.15, 9)
     assert people.vented + people.paused == 9
     assert people.vented >= 5
+
+
+def test_a_toe_channel_that_shows_the_heel_brakes_no_push_off() -> None:
+    fault = ["faults.toe.kind=distorted", "faults.toe.time=0 s", "faults.toe.crosstalk=1"]
+    result = walk(load_walk("proportional", fault), 0.09)
+    on_toes = result.recording["contact"] == TOE
+    assert -result.recording["torque"][on_toes].min() < 0.5
+    assert [event.sign.name for event in result.events if event.sign is not None][:1] == ["no_toe_off"]

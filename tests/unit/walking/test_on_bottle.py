@@ -10,11 +10,13 @@ from ppafo.engine.lanes import BatchResult, Floats
 from ppafo.engine.rows import row_numbers
 from ppafo.errors import ParameterError, ScenarioError, SimulationError
 from ppafo.parameters.bottles.bottle import FILE as BOTTLES
+from ppafo.parameters.overrides import over
 from ppafo.walking import bottle, load_walk, walk, walk_population
+from ppafo.walking.bottle import Schedule
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.result import WalkResult
-from ppafo.walking.walk import compare_walks, with_device_off
+from ppafo.walking.walk import bottle_life, compare_walks, with_device_off
 from tests.judge import bottle as independent
 
 WALK, BOTTLE = "solenoid-regulators", "paper-co2-9oz"
@@ -43,6 +45,14 @@ def test_a_bottle_of_a_gram_ends_empty_and_its_gas_stays_what_a_gas_can_be() -> 
     assert values["bottle_temperature"].max() <= 298.0 + 1e-9, "nothing is warmer than the room"
     assert values["bottle_pressure"].max() == values["bottle_pressure"][0]
     assert np.diff(values["bottle_mass"]).min() > -0.06e-3, "no more than a share leaves between two meetings"
+
+
+def test_how_long_a_bottle_lasts_is_walked_with_small_steps_too() -> None:
+    """A day of them would be more than a run may have."""
+    small = ["run.step=0.05 ms", "bottle.gas_mass=1 g", "bottle.volume=30 cm^3"]
+    life = bottle_life(load_walk("solenoid", small, bottle="paper-co2-9oz"), Schedule(86400.0, 0.0, 86400.0))
+    assert life.course.ending.kind == "empty"
+    assert 0.5 < life.walked < 10.0
 
 
 def test_what_leaves_the_bottle_is_in_the_lines_or_went_into_the_device(small: WalkResult) -> None:
@@ -184,7 +194,7 @@ MISTAKES = {
 @pytest.mark.parametrize("override", MISTAKES)
 def test_a_mistake_is_named_in_one_line(override: str) -> None:
     with pytest.raises((ScenarioError, ParameterError), match=MISTAKES[override]) as caught:
-        load_walk(WALK, ["bottle.name=paper-co2-9oz", override])
+        load_walk(WALK, over(["bottle.name=paper-co2-9oz"], [override]))
     assert "\n" not in str(caught.value)
 
 

@@ -183,7 +183,7 @@ def test_a_walk_on_a_bottle_ends_with_the_fall_and_strides_are_those_of_the_wear
     assert bare.status.message.startswith("completed: the wearer fell"), "as long a walk, whoever fell in the other"
     life = endurance(walk(load_walk(WALK), 0.1), overrides=["bottle.gas_mass=6 g", "bottle.volume=30 cm^3"])
     assert isinstance(life, Endurance)
-    assert life.draw.step_time == pytest.approx(walk(load_walk(WALK), 0.1).metrics["stride_time"].value)
+    assert life.draw.stride_time == pytest.approx(walk(load_walk(WALK), 0.1).metrics["stride_time"].value)
     (tmp_path / "walk.json").write_text(json.dumps({"format": answer_of(pair).data["format"]}))
     with pytest.raises(DataError, match="is the walk of a wearer who reacts: walk on the bottle"):
         endurance(tmp_path)

@@ -137,10 +137,6 @@ def test_a_bottle_gives_what_both_devices_take() -> None:
             "wearer.device_on = 'right' is not allowed; allowed: left, both",
         ),
         (("walk", "solenoid", "--set", BOTH), 'needs a wearer who reacts: give wearer.reacts = "NAME"'),
-        (
-            ("chip", WALK, "--set", BOTH, "--set", "controller.arithmetic=fixed"),
-            "a chip or a Python object commands one",
-        ),
         (("export", "c", WALK, "--interface", "plant", "--set", BOTH), "knows one device: leave wearer.device_on out"),
     ],
 )

@@ -13,7 +13,7 @@ import pytest
 import ppafo
 from ppafo.cli.main import main
 from ppafo.errors import DataError, PpafoError, ScenarioError
-from ppafo.loading import json_schema, list_all_scenarios, load_scenario, scenario_from_dict
+from ppafo.loading import json_schema, list_all_scenarios, load_scenario, reloaded, scenario_from_dict
 from ppafo.simulation.loading import load_scenario as load_vane
 from ppafo.simulation.numbers import declared_numbers
 from ppafo.simulation.scenario import Scenario
@@ -159,13 +159,14 @@ def test_the_schema_of_scenarios_takes_every_shipped_one_and_a_motion_that_is_a_
 
 
 def test_another_kind_drops_the_settings_of_the_old_one_as_in_every_scenario() -> None:
-    on_off = load_scenario(NAME, ["controller.peak_torque=5 N m", "controller.kind=event_on_off"])
+    on_off = load_scenario(NAME, ["controller.kind=event_on_off"])
     assert "peak_torque" not in on_off.control.settings
-    cold = [f"gas_model.{text}" for text in ("kind=thermal", "heat_transfer_coefficient=50 W/(m^2 K)")]
-    assert (
-        load_scenario(NAME, [*cold, "gas_model.wall_area_per_volume=100 1/m", "gas_model.kind=isothermal"]).thermal
-        is None
-    )
+    warm = ("kind=thermal", "heat_transfer_coefficient=50 W/(m^2 K)", "wall_area_per_volume=100 1/m")
+    thermal = load_scenario(NAME, [f"gas_model.{text}" for text in warm])
+    assert thermal.thermal is not None
+    assert reloaded(thermal, ["gas_model.kind=isothermal"]).thermal is None
+    with pytest.raises(ScenarioError, match=r"'controller.peak_torque=5 N m' and 'controller.kind=event_on_off'"):
+        load_scenario(NAME, ["controller.peak_torque=5 N m", "controller.kind=event_on_off"])
 
 
 def test_simulate_runs_a_walk_with_its_metrics_and_its_figure(

@@ -8,12 +8,13 @@ at 32 full commands.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from ppafo.control.controllers.feedback import PID as FLOAT_PID
 from ppafo.control.controllers.switching import ON_OFF as FLOAT_ON_OFF
 from ppafo.control.controllers.switching import ON_OFF_DEAD_ZONE as FLOAT_DEAD_ZONE
+from ppafo.control.fixed.planning import Numbers, on_chip
 from ppafo.control.fixed.whole_numbers import (
     COMMAND_STEPS,
     FRACTION_BITS,
@@ -39,12 +40,8 @@ from ppafo.control.kind import ControllerKind
 from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
 
-FLOAT, FIXED = "float", "fixed"
-"""The two arithmetics of a controller."""
 TARGETS = ("msp430f2013", "cortex-m0", "cortex-m4")
 """Processors that an integer controller can be written for."""
-WALK_TARGETS = ("msp430g2553",)
-"""And those that an integer controller of walking can be written for: the smallest has no room for it."""
 
 
 def sound_of(state: Any) -> int:
@@ -55,18 +52,13 @@ def sound_of(state: Any) -> int:
 
 @dataclass(frozen=True, slots=True)
 class FixedLaw:
-    """The integer form of a controller of the catalogue, of a torque task or of a walk.
+    """The integer form of a controller of the catalogue.
 
     ``kind`` runs it in the lanes: its update reads the converter, calls ``sample`` and gives the command back as a
-    number from -1 to 1, or ``VENT``. ``sample(numbers, state, readings)`` is the law itself, on whole numbers only: the
+    number from -1 to 1. ``sample(numbers, state, readings)`` is the law itself, on whole numbers only: the
     command in steps and the next state. ``numbers`` and ``readings`` are the NamedTuple classes of what it is given;
     ``number_quantities`` declare the numbers, in order. The state ``begins`` so, and ``state_ranges`` has lowest and
     highest of every number of it, by its own name; ``status`` is the word that a chip reports of it.
-
-    ``prepare`` makes the numbers: of a torque law ``(settings, period, torque_step)`` those after the limits of its
-    readings, of a walking law ``(settings, period, converter)`` all by name, which may not be within their ranges yet.
-    ``largest(settings, period, torque_step)`` is the largest part of its range that any number of a torque law takes,
-    above 1 where the settings cannot be held.
     """
 
     kind: ControllerKind
@@ -75,14 +67,12 @@ class FixedLaw:
     number_quantities: tuple[Quantity, ...]
     begins: Any
     state_ranges: Mapping[str, tuple[int, int]]
-    prepare: Callable[[Mapping[str, float], float, Any], Any]
     readings: type = Readings
     status: Callable[[Any], int] = sound_of
-    largest: Callable[[Mapping[str, float], float, float], float] = lambda _settings, _period, _step: 0.0
 
     @property
     def name(self) -> str:
-        """That of the controller whose form it is."""
+        """That of its controller."""
         return self.kind.name
 
 
@@ -188,37 +178,35 @@ _DEAD_ZONE_NUMBERS = (
     Quantity("release", "", "error at which it closes again, in counts", None, 0.0, _READING),
     Quantity("opening", "", "command while it is open, in steps", None, 0.0, _STEPS),
 )
+ON_OFF_ON_CHIP = on_chip(
+    FLOAT_ON_OFF,
+    OnOffRows,
+    each(float, OnOffCounts(1)),
+    on_off_update,
+    Numbers("on_off_on_chip", (*OF_STEPS, *OF_LIMITS), prepare_on_off),
+)
 ON_OFF = FixedLaw(
-    kind=replace(
-        FLOAT_ON_OFF,
-        quantities=(*OF_STEPS, *OF_LIMITS),
-        parameters=OnOffRows,
-        initial=each(float, OnOffCounts(1)),
-        update=on_off_update,
-    ),
+    kind=ON_OFF_ON_CHIP,
     sample=on_off_sample,
     numbers=OnOffNumbers,
     number_quantities=OF_LIMITS,
     begins=OnOffCounts(1),
     state_ranges={"sound": (0, 1)},
-    prepare=prepare_on_off,
+)
+DEAD_ZONE_ON_CHIP = on_chip(
+    FLOAT_DEAD_ZONE,
+    DeadZoneRows,
+    each(float, DeadZoneCounts(0, 1)),
+    dead_zone_update,
+    Numbers("on_off_dead_zone_on_chip", (*OF_STEPS, *_DEAD_ZONE_NUMBERS), prepare_dead_zone, largest_dead_zone),
 )
 DEAD_ZONE = FixedLaw(
-    kind=replace(
-        FLOAT_DEAD_ZONE,
-        quantities=(*OF_STEPS, *_DEAD_ZONE_NUMBERS),
-        parameters=DeadZoneRows,
-        initial=each(float, DeadZoneCounts(0, 1)),
-        update=dead_zone_update,
-        restart=None,
-    ),
+    kind=DEAD_ZONE_ON_CHIP,
     sample=dead_zone_sample,
     numbers=DeadZoneNumbers,
     number_quantities=_DEAD_ZONE_NUMBERS,
     begins=DeadZoneCounts(0, 1),
     state_ranges={"direction": (-1, 1), "sound": (0, 1)},
-    prepare=prepare_dead_zone,
-    largest=largest_dead_zone,
 )
 
 
@@ -340,15 +328,15 @@ _PID_NUMBERS = (
 )
 _PID_BEGINS = PidCounts(integral=0, error=0, slope=0, started=0, sound=1)
 _ERROR = LARGEST_READING + LARGEST_READING
+PID_ON_CHIP = on_chip(
+    FLOAT_PID,
+    PidRows,
+    each(float, _PID_BEGINS),
+    pid_update,
+    Numbers("pid_on_chip", (*OF_STEPS, *_PID_NUMBERS), prepare_pid, largest_pid),
+)
 PID = FixedLaw(
-    kind=replace(
-        FLOAT_PID,
-        quantities=(*OF_STEPS, *_PID_NUMBERS),
-        parameters=PidRows,
-        initial=each(float, _PID_BEGINS),
-        update=pid_update,
-        restart=None,
-    ),
+    kind=PID_ON_CHIP,
     sample=pid_sample,
     numbers=PidNumbers,
     number_quantities=_PID_NUMBERS,
@@ -360,8 +348,6 @@ PID = FixedLaw(
         "started": (0, 1),
         "sound": (0, 1),
     },
-    prepare=prepare_pid,
-    largest=largest_pid,
 )
 
 

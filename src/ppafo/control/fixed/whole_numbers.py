@@ -12,8 +12,6 @@ from ppafo.model.sensors import Measurement
 
 FRACTION_BITS = 15
 LARGEST_FRACTION: int = 2**FRACTION_BITS - 1
-HALF: int = 2 ** (FRACTION_BITS - 1)
-"""Added before fifteen shifts to the right: a half of what is left."""
 MOST_PLACES = 30
 WIDEST = 2**30
 """Size of the largest value that ``fraction_of`` takes without leaving 32 bits."""
@@ -41,16 +39,6 @@ class Gain(NamedTuple):
 def fraction_of(value: int, fraction: int) -> int:
     """``value`` (2^30 at most in size) times ``fraction`` / 2^15, rounded down at every bit of the fraction."""
     total = 0
-    left = fraction
-    for _ in range(FRACTION_BITS):
-        total = (total + value if left & 1 == 1 else total) >> 1
-        left = left >> 1
-    return total
-
-
-def nearest_fraction_of(value: int, fraction: int) -> int:
-    """``value`` (2^14 at most in size) times ``fraction`` / 2^15, rounded to the nearest; 16 bits hold all of it."""
-    total = HALF
     left = fraction
     for _ in range(FRACTION_BITS):
         total = (total + value if left & 1 == 1 else total) >> 1

@@ -82,6 +82,9 @@ ASSISTANCE_QUANTITIES = (
 )
 """Fields of ``Assistance`` in order."""
 
+PEAKS = ("peak_torque", "landing_peak_torque", "swing_peak_torque")
+"""Settings that ``largest_torque`` limits."""
+
 ASSISTING_QUANTITIES = (*ASSISTANCE_QUANTITIES, *PHASE_QUANTITIES, *SAFETY_QUANTITIES)
 """What every law declares after its own settings that follows ``assistance``."""
 

@@ -276,10 +276,13 @@ def walking_controllers() -> dict[str, ControllerKind]:
     """Return all that a walk file can name: those with gains for walking, and every torque law by its own name.
 
     A law that has gains for walking has them under its own name too: ``pid`` is ``event_pid``. A constant command
-    follows no torque and does not walk, nor does a law whose settings have names that walking has taken.
+    follows no torque and does not walk, nor does a law on whole numbers or one whose settings have names that walking
+    has taken.
     """
     laws = {
-        name: law for name, law in CONTROLLERS.items() if law is not switching.CONSTANT and not shared_settings(law)
+        name: law
+        for name, law in CONTROLLERS.items()
+        if law is not switching.CONSTANT and law.plan is None and not shared_settings(law)
     }
     return dict(WALKING_CONTROLLERS) | {name: law_that_walks(law) for name, law in laws.items()}
 

@@ -35,6 +35,8 @@ class Stance(NamedTuple):
 
     Both times end where the other one begins; the second one ends in the swing too. ``flat_angle`` [rad] is the ankle
     angle while the heel carried last, 0 before the first sample; ``turned`` is 1 once the ankle has left it.
+    ``largest`` [N] is the larger force at most since the strike, ``on_toes`` [N] how far the toe force was above the
+    heel force at most since the heel carried last.
     """
 
     heel_seen: float
@@ -43,6 +45,8 @@ class Stance(NamedTuple):
     apart: float
     flat_angle: float = 0.0
     turned: float = 0.0
+    largest: float = 0.0
+    on_toes: float = 0.0
 
 
 class Finding(NamedTuple):
@@ -115,12 +119,27 @@ RESTS = 0.05
 """Angle [rad] within which an ankle rests: who sits unloads heel and toes too, but does not turn the ankle, and a foot
 that steps has turned by more before its toes leave the ground."""
 
+ROLLS = 0.4
+"""Of the largest force in a stance, that toes carry more than the heel before they leave the ground: 0.98 and more in
+walks without a fault, since the heel is off the ground by then. Two channels that read one sensor have 0, swapped ones
+less than 0."""
+
+CARRIES = 100.0
+"""Force [N] in a stance below which that is not judged: the foot of who sits has less."""
+
 MINIMUM_OPENING = 0.1
 """Commands below this may lie within the overlap of a valve: they do not count as opening it."""
 
 
-def next_stance(last: Stance, before: PhaseState, phase: PhaseState, angle: float, period: float) -> Stance:
-    """The stance after a sample of ``period`` [s] with an ankle angle [rad]; a strike begins a new one."""
+def next_stance(
+    last: Stance, before: PhaseState, phase: PhaseState, measurement: GaitMeasurement, period: float
+) -> Stance:
+    """The stance after a sample of ``period`` [s]; a strike begins a new one."""
+    angle, heel_force, toe_force = measurement.angle, measurement.heel_force, measurement.toe_force
+    # A strike is known some samples late: what loads the foot before belongs to the next stance.
+    swings = phase.phase == SWING
+    larger = last.largest if swings else max(heel_force, toe_force)
+    more_on_toes = last.on_toes if swings else toe_force - heel_force
     heel, toe = phase.heel.loaded, phase.toe.loaded
     strikes = (before.phase == SWING) & (phase.phase != SWING)
     both = min(heel, toe) > 0.5
@@ -135,7 +154,14 @@ def next_stance(last: Stance, before: PhaseState, phase: PhaseState, angle: floa
         apart=last.apart + period if one else 0.0,
         flat_angle=flat_angle,
         turned=1.0 if turns | ((last.turned > 0.5) & (not flat)) else 0.0,
+        largest=larger if strikes else max(last.largest, larger),
+        on_toes=more_on_toes if strikes | flat else max(last.on_toes, more_on_toes),
     )
+
+
+def rolls_over(stance: Stance) -> bool:
+    """True where the toes carry what the heel no longer does, which tells both sensors from each other."""
+    return stance.on_toes >= ROLLS * stance.largest
 
 
 def gait_sign(rules: signs.SafetyRules, before: PhaseState, phase: PhaseState, stance: Stance) -> float:
@@ -145,7 +171,10 @@ def gait_sign(rules: signs.SafetyRules, before: PhaseState, phase: PhaseState, s
     stays = (before.phase != SWING) & (phase.phase != SWING) & (before.since_strike > longest)
     returns = (phase.heel.loaded > before.heel.loaded) | (phase.toe.loaded > before.toe.loaded)
     skips_toes = (before.phase == LANDING) & (phase.phase == SWING) & (phase.strikes > 1.5)
-    found = signs.NO_TOES if skips_toes else signs.NO_SIGN
+    # Who sits has unloaded both alike, but does not turn the ankle.
+    leaves = (phase.phase == SWING) & (stance.turned > 0.5) & (stance.largest > CARRIES)
+    found = signs.NO_TOE_OFF if leaves & (not rolls_over(stance)) else signs.NO_SIGN
+    found = signs.NO_TOES if skips_toes else found
     found = signs.RESTLESS if stays & returns else found
     return signs.ENDLESS_PHASE if endless else found
 
@@ -231,7 +260,7 @@ def remembered(
     return state._replace(
         readings=seen,
         landing=signs.next_landing(rules, state.landing, seen, before, phase, steady, period),
-        stance=next_stance(state.stance, before, phase, measurement.angle, period),
+        stance=next_stance(state.stance, before, phase, measurement, period),
         toe_strides=(state.toe_strides + 1.0 if on_toes else 0.0) if enters else state.toe_strides,
         steady=steady,
         observer=observer.next_observer(
@@ -318,10 +347,10 @@ def feed_time(since: float, opening: float, period: float) -> float:
 def permits(state: SafetyState, phase: float) -> bool:
     """True where the device may act in a phase.
 
-    A push needs a heel that was loaded in this stance and has risen; a foot that is lifted has left the ground by
-    turning, for that of somebody who sits is unloaded where it stands.
+    A push needs a heel that was loaded in this stance and has risen, and toes that carry in its place; a foot that is
+    lifted has left the ground by turning, for that of somebody who sits is unloaded where it stands.
     """
-    pushes = (state.level < signs.LIFTS) & (state.stance.heel_seen > 0.5)
+    pushes = (state.level < signs.LIFTS) & (state.stance.heel_seen > 0.5) & rolls_over(state.stance)
     steps = (phase > LANDING) | (state.stance.turned > 0.5)
     return (state.level < signs.PAUSED) & steps & (pushes | (phase != PUSH_OFF))
 

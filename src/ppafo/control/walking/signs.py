@@ -54,9 +54,10 @@ NO_TOES = 22.0
 NOT_FLAT = 23.0
 FLAT_ANGLE = 24.0
 SHORT_SWING = 25.0
-NO_HEEL = 26.0
-TOE_STRIDES = 27.0
-LATE_FORCES = 28.0
+NO_TOE_OFF = 26.0
+NO_HEEL = 27.0
+TOE_STRIDES = 28.0
+LATE_FORCES = 29.0
 
 FORCES = ("heel_force", "toe_force")
 PRESSURES = ("pressure_1", "pressure_2")
@@ -179,6 +180,12 @@ SIGNS: dict[float, Sign] = {
         ("lowest_flat_angle", "highest_flat_angle"),
     ),
     SHORT_SWING: Sign("short_swing", "a swing that is too short for its stride", FORCES, ("shortest_swing",)),
+    NO_TOE_OFF: Sign(
+        "no_toe_off",
+        "a step that does not end on the toes: heel and toe sensors show the same, or are swapped",
+        FORCES,
+        (),
+    ),
     NO_HEEL: Sign(
         "no_heel", "a foot that must stand flat and does not load the heel", FORCES, ("flat_from", "flat_to")
     ),

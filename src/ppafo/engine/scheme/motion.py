@@ -26,6 +26,8 @@ from ppafo.model.plant import (
 SAME_INSTANT = 1.0e-9
 SHORTEST_PART = 1.0e-6
 """A part [s] this short is taken as it is."""
+LOST = 1.0e5
+"""Error of a part over what is allowed by default beyond which a run is lost: a fifth of the range of the angle."""
 SAFETY = 0.81
 MINIMUM_ERROR = 0.2025
 MAXIMUM_ERROR = 20.25
@@ -123,6 +125,26 @@ class FreePart(NamedTuple):
     torque: float
     next_angle: float
     meets_stop: float
+
+
+class PartSlide(NamedTuple):
+    """End of a part without an event: driving torque [N m], sizes of friction, angular velocity [rad/s].
+
+    ``departs`` is 1 where an event leads elsewhere: a reversal, or a vane that begins to move.
+    """
+
+    torque: float
+    friction: Friction
+    angular_velocity: float
+    departs: float
+
+
+class PartEnd(NamedTuple):
+    """Angle [rad] and angular velocity [rad/s] at the end of a part, and error of the angle over what is allowed."""
+
+    angle: float
+    rate: float
+    error: float
 
 
 class PrescribedStep(NamedTuple):
@@ -229,10 +251,10 @@ def begin_part(
     ), length
 
 
-def end_part(
+def slide_part(
     plant: PlantParameters, state: PlantState, begun: FreePart, added_torque: float, length: float
-) -> tuple[float, float, float]:
-    """Angle [rad] and angular velocity [rad/s] at the end of a part, and the error of the angle over what is allowed.
+) -> tuple[PartSlide, PartEnd]:
+    """Where a part leads a free vane that slides on or stays at rest.
 
     ``state`` has the new gas and the motion of the begin; ``added_torque`` [N m] is that at the end, where the part
     would lead without reversal.
@@ -244,27 +266,60 @@ def end_part(
     sliding_torque = next_torque - way * friction.in_motion
     full_velocity = next_velocity(plant, velocity, begun.acceleration, sliding_torque, length)
     slides = way != 0.0 and full_velocity * way > 0.0
-
-    fall = velocity - full_velocity
-    turns = way != 0.0 and not slides
-    fraction = velocity / (fall if fall != 0.0 else 1.0) if turns else 0.0
-    turning_angle = clamp_angle(plant, state.angle + 0.5 * fraction * length * velocity)
-    left_torque = begun.torque + fraction * (next_torque - begun.torque)
-    departure = Departure(fraction, turning_angle, 0.0)
-    left_angle, left_velocity = depart(plant, departure, left_torque, next_torque, friction, length)
     thrown_back = rebound_velocity(plant, full_velocity, next_torque)
     slid_velocity = thrown_back if begun.meets_stop > 0.5 else full_velocity
-    angle = begun.next_angle if slides else left_angle
-    rate = slid_velocity if slides else left_velocity
 
-    last = (sliding_torque - plant.viscous_damping * full_velocity) * (1.0 / plant.inertia)
-    bent = abs(last - begun.acceleration) * length * length * SIXTH if way != 0.0 else 0.0
+    # The sums with 0 are those of ``depart``, so that a vane at rest has its bits.
+    place = clamp_angle(plant, state.angle + 0.0)
+    at_lower, at_upper = place <= plant.angle_min, place >= plant.angle_max
+    stays = holds_still(begun.torque + 0.0 * (next_torque - begun.torque), friction.at_rest, at_lower, at_upper)
+    stays_later = holds_still(next_torque, friction.at_rest, at_lower, at_upper)
+    rests = way == 0.0 and stays and stays_later
+
+    slid = PartSlide(
+        torque=next_torque,
+        friction=friction,
+        angular_velocity=full_velocity,
+        departs=0.0 if slides or rests else 1.0,
+    )
+    angle = begun.next_angle if slides else place
+    return slid, PartEnd(angle, slid_velocity if slides else 0.0, part_error(plant, begun, slid, angle, length))
+
+
+def depart_part(
+    plant: PlantParameters, state: PlantState, begun: FreePart, slid: PartSlide, ended: PartEnd, length: float
+) -> PartEnd:
+    """The end of a part in which a vane turns or begins to move, the one that it had of any other.
+
+    ``state`` is as in ``slide_part``.
+    """
+    velocity = state.angular_velocity
+    fall = velocity - slid.angular_velocity
+    fraction = velocity / (fall if fall != 0.0 else 1.0) if begun.way != 0.0 else 0.0
+    turning_angle = clamp_angle(plant, state.angle + 0.5 * fraction * length * velocity)
+    left_torque = begun.torque + fraction * (slid.torque - begun.torque)
+    departure = Departure(fraction, turning_angle, 0.0)
+    angle, rate = depart(plant, departure, left_torque, slid.torque, slid.friction, length)
+    error = part_error(plant, begun, slid, angle, length)
+    departs = slid.departs > 0.5
+    return PartEnd(
+        angle=angle if departs else ended.angle,
+        rate=rate if departs else ended.rate,
+        error=error if departs else ended.error,
+    )
+
+
+def part_error(plant: PlantParameters, begun: FreePart, slid: PartSlide, angle: float, length: float) -> float:
+    """Error of the angle [rad] at which a part ends over what is allowed [-]."""
+    sliding_torque = slid.torque - begun.way * slid.friction.in_motion
+    last = (sliding_torque - plant.viscous_damping * slid.angular_velocity) * (1.0 / plant.inertia)
+    bent = abs(last - begun.acceleration) * length * length * SIXTH if begun.way != 0.0 else 0.0
     missed = MISSED_FRACTION * abs(angle - begun.next_angle)
     # Where a chamber is small, a little of the angle is much of the pressure.
     volume_1, volume_2 = chamber_volumes(plant, begun.next_angle)
     swept = plant.volume_per_angle * (plant.angle_max - plant.angle_min)
     allowed_volume = min(ALLOWED_OF_ANGLE * swept, ALLOWED_BY_GAS * min(volume_1, volume_2))
-    return angle, rate, (bent + missed) * plant.volume_per_angle / allowed_volume
+    return (bent + missed) * plant.volume_per_angle / allowed_volume
 
 
 def rebound_velocity(plant: PlantParameters, angular_velocity: float, torque: float) -> float:

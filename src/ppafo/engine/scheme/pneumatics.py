@@ -128,7 +128,9 @@ def mean_curve(first: FlowCurve, second: FlowCurve, share: float) -> FlowCurve:
 GAMMA = 0.2928932188134524
 SHORTEST = 1.0e-30
 ALLOWED_OF_PRESSURE = 2.5e-5
-"""Error of one step over the pressure that matters; with it a run keeps to 1e-3 of the pressure range."""
+"""Error of one step over the pressure that matters; with it a run keeps to ``KEPT_OF_PRESSURE``."""
+KEPT_OF_PRESSURE = 1.0e-3
+"""Error of a pressure over the pressure range [-] that a run keeps to by default."""
 MINIMUM_PRESSURE = 0.02
 """The least pressure that matters, as a fraction of the atmosphere's."""
 

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from ppafo.control.catalog import CONTROLLERS
 from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError
 from ppafo.exports.c_library.files import (
@@ -50,7 +51,7 @@ def library_of(item: Scenario) -> Library:
 
 def scenario_library(scenario: Scenario) -> Library:
     """A library whose settings are all numbers of a scenario. ProgramError for a controller on whole numbers."""
-    if scenario.control.is_fixed:
+    if CONTROLLERS[scenario.control.kind].plan is not None:
         raise ProgramError(
             f"{scenario.name}: a controller on whole numbers has no library yet; 'ppafo firmware' writes it"
         )
@@ -74,7 +75,12 @@ def scenario_library(scenario: Scenario) -> Library:
         settings=settings,
         relations=relations_of(scenario),
         switches=_switches(scenario.device, of_sensors),
-        other_program=(f"({interval} != (double)(int64_t){interval}) != {_truth(program.program.samples_inside)}",),
+        other_program=(
+            (
+                f"({interval} != (double)(int64_t){interval}) != {_truth(program.program.samples_inside)}",
+                "run_output_interval",
+            ),
+        ),
         words=words_of(scenario, links),
         further=lambda collector, boundary: preparation_of(scenario, program.program, collector, boundary),
         following=_following(settings, links),
@@ -109,10 +115,6 @@ def walk_library(configuration: "Scenario") -> Library:
     from ppafo.walking.planning import plan_walk
 
     check_can_leave(configuration)
-    if configuration.control.is_fixed:
-        raise ProgramError(
-            f"{configuration.name}: a controller on whole numbers has no library yet; 'ppafo firmware' writes it"
-        )
     program = exported(batch_of(plan_walk(configuration)).program)
     settings, links = settings_of_walk(configuration), links_of_walk(configuration)
     failing = sensors_that_fail(configuration)
@@ -125,7 +127,9 @@ def walk_library(configuration: "Scenario") -> Library:
         settings=settings,
         relations=relations_of_walk(configuration),
         switches=_switches(configuration.device, of_readings),
-        other_program=(f"(prepared->counts.signal_delay > 0.0) != {_truth(program.program.late_readings)}",),
+        other_program=(
+            (f"(prepared->counts.signal_delay > 0.0) != {_truth(program.program.late_readings)}", "controller_period"),
+        ),
         words=words_of_walk(configuration, links, failing),
         further=lambda collector, boundary: preparation_of_walk(configuration, program.program, collector, boundary),
         following=_following(settings, links),

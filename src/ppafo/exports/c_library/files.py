@@ -17,7 +17,7 @@ from ppafo.engine.run import NEVER_FAILED
 from ppafo.engine.source_text import Collector
 from ppafo.exports import filled, in_comment, in_markdown, licence, template
 from ppafo.exports.c_library.boundary import Boundary
-from ppafo.exports.c_library.program import Entry, ExportedProgram, Further, c_text_of_run
+from ppafo.exports.c_library.program import ExportedProgram, Further, c_text_of_run
 from ppafo.metrics import METRICS
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
@@ -145,10 +145,10 @@ class Library:
     """What is to be written.
 
     ``further`` adds the function that makes the numbers of a run from the settings. ``switches`` choose the program,
-    ``other_program`` has further conditions in C under which another would be needed. ``following`` adds the function
+    ``other_program`` has further conditions in C under which another would be needed, with the setting that is named;
+    ``keeps_times`` where its times are those that a file could have. ``following`` adds the function
     that lets settings follow others, None where none does, and ``defaults`` names those whose default does so, which
     has no range; ``links`` say what follows what. ``words`` fill the page. ``surface`` is how it is called.
-    ``entries`` are functions beside those of a run.
     """
 
     title: str
@@ -157,14 +157,14 @@ class Library:
     settings: tuple[Setting, ...]
     relations: tuple[Relation, ...]
     switches: tuple[Switch, ...]
-    other_program: tuple[str, ...]
+    other_program: tuple[tuple[str, str], ...]
     words: Mapping[str, str]
     further: Further | None = None
     following: Further | None = None
     defaults: frozenset[str] = frozenset()
     links: Graph = field(default_factory=dict)
     surface: Surface = LOOP
-    entries: tuple[Entry, ...] = ()
+    keeps_times: bool = True
 
     @property
     def name(self) -> str:
@@ -196,7 +196,7 @@ def library_files(library: Library) -> dict[str, bytes]:
 
     settings = [item.name for item in library.settings]
     interface = "".join(filled(template("c_library", file), words) for file in ("interface.c", surface.source))
-    functions = c_text_of_run(program, title, name, settings, further if written else None, interface, library.entries)
+    functions = c_text_of_run(program, title, name, settings, further if written else None, interface)
     texts[f"{name}.c"] = f"{head}{functions}\n{interface}"
     return {file: text.encode() for file, text in sorted(texts.items())}
 
@@ -236,8 +236,12 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "metrics": _members((kind.name, kind.unit, kind.summary) for kind in program.metrics),
         "table": "\n".join(_line_of_table(item, item.name in library.defaults) for item in library.settings),
         "relations": "\n".join(
-            f'    if (!({holds})) {{\n        return "{name}";\n    }}'
-            for holds, name in map(_related, library.relations)
+            f'    if (!({holds})) {{\n        return "{name}";\n    }}' for holds, name in _relations(library)
+        ),
+        "is_whole": _IS_WHOLE if _rules_of_times(library) else "",
+        "needs_other": "\n".join(
+            f'    if ({condition}) {{\n        return "{name}";\n    }}'
+            for condition, name in _conditions_of_program(library)
         ),
         "csv_head": ",".join(outputs),
         "csv_form": ",".join(["%.17g"] * len(outputs)),
@@ -285,16 +289,53 @@ def _said(quantity: Quantity) -> str:
 
 def other_program_of(library: Library) -> str:
     """Conditions in C, each behind an ``or``, under which the settings ask for another program than this one."""
+    return "".join(f"\n        || {condition}" for condition, _ in _conditions_of_program(library))
+
+
+def _conditions_of_program(library: Library) -> list[tuple[str, str]]:
+    """Conditions in C under which the settings ask for another program, with the setting that is named."""
     switched = [
-        f"({' || '.join(f'settings->{name} > 0.0' for name in item.names)}) != {'true' if item.is_above else 'false'}"
+        (
+            f"({' || '.join(f'settings->{name} > 0.0' for name in item.names)}) != {str(item.is_above).lower()}",
+            item.names[0],
+        )
         for item in library.switches
     ]
-    return "".join(f"\n        || {item}" for item in (*switched, *library.other_program))
+    return [*switched, *library.other_program]
 
 
 def conditions_of(library: Library) -> list[tuple[str, str]]:
     """What settings must keep, as text in C, with the setting that is named where it is not kept, as by no number."""
-    return [*map(_range, library.settings), *map(_related, library.relations)]
+    return [*map(_range, library.settings), *_relations(library)]
+
+
+RULES_OF_TIMES = (
+    ("run_output_interval", "is_whole({} / {})", ("run_duration", "run_output_interval")),
+    ("run_duration", "{} / {} <= 1.0e8", ("run_duration", "run_step")),
+    ("run_duration", "{} / {} <= 5.0e6", ("run_duration", "run_output_interval")),
+    ("sensors_delay", "{} / {} <= 1.0e5", ("sensors_delay", "run_step")),
+)
+"""What the file of a scenario must keep of its times (``simulation/clock.py``): setting named, rule, of what."""
+
+
+_IS_WHOLE = """
+/* True for a number that is a whole one but for rounding. */
+static bool is_whole(double count)
+{
+    return fabs(count - floor(count + 0.5)) <= 1.0e-9 * count;
+}
+"""
+
+
+def _relations(library: Library) -> list[tuple[str, str]]:
+    """What settings must keep together, as text in C, with the setting that is named."""
+    return [*map(_related, library.relations), *_rules_of_times(library)]
+
+
+def _rules_of_times(library: Library) -> list[tuple[str, str]]:
+    """What the times of a scenario must keep, as text in C, with the setting that is named."""
+    rules = RULES_OF_TIMES if library.keeps_times and not library.program.program.walks else ()
+    return [(rule.format(*(f"settings->{name}" for name in names)), named) for named, rule, names in rules]
 
 
 def _related(item: Relation) -> tuple[str, str]:

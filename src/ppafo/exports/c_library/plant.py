@@ -132,7 +132,7 @@ def plant_of(item: Scenario) -> PlantAlone:
     outputs = tuple(name for name in library.program.outputs if name not in unseen)
     program = replace(library.program.program, meters=(), traced=outputs)
     return PlantAlone(
-        library=replace(library, program=ExportedProgram(program, ())),
+        library=replace(library, program=ExportedProgram(program, ()), keeps_times=False),
         inputs=(command, *further),
         motion=said,
         first=(("controller_period", "@.run_step"), ("run_output_interval", "@.run_step"), *first),

@@ -19,6 +19,7 @@ from ppafo.exports.c_library.files import Relation, Setting, c_identifier
 from ppafo.exports.c_library.program import COUNTS
 from ppafo.model.actuators.kind import Range, mean_growth
 from ppafo.model.catalog import VALVES, device_effects
+from ppafo.model.columns import smaller
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait import ShankSeries
 from ppafo.model.gas import specific_gas_constant
@@ -40,12 +41,14 @@ from ppafo.simulation.numbers import (
     links_that_hold,
     number_at,
     other_form,
+    path_of_held_angle,
     time_texts,
 )
 from ppafo.simulation.plan import (
     foot_load,
     is_slow_held,
     lines_at_start,
+    relative_tolerance,
     shank_kind,
     state_at_start,
     state_with_volumes,
@@ -247,7 +250,7 @@ class Writing:
         made = self.row("SonicOrifice" if is_sonic else "Orifice", self.section(section, names))
         return f"{self.add(sonic_restriction if is_sonic else area_restriction)}({made}, gas, flow_linear_ratio)"
 
-    def timing(self, signal_delay: str) -> Iterator[str]:
+    def timing(self, signal_delay: str, tolerance: str = "1.0") -> Iterator[str]:
         """Lines that make the valve, delays in steps, and the timing, once there are ``counts_of_steps``."""
         add, model = self.add, self.program.valve
         names = [item.name for item in VALVES[self.device.valve.kind].quantities]
@@ -258,7 +261,7 @@ class Writing:
         yield f"command_steps, command_lag = {add(whole_and_rest)}(command_delay, step)"
         yield f"signal_steps, signal_lag = {add(whole_and_rest)}({signal_delay}, step)"
         period = "step * counts_of_steps.steps_per_sample"
-        yield f"timing = {add(LaneTiming)}(step, {period}, command_lag, signal_lag, 1.0)"
+        yield f"timing = {add(LaneTiming)}(step, {period}, command_lag, signal_lag, {tolerance})"
 
     def gas(self) -> Iterator[str]:
         """Lines that make the noise of the sensors, how the gas takes up heat, and the lines of the supply."""
@@ -311,7 +314,6 @@ SAID = {
     "controller.period": "time between two decisions of the controller",
 }
 """What some settings are where no file stands around them."""
-_LEVEL_OF_HELD = "motion.profile.level"
 
 
 def settings_of(scenario: Scenario) -> tuple[Setting, ...]:
@@ -356,9 +358,11 @@ def relations_of(scenario: Scenario) -> tuple[Relation, ...]:
         ("run.output_interval", "at most", "run.duration", 0.0),
         ("sensors.delay", "at most", "run.duration", 0.0),
     ]
-    if HELD_ANGLE in declared_settings(scenario):
-        rules.append((HELD_ANGLE, "at least", "actuator.angle_min", TOLERANCE))
-        rules.append((HELD_ANGLE, "at most", "actuator.angle_max", TOLERANCE))
+    # A vane that stays at an angle, or starts there.
+    stays = path_of_held_angle(scenario) or HELD_ANGLE
+    if stays in declared_settings(scenario):
+        rules.append((stays, "at least", "actuator.angle_min", TOLERANCE))
+        rules.append((stays, "at most", "actuator.angle_max", TOLERANCE))
     if scenario.supply_lines is not None:
         rules.append(("supply.dorsiflexion_pressure", "at most", "supply.pressure", 0.0))
     of_steps = (
@@ -374,10 +378,7 @@ def relations_of(scenario: Scenario) -> tuple[Relation, ...]:
 def declared_settings(scenario: Scenario) -> dict[str, Quantity]:
     """Declarations by path, without the form of an orifice that is not used, and without second names."""
     declared = used_numbers(scenario.device, declared_numbers(scenario))
-    unused = {"controller.rate"}
-    if HELD_ANGLE in declared and isinstance(scenario.motion, PrescribedMotion):
-        unused.add(_LEVEL_OF_HELD)
-    return {path: item for path, item in declared.items() if path not in unused}
+    return {path: item for path, item in declared.items() if path != "controller.rate"}
 
 
 def used_numbers(device: Device, declared: Mapping[str, Quantity]) -> dict[str, Quantity]:
@@ -414,12 +415,15 @@ def _steps(scenario: Scenario, writing: Writing) -> Iterator[str]:
     """Lines that make the steps, delays in them, and whether the error decides about their parts."""
     given = "run_duration, run_step, run_output_interval, controller_period"
     yield f"counts_of_steps = {writing.add(step_counts)}({given})"
-    yield from writing.timing("sensors_delay")
+    yield f"tolerance = {writing.add(relative_tolerance)}(run_tolerance)"
+    yield from writing.timing("sensors_delay", "tolerance")
     if scenario.supply_lines is not None or not writing.program.is_held or writing.program.has_shape:
         yield "needs_parts = True"
         return
     stiffness = "1.0" if scenario.thermal is None else "gas_heat_capacity_ratio"
-    yield f"needs_parts = not {writing.add(is_slow_held)}(plant, step, motion_angle, {stiffness})"
+    angle = c_identifier(path_of_held_angle(scenario) or HELD_ANGLE)
+    shortened = f"step / {writing.add(smaller)}(1.0, tolerance)"
+    yield f"needs_parts = not {writing.add(is_slow_held)}(plant, {shortened}, {angle}, {stiffness})"
 
 
 def _pieces(scenario: Scenario, writing: Writing) -> Iterator[str]:
@@ -431,7 +435,7 @@ def _pieces(scenario: Scenario, writing: Writing) -> Iterator[str]:
     if program.angle is RECORDED_ANGLE:
         yield f"path = {writing.add(Segment)}(0.0, motion_angle, 0.0)"
     elif isinstance(scenario.motion, PrescribedMotion):
-        held = {"level": "motion_angle"} if program.is_held else {}
+        held = {"level": c_identifier(path_of_held_angle(scenario) or HELD_ANGLE)} if program.is_held else {}
         yield f"path = {_kind(writing, 'motion.profile', PROFILES[scenario.motion.profile.kind], held)}"
     yield from writing.gas()
 

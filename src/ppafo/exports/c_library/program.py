@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from types import FunctionType
 from typing import Any
 
@@ -38,7 +39,7 @@ from ppafo.simulation.ensemble.running import (
     thermal_totals,
     totals,
 )
-from ppafo.translation.typed import FLOAT, INT, LIBRARY, Array, Row, Shared, Type
+from ppafo.translation.typed import FLOAT, INT, Array, Row, Shared, Type
 
 
 def for_one_run(function: FunctionType, tree: ast.FunctionDef) -> ast.FunctionDef:
@@ -100,19 +101,6 @@ The last one is 1 where the error decides about the parts of a step, else 0.
 """
 Further = Callable[[Collector, Boundary], str]
 """Writes a further composed function, once it has gathered what that calls."""
-
-
-@dataclass(frozen=True, slots=True)
-class Entry:
-    """A further function of a library: its name, what it ``takes``, what it does, and what writes it.
-
-    It takes ``parameters`` of a run, ``settings``, ``numbers`` (an array) and a ``number``, in its order.
-    """
-
-    name: str
-    takes: tuple[str, ...]
-    said: str
-    write: Further
 
 
 LOOP_TYPES: tuple[Type, ...] = (
@@ -197,12 +185,11 @@ def c_text_of_run(
     settings: Sequence[str],
     further: Further | None,
     around: str,
-    others: Sequence[Entry] = (),
 ) -> str:
     """All functions of an exported program in C for people: of a single run, without lanes, between structs.
 
     ``name`` begins the names of the structs of settings and metrics, which the file ``around`` it declares; ``further``
-    may add a function that takes ``settings``, and ``others`` follow.
+    may add a function that takes ``settings``.
     """
     from ppafo.translation.c99 import Reading, c_source, documents_of
     from ppafo.translation.walk import walk_module
@@ -212,7 +199,6 @@ def c_text_of_run(
     link_program(program, collector)
     entries = [metrics_entry(item, collector, structs)] if item.metrics else []
     entries += [] if further is None else [further(collector, structs)]
-    entries += [other.write(collector, structs) for other in others]
     loop = run_loop(item.loops[WHOLE], collector, f"{name}_outputs", item.loops.get(IN_PARTS))
     composed = "\n\n".join([HEADER, collector.text(), loop, *entries, ""])
     states = struct_of("run_states", program.state_rows(), collector.add)
@@ -227,12 +213,10 @@ def c_text_of_run(
         "prepare": (given, parameters, states, struct_of_numbers("run_counts", COUNTS)),
         "follow": (given, given),
     }
-    taken: dict[str, Type] = {"parameters": parameters, "settings": given, "numbers": Array(1), "number": FLOAT}
-    types |= {other.name: tuple(taken[word] for word in other.takes) for other in others}
-    documents = documents_of(collector) | _DOCUMENTS | {other.name: other.said for other in others}
+    documents = documents_of(collector) | _DOCUMENTS
     return c_source(
         # Functions of the C library have last bits of their own: a run must not call any.
-        walk_module(composed, types, LIBRARY if others else frozenset()),
+        walk_module(composed, types),
         documents,
         title,
         reading=Reading(_short(collector), {kind.row.name: kind.row.name for kind in (given, outputs, found)}, around),
@@ -265,10 +249,20 @@ def _short(collector: SourceCollector) -> dict[str, str]:
 @cache
 def _names_around() -> frozenset[str]:
     """Names of functions in the files around a library, of which some take its source in, and of its own entries."""
-    folders = [files("ppafo.exports").joinpath(folder, "templates") for folder in ("c_library", "fmu", "mujoco")]
-    sources = [item for folder in folders for item in folder.iterdir() if item.name.endswith(".c")]
-    found = (_FUNCTION.findall(item.read_text(encoding="utf-8")) for item in sources)
+    folders = [folder.joinpath("templates") for folder in files("ppafo.exports").iterdir()]
+    texts = [_c_texts(folder) for folder in folders if folder.is_dir()]
+    # What is around a library has the name of that library in it.
+    found = (
+        _FUNCTION.findall(text)
+        for of_folder in texts
+        if any("@name@" in text for text in of_folder)
+        for text in of_folder
+    )
     return frozenset(("advance", "metrics", "prepare", "follow")).union(*found)
+
+
+def _c_texts(folder: Traversable) -> list[str]:
+    return [item.read_text(encoding="utf-8") for item in folder.iterdir() if item.name.endswith(".c")]
 
 
 _FUNCTION = re.compile(r"^(?:static )?[\w ]+\b\*?(\w+)\(", re.MULTILINE)

@@ -2,12 +2,13 @@
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple, get_type_hints
 
-from ppafo.control.catalog import CONTROLLERS
+from ppafo.control.catalog import CONTROLLERS, ON_CHIP
 from ppafo.control.fixed.torque_laws import FIXED_LAWS, TARGETS, FixedLaw
-from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, LARGEST_READING, SETTINGS, Converter, Readings
-from ppafo.engine.rows import is_number, leaf_paths, members, rebuilt
+from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, LARGEST_READING, SETTINGS, Readings, converter_with
+from ppafo.engine.rows import is_number, leaf_paths, leaves, members, rebuilt
 from ppafo.engine.source_text import SourceCollector, is_row
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports import filled, in_markdown, licence, template
@@ -15,7 +16,7 @@ from ppafo.exports.firmware.catalog import target_of
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.declaration import quantity_text
-from ppafo.simulation.plan import fixed_controller, plan_run, profile_bounds
+from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.c99 import c_source, documents_of
 from ppafo.translation.typed import INT, Row
@@ -160,7 +161,7 @@ _TEMPLATES = ("Makefile", "README.md", "board.h", "board_simulated.c", "controll
 
 
 class ChipController(NamedTuple):
-    """The integer controller of a scenario or a walk: law, whole numbers by name, converter, ticks of a sample."""
+    """The integer controller of a scenario: law, whole numbers by name, converter, ticks of a sample."""
 
     law: FixedLaw
     numbers: Mapping[str, float]
@@ -168,32 +169,40 @@ class ChipController(NamedTuple):
     ticks: int
 
 
-def chip_controller(scenario: Scenario) -> ChipController:
-    """The integer controller of a scenario whose arithmetic is fixed.
+def integer_form(scenario: Scenario) -> Scenario:
+    """The scenario with the integer form of its controller, and the converter's defaults where it had floats.
 
-    ScenarioError where it is not, or where the timer of a chip cannot make the sample period.
+    ScenarioError where that controller has none.
     """
-    control = scenario.control
-    if not control.is_fixed:
-        if control.kind in FIXED_LAWS:
-            raise ScenarioError(
-                f"{scenario.name}: the controller computes with floats; set controller.arithmetic=fixed"
-            )
+    kind = scenario.control.kind
+    if kind in FIXED_LAWS:
+        return scenario
+    if f"{kind}{ON_CHIP}" not in FIXED_LAWS:
         raise ScenarioError(
-            f"{scenario.name}: the controller '{control.kind}' has no form on whole numbers; those that have one: "
-            f"{', '.join(FIXED_LAWS)}"
+            f"{scenario.name}: the controller '{kind}' has no form on whole numbers; those that have one: "
+            f"{', '.join(name.removesuffix(ON_CHIP) for name in FIXED_LAWS)}"
         )
-    plan_run(scenario)
+    scenario.device.check_vane("a controller on whole numbers")
+    settings = {**scenario.control.settings, **{item.name: item.default or 0.0 for item in SETTINGS}}
+    return replace(scenario, control=replace(scenario.control, kind=f"{kind}{ON_CHIP}", settings=settings))
+
+
+def chip_controller(scenario: Scenario) -> ChipController:
+    """The integer controller of a scenario; ScenarioError where the timer of a chip cannot make its sample period."""
+    scenario = integer_form(scenario)
+    control = scenario.control
     ticks = ticks_of(scenario.name, control.period)
-    constant = plant_parameters(scenario.device, 0.0).torque_constant
-    found = fixed_controller(scenario, constant, profile_bounds(scenario.reference))
-    converter = rebuilt(Converter, [found.numbers[name] for name in Converter._fields])
-    return ChipController(law=FIXED_LAWS[control.kind], numbers=found.numbers, converter=converter, ticks=ticks)
+    law = FIXED_LAWS[control.kind]
+    row = plan_run(scenario).controller
+    numbers = dict(zip((item.name for item in law.number_quantities), leaves(row.numbers), strict=True))
+    converter = converter_with(row.steps, row.numbers.limits)
+    return ChipController(law=law, numbers=numbers, converter=converter, ticks=ticks)
 
 
 def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
     """Files of the firmware of a scenario's controller, by name. ScenarioError where it has no integer form."""
     chosen = target_of(target)
+    scenario = integer_form(scenario)
     chip = chip_controller(scenario)
     converter = chip.converter
     words = {
@@ -238,7 +247,7 @@ def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
 def _origins(scenario: Scenario) -> Iterator[str]:
     """Settings that the numbers come from, each with unit and value in SI units."""
     control = scenario.control
-    declared: dict[str, Quantity] = {item.name: item for item in (*CONTROLLERS[control.kind].quantities, *SETTINGS)}
+    declared: dict[str, Quantity] = {item.name: item for item in CONTROLLERS[control.kind].quantities}
     source = scenario.origin.file or "a scenario without a file"
     yield f"period {control.period:.9g} s (controller.rate or controller.period of {source.rpartition('/')[2]})"
     for name, value in control.settings.items():

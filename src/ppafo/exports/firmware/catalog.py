@@ -54,25 +54,6 @@ MSP430F2013 = Target(
     simulator=MspdebugSimulator,
 )
 
-MSP430G2553 = Target(
-    name="msp430g2553",
-    processor="MSP430G2553",
-    board="a LaunchPad",
-    clock=16.0e6,
-    flash=Memory(0xC000, 0x4000),
-    ram=Memory(0x200, 0x200),
-    interrupt_stack=4,
-    converter_bits=10,
-    words={},
-    templates=("board_msp430g2553.c", "msp430g2553.ld"),
-    wiring="README.md",
-    tools=MSP430F2013.tools,
-    packages=MSP430F2013.packages,
-    counted=MSP430F2013.counted,
-    simulator=MspdebugSimulator,
-)
-"""That of a controller of walking, whose templates are in ``walking/templates`` and have words of their own."""
-
 
 def _words_of_cortex(name: str, chip: str, pins: Mapping[str, str]) -> dict[str, str]:
     """What fills the templates for a Cortex-M on a micro:bit, whose compiler may be gcc, clang or zig."""

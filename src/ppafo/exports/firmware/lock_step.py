@@ -13,7 +13,7 @@ from ppafo.control.fixed.torque_laws import TARGETS
 from ppafo.control.fixed.whole_numbers import COMMAND_STEPS, Readings, read
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import SimulationError
-from ppafo.exports.firmware import ChipController, chip_controller, firmware
+from ppafo.exports.firmware import ChipController, chip_controller, firmware, integer_form
 from ppafo.exports.firmware.catalog import target_of
 from ppafo.exports.firmware.simulators import (
     ChipSimulator,
@@ -44,7 +44,7 @@ Shown = TypeVar("Shown", bound=tuple[int, ...])
 
 
 class PythonChip:
-    """The integer controller of a scenario or a walk in Python, as the chip computes it."""
+    """The integer controller of a scenario in Python, as the chip computes it."""
 
     def __init__(self, chip: ChipController) -> None:
         self.law = chip.law
@@ -63,7 +63,7 @@ class PythonChip:
 
 
 class ChipLaw:
-    """The simulated chip as a controller of a scenario or a walk; it keeps the decision of every sample.
+    """The simulated chip as a controller of a scenario; it keeps the decision of every sample.
 
     ``shown`` makes the converter's readings of a reference and a measurement; ``at_zero`` is the command for no steps.
     """
@@ -123,6 +123,7 @@ def run_on_chip(scenario: Scenario, target: str = TARGETS[0]) -> ChipRun:
 
     ScenarioError where the controller has no integer form, SimulationError where a tool is missing.
     """
+    scenario = integer_form(scenario)
     chip = chip_controller(scenario)
     with chip_simulator(firmware(scenario, target), target_of(target)) as (simulator, image):
         law = ChipLaw(simulator, partial(read, chip.converter))
@@ -267,9 +268,6 @@ def _draw(torque: "Axes", command: "Axes", run: ChipRun) -> None:
     command.set_ylim(-1.1, 1.1)
 
 
-FIXED = "controller.arithmetic=fixed"
-
-
 class TriedLaw(NamedTuple):
     """A controller in words, and the scenario with the settings that it is tried with."""
 
@@ -279,10 +277,10 @@ class TriedLaw(NamedTuple):
 
 
 TRIED = (
-    TriedLaw("`pid`", "torque-task-proportional", (FIXED,)),
-    TriedLaw("`pid`, with filter and anti-windup", "torque-task-anti-windup", (FIXED,)),
-    TriedLaw("`on_off`", "torque-task-solenoid", (FIXED,)),
-    TriedLaw("`on_off_dead_zone`", "torque-task-proportional", ("controller.kind=on_off_dead_zone", FIXED)),
+    TriedLaw("`pid`", "torque-task-proportional", ()),
+    TriedLaw("`pid`, with filter and anti-windup", "torque-task-anti-windup", ()),
+    TriedLaw("`on_off`", "torque-task-solenoid", ()),
+    TriedLaw("`on_off_dead_zone`", "torque-task-proportional", ("controller.kind=on_off_dead_zone",)),
 )
 """What the table has, for each target."""
 

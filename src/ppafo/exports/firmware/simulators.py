@@ -19,6 +19,7 @@ from typing import NamedTuple, Protocol, final
 from weakref import finalize
 
 from ppafo.errors import SimulationError, one_line, reason
+from ppafo.translation.native import asked
 
 
 class Memory(NamedTuple):
@@ -140,10 +141,7 @@ def built(contents: Mapping[str, bytes], folder: Path, goals: Sequence[str] = ("
     """Write the files of a firmware into a folder and make what is asked for; SimulationError where that fails."""
     for name, content in contents.items():
         (folder / name).write_bytes(content)
-    try:
-        done = subprocess.run(["make", "-C", str(folder), *goals], capture_output=True, text=True, check=False)
-    except OSError as error:
-        raise SimulationError(f"make cannot be run: {reason(error)}") from error
+    done = asked(["make", "-C", str(folder), *goals])
     if done.returncode != 0:
         said = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr)
         raise SimulationError(f"the firmware cannot be built: {one_line(said)}")

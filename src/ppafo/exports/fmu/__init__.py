@@ -1,7 +1,7 @@
 """A scenario or a walk as a functional mock-up unit: sources inside, no Python at run time.
 
 The unit holds the closed loop, or the plant alone: valve, gas and supply under a command, on a vane that is free or
-moved. It is for co-simulation; a plant on a fixture may be for model exchange.
+moved. It is for co-simulation.
 """
 
 import hashlib
@@ -14,7 +14,7 @@ import sys
 import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 
@@ -31,7 +31,6 @@ from ppafo.exports.fmu.description import (
     description_of_fmi3,
     variability_of,
 )
-from ppafo.exports.fmu.exchange import continuous_states, exchange_words, with_entries
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.native import asked, complaint
 from ppafo.version import __version__
@@ -59,8 +58,6 @@ PLATFORMS = {
     "linux64": Platform("linux64", "x86_64-linux", "x86_64-linux-gnu.2.17", ".so", "run in the tests"),
     "win64": Platform("win64", "x86_64-windows", "x86_64-windows-gnu", ".dll", "run under Wine"),
     "linux-aarch64": Platform(None, "aarch64-linux", "aarch64-linux-gnu.2.17", ".so", "run under qemu"),
-    "darwin64": Platform("darwin64", "x86_64-darwin", "x86_64-macos", ".dylib", "not run"),
-    "darwin-aarch64": Platform(None, "aarch64-darwin", "aarch64-macos", ".dylib", "not run"),
 }
 """Platforms by the names under which they are requested."""
 
@@ -70,7 +67,7 @@ def host_platform() -> str | None:
     machine = {"x86_64": "64", "amd64": "64", "aarch64": "-aarch64", "arm64": "-aarch64"}.get(
         platform.machine().lower()
     )
-    system = {"Linux": "linux", "Windows": "win", "Darwin": "darwin"}.get(platform.system())
+    system = {"Linux": "linux", "Windows": "win"}.get(platform.system())
     name = f"{system}{machine}"
     return name if name in PLATFORMS else None
 
@@ -138,16 +135,13 @@ _LOOP_TUNING = (
 def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) -> dict[str, bytes]:
     """A unit by the name of its file. ProgramError for what cannot be translated or built."""
     chosen = {name: _platform(name, fmi) for name in platforms}
-    if interface.states and fmi != 2:
-        raise ScenarioError("model exchange is written as FMI 2.0: leave --fmi 3 out")
     identifier = interface.library.name
     sources = _sources(interface, fmi)
     token = hashlib.sha256(b"".join(sources.values())).hexdigest()[:32]
     sources = {name: content.replace(b"@token@", token.encode()) for name, content in sources.items()}
     main = f"fmi{fmi}.c"
-    said = _said(interface, chosen)
     contents = {
-        "modelDescription.xml": _DESCRIBED[fmi](interface, identifier, token, said),
+        "modelDescription.xml": _DESCRIBED[fmi](interface, identifier, token),
         "documentation/index.html": _page(interface, chosen, main),
         "documentation/licenses/license.txt": licence().encode(),
         **{f"sources/{name}": content for name, content in sources.items()},
@@ -210,14 +204,11 @@ def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
         "output_changes": "".join(variability_of(name)[0] for name in library.program.outputs),
         "token": "@token@",
         "has_clock": "true" if interface.clock else "false",
-        "kind": interface.kind,
-        "fmi_type": "fmi2ModelExchange" if interface.states else "fmi2CoSimulation",
-        "fields": "",
         "checked": "inertia, volumes and areas",
         **interface.words,
     }
     unit = "\n".join(filled(template("fmu", file), words) for file in ("unit.c", *interface.templates))
-    calls = {3: ["fmi3.c"], 2: ["fmi2.c", "fmi2_exchange.c" if interface.states else "fmi2_steps.c"]}
+    calls = {3: ["fmi3.c"], 2: ["fmi2.c", "fmi2_steps.c"]}
     headers = files("ppafo.exports.fmu").joinpath("headers")
     return {
         f"{name}.h": written[f"{name}.h"],
@@ -242,13 +233,6 @@ def _page(interface: Interface, platforms: Mapping[str, Platform], main: str) ->
         "flags": " ".join(FLAGS),
     }
     return filled(template("fmu", "index.html"), words).encode()
-
-
-def _said(interface: Interface, platforms: Mapping[str, Platform]) -> str:
-    """The description, with what nobody has run."""
-    not_run = [name for name, item in platforms.items() if item.tried == "not run"]
-    said = interface.library.description
-    return f"{said} Not run: {', '.join(not_run)}." if not_run else said
 
 
 def _archive(contents: Mapping[str, bytes]) -> bytes:
@@ -298,30 +282,4 @@ def plant_alone(item: Scenario) -> Interface:
             "follow": follow_lines(alone, "settings", numbers),
             "checked": "the limits of the inputs, inertia, volumes and areas",
         },
-    )
-
-
-EXCHANGE_TIME = (
-    "The tool integrates the states. The command is discrete: it changes in events, as that of a sampled controller "
-    "does. Dead times, solenoids, and stick, slip and stops of a free vane are events, which the unit announces."
-)
-EXCHANGE_TUNING = "They are taken in the next event."
-
-
-def plant_in_time(item: Scenario) -> Interface:
-    """The plant of a scenario for model exchange: states, slopes and events. ProgramError where it has no slopes."""
-    led = plant_alone(item)
-    alone = with_entries(surfaced(plant_of(item)), item.device)
-    program = alone.library.program.program
-    return replace(
-        led,
-        library=alone.library,
-        templates=("plant_inputs.c", "exchange.c"),
-        time=EXCHANGE_TIME,
-        tuning=EXCHANGE_TUNING,
-        is_step_fixed=False,
-        hidden=alone.hidden | {"run.step"},
-        words=led.words | exchange_words(alone),
-        states=continuous_states(program),
-        indicators=2 if program.angle is None else 0,
     )

@@ -1,12 +1,12 @@
 """What a unit says of itself before it is loaded: its variables, and modelDescription.xml of FMI 2 and 3."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 from xml.etree import ElementTree as Xml
 
 from ppafo.exports.c_library.files import OUTPUTS, Library, Setting
-from ppafo.exports.c_library.plant import COMMAND, Input
+from ppafo.exports.c_library.plant import Input
 from ppafo.units import base_value, dimension
 from ppafo.version import __version__
 
@@ -24,7 +24,7 @@ STEPPED = ("command", "reference", "strides", "contact", "controller_phase", "sa
 class Variable:
     """One variable of a unit: name, number, unit and meaning; ``causality`` and ``variability`` in words of FMI.
 
-    ``start`` None is calculated, limits None are none. ``slope_of`` is the number of the state whose slope it is.
+    ``start`` None is calculated, limits None are none.
     """
 
     name: str
@@ -36,19 +36,6 @@ class Variable:
     start: float | None = None
     minimum: float | None = None
     maximum: float | None = None
-    nominal: float | None = None
-    slope_of: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class ContinuousState:
-    """A state that a tool integrates: its name, unit, meaning, usual size, and its place among the unknowns."""
-
-    name: str
-    unit: str
-    summary: str
-    nominal: float
-    place: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,13 +61,6 @@ class Interface:
     hidden: frozenset[str]
     inputs: tuple[Input, ...]
     words: dict[str, str]
-    states: tuple[ContinuousState, ...] = ()
-    indicators: int = 0
-
-    @property
-    def kind(self) -> str:
-        """What it is for, in words of FMI."""
-        return "model exchange" if self.states else "co-simulation"
 
 
 def change_of(interface: Interface, setting: Setting) -> str:
@@ -125,30 +105,14 @@ def variables_of(interface: Interface) -> tuple[Variable, ...]:
                 item.unit,
                 item.summary,
                 "input",
-                "discrete" if interface.states and item.name == COMMAND.name else "continuous",
+                "continuous",
                 item.start,
                 item.minimum,
                 item.maximum,
             )
             for place, item in enumerate(interface.inputs)
         ),
-        *_states(interface.states, first_input + len(interface.inputs) + 2),
     )
-
-
-def _states(states: Sequence[ContinuousState], first: int) -> Iterator[Variable]:
-    """States and their slopes; before them are the numbers of the clock and the time."""
-    for number, item in enumerate(states, first):
-        kind = "local", "continuous"
-        yield Variable(item.name, number, item.unit, item.summary, *kind, nominal=item.nominal)
-    for number, item in enumerate(states, first):
-        said = f"slope of {item.name}"
-        yield Variable(
-            f"der({item.name})", number + len(states), _RATES.get(item.unit, ""), said, *kind, slope_of=number
-        )
-
-
-_RATES = {"rad": "rad/s", "rad/s": "rad/s^2", "kg": "kg/s"}
 
 
 def variability_of(name: str) -> str:
@@ -177,24 +141,19 @@ DISPLAY_UNITS = {
 TOOL = f"ppafo {__version__}"
 
 
-def description_of_fmi2(interface: Interface, identifier: str, token: str, said: str) -> bytes:
+def description_of_fmi2(interface: Interface, identifier: str, token: str) -> bytes:
     """The description for FMI 2.0."""
     variables = variables_of(interface)
-    head = _head("2.0", interface, said, guid=token)
-    if interface.states:
-        head["numberOfEventIndicators"] = str(interface.indicators)
-        own: dict[str, Any] = {"completedIntegratorStepNotNeeded": "true"}
-    else:
-        own = {"canHandleVariableCommunicationStepSize": _truth(not interface.is_step_fixed)}
+    head = _head("2.0", interface, guid=token)
     root = Xml.Element("fmiModelDescription", head)
     kind = Xml.SubElement(
         root,
-        "ModelExchange" if interface.states else "CoSimulation",
+        "CoSimulation",
         modelIdentifier=identifier,
         canGetAndSetFMUstate="true",
         canSerializeFMUstate="true",
         canNotUseMemoryManagementFunctions="true",
-        **own,
+        canHandleVariableCommunicationStepSize=_truth(not interface.is_step_fixed),
     )
     Xml.SubElement(Xml.SubElement(kind, "SourceFiles"), "File", name="fmi2.c")
     _units(root, variables)
@@ -205,30 +164,21 @@ def description_of_fmi2(interface: Interface, identifier: str, token: str, said:
     places = {item.number: place for place, item in enumerate(variables, start=1)}
     for item in variables:
         row = Xml.SubElement(table, "ScalarVariable", _scalar(item))
-        slope = {} if item.slope_of is None else {"derivative": str(places[item.slope_of])}
-        Xml.SubElement(row, "Real", _real(item) | slope)
+        Xml.SubElement(row, "Real", _real(item))
     outputs = [places[item.number] for item in variables if item.causality == "output"]
-    slopes = [places[item.number] for item in variables if item.slope_of is not None]
-    states = sorted({places[item.slope_of] for item in variables if item.slope_of is not None})
     structure = Xml.SubElement(root, "ModelStructure")
-    # Outputs of a step depend on no input of that instant, those of continuous time on any.
-    none: dict[str, str] = {}
-    known = none if interface.states else {"dependencies": ""}
-    for name, found, said_of in (
-        ("Outputs", outputs, known),
-        ("Derivatives", slopes, none),
-        ("InitialUnknowns", [*outputs, *states, *slopes], none),
-    ):
-        section = Xml.SubElement(structure, name) if found else structure
-        for place in found:
-            Xml.SubElement(section, "Unknown", {"index": str(place), **said_of})
+    # Outputs of a step depend on no input of that instant.
+    for name, known in (("Outputs", {"dependencies": ""}), ("InitialUnknowns", {})):
+        section = Xml.SubElement(structure, name) if outputs else structure
+        for place in outputs:
+            Xml.SubElement(section, "Unknown", {"index": str(place), **known})
     return _text(root)
 
 
-def description_of_fmi3(interface: Interface, identifier: str, token: str, said: str) -> bytes:
+def description_of_fmi3(interface: Interface, identifier: str, token: str) -> bytes:
     """The description for FMI 3.0."""
     variables = variables_of(interface)
-    root = Xml.Element("fmiModelDescription", _head("3.0", interface, said, instantiationToken=token))
+    root = Xml.Element("fmiModelDescription", _head("3.0", interface, instantiationToken=token))
     has_clock = interface.clock is not None
     internal: dict[str, Any] = {"fixedInternalStepSize": repr(interface.step)} if interface.is_step_fixed else {}
     Xml.SubElement(
@@ -272,12 +222,12 @@ def build_description_of_fmi3(identifier: str, flags: str) -> bytes:
     return _text(root)
 
 
-def _head(version: str, interface: Interface, said: str, **further: str) -> dict[str, str]:
+def _head(version: str, interface: Interface, **further: str) -> dict[str, str]:
     return {
         "fmiVersion": version,
         "modelName": interface.name,
         **further,
-        "description": said,
+        "description": interface.library.description,
         "version": __version__,
         "license": "MIT",
         "generationTool": TOOL,
@@ -303,7 +253,7 @@ def _scalar(item: Variable) -> dict[str, str]:
 
 
 def _real(item: Variable) -> dict[str, str]:
-    limits = {"min": item.minimum, "max": item.maximum, "nominal": item.nominal, "start": item.start}
+    limits = {"min": item.minimum, "max": item.maximum, "start": item.start}
     unit = _shown(item.unit)
     found = {"unit": unit} if unit else {}
     if unit in DISPLAY_UNITS:

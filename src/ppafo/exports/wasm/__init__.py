@@ -95,10 +95,12 @@ from ppafo.exports.c_library.program import COUNTS, IN_PARTS, TOGETHER, WHOLE, E
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, Term, itself
+from ppafo.parameters.overrides import one_path, split_override
 from ppafo.parameters.parameter_set import SOURCE, Entry, atmospheric_pressure, entry_in_si
 from ppafo.simulation.declaration import SEED, value_at
-from ppafo.simulation.loading import is_of_device, set_name, split_override
+from ppafo.simulation.loading import set_name
 from ppafo.simulation.numbers import HELD_ANGLE, TIMES
+from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.scenario import Scenario, worn_kind
 from ppafo.translation.native import asked, complaint
 from ppafo.units import to_si
@@ -239,7 +241,7 @@ def display_of(unit: str, atmosphere: float, kilograms: str = "mass", is_absolut
 def _origins(file: _File, device: Device, library: Library) -> dict[str, dict[str, Any]]:
     """Where the value of each setting comes from, by path."""
     parameter_set = _parameter_set(file, device)
-    changed = {c_identifier(_of_valve(split_override(text)[0], device)) for text in file.overrides}
+    changed = {c_identifier(one_path(split_override(text).typed, device.valve_name)) for text in file.overrides}
     found: dict[str, dict[str, Any]] = {}
     for item in library.settings:
         if item.name in changed:
@@ -252,12 +254,6 @@ def _origins(file: _File, device: Device, library: Library) -> dict[str, dict[st
         if item.path in file.assumed and item.name not in changed:
             found[item.path] |= {"origin": "assumed", "note": file.assumed[item.path]}
     return found
-
-
-def _of_valve(path: str, device: Device) -> str:
-    """A path with ``valve.`` for the valve of the device."""
-    own = f"valves.{device.valve_name}."
-    return f"valve.{path.removeprefix(own)}" if path.startswith(own) else path
 
 
 def _of_set(parameter_set: ParameterSet | None, device: Device, item: Setting) -> dict[str, Any]:
@@ -290,10 +286,11 @@ def _half_width(entry: Entry, item: Setting) -> float | None:
 def _parameter_set(file: _File, device: Device) -> ParameterSet | None:
     """The set of the device with all overrides; None where it cannot be read any more."""
     section: Mapping[str, Any] = file.document.get("device", {})
-    own = [text for text in file.overrides if is_of_device(split_override(text)[0])]
+    own = [text for text in file.overrides if is_of_device(split_override(text).typed)]
     try:
         found = load_parameter_set(set_name(section.get("set", device.name), file.folder))
-        return apply_overrides(found, (*section.get("overrides", ()), *own), device.valve_name)
+        of_file = apply_overrides(found, section.get("overrides", ()), device.valve_name)
+        return apply_overrides(of_file, own, device.valve_name)
     except PpafoError:
         return None
 
@@ -319,13 +316,6 @@ FLAGS = (*TARGET, *STRICT, *_FREESTANDING, *_LINKED)
 INDEX = "index.json"
 """File of the prebuilt programs that says of which text each was made, and by which version of the compiler."""
 _TITLE = "The functions that a run is made of, from ppafo."
-_RULES_OF_TIMES = (
-    ("run_output_interval", "is_whole({} / {})", ("run_duration", "run_output_interval")),
-    ("run_duration", "{} / {} <= 1.0e8", ("run_duration", "run_step")),
-    ("run_duration", "{} / {} <= 5.0e6", ("run_duration", "run_output_interval")),
-    ("sensors_delay", "{} / {} <= 1.0e5", ("sensors_delay", "run_step")),
-)
-"""What the file of a scenario must keep of its times too (``simulation/clock.py``): setting named, rule, of what."""
 _COMMENT = re.compile(r"\s*/\*.*?\*/\s*", re.DOTALL)
 _INSIDE = re.compile(r"(?:PPAFO_INLINE\s[\w\s*]*?\b|^\} )(\w+)(?=[(;])", re.MULTILINE)
 """Declarations of functions and types that are not visible outside a module."""
@@ -373,7 +363,7 @@ def _unit(library: Library, functions: str) -> str:
         "go_on": _chosen_loop(program, ""),
         "go_on_together": _chosen_loop(program, TOGETHER),
         "members": "\n".join(f"    double {name};" for name in names),
-        "conditions": "\n".join(refused.format(holds, name.upper()) for holds, name in _conditions(library)),
+        "conditions": "\n".join(refused.format(holds, name.upper()) for holds, name in conditions_of(library)),
     }
     return filled(template("wasm", "module.c"), words)
 
@@ -403,13 +393,6 @@ def _array_words(library: Library) -> dict[str, str]:
         "other_program": _COUNT.sub(lambda found: f"counts[COUNT_{found[1].upper()}]", other_program_of(library)),
     }
     return {**words, "prepared_run": filled(template("wasm", "prepared_run.c"), words)}
-
-
-def _conditions(library: Library) -> list[tuple[str, str]]:
-    """What settings must keep in C, with the one that is named where it is not kept."""
-    rules = () if library.program.program.walks else _RULES_OF_TIMES
-    of_times = [(rule.format(*(f"settings->{name}" for name in names)), named) for named, rule, names in rules]
-    return [*conditions_of(library), *of_times]
 
 
 def _chosen_loop(program: ExportedProgram, ending: str) -> str:

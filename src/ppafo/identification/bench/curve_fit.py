@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.identification.bench.result import Number
+from ppafo.identification.linear_systems import inverse_of
 from ppafo.signals.recording import Floats
 
 if TYPE_CHECKING:
@@ -215,12 +216,7 @@ def solve_curve(residuals_of: ResidualsOf, start: Floats, lower: Floats, upper: 
     """Return the bounded least-squares fit, each value in its unit with the first of these intervals."""
     found = _least_squares(residuals_of, start, lower, upper, slice(None))
     residuals, jacobian = np.asarray(found.fun), np.asarray(found.jac)
-    # (J'J)^-1 on scaled columns; a direction that the samples do not see gets a huge variance, not none.
-    scale = np.sqrt((jacobian**2).sum(axis=0))
-    scale = np.where(scale > 0.0, scale, 1.0)
-    values, vectors = np.linalg.eigh((jacobian / scale).T @ (jacobian / scale))
-    floor = max(float(values.max()), 1e-300) * 1e-14
-    inverse = np.asarray((vectors / np.maximum(values, floor)) @ vectors.T / np.outer(scale, scale))
+    inverse = inverse_of(jacobian.T @ jacobian)
     spread = np.sqrt(np.maximum(np.diag(inverse), 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
         correlation = inverse / np.outer(spread, spread)

@@ -15,6 +15,7 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.bench.curve_fit import CurveFit, fit_curve, quantile
 from ppafo.identification.bench.result import BenchResult, Evidence, Number, Panel, Series, count_of, prospect_of
 from ppafo.identification.estimate import Check, Estimate, Prospect
+from ppafo.identification.linear_systems import inverse_of
 from ppafo.identification.source import Source, check_moves, check_no_gap, check_sources, kind_of, traces, window
 from ppafo.signals.faults import is_at_limit, plateaus
 from ppafo.signals.recording import Floats
@@ -98,7 +99,7 @@ def decay_prospects(sources: tuple[Source, ...], settings: FreeDecaySettings) ->
     for decay in decays:
         speed = float(np.abs(smoothed_rates(decay.time, decay.angle)[0][:5]).max())
         information += _information(decay, speed, rate, deceleration)
-    covariance = np.linalg.pinv(information)
+    covariance = inverse_of(information)
     half = quantile(settings.confidence, sum(decay.time.size for decay in decays)) * np.sqrt(np.diag(covariance))
     likeness = float(covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1]))
     where = f"{decays[0].time[-1]:.3g} s of decay; errors of both are correlated by {likeness:+.2f}"

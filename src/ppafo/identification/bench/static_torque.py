@@ -19,6 +19,7 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.bench.curve_fit import CHANCE, exceeds_chance, quantile
 from ppafo.identification.bench.result import BenchResult, Evidence, Number, Panel, Role, Series, prospect_of
 from ppafo.identification.estimate import Check, Prospect
+from ppafo.identification.linear_systems import inverse_of, rank_of, solution_of
 from ppafo.identification.source import (
     Source,
     check_moves,
@@ -126,7 +127,7 @@ def static_prospects(sources: tuple[Source, ...], settings: StaticTorqueSettings
     design = _design(readings, True)
     scale = np.sqrt((design**2).mean(axis=0))
     factor = quantile(settings.confidence, max(1, pressure.size - 4)) * noise
-    inverse = np.linalg.pinv((design / scale).T @ (design / scale))
+    inverse = inverse_of((design / scale).T @ (design / scale))
     half = factor * np.sqrt(np.diag(inverse)) / scale
     span, levels = float(np.ptp(pressure)), int(readings.levels.max()) + 1
     where = f"{levels} pressures over {span / 1e3:.3g} kPa"
@@ -278,8 +279,8 @@ def regress(
     ``widest`` names the one that counted for the coefficient ``judged_by``.
     """
     count, columns = design.shape
-    inverse = np.asarray(np.linalg.inv(design.T @ design), dtype=np.float64)
-    coefficients = inverse @ (design.T @ values)
+    products = design.T @ design
+    inverse, coefficients = inverse_of(products), solution_of(products, design.T @ values)
     residuals = values - design @ coefficients
     candidates = {
         "independent readings": _independent_half_widths(design, inverse, residuals, confidence),
@@ -291,16 +292,17 @@ def regress(
         scores = np.zeros((groups, columns))
         np.add.at(scores, clusters, design * residuals[:, None])
         correction = groups / (groups - 1) * (count - 1) / (count - columns)
-        covariance = correction * inverse @ (scores.T @ scores) @ inverse
-        half_widths = quantile(confidence, groups - 1) * np.sqrt(np.diag(covariance))
+        errors = np.sqrt(correction * np.square(scores @ inverse).sum(axis=0))
+        half_widths = quantile(confidence, groups - 1) * errors
         candidates["scatter between repetitions"] = np.asarray(half_widths)
     counts = np.bincount(cells)
     if columns < counts.size < count:
         means = np.stack([np.bincount(cells, weights=column) / counts for column in (*design.T, values)])
         mean_design, mean_values = means[:-1].T, means[-1]
-        if np.linalg.matrix_rank(mean_design) == columns:
-            of_means = np.asarray(np.linalg.inv(mean_design.T @ mean_design), dtype=np.float64)
-            left = mean_values - mean_design @ (of_means @ (mean_design.T @ mean_values))
+        products = mean_design.T @ mean_design
+        if rank_of(products) == columns:
+            of_means = inverse_of(products)
+            left = mean_values - mean_design @ solution_of(products, mean_design.T @ mean_values)
             half_widths = _independent_half_widths(mean_design, of_means, left, confidence)
             candidates["departure of pressure levels from a straight line"] = half_widths
     stacked = np.array(list(candidates.values()))
@@ -416,10 +418,19 @@ def _growth_check(growing: Regression, readings: Readings, grows: bool) -> Check
         low, high = (friction + growth * (pressure - readings.middle) for pressure in ends)
         text = f"friction goes from {low:.3g} N m at the lowest to {high:.3g} N m at the highest pressure difference; "
         text += "a model with one friction torque is right at one of them only"
+    elif rank_of(_products(readings)) <= _GROWTH:
+        few = "a branch has readings at a single pressure, so that growing friction and K cannot be distinguished"
+        return Check("friction over pressure", False, f"{few}; measure both branches at several pressures")
     else:
         most = (abs(growth) + growing.half_widths[_GROWTH]) * float(np.ptp(readings.pressure))
         text = f"one friction torque describes all pressures; more than {most:.2g} N m of growth would have shown"
     return Check("friction over pressure", not grows, text)
+
+
+def _products(readings: Readings) -> Floats:
+    """Return the products of the columns of K, T_0, T_s and g."""
+    design = _design(readings, True)
+    return np.asarray(design.T @ design)
 
 
 def _panels(readings: Readings, fit: Regression) -> tuple[Panel, ...]:

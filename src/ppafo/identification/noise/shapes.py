@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ppafo.identification.linear_systems import solution_of
 from ppafo.identification.noise.sample_loops import sample_loops
-from ppafo.identification.noise.t_distribution import LEAST, t_nodes
+from ppafo.identification.noise.t_distribution import t_nodes
 from ppafo.signals.recording import Floats
 
 _LEAST_VARIANCE = 1.0e-300
@@ -146,14 +147,16 @@ def reflections_of(segments: list[Floats], most: int) -> tuple[Floats, Floats]:
 
 
 def regression_of(segments: Sequence[Floats], weights: Sequence[Floats], order: int) -> tuple[Floats, Floats]:
-    """Return the coefficients [-] of an autoregression by weighted least squares, and their precision at level 1."""
+    """Return the coefficients [-] of an autoregression by weighted least squares, and their precision at level 1.
+
+    Samples of a smooth curve do not determine them all: those before a sample say the same of it.
+    """
     precision, product = np.zeros((order, order)), np.zeros(order)
     for one, weight in zip(segments, weights, strict=True):
         before, after = previous_samples(one, order), weight[order:]
         precision += before.T @ (after[:, None] * before)
         product += before.T @ (after * one[order:])
-    precision += LEAST * np.eye(order)
-    return np.asarray(np.linalg.solve(precision, product), dtype=np.float64), precision
+    return solution_of(precision, product), precision
 
 
 def previous_samples(segment: Floats, order: int) -> Floats:

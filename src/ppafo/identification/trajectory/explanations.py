@@ -13,6 +13,7 @@ import numpy as np
 
 from ppafo.errors import PpafoError
 from ppafo.identification.estimate import limit_for
+from ppafo.identification.linear_systems import solution_of
 from ppafo.identification.noise.choice import Left, sensor_noises
 from ppafo.identification.noise.sensor_noise import Course, SensorNoise, course_of
 from ppafo.identification.trajectory.directions.catalogue import EFFECT_DIRECTIONS
@@ -298,8 +299,8 @@ def _nuisances(prepared: PreparedExperiment, signals: Mapping[str, Floats], star
 
 def _less(columns: Floats, left: Floats) -> Floats:
     """Return residuals less what columns of sizes about 1 explain."""
-    product = columns.T @ columns + np.eye(columns.shape[1])
-    return np.asarray(left - columns @ np.linalg.solve(product, columns.T @ left))
+    products = columns.T @ columns + np.eye(columns.shape[1])
+    return np.asarray(left - columns @ solution_of(products, columns.T @ left))
 
 
 def _starts_of(prepared: PreparedExperiment) -> dict[str, Floats]:

@@ -36,6 +36,11 @@ def principal_axes(information: Floats) -> tuple[Floats, Floats, Floats]:
     return scale, values, vectors
 
 
+def _largest(values: Floats) -> float:
+    """Return the largest eigenvalue [-] of a scaled information, or 1, what it is where anything is known."""
+    return max(float(values[-1]), 1.0) if values.size else 1.0
+
+
 def loss_weights(residuals: Floats, loss: str) -> Floats:
     """Return the weight [-] of each residual in the information, 1 where no robust loss holds it back."""
     size = np.abs(residuals) / ROBUST_SCALE
@@ -88,7 +93,7 @@ def directions_for(information: Floats, is_fixed: Mask) -> Floats:
     free = np.flatnonzero(~is_fixed)
     part = information[np.ix_(free, free)]
     scale, values, vectors = principal_axes(part)
-    errors = 1.0 / np.sqrt(np.maximum(values, SMALLEST_FRACTION * values[-1])) if free.size else values
+    errors = 1.0 / np.sqrt(np.maximum(values, SMALLEST_FRACTION * _largest(values)))
     found = STEP_IN_ERRORS * errors * vectors / scale[:, None]
     size = np.max(np.abs(found), axis=0, initial=0.0)
     directions[np.ix_(free, free)] = found * (np.clip(size, SMALLEST_STEP, LARGEST_STEP) / size)
@@ -98,7 +103,7 @@ def directions_for(information: Floats, is_fixed: Mask) -> Floats:
 def covariance(information: Floats) -> Floats:
     """Return the inverse of an information matrix [unit^2]; a direction without information gets a huge variance."""
     scale, values, vectors = principal_axes(information)
-    kept = np.maximum(values, SMALLEST_FRACTION * values[-1])
+    kept = np.maximum(values, SMALLEST_FRACTION * _largest(values))
     return np.asarray((vectors / kept) @ vectors.T / np.outer(scale, scale))
 
 
@@ -134,10 +139,10 @@ def solution(precision: Floats, product: Floats) -> Floats:
 def solution_with_root(precision: Floats, product: Floats) -> tuple[Floats, Floats]:
     """Return what ``solution`` does, and the root of the inverse that ``inverse_with_root`` does, at half the cost."""
     scale, values, vectors = principal_axes(precision)
-    is_fixed = values > FIXED * values[-1]
+    is_fixed = values > FIXED * _largest(values)
     inverses = np.where(is_fixed, 1.0 / np.where(is_fixed, values, 1.0), 0.0)
     found = (vectors * inverses) @ (vectors.T @ (product / scale)) / scale
-    root = vectors / np.sqrt(np.maximum(values, SMALLEST_FRACTION * values[-1])) / scale[:, None]
+    root = vectors / np.sqrt(np.maximum(values, SMALLEST_FRACTION * _largest(values))) / scale[:, None]
     return np.asarray(found), np.asarray(root)
 
 
@@ -151,7 +156,7 @@ def likelihood_without_columns(whole: Floats) -> float:
     if not math.isnan(found[0]):
         return float(found[0])
     scale, values, vectors = principal_axes(whole[:-1, :-1])
-    kept = np.maximum(values, SMALLEST_FRACTION * values[-1])
+    kept = np.maximum(values, SMALLEST_FRACTION * _largest(values))
     along = vectors.T @ (whole[:-1, -1] / scale)
-    size = float(np.sum(np.where(values > FIXED * values[-1], along * along / kept, 0.0)))
+    size = float(np.sum(np.where(values > FIXED * _largest(values), along * along / kept, 0.0)))
     return 0.5 * (size - float(whole[-1, -1]) - float(np.sum(np.log(kept)))) - float(np.sum(np.log(scale)))

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ppafo.identification.linear_systems import inverse_of_steps
 from ppafo.identification.noise.choice import Left, sensor_noises
 from ppafo.identification.noise.heavy_tails import sample_weights
 from ppafo.identification.noise.sensor_noise import SensorNoise
@@ -346,7 +347,7 @@ def _around(runs: "_Runs", at: Floats, steps: Floats) -> tuple[Floats, Floats] |
     values = runs.residuals(np.vstack([at + steps.T, at - steps.T, at]))
     if not np.isfinite(values).all():
         return None
-    return values[:, -1], 0.5 * (values[:, : len(at)] - values[:, len(at) : -1]) @ np.linalg.inv(steps)
+    return values[:, -1], 0.5 * (values[:, : len(at)] - values[:, len(at) : -1]) @ inverse_of_steps(steps)
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,10 +18,12 @@ from numpy.typing import NDArray
 
 from ppafo.engine.lanes import StepInputs, replay, run_batch
 from ppafo.engine.program import Program
-from ppafo.engine.rows import row_numbers
+from ppafo.engine.rows import leaves, rebuilt, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batches_of
+from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import IdentificationError
+from ppafo.identification.linear_systems import inverse_of_steps
 from ppafo.identification.trajectory.problem import (
     GAIN_OF,
     TIME_OFFSET,
@@ -33,7 +35,6 @@ from ppafo.identification.trajectory.problem import (
 )
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import at, over_runs
-from ppafo.model.plant import chamber_1_volume, chamber_2_volume, chamber_pressure
 from ppafo.parameters.plant import effect_rows, plant_parameters, switches_of
 from ppafo.signals.faults import MINIMUM_SAMPLES, is_at_limit, noise_of, plateaus
 from ppafo.simulation.plan import (
@@ -332,15 +333,16 @@ def _run_signals(prepared: PreparedExperiment, columns: Mapping[str, Floats], co
             records[place][:, members] = outcome.record[:, row]
     assert records is not None
     offsets = np.broadcast_to(columns.get(TIME_OFFSET, np.array(prepared.time_offset)), (count,))
-    plant = run.plant
-    angle: Any
     angle, mass_1, mass_2 = (_at_samples(one, prepared, offsets) for one in records)
-    volume_1 = chamber_1_volume(angle, plant.angle_min, plant.volume_per_angle, plant.dead_volume_1)
-    volume_2 = chamber_2_volume(angle, plant.angle_max, plant.volume_per_angle, plant.dead_volume_2)
-    pressure_1: Any = chamber_pressure(mass_1, volume_1, plant.gas_product)
-    pressure_2: Any = chamber_pressure(mass_2, volume_2, plant.gas_product)
-    found = {"angle": angle, "pressure_1": pressure_1, "pressure_2": pressure_2}
-    return {channel.name: np.where(failed, np.nan, found[channel.name]) for channel in prepared.channels}
+    found = {name: np.full(angle.shape, np.nan) for name in ("angle", "pressure_1", "pressure_2")}
+    numbers = leaves(run.plant)
+    for lane in np.flatnonzero(~failed).tolist():
+        plant = rebuilt(run.program.actuator.plant, [at(number, lane) for number in numbers])
+        own = angle[:, lane], mass_1[:, lane], mass_2[:, lane]
+        pressures = pressures_of(run.program.actuator, plant, *own)
+        for name, values in zip(found, (own[0], *pressures), strict=True):
+            found[name][:, lane] = values
+    return {channel.name: found[channel.name] for channel in prepared.channels}
 
 
 @lru_cache(maxsize=16)
@@ -485,7 +487,7 @@ class Neighbourhood:
                 f"determined; give other bounds or another start"
             )
         change = np.where(use_above, above, centre) - np.where(use_below, below, centre)
-        return np.asarray((change / (1.0 * use_above + use_below)) @ np.linalg.inv(self.directions))
+        return np.asarray((change / (1.0 * use_above + use_below)) @ inverse_of_steps(self.directions))
 
     def jacobian(self) -> Floats:
         """Return the derivative of ``all_residuals`` [-] with respect to the coordinates."""

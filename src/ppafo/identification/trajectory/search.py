@@ -13,6 +13,7 @@ import numpy as np
 
 from ppafo.engine.lane_rows import LANES
 from ppafo.errors import IdentificationError
+from ppafo.identification.linear_systems import inverse_of_steps
 from ppafo.identification.noise.choice import Left, sensor_noise, sensor_noises
 from ppafo.identification.noise.heavy_tails import sample_weights
 from ppafo.identification.noise.sensor_noise import Course, SensorNoise, course_of, without_common_stamps
@@ -520,9 +521,9 @@ def _step(near: Neighbourhood, model: LinearModel, sensors: Sequence[Sensor]) ->
     low, high = coordinate_bounds(near.residuals.ranges)
     if np.all((near.point + step >= low) & (near.point + step <= high)):
         return step, information
-    _, root = inverse_with_root(information)
+    root = inverse_with_root(information)[1]
     room = np.minimum(low - near.point, 0.0), np.maximum(high - near.point, 0.0) + 1.0e-15
-    return np.asarray(lsq_linear(np.linalg.inv(root), -root.T @ pull, bounds=room).x), information
+    return np.asarray(lsq_linear(inverse_of_steps(root), -root.T @ pull, bounds=room).x), information
 
 
 def _damp_step(near: Neighbourhood, step: Floats, directions: Floats, whitening: Whitening) -> Neighbourhood | None:

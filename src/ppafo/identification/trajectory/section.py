@@ -15,7 +15,7 @@ from pydantic import Field
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.models import NAME, StrictTable, Text, Texts, validate
-from ppafo.errors import DataError, IdentificationError, UnitError, nearest_name, refused_as
+from ppafo.errors import DataError, IdentificationError, ScenarioError, UnitError, nearest_name, refused_as
 from ppafo.identification.bench.result import count_of
 from ppafo.identification.estimate import BENCH_VERDICTS, Check, Estimate, Prospect, interval_factor
 from ppafo.identification.source import Source, Use, common_use, source_of
@@ -48,6 +48,7 @@ from ppafo.identification.trajectory.uncertainty import FROM_PRIOR, STRONG, rela
 from ppafo.identification.trajectory.unseen import unseen_in_words
 from ppafo.parameters import apply_overrides, build_device
 from ppafo.parameters.device import Device
+from ppafo.parameters.overrides import over
 from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.progress import Progress, Report
 from ppafo.signals import Recording
@@ -332,7 +333,7 @@ def _experiment(item: ExperimentSection, setting: Setting) -> Experiment:
 def _scenario(name: str, overrides: tuple[str, ...], setting: Setting) -> Scenario:
     found = name if name in list_scenarios() else str(setting.folder / name)
     chosen = () if setting.valve is None else (f"device.valve={setting.valve}",)
-    return load_scenario(found, (*chosen, *overrides), setting.parameter_set)
+    return load_scenario(found, over(chosen, overrides, ScenarioError), setting.parameter_set)
 
 
 def _nuisances(

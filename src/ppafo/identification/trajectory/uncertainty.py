@@ -316,6 +316,10 @@ class Evidence:
     with_effect: WithEffect | None = None
 
 
+_ANYWHERE = 0.99
+"""Width of an interval over that of an even distribution between the bounds from which a number may be anything."""
+
+
 def estimate_of(evidence: Evidence, index: int) -> Estimate:
     """Return the estimate of one parameter."""
     item, at = evidence.ranges[index], float(evidence.point[index])
@@ -327,7 +331,10 @@ def estimate_of(evidence: Evidence, index: int) -> Estimate:
         return max(min(one, other), item.low), min(max(one, other), item.high)
 
     low, high = ends(evidence.interval)
-    fraction = relative_half_width(evidence, index, half)
+    # Such a number ends at either bound, and is not known at one more than at the other.
+    room = item.coordinate(item.high) - item.coordinate(item.low)
+    is_anywhere = 2.0 * half >= _ANYWHERE * evidence.search.confidence * room
+    fraction = math.inf if is_anywhere else relative_half_width(evidence, index, half)
     if item.is_tolerance:
         verdict, explanation = _of_bench(item, item.number(at), low, high)
     else:
@@ -440,7 +447,8 @@ def _explanation(evidence: Evidence, index: int, verdict: Verdict, fraction: flo
         factor = interval_factor(evidence.search.confidence)
         alone_half = factor * math.sqrt(evidence.inflation / information) if information > 0.0 else math.inf
         free = relative_half_width(evidence, index, alone_half)
-        if free > _FREED * fraction:
+        # What may be anything and moves with nothing shows in no residual.
+        if free > _FREED * fraction or (math.isinf(fraction) and not others):
             prior = "; no residual shows it, so it needs a prior" if fraction > evidence.search.weak else ""
             text = f"The recordings are hardly sensitive to it: they determine it only to {size}{prior}"
         else:

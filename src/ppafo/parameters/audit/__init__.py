@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from ppafo.parameters.audit.chambers import check_filling, check_rotation, check_virtual_work, check_volumes
+from ppafo.parameters.audit.changes import changes
 from ppafo.parameters.audit.evidence import Evidence, Finding, NamedValue, Severity, Side
 from ppafo.parameters.audit.flow import check_bores, check_choked_flow, check_flow, check_orifices, check_sonic_flow
 from ppafo.parameters.audit.torque import check_inertia, check_published_torque, check_torque_ceiling
@@ -18,9 +19,10 @@ from ppafo.parameters.audit.values import (
     check_ranges,
     check_statements,
 )
+from ppafo.parameters.loading import load_parameter_set
 from ppafo.parameters.parameter_set import ParameterSet, overridden_paths
 
-__all__ = ["Finding", "NamedValue", "Severity", "Side", "audit"]
+__all__ = ["Finding", "NamedValue", "Severity", "Side", "audit", "changed_paths"]
 
 CHECKS: dict[str, Callable[[Evidence], Iterator[Finding]]] = {
     "statements": check_statements,
@@ -44,25 +46,38 @@ CHECKS: dict[str, Callable[[Evidence], Iterator[Finding]]] = {
 _ORDER = {"error": 0, "warning": 1, "note": 2}
 
 
-def audit(parameter_set: ParameterSet) -> list[Finding]:
+def audit(parameter_set: ParameterSet, parent: ParameterSet | None = None) -> list[Finding]:
     """Return what contradicts, or deserves attention in, any parameter set; errors first.
 
-    An error that the set accepts with a reason becomes a warning that shows the reason. A reason for something that
-    is not found is a warning too, so that it does not outlive what it excuses.
+    An error that the set accepts with a reason becomes a warning that shows the reason. A reason that stands in its
+    ``parent`` too, the set that the file names unless given, lapses where the set changes a value of the finding. A
+    reason for something that is not found is a warning, so that it does not outlive what it excuses.
     """
+    if parent is None and parameter_set.parent:
+        parent = load_parameter_set(parameter_set.parent)
     evidence = Evidence(parameter_set, parameter_set.declarations())
     found = [finding for check in CHECKS.values() for finding in check(evidence)]
     changed = overridden_paths(parameter_set)
-    judged = [_judge(finding, parameter_set, changed) for finding in found]
+    judged = [_judge(finding, parameter_set, changed, parent) for finding in found]
     if not changed:
         judged += _idle_reasons(parameter_set, {finding.id for finding in found})
     return sorted(judged, key=lambda finding: _ORDER[finding.severity])
 
 
-def _judge(finding: Finding, parameter_set: ParameterSet, changed: frozenset[str]) -> Finding:
-    """Apply the set's reason, which speaks of the set's own values and not of overrides."""
+def changed_paths(parameter_set: ParameterSet, parent: ParameterSet | None) -> frozenset[str]:
+    """Return the paths whose values come from overrides, or are otherwise than in the parent."""
+    of_file = frozenset[str]() if parent is None else {change.path for change in changes(parameter_set, parent)}
+    return overridden_paths(parameter_set) | of_file
+
+
+def _judge(
+    finding: Finding, parameter_set: ParameterSet, overridden: frozenset[str], parent: ParameterSet | None
+) -> Finding:
+    """Apply the set's reason, which speaks of its author's values: not of overrides, nor of what a copy changes."""
     reason = parameter_set.accepted.get(finding.id, "")
-    if not reason or any(value.path in changed for value in finding.values):
+    is_copied = parent is not None and parent.accepted.get(finding.id) == reason
+    others = changed_paths(parameter_set, parent) if is_copied else overridden
+    if not reason or any(value.path in others for value in finding.values):
         return finding
     severity = "warning" if finding.severity == "error" else finding.severity
     return replace(finding, severity=severity, accepted=reason)

@@ -18,7 +18,7 @@ from pydantic import BaseModel, Field
 
 from ppafo.documents.models import NAME, make_schema, optional, read_model, table
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, refused_as
+from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as, said_missing
 from ppafo.model.cold_gas import ColdSupply, Passage
 from ppafo.model.declaration import Quantity, range_rule
 from ppafo.model.gas import SPECIES
@@ -35,6 +35,7 @@ from ppafo.model.source import (
     pressure_reserve,
 )
 from ppafo.parameters.declaration import is_within
+from ppafo.parameters.overrides import Forms, other_forms, override_set
 from ppafo.parameters.parameter_set import Entry, TextEntry
 from ppafo.parameters.parts import Part, load_catalogue
 from ppafo.units import format_quantity, split_quantity, to_si
@@ -127,6 +128,8 @@ FILL_BY_PRESSURE = (
         "fill_temperature", "K", "temperature at which the bottle has that pressure", minimum=200.0, maximum=400.0
     ),
 )
+FILLS: Forms = {"bottle": tuple(tuple(item.name for item in form) for form in (FILL_BY_MASS, FILL_BY_PRESSURE))}
+"""Forms in which a bottle says how full it is."""
 REGULATOR = (
     Quantity("set_pressure", "Pa_a", "outlet pressure of the regulator without flow", minimum=1e5, maximum=2e7),
     Quantity("droop", "Pa s/kg", "drop of the outlet pressure per mass flow", minimum=0.0, maximum=1e9),
@@ -273,8 +276,13 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     if part is not None:
         parsed = parsed.model_copy(update={"name": part.name, "title": f"{part.maker}: {part.model}, with a regulator"})
         found, file = scaled_entries(part, found), part.name
-    for override in overrides:
-        found = _override(found, override)
+    for path, given in override_set(overrides, forms=FILLS).items():
+        if path not in PATHS:
+            raise ParameterError(f"override '{given}': a bottle has no value '{path}'{nearest_name(path, PATHS)}")
+        with refused_as(ParameterError, f"override '{given}'", UnitError):
+            value, unit = split_quantity(given.text)
+        kept = {name: entry for name, entry in found.items() if name not in other_forms(path, FILLS)}
+        found = kept | {path: Entry(value=value, unit=unit, origin="assumed", source="override")}
     return _build(parsed, found, file)
 
 
@@ -302,29 +310,11 @@ def _warming() -> dict[str, Entry]:
     return {path: given[path] for path in WARMING}
 
 
-def _override(entries: Mapping[str, Entry], override: str) -> dict[str, Entry]:
-    path, separator, text = (part.strip() for part in one_line(override).partition("="))
-    if not separator or not text:
-        raise ParameterError(f"override '{one_line(override)}' is not of the form PATH=VALUE")
-    if path not in PATHS:
-        raise ParameterError(f"override '{path}={text}': a bottle has no value '{path}'{nearest_name(path, PATHS)}")
-    with refused_as(ParameterError, f"override '{path}={text}'", UnitError):
-        value, unit = split_quantity(text)
-    entry = Entry(value=value, unit=unit, origin="assumed", source="override")
-    return {name: kept for name, kept in entries.items() if name not in _other_fill(path)} | {path: entry}
-
-
-def _other_fill(path: str) -> frozenset[str]:
-    """Return the values that an override drops: how full a bottle is, said in the other way."""
-    by_mass, by_pressure = ({f"bottle.{item.name}" for item in form} for form in (FILL_BY_MASS, FILL_BY_PRESSURE))
-    return frozenset(by_pressure if path in by_mass else by_mass if path in by_pressure else ())
-
-
 def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
     """Return the bottle of these values, or report what is missing or cannot be."""
     missing = [path for path in NEEDED if path not in entries]
     if missing:
-        raise ParameterError(f"{file}: '{missing[0]}' is missing")
+        raise ParameterError(f"{file}: {said_missing(missing)}")
     values = {path: _in_si(path, entry, file) for path, entry in entries.items()}
     fluid = _fluid(parsed.gas.value, file)
     bottle = Bottle(
@@ -378,7 +368,7 @@ def _mass_of_fill(values: Mapping[str, float], fluid: Fluid, file: str) -> float
         return values["bottle.gas_mass"]
     missing = [path for path in by_pressure if path not in values]
     if missing:
-        raise ParameterError(f"{file}: '{missing[0]}' is missing beside {given[0]}")
+        raise ParameterError(f"{file}: {said_missing(missing)} beside {given[0]}")
     pressure, temperature = (values[path] for path in by_pressure)
     _check_temperature("bottle.fill_temperature", temperature, fluid, file)
     if fluid_pressure(fluid.table, temperature, math.inf) < pressure:

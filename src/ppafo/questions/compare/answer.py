@@ -179,7 +179,7 @@ class Case:
     renoised: Outcomes | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Comparison(Solved):
     """All cases, task by task in the order of the configurations, one of which is the ``baseline``.
 

@@ -19,11 +19,13 @@ QUESTION = Question(
             type=Path,
             nargs="*",
         ),
-        Argument(("--gas-per-step",), "gas_per_step", "gas per step, for example '0.3 g'", "MASS", type=quantity("kg")),
         Argument(
-            ("--step-time",),
-            "step_time",
-            "time of one step; default: '1.1 s', the whole recording, one stride of a walk, or its whole course",
+            ("--gas-per-stride",), "gas_per_stride", "gas per stride, for example '0.3 g'", "MASS", type=quantity("kg")
+        ),
+        Argument(
+            ("--stride-time",),
+            "stride_time",
+            "time of one stride; default: '1.1 s', the whole recording, one stride of a walk, or its whole course",
             metavar="TIME",
             type=quantity("s"),
         ),

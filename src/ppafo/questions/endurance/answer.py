@@ -54,14 +54,14 @@ class Reuse:
         return reuse_balance(self.cycle)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Endurance(Solved):
     """The request and its result.
 
     ``discharge`` is the requested course; ``without_reuse`` the same without reuse, where there is one.
-    ``steps_when_warm`` is the number of steps that a bottle which stays at room temperature gives: what cooling costs.
-    ``is_of_course`` is true where a step is a course. ``others`` is the same for a walk or a run with other readings of
-    the paper's chambers, by their names.
+    ``strides_when_warm`` is the number of strides that a bottle which stays at room temperature gives: what cooling
+    costs. ``is_of_course`` is true where a stride is a course. ``others`` is the same for a walk or a run with other
+    readings of the paper's chambers, by their names.
     """
 
     bottle: Bottle
@@ -70,12 +70,12 @@ class Endurance(Solved):
     discharge: Discharge
     reuse: Reuse | None
     without_reuse: Discharge | None
-    steps_when_warm: float
+    strides_when_warm: float
     is_of_course: bool = False
     others: Mapping[str, "Endurance"] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Endurances(Solved):
     """Several gas uses on the same bottle, by name."""
 
@@ -113,8 +113,8 @@ def endurance_figure(found: Endurance) -> "matplotlib.figure.Figure":
 
 
 def _title(found: Endurance) -> str:
-    gas, time = quantity_text(found.draw.mass_per_step, "gas mass"), quantity_text(found.draw.step_time, "time")
-    return f"{found.bottle.name}: {gas} per step of {time}"
+    gas, time = quantity_text(found.draw.mass_per_stride, "gas mass"), quantity_text(found.draw.stride_time, "time")
+    return f"{found.bottle.name}: {gas} per stride of {time}"
 
 
 def _draw_temperature(axes: "Axes", found: Endurance, minutes: Floats) -> None:
@@ -139,16 +139,16 @@ _LEFT_OUT = (
 )
 _REUSE_ASSUMES = (
     "A balance for ideal gas at constant temperature: pressures equalise, check valves have no losses, nothing "
-    "leaks, and the reservoir has settled over many steps."
+    "leaks, and the reservoir has settled over many strides."
 )
 _CAPTION = "Temperature, pressure and gas in the bottle from full to the end."
-_USE = (Column("gas use"), Column("gas per step", "gas mass", ".3g"))
+_USE = (Column("gas use"), Column("gas per stride", "gas mass", ".3g"))
 _REUSED = (
     Column("gas saved", "gas mass", ".3g"),
     Column("walking with reuse", "duration"),
-    Column("steps with reuse"),
+    Column("strides with reuse"),
 )
-_COURSE = (Column("walking", "duration"), Column("steps"))
+_COURSE = (Column("walking", "duration"), Column("strides"))
 
 
 def answer_of(found: Endurance | Endurances) -> Answer:
@@ -202,11 +202,11 @@ def _answer_of_several(several: Endurances) -> Answer:
 
 def _cells(one: Endurance) -> tuple[str | float, ...]:
     course = one.discharge
-    last = (course.walking_time, steps_text(course.steps))
+    last = (course.walking_time, strides_text(course.strides))
     if one.reuse is None or one.without_reuse is None:
-        return one.draw.mass_per_step, *last, course.ending.kind
+        return one.draw.mass_per_stride, *last, course.ending.kind
     saved, before = one.reuse.balance.returned_mass, one.without_reuse
-    first = (one.draw.mass_per_step + saved, before.walking_time, steps_text(before.steps))
+    first = (one.draw.mass_per_stride + saved, before.walking_time, strides_text(before.strides))
     return *first, saved, *last, course.ending.kind
 
 
@@ -217,10 +217,13 @@ def _facts(found: Endurance) -> list[tuple[str, str]]:
     flows = [quantity_text(flow, "mass flow") for flow in (draw.mean_flow, draw.peak_flow)]
     rows = [
         ("run time", f"{_lasting(found)} of walking, {minutes_text(course.total_time)} in total"),
-        ("steps", steps_text(course.steps)),
-        ("steps without cooling", f"{steps_text(found.steps_when_warm)} (a bottle that stays at room temperature)"),
+        ("strides", strides_text(course.strides)),
+        (
+            "strides without cooling",
+            f"{strides_text(found.strides_when_warm)} (a bottle that stays at room temperature)",
+        ),
         ("ended", course.ending.message),
-        ("gas", f"{_gas(draw.mass_per_step)} a step, {flows[0]}, largest {flows[1]}"),
+        ("gas", f"{_gas(draw.mass_per_stride)} a stride, {flows[0]}, largest {flows[1]}"),
         ("heat that it lacks", _lacking_heat(found)),
         (
             "lowest temperature of the content",
@@ -245,9 +248,9 @@ def _other_facts(found: Endurance) -> list[tuple[str, str]]:
     return [
         (
             f"with {name}",
-            f"{_gas(other.draw.mass_per_step + _saved(other))} a step, "
+            f"{_gas(other.draw.mass_per_stride + _saved(other))} a stride, "
             f"{f'{_gas(_saved(other))} of it saved, ' if other.reuse else ''}"
-            f"{minutes_text(other.discharge.walking_time)} of walking, {steps_text(other.discharge.steps)} steps"
+            f"{minutes_text(other.discharge.walking_time)} of walking, {strides_text(other.discharge.strides)} strides"
             f"{', without reuse' if found.reuse and not other.reuse else ''}",
         )
         for name, other in found.others.items()
@@ -260,12 +263,12 @@ def _saved(found: Endurance) -> float:
 
 def _reuse_facts(found: Endurance, reused: Reuse, without: Discharge) -> list[tuple[str, str]]:
     balance = reused.balance
-    before = found.draw.mass_per_step + balance.returned_mass
-    saved = f"{_gas(balance.returned_mass)} a step, {balance.returned_mass / before:.1%} of {_gas(before)}"
+    before = found.draw.mass_per_stride + balance.returned_mass
+    saved = f"{_gas(balance.returned_mass)} a stride, {balance.returned_mass / before:.1%} of {_gas(before)}"
     return [
         ("exhaust reused", f"{saved}; the exhaust holds {_gas(balance.exhausted_mass)}"),
         ("chambers", _chambers(reused)),
-        ("without reuse", f"{minutes_text(without.walking_time)} of walking, {steps_text(without.steps)} steps"),
+        ("without reuse", f"{minutes_text(without.walking_time)} of walking, {strides_text(without.strides)} strides"),
     ]
 
 
@@ -327,7 +330,7 @@ def _data(found: Endurance) -> dict[str, Any]:
         "schema_version": 1,
         "kind": "simulated",
         "ppafo": __version__,
-        "result": _course_data(found.discharge) | {"steps_when_warm": found.steps_when_warm},
+        "result": _course_data(found.discharge) | {"strides_when_warm": found.strides_when_warm},
         "draw": asdict(found.draw) | {"mean_flow": found.draw.mean_flow},
         "schedule": found.schedule._asdict(),
         "bottle": _bottle_data(found),
@@ -335,7 +338,7 @@ def _data(found: Endurance) -> dict[str, Any]:
     if found.others:
         data["other_chambers"] = {
             name: _course_data(other.discharge)
-            | {"gas_per_step": other.draw.mass_per_step + _saved(other), "gas_saved": _saved(other)}
+            | {"gas_per_stride": other.draw.mass_per_stride + _saved(other), "gas_saved": _saved(other)}
             for name, other in found.others.items()
         }
     if found.reuse is not None and found.without_reuse is not None:
@@ -350,7 +353,7 @@ def _course_data(course: Discharge) -> dict[str, Any]:
     return {
         "walking_time": course.walking_time,
         "total_time": course.total_time,
-        "steps": course.steps,
+        "strides": course.strides,
         "ending": asdict(course.ending),
         "coldest_temperature": float(np.min(recording["bottle_temperature"])),
         "at_end": {name: float(recording[name][-1]) for name in recording.names},
@@ -371,9 +374,9 @@ def _bottle_data(found: Endurance) -> dict[str, Any]:
     }
 
 
-def steps_text(steps: float) -> str:
-    """Return a number of steps as it is shown: a decimal of few, such as of courses, whole ones of many."""
-    return f"{steps:.1f}" if steps < 99.5 else f"{steps:.0f}"
+def strides_text(strides: float) -> str:
+    """Return a number of strides as it is shown: a decimal of few, such as of courses, whole ones of many."""
+    return f"{strides:.1f}" if strides < 99.5 else f"{strides:.0f}"
 
 
 def _gas(mass: float) -> str:

@@ -142,11 +142,11 @@ class Balance(NamedTuple):
 
 @dataclass(frozen=True)
 class Discharge:
-    """The course of a bottle: time of walking and of all [s], steps, how it ended, the balance, and its recording."""
+    """The course of a bottle: time of walking and of all [s], strides, how it ended, the balance, and its recording."""
 
     walking_time: float
     total_time: float
-    steps: float
+    strides: float
     ending: Ending
     balance: Balance | SupplyBalance
     record: Callable[[], Recording] = field(repr=False, compare=False)
@@ -172,9 +172,9 @@ def check_schedule(schedule: Schedule) -> None:
 
 
 def discharge(bottle: Bottle, draw: Draw, schedule: Schedule) -> Discharge:
-    """Return the course of a full bottle under a draw; walking takes the mean flow of a step.
+    """Return the course of a full bottle under a draw; walking takes the mean flow of a stride.
 
-    Steps are a second long and bottles cool in minutes, so the mean stands for the pulses; the regulator is judged by
+    Strides are a second long and bottles cool in minutes, so the mean stands for the pulses; the regulator is judged by
     the largest flow. SimulationError where the solver fails.
     """
     check_schedule(schedule)
@@ -211,7 +211,7 @@ def discharge(bottle: Bottle, draw: Draw, schedule: Schedule) -> Discharge:
     return Discharge(
         walking_time=walked,
         total_time=stretches[-1].end,
-        steps=walked / draw.step_time,
+        strides=walked / draw.stride_time,
         ending=ending(bottle, draw, float(last[0]), content_of(bottle, float(last[0]), float(last[1])), reason),
         balance=balance,
         record=lambda: _recording(bottle, stretches),
@@ -226,7 +226,7 @@ def discharge_of_life(life: BottleLife, draw: Draw) -> Discharge:
     return Discharge(
         walking_time=life.walked,
         total_time=life.total,
-        steps=life.repeats,
+        strides=life.repeats,
         ending=Ending(TIME_IS_UP if ended.kind == WALKED else ended.kind, ended.message, course.last.mass, usable),
         balance=course.balance,
         record=lambda: course.recording,

@@ -1,4 +1,4 @@
-"""How much gas a device takes in a step: from numbers, from a recording, from a walk; when it walks and rests."""
+"""How much gas a device takes in a stride: from numbers, from a recording, from a walk; when it walks and rests."""
 
 import math
 import sys
@@ -29,7 +29,7 @@ from ppafo.walking.motion import walk_of
 PEAK_WINDOW = 0.1
 """Seconds over which the largest flow of a recording is averaged; lines and regulator even out what is shorter."""
 _MAXIMUM_FALLEN = 0.1
-"""Fraction of the gas used that may flow back: it waits in the line before the valve, and the next step takes it."""
+"""Fraction of the gas used that may flow back: it waits in the line before the valve, and the next stride takes it."""
 WALK_FILE = "walk.json"
 FORMAT, FORMAT_OF_REACTING = "ppafo walk", "ppafo walk of a wearer who reacts"
 _VOLUMES = ("volume_per_angle", "dead_volume_1", "dead_volume_2")
@@ -40,42 +40,42 @@ _LEAST = 1.0e-12
 
 @dataclass(frozen=True, slots=True)
 class Draw:
-    """Gas use: mass per step [kg], time of a step [s], largest flow [kg/s], and where the numbers come from.
+    """Gas use: mass per stride [kg], time of a stride [s], largest flow [kg/s], and where the numbers come from.
 
-    A step is one cycle of the device's leg, heel strike to heel strike of the same foot.
+    A stride is one cycle of the device's leg, heel strike to heel strike of the same foot.
     """
 
-    mass_per_step: float
-    step_time: float
+    mass_per_stride: float
+    stride_time: float
     peak_flow: float
     origin: str
 
     @property
     def mean_flow(self) -> float:
-        """Mass flow [kg/s] while walking, averaged over a step."""
-        return self.mass_per_step / self.step_time
+        """Mass flow [kg/s] while walking, averaged over a stride."""
+        return self.mass_per_stride / self.stride_time
 
     def less(self, saved: float) -> "Draw":
-        """Return the draw with a mass [kg] saved in every step; the largest flow stays, which is the safe side."""
-        return replace(self, mass_per_step=self.mass_per_step - saved)
+        """Return the draw with a mass [kg] saved in every stride; the largest flow stays, which is the safe side."""
+        return replace(self, mass_per_stride=self.mass_per_stride - saved)
 
 
-def draw_of_numbers(mass_per_step: float, step_time: float, peak_flow: float | None) -> Draw:
+def draw_of_numbers(mass_per_stride: float, stride_time: float, peak_flow: float | None) -> Draw:
     """Return the draw of given numbers [kg, s, kg/s]; without a largest flow the mean one is taken for it."""
-    for name, value, unit in (("gas per step", mass_per_step, "kg"), ("step time", step_time, "s")):
+    for name, value, unit in (("gas per stride", mass_per_stride, "kg"), ("stride time", stride_time, "s")):
         if not (math.isfinite(value) and value > 0.0):
             raise ParameterError(f"{name} must be above 0, it is {value:g} {unit}")
-    mean = mass_per_step / step_time
+    mean = mass_per_stride / stride_time
     if peak_flow is not None and not (math.isfinite(peak_flow) and peak_flow >= mean):
         raise ParameterError(
             f"the largest flow, {peak_flow * GRAMS_PER_KILOGRAM:.4g} g/s, must be at least the mean flow, "
             f"{mean * GRAMS_PER_KILOGRAM:.4g} g/s"
         )
-    return Draw(mass_per_step, step_time, mean if peak_flow is None else peak_flow, "numbers given")
+    return Draw(mass_per_stride, stride_time, mean if peak_flow is None else peak_flow, "numbers given")
 
 
-def draw_of_recording(recording: Recording, step_time: float | None) -> Draw:
-    """Return the draw of a recording with ``supplied_mass``, repeated for ever; all of it is one step by default."""
+def draw_of_recording(recording: Recording, stride_time: float | None) -> Draw:
+    """Return the draw of a recording with ``supplied_mass``, repeated for ever; all of it is one stride by default."""
     if "supplied_mass" not in recording:
         raise DataError(f"{recording.label}: has no channel 'supplied_mass'; available: {', '.join(recording.names)}")
     supplied = _gas_use(recording)
@@ -89,14 +89,14 @@ def draw_of_recording(recording: Recording, step_time: float | None) -> Draw:
             f"gains {gain * GRAMS_PER_KILOGRAM:.3g} g; it must be cumulative from the start of the recording to "
             "its end"
         )
-    step = recording.duration if step_time is None else step_time
-    if not 0.0 < step <= recording.duration:
+    stride = recording.duration if stride_time is None else stride_time
+    if not 0.0 < stride <= recording.duration:
         raise DataError(
-            f"{recording.label}: a step of {step:g} s does not fit into a recording of {recording.duration:g} s"
+            f"{recording.label}: a stride of {stride:g} s does not fit into a recording of {recording.duration:g} s"
         )
     mean = gain / recording.duration
     peak = max(mean, largest_flow(recording))
-    return Draw(mean * step, step, peak, f"recording '{recording.label}', {recording.kind}, repeated")
+    return Draw(mean * stride, stride, peak, f"recording '{recording.label}', {recording.kind}, repeated")
 
 
 def _gas_use(recording: Recording) -> Floats:
@@ -186,7 +186,7 @@ def read_walk_gas(folder: Path) -> WalkGas:
     if isinstance(document, dict) and document.get("format") == FORMAT_OF_REACTING:
         raise DataError(
             f"{path}: is the walk of a wearer who reacts: walk on the bottle, with 'ppafo walk --bottle', or give gas "
-            "and time of a stride, with --gas-per-step and --step-time"
+            "and time of a stride, with --gas-per-stride and --stride-time"
         )
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise DataError(f"{path}: is not the result of a ppafo walk (its 'format' is not '{FORMAT}')")
@@ -255,7 +255,7 @@ def _number(document: Mapping[str, Any], path: str, file: Path, above: float = -
 
 
 def draw_of_walk(walk: WalkGas) -> Draw:
-    """Return the gas use of a walk that continues: a step is a stride of the leg with the device."""
+    """Return the gas use of a walk that continues: a stride is one of the leg with the device."""
     if walk.gas_per_stride <= 0.0:
         raise DataError(f"walk '{walk.name}': no gas was taken from the supply, so a bottle would never be empty")
     # An open valve may let gas back into the supply for moments, so the largest flow is that of a tenth of a second.
@@ -299,7 +299,7 @@ def _fullest(pressure: Floats, volume: Floats, strides: list[tuple[int, int]]) -
     return float(pressure[places].mean()), float(volume[places].mean())
 
 
-def other_draws(recording: str | Path, step_time: float | None) -> dict[str, Draw]:
+def other_draws(recording: str | Path, stride_time: float | None) -> dict[str, Draw]:
     """Return the gas use of a result folder with the other chambers, by name; {} where it cannot be run again.
 
     That is a file without a folder, a law in Python, chambers of its own, or a device that has changed since.
@@ -314,7 +314,7 @@ def other_draws(recording: str | Path, step_time: float | None) -> dict[str, Dra
     for chambers in other_readings(scenario.device.actuator):
         result = simulate(with_numbers(scenario, chambers.numbers()))
         if result.status.is_completed:
-            found[chambers.name] = draw_of_recording(result.recording, step_time)
+            found[chambers.name] = draw_of_recording(result.recording, stride_time)
     return found
 
 

@@ -5,6 +5,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ppafo.answers.display_units import quantity_text
 from ppafo.constants import GRAMS_PER_KILOGRAM, STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, ParameterError, UnitError, nearest_name, one_line, refused_as
 from ppafo.model.declaration import Quantity
@@ -56,20 +57,20 @@ neutral angle at which the paper holds the foot in swing."""
 _DEFAULT = "the regulator's pressure, and the paper's device at toe-off and in neutral position"
 
 
-def check_reuse(reused: Reuse, mass_per_step: float) -> None:
-    """Refuse a cycle that does not belong to a gas use of ``mass_per_step`` [kg] a step without a reservoir.
+def check_reuse(reused: Reuse, mass_per_stride: float) -> None:
+    """Refuse a cycle that does not belong to a gas use of ``mass_per_stride`` [kg] a stride without a reservoir.
 
-    ParameterError for pressures below the atmosphere, and for chambers that hold more than the step takes.
+    ParameterError for pressures below the atmosphere, and for chambers that hold more than the stride takes.
     """
     for name in ("exhaust_pressure", "fill_pressure"):
         if getattr(reused.cycle, name) < reused.cycle.atmospheric_pressure:
             raise ParameterError(f"--reuse {name}: must be at least the atmospheric pressure")
     balance = reused.balance
     filled = balance.exhausted_mass + balance.returned_mass + balance.topped_up_mass
-    if filled > mass_per_step:
+    if filled > mass_per_stride:
         raise ParameterError(
-            f"--reuse: the chambers take {filled * GRAMS_PER_KILOGRAM:.3g} g per step at these pressures and volumes, "
-            f"more than the {mass_per_step * GRAMS_PER_KILOGRAM:.3g} g of the gas use; give the exhaust_pressure, "
+            f"--reuse: the chambers take {filled * GRAMS_PER_KILOGRAM:.3g} g a stride at these pressures and volumes, "
+            f"more than the {mass_per_stride * GRAMS_PER_KILOGRAM:.3g} g of the gas use; give the exhaust_pressure, "
             "fill_pressure, exhaust_volume and fill_volume of that gas use"
         )
 
@@ -143,7 +144,7 @@ def _defaults(bottle: Bottle) -> dict[str, float]:
 GasUse = str | Path | Recording | WalkResult
 """A file, a result folder, the folder of a walk, or what was read or returned of them."""
 _BETWEEN_RESTS = 600.0
-_STEP_TIME = 1.1
+_STRIDE_TIME = 1.1
 _LONGEST = 24.0 * 3600.0
 _FEW = 15.0
 """Seconds that are walked to see how full other chambers get."""
@@ -152,8 +153,8 @@ WITHOUT_REST = Schedule(_LONGEST, 0.0, _LONGEST)
 
 def endurance(
     recordings: GasUse | Sequence[GasUse] = (),
-    gas_per_step: float | None = None,
-    step_time: float | None = None,
+    gas_per_stride: float | None = None,
+    stride_time: float | None = None,
     peak_flow: float | None = None,
     bottle: str | Path | None = None,
     walk: float | None = None,
@@ -165,30 +166,30 @@ def endurance(
     """Return how long a full bottle lasts for a gas use that continues; ``Endurances`` for several recordings.
 
     A walk, its result or its folder, walks on the bottle until that ends it; ``bottle`` is its own, or the paper's,
-    unless given. Any other gas use is that of ``recordings``, or else ``gas_per_step`` [kg] every ``step_time`` [s]
+    unless given. Any other gas use is that of ``recordings``, or else ``gas_per_stride`` [kg] every ``stride_time`` [s]
     (default 1.1 s) with at most ``peak_flow`` [kg/s] (the mean flow). ``walk`` [s], 10 min unless given, and ``rest``
     [s] take turns, for at most ``longest`` [s]. ``reuse`` are texts such as ``reservoir_volume=50 cm^3``, and
     ``overrides`` such as ``room.temperature=5 degC``.
     ParameterError or DataError for bad input, SimulationError where the solver fails.
     """
     given = (recordings,) if isinstance(recordings, str | Path | Recording | WalkResult) else tuple(recordings)
-    if bool(given) == (gas_per_step is not None):
-        raise ParameterError("give either a recording or --gas-per-step, for example --gas-per-step '0.3 g'")
+    if bool(given) == (gas_per_stride is not None):
+        raise ParameterError("give either a recording or --gas-per-stride, for example --gas-per-stride '0.3 g'")
     if walk is not None and rest is None:
         raise ParameterError("--walk: is the time between two rests: give --rest too, or --longest for the whole time")
     schedule, changes = Schedule(_BETWEEN_RESTS if walk is None else walk, rest or 0.0, longest), tuple(reuse)
     chosen = _Bottle(bottle, tuple(overrides))
-    if gas_per_step is not None:
+    if gas_per_stride is not None:
         full = chosen.load()
-        draw = draw_of_numbers(gas_per_step, _STEP_TIME if step_time is None else step_time, peak_flow)
+        draw = draw_of_numbers(gas_per_stride, _STRIDE_TIME if stride_time is None else stride_time, peak_flow)
         return follow_bottle(full, draw, schedule, parse_reuse(changes, full) if changes else None)
     if peak_flow is not None:
-        raise ParameterError("--peak-flow belongs to --gas-per-step; a recording has its own largest flow")
+        raise ParameterError("--peak-flow belongs to --gas-per-stride; a recording has its own largest flow")
     names = [_name(use) for use in given]
     if len(set(names)) < len(names):
         raise ParameterError("the same recording is given twice")
     found = {
-        name: _endurance_of_use(use, step_time, chosen, schedule, changes)
+        name: _endurance_of_use(use, stride_time, chosen, schedule, changes)
         for name, use in zip(names, given, strict=True)
     }
     return found[names[0]] if len(found) == 1 else Endurances(found)
@@ -200,7 +201,7 @@ def endurance_of_walk(
     """Return how long a bottle lasts when the walk continues without rest; None where the walk took no gas.
 
     The same device, without faults, walks on the bottle until that ends it, as ``ppafo walk --bottle`` does;
-    ``bottle`` is its own, or the paper's, unless given. A step is a stride of the leg with the device, or a whole
+    ``bottle`` is its own, or the paper's, unless given. A stride is one of the leg with the device, or a whole
     course. ``reuse`` are texts such as ``reservoir_volume=50 cm^3``: what they do not say of the chambers is taken from
     the walk.
     """
@@ -236,7 +237,7 @@ def endurance_of_walk_gas(
                 its_draw = draw_of_walk(its_gas)
                 with suppress(ParameterError):
                     its_reuse = parse_reuse(changes, supply.bottle, full_chambers(its_gas), zero)
-                    check_reuse(its_reuse, its_draw.mass_per_step)
+                    check_reuse(its_reuse, its_draw.mass_per_stride)
             its_walk = with_numbers(carried, chambers.numbers())
             others[chambers.name] = _walked_to_its_end(its_walk, its_draw, schedule, its_reuse)
     without = None if reused is None else _walked_to_its_end(carried, at_set_pressure, schedule, None).discharge
@@ -249,15 +250,17 @@ def _walked_to_its_end(carried: Scenario, at_set_pressure: Draw, schedule: Sched
     assert supply is not None, "a walk on a bottle"
     check_schedule(schedule)
     if reused is not None:
-        check_reuse(reused, at_set_pressure.mass_per_step)
-    saved = 0.0 if reused is None else reused.balance.returned_mass / at_set_pressure.mass_per_step
+        check_reuse(reused, at_set_pressure.mass_per_stride)
+    saved = 0.0 if reused is None else reused.balance.returned_mass / at_set_pressure.mass_per_stride
     life = bottle_life(carried, schedule, saved)
     if walk_of(carried).reacts is not None:  # whose strides no gait sets
-        life = replace(life, repeats=life.walked / at_set_pressure.step_time)
-    steps = max(life.repeats, 1.0e-9)
-    step_time = life.walked / steps
-    mass = life.course.regulated / steps
-    taken = Draw(mass, step_time, max(at_set_pressure.peak_flow, mass / step_time), at_set_pressure.origin)
+        life = replace(life, repeats=life.walked / at_set_pressure.stride_time)
+    strides = max(life.repeats, 1.0e-9)
+    stride_time = life.walked / strides
+    mass = life.course.regulated / strides
+    of_walk = quantity_text(at_set_pressure.mass_per_stride, "gas mass")
+    origin = f"{at_set_pressure.origin} on the bottle, mean over its strides ({of_walk} before, at the set pressure)"
+    taken = Draw(mass, stride_time, max(at_set_pressure.peak_flow, mass / stride_time), origin)
     usable = supply.mass - smallest_mass_when_warm(supply.bottle, taken)
     return Endurance(
         bottle=supply.bottle,
@@ -266,7 +269,7 @@ def _walked_to_its_end(carried: Scenario, at_set_pressure: Draw, schedule: Sched
         discharge=discharge_of_life(life, taken),
         reuse=reused,
         without_reuse=None,
-        steps_when_warm=usable / taken.mass_per_step,
+        strides_when_warm=usable / taken.mass_per_stride,
     )
 
 
@@ -282,9 +285,9 @@ class _Bottle:
 
 
 def follow_bottle(bottle: Bottle, draw: Draw, schedule: Schedule, reused: Reuse | None = None) -> Endurance:
-    """Return how long a full bottle lasts; ``reused`` takes the gas that a reservoir gives back off every step."""
+    """Return how long a full bottle lasts; ``reused`` takes the gas that a reservoir gives back off every stride."""
     if reused is not None:
-        check_reuse(reused, draw.mass_per_step)
+        check_reuse(reused, draw.mass_per_stride)
     taken = draw if reused is None else draw.less(reused.balance.returned_mass)
     usable = bottle.mass - smallest_mass_when_warm(bottle, taken)
     return Endurance(
@@ -294,7 +297,7 @@ def follow_bottle(bottle: Bottle, draw: Draw, schedule: Schedule, reused: Reuse 
         discharge=discharge(bottle, taken, schedule),
         reuse=reused,
         without_reuse=None if reused is None else discharge(bottle, draw, schedule),
-        steps_when_warm=usable / taken.mass_per_step,
+        strides_when_warm=usable / taken.mass_per_stride,
     )
 
 
@@ -305,21 +308,21 @@ def _name(use: GasUse) -> str:
 
 
 def _endurance_of_use(
-    use: GasUse, step_time: float | None, chosen: _Bottle, schedule: Schedule, reuse: tuple[str, ...]
+    use: GasUse, stride_time: float | None, chosen: _Bottle, schedule: Schedule, reuse: tuple[str, ...]
 ) -> Endurance:
     gas = walk_gas(use) if isinstance(use, WalkResult) else None
     if isinstance(use, str | Path) and is_walk_folder(Path(use)):
         gas = read_walk_gas(Path(use))
     if gas is not None:
-        step = f"its whole course '{gas.course}'" if gas.course else "one stride of its walk"
-        if step_time is not None:
-            raise ParameterError(f"--step-time: a step of {_name(use)} is {step}; omit --step-time")
+        stride = f"its whole course '{gas.course}'" if gas.course else "one stride of its walk"
+        if stride_time is not None:
+            raise ParameterError(f"--stride-time: a stride of {_name(use)} is {stride}; omit --stride-time")
         return endurance_of_walk_gas(gas, chosen.name, schedule, reuse, chosen.overrides)
     bottle = chosen.load()
     recording = use if isinstance(use, Recording) else read_recording(Path(str(use)))
-    draw = draw_of_recording(recording, step_time)
+    draw = draw_of_recording(recording, stride_time)
     found = follow_bottle(bottle, draw, schedule, parse_reuse(reuse, bottle) if reuse else None)
     if isinstance(use, Recording | WalkResult):
         return found
-    others = other_draws(use, step_time)
+    others = other_draws(use, stride_time)
     return replace(found, others={name: follow_bottle(bottle, other, schedule) for name, other in others.items()})

@@ -83,7 +83,7 @@ class Condition:
         return values <= self.limit if self.is_upper_limit else values >= self.limit
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Found(Solved):
     """The value that was looked for, None where no value of the grid meets the condition.
 

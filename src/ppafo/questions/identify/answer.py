@@ -53,7 +53,7 @@ class Beforehand:
     prospects: tuple[Prospect, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Identification(Solved):
     """The outcome of a problem: what could be had, results in the order of making, the set before and after."""
 

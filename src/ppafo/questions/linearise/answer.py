@@ -68,7 +68,7 @@ class Delays:
     period: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class LinearModel(Solved):
     """The plant of a scenario near one point, x' = A x + B u, y = C x + D u, for differences from the point in SI.
 
@@ -105,17 +105,22 @@ class LinearModel(Solved):
     def response(self, frequencies: Floats, output: str = "torque", source: str = "command") -> Any:
         """Frequency response (frequencies,) of an output to an input, complex, in SI; frequencies [Hz].
 
-        ScenarioError for a name that is no output or input.
+        ScenarioError for a name that is no output or input, and for a frequency at which the model has a pole.
         """
         row, column = _place(output, self.outputs, "output"), _place(source, self.inputs, "input")
-        eye = np.eye(len(self.states))
-        return np.array(
-            [
-                self.c[row] @ np.linalg.solve(2.0j * np.pi * frequency * eye - self.a, self.b[:, column])
-                + self.d[row, column]
-                for frequency in np.asarray(frequencies, dtype=np.float64).ravel().tolist()
-            ]
-        )
+        eye, found = np.eye(len(self.states)), []
+        for frequency in np.asarray(frequencies, dtype=np.float64).ravel().tolist():
+            matrix = 2.0j * np.pi * frequency * eye - self.a
+            # States and their rates differ by powers of ten in SI: rank is that of rows and columns of one size.
+            rows = _sizes(np.abs(matrix), axis=1)
+            columns = _sizes(np.abs(matrix) / rows[:, None], axis=0)
+            if np.linalg.cond(matrix / rows[:, None] / columns) > _SINGULAR:
+                raise ScenarioError(
+                    f"{self.scenario.name}: the linear model has a pole at {frequency:g} Hz, where its response has no "
+                    "end; give another frequency"
+                )
+            found.append(self.c[row] @ np.linalg.solve(matrix, self.b[:, column]) + self.d[row, column])
+        return np.array(found)
 
     def to_control(self) -> Any:
         """Return the model as a ``control.StateSpace`` with its names; ScenarioError without the extra ``control``."""
@@ -125,6 +130,16 @@ class LinearModel(Solved):
 
         names = {kind: [item.name for item in getattr(self, kind)] for kind in ("states", "inputs", "outputs")}
         return control.ss(self.a, self.b, self.c, self.d, name=self.scenario.name.replace("-", "_"), **names)
+
+
+_SINGULAR = 1.0e13
+"""Condition number from which what a matrix says is rounding."""
+
+
+def _sizes(entries: Floats, axis: int) -> Floats:
+    """Return the largest size in each row or column of entries' sizes, 1 where all are 0."""
+    largest = np.max(entries, axis=axis, initial=0.0)
+    return np.where(largest > 0.0, largest, 1.0)
 
 
 def _place(name: str, items: Sequence[Variable], kind: str) -> int:

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from ppafo.control.profiles import CONSTANT
+from ppafo.engine.continuous_time import mode_at_rest, torque_on_vane
 from ppafo.engine.lanes import Floats, run_batch
 from ppafo.engine.led_leg import LedLeg, shank_at, torque_of_leg
 from ppafo.engine.program import Program, python_place
-from ppafo.engine.reference.solver import mode_at_rest, torque_on_vane
 from ppafo.engine.rows import leaf_paths, leaves, numbers, rebuilt
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.errors import ScenarioError, SimulationError, UnitError, refused_as
@@ -38,7 +38,6 @@ from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.simulation.simulate import OPEN_LOOP
 from ppafo.translation.plant_rates import (
     PlantRates,
-    check_without_opensim,
     gas_rates,
     thermal_gas_rates,
     vane_acceleration,
@@ -334,6 +333,8 @@ class _Search:
             largest = float(np.max(np.abs(residual)))
             if largest < STEADY:
                 return values if abs(values["command"]) <= 1.0 + STEADY else None
+            if not (np.isfinite(largest) and np.isfinite(slopes).all()):
+                return None
             step = np.linalg.lstsq(slopes * self._sizes, -residual, rcond=None)[0] * self._sizes
             share = 1.0
             while share > 1.0e-6:
@@ -406,7 +407,6 @@ def linearise(
     """
     if find_spec("casadi") is None:
         raise ScenarioError(MISSING_CASADI)
-    check_without_opensim()
     chosen = scenario_or_load(scenario, overrides)
     run = plan_run(chosen)
     if chosen.supply_lines is not None:

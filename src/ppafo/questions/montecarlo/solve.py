@@ -68,13 +68,13 @@ from ppafo.studies.draws import (
     with_new_noise,
 )
 from ppafo.studies.study import Study
-from ppafo.units import parse_quantity
+from ppafo.units import number_text, parse_quantity
 
 if TYPE_CHECKING:
     import matplotlib.figure
 
 GRAMMAR = "'mean', 'quantile 0.95', 'probability above VALUE' or 'probability below VALUE'"
-_QUANTILE = re.compile(r"quantile\s+(\d*\.?\d+)")
+_QUANTILE = re.compile(r"quantile\s+([0-9]*\.?[0-9]+)")
 _PROBABILITY = re.compile(r"probability\s+(above|below)\s+(\S.*)")
 
 
@@ -225,7 +225,7 @@ class Look:
         return self.effective_size >= min(FEWEST_EFFECTIVE, 0.5 * (self.draws - self.missing))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class MonteCarlo(Solved):
     """The looks one after the other, whether the last one met the rule, and the values of the metric (draws,) [SI].
 
@@ -379,7 +379,7 @@ def parse_fraction(text: str) -> float:
 
 def _plain(text: str) -> float:
     try:
-        return float(text)
+        return float(number_text(text))
     except ValueError as error:
         raise StudyError(f"width = '{text}': for a probability give a plain number, such as 0.01") from error
 

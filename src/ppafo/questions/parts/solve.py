@@ -13,7 +13,7 @@ from ppafo.parameters.parts.catalogue import DEFAULT
 from ppafo.questions.question import Solved
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Parts(Solved):
     """Parts of a catalogue: one, or all where ``part`` is None."""
 

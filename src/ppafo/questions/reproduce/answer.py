@@ -55,7 +55,7 @@ SOLENOID = "torque-task-solenoid"
 PROPORTIONAL = "torque-task-proportional"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Reproduction(Solved):
     """What came of it: claims in the order of the paper, what the text tells, runs, assumptions and audit findings."""
 
@@ -88,7 +88,7 @@ class Reproduction(Solved):
         return tuple(claim for claim in self.claims if claim.is_missed)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Studies(Solved):
     """Some publications with their judged claims, and the reproduction of the paper where it is among them."""
 

@@ -37,7 +37,7 @@ from ppafo.questions.reproduce.claim import PRINTED_DIGITS, Claim, Printed, Verd
 from ppafo.rig import record
 from ppafo.signals import Recording
 from ppafo.simulation.declaration import quantities
-from ppafo.simulation.loading import apply_overrides
+from ppafo.simulation.overrides import apply_overrides
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
 from ppafo.validation import RecordingAgreement, ReplaySettings, compare_recording
 from ppafo.validation.measured import check_recording
@@ -149,7 +149,7 @@ class BenchStudy:
 
 @cache
 def bench_study() -> BenchStudy:
-    """Identify the paper's parameters from synthetic recordings; SimulationError without the extra ``reference``."""
+    """Identify the paper's parameters from synthetic recordings; SimulationError where the rig gives up."""
     planted, gas = load_parameter_set(PLANTED_SET), load_device(PLANTED_SET).gas
     gas_at = GasAt(gas.molar_mass, gas.heat_capacity_ratio, gas.temperature)
 

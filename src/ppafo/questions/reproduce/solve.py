@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 from typing import Any, Literal, overload
 
-from ppafo.errors import SimulationError
+from ppafo.errors import ScenarioError, SimulationError
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.audit import audit
+from ppafo.parameters.overrides import override_set
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.reproduce.answer import PROPORTIONAL, SOLENOID, STEP, Reproduction, Studies
 from ppafo.questions.reproduce.bench import (
@@ -19,14 +20,8 @@ from ppafo.questions.reproduce.publication import ALL, SEED, check_study, run_st
 from ppafo.questions.reproduce.step_response import Levels, step_events, step_observations
 from ppafo.questions.reproduce.torque_task import control_claims, torque_task_claims, torque_task_observations
 from ppafo.simulation.declaration import value_at
-from ppafo.simulation.loading import (
-    apply_overrides,
-    is_of_device,
-    load_scenario,
-    scenario_paths,
-    split_override,
-    unknown_value,
-)
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.overrides import apply_overrides, chosen_by, is_of_device, scenario_paths, unknown_value
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate
 
@@ -144,14 +139,16 @@ def _reproduce_paper(overrides: Sequence[str], report: Report) -> Reproduction:
 def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
     """Return the experiments, each with the overrides that are meant for it."""
     meant: dict[str, list[str]] = {name: [] for name in EXPERIMENTS}
-    for override in overrides:
-        path, _ = split_override(override)
+    given = override_set(overrides, ScenarioError)
+    kinds = [path for path in given if path.endswith(".kind")]
+    for path in sorted(given, key=lambda path: (path not in kinds, path.count("."), path)):
+        override = str(given[path])
         documents = {
             name: apply_overrides(load_scenario(name).origin.content, earlier, name).document
             for name, earlier in meant.items()
         }
         known = tuple(dict.fromkeys(known for item in documents.values() for known in scenario_paths(item)))
-        if path not in known and not is_of_device(path):
+        if path not in known and not is_of_device(path) and not chosen_by(path, kinds):
             raise unknown_value(override, known, f"{', '.join(EXPERIMENTS)} have")
         having = [name for name, document in documents.items() if _has(document, path)]
         for name in having or EXPERIMENTS:

@@ -98,7 +98,7 @@ class OfMetric:
         return self.settling[-1].blocks - self.settling[-1].used
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Sensitivity(Solved):
     """Indices of some metrics with regard to some paths; ``runs`` were made, ``failures`` of them failed."""
 

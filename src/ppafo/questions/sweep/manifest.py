@@ -212,7 +212,7 @@ def _uniform_numbers(study: Study, draws: NDArray[np.int64]) -> Floats:
 def estimate_bytes(study: Study) -> int:
     """Return an upper estimate of the bytes on disk: as if nothing could be compressed."""
     outputs, samples = study.outputs, maximum_samples(study)
-    numbers = 2 + len(study.paths) + len(outputs.metrics)
+    numbers = 2 + len(study.paths) + len(outputs.metrics) * (2 if outputs.errors else 1)
     row = _FIXED_BYTES_OF_ROW + _BYTES_OF_NUMBER * numbers + _BYTES_OF_SAMPLE * samples * len(outputs.trajectories)
     counts = _BYTES_OF_COUNT * samples * len(outputs.bands) * BINS // 2
     return study.runs * row + chunk_count(study) * (counts + _BYTES_OF_FILE)

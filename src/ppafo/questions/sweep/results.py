@@ -105,6 +105,9 @@ def compute_chunk(task: Task, number: int) -> tuple[Finished, Files]:
     for metric in study.outputs.metrics:
         computed = result.metrics.get(metric, np.full(part.runs, np.nan))
         columns[metric] = TableColumn(computed, stored_unit(METRICS[metric].unit), METRICS[metric].summary)
+        if metric in result.errors:
+            unit = "Pa_d" if METRICS[metric].unit == "Pa" else METRICS[metric].unit
+            columns[f"{metric}_error"] = TableColumn(result.errors[metric], unit, f"estimated error of {metric}")
     tables = {RUNS_FOLDER: table_of(columns, chunk_facts(study, part))}
     if study.outputs.trajectories:
         tables[TRAJECTORIES_FOLDER] = trajectories_table(study, part, result)
@@ -186,7 +189,14 @@ def _result(study: Study, part: Chunk, values: dict[str, Floats], threads: int |
     every = outputs.every if outputs.traces else 0.0
     with refused_as(StudyError, f"configuration '{configuration.name}'", ScenarioError):
         return run_ensemble(
-            configuration.scenario, columns, outputs.metrics, outputs.traces, every, threads, study.gauge
+            configuration.scenario,
+            columns,
+            outputs.metrics,
+            outputs.traces,
+            every,
+            threads,
+            study.gauge,
+            outputs.errors,
         )
 
 

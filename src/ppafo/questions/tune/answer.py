@@ -23,6 +23,7 @@ from ppafo.answers.style import (
     mark_kind,
 )
 from ppafo.live.words import label_of
+from ppafo.parameters.overrides import over
 from ppafo.questions.question import Solved
 from ppafo.questions.tune.problem import Gains, Limit, Problem
 from ppafo.simulation.scenario import plain, worn_kind
@@ -116,7 +117,7 @@ class Setting:
         return self.is_feasible_in_search and self.violation[1] == 0.0 and self.without_value[1] == 0.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Tuning(Solved):
     """What a search came to. ``starts`` are best first; ``runs`` counts all simulated runs."""
 
@@ -137,6 +138,11 @@ class Tuning(Solved):
     def lines(self) -> list[str]:
         """The gains found, as overrides ``PATH=VALUE`` to paste."""
         return self.problem.lines(self.after.gains)
+
+    @property
+    def overrides(self) -> tuple[str, ...]:
+        """Every override that makes the tuned scenario of its file: the gains over those of the problem."""
+        return over(self.problem.overrides, self.lines, valve=self.problem.scenario.device.valve_name)
 
 
 _WIDTH, _PANEL, _LETTER = 7.2, 1.7, 0.083
@@ -371,12 +377,12 @@ def _verb(problem: Problem) -> str:
 
 def _options(tuning: Tuning) -> str:
     """Return the gains as options of a command."""
-    return " ".join(f'--set "{line}"' for line in (*tuning.problem.overrides, *tuning.lines))
+    return " ".join(f'--set "{line}"' for line in tuning.overrides)
 
 
 def _overrides(tuning: Tuning) -> str:
     """Return the gains for a command line, a study file and Python."""
-    lines = (*tuning.problem.overrides, *tuning.lines)
+    lines = tuning.overrides
     listed, verb = ", ".join(f'"{line}"' for line in lines), _verb(tuning.problem)
     given = "" if verb == "simulate" else "overrides="
     return (
@@ -392,7 +398,7 @@ def _data(tuning: Tuning) -> dict[str, Any]:
         "scenario": problem.scenario.name,
         "verdict": verdict(tuning),
         "is_feasible": tuning.after.is_feasible,
-        "overrides": [*problem.overrides, *tuning.lines],
+        "overrides": list(tuning.overrides),
         "bounds_reached": dict(tuning.bounds_reached),
         "scales": dict(tuning.scales),
         "goals": plain(list(problem.goals)),

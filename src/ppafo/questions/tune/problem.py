@@ -14,7 +14,7 @@ from pydantic import Field
 from ppafo.documents.models import NAME, StrictTable, Text, Texts, make_schema, validate
 from ppafo.documents.toml_text import TomlKind, beside, label
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice, refused_as
-from ppafo.loading import load_scenario, placed
+from ppafo.loading import load_scenario, placed, reloaded
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import Scenario
@@ -268,7 +268,8 @@ def _problem(document: dict[str, Any], file: str, folder: Path, overrides: Seque
 
     parsed = validate(TuningFile, document, file, StudyError)
     try:
-        scenario = load_scenario(placed(parsed.scenario, folder), (*parsed.overrides, *overrides))
+        scenario = load_scenario(placed(parsed.scenario, folder), parsed.overrides)
+        scenario = reloaded(scenario, overrides) if overrides else scenario
         check_metrics(_once([*parsed.objective, *parsed.constraints]), scenario)
     except (ScenarioError, ParameterError, StudyError) as error:
         raise refusal(error) from error
@@ -285,7 +286,7 @@ def _problem(document: dict[str, Any], file: str, folder: Path, overrides: Seque
         name=parsed.name,
         description=" ".join(parsed.description.split()),
         scenario=scenario,
-        overrides=(*parsed.overrides, *overrides),
+        overrides=scenario.origin.overrides,
         searched=searched,
         goals=tuple(_goal(item, refusal) for item in parsed.objective),
         constraints=tuple(_constraint(item, atmosphere, refusal) for item in parsed.constraints),

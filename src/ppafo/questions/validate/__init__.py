@@ -55,7 +55,7 @@ QUESTION = Question(
             ("--threshold",),
             "thresholds",
             "maximum RMS error, as a fraction of full range or with a unit: 5%%, angle=10%%, 'pressure_1=3.7 "
-            "psi_d'; default 10%%",
+            "psi_d'; default: 10%%, and half of the variance of the signal is explained",
             metavar="[CHANNEL=]LIMIT",
             action="append",
             default=(),

@@ -35,6 +35,7 @@ from ppafo.identification.trajectory.prediction import Ranking
 from ppafo.identification.trajectory.problem import FITTED_CHANNELS, Experiment
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
+from ppafo.parameters.overrides import over
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.question import Solved
 from ppafo.questions.validate.several import (
@@ -65,6 +66,7 @@ from ppafo.validation.measured import (
     Measured,
     parse_thresholds,
     read_measured,
+    shows_nothing,
 )
 from ppafo.validation.replay import (
     MOTIONS,
@@ -85,7 +87,7 @@ LARGEST_DELAY = 1.0
 """Seconds; a recording that is later than this was not recorded with its command."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Validation(Solved):
     """A parameter set and what each recording reports of it."""
 
@@ -126,8 +128,9 @@ def validate(
     and external torque; ``motion`` is ``free``, ``measured`` (the recorded angle is prescribed) or ``held``. With a
     ``volume`` [m^3] there is no vane and chamber 1 is a fixed volume. ``initial`` are texts such as
     ``pressure_2=0 psi_g`` for channels that were not recorded, ``thresholds`` texts such as ``5%`` or ``angle=2 deg``:
-    the largest RMS errors that pass, of the full range or in a unit. Without any it is 10 %, and no single change of
-    record, set or model may explain the recordings better than noise of the sensors could. ``longest_delay`` [s], at
+    the largest RMS errors that pass, of the full range or in a unit. Without any it is 10 % of full range, at
+    least half of the variance of a signal beside its noise is explained, and no single change of record, set or model
+    may explain the recordings better than noise of the sensors could. ``longest_delay`` [s], at
     most 1 s, limits the delay of the measurement that is taken out. ``columns`` is a column map or
     ``FILE.toml[:NAME]``. ``against`` are other sets, ``NAME`` or ``NAME:PATH=VALUE,PATH=VALUE`` (after ``overrides``,
     which hold for all of them), with which the set is compared by log predictive density: ``ranking``, else None.
@@ -142,8 +145,8 @@ def validate(
     report = progress or report_nothing
     sets = parse_sets(str(parameter_set), against)
     device = load_device(parameter_set, valve, overrides)
-    others = [load_device(one.parameter_set, valve, (*overrides, *one.overrides)) for one in sets[1:]]
-    device.check_vane("a replay of recordings")
+    words = [over(overrides, one.overrides, valve=valve or "") for one in sets[1:]]
+    others = [load_device(one.parameter_set, valve, own) for one, own in zip(sets[1:], words, strict=True)]
     if volume is not None and not volume > 0.0:
         raise DataError(f"volume of {volume:g} m^3: must be above 0")
     if not 0.0 <= longest_delay <= LARGEST_DELAY:
@@ -188,8 +191,9 @@ def _explanations(
 ) -> Explanations:
     """Return what single change would explain all recordings better than the set does.
 
-    Recordings that were compared in no channel of a fit are left out. Where the vane follows the recorded angle nothing
-    is searched: a delay of the sensors is then one of an input as well.
+    Recordings that were compared in no channel of a fit are left out, and channels of sensors that are dead or clipped.
+    Where the vane follows the recorded angle nothing is searched: a delay of the sensors is then one of an input as
+    well.
     """
     if settings.motion == "measured":
         return Explanations((), 0.0, 0)
@@ -198,7 +202,11 @@ def _explanations(
         settings = replace(settings, motion="held", initial=initial_in_fixed_volume(device, settings.initial))
     experiments, delays = [], []
     for number, (measured, agreement) in enumerate(zip(read, agreements, strict=True), start=1):
-        noise = {one.channel: one.noise for one in agreement.channels if one.channel in FITTED_CHANNELS}
+        noise = {
+            one.channel: one.noise
+            for one in agreement.channels
+            if one.channel in FITTED_CHANNELS and not shows_nothing(measured.recording, one.channel)
+        }
         if not noise or (tuple(noise) == (ANGLE,) and settings.motion == "held"):
             continue
         start = start_of(measured, device, settings.initial)
@@ -342,7 +350,10 @@ _NOISE = 2.0
 _HEAD = tuple(
     map(
         Column,
-        ("channel", "RMS error", "in noise", "of range", "limit", "bias", "largest", "at", "own delay", "verdict"),
+        (
+            *("channel", "RMS error", "in noise", "variation", "of range", "limit", "bias", "largest", "at"),
+            *("own delay", "verdict"),
+        ),
     )
 )
 _UNUSUAL = re.compile(r"[^A-Za-z0-9_.-]+")
@@ -533,11 +544,12 @@ def replay_sentence(agreement: RecordingAgreement) -> str:
 
 
 def channel_cells(channel: ChannelAgreement) -> tuple[str, ...]:
-    """Return the cells of a row: name, RMS error, over noise, share, limit, bias, largest, its time, delay, verdict."""
+    """Return the cells of a row: name, RMS error, over noise, variation, share, limit, bias, largest to verdict."""
     return (
         channel.channel,
         _error(channel, channel.rms),
         _number(channel.in_noise),
+        _error(channel, channel.variation),
         f"{_number(100 * channel.fraction)} %",
         f"{_number(100 * channel.limit)} %",
         _error(channel, channel.bias),
@@ -587,6 +599,7 @@ def _channel_data(channel: ChannelAgreement) -> dict[str, Any]:
         "limit_share": channel.limit,
         "passes": channel.passes,
         "full_range": channel.full_range,
+        "variation": channel.variation,
         "rms_unaligned": channel.rms_unaligned,
         "bias": channel.bias,
         "largest": channel.largest,

@@ -158,7 +158,7 @@ def _values(values: Floats) -> Floats:
     return np.quantile(values, QUANTILES) if values.size else np.zeros(0)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class WalkPair(Solved):
     """A walk with the device and without it.
 
@@ -169,7 +169,7 @@ class WalkPair(Solved):
     volumes: tuple[VolumeReading, ...]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Wearers(Solved):
     """What many wearers get; ``volumes`` is the same for fewer of them with other readings of the paper's chambers."""
 
@@ -351,7 +351,7 @@ def _bottle(pair: WalkPair) -> str:
     """Return how long the bottle of the walk lasts and what ended it, or how to see that; empty without gas."""
     worn = pair.comparison.with_device
     if worn.supply is not None:
-        return bottle_remark(worn, [one.result for one in pair.volumes[1:]])
+        return bottle_remark(worn, [one.on_bottle for one in pair.volumes[1:]])
     gas = worn.metrics.get("gas")
     if gas is None or gas.value <= 0.0:
         return ""

@@ -10,7 +10,7 @@ from ppafo.answers import Column, Figure, Section, Table
 from ppafo.answers.display_units import display_value, quantity_text
 from ppafo.errors import DataError
 from ppafo.gait.gait import speed_range
-from ppafo.questions.endurance.answer import steps_text
+from ppafo.questions.endurance.answer import strides_text
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.walking.bottle import SupplyCourse, lasted, lasting_text
@@ -48,12 +48,12 @@ def bottle_sections(worn: WalkResult) -> tuple[Section, ...]:
     )
 
 
-def bottle_remark(worn: WalkResult, others: Sequence[WalkResult]) -> str:
-    """Return what ended a walk on its bottle, and when; ``others`` is the walk with other readings of its chambers."""
+def bottle_remark(worn: WalkResult, others: Sequence[SupplyCourse | None]) -> str:
+    """Return what ended a walk on its bottle, and when; ``others`` are bottles with other readings of its chambers."""
     supply = worn.supply
     assert supply is not None, "said of a walk on a bottle"
     time = lasted(supply)
-    times = [None if other.supply is None else lasted(other.supply) for other in others]
+    times = [None if other is None else lasted(other) for other in others]
     ended = "" if time is None else f"lasts {lasting_text(time, times)}: "
     return f"bottle {supply.supply.bottle.name}: {ended}{supply.ending.message}"
 
@@ -63,7 +63,9 @@ def _walked(worn: WalkResult, seconds: float) -> str:
     motion = walk_of(worn.scenario)
     if motion.course is not None or motion.reacts is not None:
         return f"after {worn.helped.size} whole strides"
-    return f"{steps_text(seconds / motion.gait.stride_time)} strides, {worn.helped.size} of them whole between strikes"
+    return (
+        f"{strides_text(seconds / motion.gait.stride_time)} strides, {worn.helped.size} of them whole between strikes"
+    )
 
 
 def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:

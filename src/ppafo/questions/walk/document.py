@@ -44,7 +44,6 @@ def walk_document(scenario: Scenario) -> dict[str, Any]:
         "device": plain(scenario.device),
         **_who_walks(motion),
         "controller": control.kind,
-        "arithmetic": control.arithmetic,
         "timing": motion.timing,
         "settings": plain(control.settings),
         "period": control.period,

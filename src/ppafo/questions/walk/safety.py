@@ -1,7 +1,10 @@
 """What the answer of a walk says of safety: what is fitted, pressures far above the supply, less help over time."""
 
+import math
+
 from ppafo.answers import Figure, Section
-from ppafo.answers.display_units import display_value
+from ppafo.answers.display_units import display_value, quantity_text
+from ppafo.control.walking.assistance import PEAKS
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.events import event_lines
 from ppafo.walking.figures.over_time import failures, over_time_figure
@@ -21,8 +24,8 @@ _FAR_ABOVE = 2.0
 
 
 def safety_remarks(worn: WalkResult) -> list[str]:
-    """Return what is fitted, pressures far above the supply, pauses, stop, returns of help and strides with help."""
-    fitted = [*_shut_off_line(worn.scenario), *_pressure_lines(worn)]
+    """Return what is fitted, torques above the limit, pressures far above the supply, pauses, stop, strides helped."""
+    fitted = [*_shut_off_line(worn.scenario), *_limit_line(worn.scenario), *_pressure_lines(worn)]
     if not worn.events:
         return fitted
     helped, strides = int(worn.helped.sum()), worn.helped.size
@@ -40,6 +43,21 @@ def _shut_off_line(scenario: Scenario) -> list[str]:
     mass, power = 1.0e3 * float(given["mass"]), float(given["power"])
     where = "on each leg a shut-off valve" if walk_of(scenario).devices > 1 else "shut-off valve"
     return [f"{where}: {mass:.0f} g, {power:.2g} W as long as the device helps ({60.0 * power:.0f} J a minute)"]
+
+
+def _limit_line(scenario: Scenario) -> list[str]:
+    """Return which peaks of the desired torque are above the limit of the controller, which requests no more."""
+    settings = scenario.control.settings
+    limit = settings.get("largest_torque", math.inf)
+    cut = [
+        f"controller.{name} = {quantity_text(settings[name], 'torque')}"
+        for name in PEAKS
+        if settings.get(name, 0.0) > limit
+    ]
+    if not cut:
+        return []
+    shown = quantity_text(limit, "torque")
+    return [f"{', '.join(cut)}: no more than controller.largest_torque = {shown} is requested; set that higher too"]
 
 
 def _pressure_lines(worn: WalkResult) -> list[str]:

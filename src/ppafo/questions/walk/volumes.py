@@ -1,7 +1,7 @@
 """The walk, of one wearer or of many, with other readings of the paper's chambers: what each comes to."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,13 +10,15 @@ from ppafo.answers import Column, Section, Table
 from ppafo.parameters.chamber_volumes import ChamberVolumes, other_readings, own_reading
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
-from ppafo.walking.bottle import lasted
+from ppafo.walking.bottle import WALKED, Schedule, SupplyCourse, lasted
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult, integral_of_a_stride
-from ppafo.walking.walk import Population, Progress, walk, walk_population
+from ppafo.walking.walk import Population, Progress, bottle_life, walk, walk_population
 
 LONGEST = 1.0
 """Minutes that are walked at most with other chambers: a walk repeats itself, but for a course and on a bottle."""
+_DAY = 24.0 * 3600.0
+_TO_THE_END = Schedule(_DAY, 0.0, _DAY)
 _HEAD = (
     Column("chambers"),
     Column("swept", "volume per angle", ".3g"),
@@ -40,20 +42,26 @@ _EXPLAINED = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VolumeReading:
-    """A walk with some chambers; works of a stride [J], peak of the mean torque [N m]."""
+    """A walk with some chambers; works of a stride [J], peak of the mean torque [N m].
+
+    ``on_bottle`` is the course of its bottle to the end, None without one: of a walk that its bottle outlasts it goes
+    on where the bottle of the walk itself ended.
+    """
 
     chambers: ChamberVolumes
     result: WalkResult
     gas_work: float
     shaft_work: float
     peak_torque: float
+    on_bottle: SupplyCourse | None
 
 
 def walks_by_volume(result: WalkResult, minutes: float | None = None) -> tuple[VolumeReading, ...]:
     """Return a walk and the same with the other readings of its chambers; none where it has chambers of its own.
 
     The walk is left alone where no gas was taken or it has no whole strides, for then nothing rests on the volume. On a
-    bottle the others walk for as many ``minutes`` [min] as it was to be, each on a bottle of its own.
+    bottle the others walk for as many ``minutes`` [min] as it was to be, each on a bottle of its own, which is then
+    walked to its end if that of the walk itself ended.
     """
     actuator = result.scenario.device.actuator
     others, own = other_readings(actuator), own_reading(actuator)
@@ -68,8 +76,15 @@ def walks_by_volume(result: WalkResult, minutes: float | None = None) -> tuple[V
         configuration = result.scenario
         other = walk(with_numbers(configuration, chambers.numbers()), minutes)
         if other.status.is_completed and other.averages:
-            found.append(_read(chambers, other))
+            on_bottle = other.supply
+            if result.supply is not None and lasted(result.supply) is not None and _outlasts(on_bottle):
+                on_bottle = bottle_life(other.scenario, _TO_THE_END).course
+            found.append(replace(_read(chambers, other), on_bottle=on_bottle))
     return tuple(found)
+
+
+def _outlasts(course: SupplyCourse | None) -> bool:
+    return course is not None and course.ending.kind == WALKED
 
 
 def _read(chambers: ChamberVolumes, result: WalkResult) -> VolumeReading:
@@ -82,6 +97,7 @@ def _read(chambers: ChamberVolumes, result: WalkResult) -> VolumeReading:
         gas_work=chambers.volume_per_angle * turned,
         shaft_work=torque_constant * turned,
         peak_torque=float(result.averages["torque"].mean.max()),
+        on_bottle=result.supply,
     )
 
 
@@ -114,11 +130,11 @@ def _row(one: VolumeReading) -> tuple[str | float | None, ...]:
 
 def _lasts(one: VolumeReading) -> float | None:
     """Return how long the bottle lasts [s], None where the walk ended before it did."""
-    return None if one.result.supply is None else lasted(one.result.supply)
+    return None if one.on_bottle is None else lasted(one.on_bottle)
 
 
 def _ending(one: VolumeReading) -> str | None:
-    return None if one.result.supply is None else one.result.supply.ending.kind
+    return None if one.on_bottle is None else one.on_bottle.ending.kind
 
 
 def volumes_data(read: tuple[VolumeReading, ...]) -> list[Mapping[str, Any]]:
@@ -136,9 +152,7 @@ def volumes_data(read: tuple[VolumeReading, ...]) -> list[Mapping[str, Any]]:
             "push_off_work": one.result.metrics["push_off_work"].value,
             "peak_torque": one.peak_torque,
             **(
-                {}
-                if one.result.supply is None
-                else {"walking_time": _lasts(one), "ending": one.result.supply.ending._asdict()}
+                {} if one.on_bottle is None else {"walking_time": _lasts(one), "ending": one.on_bottle.ending._asdict()}
             ),
         }
         for one in read

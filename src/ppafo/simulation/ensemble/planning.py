@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.engine.lanes import Batch, Floats
-from ppafo.engine.run import Members, batches_of
+from ppafo.engine.run import Members, Run, batches_of
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at
 from ppafo.model.declaration import Quantity, range_rule
 from ppafo.parameters.building import actuator_problem, beyond_pressures, consistency, growth_and_problem
 from ppafo.parameters.device import VANE
 from ppafo.parameters.plant import switches_of
+from ppafo.simulation.accuracy import unchanged
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock
 from ppafo.simulation.declaration import limits, quantity_text
 from ppafo.simulation.motion import TOLERANCE, profile_problem
@@ -27,6 +28,7 @@ from ppafo.simulation.numbers import (
     TimeTexts,
     clock_of,
     clock_with,
+    path_of_held_angle,
     time_texts,
     varied_scenario,
 )
@@ -168,24 +170,24 @@ class EnsemblePlan:
     reasons: dict[int, str]
 
 
-def plan_ensemble(columns: Columns) -> EnsemblePlan:
-    """Batches of all runs that can be; each run has the rows, bit for bit, that ``plan_run`` gives it alone."""
+def plan_ensemble(columns: Columns, change: Callable[[Run], Run] = unchanged) -> EnsemblePlan:
+    """Batches of all runs that can be; each has the rows, bit for bit, that ``plan_run`` gives it alone and changed."""
     screen = screen_columns(columns)
     batches: list[tuple[Members, Batch]] = []
     if screen.members.size:
         for places in _of_one_program(screen.scenario, screen.members.size):
-            batches += _plan_batches(screen, places)
+            batches += _plan_batches(screen, places, change)
     return EnsemblePlan(tuple(batches), screen.reasons)
 
 
-def _plan_batches(screen: Screen, places: Members) -> list[tuple[Members, Batch]]:
+def _plan_batches(screen: Screen, places: Members, change: Callable[[Run], Run]) -> list[tuple[Members, Batch]]:
     """Batches of some runs that ask for one program; what cannot be planned is refused."""
     part = screen.at(places)
     while part.members.size:
         run, problems = plan_runs(part.scenario)
         bad = [problem for problem in problems if np.any(problem[0])]
         if not bad:
-            return [(part.members[members], batch) for members, batch in batches_of(run, part.members.size)]
+            return [(part.members[members], batch) for members, batch in batches_of(change(run), part.members.size)]
         part.refuse(*bad[0])
     return []
 
@@ -265,7 +267,8 @@ def _beyond_the_stops(scenario: Scenario) -> tuple[Problem, ...]:
 
         def angle_line(run: int) -> str:
             low, high = (quantity_text(at(stop, run), "rad") for stop in (actuator.angle_min, actuator.angle_max))
-            return f"{HELD_ANGLE} = {quantity_text(at(level, run), 'rad')}: must be between the stops, {low} to {high}"
+            path = path_of_held_angle(scenario) or HELD_ANGLE
+            return f"{path} = {quantity_text(at(level, run), 'rad')}: must be between the stops, {low} to {high}"
 
         return ((outside, angle_line),)
     # The bounds hold for all time; a run that may leave them is checked at its own times.

@@ -13,6 +13,7 @@ from gymnasium.vector.utils import batch_space
 from ppafo.engine.lanes import Floats
 from ppafo.errors import ScenarioError, SimulationError, nearest_name
 from ppafo.parameters.device import Device
+from ppafo.parameters.overrides import over
 from ppafo.simulation.loading import load_scenario
 from ppafo.walking.loading import load_walk
 from ppafo.walking.walk import lasting
@@ -108,7 +109,8 @@ class World:
             raise ScenarioError(f"frame_skip = {frame_skip!r}: must be a whole number of samples, at least 1")
         self.frame_skip = frame_skip
         usual, flaws = DEFAULTS[task]
-        file, words = (usual, (*flaws, *overrides)) if scenario is None else (scenario, tuple(overrides))
+        file, flaws = (usual, flaws) if scenario is None else (scenario, ())
+        words = over(flaws, overrides, ScenarioError)
         varied = VARIED.get(task, {}) if vary is None and scenario is None else vary or {}
         self.episodes: Episodes
         if self.task.walks:
@@ -118,7 +120,8 @@ class World:
             seconds = lasting(walk, (WALKING_TIME if duration is None else duration) / 60.0).duration
             self.episodes = walk_episodes(walk, randomise, seconds)
         else:
-            words = words if duration is None else (*words, f"run.duration={float(duration)!r} s")
+            own = () if duration is None else (f"run.duration={float(duration)!r} s",)
+            words = over(words, own, ScenarioError)
             chosen = load_scenario(file, words)
             chosen.device.check_vane("an environment")
             self.episodes = scenario_episodes(chosen, randomise, varied, targets)

@@ -312,6 +312,44 @@ def test_no_push_without_a_heel_that_was_loaded_in_this_stance() -> None:
     assert safety.safe_command(missed, SWING, -1.0, PERIOD)[0] == -1.0, "the foot is still held up"
 
 
+def after_a_stance(forces: list[tuple[float, float]]) -> SafetyState:
+    """The state at the toe-off of a stance with these forces [N] under heel and toes, flat but for the last one."""
+    lands, flat = phase(LANDING, 0.0, 1.0, 0.0), phase(MID_STANCE, 0.3)
+    heel, toe = forces[-1]
+    last = phase(PUSH_OFF, 0.5, heel=float(heel > 60.0))
+    state, before = STEPS, phase(SWING, 1.0, 0.0, 0.0, in_phase=0.4)
+    for now, (heel, toe) in zip([lands, *[flat] * (len(forces) - 2), last], forces, strict=True):
+        state = safety.monitor(RULES, state, before, now, GOOD._replace(heel_force=heel, toe_force=toe), PERIOD)
+        before = now
+    off = phase(SWING, 0.63, 0.0, 0.0, in_phase=0.0)
+    return safety.monitor(RULES, state, before, off, GOOD._replace(heel_force=25.0, toe_force=25.0, angle=1.8), PERIOD)
+
+
+@pytest.mark.parametrize(
+    ("forces", "sign"),
+    [
+        ([(400.0, 0.0), (350.0, 350.0), (10.0, 600.0)], signs.NO_SIGN),
+        ([(400.0, 400.0), (350.0, 350.0), (25.0, 25.0)], signs.NO_TOE_OFF),
+        ([(400.0, 320.0), (350.0, 350.0), (10.0, 130.0)], signs.NO_TOE_OFF),
+        ([(0.0, 400.0), (350.0, 350.0), (600.0, 10.0)], signs.NO_TOE_OFF),
+        ([(90.0, 90.0), (80.0, 80.0), (25.0, 25.0)], signs.NO_SIGN),
+    ],
+    ids=["a step", "toes show the heel", "toes show 0.8 of the heel", "swapped", "who sits"],
+)
+def test_a_step_that_does_not_end_on_the_toes_pauses_before_the_foot_is_lifted(
+    forces: list[tuple[float, float]], sign: float
+) -> None:
+    state = after_a_stance(forces)
+    assert state.finding.sign == sign
+    assert safety.permits(state, SWING) is (sign == signs.NO_SIGN)
+
+
+def test_a_push_needs_toes_that_carry_in_place_of_the_heel() -> None:
+    stance = Stance(1.0, 1.0, 0.0, 0.1, flat_angle=1.0, turned=1.0, largest=700.0, on_toes=300.0)
+    assert safety.permits(STEPS._replace(stance=stance), PUSH_OFF)
+    assert not safety.permits(STEPS._replace(stance=stance._replace(on_toes=250.0)), PUSH_OFF)
+
+
 def test_a_swing_that_is_too_short_for_a_steady_stride_pauses() -> None:
     lands = phase(LANDING, 0.0, 1.0, 0.0)
     before = phase(SWING, 1.0, 0.0, 0.0, in_phase=0.24)

@@ -8,6 +8,7 @@ import pytest
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench import StaticTorqueSettings, static_torque
+from ppafo.identification.bench.static_torque import static_prospects
 from ppafo.identification.source import Source
 
 
@@ -153,3 +154,14 @@ def test_an_outlier_is_named_with_its_file_and_sample(planted: ModuleType) -> No
     checks = static_torque((planted.static(seed=2), wild)).checks
     told = next(check.statement for check in checks if check.name == "outliers")
     assert "the worst is sample 51 of bench.csv" in told
+
+
+def test_a_branch_at_a_single_pressure_does_not_show_whether_friction_grows(planted: ModuleType) -> None:
+    whole = planted.static()
+    time, pressure = whole.recording.time, whole.recording["pressure_difference"]
+    kept = (whole.recording["direction"] > 0.0) | (pressure == pressure[10])
+    few = Source(whole.recording.resample(time[kept]))
+    result = static_torque((few,))
+    assert "measure both branches at several pressures" in result.failed[-1].statement
+    assert result["static_torque.friction_per_pressure"].verdict == "not identifiable"
+    assert not any(one.can_be_had for one in static_prospects((few,), StaticTorqueSettings()))

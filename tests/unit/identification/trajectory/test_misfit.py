@@ -179,7 +179,6 @@ def test_the_posterior_is_a_tree_that_arviz_reads(right: list[TrajectoryFit]) ->
 
 @pytest.mark.thorough
 def test_a_bench_richer_than_the_model_identifies_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("sksundae", reason="the virtual rig needs the extra 'reference'")
     monkeypatch.chdir(tmp_path)
     # Each seed is a bench with zeros of its own; a prediction is for the sensors as they are.
     settings = ("run.duration=0.5 s", "rig.angle_sensor.offset=0 deg", "rig.pressure_sensor.offset=0 Pa_d")

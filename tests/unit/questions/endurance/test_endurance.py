@@ -17,7 +17,7 @@ WITHOUT_REST = Schedule(600.0, 0.0, 86400.0)
 
 
 def lasting(grams: float, *overrides: str, schedule: Schedule = WITHOUT_REST, peak: float | None = None) -> Endurance:
-    """The paper's bottle under a gas use per step of 1.1 s."""
+    """The paper's bottle under a gas use per stride of 1.1 s."""
     return follow_bottle(load_bottle(PAPER_BOTTLE, overrides), draw_of_numbers(grams * 1e-3, 1.1, peak), schedule)
 
 
@@ -34,8 +34,8 @@ def test_a_small_use_empties_the_bottle_and_a_large_one_freezes_it_out() -> None
     assert large.discharge.ending.kind == "too cold"
     assert large.discharge.ending.usable_when_warm > 0.03
     assert large.discharge.recording["bottle_temperature"][-1] < 230.0
-    assert large.discharge.steps < 0.8 * large.steps_when_warm
-    assert small.discharge.steps == pytest.approx(small.steps_when_warm, rel=0.01)
+    assert large.discharge.strides < 0.8 * large.strides_when_warm
+    assert small.discharge.strides == pytest.approx(small.strides_when_warm, rel=0.01)
 
 
 def test_the_end_is_where_the_regulator_just_needs_all_that_the_bottle_has() -> None:
@@ -49,8 +49,8 @@ def test_the_end_is_where_the_regulator_just_needs_all_that_the_bottle_has() -> 
 
 def test_steps_are_what_was_drawn_over_what_a_step_takes() -> None:
     made = lasting(0.3)
-    assert made.discharge.steps == pytest.approx(made.discharge.balance.drawn_mass / 0.3e-3, rel=1e-9)
-    assert made.discharge.walking_time == pytest.approx(made.discharge.steps * 1.1, rel=1e-9)
+    assert made.discharge.strides == pytest.approx(made.discharge.balance.drawn_mass / 0.3e-3, rel=1e-9)
+    assert made.discharge.walking_time == pytest.approx(made.discharge.strides * 1.1, rel=1e-9)
 
 
 def test_liquid_begins_to_freeze_where_the_regulator_asks_for_little() -> None:
@@ -61,7 +61,7 @@ def test_liquid_begins_to_freeze_where_the_regulator_asks_for_little() -> None:
 
 def test_a_narrow_regulator_ends_the_run_early_for_want_of_flow() -> None:
     wide, narrow = lasting(0.3, peak=4.5e-3), lasting(0.3, "regulator.area=0.5 mm^2", peak=4.5e-3)
-    assert narrow.discharge.steps < 0.8 * wide.discharge.steps
+    assert narrow.discharge.strides < 0.8 * wide.discharge.strides
     assert narrow.discharge.recording["bottle_pressure"][-1] > 3e6
     assert "is too low to drive the largest flow" in narrow.discharge.ending.message
     assert "is too low to maintain the supply pressure" in lasting(0.3).discharge.ending.message
@@ -80,7 +80,7 @@ def test_the_time_that_was_asked_for_ends_a_run_too() -> None:
 
 def test_rests_let_the_bottle_warm_up_and_give_more_steps() -> None:
     without, rested = lasting(0.5), lasting(0.5, schedule=Schedule(180.0, 900.0, 86400.0))
-    assert rested.discharge.steps > 1.1 * without.discharge.steps
+    assert rested.discharge.strides > 1.1 * without.discharge.strides
     assert rested.discharge.total_time > rested.discharge.walking_time
     mass = rested.discharge.recording["bottle_mass"]
     resting = (rested.discharge.recording.time > 200.0) & (rested.discharge.recording.time < 1000.0)
@@ -88,7 +88,7 @@ def test_rests_let_the_bottle_warm_up_and_give_more_steps() -> None:
 
 
 def test_a_cold_room_shortens_the_run() -> None:
-    assert lasting(0.3, "room.temperature=0 degC").discharge.steps < lasting(0.3).discharge.steps
+    assert lasting(0.3, "room.temperature=0 degC").discharge.strides < lasting(0.3).discharge.strides
 
 
 @pytest.mark.parametrize(
@@ -108,7 +108,7 @@ def test_numbers_that_cannot_be_are_refused(mass: float, time: float, peak: floa
 
 def test_the_draw_of_a_recording_is_its_gain_its_time_and_its_largest_flow() -> None:
     draw = draw_of_recording(staircase(6e-4, 2.2, 0.4), 1.1)
-    assert draw.mass_per_step == pytest.approx(3e-4)
+    assert draw.mass_per_stride == pytest.approx(3e-4)
     assert draw.mean_flow == pytest.approx(6e-4 / 2.2)
     assert draw.peak_flow == pytest.approx(6e-4 / 0.4, rel=1e-9)
     assert "walk" in draw.origin
@@ -116,25 +116,25 @@ def test_the_draw_of_a_recording_is_its_gain_its_time_and_its_largest_flow() -> 
 
 
 def test_all_of_a_recording_is_one_step_unless_the_time_of_a_step_is_given() -> None:
-    assert draw_of_recording(staircase(6e-4, 2.2, 0.4), None).mass_per_step == pytest.approx(6e-4)
+    assert draw_of_recording(staircase(6e-4, 2.2, 0.4), None).mass_per_stride == pytest.approx(6e-4)
 
 
 def test_a_recording_lasts_as_the_same_numbers_do() -> None:
     draw = draw_of_recording(staircase(3e-4, 1.1, 1.1), None)
     bottle = load_bottle(PAPER_BOTTLE)
-    assert follow_bottle(bottle, draw, WITHOUT_REST).discharge.steps == pytest.approx(
-        lasting(0.3).discharge.steps, rel=1e-6
+    assert follow_bottle(bottle, draw, WITHOUT_REST).discharge.strides == pytest.approx(
+        lasting(0.3).discharge.strides, rel=1e-6
     )
 
 
 def test_a_little_gas_that_flows_back_into_the_line_is_taken_off() -> None:
     supplied = Channel(np.array([0.0, 3e-4, 2.9e-4, 6e-4]), "kg")
     recording = Recording("walk", np.array([0.0, 1.0, 1.5, 2.0]), {"supplied_mass": supplied})
-    assert draw_of_recording(recording, None).mass_per_step == pytest.approx(6e-4)
+    assert draw_of_recording(recording, None).mass_per_stride == pytest.approx(6e-4)
 
 
 @pytest.mark.parametrize(
-    ("recording", "step_time", "words"),
+    ("recording", "stride_time", "words"),
     [
         (staircase(0.0, 2.2, 0.4), None, "never be empty"),
         (staircase(6e-4, 2.2, 0.4), 3.0, "does not fit"),
@@ -147,10 +147,10 @@ def test_a_little_gas_that_flows_back_into_the_line_is_taken_off() -> None:
     ],
 )
 def test_recordings_that_say_nothing_of_a_gas_use_are_refused(
-    recording: Recording, step_time: float | None, words: str
+    recording: Recording, stride_time: float | None, words: str
 ) -> None:
     with pytest.raises(DataError, match=words):
-        draw_of_recording(recording, step_time)
+        draw_of_recording(recording, stride_time)
 
 
 def test_reuse_takes_what_it_saves_off_every_step_and_the_bottle_lasts_longer() -> None:
@@ -159,9 +159,9 @@ def test_reuse_takes_what_it_saves_off_every_step_and_the_bottle_lasts_longer() 
     made = follow_bottle(bottle, draw, WITHOUT_REST, parse_reuse(["reservoir_volume=50 cm^3"], bottle))
     assert made.reuse is not None
     assert made.without_reuse is not None
-    assert made.draw.mass_per_step == pytest.approx(1e-3 - made.reuse.balance.returned_mass, rel=1e-12)
-    assert made.without_reuse.steps == pytest.approx(lasting(1.0).discharge.steps, rel=1e-9)
-    assert made.discharge.steps > made.without_reuse.steps
+    assert made.draw.mass_per_stride == pytest.approx(1e-3 - made.reuse.balance.returned_mass, rel=1e-12)
+    assert made.without_reuse.strides == pytest.approx(lasting(1.0).discharge.strides, rel=1e-9)
+    assert made.discharge.strides > made.without_reuse.strides
 
 
 def test_a_reservoir_of_nothing_saves_nothing() -> None:
@@ -169,7 +169,7 @@ def test_a_reservoir_of_nothing_saves_nothing() -> None:
     made = follow_bottle(
         bottle, draw_of_numbers(1e-3, 1.1, None), WITHOUT_REST, parse_reuse(["reservoir_volume=0 L"], bottle)
     )
-    assert made.discharge.steps == lasting(1.0).discharge.steps
+    assert made.discharge.strides == lasting(1.0).discharge.strides
 
 
 def test_defaults_of_reuse_are_the_regulators_pressure_and_the_paper_devices_volumes() -> None:
@@ -205,7 +205,7 @@ def test_chambers_that_hold_more_than_a_step_takes_are_refused() -> None:
 
 
 def test_the_verb_takes_numbers_as_the_command_takes_texts() -> None:
-    found = endurance(gas_per_step=1e-3, step_time=1.1, overrides=["bottle.gas_mass=100 g"])
+    found = endurance(gas_per_stride=1e-3, stride_time=1.1, overrides=["bottle.gas_mass=100 g"])
     assert isinstance(found, Endurance)
     assert found.draw.mean_flow == pytest.approx(1e-3 / 1.1)
     assert found.to_dict()["bottle"]["gas_mass"] == pytest.approx(0.1)
@@ -219,6 +219,6 @@ def test_the_verb_takes_recordings_one_or_several() -> None:
     assert isinstance(alone, Endurance)
     several = endurance([one, replace(two, label="other")], rest=60.0)
     assert isinstance(several, Endurances)
-    assert [use.draw.mass_per_step for use in several.uses.values()] == pytest.approx([1e-3, 2e-3])
+    assert [use.draw.mass_per_stride for use in several.uses.values()] == pytest.approx([1e-3, 2e-3])
     with pytest.raises(ParameterError, match="the same recording is given twice"):
         endurance([one, one])

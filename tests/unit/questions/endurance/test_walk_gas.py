@@ -196,7 +196,7 @@ def test_reuse_takes_the_chambers_from_the_walk_and_a_given_value_overrides() ->
     assert made.reuse.origins["fill_pressure"] == "given"
     assert made.reuse.origins["exhaust_volume"].startswith("from the walk, mean over ")
     assert made.reuse.balance.exhausted_mass > made.reuse.balance.returned_mass > 1e-5
-    assert made.discharge.steps > made.without_reuse.steps
+    assert made.discharge.strides > made.without_reuse.strides
 
 
 def test_a_walk_lasts_the_same_with_and_without_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -205,7 +205,7 @@ def test_a_walk_lasts_the_same_with_and_without_its_folder(tmp_path: Path, capsy
     document = json.loads(capsys.readouterr().out)
     made = endurance(solenoid(), reuse=["reservoir_volume=50 cm^3"], longest=5.0)
     assert isinstance(made, Endurance)
-    assert document["result"]["steps"] == pytest.approx(made.discharge.steps, rel=1e-6)
+    assert document["result"]["strides"] == pytest.approx(made.discharge.strides, rel=1e-6)
     assert document["reuse"]["origins"]["exhaust_pressure"].startswith("from the walk")
 
 
@@ -213,7 +213,9 @@ def test_several_recordings_stand_side_by_side(tmp_path: Path, capsys: pytest.Ca
     one, two = (folder_of(walk_gas(solenoid()), tmp_path / name) for name in ("one", "two"))
     assert main(["endurance", str(one), str(two), "--reuse", "reservoir_volume=50cm^3", "--longest", "5 s"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    titles = "gas use,gas per step (g),walking (min),steps,gas saved (g),walking with reuse (min),steps with reuse"
+    titles = (
+        "gas use,gas per stride (g),walking (min),strides,gas saved (g),walking with reuse (min),strides with reuse"
+    )
     assert re.split(r"\s{2,}", lines[2].replace("gas use", "gas use ")) == [*titles.split(","), "ended"]
     assert lines[3].split()[0] == str(one)
     assert lines[3].split()[1:] == lines[4].split()[1:]
@@ -224,9 +226,9 @@ def test_several_recordings_stand_side_by_side(tmp_path: Path, capsys: pytest.Ca
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        (["--step-time", "1.1 s"], "one stride of its walk"),
-        (["--peak-flow", "4 g/s"], "belongs to --gas-per-step"),
-        (["--gas-per-step", "1 g"], "give either a recording or --gas-per-step"),
+        (["--stride-time", "1.1 s"], "one stride of its walk"),
+        (["--peak-flow", "4 g/s"], "belongs to --gas-per-stride"),
+        (["--gas-per-stride", "1 g"], "give either a recording or --gas-per-stride"),
     ],
 )
 def test_what_does_not_belong_to_a_walk_is_refused(
@@ -297,7 +299,7 @@ def test_every_door_says_how_long_a_device_lasts_in_the_same_words(
 
 def test_a_time_between_rests_without_a_rest_is_refused() -> None:
     with pytest.raises(ParameterError, match="--walk: is the time between two rests: give --rest too"):
-        endurance(gas_per_step=3.0e-4, walk=60.0)
+        endurance(gas_per_stride=3.0e-4, walk=60.0)
 
 
 def test_rests_warm_the_bottle_that_is_walked_on() -> None:
@@ -311,7 +313,7 @@ def test_rests_warm_the_bottle_that_is_walked_on() -> None:
     rests = round((rested.discharge.total_time - rested.discharge.walking_time) / 120.0)
     assert rests == int(rested.discharge.walking_time / 10.0)
     mass = rested.discharge.recording["bottle_mass"]
-    assert mass[0] - mass[-1] == pytest.approx(rested.draw.mass_per_step * rested.discharge.steps)
+    assert mass[0] - mass[-1] == pytest.approx(rested.draw.mass_per_stride * rested.discharge.strides)
 
 
 def test_a_device_that_a_fault_stops_is_asked_about_without_the_fault() -> None:

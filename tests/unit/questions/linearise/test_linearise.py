@@ -242,6 +242,9 @@ def test_without_a_leak_a_closed_valve_is_steady_and_its_sides_are_told_apart() 
     assert model.outputs[0].value == pytest.approx(3.0, rel=1e-9)
     assert not model.a.any()
     assert any("command >= 0.0" in edge.place for edge in model.edges)
+    with pytest.raises(ScenarioError, match="has a pole at 0 Hz"):
+        model.response(np.array([0.0]))
+    assert np.isfinite(model.response(np.array([1.0e-3]))).all()
 
 
 def test_what_has_no_linear_model_is_refused_in_one_line() -> None:

@@ -66,6 +66,18 @@ def test_noise_has_a_column_with_which_a_row_is_run_again(varying: Callable[...,
     assert table["rms_error"][2] == pytest.approx(alone["rms_error"].value, rel=1e-12)
 
 
+def test_a_row_has_the_estimated_error_of_each_metric_where_the_study_keeps_it(varying: Callable[..., Any]) -> None:
+    document = varying({"path": "valve.area", "kind": "uniform", "minimum": "8 mm^2", "maximum": "16 mm^2"})
+    plain = sweep(document)
+    document["outputs"] = document["outputs"] | {"metrics": ["rms_error", "largest_pressure"], "errors": True}
+    results = sweep(document)
+    table = results.table()
+    assert np.array_equal(table["rms_error"], plain.table()["rms_error"])
+    assert "rms_error_error" not in plain.table()
+    assert all((table["rms_error_error"] > 0.0) & (table["rms_error_error"] < 1e-3 * table["rms_error"]))
+    assert all(table["largest_pressure_error"] < 10.0)
+
+
 def test_tables_tell_absolute_pressures_from_differences(varying: Callable[..., Any]) -> None:
     document = varying(
         {"path": "supply.pressure", "kind": "uniform", "minimum": "45 psi_g", "maximum": "55 psi_g"},

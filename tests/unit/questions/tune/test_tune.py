@@ -146,7 +146,10 @@ def test_the_tunings_of_the_package_load_and_fit_the_published_schema() -> None:
         ({"search": [DOCUMENT["search"][0] | {"minimum": "2 kg"}]}, "search 'controller.proportional_gain'"),
         ({"search": [DOCUMENT["search"][0] | {"minimum": "0 1/(N m)", "spacing": "logarithmic"}]}, "a minimum above 0"),
         ({"search": [DOCUMENT["search"][0] | {"maximum": "1e9 1/(N m)"}]}, "at most 1000 1/(N m)"),
-        ({"search": [{"path": "controller.integral_gain"}]}, "'search.0.minimum' is missing"),
+        (
+            {"search": [{"path": "controller.integral_gain"}]},
+            "tuning: 'search.0.minimum' and 'search.0.maximum' are missing",
+        ),
         ({"objective": [{"metric": "rms_eror"}]}, "no metric 'rms_eror', did you mean 'rms_error'"),
         ({"objective": [{"metric": "rms_error", "weight": 0.0}]}, "weight = 0 has no effect"),
         ({"objective": [{"metric": "rms_error", "scale": "2 g"}]}, "objective 'rms_error': scale = '2 g'"),

@@ -10,8 +10,17 @@ from ppafo.control.walking.signs import LIFTS, NOT_FLAT, SIGNS
 from ppafo.questions.walk.reacting import reacting_answer
 from ppafo.questions.walk.safety import safety_remarks
 from ppafo.signals import Channel
-from ppafo.walking import compare_walks, load_walk
+from ppafo.walking import compare_walks, load_walk, walk
 from ppafo.walking.events import SafetyEvent
+
+
+def test_a_peak_torque_above_the_limit_of_the_controller_is_said() -> None:
+    peak = "controller.peak_torque=9 N m"
+    (said,) = safety_remarks(walk(load_walk("proportional", [peak]), 0.1))
+    assert said.startswith(
+        "controller.peak_torque = 9 N m: no more than controller.largest_torque = 5 N m is requested"
+    )
+    assert safety_remarks(walk(load_walk("proportional", [peak, "controller.largest_torque=9 N m"]), 0.1)) == []
 
 
 @pytest.mark.long

@@ -11,6 +11,7 @@ from ppafo.errors import DataError
 from ppafo.questions.endurance.answer import Endurance
 from ppafo.questions.endurance.solve import endurance
 from ppafo.questions.walk.answer import WalkPair, Wearers, walk_with_and_without
+from ppafo.walking.bottle import minutes_text
 
 MINUTES = 0.1
 
@@ -57,6 +58,20 @@ def test_the_work_of_the_gas_is_that_of_its_energy_balance() -> None:
     assert own.gas_work == pytest.approx((work[last] - work[first]) / strides, rel=0.01)
 
 
+def test_the_interval_of_a_bottle_has_the_chambers_that_outlast_the_walk() -> None:
+    small = ["bottle.gas_mass=6 g", "bottle.volume=30 cm^3"]
+    found = walk_with_and_without("solenoid", 0.25, bottle="paper-co2-9oz", overrides=small)
+    assert isinstance(found, WalkPair)
+    short = found.volumes[2]
+    assert short.result.supply is not None
+    assert short.result.supply.ending.kind == "walk's end"
+    assert short.on_bottle is not None
+    assert short.on_bottle.ending.kind == "empty"
+    assert 15.0 < short.on_bottle.ending.time < 20.0
+    lasts = minutes_text(short.on_bottle.ending.time)
+    assert f" to {lasts} depending on the volume of the chambers" in text_of(found.answer())
+
+
 def test_volumes_of_ones_own_and_a_walk_without_gas_have_no_other_rows() -> None:
     for name, changes in (("solenoid", ["actuator.volume_per_angle=20 cm^3/rad"]), ("off", [])):
         found = walk_with_and_without(name, MINUTES, overrides=changes)
@@ -90,7 +105,7 @@ def test_a_bottle_takes_the_folder_of_a_course_and_refuses_to_reuse_its_exhaust(
     assert isinstance(life, Endurance)
     time = course.comparison.with_device.metrics["course_time"].value
     assert life.discharge.walking_time == pytest.approx(30.0, abs=0.2)
-    assert life.discharge.steps == pytest.approx(life.discharge.walking_time / time, rel=1e-2)
+    assert life.discharge.strides == pytest.approx(life.discharge.walking_time / time, rel=1e-2)
     assert len(life.others) == 2
     with pytest.raises(DataError, match="the strides of course 'stairs' differ"):
         endurance(tmp_path, reuse=["reservoir_volume=50 cm^3"])
@@ -124,7 +139,7 @@ def test_a_run_is_run_again_from_its_folder_with_the_other_chambers(tmp_path: Pa
     again = ppafo.simulate(
         ppafo.load_scenario(scenario, ["run.duration=0.3 s", *volumes, "actuator.dead_volume_2=32 cm^3"])
     )
-    assert other.draw.mass_per_step == pytest.approx(again.recording["supplied_mass"][-1], rel=2e-3)
+    assert other.draw.mass_per_stride == pytest.approx(again.recording["supplied_mass"][-1], rel=2e-3)
     (tmp_path / "out" / "run.json").write_text(
         (tmp_path / "out" / "run.json").read_text(encoding="utf-8").replace("1.451e-05", "1.551e-05"), encoding="utf-8"
     )

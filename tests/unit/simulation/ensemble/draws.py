@@ -68,8 +68,6 @@ def drawn_columns(scenario: Scenario, generator: np.random.Generator, runs: int)
             section = pair[0].rpartition(".")[0]
             chosen -= {f"{section}.area", f"{section}.discharge_coefficient"}
             chosen |= set(pair)
-    if "motion.angle" in declared:
-        chosen -= {"motion.profile.level"}
     return {path: column(scenario, path, declared[path], generator, runs) for path in paths if path in chosen}
 
 

@@ -28,7 +28,7 @@ QUESTION = Question(
 )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Pressures(Solved):
     """A scenario at several supply pressures: how each run ended, its RMS error [N m] and its gas [kg]."""
 

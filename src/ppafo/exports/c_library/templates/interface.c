@@ -67,13 +67,20 @@ static void prepare_run(const @name@_settings *chosen, prepared_run *prepared)
     prepare(settings, &prepared->parameters, &prepared->states, &prepared->counts);
 }
 
-/* True where Python would run other functions for these settings than there are here. */
-static bool is_other_program(const @name@_settings *settings, const prepared_run *prepared)
+/* The setting for which Python would run other functions than there are here, NULL where there is none. */
+static const char *needs_other_program(const @name@_settings *settings, const prepared_run *prepared)
 {
     (void)settings;
-    return prepared->counts.interval < 1.0 || prepared->counts.steps > 1.0e9@other_program@;
+    if (prepared->counts.interval < 1.0) {
+        return "run_output_interval";
+    }
+    if (prepared->counts.steps > 1.0e9) {
+        return "run_duration";
+    }
+@needs_other@
+    return NULL;
 }
-
+@is_whole@
 static ppafo_array array_of(double *values, int64_t first, int64_t second, int64_t third)
 {
     const ppafo_array made = {values, {first, second, third}};
@@ -106,7 +113,8 @@ void @name@_defaults(@name@_settings *settings)
     }
 }
 
-const char *@name@_bad_setting(const @name@_settings *chosen)
+/* The first setting that is out of range or contradicts another, NULL where there is none. */
+static const char *wrong_setting(const @name@_settings *chosen)
 {
     const @name@_settings all = with_followers(chosen);
     const @name@_settings *settings = &all;
@@ -122,6 +130,17 @@ const char *@name@_bad_setting(const @name@_settings *chosen)
     return NULL;
 }
 
+const char *@name@_bad_setting(const @name@_settings *chosen)
+{
+    prepared_run prepared;
+    const char *wrong = wrong_setting(chosen);
+    if (wrong != NULL) {
+        return wrong;
+    }
+    prepare_run(chosen, &prepared);
+    return needs_other_program(chosen, &prepared);
+}
+
 size_t @name@_size(const @name@_settings *settings)
 {
     prepared_run prepared;
@@ -129,9 +148,6 @@ size_t @name@_size(const @name@_settings *settings)
         return 0;
     }
     prepare_run(settings, &prepared);
-    if (is_other_program(settings, &prepared)) {
-        return 0;
-    }
     return sizeof(@name@_run) + sizeof(double) * (size_t)values_of_history((int64_t)prepared.counts.signal_delay,
         (int64_t)prepared.counts.command_delay);
 }
@@ -142,11 +158,11 @@ static @name@_status begin_run(@name@_run *run, const @name@_settings *settings)
     double *history = (double *)(run + 1);
     int64_t place;
     int64_t values;
-    if (@name@_bad_setting(settings) != NULL) {
+    if (wrong_setting(settings) != NULL) {
         return @NAME@_BAD_SETTING;
     }
     prepare_run(settings, &prepared);
-    if (is_other_program(settings, &prepared)) {
+    if (needs_other_program(settings, &prepared) != NULL) {
         return @NAME@_OTHER_PROGRAM;
     }
     memset(run, 0, sizeof(*run));

@@ -24,11 +24,8 @@ int main(void)
     @name@_defaults(&settings);
     /* Change what you like here, for example: settings.@example@ */
     if (@name@_bad_setting(&settings) != NULL) {
-        fprintf(stderr, "%s is out of range\n", @name@_bad_setting(&settings));
-        return 2;
-    }
-    if (@name@_size(&settings) == 0) {
-        fprintf(stderr, "these settings need another program, see README.md\n");
+        fprintf(stderr, "%s is out of range, contradicts another or needs another program, see README.md\n",
+            @name@_bad_setting(&settings));
         return 2;
     }
     run = (@name@_run *)malloc(@name@_size(&settings));

@@ -1,4 +1,4 @@
-/* @title@ as a functional mock-up unit of FMI 2.0 for @kind@: this is the one file to compile.
+/* @title@ as a functional mock-up unit of FMI 2.0 for co-simulation: this is the one file to compile.
  *
  * Written by ppafo @version@. Needed flags: -ffp-contract=off; never -ffast-math.
  */
@@ -59,10 +59,10 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String token, 
     (void)resources;
     (void)visible;
     (void)logging;
-    if (name == NULL || token == NULL || strcmp(token, "@token@") != 0 || type != @fmi_type@) {
+    if (name == NULL || token == NULL || strcmp(token, "@token@") != 0 || type != fmi2CoSimulation) {
         if (functions != NULL && functions->logger != NULL) {
             functions->logger(functions->componentEnvironment, name, fmi2Error, "logStatusError",
-                "this unit is for @kind@, and its GUID is @token@");
+                "this unit is for co-simulation, and its GUID is @token@");
         }
         return NULL;
     }

@@ -39,7 +39,7 @@ typedef struct {
     double inputs[INPUTS + 1];
     double held[OUTPUTS]; /* the outputs in the last event of FMI 3 */
     @name@_settings settings;
-@fields@} unit_state;
+} unit_state;
 
 typedef struct {
     unit_state now;
@@ -47,12 +47,10 @@ typedef struct {
     char said[320]; /* why something was refused */
 } unit;
 
-/* What differs between the closed loop, the plant alone and the plant for model exchange. */
+/* What differs between the closed loop and the plant alone. */
 static void follow_inputs(unit *item);
 static bool take_first_sample(unit *item);
-static bool bring_up(unit *item);
 static bool get_metric(unit *item, uint32_t number, double *value);
-static bool get_further(unit *item, uint32_t number, double *value);
 
 static bool refuse(unit *item, const char *form, ...)
 {
@@ -108,15 +106,16 @@ static bool prepare_unit(unit *item, prepared_run *prepared)
 {
     const char *bad;
     follow_inputs(item);
-    bad = @name@_bad_setting(&item->now.settings);
+    bad = wrong_setting(&item->now.settings);
     if (bad != NULL) {
         const char *path = path_of(bad);
         return is_hidden(path) ? refuse(item, "an input is out of range (it sets %s)", path)
                                : refuse(item, "parameter %s is out of range or contradicts another", path);
     }
     prepare_run(&item->now.settings, prepared);
-    if (is_other_program(&item->now.settings, prepared)) {
-        return refuse(item, "these parameters need other functions than the unit has: export it from ppafo with them");
+    bad = needs_other_program(&item->now.settings, prepared);
+    if (bad != NULL) {
+        return refuse(item, "parameter %s needs other functions than the unit has: export it from ppafo with it", path_of(bad));
     }
     return true;
 }
@@ -190,20 +189,14 @@ static bool get_value(unit *item, uint32_t variable, double *value)
         *value = item->now.start + item->now.time;
         return true;
     }
-    if (variable == TICK) {
+    if (variable == TICK || variable > TIME) {
         return refuse(item, "there is no variable %lu", (unsigned long)variable);
     }
     if (item->now.phase <= UNIT_BEGINNING && item->now.is_stale && !begin(item)) {
         return false;
     }
-    if (variable > TIME) {
-        return get_further(item, variable - TIME - 1, value);
-    }
     if (variable < FIRST_METRIC) {
         @name@_outputs outputs;
-        if (!bring_up(item)) {
-            return false;
-        }
         @name@_read_outputs(item->run, &outputs);
         *value = ((const double *)&outputs)[variable - FIRST_OUTPUT + 1];
     } else {

@@ -62,7 +62,7 @@ class Rerun:
     result: Result
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Design(Solved):
     """The result of a design study.
 

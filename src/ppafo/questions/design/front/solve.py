@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.answers.display_units import change_text
-from ppafo.errors import StudyError
+from ppafo.errors import ScenarioError, StudyError
 from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH
+from ppafo.parameters.overrides import over
 from ppafo.parameters.parts import Part
 from ppafo.progress import Report, report_nothing
 from ppafo.questions.design.front.answer import SHOWN_OBJECTIVES, Design, DesignPoint, Rerun, objective_table
@@ -263,8 +264,7 @@ def _run_again(problem: DesignProblem, chosen: Candidates) -> Iterator[Rerun]:
             f"{path}={values[0]:.6g} {'' if units[path] in PLAIN else units[path]}".strip()
             for path, values in columns.items()
         ]
-        own = [text for text in origin.overrides if text.partition("=")[0].strip() not in columns]
-        overrides = (*own, *texts)
+        overrides = over(origin.overrides, texts, ScenarioError, valve=origin.valve)
         sets = " ".join(f"--set {shlex.quote(text)}" for text in overrides)
         yield Rerun(task.name, f"ppafo simulate {origin.file} {sets}", simulate(origin.file or "", overrides))
 

@@ -114,7 +114,7 @@ class SizedValve:
     curve: tuple[Floats, Floats, Floats]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Sizing(Solved):
     """The result of a sizing study: every valve, and the place of the lightest that works with a bottle, if any.
 

@@ -15,6 +15,7 @@ from ppafo.control.profiles import KNOTS
 from ppafo.documents.models import NAME, StrictTable, Text, Texts
 from ppafo.documents.toml_text import beside
 from ppafo.errors import DataError, StudyError, UnitError, refused_as
+from ppafo.loading import reloaded
 from ppafo.parameters.parts import Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
 from ppafo.simulation.loading import load_scenario
@@ -315,7 +316,7 @@ def _scenario(document: SizingFile, profile: TorqueProfile, folder: Path, file: 
     grain = _common_multiple(plain.control.period, plain.output_interval)
     count = math.ceil(Fraction(document.simulated * profile.period).limit_denominator(_LARGEST_DENOMINATOR) / grain)
     duration = f"run.duration={float(count * grain)!r} s"
-    return load_scenario(name, (*document.overrides, *profile.overrides(), duration))
+    return reloaded(plain, (*profile.overrides(), duration))
 
 
 def _common_multiple(first: float, second: float) -> Fraction:

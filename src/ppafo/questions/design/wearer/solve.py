@@ -109,7 +109,7 @@ class Device:
         return f"ppafo walk {WALKS[self.tried.valve.kind]} --bottle {self.bottle.name} --minutes {minutes:.4g} {sets}"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class WearerSizing(Solved):
     """What was wanted and all that was tried; ``device`` is None where none has it, and ``instead`` what would do."""
 

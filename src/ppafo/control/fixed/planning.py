@@ -1,0 +1,105 @@
+"""From the settings of an integer law to its whole numbers, in floats for the lanes, and what may be wrong."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ppafo.control.fixed.whole_numbers import SETTINGS, Converter, converter_of
+from ppafo.control.kind import ControllerKind
+from ppafo.model.columns import Problem, at, over_runs
+from ppafo.model.declaration import Quantity
+
+Settings = Mapping[str, float]
+_ROUNDING = 1.0e-9
+
+
+def holds_all(settings: Settings, period: float, torque_step: float) -> float:
+    """0: a law without numbers of its own can hold all settings."""
+    return 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """The plan of an integer law, of which ``ControllerKind`` says what it is given and what it makes.
+
+    ``prepare(settings, period, torque_step)`` makes the numbers after the converter's, for one run, ``quantities``
+    declare all of them in order. ``largest`` is the largest part of its range that any number takes, above 1 where the
+    settings cannot be held.
+    """
+
+    name: str
+    quantities: tuple[Quantity, ...]
+    prepare: Callable[[Settings, float, float], tuple[float, ...]]
+    largest: Callable[[Settings, float, float], float] = holds_all
+
+    def __call__(
+        self, settings: Mapping[str, Any], period: Any, torque_constant: Any, reference: tuple[Any, Any]
+    ) -> tuple[dict[str, Any], tuple[Problem, ...]]:
+        """Whole numbers by name, and what may be wrong."""
+        bits, pressure_range = (settings[item.name] for item in SETTINGS)
+        converter: Converter = over_runs(converter_of, bits, pressure_range, torque_constant)
+        names = tuple(settings)
+
+        def prepared(period: float, torque_step: float, *values: float) -> tuple[float, ...]:
+            return self.prepare(dict(zip(names, values, strict=True)), period, torque_step)
+
+        def largest(period: float, torque_step: float, *values: float) -> float:
+            return self.largest(dict(zip(names, values, strict=True)), period, torque_step)
+
+        given = (period, converter.torque_step, *settings.values())
+        every = (*converter, *over_runs(prepared, *given))
+        numbers = dict(zip((item.name for item in self.quantities), every, strict=True))
+        size = over_runs(largest, *given)
+        return numbers, (_broken_bit(bits), _too_large(size, self.name), _reference(reference, converter))
+
+
+def on_chip(
+    floats: ControllerKind, parameters: type, initial: Any, update: Callable[..., Any], plan: Numbers
+) -> ControllerKind:
+    """The integer form of a law as a controller of the catalogue: its settings, and those of the converter."""
+    return replace(
+        floats,
+        name=plan.name,
+        summary=f"{floats.summary} On whole numbers, as a small processor computes.",
+        quantities=(*floats.quantities, *SETTINGS),
+        parameters=parameters,
+        initial=initial,
+        update=update,
+        restart=None,
+        plan=plan,
+    )
+
+
+def _broken_bit(bits: Any) -> Problem:
+    """A number of bits that is not whole."""
+    return np.asarray(bits % 1.0 != 0.0), lambda run: f"controller.converter_bits = {at(bits, run):g}: must be whole"
+
+
+def _too_large(size: Any, kind: str) -> Problem:
+    """A setting beyond what 15 bits and the range of the converter can hold."""
+
+    def line(run: int) -> str:
+        return (
+            f"controller: a gain of '{kind}' is {at(size, run):.3g} times the largest: take more "
+            f"converter_bits, a smaller converter_range, or a smaller gain"
+        )
+
+    return np.asarray(size > 1.0), line
+
+
+def _reference(bounds: tuple[Any, Any], converter: Converter) -> Problem:
+    """A reference that the converter cannot show."""
+    lowest, highest = bounds
+    low, high = -converter.middle * converter.torque_step, (converter.top - converter.middle) * converter.torque_step
+
+    def line(run: int) -> str:
+        shown, wanted = (
+            " to ".join(f"{at(end, run):.6g} N m" for end in ends) for ends in ((low, high), (lowest, highest))
+        )
+        return (
+            f"reference: from {wanted}, and the converter shows {shown} only: take a larger controller.converter_range"
+        )
+
+    return np.logical_or(lowest < low - _ROUNDING, highest > high + _ROUNDING), line

@@ -1,0 +1,201 @@
+"""Functions of the model over whole columns: their composed text, with NumPy's operations in the place of Python's.
+
+A column has the numbers of all samples of a run. Each operation is one of whole columns, in the same order, so that
+every number has the bits that the function itself gives; a choice works out both of its values. What has no such form,
+a loop whose end depends on a number or a power, is called sample by sample.
+"""
+
+import ast
+from collections import namedtuple
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from ppafo.engine.plain_python import parse_module
+from ppafo.engine.rows import leaves, rebuilt
+from ppafo.engine.source_text import COMPILED_BUILTINS, SourceCollector
+from ppafo.errors import ProgramError
+
+
+def over_samples(function: Callable[..., Any], *given: Any) -> Any:
+    """Value of a function of the model, in its own units, of rows and numbers any of which may be columns (samples,).
+
+    What is the same for all samples may stay one number.
+    """
+    return called_over_samples(function, _columns_of(function), *given)
+
+
+def called_over_samples(function: Callable[..., Any], of_columns: Callable[..., Any] | None, *given: Any) -> Any:
+    """As ``over_samples``, of a function whose form for columns is known; None where it has none."""
+    if of_columns is None:
+        return _one_by_one(function, given)
+    # A choice works out what no sample takes, too.
+    with np.errstate(all="ignore"):
+        return of_columns(*given)
+
+
+def _columns_of(function: Callable[..., Any]) -> Callable[..., Any] | None:
+    found = _composed(function)
+    if found is not None and not found[0].is_current():
+        _composed.cache_clear()
+        found = _composed(function)
+    return None if found is None else found[1]
+
+
+@lru_cache(maxsize=64)
+def _composed(function: Callable[..., Any]) -> tuple[SourceCollector, Callable[..., Any] | None] | None:
+    collector = SourceCollector("")
+    try:
+        name = collector.add(function)
+    except ProgramError:
+        return None
+    return collector, in_columns(collector.text(), name)
+
+
+def in_columns(text: str, name: str) -> Callable[..., Any] | None:
+    """A function of a composed text for columns; None where it has no such form."""
+    try:
+        tree = _Columns().visit(parse_module(text))
+    except ProgramError:
+        return None
+    scope: dict[str, Any] = {"namedtuple": namedtuple, **_OPERATIONS}
+    exec(compile(ast.fix_missing_locations(tree), "<columns>", "exec"), scope)
+    found: Callable[..., Any] = scope[name]
+    return found
+
+
+def _one_by_one(function: Callable[..., Any], given: tuple[Any, ...]) -> Any:
+    flat = [leaves(item) if isinstance(item, tuple) else [item] for item in given]
+    columns = [value for row in flat for value in row if isinstance(value, np.ndarray)]
+    if not columns:
+        return function(*given)
+
+    def at(sample: int) -> Any:
+        numbers = [[value[sample] if isinstance(value, np.ndarray) else value for value in row] for row in flat]
+        parts = (
+            rebuilt(type(item), map(float, row)) if isinstance(item, tuple) else float(row[0])
+            for item, row in zip(given, numbers, strict=True)
+        )
+        return function(*parts)
+
+    return _gathered([at(sample) for sample in range(columns[0].size)])
+
+
+def _gathered(results: list[Any]) -> Any:
+    first = results[0]
+    if not isinstance(first, tuple):
+        return np.array(results, dtype=np.float64)
+    parts = [_gathered([result[place] for result in results]) for place in range(len(first))]
+    return type(first)(*parts) if hasattr(first, "_fields") else tuple(parts)
+
+
+def _chosen(test: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
+    if isinstance(test, np.ndarray):
+        return _where(test, yes(), no())
+    return yes() if test else no()
+
+
+def _where(test: Any, yes: Any, no: Any) -> Any:
+    if isinstance(yes, tuple):
+        parts = [_where(test, one, other) for one, other in zip(yes, no, strict=True)]
+        return type(yes)(*parts) if hasattr(yes, "_fields") else tuple(parts)
+    return np.where(test, yes, no)
+
+
+def _largest(first: Any, *others: Any) -> Any:
+    """As Python has it: of equal numbers the first, also of 0 and -0."""
+    for other in others:
+        first = _either(other > first, other, first)
+    return first
+
+
+def _smallest(first: Any, *others: Any) -> Any:
+    for other in others:
+        first = _either(other < first, other, first)
+    return first
+
+
+def _either(test: Any, yes: Any, no: Any) -> Any:
+    return np.where(test, yes, no) if isinstance(test, np.ndarray) else (yes if test else no)
+
+
+def _without_fraction(number: Any) -> Any:
+    # Python has no whole number -0.
+    return np.trunc(number) + 0.0 if isinstance(number, np.ndarray) else int(number)
+
+
+def _as_float(number: Any) -> Any:
+    return number.astype(np.float64) if isinstance(number, np.ndarray) else float(number)
+
+
+_OPERATIONS: dict[str, Callable[..., Any]] = {
+    "_chosen": _chosen,
+    "_all": np.logical_and,
+    "_any": np.logical_or,
+    "_not": np.logical_not,
+    "_quotient": np.divide,
+    "_root": np.sqrt,
+    "max": _largest,
+    "min": _smallest,
+    "int": _without_fraction,
+    "float": _as_float,
+}
+_SAME_IN_COLUMNS = frozenset({"abs", "range", *_OPERATIONS})
+
+
+def _is_elementwise(node: ast.AST) -> bool:
+    if isinstance(node, ast.BinOp):
+        return isinstance(node.op, ast.Add | ast.Sub | ast.Mult | ast.Div)
+    if isinstance(node, ast.Compare):
+        return len(node.ops) == 1
+    if isinstance(node, ast.For) and isinstance(node.iter, ast.Call):
+        return all(isinstance(item, ast.Constant) for item in node.iter.args)
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+        return node.func.id not in COMPILED_BUILTINS - _SAME_IN_COLUMNS
+    # The last bits of NumPy's other functions are not those of ``math``.
+    return not isinstance(node, ast.Call) or ast.unparse(node.func) == "math.sqrt"
+
+
+def _call(name: str, *given: ast.expr) -> ast.expr:
+    return ast.Call(ast.Name(name, ast.Load()), list(given), [])
+
+
+def _later(value: ast.expr) -> ast.Lambda:
+    return ast.Lambda(ast.arguments([], [], None, [], [], None, []), value)
+
+
+class _Columns(ast.NodeTransformer):
+    """Writes the operations of a composed text for columns."""
+
+    def visit(self, node: ast.AST) -> Any:
+        """Write a node. ProgramError for what has no such form."""
+        if isinstance(node, ast.If | ast.While | ast.Starred | ast.AugAssign) or not _is_elementwise(node):
+            raise ProgramError(f"'{ast.unparse(node)}' has no form for columns")
+        return super().visit(node)
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
+        test, yes, no = (self.visit(part) for part in (node.test, node.body, node.orelse))
+        return _call("_chosen", test, _later(yes), _later(no))
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
+        name = "_all" if isinstance(node.op, ast.And) else "_any"
+        found: ast.expr
+        found, *others = (self.visit(part) for part in node.values)
+        for other in others:
+            found = _call(name, found, other)
+        return found
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
+        inner = self.visit(node.operand)
+        return _call("_not", inner) if isinstance(node.op, ast.Not) else ast.UnaryOp(node.op, inner)
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        left, right = self.visit(node.left), self.visit(node.right)
+        return _call("_quotient", left, right) if isinstance(node.op, ast.Div) else ast.BinOp(left, node.op, right)
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        if isinstance(node.func, ast.Attribute):
+            return _call("_root", *map(self.visit, node.args))
+        return self.generic_visit(node)

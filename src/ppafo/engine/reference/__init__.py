@@ -1,1 +1,0 @@
-"""The reference solver: SUNDIALS CVODE with exact flow functions and located events. Slow, independent, the judge."""

@@ -1,0 +1,68 @@
+"""The torque of a walk for OpenSim: a table in its names, zero and signs. Nothing here needs OpenSim."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from ppafo.errors import ScenarioError
+from ppafo.signals import Channel, Recording
+from ppafo.storage.opensim import opensim_bytes, opensim_recording
+from ppafo.walking.motion import walk_of
+from ppafo.walking.result import WalkResult
+from ppafo.walking.strides import PHASES
+
+Side = Literal["right", "left"]
+SHORTEST_STRIDE, LONGEST_STRIDE = 0.4, 5.0
+"""Between two heel strikes of a foot [s]."""
+
+
+def opensim_files(result: WalkResult, side: Side = "right", strikes: Sequence[float] = ()) -> dict[str, bytes]:
+    """Return the files of a walk for OpenSim by name; with ``strikes`` [s] its mean stride lies on these heel strikes.
+
+    ScenarioError for a walk that failed or has no stride with help, and for times that are no heel strikes.
+    """
+    torque = device_torque(result, side, strikes)
+    named, _ = opensim_recording(result.recording, side, walk_of(result.scenario).wearer.body_mass)
+    return {"device_torque.sto": opensim_bytes(torque), "walk.sto": opensim_bytes(named)}
+
+
+def coordinate_of(side: Side) -> str:
+    """Return the name that models of OpenSim give the ankle of a side."""
+    return f"ankle_angle_{side[0]}"
+
+
+def device_torque(result: WalkResult, side: Side = "right", strikes: Sequence[float] = ()) -> Recording:
+    """Return what the device adds along OpenSim's ankle [N m], above 0 in dorsiflexion, as ``opensim_files`` has it."""
+    name = f"{coordinate_of(side)}_device"
+    recording = result.recording
+    if result.status.time is not None:
+        raise ScenarioError(f"{result.scenario.name}: {result.status.message}")
+    if not strikes:
+        return Recording(name, recording.time, {name: _reversed(recording["external_torque"])}, "simulated")
+    check_strikes(strikes)
+    if "external_torque" not in result.averages:
+        raise ScenarioError(f"{result.scenario.name}: has no whole stride with help to lay on heel strikes")
+    mean = result.averages["external_torque"].mean
+    parts = [first + PHASES[:-1] * (last - first) for first, last in pairwise(strikes)]
+    time = np.append(np.concatenate(parts), strikes[-1])
+    values = np.append(np.tile(mean[:-1], len(parts)), mean[0])
+    return Recording(name, time, {name: _reversed(values)}, "simulated")
+
+
+def _reversed(torque: "np.ndarray") -> Channel:
+    """Return a torque [N m] above 0 in plantarflexion as one above 0 in dorsiflexion; no zero gets a minus."""
+    return Channel(0.0 - torque, "N m")
+
+
+def check_strikes(strikes: Sequence[float]) -> None:
+    """Refuse times [s] that are no heel strikes of one foot, one after the other; ScenarioError."""
+    if len(strikes) < 2:
+        raise ScenarioError("--strikes: give two heel strikes or more, such as 0.63,1.86")
+    for first, last in pairwise(strikes):
+        if not SHORTEST_STRIDE <= last - first <= LONGEST_STRIDE:
+            raise ScenarioError(
+                f"--strikes: from {first:g} to {last:g} s is no stride: heel strikes of one foot are "
+                f"{SHORTEST_STRIDE:g} to {LONGEST_STRIDE:g} s apart, in order"
+            )

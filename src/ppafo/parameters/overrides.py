@@ -1,0 +1,110 @@
+"""Overrides are a set: each value once, each orifice in one form, the same result in any order; two sets are layers.
+
+A form is one of the ways to give a thing, of which only one is taken: files, overrides and columns of studies are
+checked by the same table. What the kinds of a scenario add is in ``simulation/overrides.py``.
+"""
+
+from collections.abc import Collection, Iterable, Mapping
+from typing import NamedTuple
+
+from ppafo.errors import ParameterError, PpafoError, one_line
+from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM
+
+CHOSEN_VALVE, NAMED_VALVE = "valve.", "valves."
+Forms = Mapping[str, tuple[tuple[str, ...], ...]]
+"""By section the forms in which something is given, each as the names of its values."""
+_ORIFICE = tuple(tuple(item.name for item in form) for form in (AREA_FORM, SONIC_FORM))
+FORMS: Forms = {"valve": _ORIFICE, "actuator.leak": _ORIFICE, "controller": (("rate",), ("period",))}
+
+
+class Given(NamedTuple):
+    """An override as it was typed: path and value."""
+
+    typed: str
+    text: str
+
+    def __str__(self) -> str:
+        """The override as a message quotes it."""
+        return f"{self.typed}={self.text}"
+
+
+def split_override(override: str, error: type[PpafoError] = ParameterError) -> Given:
+    """Return path and value of a text such as ``run.duration=1 s``; an ``error`` for any other text."""
+    on_one_line = one_line(override)
+    path, separator, text = (part.strip() for part in on_one_line.partition("="))
+    if not separator or not path or not text:
+        raise error(f"override '{on_one_line}' is not of the form PATH=VALUE, for example valve.area=12.6mm^2")
+    return Given(path, text)
+
+
+def override_set(
+    overrides: Iterable[str],
+    error: type[PpafoError] = ParameterError,
+    same: Mapping[str, str] | None = None,
+    valve: str = "",
+    forms: Forms = FORMS,
+) -> dict[str, Given]:
+    """Return overrides by path, sorted, so that their order is forgotten.
+
+    ``same`` maps a path to another one of the same value; ``valve`` is the name of the valve that is chosen, whose
+    values have two paths. An ``error`` where a value is given twice or in two forms names both overrides.
+    """
+    found: dict[str, Given] = {}
+    for override in sorted(overrides):
+        given = split_override(override, error)
+        path = one_path((same or {}).get(given.typed, given.typed), valve)
+        if path in found:
+            raise error(f"overrides '{found[path]}' and '{given}': the same value is given twice; omit one")
+        found[path] = given
+    pair = in_two_forms(found, forms)
+    if pair is not None:
+        first, second = (found[path] for path in pair)
+        raise error(f"overrides '{first}' and '{second}': {either(pair[0], forms)}")
+    return {path: found[path] for path in sorted(found)}
+
+
+def over(
+    earlier: Iterable[str],
+    later: Iterable[str],
+    error: type[PpafoError] = ParameterError,
+    same: Mapping[str, str] | None = None,
+    valve: str = "",
+    forms: Forms = FORMS,
+) -> tuple[str, ...]:
+    """Return two layers as one set: what the later one gives replaces the value, and another form, of the earlier.
+
+    The other arguments are those of ``override_set``.
+    """
+    first, second = tuple(earlier), tuple(later)
+    old, new = (override_set(layer, error, same, valve, forms) for layer in (first, second))
+    replaced = {other for path in new for other in (path, *other_forms(path, forms))}
+    kept = {item for path, item in old.items() if path not in replaced}
+    return (*(text for text in first if split_override(text, error) in kept), *second)
+
+
+def one_path(path: str, valve: str) -> str:
+    """Return the path with ``valve.`` in place of ``valves.NAME.`` where that is the valve that is chosen."""
+    own = f"{NAMED_VALVE}{valve}."
+    return CHOSEN_VALVE + path.removeprefix(own) if valve and path.startswith(own) else path
+
+
+def other_forms(path: str, forms: Forms = FORMS) -> tuple[str, ...]:
+    """Return the paths of the other forms of what a path gives; none where there is one form."""
+    section, _, name = path.rpartition(".")
+    ways = forms.get("valve" if section.startswith(NAMED_VALVE) else section, ())
+    if not any(name in way for way in ways):
+        return ()
+    return tuple(f"{section}.{other}" for way in ways if name not in way for other in way)
+
+
+def in_two_forms(paths: Collection[str], forms: Forms = FORMS) -> tuple[str, str] | None:
+    """Return the first two paths that give one thing in two forms, None where all give each thing in one."""
+    pairs = ((path, other) for path in sorted(paths) for other in sorted(other_forms(path, forms)) if other in paths)
+    return next(pairs, None)
+
+
+def either(path: str, forms: Forms = FORMS) -> str:
+    """Return what a message asks for where a thing is given in two forms."""
+    section = path.rpartition(".")[0]
+    ways = forms["valve" if section.startswith(NAMED_VALVE) else section]
+    return f"give either {' or '.join(' and '.join(f'{section}.{name}' for name in way) for way in ways)}, not both"

@@ -1,0 +1,223 @@
+"""Overrides of a scenario as a set: kinds first by depth, then numbers, so that their order means nothing.
+
+What is given beside a kind that has no use for it is an error that names both. A document, or the overrides of a file,
+is a layer under those of the caller: there another kind drops what only the kind before had.
+"""
+
+import copy
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ppafo.errors import ScenarioError, nearest_name
+from ppafo.model.catalog import EFFECTS, VALVES
+from ppafo.model.effects.kind import SECTION as EFFECTS_SECTION
+from ppafo.parameters.declaration import ORIFICE, RELIEVING_PATH, SECTIONS, SPECIES_PATH
+from ppafo.parameters.declaration import quantities as device_quantities
+from ppafo.parameters.overrides import Given, other_forms, over, override_set, split_override
+from ppafo.simulation.declaration import ARITHMETIC, OF_A_VANE, Declared, kind_at, no_arithmetic, value_at
+from ppafo.units import number_text
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_SEED, _VALVE = "sensors.seed", "device.valve"
+_OF_ANY_KIND = {"controller": frozenset({"kind", "rate", "period"})}
+_CHOOSING = ("kind", "reacts")
+"""Last names of paths that decide which other values their section has."""
+
+
+@dataclass(frozen=True, slots=True)
+class OverriddenDocument:
+    """A document with overrides in it: paths that were set, and the overrides that belong to the device."""
+
+    document: dict[str, Any]
+    paths: frozenset[str]
+    device: tuple[str, ...]
+
+
+def apply_overrides(
+    document: Mapping[str, Any], overrides: Iterable[str], file: str, declared: Declared = OF_A_VANE
+) -> OverriddenDocument:
+    """Return a changed copy of a document; ``file`` is what messages call it.
+
+    Naming another kind of motion, controller, timing or profile drops the settings of the document that only the old
+    kind has; giving a rate drops its period, and the reverse. A gain on the torque may leave out its unit.
+    ScenarioError for a path that is neither ``declared`` nor of the device, and for two overrides of which one leaves
+    the other without use.
+    """
+    given = override_set(overrides, ScenarioError, declared.same)
+    changed = _with_one_path_each(document, file, declared)
+    of_device = {path: item for path, item in given.items() if path not in declared.appended and is_of_device(path)}
+    own = {path: item for path, item in given.items() if path not in of_device}
+    waiting = _choose_kinds(changed, own, file, declared)
+    known = declared.paths(changed)
+    for path in sorted(own):
+        if path not in known:
+            declared.find_kinds(changed, file)
+            if path == ARITHMETIC:
+                instead = no_arithmetic(kind_at(changed, "controller"), own[path].text)
+                raise ScenarioError(f"override '{own[path]}': {instead}")
+            raise _unused(path, own, known, file)
+    for path in waiting:
+        if path in declared.appended:
+            section, inner = declared.appended[path]
+            changed.setdefault(section, {}).setdefault("overrides", []).append(f"{inner}={own[path].text}")
+        else:
+            _set(changed, path, own[path].text, file, declared)
+    return OverriddenDocument(changed, frozenset(own), tuple(map(str, of_device.values())))
+
+
+def over_layer(
+    content: Mapping[str, Any],
+    earlier: Sequence[str],
+    later: Sequence[str],
+    file: str,
+    declared: Declared,
+    valve: str = "",
+) -> tuple[str, ...]:
+    """Return two layers of overrides of a document as one set: the later ones replace by path, form and kind.
+
+    ``valve`` is the name of the one that is chosen unless the later ones choose another.
+    """
+    new = override_set(later, ScenarioError, declared.same)
+    chosen = new[_VALVE].text if _VALVE in new else valve
+    both = over(earlier, later, ScenarioError, declared.same, chosen)
+    choosing = {path for path in new if _is_choosing(path)}
+    if not choosing:
+        return both
+    every = override_set(both, ScenarioError, declared.same, chosen)
+    changed = _with_one_path_each(content, file, declared)
+    _choose_kinds(changed, every, file, declared)
+    known = frozenset(declared.paths(changed))
+    lost = {path for path in every if path not in known and path not in new and chosen_by(path, choosing)}
+    left = {item for path, item in every.items() if path not in lost}
+    return tuple(text for text in both if split_override(text, ScenarioError) in left)
+
+
+def _is_choosing(path: str) -> bool:
+    section, _, name = path.rpartition(".")
+    return bool(section) and name in _CHOOSING
+
+
+def chosen_by(path: str, choosing: Iterable[str]) -> list[str]:
+    """Return the paths that decide whether there is a value at a path, the nearest one last."""
+    found = (chosen for chosen in choosing if chosen != path and path.startswith(f"{chosen.rpartition('.')[0]}."))
+    return sorted(found, key=len)
+
+
+def _choose_kinds(
+    document: dict[str, Any], given: Mapping[str, Given], file: str, declared: Declared
+) -> tuple[str, ...]:
+    """Set the kinds that are given, those of outer sections first, and return the paths that remain.
+
+    A kind whose section is not there remains.
+    """
+    places = {path: (not path.endswith(".kind"), path.count("."), path) for path in filter(_is_choosing, given)}
+    first = sorted(places, key=lambda path: places[path])
+    done = set()
+    for path in first:
+        if path in declared.paths(document):
+            if path == "motion.kind":
+                declared.check_motion(given[path].text, f"override '{given[path]}'")
+            _set(document, path, given[path].text, file, declared)
+            done.add(path)
+    return tuple(path for path in sorted(given) if path not in done)
+
+
+def _unused(path: str, given: Mapping[str, Given], known: tuple[str, ...], file: str) -> ScenarioError:
+    """Return the error for an override without use: beside a kind that is given, or in any case."""
+    choosing = chosen_by(path, filter(_is_choosing, given))
+    if not choosing:
+        return unknown_value(str(given[path]), known, f"{file} has")
+    section = f"{choosing[-1].rpartition('.')[0]}."
+    near = [item for item in known if item.startswith(section)]
+    hint = nearest_name(path, near) or f"; there it has {', '.join(near)}"
+    return ScenarioError(
+        f"overrides '{given[path]}' and '{given[choosing[-1]]}': with the latter {file} has no value '{path}'{hint}"
+    )
+
+
+def _with_one_path_each(document: Mapping[str, Any], file: str, declared: Declared) -> dict[str, Any]:
+    """Return a copy of a document where each value stands at the one path that the document keeps."""
+    changed = copy.deepcopy(dict(document))
+    for path, kept in declared.same.items():
+        section, _, name = path.rpartition(".")
+        table = value_at(changed, section)
+        if not isinstance(table, dict) or name not in table:
+            continue
+        if kept in changed:
+            raise ScenarioError(f"{file}: give either {path} or {kept}, not both")
+        changed[kept] = table.pop(name)
+    return changed
+
+
+def scenario_paths(document: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return every path of the scenario that an override can set, for the kinds that the document names."""
+    return OF_A_VANE.paths(document)
+
+
+def device_paths() -> tuple[str, ...]:
+    """Return every path of the device that an override can set, with ``valve`` for the one that is chosen."""
+    sections = [path for path in device_quantities({}) if not path.startswith("reported.")]
+    valve = [*ORIFICE, *(item for kind in VALVES.values() for item in kind.quantities)]
+    return (*sections, SPECIES_PATH, RELIEVING_PATH, *(f"valve.{item.name}" for item in valve))
+
+
+def is_of_device(path: str) -> bool:
+    """Tell whether a path begins in the device, which then has the say about the rest of it."""
+    return path.partition(".")[0] in {*SECTIONS, EFFECTS_SECTION, "valve", "valves"}
+
+
+def unknown_value(override: str, known: tuple[str, ...], who_has: str) -> ScenarioError:
+    """Return the error for a path that is neither known nor of the device; ``who_has`` begins as ``task.toml has``."""
+    given = split_override(override, ScenarioError)
+    EFFECTS.load_own()
+    allowed = [*known, *device_paths()]
+    section = given.typed.partition(".")[0]
+    near = [name for name in known if name.startswith(f"{section}.")]
+    hint = nearest_name(given.typed, allowed) or f"; for example {', '.join(near[:6] or known[:6])}"
+    return ScenarioError(f"override '{given}': {who_has} no value '{given.typed}'{hint}")
+
+
+def _set(document: dict[str, Any], path: str, text: str, file: str, declared: Declared) -> None:
+    section, _, name = path.rpartition(".")
+    table = document
+    for part in section.split(".") if section else ():
+        table = table.setdefault(part, {})
+        if not isinstance(table, dict):
+            raise ScenarioError(f"override '{path}={text}': {file} has no table [{section}]")
+    if name == "kind" and table.get("kind") != text:
+        _drop_settings_of_old_kind(document, section, text, declared)
+    for other in other_forms(path):
+        table.pop(other.rpartition(".")[2], None)
+    table[name] = _seed(path, text) if path == _SEED else _with_unit_of_gain(document, path, text, declared)
+
+
+def _drop_settings_of_old_kind(document: dict[str, Any], section: str, kind: str, declared: Declared) -> None:
+    table = value_at(document, section)
+    before = _setting_names(document, section, declared)
+    table["kind"] = kind
+    after = _setting_names(document, section, declared)
+    for name in before - after - _OF_ANY_KIND.get(section, frozenset()):
+        table.pop(name, None)
+
+
+def _setting_names(document: dict[str, Any], section: str, declared: Declared) -> frozenset[str]:
+    """Return the keys that a section can have beside its kind."""
+    prefix = f"{section}."
+    paths = [path.removeprefix(prefix) for path in declared.paths(document) if path.startswith(prefix)]
+    return frozenset(path.partition(".")[0] for path in paths) - {"kind"}
+
+
+def _with_unit_of_gain(document: dict[str, Any], path: str, text: str, declared: Declared) -> str:
+    """Return the text with the SI unit of a gain on the torque where it has none: papers print gains without units."""
+    quantity = declared.quantities(document).get(path)
+    is_gain = quantity is not None and path.startswith("controller.") and "(N m" in quantity.unit
+    return f"{text} {quantity.unit}" if quantity is not None and is_gain and _NUMBER.fullmatch(text) else text
+
+
+def _seed(path: str, text: str) -> int:
+    try:
+        return int(number_text(text))
+    except ValueError as error:
+        raise ScenarioError(f"override '{path}={text}': must be a whole number") from error

@@ -1,0 +1,79 @@
+"""Golden bits: every scenario and walk has its hash, a part of them is found here, and another number is named."""
+
+import shutil
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ppafo.engine.lanes import BatchResult, run_batch
+from ppafo.simulation.loading import list_scenarios
+from ppafo.walking import list_walks
+from scripts import bits, golden_bits
+
+needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
+CHEAP = "torque-task-proportional"
+
+
+def test_every_scenario_and_walk_has_golden_hashes() -> None:
+    golden = golden_bits.golden_hashes()
+    assert set(golden) == set(golden_bits.names())
+    assert {*list_scenarios(), *list_walks()} <= set(golden)
+    assert all(0 < hashes["failed"] < golden_bits.DRAWS // 2 for hashes in golden.values())
+    assert len({hashes["draws"] for hashes in golden.values()}) == len(golden)
+
+
+@pytest.mark.parametrize(
+    ("backend", "name"),
+    [
+        ("", CHEAP),
+        pytest.param("gcc", "off", marks=needs_gcc),
+        ("", "solenoid"),
+        ("", "proportional"),
+        pytest.param("numba", CHEAP, marks=pytest.mark.long),
+        pytest.param("numba", "off", marks=pytest.mark.long),
+        pytest.param("numba", "reacting", marks=[pytest.mark.long, pytest.mark.thorough]),
+    ],
+)
+def test_the_golden_bits_are_found_on_this_computer(backend: str, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PPAFO_BACKEND", backend)
+    assert golden_bits.hashes_of(name, lambda _batch: run_batch) == golden_bits.golden_hashes()[name]
+
+
+@pytest.mark.parametrize("name", [CHEAP, "solenoid"])
+def test_a_draw_has_the_same_bits_in_a_block_and_alone(name: str) -> None:
+    batch = golden_bits.drawn_batch(golden_bits.plain_batch(name), 100)
+    together = run_batch(batch).states
+    for run in range(100):
+        column = slice(run, run + 1)
+        alone = replace(batch, parameters=batch.parameters[:, column].copy(), states=batch.states[:, column].copy())
+        assert np.array_equal(run_batch(alone).states[:, 0], together[:, run], equal_nan=True), run
+
+
+def test_another_hash_is_named_and_the_script_ends_with_1(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    golden: dict[str, Any] = {name: dict(hashes) for name, hashes in golden_bits.golden_hashes().items()}
+    golden[CHEAP]["draws"] = "0" * 16
+    monkeypatch.setattr(bits, "golden_hashes", lambda: golden)
+    assert bits.compare([bits.HERE], [CHEAP]) == 1
+    assert f"this computer | 0 of 2; differs: {CHEAP} |" in capsys.readouterr().out
+
+
+def test_the_last_bit_of_one_number_is_another_hash_and_what_a_nan_is_made_of_is_not() -> None:
+    result = BatchResult(np.array([[1.0, np.nan]]), np.zeros((1, 1, 2)))
+    other = replace(result, states=np.array([[np.nextafter(1.0, 2.0), np.nan]]))
+    signed = replace(result, states=np.array([[1.0, -np.nan]]))
+    assert golden_bits.digest(result) == golden_bits.digest(signed) != golden_bits.digest(other)
+
+
+def test_draws_are_made_of_whole_numbers_and_spread_over_their_range() -> None:
+    plain = golden_bits.plain_batch(CHEAP)
+    drawn = golden_bits.drawn_batch(plain, 1000)
+    assert (drawn.parameters[:5] == plain.parameters[:5]).all()
+    row = np.flatnonzero(plain.parameters[:, 0] > 0.0)[7]
+    factors = np.delete(drawn.parameters[row] / plain.parameters[row], np.arange(0, 1000, 10))
+    assert 0.7 <= factors.min() < 0.702
+    assert 1.398 < factors.max() < 1.4
+    assert abs(factors.mean() - 1.05) < 0.02

@@ -1,0 +1,38 @@
+"""``print(result)`` is what the command prints, and the short form is one line; neither prints an array."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+import ppafo
+from ppafo.cli.main import main
+from ppafo.questions.catalogue import QUESTIONS
+from ppafo.questions.question import Solved
+
+
+@pytest.mark.parametrize("name", ["step-response", "torque-task-solenoid"])
+def test_a_printed_run_is_what_its_command_prints(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["simulate", name, "--out", str(tmp_path / "run")]) == 0
+    assert capsys.readouterr().out.startswith(f"{ppafo.simulate(name)}\n\nwritten: ")
+
+
+def test_a_printed_answer_is_what_its_command_prints(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["parts"]) == 0
+    found = ppafo.parts()
+    assert capsys.readouterr().out == f"{found}\n"
+    assert repr(found) == f"<Parts: {found.answer().title}>"
+
+
+def test_every_public_answer_prints_its_table_and_has_a_short_form() -> None:
+    QUESTIONS.load_all()
+    for question in QUESTIONS.loaded().values():
+        question.solver()
+    # A dataclass with slots is made from another class of its name.
+    classes = [one for one in Solved.__subclasses__() if getattr(sys.modules[one.__module__], one.__name__) is one]
+    assert len(classes) > 20
+    for one in classes:
+        assert one.__str__ is Solved.__str__, one
+        assert one.__repr__ is Solved.__repr__ or one is ppafo.StudyResults, one
