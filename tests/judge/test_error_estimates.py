@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from ppafo.parameters.overrides import over
 from ppafo.running import simulate
 from ppafo.simulation.accuracy import LARGEST_OF_PRESSURE
 from ppafo.simulation.check import FINER
@@ -90,7 +91,7 @@ def test_rows_of_an_ensemble_have_the_errors_of_single_runs() -> None:
     found = run_ensemble(base, {"valve.area": areas}, ["gas_supplied", "mechanical_work"], errors=True)
     assert run_ensemble(base, {"valve.area": areas}, ["gas_supplied"]).errors == {}
     for row, area in enumerate(areas.tolist()):
-        alone = simulate("step-response", [*SENSITIVE["thermal leg"], f"valve.area={area!r} m^2"]).error().metrics
+        alone = simulate("step-response", over(SENSITIVE["thermal leg"], [f"valve.area={area!r} m^2"])).error().metrics
         for name in ("gas_supplied", "mechanical_work"):
             assert found.errors[name][row] == pytest.approx(alone[name], rel=1e-6, abs=1e-15)
             assert found.errors[name][row] > 0.0

@@ -111,7 +111,7 @@ def _unknown_key(spot: _Spot, model: type[BaseModel]) -> str:
     allowed, key = list(spot.holder.model_fields), spot.path.rpartition(".")[2]
     homes = _homes(model, key)
     homes = homes if len(homes) <= _MAXIMUM_HOMES else []
-    hint = f", which belongs in {' or '.join(homes)}" if homes else nearest_name(key, allowed)
+    hint = f", which is a key of {' and '.join(homes)}" if homes else nearest_name(key, allowed)
     return f"unknown key '{spot.path}'{hint}; allowed here: {', '.join(allowed)}"
 
 

@@ -286,7 +286,7 @@ def test_a_setting_that_contradicts_another_is_refused_by_name_and_a_flaw_needs_
         ("wearer_body_mass", 1.0, b"wearer_body_mass"),
         ("controller_unload_threshold", 70.0, b"controller_unload_threshold"),
         ("controller_peak_time", 0.39, b"controller_peak_time"),
-        ("sensors_force_noise", 5.0, None),
+        ("sensors_force_noise", 5.0, b"sensors_force_noise"),
     ):
         changed = (ctypes.c_double * len(names))(*settings)
         changed[names.index(name)] = value

@@ -211,7 +211,7 @@ def test_all_that_is_missing_is_named() -> None:
 
 def test_a_key_in_the_wrong_place_is_told_where_it_belongs() -> None:
     problem = problem_of(changed("schema_version = 1", "schema_version = 1\nstatic_torque = 1"))
-    assert "unknown key 'static_torque', which belongs in [friction]; allowed here: " in problem
+    assert "unknown key 'static_torque', which is a key of [friction]; allowed here: " in problem
 
 
 def test_a_wrong_dimension_is_kept_for_the_audit_and_refused_for_a_device(tmp_path: Path) -> None:

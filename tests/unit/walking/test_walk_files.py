@@ -97,7 +97,10 @@ MISTAKES: dict[str, tuple[str, str]] = {
         '[reference]\nkind = "constant"\nlevel = "3 N m"\n',
         "unknown key 'reference'; allowed here: .*motion",
     ),
-    "an angle": ('angle = "90 deg"\n', r"unknown key 'motion\.angle'; allowed here: kind"),
+    "an angle": (
+        'angle = "90 deg"\n',
+        r"unknown key 'motion\.angle', which is a key of \[faults\]; allowed here: kind",
+    ),
     "a gait that is a number": ("gait = 3\n", "gait = 3 must be a text"),
 }
 

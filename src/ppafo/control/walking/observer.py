@@ -361,10 +361,16 @@ def filled_lines(nominal: NominalDevice) -> LineState:
     )
 
 
+def is_behind_lines(nominal: NominalDevice) -> bool:
+    """True where both lines have a volume and a droop of their regulators: one without either cannot be predicted."""
+    given = nominal.nominal_lines
+    return min(given.volume_1, given.volume_2, given.droop_1, given.droop_2) > 0.0
+
+
 def supplied(nominal: NominalDevice, lines: LineState) -> tuple[float, float]:
     """Absolute pressures [Pa] before the valve: of both lines, or of a supply that needs none."""
     first, second = max(nominal.nominal_lines.volume_1, TINY), max(nominal.nominal_lines.volume_2, TINY)
-    has_lines = nominal.nominal_lines.volume_1 > 0.0
+    has_lines = is_behind_lines(nominal)
     return (
         lines.mass_1 / first if has_lines else nominal.nominal_supply_pressure,
         lines.mass_2 / second if has_lines else nominal.nominal_dorsiflexion_pressure,
@@ -373,7 +379,7 @@ def supplied(nominal: NominalDevice, lines: LineState) -> tuple[float, float]:
 
 def next_lines(nominal: NominalDevice, lines: LineState, taken_1: float, taken_2: float, period: float) -> LineState:
     """Lines after a sample [s] in which the chambers took two contents [J]; as they are where there are none."""
-    has_lines = nominal.nominal_lines.volume_1 > 0.0
+    has_lines = is_behind_lines(nominal)
     given = nominal.nominal_lines
     real = SupplyLines(
         droop_1=max(given.droop_1, TINY),

@@ -294,13 +294,11 @@ def other_program_of(library: Library) -> str:
 
 def _conditions_of_program(library: Library) -> list[tuple[str, str]]:
     """Conditions in C under which the settings ask for another program, with the setting that is named."""
-    switched = [
-        (
-            f"({' || '.join(f'settings->{name} > 0.0' for name in item.names)}) != {str(item.is_above).lower()}",
-            item.names[0],
-        )
-        for item in library.switches
-    ]
+    switched = []
+    for item in library.switches:
+        on = [(f"settings->{name} > 0.0", name) for name in item.names]
+        none = f"!({' || '.join(condition for condition, _ in on)})"
+        switched += [(none, item.names[0])] if item.is_above else on
     return [*switched, *library.other_program]
 
 

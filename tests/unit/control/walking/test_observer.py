@@ -171,3 +171,13 @@ def test_a_supply_that_is_higher_than_the_controller_believes_stops_within_two_s
     assert event.sign is not None
     assert event.sign.name == "supply_high"
     assert event.time < 2.0 * walk_of(scenario).gait.stride_time
+
+
+def test_a_line_without_a_volume_or_a_droop_is_not_predicted_and_no_state_is_lost() -> None:
+    whole = {"droop": 1.0, "largest_flow": 1.0e3, "volume": 1.0e-6}
+    for missing in ("volume_2", "droop_1", "droop_2"):
+        given = {f"{name}_{line}": value for name, value in whole.items() for line in (1, 2)}
+        nominal = PAIR._replace(nominal_lines=SupplyLines(**{**given, missing: 0.0}, relieving=0.4))
+        state = observer.next_observer(nominal, observer.START, STANDS, ROOM, ROOM, STANDS, ROOM, ROOM, PERIOD)
+        assert (state.lines.mass_1, state.lines.mass_2) == (0.0, 0.0)
+        assert observer.supplied(nominal, state.lines) == (SUPPLY, nominal.nominal_dorsiflexion_pressure)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ppafo.engine.lanes import add_meters
 from ppafo.errors import ScenarioError
 from ppafo.metrics import METRICS
+from ppafo.parameters.overrides import over
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import COMPLETED, DIVERGED, REFUSED, EnsembleResult, run_ensemble, running
 from ppafo.simulation.loading import load_scenario
@@ -66,7 +67,7 @@ def quiet_columns(draws: ModuleType, base: Scenario, generator: np.random.Genera
 def alone(base: str, overrides: tuple[str, ...], columns: dict[str, Floats], run: int) -> Result:
     declared = declared_numbers(load_scenario(base, overrides))
     texts = [f"{path}={float(values[run])!r} {declared[path].unit}".strip() for path, values in columns.items()]
-    return simulate(base, [*overrides, *texts])
+    return simulate(base, over(overrides, texts))
 
 
 def assert_same_metrics(result: EnsembleResult, run: int, single: Result) -> None:

@@ -23,7 +23,7 @@ def test_each_run_gives_what_it_gives_alone() -> None:
     found = run_ensemble(base, {"gas_model.heat_transfer_coefficient": coefficients}, METRICS)
     for index, coefficient in enumerate(coefficients):
         override = f"gas_model.heat_transfer_coefficient={coefficient} W/(m^2 K)"
-        alone = simulate("torque-task-proportional", [*THERMAL, override]).metrics
+        alone = simulate("torque-task-proportional", over(THERMAL, [override])).metrics
         assert found.metrics["rms_error"][index] == pytest.approx(alone["rms_error"].value, rel=1e-11)
         assert found.metrics["gas_supplied"][index] == pytest.approx(alone["gas_supplied"].value, rel=1e-11)
         assert found.metrics["lowest_temperature"][index] == pytest.approx(alone["lowest_temperature"].value, rel=1e-11)
