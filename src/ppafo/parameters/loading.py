@@ -23,6 +23,7 @@ from ppafo.parameters import declaration
 from ppafo.parameters.actuator_table import read_actuator_table
 from ppafo.parameters.building import build_device
 from ppafo.parameters.device import VANE, Device
+from ppafo.parameters.overrides import check_valve
 from ppafo.parameters.parameter_set import (
     Accepted,
     Citation,
@@ -169,8 +170,11 @@ def list_sets() -> tuple[str, ...]:
 def load_device(name_or_path: str | Path, valve: str | None = None, overrides: Iterable[str] = ()) -> Device:
     """Return the device of a parameter set with one of its valves (default: the set's own choice), in SI units.
 
-    ``overrides`` are texts such as ``valve.area=12.6mm^2`` or ``supply.pressure=55 psi_g``.
+    ``overrides`` are texts such as ``valve.area=12.6mm^2`` or ``supply.pressure=55 psi_g``. ParameterError for one of
+    another valve than the one that is named.
     """
+    overrides = tuple(overrides)
+    check_valve(overrides, valve, f"valve = '{valve}'")
     parameter_set = apply_overrides(load_parameter_set(name_or_path), overrides, valve)
     return build_device(parameter_set, valve)
 

@@ -88,6 +88,24 @@ def one_path(path: str, valve: str) -> str:
     return CHOSEN_VALVE + path.removeprefix(own) if valve and path.startswith(own) else path
 
 
+def of_another_valve(path: str, valve: str) -> bool:
+    """Tell whether a path is of a valve by name that is not the one that is chosen."""
+    return path.startswith(NAMED_VALVE) and not path.startswith(f"{NAMED_VALVE}{valve}.")
+
+
+def check_valve(
+    overrides: Iterable[str], valve: str | None, choice: str, error: type[PpafoError] = ParameterError
+) -> None:
+    """Refuse an override of another valve than the one that is chosen beside it, None for no choice.
+
+    The ``error`` names the override and the ``choice`` as it was given.
+    """
+    for override in sorted(overrides) if valve else ():
+        given = split_override(override, error)
+        if valve and of_another_valve(given.typed, valve):
+            raise error(f"override '{given}' and {choice}: with the latter that valve is not used; omit one")
+
+
 def other_forms(path: str, forms: Forms = FORMS) -> tuple[str, ...]:
     """Return the paths of the other forms of what a path gives; none where there is one form."""
     section, _, name = path.rpartition(".")

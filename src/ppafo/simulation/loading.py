@@ -24,7 +24,7 @@ from ppafo.parameters import apply_overrides as apply_device_overrides
 from ppafo.parameters.declaration import RELIEVING_PATH
 from ppafo.parameters.device import Device, Supply
 from ppafo.parameters.graph import Follows, Graph, follows, gauge_link
-from ppafo.parameters.overrides import FORMS, either, in_two_forms, split_override
+from ppafo.parameters.overrides import FORMS, check_valve, either, in_two_forms, split_override
 from ppafo.parameters.parameter_set import atmospheric_pressure, chosen_valve, entry_text, links_of_set
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock, read_clock
 from ppafo.simulation.declaration import (
@@ -139,9 +139,10 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
 
 def read_hardware(reading: Reading, request: ScenarioRequest, overrides: tuple[str, ...]) -> Hardware:
     """Return the parameter set with the overrides of the file and then those of the caller."""
-    section = reading.document["device"]
+    section, in_file = reading.document["device"], request.content.get("device", {})
     valve = section.get("valve")
     try:
+        check_valve(in_file.get("overrides", ()), in_file.get("valve"), f"device.valve = '{in_file.get('valve')}'")
         parameter_set = request.parameter_set or load_parameter_set(set_name(section["set"], request.folder))
         name = chosen_valve(parameter_set, valve)
         parameter_set = apply_device_overrides(parameter_set, section.get("overrides", ()), valve)

@@ -15,7 +15,15 @@ from ppafo.model.catalog import EFFECTS, VALVES
 from ppafo.model.effects.kind import SECTION as EFFECTS_SECTION
 from ppafo.parameters.declaration import ORIFICE, RELIEVING_PATH, SECTIONS, SPECIES_PATH
 from ppafo.parameters.declaration import quantities as device_quantities
-from ppafo.parameters.overrides import Given, other_forms, over, override_set, split_override
+from ppafo.parameters.overrides import (
+    Given,
+    check_valve,
+    of_another_valve,
+    other_forms,
+    over,
+    override_set,
+    split_override,
+)
 from ppafo.simulation.declaration import ARITHMETIC, OF_A_VANE, Declared, kind_at, no_arithmetic, value_at
 from ppafo.units import number_text
 
@@ -46,6 +54,8 @@ def apply_overrides(
     the other without use.
     """
     given = override_set(overrides, ScenarioError, declared.same)
+    if _VALVE in given:
+        check_valve(map(str, given.values()), given[_VALVE].text, f"override '{given[_VALVE]}'", ScenarioError)
     changed = _with_one_path_each(document, file, declared)
     of_device = {path: item for path, item in given.items() if path not in declared.appended and is_of_device(path)}
     own = {path: item for path, item in given.items() if path not in of_device}
@@ -81,6 +91,8 @@ def over_layer(
     """
     new = override_set(later, ScenarioError, declared.same)
     chosen = new[_VALVE].text if _VALVE in new else valve
+    if _VALVE in new:
+        earlier = [text for text in earlier if not of_another_valve(split_override(text, ScenarioError).typed, chosen)]
     both = over(earlier, later, ScenarioError, declared.same, chosen)
     choosing = {path for path in new if _is_choosing(path)}
     if not choosing:

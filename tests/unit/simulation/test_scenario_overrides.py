@@ -9,7 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ppafo.errors import ParameterError, PpafoError, ScenarioError
-from ppafo.simulation.loading import device_paths, load_scenario, scenario_paths, split_override
+from ppafo.loading import reloaded
+from ppafo.simulation.loading import (
+    device_paths,
+    load_scenario,
+    scenario_from_dict,
+    scenario_paths,
+    split_override,
+)
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, ProfileChoice
 
 TASK = "torque-task-proportional"
@@ -179,3 +186,25 @@ def test_a_value_comes_before_or_behind_the_kind_that_has_it() -> None:
     words = ["controller.integral_gain=2", "controller.kind=pid", "reference.kind=constant", "reference.level=2 N m"]
     for order in itertools.permutations(words):
         assert load_scenario("step-response", order).control.settings["integral_gain"] == 2.0
+
+
+def test_a_value_of_a_valve_beside_the_choice_of_another_is_refused_with_both_in_any_order() -> None:
+    words = ("device.valve=solenoid", "valves.proportional.area=5 mm^2")
+    told = {problem_of(*order) for order in itertools.permutations(words)}
+    assert len(told) == 1
+    assert all(f"'{word}'" in next(iter(told)) for word in words)
+    assert load_scenario(TASK, ["device.valve=solenoid", "valves.solenoid.area=5 mm^2"]).device.valve_name == "solenoid"
+
+
+def test_a_file_that_chooses_a_valve_and_changes_another_is_refused_with_both() -> None:
+    content = dict(load_scenario(TASK).origin.content)
+    content["device"] = {"set": "ppafo2011", "valve": "solenoid", "overrides": ["valves.proportional.area=5 mm^2"]}
+    with pytest.raises(ParameterError, match=r"'valves\.proportional\.area=5 mm\^2' and device\.valve = 'solenoid'"):
+        scenario_from_dict(content)
+
+
+def test_the_choice_of_a_valve_drops_what_a_layer_below_gives_of_another() -> None:
+    below = load_scenario(TASK, ["valves.proportional.area=5 mm^2", "run.duration=1 s"])
+    chosen = reloaded(below, ["device.valve=solenoid"])
+    assert chosen.origin.overrides == ("run.duration=1 s", "device.valve=solenoid")
+    assert chosen.device == load_scenario(TASK, ["device.valve=solenoid"]).device

@@ -22,6 +22,7 @@ from ppafo.identification.trajectory.section import solve_section
 from ppafo.identification.trajectory.tolerances import AbilitySection, Tolerances, ability_of, tolerances_of
 from ppafo.parameters.device import VANE
 from ppafo.parameters.loading import list_sets, load_parameter_set
+from ppafo.parameters.overrides import check_valve
 from ppafo.parameters.parameter_set import ParameterSet, apply_overrides, atmospheric_pressure, chosen_valve
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.identify.answer import Beforehand, Identification, _bench_estimates
@@ -139,6 +140,7 @@ def _base_set(problem: ProblemFile, folder: Path) -> ParameterSet:
     name = problem.device.set
     beside = folder / name
     base = load_parameter_set(beside if beside.suffix == ".toml" else name)
+    check_valve(problem.device.overrides, problem.device.valve, f"device.valve = '{problem.device.valve}'")
     return apply_overrides(base, problem.device.overrides, problem.device.valve)
 
 
