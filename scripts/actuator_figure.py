@@ -1,4 +1,4 @@
-"""Draws every kind of actuator: torque and volume over the angle, and the step responses of the example.
+"""Draws every kind of actuator: torque and volume over the angle, and the step responses of the tests.
 
     python scripts/actuator_figure.py docs/images/actuators.png
 
@@ -6,7 +6,6 @@ Solid lines are at the pressure of the supply in chamber 1, dashed ones at half 
 """
 
 import argparse
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,7 @@ from ppafo.engine.scheme.actuators import torque_of, volumes_of
 from ppafo.model.catalog import ACTUATORS
 from ppafo.parameters.plant import plant_parameters
 
-EXAMPLE = Path(str(resources.files("ppafo") / "examples" / "actuators"))
+EXAMPLE = Path(__file__).parents[1] / "tests" / "actuators"
 SHOWN = {
     "cylinder": ("cylinder-lever", "cylinder with a lever"),
     "muscles": ("muscle-pair", "McKibben pair"),

@@ -6,7 +6,6 @@ import json
 import re
 import shlex
 import sys
-import textwrap
 import tomllib
 from collections.abc import Callable, Iterator
 from importlib.resources import files
@@ -32,17 +31,15 @@ from ppafo.simulation.loading import scenario_from_dict
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PrescribedMotion
 from tests.judge.reference_solver import compare_with_reference
+from tests.page_code import code_blocks, write_package
 from tests.scenario_text import parse_scenario
 
 PAGES = Path(__file__).parents[2] / "docs" / "how-to"
 
 
 def blocks(page: str, language: str) -> list[str]:
-    """The code blocks of a page in one language, without their indentation."""
-    found = re.findall(
-        rf"^( *)```{language}\n(.*?)^\1```", (PAGES / page).read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE
-    )
-    return [textwrap.dedent(text) for _, text in found]
+    """The code blocks of a how-to page in one language."""
+    return code_blocks(f"how-to/{page}", language)
 
 
 @pytest.fixture
@@ -52,21 +49,9 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
     packages: set[str] = set()
 
     def installed(module: str, text: str, entry_points: str) -> ModuleType:
-        package, name = module.split(".")
-        (tmp_path / package).mkdir(exist_ok=True)
-        (tmp_path / package / "__init__.py").touch()
-        (tmp_path / package / f"{name}.py").write_text(text)
-        about = tmp_path / f"{package}-1.0.dist-info"
-        about.mkdir(exist_ok=True)
-        (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
-        groups = tomllib.loads(entry_points)["project"]["entry-points"]
-        lines = [
-            f"[{group}]\n" + "".join(f"{key} = {value}\n" for key, value in groups[group].items()) for group in groups
-        ]
-        with (about / "entry_points.txt").open("a") as file:
-            file.writelines(lines)
+        write_package(tmp_path, module, text, entry_points)
         monkeypatch.syspath_prepend(tmp_path)
-        packages.add(package)
+        packages.add(module.partition(".")[0])
         return importlib.import_module(module)
 
     yield installed

@@ -13,7 +13,7 @@ from ppafo.model.catalog import ACTUATORS
 from ppafo.model.plant import PlantParameters
 from ppafo.parameters.plant import plant_parameters
 
-EXAMPLE = Path(__file__).parents[2] / "src" / "ppafo" / "examples" / "actuators"
+EXAMPLE = Path(__file__).parents[1] / "actuators"
 SETS = {
     # The printed vane loses two thirds of what its gas gives; by virtual work both numbers are one.
     "vane": ("ppafo2011", ("actuator.volume_per_angle=14.51 cm^3/rad",)),
