@@ -3,6 +3,7 @@
 import dataclasses
 import importlib
 import json
+import math
 import re
 import shlex
 import sys
@@ -26,7 +27,6 @@ from ppafo.model.valves.kind import VENT
 from ppafo.parameters.building import build_device
 from ppafo.parameters.device import Valve
 from ppafo.parameters.loading import parse_parameter_set
-from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.loading import scenario_from_dict
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PrescribedMotion
@@ -35,6 +35,8 @@ from tests.page_code import code_blocks, write_package
 from tests.scenario_text import parse_scenario
 
 PAGES = Path(__file__).parents[2] / "docs" / "how-to"
+MEASURED = Path(__file__).parents[1] / "actuators"
+MUSCLES = Path(__file__).parents[2] / "src" / "ppafo" / "examples" / "add-an-actuator"
 
 
 def blocks(page: str, language: str) -> list[str]:
@@ -253,29 +255,53 @@ def test_the_valve_of_the_page_agrees_with_the_reference_solver() -> None:
     assert agreement.worst_pressure < 1e-3
 
 
+def test_a_set_with_the_section_of_the_page_has_the_actuator_that_was_measured(tmp_path: Path) -> None:
+    shipped = (files("ppafo.parameters") / "sets" / "cylinder-lever.toml").read_text(encoding="utf-8")
+    before, after = shipped.index("[actuator]"), shipped.index("[actuator.angle_min]")
+    (tmp_path / "mine.toml").write_text(
+        shipped[:before] + blocks("add-an-actuator.md", "toml")[0] + "\n" + shipped[after:], encoding="utf-8"
+    )
+    (tmp_path / "measured-bladder.csv").write_bytes((MEASURED / "measured-bladder.csv").read_bytes())
+    actuator = ppafo.load_device(tmp_path / "mine.toml", overrides=["actuator.angle_max=110 deg"]).actuator
+    same = ppafo.load_device(MEASURED / "measured-bladder.toml").actuator
+    assert actuator.kind == "table"
+    assert actuator.volume_per_angle == same.volume_per_angle
+
+
 @pytest.fixture
-def diaphragms(install: Callable[..., ModuleType]) -> ModuleType:
+def muscles(install: Callable[..., ModuleType]) -> ModuleType:
     """The actuator of the page, installed for the length of a test."""
-    _, offered, _ = blocks("add-an-actuator.md", "toml")
-    return install("my_actuators.diaphragms", blocks("add-an-actuator.md", "python")[0], offered)
+    offered = blocks("add-an-actuator.md", "toml")[1]
+    return install("my_actuators.muscle_pair", blocks("add-an-actuator.md", "python")[0], offered)
 
 
-@pytest.mark.usefixtures("diaphragms")
-def test_the_actuator_of_the_page_gives_the_shaft_what_its_gas_gives() -> None:
-    shipped = (files("ppafo.parameters") / "sets" / "fabric-bladder.toml").read_text(encoding="utf-8")
-    head, tail = shipped.split("[actuator]")
-    common = tail[tail.index("[actuator.angle_min]") :]
-    for kind in ("diaphragms", "my_actuators.diaphragms:KIND"):
-        own = blocks("add-an-actuator.md", "toml")[2].replace('"diaphragms"', f'"{kind}"')
-        device = build_device(parse_parameter_set(f"{head}\n{own}\n{common}".encode(), "mine.toml"))
-        assert device.actuator.kind == kind
-        assert device.actuator.torque_constant == pytest.approx(8e-4 * 0.025)
-        plant, model = plant_parameters(device), ACTUATORS[kind].model
-        room, pressed, step = plant.atmospheric_pressure, plant.atmospheric_pressure + 5e4, 1e-6
-        for angle in (0.6, 1.2, 1.8):
-            after, before = (model.chambers(plant, angle + way, pressed, room).volume_1 for way in (step, -step))
-            more, less = (model.torque(plant, angle, pressed + way, room) for way in (1.0, -1.0))
-            assert 0.5 * (more - less) == pytest.approx(0.5 * (after - before) / step, rel=1e-6)
+@pytest.mark.usefixtures("muscles")
+def test_the_actuator_of_the_page_pulls_as_its_catalogue_prints_by_entry_point_and_by_name_of_its_object() -> None:
+    shipped = (MUSCLES / "muscle-pair.toml").read_text(encoding="utf-8")
+    assert blocks("add-an-actuator.md", "toml")[2] in shipped
+    for kind in ("muscle_pair", "my_actuators.muscle_pair:KIND"):
+        text = shipped.replace('kind = "muscle_pair"', f'kind = "{kind}"')
+        actuator = build_device(parse_parameter_set(text.encode(), "mine.toml")).actuator
+        assert actuator.kind == kind
+        thread, turns = actuator.settings["thread_length"], actuator.settings["turns"]
+        # Chou and Hannaford, F = p b^2 (3 cos^2 - 1)/(4 pi n^2), at the nominal length; 40 mm has four times the area.
+        cosine = 0.2 / thread
+        force = 6.0e5 * thread**2 * (3.0 * cosine**2 - 1.0) / (4.0 * math.pi * turns**2)
+        assert 4.0 * force == pytest.approx(6000.0, rel=0.01)
+
+
+@pytest.mark.usefixtures("muscles")
+def test_the_actuator_of_the_page_says_what_does_not_fit_together() -> None:
+    with pytest.raises(ppafo.PpafoError, match=r"a muscle is 0\.1184 to 0\.2336 m long"):
+        ppafo.load_device(MUSCLES / "muscle-pair.toml", overrides=["actuator.pulley_radius=60 mm"])
+
+
+@pytest.mark.usefixtures("muscles")
+def test_the_step_response_of_the_actuator_of_the_page_agrees_with_the_reference_solver() -> None:
+    scenario = ppafo.load_scenario(MUSCLES / "step-response-muscles.toml", ["run.duration=0.3 s"])
+    agreement = compare_with_reference(plan_run(scenario))
+    assert agreement.angle < 2e-4
+    assert agreement.worst_pressure < 1e-3
 
 
 def test_the_publication_of_the_page_is_judged(

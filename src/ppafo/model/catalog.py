@@ -31,8 +31,6 @@ ACTUATORS: Kinds[ActuatorKind] = Kinds(
     {
         "vane": "ppafo.model.actuators.vane:KIND",
         "cylinder": "ppafo.model.actuators.cylinder:KIND",
-        "muscle_pair": "ppafo.model.actuators.muscle_pair:KIND",
-        "bladder": "ppafo.model.actuators.bladder:KIND",
         "table": "ppafo.model.actuators.table:KIND",
     },
 )

@@ -16,6 +16,8 @@ EXAMPLES = load_examples()
 PYPROJECT = PurePosixPath("pyproject.toml")
 SCRIPT = "first-steps"
 """The example that is no part of a page: tests/acceptance/test_examples.py runs it."""
+DATA = ("muscle-pair.toml", "step-response-muscles.toml")
+"""A set and its scenario, which a page names: too long to be shown."""
 
 
 @pytest.fixture(autouse=True)
@@ -35,7 +37,7 @@ def test_the_files_of_an_example_are_what_its_page_shows(name: str) -> None:
         text = content.decode("utf-8")
         if path.name == "pyproject.toml":
             assert any(text.endswith(block) for block in shown), path
-        elif path.name != "__init__.py":
+        elif path.name not in ("__init__.py", *DATA):
             assert text in shown, path
 
 

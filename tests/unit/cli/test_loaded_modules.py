@@ -89,9 +89,7 @@ def test_a_run_loads_the_valves_of_its_set_and_the_controller_and_actuator_that_
 ) -> None:
     before, _ = simulated
     others = (
-        "actuators.muscle_pair",
         "actuators.cylinder",
-        "actuators.bladder",
         "effects.silencer",
         "effects.coil_heating",
     )

@@ -155,11 +155,11 @@ def test_an_audit_shows_first_what_the_set_changes_of_its_parent(capsys: pytest.
 def test_a_set_without_a_parent_begins_with_its_findings_and_may_be_compared_with_any(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    main(["audit", "muscle-pair", "--json"])
+    main(["audit", "cylinder-lever", "--json"])
     assert json.loads(capsys.readouterr().out)["parent"] is None
-    main(["audit", "muscle-pair", "--parent", "muscle-pair", "--set", "gas.temperature=30 degC", "--json"])
+    main(["audit", "cylinder-lever", "--parent", "cylinder-lever", "--set", "gas.temperature=30 degC", "--json"])
     document = json.loads(capsys.readouterr().out)
-    assert document["parent"] == "muscle-pair"
+    assert document["parent"] == "cylinder-lever"
     (change,) = document["changes"]
     assert change == {"path": "gas.temperature", "before": "293.15 K", "after": "30 degC", "origin": "assumed"}
 

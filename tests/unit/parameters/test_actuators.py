@@ -48,15 +48,6 @@ def test_the_torque_constant_of_another_kind_is_its_mean_growth() -> None:
     assert actuator.torque_constant == pytest.approx(area * stroke / np.radians(110.0), rel=0.01)
 
 
-def test_a_muscle_of_the_set_pulls_as_its_catalogue_prints() -> None:
-    muscles = load_device("muscle-pair").actuator.settings
-    thread, turns = muscles["thread_length"], muscles["turns"]
-    # Chou and Hannaford, F = p b^2 (3 cos^2 - 1)/(4 pi n^2), at the nominal length; 40 mm has four times the area.
-    cosine = 0.2 / thread
-    force = 6.0e5 * thread**2 * (3.0 * cosine**2 - 1.0) / (4.0 * np.pi * turns**2)
-    assert 4.0 * force == pytest.approx(6000.0, rel=0.01)
-
-
 def test_a_measured_set_is_written_with_its_file(tmp_path: Path) -> None:
     text = parameter_set_toml(load_parameter_set(EXAMPLE / "measured-bladder.toml"))
     (tmp_path / "measured-bladder.csv").write_bytes((EXAMPLE / "measured-bladder.csv").read_bytes())
@@ -168,8 +159,8 @@ def test_a_run_of_a_study_that_the_table_does_not_hold_for_is_refused_as_alone(
 
 
 def test_of_another_actuator_no_torque_ceiling_and_no_lower_bound_is_known() -> None:
-    # The muscles give 25 N m at 20 deg, and 16 as the mean over the angles.
-    scenario = load_scenario(EXAMPLE / "torque-task-muscles.toml", ["reference.level=20 N m"])
+    # The cylinder gives 6.5 N m where lever and rod are square, and 5.5 as the mean over the angles.
+    scenario = load_scenario(EXAMPLE / "torque-task-cylinder.toml", ["reference.level=6 N m"])
     assert shortfall(scenario).tolist() == [0.0]
 
 
@@ -183,12 +174,9 @@ def test_stops_beyond_what_was_measured_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "override", "said"),
     [
-        ("muscle-pair", "actuator.pulley_radius=60 mm", "a muscle is 0.1184 to 0.2336 m long"),
         ("cylinder-lever", "actuator.lever_offset=60 deg", "lever and base are 80 to 190 deg apart"),
         ("cylinder-lever", "actuator.rod_diameter=30 mm", "rod_diameter must be below bore"),
-        ("fabric-bladder", "actuator.straight_angle_1=60 deg", "bladder 1 is folded by -50 to 40 deg"),
-        ("fabric-bladder", "actuator.tube_length=5 cm", "tube_length must be above 0.16 m"),
-        ("muscle-pair", "actuator.torque_constant=1e-5 m^3", "has no value 'actuator.torque_constant'"),
+        ("cylinder-lever", "actuator.torque_constant=1e-5 m^3", "has no value 'actuator.torque_constant'"),
     ],
 )
 def test_numbers_that_do_not_fit_together_are_refused(name: str, override: str, said: str) -> None:
@@ -204,23 +192,24 @@ THERMAL = ("gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(
     "overrides", [(*THERMAL, "gas_model.wall_area_per_volume=100 1/m"), ("controller.kind=pid_on_chip",)]
 )
 def test_a_scenario_asks_no_more_of_another_actuator_than_it_can(overrides: tuple[str, ...]) -> None:
-    with pytest.raises(ParameterError, match="is made for a vane, and 'muscle-pair' has an actuator 'muscle_pair'"):
-        load_scenario(EXAMPLE / "torque-task-muscles.toml", overrides)
+    with pytest.raises(ParameterError, match="is made for a vane, and 'cylinder-lever' has an actuator 'cylinder'"):
+        load_scenario(EXAMPLE / "torque-task-cylinder.toml", overrides)
 
 
-def test_a_run_of_an_ensemble_whose_muscles_are_too_long_is_refused_and_the_others_go_on() -> None:
-    base = load_scenario(EXAMPLE / "torque-task-muscles.toml")
-    screen = screen_columns(check_columns(base, {"actuator.pulley_radius": np.array([0.02, 0.06, 0.025])}))
+def test_a_run_of_an_ensemble_whose_lever_comes_to_its_dead_centre_is_refused_and_the_others_go_on() -> None:
+    base = load_scenario(EXAMPLE / "torque-task-cylinder.toml")
+    offsets = np.radians([15.0, 60.0, 20.0])
+    screen = screen_columns(check_columns(base, {"actuator.lever_offset": offsets}))
     assert screen.members.tolist() == [0, 2]
-    assert "actuator: a muscle is 0.1184 to 0.2336 m long" in screen.reasons[1]
+    assert "actuator: lever and base are 80 to 190 deg apart" in screen.reasons[1]
 
 
 @pytest.mark.parametrize(
     "command",
     [
-        ["walk", "proportional", "--set", "device.set=muscle-pair"],
-        ["linearise", str(EXAMPLE / "torque-task-muscles.toml")],
-        ["rig", "record", "step-response", "--device", "muscle-pair", "--out", "out"],
+        ["walk", "proportional", "--set", "device.set=cylinder-lever"],
+        ["linearise", str(EXAMPLE / "torque-task-cylinder.toml")],
+        ["rig", "record", "step-response", "--device", "cylinder-lever", "--out", "out"],
     ],
     ids=lambda command: command[0],
 )
@@ -230,5 +219,5 @@ def test_what_is_made_for_a_vane_refuses_another_actuator_in_one_line(
     monkeypatch.chdir(tmp_path)
     assert main(command) == 2
     said = capsys.readouterr().err
-    assert "is made for a vane, and 'muscle-pair' has an actuator 'muscle_pair'" in said
+    assert "is made for a vane, and 'cylinder-lever' has an actuator 'cylinder'" in said
     assert said.count("\n") == 1

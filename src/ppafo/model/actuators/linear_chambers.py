@@ -24,13 +24,6 @@ def rigid(volume: float, slope: float) -> LinearChamber:
     return LinearChamber(rest=volume, compliance=0.0, rest_slope=slope, compliance_slope=0.0)
 
 
-def stretching(dead_volume: float, volume: float, slope: float, stretch: float) -> LinearChamber:
-    """A chamber whose volume [m^3] grows by a share per gauge pressure [1/Pa], and its slope [m^3/rad] with it."""
-    return LinearChamber(
-        rest=dead_volume + volume, compliance=stretch * volume, rest_slope=slope, compliance_slope=stretch * slope
-    )
-
-
 def grown(chamber: LinearChamber, gauge: float) -> float:
     """Volume [m^3] at a gauge pressure [Pa]: dPhi/dp."""
     return chamber.rest + chamber.compliance * gauge
