@@ -262,10 +262,12 @@ def test_a_set_with_the_section_of_the_page_has_the_actuator_that_was_measured(t
         shipped[:before] + blocks("add-an-actuator.md", "toml")[0] + "\n" + shipped[after:], encoding="utf-8"
     )
     (tmp_path / "measured-bladder.csv").write_bytes((MEASURED / "measured-bladder.csv").read_bytes())
-    actuator = ppafo.load_device(tmp_path / "mine.toml", overrides=["actuator.angle_max=110 deg"]).actuator
+    within = ["actuator.angle_max=110 deg", "supply.pressure=65 kPa_g"]
+    actuator = ppafo.load_device(tmp_path / "mine.toml", overrides=within).actuator
     same = ppafo.load_device(MEASURED / "measured-bladder.toml").actuator
     assert actuator.kind == "table"
-    assert actuator.volume_per_angle == same.volume_per_angle
+    assert actuator.settings == same.settings
+    assert actuator.table == same.table
 
 
 @pytest.fixture
