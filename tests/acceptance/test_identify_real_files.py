@@ -41,7 +41,7 @@ def cylinder(raw_files: Path) -> Identification:
 
 
 def test_the_known_area_lies_inside_the_interval_and_within_half_a_percent(cylinder: Identification) -> None:
-    area = cylinder.results[0]["actuator.torque_constant"]
+    area = cylinder.results[0]["static_torque.area"]
     assert area.low <= KNOWN_AREA <= area.high
     assert abs(area.value / KNOWN_AREA - 1.0) < 0.005
     assert area.relative_half_width < 0.005
@@ -51,23 +51,34 @@ def test_friction_of_the_cylinder_grows_with_pressure(cylinder: Identification) 
     growth = cylinder.results[0]["static_torque.friction_per_pressure"]
     assert growth.low > 2.0e-6
     assert growth.value == pytest.approx(5.07e-6, rel=0.02)
-    assert "grows" in cylinder.results[0]["friction.static_torque"].explanation
+    assert "grows" in cylinder.results[0]["static_torque.dynamic_friction"].explanation
 
 
 def test_friction_of_the_cylinder_says_its_pressure_and_nothing_of_it_counts_as_identified(
     cylinder: Identification,
 ) -> None:
-    friction = cylinder.results[0]["friction.static_torque"]
+    friction = cylinder.results[0]["static_torque.dynamic_friction"]
     assert friction.verdict_in_words.startswith("holds for this model only, at 431.6 kPa")
     assert [check.name for check in cylinder.results[0].failed] == ["friction over pressure"]
     assert cylinder.new_set.written == ()
-    assert set(cylinder.new_set.fitted) == {"actuator.torque_constant", "friction.static_torque"}
+    assert cylinder.new_set.fitted == (), "a set has no place for newtons"
     left = cylinder.results[0]["static_torque.friction_at_no_pressure"]
     assert left.low < friction.value - 5.07e-6 * 4.316e5 < left.high
 
 
+def test_with_its_lever_arm_the_friction_of_a_sliding_cylinder_is_friction_in_motion(raw_files: Path) -> None:
+    text = blocks("toml")[0].replace(
+        'force = { column = 7, unit = "N" }', 'torque = { column = 7, unit = "N", times = "22 mm" }'
+    )
+    (raw_files / "lever.toml").write_text(text, encoding="utf-8")
+    found = identify(raw_files / "lever.toml")
+    assert set(found.new_set.fitted) == {"actuator.torque_constant", "friction.dynamic_torque"}
+    assert found.results[0]["friction.dynamic_torque"].value == pytest.approx(0.022 * 6.42, rel=1e-3)
+    assert found.new_set.parameter_set.numbers["friction.static_torque"].origin != "fitted"
+
+
 def test_mean_forces_alone_would_count_the_regulator_as_friction(cylinder: Identification) -> None:
-    friction = cylinder.results[0]["friction.static_torque"].value
+    friction = cylinder.results[0]["static_torque.dynamic_friction"].value
     growth = cylinder.results[0]["static_torque.friction_per_pressure"].value
     at_1_bar = friction + growth * (1.0e5 - 4.3e5)
     assert at_1_bar == pytest.approx(4.7, abs=0.2)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ppafo.answers.setting_names import setting_names
 from ppafo.cli.main import main
 from ppafo.engine.lanes import LaneBlock
 from ppafo.engine.rows import row_numbers
@@ -23,7 +24,6 @@ from ppafo.exports.fmu import closed_loop, functional_unit, host_platform
 from ppafo.exports.wasm import module_of
 from ppafo.identification.trajectory.problem import declaration_of
 from ppafo.identification.trajectory.problem import with_numbers as with_fitted
-from ppafo.live.workbench import words
 from ppafo.model.catalog import EFFECTS
 from ppafo.parameters.building import build_device
 from ppafo.parameters.loading import json_schema, parse_parameter_set
@@ -200,7 +200,7 @@ def test_the_page_has_its_words_and_the_bits_of_python() -> None:
     module = module_of(load_scenario(NAME, (*SHORT, NARROW, *ICE, REAL)))
     (entry,) = [item for item in module.description["settings"] if item["key"] == AREA]
     assert entry["description"] == "open area of the mesh, 0 for none"
-    assert AREA not in words()["labels"], "a page needs no words of its own for it"
+    assert AREA not in setting_names(), "a page needs no words of its own for it"
     assert compared(NAME, module, drawn(module, 3))
 
 

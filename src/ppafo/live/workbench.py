@@ -9,13 +9,14 @@ from importlib.resources import files
 from typing import Any
 
 from ppafo.answers import LivePart
+from ppafo.answers.setting_names import label_of
 from ppafo.answers.style import PAGE_LOOKS
 from ppafo.errors import PpafoError, ScenarioError, UnitError
 from ppafo.exports.wasm import WasmModule, module_of
 from ppafo.live.opening import computed_opening, first_settings, opening_like, opening_of
 from ppafo.live.page import block_of, check_start, packed_once, page_of, policy_of_block, values_of_changes
 from ppafo.live.still import still_of
-from ppafo.live.words import label_of, words
+from ppafo.live.words import words
 from ppafo.loading import load_scenario
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import over

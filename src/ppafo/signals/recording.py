@@ -139,6 +139,7 @@ CHANNELS: dict[str, ChannelKind] = {
     "pressure_difference": ChannelKind("Pa_d", "pressure in chamber 1 minus that in chamber 2"),
     "upstream_pressure": ChannelKind("Pa", "absolute pressure on the side that the gas comes from"),
     "downstream_pressure": ChannelKind("Pa", "absolute pressure on the side that the gas goes to"),
+    "force": ChannelKind("N", "force of a linear actuator on a scale, positive where chamber 1 pushes"),
     "mass_flow": ChannelKind("kg/s", "gas through the part on the bench, positive into chamber 1"),
     "direction": ChannelKind(PLAIN_NUMBER, "1 while the pressure rises, -1 while it falls", is_held=True),
     "repetition": ChannelKind(PLAIN_NUMBER, "number of the repetition", is_held=True),

@@ -1,4 +1,4 @@
-"""Static torque over rising and falling pressure: torque constant and static friction; figure 3, top, of the paper.
+"""Static torque over rising and falling pressure: torque constant and friction; figure 3, top, of the paper.
 
 While the pressure rises, friction keeps part of the torque from the scale; while it falls, friction adds to it. So
 
@@ -7,6 +7,9 @@ While the pressure rises, friction keeps part of the torque from the scale; whil
 K is the common slope, by equation (2) T = K (P1 - P2), T_s half the distance of the branches, g how the friction
 grows with pressure, T_0 the zero of the scale. All are linear, so one regression gives them all. Its intervals stay
 honest where readings are not independent of each other: those of one repetition, or of one pressure, share an error.
+
+Where a position or an angle moves with the direction, and not the pressure, the actuator slid, and T_s is its friction
+in motion. A ``force`` in place of the torque gives an area and forces, for which a set has no place.
 """
 
 from collections.abc import Sequence
@@ -35,7 +38,10 @@ from ppafo.signals.recording import Floats
 Labels = NDArray[np.int64]
 
 PROCEDURE = "static-torque"
-CHANNELS = ("torque", "pressure_difference", "direction")
+_OWN = "static_torque"
+"""Where the numbers are that no set has a place for."""
+_TORQUE, _FORCE = "torque", "force"
+_MOVING = ("position", "angle")
 MINIMUM_SAMPLES = 6
 _MINIMUM_LEVELS = 3
 _SLOPE, _ZERO, _FRICTION, _GROWTH = range(4)
@@ -47,6 +53,8 @@ _FEWEST_CLUSTERS = 3
 _LEVEL_GAP, _WIDEST_LEVEL, _BINS = 1.0 / 40.0, 1.0 / 8.0, 20
 """Gap between two pressure levels and width of one, over the whole span; equal parts where readings have no levels."""
 _FLAT = 0.002
+_MOVES_WITH_DIRECTION = 0.5
+"""Share of its range by which a channel moves with the direction in a sweep, where that is what the direction is of."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,29 +66,30 @@ class StaticTorqueSettings:
 
 
 def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | None = None) -> BenchResult:
-    """Return torque constant [m^3], static friction [N m] with its growth [m^3], and zero offset [N m]; equation (2).
+    """Return torque constant [m^3], friction [N m] with its growth [m^3], and zero offset [N m]; equation (2).
 
-    Readings whose direction is 0 belong to no branch and are left out. So is a flat start of the rising branch, where a
-    scale that only pulls shows nothing until friction is overcome.
+    The friction is that at rest, or in motion where the actuator slid; of a force they are in m^2 and N. Readings whose
+    direction is 0 belong to no branch and are left out. So is a flat start of the rising branch, where a scale that
+    only pulls shows nothing until friction is overcome.
     IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
     """
     chosen = settings or StaticTorqueSettings()
-    check_sources(sources, PROCEDURE, CHANNELS, 1)
+    load = load_of(sources)
     for source in sources:
-        check_moves(source, PROCEDURE, "torque")
+        check_moves(source, PROCEDURE, load)
         pressure = source.recording["pressure_difference"]
-        check_not_clipped(source, PROCEDURE, "torque", "pressure_difference", pressure)
+        check_not_clipped(source, PROCEDURE, load, "pressure_difference", pressure)
     readings = readings_of(sources)
     for source in sources:
-        torque = source.recording["torque"]
-        check_not_clipped(source, PROCEDURE, "pressure_difference", "torque", torque, _MORE_THAN_FRICTION)
+        torque = source.recording[load]
+        check_not_clipped(source, PROCEDURE, "pressure_difference", load, torque, _MORE_THAN_FRICTION)
     growing = _fit(readings, True, chosen.confidence)
     grows = _fit(readings, True, 1.0 - CHANCE).differs_from_zero(_GROWTH)
     fit = growing if grows else _fit(readings, False, chosen.confidence)
     names = ", ".join(source.name for source in sources)
     if fit.coefficients[_SLOPE] <= 0.0:
         raise IdentificationError(
-            f"{names}: {PROCEDURE}: the torque falls with the pressure difference; reverse the sign of one channel"
+            f"{names}: {PROCEDURE}: the {load} falls with the pressure difference; reverse the sign of one channel"
         )
     if fit.coefficients[_FRICTION] < -fit.half_widths[_FRICTION]:
         raise IdentificationError(
@@ -93,7 +102,8 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
     return BenchResult(
         PROCEDURE,
         f"{count} readings at {levels} pressures, {int(readings.clusters.max()) + 1} repetitions; "
-        f"K = {fit.coefficients[_SLOPE]:.4g} m^3, friction {fit.coefficients[_FRICTION]:.3g} N m"
+        f"K = {fit.coefficients[_SLOPE]:.4g} {readings.names.slope_unit}, "
+        f"{readings.names.friction} {fit.coefficients[_FRICTION]:.3g} {readings.names.unit}"
         f"{' on average, growing with pressure' if grows else ''}",
         tuple(evidence.with_calibration(number) for number in numbers),
         (
@@ -108,9 +118,9 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
 
 
 def static_prospects(sources: tuple[Source, ...], settings: StaticTorqueSettings) -> tuple[Prospect, ...]:
-    """Return how well torque constant, static friction and its growth can be had; intervals from scatter and design."""
-    check_sources(sources, PROCEDURE, CHANNELS, 1)
+    """Return how well torque constant, friction and its growth can be had; intervals from scatter and design."""
     readings = readings_of(sources)
+    names = readings.names
     pressure, torque, rising = readings.pressure, readings.torque, readings.branch > 0
     # The scatter within pressures and branches, about lines of their own: what the law misses is not in it.
     cells = readings.cells
@@ -132,19 +142,43 @@ def static_prospects(sources: tuple[Source, ...], settings: StaticTorqueSettings
     span, levels = float(np.ptp(pressure)), int(readings.levels.max()) + 1
     where = f"{levels} pressures over {span / 1e3:.3g} kPa"
     return (
-        prospect_of("torque constant", half[_SLOPE], float(line[0]), where),
-        prospect_of("static friction", half[_FRICTION], friction, f"both branches at {where}"),
+        prospect_of(names.slope, half[_SLOPE], float(line[0]), where),
+        prospect_of(names.friction, half[_FRICTION], friction, f"both branches at {where}"),
         Prospect(
             "growth of the friction",
             bool(levels > 2 and half[_GROWTH] * span < abs(friction)),
-            f"{half[_GROWTH] * span:.2g} N m from the lowest to the highest pressure would show",
+            f"{half[_GROWTH] * span:.2g} {names.unit} from the lowest to the highest pressure would show",
         ),
     )
 
 
 @dataclass(frozen=True, slots=True)
+class Names:
+    """What the numbers are of a load in a unit, by path, unit and word: the slope, and a friction at rest or in motion.
+
+    Only what a set has a place for has a path of a set.
+    """
+
+    load: str
+    unit: str
+    slope: str
+    slope_path: str
+    slope_unit: str
+    friction: str
+    friction_path: str
+
+
+def names_of(load: str, slides: bool) -> Names:
+    """Return what the numbers of a torque or a force are called, of an actuator that slides or is held."""
+    word, key = ("friction in motion", "dynamic") if slides else ("static friction", "static")
+    if load == _FORCE:
+        return Names(load, "N", "area", f"{_OWN}.area", "m^2", word, f"{_OWN}.{key}_friction")
+    return Names(load, "N m", "torque constant", "actuator.torque_constant", "m^3", word, f"friction.{key}_torque")
+
+
+@dataclass(frozen=True, slots=True)
 class Readings:
-    """All readings of a branch: pressure difference [Pa], torque [N m], branch (+1, -1), groups, place in a file."""
+    """All readings of a branch: pressure difference [Pa], load [N m or N], branch (+1, -1), groups, place in a file."""
 
     pressure: Floats
     torque: Floats
@@ -152,6 +186,7 @@ class Readings:
     clusters: Labels
     levels: Labels
     places: tuple[str, ...]
+    names: Names
 
     @property
     def middle(self) -> float:
@@ -164,8 +199,39 @@ class Readings:
         return labels_of([self.levels, (self.branch > 0).astype(np.int64)])
 
 
+def load_of(sources: tuple[Source, ...]) -> str:
+    """Return the channel that all recordings have, ``torque`` or ``force``; IdentificationError where one lacks it."""
+    is_force = bool(sources) and all(_FORCE in one.recording and _TORQUE not in one.recording for one in sources)
+    load = _FORCE if is_force else _TORQUE
+    check_sources(sources, PROCEDURE, (load, "pressure_difference", "direction"), 1)
+    return load
+
+
+def slides(sources: tuple[Source, ...]) -> bool:
+    """Tell whether a position or an angle moves with the direction and the pressure does not."""
+    pressure = float(np.ptp(pool(sources, "pressure_difference")))
+    moving = [
+        _swept(one, name) / max(float(np.ptp(one.recording[name])), 1.0e-300)
+        for one in sources
+        for name in _MOVING
+        if name in one.recording
+    ]
+    branches = [_swept(one, "pressure_difference") / max(pressure, 1.0e-300) for one in sources]
+    return bool(moving) and min(moving) > _MOVES_WITH_DIRECTION > max(branches)
+
+
+def _swept(source: Source, name: str) -> float:
+    """By how much a channel moves with or against the direction in a sweep, the mean of all sweeps."""
+    direction = source.recording["direction"]
+    within = (direction[1:] == direction[:-1]) & (direction[1:] != 0.0)
+    used = direction[direction != 0.0]
+    sweeps = 1 + int(np.count_nonzero(np.diff(used)))
+    return abs(float(np.sum((direction[1:] * np.diff(source.recording[name]))[within]))) / sweeps
+
+
 def readings_of(sources: tuple[Source, ...]) -> Readings:
     """Return the readings of all recordings; IdentificationError where they cannot separate slope from friction."""
+    load = load_of(sources)
     for source in sources:
         values = source.recording["direction"]
         wrong = np.flatnonzero(~np.isin(values, (-1.0, 0.0, 1.0)))
@@ -174,7 +240,7 @@ def readings_of(sources: tuple[Source, ...]) -> Readings:
                 f"{source.name}: {PROCEDURE}: channel 'direction' is {values[wrong[0]]:g} at sample {wrong[0] + 1}; "
                 f"it is 1 while the pressure rises, -1 while it falls, 0 for neither"
             )
-    pressure, torque, direction = (pool(sources, name) for name in ("pressure_difference", "torque", "direction"))
+    pressure, torque, direction = (pool(sources, name) for name in ("pressure_difference", load, "direction"))
     used = direction != 0.0
     # A scale that only pulls shows nothing until friction is overcome: the rising branch then has a flat start, a
     # lowest reading that belongs to two pressures or more, or is nothing at all.
@@ -213,7 +279,8 @@ def readings_of(sources: tuple[Source, ...]) -> Readings:
         f"sample {number} of {source.name}" for source in sources for number in range(1, len(source.recording) + 1)
     ]
     kept = tuple(place for place, is_used in zip(places, used.tolist(), strict=True) if is_used)
-    return Readings(pressure, torque, direction, clusters[used], levels, kept)
+    names = names_of(load, slides(sources))
+    return Readings(pressure, torque, direction, clusters[used], levels, kept, names)
 
 
 def _levels(pressure: Floats) -> Labels:
@@ -352,8 +419,10 @@ def _numbers(
 ) -> tuple[Number, ...]:
     """Return what the readings give; where the friction grows, it is that at the mean pressure, which it says."""
     source = "the scatter of the readings" if fit.widest == "independent readings" else f"the {fit.widest}"
+    names = readings.names
+    unit, growth_unit = names.unit, names.slope_unit
     slope_text = (
-        f"Common slope of both branches; residuals scatter by {fit.scatter:.3g} N m; "
+        f"Common slope of both branches; residuals scatter by {fit.scatter:.3g} {unit}; "
         f"the interval comes from {source}; {evidence.calibration_text}."
     )
     condition, grown = "", "no growth with pressure shows in these readings"
@@ -361,27 +430,30 @@ def _numbers(
         growth = growing.coefficients[_GROWTH]
         at_rest = growing.coefficients[_FRICTION] - growth * readings.middle
         condition = f"at {readings.middle / 1e3:.4g} kPa"
-        grown = f"it grows by {growth:.3g} m^3 with the pressure difference (per Pa), from {at_rest:.3g} N m at none, "
-        grown += "and a model with one friction torque is right at that pressure only"
+        grown = f"it grows by {growth:.3g} {growth_unit} with the pressure difference (per Pa), from {at_rest:.3g} "
+        grown += f"{unit} at none, and a model with one friction {names.load} is right at that pressure only"
     text = (
         f"Half the distance between the branches at the mean pressure difference of {readings.middle:.4g} Pa; {grown}."
     )
-    zero_text = "Torque that the scale shows at no pressure difference, midway between the branches."
-    growth_text = "Growth of the static friction with the pressure difference [N m per Pa]."
-    friction = fit.number(_FRICTION, "friction.static_torque", "N m", text)
-    zero = fit.number(_ZERO, "static_torque.zero_offset", "N m", zero_text)
+    zero_text = (
+        f"{names.load.capitalize()} that the scale shows at no pressure difference, midway between the branches."
+    )
+    growth_text = f"Growth of the {names.friction} with the pressure difference [{unit} per Pa]."
+    friction = fit.number(_FRICTION, names.friction_path, unit, text)
+    zero = fit.number(_ZERO, f"{_OWN}.zero_offset", unit, zero_text)
     found = (
-        fit.number(_SLOPE, "actuator.torque_constant", "m^3", slope_text),
+        fit.number(_SLOPE, names.slope_path, growth_unit, slope_text),
         replace(friction, condition=condition),
         replace(zero, scale=float(np.ptp(readings.torque))),
-        growing.number(_GROWTH, "static_torque.friction_per_pressure", "m^3", growth_text),
+        growing.number(_GROWTH, f"{_OWN}.friction_per_pressure", growth_unit, growth_text),
     )
     if not grows:
         return found
     lowest = float(readings.pressure.min())
-    text = f"Static friction without a pressure difference, on a line through readings from {lowest:.4g} Pa upwards."
+    text = f"{names.friction.capitalize()} without a pressure difference, on a line through readings "
+    text += f"from {lowest:.4g} Pa upwards."
     at_none = _fit(readings, True, evidence.confidence, at=0.0)
-    return (*found, at_none.number(_FRICTION, "static_torque.friction_at_no_pressure", "N m", text))
+    return (*found, at_none.number(_FRICTION, f"{_OWN}.friction_at_no_pressure", unit, text))
 
 
 def _straight_check(readings: Readings, grows: bool, confidence: float) -> Check:
@@ -396,7 +468,8 @@ def _straight_check(readings: Readings, grows: bool, confidence: float) -> Check
     return Check(
         "straight line",
         holds,
-        f"the branches are {word}: a quadratic term would change the torque by {fraction:.1%} of its range",
+        f"the branches are {word}: a quadratic term would change the {readings.names.load} by {fraction:.1%} "
+        "of its range",
     )
 
 
@@ -405,25 +478,27 @@ def _outlier_check(readings: Readings, fit: Regression) -> Check:
     spread = 1.4826 * float(np.median(np.abs(fit.residuals - np.median(fit.residuals))))
     worst = int(np.argmax(np.abs(fit.residuals)))
     count = int((np.abs(fit.residuals) > 6.0 * max(spread, 1e-300)).sum())
-    text = f"{count} of {fit.residuals.size} readings lie more than six scatters off ({spread:.3g} N m each)"
-    text += f"; the worst is {readings.places[worst]}, {fit.residuals[worst]:+.3g} N m" if count else ""
+    unit = readings.names.unit
+    text = f"{count} of {fit.residuals.size} readings lie more than six scatters off ({spread:.3g} {unit} each)"
+    text += f"; the worst is {readings.places[worst]}, {fit.residuals[worst]:+.3g} {unit}" if count else ""
     return Check("outliers", count / fit.residuals.size <= 0.01, text)
 
 
 def _growth_check(growing: Regression, readings: Readings, grows: bool) -> Check:
     """Ask whether one number for the friction will do: a friction that grows fails, but for a chance of one percent."""
     friction, growth = growing.coefficients[_FRICTION], growing.coefficients[_GROWTH]
+    load, unit = readings.names.load, readings.names.unit
     if grows:
         ends = readings.pressure.min(), readings.pressure.max()
         low, high = (friction + growth * (pressure - readings.middle) for pressure in ends)
-        text = f"friction goes from {low:.3g} N m at the lowest to {high:.3g} N m at the highest pressure difference; "
-        text += "a model with one friction torque is right at one of them only"
+        text = f"friction goes from {low:.3g} {unit} at the lowest to {high:.3g} {unit} at the highest pressure "
+        text += f"difference; a model with one friction {load} is right at one of them only"
     elif rank_of(_products(readings)) <= _GROWTH:
         few = "a branch has readings at a single pressure, so that growing friction and K cannot be distinguished"
         return Check("friction over pressure", False, f"{few}; measure both branches at several pressures")
     else:
         most = (abs(growth) + growing.half_widths[_GROWTH]) * float(np.ptp(readings.pressure))
-        text = f"one friction torque describes all pressures; more than {most:.2g} N m of growth would have shown"
+        text = f"one friction {load} describes all pressures; more than {most:.2g} {unit} of growth would have shown"
     return Check("friction over pressure", not grows, text)
 
 
@@ -444,8 +519,8 @@ def _panels(readings: Readings, fit: Regression) -> tuple[Panel, ...]:
         rest.append(Series("", readings.pressure[on], fit.residuals[on], role))
     line = Series("nominal", ends, nominal, "law")
     zero = Series("", ends, np.zeros(2), "law")
-    axis = ("Pressure difference", "Pa_d")
+    axis, load, unit = ("Pressure difference", "Pa_d"), readings.names.load, readings.names.unit
     return (
-        Panel("Static torque", *axis, "Torque", "N m", (*main, line)),
-        Panel("Residuals", *axis, "Measured minus fitted", "N m", (*rest, zero)),
+        Panel(f"Static {load}", *axis, load.capitalize(), unit, (*main, line)),
+        Panel("Residuals", *axis, "Measured minus fitted", unit, (*rest, zero)),
     )

@@ -20,6 +20,7 @@ from ppafo.answers.display_units import (
     quantity_of_unit,
     quantity_text,
 )
+from ppafo.answers.setting_names import label_of
 from ppafo.answers.style import (
     BLACK,
     BLUE,
@@ -32,7 +33,6 @@ from ppafo.answers.style import (
     mark_kind,
 )
 from ppafo.errors import ScenarioError, StudyError, UnitError, one_line, refused_as
-from ppafo.live.words import label_of
 from ppafo.loading import scenario_or_load
 from ppafo.progress import Report
 from ppafo.questions.question import Solved

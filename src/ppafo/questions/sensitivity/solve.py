@@ -23,9 +23,9 @@ from ppafo.answers.display_units import (
     metric_quantity,
     metric_words,
 )
+from ppafo.answers.setting_names import label_of
 from ppafo.answers.style import BLUE, COLOURS, ORANGE, Margins, figure_of_free_panels, house_style, mark_kind
 from ppafo.errors import StudyError, nearest_name
-from ppafo.live.words import label_of
 from ppafo.progress import Report
 from ppafo.questions.question import Solved
 from ppafo.questions.sensitivity.methods import METHODS, TAIL, Evaluated, Indices, Method

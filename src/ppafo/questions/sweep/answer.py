@@ -19,10 +19,10 @@ from ppafo.answers.display_units import (
     metric_unit,
     quantity_of_unit,
 )
+from ppafo.answers.setting_names import label_of
 from ppafo.answers.style import BLUE, GREEN, GREY, ORANGE, VERMILION, house_style, mark_kind
 from ppafo.answers.writing import files_of
 from ppafo.errors import DataError, StudyError, nearest_name
-from ppafo.live.words import label_of
 from ppafo.questions.question import Solved
 from ppafo.questions.sweep.manifest import RUNS_FOLDER, TRAJECTORIES_FOLDER, chunk_file
 from ppafo.signals.recording import CHANNELS

@@ -9,6 +9,7 @@ import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import display_value, display_values, metric_quantity, title_with_unit
+from ppafo.answers.setting_names import label_of
 from ppafo.answers.style import (
     BLACK,
     BLUE,
@@ -22,7 +23,6 @@ from ppafo.answers.style import (
     label_lines,
     mark_kind,
 )
-from ppafo.live.words import label_of
 from ppafo.parameters.overrides import over
 from ppafo.questions.question import Solved
 from ppafo.questions.tune.problem import Gains, Limit, Problem

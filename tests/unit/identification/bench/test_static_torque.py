@@ -165,3 +165,39 @@ def test_a_branch_at_a_single_pressure_does_not_show_whether_friction_grows(plan
     assert "measure both branches at several pressures" in result.failed[-1].statement
     assert result["static_torque.friction_per_pressure"].verdict == "not identifiable"
     assert not any(one.can_be_had for one in static_prospects((few,), StaticTorqueSettings()))
+
+
+@pytest.mark.parametrize(
+    ("load", "moves", "slope", "friction"),
+    [
+        ("torque", "pressure", "actuator.torque_constant", "friction.static_torque"),
+        ("torque", "position", "actuator.torque_constant", "friction.dynamic_torque"),
+        ("force", "pressure", "static_torque.area", "static_torque.static_friction"),
+        ("force", "position", "static_torque.area", "static_torque.dynamic_friction"),
+    ],
+)
+def test_the_friction_is_that_of_what_moved_in_the_unit_of_what_was_measured(
+    planted: ModuleType, load: str, moves: str, slope: str, friction: str
+) -> None:
+    held = planted.static().recording
+    strokes = np.repeat(np.arange(6), 20)
+    within = np.tile(np.linspace(0.0, 1.0, 20), 6)
+    # Held, the position only shakes; sliding, it goes to and fro while the pressure rises slowly.
+    shaking = 1e-4 * np.sin(np.arange(120.0))
+    position = shaking if moves == "pressure" else np.where(strokes % 2 == 0, within, 1.0 - within)
+    order = np.arange(120) if moves == "pressure" else np.argsort(held["pressure_difference"], kind="stable")
+    pressure = held["pressure_difference"][order]
+    direction = held["direction"] if moves == "pressure" else np.where(strokes % 2 == 0, 1.0, -1.0)
+    readings = planted.TORQUE_CONSTANT * pressure - direction * planted.STATIC_TORQUE
+    recording = planted.source(
+        "load",
+        held.time,
+        **{load: (readings + 0.01 * shaking, "N m" if load == "torque" else "N")},
+        pressure_difference=(pressure, "Pa_d"),
+        direction=(direction, "-"),
+        position=(position, "m"),
+    )
+    result = static_torque((recording,))
+    assert result[slope].value == pytest.approx(planted.TORQUE_CONSTANT, rel=1e-3)
+    assert result[friction].value == pytest.approx(planted.STATIC_TORQUE, rel=1e-3)
+    assert (result[slope].unit, result[friction].unit) == (("m^3", "N m") if load == "torque" else ("m^2", "N"))
