@@ -8,14 +8,10 @@ CORES := $(shell nproc 2>/dev/null || echo 2)
 QUICK_TESTS := tests/architecture tests/contract/test_command_words.py tests/contract/test_catalogs.py $(addprefix tests/unit/,\
 	test_public_interface.py test_units.py control documents gait metrics model parameters signals storage)
 
-.PHONY: reproduce gallery validation test test-long test-all test-processors coverage quick check format bench bits dist page site lock clean
+.PHONY: reproduce validation test test-long test-all test-processors coverage quick check format bench bits dist page site lock clean
 
 reproduce: $(LEAN)
 	$(BIN)/ppafo reproduce --out out/reproduce
-
-# Ready workbenches, each one file that simulates in a browser: out/gallery/*.html.
-gallery: $(READY)
-	$(BIN)/python scripts/gallery.py out/gallery
 
 # What was judged by what, with which result, and what was not: out/validation/report.md. Half an hour; goes on where it was interrupted.
 validation: $(READY)

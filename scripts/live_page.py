@@ -294,8 +294,6 @@ def _first_curve(chromium: Any, file: Path) -> float:
 FIRST_SCREEN = "workbench-settings"
 PICTURES: Sequence[tuple[str, dict[str, Any], str]] = (
     ("workbench", {"viewport": {"width": 1400, "height": 1000}, "color_scheme": "light"}, ""),
-    ("workbench-dark", {"viewport": {"width": 1400, "height": 1000}, "color_scheme": "dark"}, "#tab=2"),
-    ("workbench-phone", {"viewport": {"width": 390, "height": 844}, "color_scheme": "light"}, ""),
     # Of the README, which a forge shows about 830 pixels wide.
     (
         FIRST_SCREEN,

@@ -29,6 +29,8 @@ DOCS = ROOT / "docs"
 FRONT = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md")
 LONG = 10
 """A section of the index with more pages than this has a page of its own in the table of contents."""
+WORKBENCH = "workbench.html"
+"""The page that simulates, as `ppafo workbench` writes it, beside the pages of the site."""
 ROOMS = ("control", "control.controllers", "control.profiles", "control.walking", "metrics", "model", "model.valves")
 """Rooms that users extend or look equations up in; all functions of their modules are described."""
 LANGUAGES = {".py": "python", ".toml": "toml", ".cff": "yaml"}
@@ -93,8 +95,8 @@ def _linked(text: str, page: str, files: set[str]) -> str:
         return os.path.relpath(f"files/{place}.md", here)
 
     text = _LINK.sub(led, text)
-    if page == "docs/gallery.md":
-        text = re.sub(r"^\| `(\S+\.html)`", r'| <a href="../gallery/\1">\1</a>', text, flags=re.MULTILINE)
+    if page == "docs/how-to/workbench.md":
+        text = text.replace(f"Open `out/{WORKBENCH}`", f'Open <a href="../../{WORKBENCH}">{WORKBENCH}</a>')
     return text
 
 
@@ -272,8 +274,7 @@ class Page(HTMLParser):
 
 def faults(site: Path) -> list[str]:
     """Links within the site that lead nowhere, and whatever a page would load from another host."""
-    gallery = site / "gallery"
-    pages = {file: Page(file) for file in sorted(site.rglob("*.html")) if gallery not in file.parents}
+    pages = {file: Page(file) for file in sorted(site.rglob("*.html")) if file != site / WORKBENCH}
     found = []
     for file, page in pages.items():
         here = file.relative_to(site).as_posix()
@@ -291,10 +292,10 @@ def faults(site: Path) -> list[str]:
 
 
 def build(site: Path) -> int:
-    """Stage, build, add the gallery, check; return 0 where all is well."""
+    """Stage, build, add the page that simulates, check; return 0 where all is well."""
     from sphinx.cmd.build import build_main
 
-    from ppafo.live.workbench import gallery
+    from ppafo.cli.main import main as command
 
     source = site.with_suffix(".source")
     for folder in (source, site):
@@ -303,8 +304,8 @@ def build(site: Path) -> int:
     options = ["-q", "-E", "-W", "--keep-going", "-j", "auto", "-b", "html", "-c", str(DOCS)]
     if build_main([*options, "-d", str(site.with_suffix(".doctrees")), str(source), str(site)]) != 0:
         return 1
-    for name, page in gallery().items():
-        _write(site / "gallery" / name, page.decode("utf-8"))
+    if command(["workbench", "--out", str(site / WORKBENCH)]) != 0:
+        return 1
     found = faults(site)
     print("".join(f"{line}\n" for line in found), end="")
     return 1 if found else 0

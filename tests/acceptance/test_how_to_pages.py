@@ -7,7 +7,6 @@ import math
 import re
 import shlex
 import sys
-import textwrap
 import tomllib
 from collections.abc import Callable, Iterator
 from importlib.resources import files
@@ -32,18 +31,17 @@ from ppafo.simulation.loading import scenario_from_dict
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PrescribedMotion
 from tests.judge.reference_solver import compare_with_reference
+from tests.page_code import code_blocks, write_package
 from tests.scenario_text import parse_scenario
 
 PAGES = Path(__file__).parents[2] / "docs" / "how-to"
+MEASURED = Path(__file__).parents[1] / "actuators"
 MUSCLES = Path(__file__).parents[2] / "src" / "ppafo" / "examples" / "add-an-actuator"
 
 
 def blocks(page: str, language: str) -> list[str]:
-    """The code blocks of a page in one language, without their indentation."""
-    found = re.findall(
-        rf"^( *)```{language}\n(.*?)^\1```", (PAGES / page).read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE
-    )
-    return [textwrap.dedent(text) for _, text in found]
+    """The code blocks of a how-to page in one language."""
+    return code_blocks(f"how-to/{page}", language)
 
 
 @pytest.fixture
@@ -53,21 +51,9 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
     packages: set[str] = set()
 
     def installed(module: str, text: str, entry_points: str) -> ModuleType:
-        package, name = module.split(".")
-        (tmp_path / package).mkdir(exist_ok=True)
-        (tmp_path / package / "__init__.py").touch()
-        (tmp_path / package / f"{name}.py").write_text(text)
-        about = tmp_path / f"{package}-1.0.dist-info"
-        about.mkdir(exist_ok=True)
-        (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
-        groups = tomllib.loads(entry_points)["project"]["entry-points"]
-        lines = [
-            f"[{group}]\n" + "".join(f"{key} = {value}\n" for key, value in groups[group].items()) for group in groups
-        ]
-        with (about / "entry_points.txt").open("a") as file:
-            file.writelines(lines)
+        write_package(tmp_path, module, text, entry_points)
         monkeypatch.syspath_prepend(tmp_path)
-        packages.add(package)
+        packages.add(module.partition(".")[0])
         return importlib.import_module(module)
 
     yield installed
@@ -267,6 +253,21 @@ def test_the_valve_of_the_page_agrees_with_the_reference_solver() -> None:
     agreement = compare_with_reference(plan_run(scenario))
     assert agreement.angle < 2e-4
     assert agreement.worst_pressure < 1e-3
+
+
+def test_a_set_with_the_section_of_the_page_has_the_actuator_that_was_measured(tmp_path: Path) -> None:
+    shipped = (files("ppafo.parameters") / "sets" / "cylinder-lever.toml").read_text(encoding="utf-8")
+    before, after = shipped.index("[actuator]"), shipped.index("[actuator.angle_min]")
+    (tmp_path / "mine.toml").write_text(
+        shipped[:before] + blocks("add-an-actuator.md", "toml")[0] + "\n" + shipped[after:], encoding="utf-8"
+    )
+    (tmp_path / "measured-bladder.csv").write_bytes((MEASURED / "measured-bladder.csv").read_bytes())
+    within = ["actuator.angle_max=110 deg", "supply.pressure=65 kPa_g"]
+    actuator = ppafo.load_device(tmp_path / "mine.toml", overrides=within).actuator
+    same = ppafo.load_device(MEASURED / "measured-bladder.toml").actuator
+    assert actuator.kind == "table"
+    assert actuator.settings == same.settings
+    assert actuator.table == same.table
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""What the page on workbenches shows runs as it stands there, and the gallery's page names what the gallery has."""
+"""What the page on workbenches shows runs as it stands there."""
 
 import re
 import shlex
@@ -8,7 +8,6 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.live.page import is_page
-from ppafo.live.workbench import declared_workbenches
 
 DOCS = Path(__file__).parents[2] / "docs"
 TEXT = (DOCS / "how-to" / "workbench.md").read_text(encoding="utf-8")
@@ -35,8 +34,3 @@ def test_a_page_is_written_anew_and_the_file_of_somebody_else_is_not(
     assert main(["workbench", "step-response", "--out", str(other)]) == 2
     assert "already exists" in capsys.readouterr().err
     assert other.read_text(encoding="utf-8") == "<p>mine</p>"
-
-
-def test_the_page_of_the_gallery_names_every_workbench() -> None:
-    named = re.findall(r"^\| `([\w-]+)\.html`", (DOCS / "gallery.md").read_text(encoding="utf-8"), re.MULTILINE)
-    assert named == list(declared_workbenches())

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import ppafo
 from scripts.docstrings import restructured
-from scripts.website import FRONT, contents, documents, faults, interface
+from scripts.website import FRONT, WORKBENCH, contents, documents, faults, interface, stage
 
 INDEX = {"README.md", "docs/README.md"}
 
@@ -21,6 +21,12 @@ def test_every_public_name_is_described_once() -> None:
     described = [line.split("::")[1].strip() for line in text.splitlines() if line.startswith(".. auto")]
     assert sorted(described) == sorted(f"ppafo.{name}" for name in ppafo.__all__)
     assert "``proportional_gain``" in pages["kinds"]
+
+
+def test_the_page_on_workbenches_leads_to_the_one_that_the_site_has(tmp_path: Path) -> None:
+    stage(tmp_path)
+    text = (tmp_path / "docs" / "how-to" / "workbench.md").read_text(encoding="utf-8")
+    assert f'<a href="../../{WORKBENCH}">' in text
 
 
 def test_a_docstring_is_text_with_code_in_it() -> None:

@@ -16,13 +16,13 @@ from ppafo.model.catalog import ACTUATORS
 from ppafo.model.plant import PlantParameters
 from ppafo.parameters.plant import plant_parameters
 
-EXAMPLES = Path(__file__).parents[2] / "src" / "ppafo" / "examples"
-PACKAGE = EXAMPLES / "add-an-actuator"
+TESTS = Path(__file__).parents[1]
+PACKAGE = TESTS.parent / "src" / "ppafo" / "examples" / "add-an-actuator"
 SETS = {
     # The printed vane loses two thirds of what its gas gives; by virtual work both numbers are one.
     "vane": ("ppafo2011", ("actuator.volume_per_angle=14.51 cm^3/rad",)),
     "cylinder": ("cylinder-lever", ()),
-    "table": (str(EXAMPLES / "actuators" / "measured-bladder.toml"), ()),
+    "table": (str(TESTS / "actuators" / "measured-bladder.toml"), ()),
     "muscle_pair": (str(PACKAGE / "muscle-pair.toml"), ()),
 }
 """A set with an actuator of each kind, the last one of the example package, and what of it is changed."""

@@ -38,6 +38,7 @@ from ppafo.walking.walk import walk
 from tests.built_once import shared_library
 from tests.judge.reference_solver import compare_with_reference
 from tests.modules_under_node import compared, drawn
+from tests.page_code import code_blocks, write_package
 
 AREA = "effects.mesh.area"
 NARROW = f"{AREA}=4 mm^2"
@@ -45,7 +46,7 @@ NAME, SHORT = "step-response", ("run.duration=0.3 s",)
 BOTTLE = "bottle.name=paper-co2-9oz"
 ICE = ("effects.ice.blockage_per_gas=3e4 1/kg", "effects.ice.melting_time=30 ms")
 REAL = "effects.second_virial.share=1"
-EXAMPLE = files("ppafo.examples") / "add-an-effect"
+PAGE = "how-to/add-an-effect.md"
 
 
 @pytest.fixture(autouse=True)
@@ -61,14 +62,9 @@ def _forgotten() -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def _installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The package of the example, as an installer leaves it."""
-    folder = tmp_path / "site"
-    shutil.copytree(Path(str(EXAMPLE)) / "my_effects", folder / "my_effects")
-    about = folder / "my_effects-0.1.0.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: my-effects\nVersion: 0.1.0\n")
-    (about / "entry_points.txt").write_text("[ppafo.effects]\nmesh = my_effects.mesh:EFFECT\n")
-    monkeypatch.syspath_prepend(folder)
+    """The package of the page, as an installer leaves it."""
+    write_package(tmp_path / "site", "my_effects.mesh", code_blocks(PAGE, "python")[0], code_blocks(PAGE, "toml")[0])
+    monkeypatch.syspath_prepend(tmp_path / "site")
 
 
 def slower(with_mesh: Any, without: Any) -> bool:

@@ -3,7 +3,6 @@
 import shutil
 import sys
 from collections.abc import Iterator
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +13,9 @@ from ppafo.gait import load_gait, walk_recording
 from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.gait.recorded.form import GaitForm
 from ppafo.gait.recorded.reading import FORMS, read_table
+from tests.page_code import code_blocks, write_package
 
-EXAMPLE = Path(str(files("ppafo.examples") / "add-a-gait-form"))
+PAGE = "how-to/add-a-gait-form.md"
 OWN = list(FORMS)
 GAIT = load_gait("falisse2019-subject1")
 PERCENT = np.linspace(0.0, 1.0, 101)
@@ -23,9 +23,10 @@ PERCENT = np.linspace(0.0, 1.0, 101)
 
 @pytest.fixture
 def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A folder where packages are found, with the module of the example; forgotten at the end of the test."""
+    """A folder with the package of the page, as an installer leaves it; forgotten at the end of the test."""
     folder = tmp_path / "site"
-    shutil.copytree(EXAMPLE / "my_forms", folder / "my_forms")
+    (module,), (entry_points,) = code_blocks(PAGE, "python"), code_blocks(PAGE, "toml")
+    write_package(folder, "my_forms.goniometer", module, entry_points)
     monkeypatch.syspath_prepend(folder)
     monkeypatch.chdir(tmp_path)
     yield folder
@@ -33,15 +34,6 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         del FORMS[name]
     for name in [name for name in sys.modules if name.split(".")[0] == "my_forms"]:
         del sys.modules[name]
-
-
-@pytest.fixture
-def _installed(site: Path) -> None:
-    """The package of the example, as an installer leaves it."""
-    about = site / "my_forms-0.1.0.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: my-forms\nVersion: 0.1.0\n")
-    (about / "entry_points.txt").write_text("[ppafo.gait_forms]\ngoniometer = my_forms.goniometer:FORM\n")
 
 
 def write_walk(path: Path, names: str = "ms shank_r ankle_r") -> Path:
@@ -54,7 +46,7 @@ def write_walk(path: Path, names: str = "ms shank_r ankle_r") -> Path:
     return path
 
 
-@pytest.mark.usefixtures("_installed")
+@pytest.mark.usefixtures("site")
 def test_its_files_are_recognised_and_imported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write_walk(tmp_path / "walk.txt")
     found = import_gait([path], ImportSettings(body_mass=62.0, name="mine")).gait
@@ -72,6 +64,7 @@ def test_its_files_are_recognised_and_imported(tmp_path: Path, capsys: pytest.Ca
 
 
 def test_it_can_be_named_by_its_module_without_an_entry_point(site: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.rmtree(site / "my_forms-0.1.0.dist-info")
     path = write_walk(site.parent / "walk.txt")
     words = ["gait", "import", str(path), "--body-mass", "62 kg"]
     assert main(words) == 2
@@ -79,7 +72,7 @@ def test_it_can_be_named_by_its_module_without_an_entry_point(site: Path, capsys
     assert main([*words, "--form", "my_forms.goniometer:FORM"]) == 0
 
 
-@pytest.mark.usefixtures("_installed")
+@pytest.mark.usefixtures("site")
 def test_a_wrong_file_of_it_is_one_line_that_names_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for names, said in (
         ("s shank_r ankle_r", "of which the first must be 'ms'"),

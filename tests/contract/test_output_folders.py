@@ -79,9 +79,9 @@ def test_every_command_is_here() -> None:
 
 
 def test_an_example_takes_only_a_folder_that_is_absent(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["examples", "tune", "--out", str(tmp_path / "tune")]) == 0
+    assert main(["examples", "study", "--out", str(tmp_path / "study")]) == 0
     before = contents(tmp_path)
-    assert main(["examples", "tune", "--out", str(tmp_path / "tune")]) == 2
+    assert main(["examples", "study", "--out", str(tmp_path / "study")]) == 2
     assert contents(tmp_path) == before
 
 

@@ -5,13 +5,9 @@ That of the how-to page is installed as a package of its own would be, and is a 
 
 import inspect
 import json
-import re
-import shutil
 import sys
-import textwrap
 import typing
 from collections.abc import Iterator
-from importlib.resources import files
 from pathlib import Path
 
 import pytest
@@ -21,6 +17,7 @@ from ppafo.cli.main import build_parser, main
 from ppafo.documents.toml_text import TomlKind
 from ppafo.questions.catalogue import QUESTIONS
 from ppafo.questions.question import Solved, load_name
+from tests.page_code import code_blocks, write_package
 
 NAMES = list(QUESTIONS)
 NO_VERB_OF_ITS_OWN = {
@@ -92,22 +89,18 @@ def test_the_parser_of_the_command_is_made_without_loading_what_solves_it(name: 
         assert isinstance(load_name(declared.library), TomlKind)
 
 
-EXAMPLE = files("ppafo.examples") / "add-a-question"
-PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "add-a-question.md").read_text(encoding="utf-8")
+PAGE = "how-to/add-a-question.md"
 WORDS = ("torque-task-proportional", "--pressure", "30 psi_g", "--pressure", "60 psi_g")
 
 
 @pytest.fixture
 def _installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """The package of the example, as an installer leaves it."""
-    folder = tmp_path / "site"
-    shutil.copytree(Path(str(EXAMPLE)) / "my_questions", folder / "my_questions")
-    about = folder / "my_questions-0.1.0.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: my-questions\nVersion: 0.1.0\n")
-    entries = "[ppafo.questions]\npressures = my_questions.pressures:QUESTION\nbroken = my_questions.nothing:QUESTION\n"
-    (about / "entry_points.txt").write_text(entries)
-    monkeypatch.syspath_prepend(folder)
+    """The package of the page, as an installer leaves it, with one more question that cannot be loaded."""
+    (module,), (entry_points,) = code_blocks(PAGE, "python"), code_blocks(PAGE, "toml")
+    write_package(
+        tmp_path / "site", "my_questions.pressures", module, f'{entry_points}broken = "my_questions.nothing:QUESTION"\n'
+    )
+    monkeypatch.syspath_prepend(tmp_path / "site")
     monkeypatch.chdir(tmp_path)
     yield
     for name in set(QUESTIONS) - set(NAMES):
@@ -120,9 +113,9 @@ def _installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None
 def test_a_question_of_another_package_is_a_command_that_answers_what_its_page_shows(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (shown,) = re.findall(r"```text\n(.*?)```", PAGE, re.DOTALL)
+    (shown,) = code_blocks(PAGE, "text")
     assert main(["pressures", *WORDS]) == 0
-    assert capsys.readouterr().out == textwrap.dedent(shown)
+    assert capsys.readouterr().out == shown
     assert main(["my_questions.pressures:QUESTION", *WORDS, "--json", "--out", str(tmp_path / "out")]) == 0
     runs = json.loads(capsys.readouterr().out)["runs"]
     assert [run["supply"] for run in runs] == ["30 psi_g", "60 psi_g"]

@@ -1,6 +1,5 @@
 """Actuators that are no vane: the lanes against the reference solver."""
 
-from importlib import resources
 from pathlib import Path
 
 import pytest
@@ -9,7 +8,7 @@ from ppafo import load_scenario
 from ppafo.simulation.plan import plan_run
 from tests.judge.reference_solver import compare_with_reference
 
-EXAMPLE = Path(str(resources.files("ppafo") / "examples" / "actuators"))
+EXAMPLE = Path(__file__).parents[1] / "actuators"
 
 
 @pytest.mark.parametrize("kind", ["cylinder", "measured-bladder"])

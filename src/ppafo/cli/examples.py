@@ -16,21 +16,17 @@ _FOLDER = resources.files("ppafo") / "examples"
 
 @dataclass(frozen=True, slots=True)
 class Example:
-    """What an example shows, the page that explains it, its commands in order, and what it needs that is not there."""
+    """What an example shows, the page that explains it, and its commands in order."""
 
     summary: str
     page: str
     commands: tuple[str, ...]
-    needs: str = ""
 
 
 def load_examples() -> dict[str, Example]:
     """Return the examples of the package by name."""
     content = tomllib.loads((_FOLDER / "catalogue.toml").read_text(encoding="utf-8"))
-    return {
-        name: Example(entry["summary"], entry["page"], tuple(entry["commands"]), entry.get("needs", ""))
-        for name, entry in content.items()
-    }
+    return {name: Example(entry["summary"], entry["page"], tuple(entry["commands"])) for name, entry in content.items()}
 
 
 def example_files(name: str) -> dict[PurePosixPath, bytes]:
@@ -84,16 +80,10 @@ def _write(name: str, example: Example, folder: Path, as_json: bool) -> None:
     files = example_files(name)
     replace_folder(folder, {str(path): content for path, content in files.items()})
     lines = [f"written: {folder}, {', '.join(map(str, files))}", f"page: {example.page}"]
-    lines += [f"needs: {example.needs}"] if example.needs else []
     lines += ["run there:", *(f"  {command}" for command in example.commands)]
     document = {"name": name, "folder": str(folder), "files": [str(path) for path in files], **_document(example)}
     output.print_result("\n".join(lines), document, as_json)
 
 
 def _document(example: Example) -> dict[str, object]:
-    return {
-        "summary": example.summary,
-        "page": example.page,
-        "commands": list(example.commands),
-        "needs": example.needs or None,
-    }
+    return {"summary": example.summary, "page": example.page, "commands": list(example.commands)}

@@ -2,7 +2,6 @@
 
 import json
 import math
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -488,19 +487,3 @@ _SUMMARIES = {
     "Torque task": "The foot stays flat on the ground while the actuator follows a torque that ramps up and is held.",
     "Walk": "A leg that walks with the device; the dashed line is what a healthy ankle would do.",
 }
-
-
-def gallery() -> dict[str, bytes]:
-    """Return the pages of the gallery by file name, in the order in which they are declared."""
-    return {f"{name}.html": _page(entry) for name, entry in declared_workbenches().items()}
-
-
-def declared_workbenches() -> dict[str, Mapping[str, Any]]:
-    """Return title, summary, scenarios and start of each workbench by name."""
-    return tomllib.loads(files("ppafo.live").joinpath("gallery.toml").read_text(encoding="utf-8"))
-
-
-def _page(entry: Mapping[str, Any]) -> bytes:
-    return workbench(
-        entry["scenarios"], entry.get("overrides", ()), entry["title"], entry.get("start", ()), entry["summary"]
-    )

@@ -3,7 +3,6 @@
 import json
 import re
 import shlex
-import textwrap
 from importlib import resources
 from pathlib import Path, PurePosixPath
 
@@ -11,12 +10,12 @@ import pytest
 
 from ppafo.cli.examples import example_files, load_examples
 from ppafo.cli.main import build_parser, main
+from tests.page_code import code_blocks
 
-ROOT = Path(__file__).parents[3]
 EXAMPLES = load_examples()
 PYPROJECT = PurePosixPath("pyproject.toml")
-SCRIPTS = ("first-steps", "compare-controllers", "learn-a-controller", "actuators")
-"""Examples that are no part of a page: scripts, which tests of their own run, and scenarios of actuators."""
+SCRIPT = "first-steps"
+"""The example that is no part of a page: tests/acceptance/test_examples.py runs it."""
 DATA = ("muscle-pair.toml", "step-response-muscles.toml")
 """A set and its scenario, which a page names: too long to be shown."""
 
@@ -26,21 +25,14 @@ def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.chdir(tmp_path)
 
 
-def blocks(page: str) -> list[str]:
-    """The code blocks of a page, without their indentation."""
-    text = (ROOT / page).read_text(encoding="utf-8")
-    found = re.findall(r"^( *)```(?:toml|python)\n(.*?)^\1```", text, re.DOTALL | re.MULTILINE)
-    return [textwrap.dedent(block) for _, block in found]
-
-
 def test_every_folder_is_listed_and_every_entry_has_a_folder() -> None:
     folders = [item.name for item in (resources.files("ppafo") / "examples").iterdir() if item.is_dir()]
     assert sorted(EXAMPLES) == sorted(folders)
 
 
-@pytest.mark.parametrize("name", [name for name in EXAMPLES if name not in SCRIPTS])
+@pytest.mark.parametrize("name", [name for name in EXAMPLES if name != SCRIPT])
 def test_the_files_of_an_example_are_what_its_page_shows(name: str) -> None:
-    shown = blocks(EXAMPLES[name].page)
+    shown = code_blocks(EXAMPLES[name].page.removeprefix("docs/"), "toml", "python")
     for path, content in example_files(name).items():
         text = content.decode("utf-8")
         if path.name == "pyproject.toml":
@@ -50,7 +42,7 @@ def test_the_files_of_an_example_are_what_its_page_shows(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_every_command_is_one_and_every_file_that_it_names_is_there_or_made_or_needed(name: str) -> None:
+def test_every_command_is_one_and_every_file_that_it_names_is_there(name: str) -> None:
     example = EXAMPLES[name]
     known = {str(path) for path in example_files(name)}
     for command in example.commands:
@@ -59,8 +51,6 @@ def test_every_command_is_one_and_every_file_that_it_names_is_there_or_made_or_n
             build_parser(words[1]).parse_args(words[1:])
         named = {word.split(":")[0] for word in words if PurePosixPath(word.split(":")[0]).suffix in (".toml", ".py")}
         assert named <= known, command
-        measured = {word for word in words if PurePosixPath(word).suffix in (".csv", ".mot")}
-        assert all(word in example.needs for word in measured), command
 
 
 def test_they_are_listed_with_what_they_show(capsys: pytest.CaptureFixture[str]) -> None:
@@ -72,28 +62,27 @@ def test_they_are_listed_with_what_they_show(capsys: pytest.CaptureFixture[str])
 
 
 def test_one_is_written_whole_with_its_folders(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["examples", "add-a-valve", "--json"]) == 0
+    assert main(["examples", "add-a-controller", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["files"] == [
-        "my_valves/__init__.py",
-        "my_valves/three_position.py",
+        "my_laws/__init__.py",
+        "my_laws/hysteresis.py",
         "pyproject.toml",
     ]
-    written = {
-        path.relative_to("add-a-valve").as_posix(): path.read_bytes() for path in Path("add-a-valve").rglob("*.*")
-    }
-    assert written == {str(path): content for path, content in example_files("add-a-valve").items()}
+    folder = Path("add-a-controller")
+    written = {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*.*")}
+    assert written == {str(path): content for path, content in example_files("add-a-controller").items()}
 
 
 def test_what_is_there_is_not_touched(capsys: pytest.CaptureFixture[str]) -> None:
     Path("mine").mkdir()
-    assert main(["examples", "tune", "--out", "mine"]) == 2
+    assert main(["examples", "study", "--out", "mine"]) == 2
     assert "mine: already exists" in capsys.readouterr().err
     assert list(Path("mine").iterdir()) == []
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
-    [(["tunes"], "there is no example 'tunes', did you mean 'tune'?"), (["--out", "x"], "--out: needs the NAME")],
+    [(["studies"], "there is no example 'studies', did you mean 'study'?"), (["--out", "x"], "--out: needs the NAME")],
 )
 def test_a_wrong_request_is_refused_in_one_line(
     words: list[str], said: str, capsys: pytest.CaptureFixture[str]

@@ -8,7 +8,6 @@ import re
 import shutil
 import subprocess
 from dataclasses import replace
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -117,7 +116,7 @@ def test_the_example_prints_the_torque_task_with_the_bits_of_python(tmp_path: Pa
 
 
 def test_an_actuator_from_a_file_prints_the_bits_of_python(tmp_path: Path) -> None:
-    example = resources.files("ppafo") / "examples" / "actuators" / "torque-task-measured-bladder.toml"
+    example = Path(__file__).parents[2] / "actuators" / "torque-task-measured-bladder.toml"
     scenario = load_scenario(str(example), ("run.duration=0.3 s",))
     for file, content in c_library(scenario).items():
         (tmp_path / file).write_bytes(content)

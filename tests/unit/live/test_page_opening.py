@@ -13,7 +13,7 @@ from ppafo.live import page as pages
 from ppafo.live import workbench as workbench_module
 from ppafo.live.opening import LEAST_CHANGE, MOST_FIRST, _key
 from ppafo.live.words import words
-from ppafo.live.workbench import DEFAULT, declared_workbenches, openings_of, workbench
+from ppafo.live.workbench import DEFAULT, openings_of, workbench
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.questions.endurance.draw import draw_of_numbers
 from ppafo.questions.endurance.solve import follow_bottle
@@ -79,7 +79,6 @@ def test_each_question_is_of_a_tab_and_in_the_range_of_its_settings() -> None:
     tabs = {tab for one in words()["questions"] for tab in one["tabs"]}
     for tab in tabs:
         assert sum(tab in one["tabs"] for one in words()["questions"]) == 3
-    assert declared_workbenches()
 
 
 def test_without_scripts_there_is_a_picture(file: Path) -> None:

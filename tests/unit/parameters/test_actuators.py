@@ -17,7 +17,7 @@ from ppafo.simulation.ensemble.planning import screen_columns
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import check_columns
 
-EXAMPLE = Path(str(resources.files("ppafo") / "examples" / "actuators"))
+EXAMPLE = Path(__file__).parents[2] / "actuators"
 HEADER = "angle [deg],pressure [kPa_g],volume_1 [mL]"
 GOOD = ["20,0,100", "20,50,130", "60,0,120", "60,50,160", "100,0,150", "100,50,200"]
 

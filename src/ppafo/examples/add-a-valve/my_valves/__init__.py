@@ -1,1 +1,0 @@
-"""Valves of our own, offered to ppafo by the entry point in pyproject.toml."""

@@ -1,0 +1,32 @@
+"""The code that a page of the documents shows: its blocks as text, and a module of it as a package on the path."""
+
+import re
+import textwrap
+import tomllib
+from pathlib import Path
+
+DOCS = Path(__file__).parents[1] / "docs"
+
+
+def code_blocks(page: str, *languages: str) -> list[str]:
+    """The code blocks of a page below ``docs``, in any of some languages, without their indentation."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    found = re.findall(rf"^( *)```(?:{'|'.join(languages)})\n(.*?)^\1```", text, re.DOTALL | re.MULTILINE)
+    return [textwrap.dedent(block) for _, block in found]
+
+
+def write_package(folder: Path, module: str, text: str, entry_points: str) -> None:
+    """Write the one module of a package and what an installer leaves beside it; entry points as in pyproject.toml."""
+    package, name = module.split(".")
+    (folder / package).mkdir(parents=True)
+    (folder / package / "__init__.py").touch()
+    (folder / package / f"{name}.py").write_text(text, encoding="utf-8")
+    about = folder / f"{package}-0.1.0.dist-info"
+    about.mkdir()
+    called = package.replace("_", "-")
+    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {called}\nVersion: 0.1.0\n", encoding="utf-8")
+    groups = tomllib.loads(entry_points)["project"]["entry-points"]
+    lines = [
+        line for group, names in groups.items() for line in (f"[{group}]", *(f"{a} = {b}" for a, b in names.items()))
+    ]
+    (about / "entry_points.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
