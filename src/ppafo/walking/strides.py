@@ -183,10 +183,9 @@ def _tracking(recording: Recording, starts: NDArray[np.intp], chosen: NDArray[np
 
 def first_less_help(recording: Recording) -> dict[str, Metric]:
     """When the controller first helped less; nothing where it never did."""
-    levels = [recording[name] for name in ("safe_state", "other_safe_state") if name in recording]
-    if not any(level.any() for level in levels):
+    if "safe_state" not in recording or not recording["safe_state"].any():
         return {}
-    time = float(recording.time[int(np.argmax(np.maximum.reduce(levels) > 0.5))])
+    time = float(recording.time[int(np.argmax(recording["safe_state"] > 0.5))])
     return {"safe_state_time": Metric(time, "s", "time at which the controller first lifted only, paused or stopped")}
 
 
