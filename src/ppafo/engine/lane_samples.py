@@ -13,6 +13,7 @@ from ppafo.engine.scheme.actuators import seen_with_torque, torque_at
 from ppafo.engine.scheme.motion import SAME_INSTANT
 from ppafo.engine.scheme.pneumatics import held_pressures
 from ppafo.model.gait import foot_in_gait
+from ppafo.model.helping import STOPPED
 from ppafo.model.places import shown_signals
 from ppafo.model.plant import actuator_torque, chamber_pressures
 from ppafo.model.plant_faults import is_dark, is_due, is_silenced, next_unpowered, runs_at
@@ -29,8 +30,8 @@ from ppafo.signals.meter import (
     is_away,
 )
 
-STOPPED, LEVEL = 3.0, "safety.level"
-"""Level of a controller of walking that has stopped for good, and where it keeps it."""
+LEVEL = "safety.level"
+"""Where a controller of walking keeps its level of help."""
 
 SIGNALS = ("angle", "pressure_1", "pressure_2")
 READINGS = {

@@ -14,7 +14,6 @@ from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program, 
 from ppafo.engine.rows import leaf_paths, leaves, rebuilt, table
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import Pace
-from ppafo.engine.scheme.walking import DeviceShare, WalkState
 from ppafo.model.columns import larger, over_runs, truncated
 from ppafo.model.effects.kind import Moment, State
 from ppafo.model.gait import Course, GaitSeries, GaitTiming
@@ -25,8 +24,9 @@ from ppafo.model.plant_faults import POWERED, PlantFaults, ShutOff
 from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters
 
-if TYPE_CHECKING:  # for most runs know no wearer who reacts
+if TYPE_CHECKING:  # for most runs know no walk
     from ppafo.engine.scheme.reacting import ReactingState, Reflexes
+    from ppafo.engine.scheme.walking import DeviceShare, WalkState
     from ppafo.model.wearer.nerves import Nerves
     from ppafo.model.wearer.walker import Walker
     from ppafo.model.wearer.walker import Wearer as Body
@@ -53,11 +53,11 @@ class Walk:
     """
 
     leg: LegParameters
-    share: DeviceShare
+    share: "DeviceShare"
     gait: GaitSeries
     timing: GaitTiming
     sensors: GaitSensors
-    initial: WalkState
+    initial: "WalkState"
     course: Course | None = None
     failing: tuple[PlantFaults, ShutOff] | None = None
 
@@ -66,7 +66,7 @@ class Walk:
 class ReactingWalk:
     """What a wearer who reacts adds to a run: the device on the left leg, the body, and where all of it begins."""
 
-    share: DeviceShare
+    share: "DeviceShare"
     body: "Body"
     sensors: GaitSensors
     initial: "ReactingState"

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.control.walking import phases
-from ppafo.control.walking.signs import HELPS, LIFTS, PAUSED, SIGNS, STOPPED, Sign
+from ppafo.control.walking.signs import SIGNS, Sign
 from ppafo.engine.lanes import Floats
 from ppafo.model import contact as ground
+from ppafo.model.helping import HELPS, LIFTS, PAUSED, STOPPED, SWING
 from ppafo.simulation.declaration import PLAIN, WRITTEN_UNITS
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import from_si
@@ -102,7 +102,7 @@ def known_events(record: Mapping[str, Floats]) -> dict[str, Samples]:
         return _begun(predicted)
     if f"{_STATE}phase.phase" not in record:
         return {}
-    swing = record[f"{_STATE}phase.phase"] == phases.SWING
+    swing = record[f"{_STATE}phase.phase"] == SWING
     heel, toe = (record[f"{_STATE}phase.{name}.loaded"] > 0.5 for name in ("heel", "toe"))
     return dict(zip(EVENTS, (_rises(~swing), _rises(toe), _rises(~heel), _rises(swing)), strict=True))
 

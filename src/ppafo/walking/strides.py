@@ -7,11 +7,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.control.walking.phases import PUSH_OFF
-from ppafo.control.walking.signs import HELPS
 from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE, SETTLING
 from ppafo.model.contact import FLAT, SWING
+from ppafo.model.helping import HELPS, PUSH_OFF
 from ppafo.signals import CHANNELS, Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import Scenario

@@ -23,8 +23,8 @@ from ppafo.answers.style import (
     mark_kind,
 )
 from ppafo.constants import GRAMS_PER_KILOGRAM
-from ppafo.control.walking.signs import HELPS, LIFTS, PAUSED, STOPPED
 from ppafo.gait.gait import clinical_angle
+from ppafo.model.helping import HELPS, LIFTS, PAUSED, STOPPED
 from ppafo.model.source import Regulator
 from ppafo.signals.recording import Floats, Recording
 from ppafo.simulation.scenario import Scenario

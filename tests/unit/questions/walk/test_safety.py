@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from ppafo.constants import PASCALS_PER_PSI
-from ppafo.control.walking.signs import LIFTS, NOT_FLAT, SIGNS
+from ppafo.control.walking.signs import NOT_FLAT, SIGNS
+from ppafo.model.helping import LIFTS
 from ppafo.questions.walk.reacting import reacting_answer
 from ppafo.questions.walk.safety import safety_remarks
 from ppafo.signals import Channel
