@@ -24,10 +24,10 @@ import numpy as np
 
 from ppafo.control.walking import observer
 from ppafo.control.walking.observer import NominalDevice
-from ppafo.control.walking.signs import HELPS, PAUSED, STOPPED
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.errors import ScenarioError
 from ppafo.model import contact as ground
+from ppafo.model.helping import HELPS, PAUSED, STOPPED
 from ppafo.model.plant_faults import PLANT_FAULTS
 from ppafo.parameters.device import Orifice
 from ppafo.simulation.numbers import with_numbers

@@ -22,7 +22,15 @@ SCENARIOS = (
     "torque-task-slow-valve",
     "torque-task-solenoid",
 )
-WALKS = ("off", "proportional", "proportional-learning", "proportional-regulators", "solenoid", "solenoid-regulators")
+WALKS = (
+    "off",
+    "proportional",
+    "proportional-learning",
+    "proportional-regulators",
+    "solenoid",
+    "solenoid-regulators",
+    "reacting",
+)
 SETS = ("ppafo2011", "ppafo2011-consistent", "ppafo2011-printed")
 
 LINES: dict[str, str] = {

@@ -58,6 +58,16 @@ def test_importing_the_package_loads_nothing_heavy() -> None:
     assert printed == "[]\n"
 
 
+def test_a_plain_run_loads_nothing_of_walking() -> None:
+    code = (
+        "import sys\nfrom ppafo.simulation.loading import load_scenario\nfrom ppafo.simulation import plan, simulate\n"
+        "plan.plan_run(load_scenario('step-response'))\n"
+        "print([name for name in sys.modules if name.startswith('ppafo.') and 'walking' in name])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
 def test_public_functions_are_the_ones_of_their_modules() -> None:
     assert ppafo.simulate is importlib.import_module("ppafo.running").simulate
     assert ppafo.audit is importlib.import_module("ppafo.parameters.audit").audit

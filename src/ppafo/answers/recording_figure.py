@@ -1,8 +1,8 @@
 """The figure of a recording: one panel a quantity over a common time, each in the unit that the field uses."""
 
 import textwrap
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -126,26 +126,6 @@ PANELS = (
 )
 
 
-_ANKLE_OF_OTHER = "other_ankle_angle"
-"""Not named as the rest: every wearer who reacts has it, with a device on that leg or without one."""
-
-
-def _panels_of_legs(recording: Recording) -> Iterator[Panel]:
-    """Yield each panel, where a device is on each leg one for the left and one for the right; gas is of both."""
-    if "other_torque" not in recording:
-        yield from PANELS
-        return
-    for panel in PANELS[:-1]:
-        quantity, _, unit = panel.title.partition(" (")
-        other = (
-            replace(line, channel=_ANKLE_OF_OTHER if line.channel == "angle" else f"other_{line.channel}")
-            for line in panel.lines
-        )
-        yield replace(panel, title=f"{quantity}, left leg ({unit}")
-        yield replace(panel, title=f"{quantity}, right leg ({unit}", lines=tuple(other))
-    yield replace(PANELS[-1], title="Gas of both devices since the start (g)")
-
-
 def recording_figure(
     recording: Recording,
     title: str = "",
@@ -153,12 +133,12 @@ def recording_figure(
     atmosphere: float = STANDARD_ATMOSPHERE,
     valve: str = "",
 ) -> "Figure":
-    """Return the figure of a recording, with a panel for every quantity that it has, and of each leg with a device.
+    """Return the figure of a recording, with a panel for every quantity that it has.
 
     ``remark`` stands below the title, for example why a run stopped early. Gauge pressure counts from ``atmosphere``
     [Pa absolute]. ``valve`` is the kind of valve, in whose colour the device is drawn.
     """
-    panels = [panel for panel in _panels_of_legs(recording) if any(line.channel in recording for line in panel.lines)]
+    panels = [panel for panel in PANELS if any(line.channel in recording for line in panel.lines)]
     if not panels:
         drawn = ", ".join(line.channel for panel in PANELS for line in panel.lines)
         raise DataError(f"{recording.label}: has nothing to draw; a figure shows {drawn}")

@@ -2,12 +2,11 @@
 
 import re
 from collections.abc import Callable
-from copy import copy
 from functools import lru_cache
 from typing import Any, TypeAlias, final
 
-from ppafo.engine.pieces import OTHER, Phases, RarePhase
-from ppafo.engine.program import Program, command_slots
+from ppafo.engine.pieces import Phases, RarePhase
+from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.run_rows import RunRows
 from ppafo.engine.source_text import Collector, woven
@@ -22,7 +21,7 @@ FIRST_CACHE = 48 * 1024
 """Bytes of the first-level data cache of a core; a block that does not fit takes fewer runs."""
 
 
-HANDED = ("held.", "carried.", f"{OTHER}held.")
+HANDED = ("held.", "carried.")
 """Groups of rows that a step is handed by the one before."""
 
 OWN_ROWS = 4
@@ -53,7 +52,6 @@ class LaneRows:
         self.lanes = lanes or lanes_of(program)
         self.add: Callable[[Callable[..., Any] | type], str] = collector.add
         self.needs = collector.needs
-        self.command_slots, self.first_command = command_slots(program), ""
         self.state_at = _row_numbers(program.state_rows(), 0)
         self.parameter_at = _row_numbers(program.parameter_rows(), len(self.state_at))
         self.step_at = _row_numbers(program.step_rows(), len(self.state_at) + len(self.parameter_at))
@@ -65,16 +63,6 @@ class LaneRows:
         self.aside = len(numbered) + OWN_ROWS
         kept = len(self.state_at) + 1 + sum(path.startswith(HANDED) for path in self.step_at)
         self.count = self.aside + (kept if program.parts_are_rare else 0)
-
-    def of_other_leg(self) -> "LaneRows | None":
-        """The rows as the device on the other leg has them, under the names of those of one device; None without it."""
-        program = self.program.of_other_leg
-        if program is None:
-            return None
-        others = copy(self)
-        others.program, others.first_command = program, f"{self.command_slots} + "
-        others.cells = {path: self.cells.get(f"{OTHER}{path}", cell) for path, cell in self.cells.items()}
-        return others
 
     def load(self, group: str) -> str:
         """Line that makes the NamedTuple ``group`` from its rows."""

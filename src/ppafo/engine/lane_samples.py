@@ -6,7 +6,6 @@ get the course of the reference too, which is looked at once before the first sa
 
 from ppafo.engine.lane_rows import LaneRows, Rows, indent
 from ppafo.engine.led_leg import GAIT_SHANK
-from ppafo.engine.pieces import OTHER
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, leaves
 from ppafo.engine.run_rows import RunRows
@@ -14,8 +13,9 @@ from ppafo.engine.scheme.actuators import seen_with_torque, torque_at
 from ppafo.engine.scheme.motion import SAME_INSTANT
 from ppafo.engine.scheme.pneumatics import held_pressures
 from ppafo.model.gait import foot_in_gait
+from ppafo.model.helping import STOPPED
 from ppafo.model.places import shown_signals
-from ppafo.model.plant import actuator_torque, chamber_pressures, with_gas_of
+from ppafo.model.plant import actuator_torque, chamber_pressures
 from ppafo.model.plant_faults import is_dark, is_due, is_silenced, next_unpowered, runs_at
 from ppafo.model.sensors import GaitMeasurement, Measurement, late_measurement, measure, measure_gait, samples_late
 from ppafo.model.valves.kind import VENT
@@ -30,8 +30,8 @@ from ppafo.signals.meter import (
     is_away,
 )
 
-STOPPED, LEVEL = 3.0, "safety.level"
-"""Level of a controller of walking that has stopped for good, and where it keeps it."""
+LEVEL = "safety.level"
+"""Where a controller of walking keeps its level of help."""
 
 SIGNALS = ("angle", "pressure_1", "pressure_2")
 READINGS = {
@@ -48,14 +48,11 @@ def control_loop(rows: Rows) -> list[str]:
     """Sense and control, at every sample; nothing where the caller sets the command."""
     if rows.program.controller is None:
         return []
-    other = rows.of_other_leg()
-    devices = [rows] if other is None else [rows, other]
-    loops = [line for device in devices for line in device.over_lanes(sampled(device))]
-    return ["if step_index % steps_per_sample == 0:", *indent([*places(rows), *loops])]
+    return ["if step_index % steps_per_sample == 0:", *indent([*places(rows), *rows.over_lanes(sampled(rows))])]
 
 
 def sampled(rows: Rows) -> list[str]:
-    """What the controller of a device does at a sample."""
+    """What the controller does at a sample."""
     controller = rows.program.controller
     assert controller is not None, "a controller takes samples"
     groups = ("timing", "plant", "state", "controller", "controller_state", "reference")
@@ -230,12 +227,8 @@ def remember_commands(rows: Rows) -> list[str]:
     """Keeps the command of every step, where the valve gets it late."""
     if not rows.program.late_commands:
         return []
-    other = rows.of_other_leg()
-    lines = [
-        f"command_history[{device.first_command}command_place, lane] = {device.cells['result.command']}"
-        for device in ([rows] if other is None else [rows, other])
-    ]
-    return [f"command_place = step_index % {rows.command_slots}", *rows.over_lanes(lines)]
+    kept = f"command_history[command_place, lane] = {rows.cells['result.command']}"
+    return ["command_place = step_index % command_history.shape[0]", *rows.over_lanes([kept])]
 
 
 TRACED: dict[str, str] = {
@@ -258,17 +251,6 @@ TRACED_IN_WALKS: dict[str, str] = {
     "gait_fraction": "clock.fraction",
 }
 """Further ones of a walk: how the path of a number of its state ends, which not every controller has."""
-OF_OTHER = {
-    "other_ankle_angle": f"{OTHER}state.angle",
-    **{f"{OTHER}{name}": f"{OTHER}{name}" for name in ("pressure_1", "pressure_2", "torque")},
-    f"{OTHER}command": f"{OTHER}result.command",
-    **{f"{OTHER}{name}": f"{OTHER}walk.{name}" for name in ("external_torque", "contact", "heel_force", "toe_force")},
-    f"{OTHER}controller_phase": f"{OTHER}controller_state.phase.phase",
-    f"{OTHER}safe_state": f"{OTHER}controller_state.safety.level",
-}
-"""Those of a device on the other leg, and where a sample has them."""
-GAS_TOTALS = ("supplied_mass", "vented_mass", "leaked_mass")
-"""What is counted of both devices together where there are two."""
 REQUEST = "controller_state.request.torque"
 """Where a controller of walking keeps the torque that it wants, if it wants one."""
 TRUE_MASSES = {name: f"masses.{name}" for name in ("mass_1", "mass_2")}
@@ -352,11 +334,9 @@ def sample_lines(rows: Rows, moment: str) -> list[str]:
         "temperature_2": warm[1] if thermal else "0.0",
     }
     groups: tuple[str, ...] = ()
-    if program.devices == 2:
-        groups = tuple(f"{OTHER}{name}" for name in ("state", "held", "result", "walk", "controller_state"))
     foot, stride, on_gait = _zeros(FootSample), _zeros(StrideSample), []
     if program.walks:
-        groups += ("walk", "controller_state")
+        groups = ("walk", "controller_state")
         wanted, stride = _of_state(rows, REQUEST), _stride_values(rows)
     if program.shank is GAIT_SHANK:
         groups = ("shank",)
@@ -368,27 +348,11 @@ def sample_lines(rows: Rows, moment: str) -> list[str]:
         *[rows.load(group) for group in ("timing", "plant", "state", "result", "reference", *of_gas, *groups)],
         *present_pressures(rows),
         torque_line(rows, "state.angle"),
-        *(sample_of_other(rows) if program.devices == 2 else []),
         f"wanted = {wanted}",
         *on_gait,
         f"sample = {_row(add(Sample), values)}",
         *(wearer_sample(rows) if any(kind.of_wearer for kind in program.meters) else []),
     ]
-
-
-def sample_of_other(rows: Rows) -> list[str]:
-    """Lines that make both pressures and the torque of a second device, and ``all_gas`` that both took and vented."""
-    first, second, torque = (f"{OTHER}{name}" for name in ("pressure_1", "pressure_2", "torque"))
-    return [
-        f"{first}, {second} = {rows.add(held_pressures)}({OTHER}held, {OTHER}state)",
-        f"{torque} = {rows.add(actuator_torque)}({first}, {second}, plant.torque_constant)",
-        f"all_gas = {rows.add(with_gas_of)}(state, {OTHER}state)",
-    ]
-
-
-def gas_total(program: Program, name: str) -> str:
-    """Expression for what is counted of the gas of all devices."""
-    return f"state.{name}" if program.devices == 1 else f"all_gas.{name}"
 
 
 FELL = "walk.fall_time"
@@ -426,19 +390,12 @@ def _stride_values(rows: Rows) -> dict[str, str]:
     """Where a walk is in its stride."""
     totals = ("strides", "push_off_work", "slap_rates", "clearances", "toe_landings")
     return {
-        "supplied_mass": gas_total(rows.program, "supplied_mass"),
+        "supplied_mass": "state.supplied_mass",
         **{name: f"walk.{name}" for name in totals},
         "phase": _of_state(rows, TRACED_IN_WALKS["controller_phase"]),
-        "level": _least_help(rows),
+        "level": _of_state(rows, TRACED_IN_WALKS["safe_state"]),
         "time": "next_record * (timing.step * interval)",
     }
-
-
-def _least_help(rows: Rows) -> str:
-    """Level of help, of two devices that of the one that helps less."""
-    left = _of_state(rows, TRACED_IN_WALKS["safe_state"])
-    right = _of_state(rows, OF_OTHER[f"{OTHER}safe_state"])
-    return f"max({left}, {right})" if rows.program.devices == 2 else left
 
 
 def _of_state(rows: Rows, path: str) -> str:
@@ -454,16 +411,12 @@ def walk_traces(program: Program) -> dict[str, str]:
     found = {
         name: next((path for path in paths if path.endswith(ending)), "") for name, ending in TRACED_IN_WALKS.items()
     }
-    if program.devices == 2:
-        # Expressions of a sample have no point, and paths of the state one.
-        found |= {name: path for name, path in OF_OTHER.items() if "." not in path or path in paths}
     return {name: path for name, path in found.items() if path}
 
 
 def _traced_paths(program: Program) -> dict[str, str]:
     """Where a sample has channels that are no number of the state itself."""
-    totals = {name: gas_total(program, name) for name in GAS_TOTALS}
-    return TRACED | totals | walk_traces(program) | (TRUE_MASSES if program.has_true_masses else {})
+    return TRACED | walk_traces(program) | (TRUE_MASSES if program.has_true_masses else {})
 
 
 def _trace_lines(rows: LaneRows, moment: str) -> list[str]:

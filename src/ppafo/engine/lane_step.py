@@ -39,26 +39,14 @@ def find_begin(rows: Rows) -> list[str]:
         return []
     held = f"held = {rows.add(pneumatics.held_chambers)}(plant, state.angle)"
     lines = [rows.load("plant"), rows.load("state"), held, *rows.keep("held")]
-    other = rows.of_other_leg()
-    return [
-        *rows.over_lanes([*lines, *([] if rows.program.leg is None else rows.program.leg.find(rows))]),
-        *([] if other is None else find_begin(other)),
-    ]
+    return rows.over_lanes([*lines, *([] if rows.program.leg is None else rows.program.leg.find(rows))])
 
 
 def plant_loop(rows: Rows) -> list[str]:
     """Valve, gas and vane up to ``goal`` [-], a share of the step; 1 for programs that are not parted."""
     if rows.program.is_parted:
         return step_in_parts(rows)
-    lines = rows.over_phases([*opening(rows), *command_at_valve(rows), "length = timing.step"], phases(rows))
-    other = rows.of_other_leg()
-    return lines if other is None else [*lines, *plant_loop(other), *fail_together(rows, other)]
-
-
-def fail_together(rows: Rows, other: Rows) -> list[str]:
-    """A run has failed where either of its devices has."""
-    one, two = (item.cells["result.failure_time"] for item in (rows, other))
-    return rows.over_lanes([f"{one} = min({one}, {two})"])
+    return rows.over_phases([*opening(rows), *command_at_valve(rows), "length = timing.step"], phases(rows))
 
 
 def opening(rows: Rows) -> list[str]:
@@ -234,8 +222,7 @@ def finish(rows: Rows) -> list[str]:
     if not program.is_adaptive:
         flag = "" if program.parts_are_rare else "taken"
         stored = [*store_all(rows, flag), *judge(rows, flag), *sense_end(rows)]
-        # Of two devices the second one counts the time, once for both.
-        return [f"taken = {rows.remaining} > 0.0", *lines, *stored, *(add_up(rows) if program.devices == 1 else [])]
+        return [f"taken = {rows.remaining} > 0.0", *lines, *stored, *add_up(rows)]
     return [
         *lines,
         f"missed = max({', '.join(['error', 'gas_error', *state_errors(rows)])})",
@@ -394,29 +381,22 @@ def step_in_parts(rows: Rows) -> list[str]:
     """As many parts as the lane with the most of them needs; places of late commands are the same for all lanes."""
     places = []
     if rows.program.late_commands:
-        places.append(f"place_before = (step_index - command_delay - 1) % {rows.command_slots}")
-        places.append(f"place_after = (step_index - command_delay) % {rows.command_slots}")
+        places.append("place_before = (step_index - command_delay - 1) % command_history.shape[0]")
+        places.append("place_after = (step_index - command_delay) % command_history.shape[0]")
     if rows.program.late_signals:
         places.append("next_place = (step_index + 1) % signal_history.shape[1]")
-    other = rows.of_other_leg()
+    part = rows.over_phases([*part_opening(rows), f"length = {rows.length}"], phases(rows))
     return [
         *places,
         f"for part in range({MAXIMUM_PARTS}):",
         *indent(rows.over_lanes([*part_opening(rows), *measure(rows)])),
-        *indent([] if other is None else other.over_lanes([*part_opening(other), *measure_again(other)])),
         *indent([] if isinstance(rows, RunRows) else put_aside(rows)),
-        *indent(part_of(rows)),
-        *indent([] if other is None else [*part_of(other), *fail_together(rows, other)]),
+        *indent(part),
         *indent(none_left(rows)),
         "        break",
         "else:",
         *indent(rows.over_lanes(give_up(rows))),
     ]
-
-
-def part_of(rows: Rows) -> list[str]:
-    """A part of a step of one device."""
-    return rows.over_phases([*part_opening(rows), f"length = {rows.length}"], phases(rows))
 
 
 def none_left(rows: Rows) -> list[str]:
@@ -433,8 +413,8 @@ def part_opening(rows: Rows) -> list[str]:
     if rows.program.late_commands:
         lines += [
             f"until_command = timing.command_lag * timing.step - before - {motion.SAME_INSTANT!r}",
-            f"early = command_history[{rows.first_command}place_before, lane]",
-            f"command = early if until_command > 0.0 else command_history[{rows.first_command}place_after, lane]",
+            "early = command_history[place_before, lane]",
+            "command = early if until_command > 0.0 else command_history[place_after, lane]",
         ]
     if rows.program.late_signals:
         lines.append("look_at = (1.0 - timing.signal_lag) * timing.step")
@@ -451,7 +431,12 @@ def measure(rows: Rows) -> list[str]:
     if program.late_signals:
         soon = f"look_at - before > {motion.SAME_INSTANT!r}"
         lines.append(f"until = min(until, look_at - before) if {soon} else until")
-    lines += until_valve(rows)
+    if program.valve.jumps:
+        lines += [
+            f"settled = {add(program.valve.settle)}(valve, valve_state, command, time)",
+            f"jump = {add(program.valve.next_event)}(valve, settled, command, time)",
+            f"until = {add(motion.until_jump)}(jump - time, until)",
+        ]
     if program.is_adaptive:
         hurries = "remaining == 0.0 or result.failure_time <= time"
         lines.append(f"until = remaining if {hurries} else {add(motion.part_length)}(pace, until)")
@@ -462,23 +447,6 @@ def measure(rows: Rows) -> list[str]:
     else:
         lines.append("until = remaining if result.failure_time <= time else until")
     return [*lines, f"{rows.length} = until", f"{rows.remaining} = remaining"]
-
-
-def until_valve(rows: Rows) -> list[str]:
-    """Lines that end a part where the valve jumps, if it is one that does."""
-    valve, add = rows.program.valve, rows.add
-    if not valve.jumps:
-        return []
-    return [
-        f"settled = {add(valve.settle)}(valve, valve_state, command, time)",
-        f"jump = {add(valve.next_event)}(valve, settled, command, time)",
-        f"until = {add(motion.until_jump)}(jump - time, until)",
-    ]
-
-
-def measure_again(rows: Rows) -> list[str]:
-    """Lines that end a part where the valve of a second device jumps before; commands are late by the same time."""
-    return [f"until = {rows.length}", *until_valve(rows), f"{rows.length} = until"]
 
 
 def put_aside(rows: LaneRows) -> list[str]:

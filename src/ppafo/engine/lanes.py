@@ -198,7 +198,7 @@ class LaneBlock:
         traces = (clock.samples - 1) // clock.trace_every + 1 if clock.trace_every else 0
         self._trace = np.empty((traces, len(program.traced), self.states.shape[1]))
         self._signals = np.zeros((SIGNAL_ROWS, clock.signal_delay + 2, self.states.shape[1]))
-        self._commands = np.zeros((program.devices * (clock.command_delay + 2), self.states.shape[1]))
+        self._commands = np.zeros((clock.command_delay + 2, self.states.shape[1]))
 
     def advance(self, step_count: int) -> None:
         """Go ``step_count`` steps on."""

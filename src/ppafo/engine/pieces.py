@@ -20,9 +20,6 @@ class RarePhase:
 
 Phases = list[list[str] | RarePhase]
 
-OTHER = "other_"
-"""What the names of the rows of a second device, on the other leg, begin with."""
-
 
 class Second(NamedTuple):
     """Expressions of the second stage of the gas, and of what a step changes, once ``second`` is known.
@@ -94,8 +91,7 @@ class LegScheme:
     before the gas, from the step before, at the end. ``find`` makes what a step is handed by the one before, ``lead``
     are phases before the gas, ``assume`` where the gas takes the vane to be, ``reach`` phases that find where the
     step ends, ``end`` the state after it. One that ``fails`` has faults of the plant, and a shut-off valve; one that
-    ``reacts`` has a body of its own, which no gait leads. ``other`` is what a second device on the other leg does,
-    None where there is none: its rows have the names of the first ones behind ``OTHER``.
+    ``reacts`` has a body of its own, which no gait leads.
     """
 
     takes_course: bool
@@ -114,4 +110,3 @@ class LegScheme:
     end: Callable[[Any], list[str]]
     fails: bool = False
     reacts: bool = False
-    other: "LegScheme | None" = None

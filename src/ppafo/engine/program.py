@@ -11,7 +11,7 @@ from ppafo.control.controllers import switching as constant_controller
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.control.profiles import CONSTANT
 from ppafo.engine.over_samples import called_over_samples, in_columns
-from ppafo.engine.pieces import OTHER, Feed, GasScheme, LegScheme
+from ppafo.engine.pieces import Feed, GasScheme, LegScheme
 from ppafo.engine.scheme.actuators import links_of
 from ppafo.engine.scheme.isothermal_gas import ISOTHERMAL
 from ppafo.engine.scheme.motion import FreePart, Pace, PartEnd, PartSlide, PrescribedStep
@@ -23,8 +23,7 @@ from ppafo.model.actuators.vane import MODEL as VANE
 from ppafo.model.effects.kind import Effect, State, effect_problem, laws_in_order
 from ppafo.model.leg import FootLoad
 from ppafo.model.plant import PlantState
-from ppafo.model.plant_faults import PlantFaults
-from ppafo.model.sensors import GaitSensors, SensorParameters
+from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
 from ppafo.signals.meter import Course, MeterKind
 
@@ -57,10 +56,6 @@ class LaneStart(NamedTuple):
     """Step of the block at which the run of a lane began, a whole number [-]."""
 
     step: float
-
-
-OTHER_PARAMETERS = {f"{OTHER}sensors": SensorParameters, f"{OTHER}gait_sensors": GaitSensors}
-"""Groups of parameters that a second device has of its own: noise differs, and so do faults."""
 
 
 class NoParameters(NamedTuple):
@@ -120,24 +115,7 @@ class Program:
             **({} if self.feed is None else self.feed.parameters),
             **({} if self.shank is None else {"load": FootLoad, "shank": self.shank.parameters}),
             **{effect.name: effect.parameters for effect in self.effects},
-            **(OTHER_PARAMETERS if self.devices == 2 else {}),
-            **({f"{OTHER}plant_faults": PlantFaults} if self.devices == 2 and self.fails else {}),
         }
-
-    @property
-    def of_other_leg(self) -> "Program | None":
-        """The program of the device on the other leg, in the words of a program of one; None where there is none.
-
-        Its sensors, and all that a step hands on or leaves of valve, gas, controller and what the leg counts, are its
-        own: groups of this program whose names begin with ``OTHER``.
-        """
-        other = None if self.leg is None else self.leg.other
-        return None if other is None else replace(self, leg=other, late_readings=False, meters=(), traced=())
-
-    @property
-    def devices(self) -> int:
-        """How many devices there are, one or two."""
-        return 1 if self.of_other_leg is None else 2
 
     @property
     def effect_rows(self) -> dict[str, type]:
@@ -159,33 +137,17 @@ class Program:
         return {
             "result": LaneResult,
             "pace": Pace,
-            **self._device_states(),
-            **({} if self.leg is None else self.leg.states),
-            **({} if self.feed is None else self.feed.states),
-            **self.effect_states,
-            **self._states_of_other_leg(),
-            "course": Course if self.follows_reference else NoParameters,
-            **{group: kind.state for group, kind in self.meter_groups.items()},
-            **({"start": LaneStart} if self.starts_apart else {}),
-        }
-
-    def _device_states(self) -> dict[str, type]:
-        return {
             "state": PlantState,
             **self.gas.states,
             "valve_state": self.valve.state,
             "controller_state": NoParameters if self.controller is None else type(self.controller.initial),
+            **({} if self.leg is None else self.leg.states),
+            **({} if self.feed is None else self.feed.states),
+            **self.effect_states,
+            "course": Course if self.follows_reference else NoParameters,
+            **{group: kind.state for group, kind in self.meter_groups.items()},
+            **({"start": LaneStart} if self.starts_apart else {}),
         }
-
-    def _states_of_other_leg(self) -> dict[str, type]:
-        other = self.of_other_leg
-        if other is None or other.leg is None:
-            return {}
-        powered = ["unpowered"] if other.leg.fails else []
-        counted = {name: other.leg.states[name] for name in (*other.leg.stored, "gait_seen", *powered)}
-        lines = {} if self.feed is None else self.feed.states
-        own = {"result": LaneResult, **self._device_states(), **counted, **lines, **self.effect_states}
-        return {f"{OTHER}{name}": row for name, row in own.items()}
 
     @property
     def is_thermal(self) -> bool:
@@ -284,7 +246,8 @@ class Program:
         begun = free if self.angle is None else (NoParameters if self.is_held else PrescribedStep)
         gas = self.gas.begun(self) if self.feed is None else self.feed.begun(self)
         shown = _shown_by(self.valve.connect)
-        own = {
+        return {
+            **({} if self.leg is None else self.leg.led),
             **({"held": HeldChambers} if self.hands_chambers_on else {}),
             **({} if self.leg is None else self.leg.handed),
             "begun": begun,
@@ -302,13 +265,6 @@ class Program:
                 else {}
             ),
         }
-        others = {} if self.of_other_leg is None else {f"{OTHER}{name}": row for name, row in own.items()}
-        return {**({} if self.leg is None else self.leg.led), **own, **others}
-
-
-def command_slots(program: Program) -> str:
-    """How many commands of one device are kept, as a loop finds it: those of a second device lie behind the first's."""
-    return "command_history.shape[0]" if program.devices == 1 else "(command_history.shape[0] // 2)"
 
 
 @cache

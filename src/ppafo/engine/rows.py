@@ -48,11 +48,6 @@ def row_numbers(groups: Mapping[str, type]) -> dict[str, int]:
     return {path: number for number, path in enumerate(paths)}
 
 
-def behind(prefix: str, rows: Mapping[str, Any]) -> dict[str, Any]:
-    """Those rows whose paths begin with a prefix, by their paths without it."""
-    return {path.removeprefix(prefix): values for path, values in rows.items() if path.startswith(prefix)}
-
-
 def row_expression(row: Any, path: str, cells: dict[str, str], name_of: Callable[[type], str]) -> str:
     """Source text that makes a NamedTuple (or a float) from the cells that hold its numbers; an empty one is ``()``."""
     if is_number(row):

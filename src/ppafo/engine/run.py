@@ -14,7 +14,6 @@ from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program, 
 from ppafo.engine.rows import leaf_paths, leaves, rebuilt, table
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import Pace
-from ppafo.engine.scheme.walking import DeviceShare, WalkState
 from ppafo.model.columns import larger, over_runs, truncated
 from ppafo.model.effects.kind import Moment, State
 from ppafo.model.gait import Course, GaitSeries, GaitTiming
@@ -25,8 +24,9 @@ from ppafo.model.plant_faults import POWERED, PlantFaults, ShutOff
 from ppafo.model.regulator import LineState, SupplyLines
 from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters
 
-if TYPE_CHECKING:  # for most runs know no wearer who reacts
+if TYPE_CHECKING:  # for most runs know no walk
     from ppafo.engine.scheme.reacting import ReactingState, Reflexes
+    from ppafo.engine.scheme.walking import DeviceShare, WalkState
     from ppafo.model.wearer.nerves import Nerves
     from ppafo.model.wearer.walker import Walker
     from ppafo.model.wearer.walker import Wearer as Body
@@ -53,23 +53,20 @@ class Walk:
     """
 
     leg: LegParameters
-    share: DeviceShare
+    share: "DeviceShare"
     gait: GaitSeries
     timing: GaitTiming
     sensors: GaitSensors
-    initial: WalkState
+    initial: "WalkState"
     course: Course | None = None
     failing: tuple[PlantFaults, ShutOff] | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class ReactingWalk:
-    """What a wearer who reacts adds to a run: the device on the left leg, the body, and where all of it begins.
+    """What a wearer who reacts adds to a run: the device on the left leg, the body, and where all of it begins."""
 
-    ``on_both`` is true where a second device is on the right leg: an ``OtherDevice`` of the run.
-    """
-
-    share: DeviceShare
+    share: "DeviceShare"
     body: "Body"
     sensors: GaitSensors
     initial: "ReactingState"
@@ -77,18 +74,6 @@ class ReactingWalk:
     reflexes: "Reflexes"
     nerves: "Nerves"
     failing: tuple[PlantFaults, ShutOff] | None = None
-    on_both: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class OtherDevice:
-    """Where a second device begins, on the right leg of a wearer who reacts; its sensors, and what fails of it."""
-
-    initial: PlantState
-    walk: "ReactingState"
-    sensors: SensorParameters
-    gait_sensors: GaitSensors
-    faults: PlantFaults | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +120,6 @@ class Run:
     lines: Lines | None = None
     effects: tuple[Any, ...] = ()
     leg: LedLeg | None = None
-    other: OtherDevice | None = None
 
     @property
     def period(self) -> float:
@@ -170,11 +154,9 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     walk, walk_states = _walk_groups(run.walk) if run.reacting is None else _reacting_groups(run.reacting)
     lines, line_states = ([], []) if run.lines is None else ([run.lines.parameters], [run.lines.initial])
     leg = [] if run.leg is None else [run.leg.load, run.leg.shank]
-    other: list[Any] = [] if run.other is None else [run.other.sensors, run.other.gait_sensors]
-    other += [] if run.other is None or run.other.faults is None else [run.other.faults]
-    rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, *leg, *run.effects, *other]
+    rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, *leg, *run.effects]
     parameters = table([timing, *plant, *valve, *rest], runs)
-    further = [*walk_states, *line_states, *states_at_start(run), *_states_of_other(run)]
+    further = [*walk_states, *line_states, *states_at_start(run)]
     states = table(
         [AT_REST, Pace(run.step), *_device_at_start(run), *further],
         runs,
@@ -309,17 +291,6 @@ def _device_at_start(run: Run) -> list[Any]:
     program = run.program
     controller = NoParameters() if program.controller is None else program.controller.initial
     return [run.initial, gas_at_start(run), program.valve.initial(), controller]
-
-
-def _states_of_other(run: Run) -> list[Any]:
-    """Initial states of a second device, in the order of ``Program``."""
-    if run.other is None:
-        return []
-    alike = replace(run, initial=run.other.initial)
-    lines = [] if run.lines is None else [run.lines.initial]
-    powered = [] if run.other.faults is None else [POWERED]
-    counted = [run.other.walk, NOTHING_SEEN, *powered]
-    return [AT_REST, *_device_at_start(alike), *counted, *lines, *states_at_start(alike)]
 
 
 def _members(group: Members, groups: int) -> list[Members]:

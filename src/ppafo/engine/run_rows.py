@@ -8,11 +8,10 @@ nothing and a store an assignment. Lines that change a group for themselves alon
 import ast
 import re
 from collections.abc import Callable
-from copy import copy
 from typing import Any, final
 
-from ppafo.engine.pieces import OTHER, Phases, RarePhase
-from ppafo.engine.program import Program, command_slots
+from ppafo.engine.pieces import Phases, RarePhase
+from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression, row_numbers
 from ppafo.engine.source_text import Collector, woven
 
@@ -34,9 +33,6 @@ class RunRows:
         self.needs = collector.needs
         self.groups = program.parameter_rows() | program.state_rows() | program.step_rows()
         self.state_at = row_numbers(program.state_rows())
-        self.kept = {group: f"{KEPT}.{group}" for group in self.groups}
-        self.is_of_other = False
-        self.command_slots, self.first_command = command_slots(program), ""
         self.cells = {path: f"{KEPT}.{path}" for name, row in self.groups.items() for path in leaf_paths(row, name)}
         self.length, self.before, self.remaining, self.error = (
             "part_length",
@@ -45,27 +41,15 @@ class RunRows:
             "part_error",
         )
 
-    def of_other_leg(self) -> "RunRows | None":
-        """The rows as the device on the other leg has them, under the names of those of one device; None without it."""
-        program = self.program.of_other_leg
-        if program is None:
-            return None
-        others = copy(self)
-        others.program, others.is_of_other = program, True
-        others.first_command = f"{self.command_slots} + "
-        others.kept = {group: self.kept.get(f"{OTHER}{group}", name) for group, name in self.kept.items()}
-        others.cells = {path: self.cells.get(f"{OTHER}{path}", cell) for path, cell in self.cells.items()}
-        return others
-
     def load(self, group: str) -> str:
         """Line after which ``group`` is what was stored under it."""
-        return f"{group} = {self.kept[group]}"
+        return f"{group} = {KEPT}.{group}"
 
     def store(self, group: str, name: str = "", flag: str = "") -> list[str]:
         """Lines that make ``name`` (or ``group``) the group from now on; a flag may forbid it."""
         if not leaf_paths(self.groups[group], group):
             return []
-        return [f"{self.kept[group]} = {name or group}" + (f" if {flag} else {self.kept[group]}" if flag else "")]
+        return [f"{KEPT}.{group} = {name or group}" + (f" if {flag} else {KEPT}.{group}" if flag else "")]
 
     def keep(self, *names: str) -> list[str]:
         """Lines that keep what a phase hands on to the next ones of the step, by group."""
@@ -77,8 +61,6 @@ class RunRows:
 
     def over_phases(self, prelude: list[str], all_phases: Phases) -> list[str]:
         """All phases one after another, behind what they share."""
-        if self.is_of_other:  # what it loads has names of its own here, so that each phase must load it anew
-            return self.in_turn([[*prelude, *phase] for phase in all_phases if not isinstance(phase, RarePhase)])
         return self.in_turn([prelude, *all_phases], shared=1)
 
     def in_turn(self, parts: Phases, shared: int = 0) -> list[str]:
@@ -87,18 +69,12 @@ class RunRows:
         common: dict[str, str] = {}
         for place, part in enumerate(parts):
             own = woven(part.lines if isinstance(part, RarePhase) else part, self.needs)
-            own = [*self.loads_of_effects(own), *own] if self.is_of_other else own
             written, names = self.renamed(own, common, lines)
             common = names if place < shared else common
             if isinstance(part, RarePhase):
                 written = [f"if {part.cell} > 0.0:", *(f"    {line}" for line in written)]
             lines += written
         return lines
-
-    def loads_of_effects(self, lines: list[str]) -> list[str]:
-        """Lines that load the states of effects that some lines ask for: those of one device need no load."""
-        words = {word for line in lines for word in re.findall(r"\w+", line)}
-        return [self.load(state) for state in self.program.effect_states if state in words]
 
     def renamed(self, lines: list[str], names: dict[str, str], before: list[str]) -> tuple[list[str], dict[str, str]]:
         """Lines in which a group that is changed, and not stored, has another name; and these names in the end."""

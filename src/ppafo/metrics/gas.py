@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.metrics.metric import ONE_DEVICE, Floats, MetricKind, Readings
+from ppafo.metrics.metric import Floats, MetricKind, Readings
 from ppafo.model.columns import choose
 from ppafo.signals import Recording
 from ppafo.signals.meter import Course, MeterKind, Sample
@@ -222,7 +222,6 @@ METRICS = (
         _BALANCE,
         gas_imbalance,
         read_gas_imbalance,
-        needs=(ONE_DEVICE,),
     ),
     MetricKind(
         "energy_imbalance",
@@ -231,7 +230,6 @@ METRICS = (
         ENERGIES,
         energy_imbalance,
         read_energy_imbalance,
-        needs=(ONE_DEVICE,),
     ),
     MetricKind(
         "largest_pressure",
@@ -241,7 +239,6 @@ METRICS = (
         largest_pressure,
         read_largest_pressure,
         (LARGEST_PRESSURE,),
-        needs=(ONE_DEVICE,),
     ),
     MetricKind(
         "lowest_temperature",
@@ -251,7 +248,6 @@ METRICS = (
         lowest_temperature,
         read_lowest_temperature,
         (LOWEST_TEMPERATURE,),
-        needs=(ONE_DEVICE,),
     ),
     MetricKind(
         "mechanical_work",
@@ -261,7 +257,6 @@ METRICS = (
         mechanical_work,
         read_mechanical_work,
         (WORK,),
-        needs=(ONE_DEVICE,),
     ),
     MetricKind(
         "work_per_gas",
@@ -271,7 +266,6 @@ METRICS = (
         work_per_gas,
         read_work_per_gas,
         (WORK,),
-        needs=(ONE_DEVICE,),
     ),
     MetricKind(
         "gas_per_work",
@@ -281,6 +275,5 @@ METRICS = (
         gas_per_work,
         read_gas_per_work,
         (WORK,),
-        needs=(ONE_DEVICE,),
     ),
 )

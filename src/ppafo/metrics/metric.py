@@ -20,8 +20,6 @@ WALK, STEADY, REQUEST, LED_SHANK = "walk", "steady strides", "requested torque",
 leg whose shank a gait leads."""
 LED, REACTS = "prescribed gait", "wearer who reacts"
 """Whose walk it is: of a wearer whose gait is prescribed, or of one who reacts."""
-ONE_DEVICE = "one device"
-"""That there is one device: the gas of two is counted together, and their torques are not."""
 
 
 @dataclass(frozen=True, slots=True)

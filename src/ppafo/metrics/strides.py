@@ -9,10 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ppafo.control.walking.phases import PUSH_OFF
-from ppafo.control.walking.signs import HELPS
 from ppafo.metrics.metric import LED, REQUEST, STEADY, WALK, Floats, MetricKind, Readings
 from ppafo.model.columns import choose, larger, root
+from ppafo.model.helping import HELPS, PUSH_OFF
 from ppafo.signals.meter import Course, MeterKind, Sample, StrideSample
 
 SETTLING = 2

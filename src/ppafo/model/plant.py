@@ -63,15 +63,6 @@ class PlantState(NamedTuple):
     leaked_mass: float
 
 
-def with_gas_of(state: PlantState, other: PlantState) -> PlantState:
-    """A state with what a second device took, vented and leaked [kg] as well; its numbers may be arrays (runs,)."""
-    return state._replace(
-        supplied_mass=state.supplied_mass + other.supplied_mass,
-        vented_mass=state.vented_mass + other.vented_mass,
-        leaked_mass=state.leaked_mass + other.leaked_mass,
-    )
-
-
 class ThermalParameters(NamedTuple):
     """Gas with an energy balance: heat capacity ratio [-], and what the walls give, h a (k - 1)/R [kg/(s m^3)].
 

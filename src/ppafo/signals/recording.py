@@ -90,20 +90,6 @@ CHANNELS: dict[str, ChannelKind] = {
     "other_ankle_angle": ChannelKind("rad", "ankle angle of the other leg, growing in plantarflexion"),
     "other_knee_angle": ChannelKind("rad", "knee angle of the other leg, 180 deg straight"),
     "other_hip_angle": ChannelKind("rad", "hip angle of the other leg"),
-    "other_pressure_1": ChannelKind("Pa", "absolute pressure in chamber 1 of the device on the other leg"),
-    "other_pressure_2": ChannelKind("Pa", "absolute pressure in chamber 2 of the device on the other leg"),
-    "other_torque": ChannelKind("N m", "torque of the actuator on the other leg, positive in plantarflexion"),
-    "other_external_torque": ChannelKind("N m", "torque of the device on the other leg on the wearer"),
-    "other_command": ChannelKind(PLAIN_NUMBER, "command to the valve of the other leg, as the first", is_held=True),
-    "other_contact": ChannelKind(PLAIN_NUMBER, "other foot and ground, as the first", is_held=True),
-    "other_controller_phase": ChannelKind(
-        PLAIN_NUMBER, "phase that the controller of the other leg sees, as the first", is_held=True
-    ),
-    "other_safe_state": ChannelKind(
-        PLAIN_NUMBER, "what the controller of the other leg has found, as the first", is_held=True
-    ),
-    "other_heel_force": ChannelKind("N", "force under the other heel as its sensor follows it"),
-    "other_toe_force": ChannelKind("N", "force under the other toes as its sensor follows it"),
     "trunk_lean": ChannelKind("rad", "lean of the trunk from the vertical, forward above 0"),
     "hip_height": ChannelKind("m", "hip over the ground"),
     "hip_position": ChannelKind("m", "hip in front of where it started"),

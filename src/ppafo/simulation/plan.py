@@ -186,7 +186,7 @@ def _leg_scheme(walk: Walk | ReactingWalk) -> str:
     """Return where the scheme of a walking leg is."""
     fails = "" if walk.failing is None else "FAILING_"
     if isinstance(walk, ReactingWalk):
-        return f"{_REACTING}{fails}REACTING{'_ON_BOTH' if walk.on_both else ''}"
+        return f"{_REACTING}{fails}REACTING"
     which = "STRIDES" if walk.course is None else "COURSE"
     return f"{_WALKING}{fails}{which}"
 

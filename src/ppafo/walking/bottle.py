@@ -466,7 +466,6 @@ def _use_bottle(
     count = batch.clock.step_count
     block = begin_block(batch)
     states = row_numbers(batch.program.state_rows())
-    # Where there are two devices, each hangs on the bottle by a line of its own.
     regulated, lines = ([row for path, row in states.items() if path.endswith(end)] for end in (REGULATED, _LINE))
     every = max(1, round(supply.coupling / run.step))
     table, met, walked_before = supply.bottle.fluid.table, use.met, use.walked

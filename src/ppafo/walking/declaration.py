@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import BaseModel, Field
 
@@ -41,7 +41,7 @@ from ppafo.simulation.schema import (
     quantity_fields,
 )
 from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BOTTLE_NUMBERS, BOTTLE_OVERRIDES
-from ppafo.walking.reacting_wearer import DEVICE_ON, LEGS, REACTIONS, REACTS
+from ppafo.walking.reacting_wearer import REACTIONS, REACTS
 from ppafo.walking.wearer import WEARER
 
 THRESHOLDS = next(iter(TIMINGS))
@@ -51,8 +51,6 @@ REACTS_SUMMARY = (
     "name of a wearer who reacts, or the path of its file; the gait is prescribed unless given, and strengths of "
     "muscles, gains and the start speed are for a wearer who reacts alone"
 )
-
-DEVICE_ON_SUMMARY = "on which legs a wearer who reacts has a device: the left one, or one like it on both"
 
 
 LARGEST_SEED = 2**32 - 1
@@ -193,7 +191,7 @@ def _texts(_document: Mapping[str, Any]) -> tuple[str, ...]:
         "gas_model.kind",
         *(f"faults.{part}.kind" for part in (*FAULTY, *PLANT_FAULTS)),
     )
-    return (*TEXTS, "motion.kind", "gait", "course", REACTS, DEVICE_ON, BOTTLE_NAME, *kinds)
+    return (*TEXTS, "motion.kind", "gait", "course", REACTS, BOTTLE_NAME, *kinds)
 
 
 def others_wearer(reacts: bool) -> set[str]:
@@ -302,7 +300,6 @@ def _walk_file(_kinds: Any) -> type[BaseModel]:
                 "Wearer",
                 {
                     "reacts": optional(str, REACTS_SUMMARY),
-                    "device_on": optional(Literal[LEGS], DEVICE_ON_SUMMARY),
                     **quantity_fields((*WEARER, PERSON, *REACTIONS)),
                 },
             ),

@@ -4,19 +4,17 @@ Less help, a pause, a stop or a return of help is listed with the sign that caus
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.control.walking import phases
-from ppafo.control.walking.signs import HELPS, LIFTS, PAUSED, SIGNS, STOPPED, Sign
+from ppafo.control.walking.signs import SIGNS, Sign
 from ppafo.engine.lanes import Floats
-from ppafo.engine.pieces import OTHER
-from ppafo.engine.rows import behind
 from ppafo.model import contact as ground
+from ppafo.model.helping import HELPS, LIFTS, PAUSED, STOPPED, SWING
 from ppafo.simulation.declaration import PLAIN, WRITTEN_UNITS
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import from_si
@@ -59,7 +57,6 @@ REQUEST_ROW = "controller_state.request.torque"
 _WORDS = {LIFTS: "lift-only (no push-off) from", PAUSED: "paused at", STOPPED: "stopped for good at"}
 _RETURNS = {HELPS: "help came back", LIFTS: "the foot is lifted again"}
 _NAMES = {HELPS: "help", LIFTS: "lift", PAUSED: "pause", STOPPED: "stop"}
-LEFT_LEG, RIGHT_LEG = "left leg", "right leg"
 _NOTHING = 1.0e-12
 """Readings and settings below this in SI units are nothing: a filtered force never quite comes to rest."""
 _UNITS = {"heel_force": "N", "toe_force": "N", "angle": "rad", "pressure_1": "Pa_a", "pressure_2": "Pa_a"}
@@ -105,7 +102,7 @@ def known_events(record: Mapping[str, Floats]) -> dict[str, Samples]:
         return _begun(predicted)
     if f"{_STATE}phase.phase" not in record:
         return {}
-    swing = record[f"{_STATE}phase.phase"] == phases.SWING
+    swing = record[f"{_STATE}phase.phase"] == SWING
     heel, toe = (record[f"{_STATE}phase.{name}.loaded"] > 0.5 for name in ("heel", "toe"))
     return dict(zip(EVENTS, (_rises(~swing), _rises(toe), _rises(~heel), _rises(swing)), strict=True))
 
@@ -143,7 +140,7 @@ class SafetyEvent:
 
     ``readings`` are what the sensors showed then and ``settings`` what they were compared with, by name, in SI units;
     empty where help came back. ``units`` are those of the settings. Gauge pressures count from ``atmosphere`` [Pa
-    absolute]. ``leg`` says on which leg, where there are two devices.
+    absolute].
     """
 
     time: float
@@ -153,15 +150,13 @@ class SafetyEvent:
     settings: Mapping[str, float] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     atmosphere: float = STANDARD_ATMOSPHERE
-    leg: str = ""
 
     @property
     def message(self) -> str:
         """The event in one line."""
-        where = f"{self.leg}: " if self.leg else ""
         if self.sign is None:
-            return f"{where}{_RETURNS[self.level]} at {self.time:.2f} s"
-        head = f"{where}{_WORDS[self.level]} {self.time:.2f} s"
+            return f"{_RETURNS[self.level]} at {self.time:.2f} s"
+        head = f"{_WORDS[self.level]} {self.time:.2f} s"
         zero = self.atmosphere
         shown = [f"{_word(name)} {_text(value, _UNITS[name], zero)}" for name, value in self.readings.items()]
         limits = [f"{name} {_text(value, self.units[name], zero)}" for name, value in self.settings.items()]
@@ -176,7 +171,6 @@ class SafetyEvent:
             "readings": dict(self.readings),
             "settings": dict(self.settings),
             "message": self.message,
-            **({"leg": self.leg} if self.leg else {}),
         }
 
 
@@ -196,16 +190,6 @@ def safety_events(configuration: Scenario, time: Floats, record: Mapping[str, Fl
         for place in places
     )
     return (*(event for event in found if not watchdog or event.time < watchdog[0].time), *watchdog)
-
-
-def events_of_legs(configuration: Scenario, time: Floats, record: Mapping[str, Floats]) -> tuple[SafetyEvent, ...]:
-    """Return the events of a wearer with a device on one leg or both, in their order."""
-    own = safety_events(configuration, time, record)
-    if walk_of(configuration).devices == 1:
-        return own
-    found = [replace(event, leg=LEFT_LEG) for event in own]
-    found += [replace(event, leg=RIGHT_LEG) for event in safety_events(configuration, time, behind(OTHER, record))]
-    return tuple(sorted(found, key=lambda event: event.time))
 
 
 def _silenced(configuration: Scenario, time: Floats, record: Mapping[str, Floats]) -> tuple[SafetyEvent, ...]:

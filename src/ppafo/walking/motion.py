@@ -32,7 +32,7 @@ from ppafo.walking.declaration import (
     timing_settings,
 )
 from ppafo.walking.preparation import FaultSettings
-from ppafo.walking.reacting_wearer import DEVICE_ON, REACTIONS, ReactingWearer
+from ppafo.walking.reacting_wearer import REACTIONS, ReactingWearer
 from ppafo.walking.wearer import WEARER, Wearer, who_walks
 
 
@@ -65,11 +65,6 @@ class WalkMotion:
     reacts: ReactingWearer | None = None
 
     @property
-    def devices(self) -> int:
-        """How many devices the wearer has."""
-        return 2 if self.reacts is not None and self.reacts.on_both else 1
-
-    @property
     def label(self) -> str:
         """The motion in a few words."""
         if self.reacts is not None:
@@ -96,18 +91,12 @@ def check_led(scenario: Scenario, doing: str) -> None:
         )
 
 
-def check_one_device(scenario: Scenario, doing: str) -> None:
-    """Raise ScenarioError for a wearer with a device on either leg, where ``doing`` knows one."""
-    if isinstance(scenario.motion, WalkMotion) and scenario.motion.devices == 2:
-        raise ScenarioError(f"{scenario.name}: {doing} knows one device: leave {DEVICE_ON} out")
-
-
 def person_remarks(scenario: Scenario) -> list[str]:
     """Return who walks, and what is odd about the zero of the gait's ankle."""
     motion = walk_of(scenario)
     if motion.reacts is not None:
-        where = "the device is on the left leg" if motion.devices == 1 else "a device is on each leg"
-        return [f"wearer: {motion.reacts.name}, who reacts, {motion.reacts.mass:.4g} kg; {where}"]
+        mass = f"{motion.reacts.mass:.4g} kg"
+        return [f"wearer: {motion.reacts.name}, who reacts, {mass}; the device is on the left leg"]
     remarks = [f"remark: {text}" for text in gait_file_remarks(motion.gait)]
     return [who_walks(motion.wearer, motion.gait, motion.wearer_origin), *remarks]
 

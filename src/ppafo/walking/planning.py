@@ -13,7 +13,7 @@ from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
 from ppafo.engine.lanes import Batch
 from ppafo.engine.rows import leaf_paths, leaves, rebuilt
-from ppafo.engine.run import OtherDevice, ReactingWalk, Run, Walk, batches_of
+from ppafo.engine.run import ReactingWalk, Run, Walk, batches_of
 from ppafo.engine.scheme.walking import WalkState
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
@@ -41,7 +41,6 @@ from ppafo.walking.preparation import (
     device_share,
     longest_delay,
     sensors_of,
-    sensors_of_other,
     smallest_chamber,
     vented_state,
     walk_from_standing,
@@ -50,7 +49,7 @@ from ppafo.walking.preparation import (
     with_leg,
     without_leg,
 )
-from ppafo.walking.reacting_wearer import BOTH, DEVICE_ON, LONGEST_STEP, start_of_body
+from ppafo.walking.reacting_wearer import LONGEST_STEP, start_of_body
 from ppafo.walking.wearer import Build, leg_parameters
 
 NO_REFERENCE = ProfileChoice("constant", {"level": 0.0})
@@ -138,7 +137,6 @@ def _plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         reflexes=start.reflexes,
         nerves=start.nerves,
         failing=failing_of(scenario),
-        on_both=wearer.on_both,
     )
     controller, settings = controller_of(scenario)
     delay = _of_each(longest_delay, sensors) * scenario.control.period
@@ -149,26 +147,7 @@ def _plan_reacting(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         lambda plant: vented_state(plant, start.ankle, 0.0),
         walk,
     )
-    if wearer.on_both:
-        initial = vented_state(run.plant, start.other_ankle, 0.0)
-        shared = failing_of(scenario, SHARED)
-        other = OtherDevice(
-            initial=initial,
-            walk=start.other_walk,
-            sensors=sensors_of_other(run.sensors),
-            gait_sensors=_sensors_without_faults(scenario),
-            faults=None if shared is None else shared[0],
-        )
-        run = replace(run, other=other)
-    lacks = (_lacks_both(scenario),) if wearer.on_both else ()
-    return run, (too_many_steps(scenario, run.step, run.step_count), *lacks, _too_long(scenario))
-
-
-def _lacks_both(scenario: Scenario) -> Problem:
-    """What does not go with a device on either leg."""
-    is_outside = scenario.control.kind == PYTHON_CONTROLLER
-    what = "a Python object commands one device; leave out one of both"
-    return np.asarray(is_outside), lambda _run: f"{DEVICE_ON} = {BOTH}: {what}"
+    return run, (too_many_steps(scenario, run.step, run.step_count), _too_long(scenario))
 
 
 def _too_long(scenario: Scenario) -> Problem:
@@ -231,15 +210,7 @@ def _of_each(function: Any, *rows: Any) -> Any:
 
 def gait_sensors_of(scenario: Scenario) -> GaitSensors:
     """The sensors of a walk with their faults, at the sample period of its controller."""
-    return _gait_sensors(scenario, sensor_settings(scenario))
-
-
-def _sensors_without_faults(scenario: Scenario) -> GaitSensors:
     settings = sensor_settings(scenario)
-    return _gait_sensors(scenario, replace(settings, faults=dict.fromkeys(settings.faults, FaultSettings())))
-
-
-def _gait_sensors(scenario: Scenario, settings: SensorSettings) -> GaitSensors:
     names, values = tuple(settings.numbers), [*settings.numbers.values()]
     faults = [(sensor, fault.kind, tuple(fault.numbers)) for sensor, fault in settings.faults.items()]
     values += [value for fault in settings.faults.values() for value in fault.numbers.values()]
@@ -253,20 +224,14 @@ def _gait_sensors(scenario: Scenario, settings: SensorSettings) -> GaitSensors:
     return over_runs(made, scenario.control.period, *values)
 
 
-SHARED = ("regulator", "bottle")
-"""What the parts are called that two devices share: a fault of these is one of both."""
-
-
-def failing_of(scenario: Scenario, parts: tuple[str, ...] = ("",)) -> tuple[PlantFaults, ShutOff] | None:
-    """What fails of the plant of a walk, of parts whose names begin so, and its shut-off valve; None without both."""
+def failing_of(scenario: Scenario) -> tuple[PlantFaults, ShutOff] | None:
+    """What fails of the plant of a walk, and its shut-off valve; None without both."""
     motion = walk_of(scenario)
     if not motion.broken and not motion.shut_off:
         return None
     names = leaf_paths(PlantFaults, "")
     numbers: dict[str, Any] = dict(zip((name.lstrip(".") for name in names), leaves(SOUND), strict=True))
     for part, fault in motion.broken.items():
-        if not part.startswith(parts):
-            continue
         declared = PLANT_FAULTS[part][fault.kind]
         numbers |= {declared.fields[name]: number for name, number in fault.numbers.items()}
     return rebuilt(PlantFaults, list(numbers.values())), _shut_off(motion.shut_off, scenario.device)

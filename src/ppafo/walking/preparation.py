@@ -16,7 +16,7 @@ from ppafo.model.elementary import exponential
 from ppafo.model.gait import GaitNow
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, torque_of_shank
 from ppafo.model.plant import PlantParameters, PlantState, chamber_volumes
-from ppafo.model.sensors import Fault, GaitSensors, SensorParameters
+from ppafo.model.sensors import Fault, GaitSensors
 from ppafo.simulation.plan import WHOLE, StepCounts, state_at_start
 from ppafo.walking.wearer import HeelRocker
 
@@ -246,11 +246,6 @@ def distorting_fault(
         period=fault_period,
         late_samples=truncated(delay / period + 0.5),
     )
-
-
-def sensors_of_other(sensors: SensorParameters) -> SensorParameters:
-    """Sensors of a second device: like those of the first one, with noise of their own. A seed is below 2^32."""
-    return sensors._replace(seed=4294967295.0 - sensors.seed)
 
 
 def longest_delay(sensors: GaitSensors) -> float:

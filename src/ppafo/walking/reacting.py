@@ -11,13 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.lane_samples import FELL, GAS_TOTALS, OF_OTHER, WEARER_ROWS
+from ppafo.engine.lane_samples import WEARER_ROWS
 from ppafo.engine.lanes import Floats
-from ppafo.engine.pieces import OTHER
-from ppafo.engine.rows import behind
 from ppafo.engine.run import Run
 from ppafo.metrics import Metric
-from ppafo.metrics.gas import ENERGIES
 from ppafo.metrics.metric import Readings
 from ppafo.metrics.strides import PER_STRIDE, SETTLING
 from ppafo.metrics.wearer import METER, WearerTotals
@@ -30,24 +27,8 @@ from ppafo.signals import Channel, Recording
 from ppafo.signals.meter import WearerSample
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import gas_channels
-from ppafo.walking.bottle import REGULATED
 from ppafo.walking.channels import Channels, actuator_channels, controller_channels, valve_and_ground_channels
-from ppafo.walking.events import SAFE_ROW
 from ppafo.walking.strides import counts_of_strides, first_less_help
-
-
-def gas_of_all(run: Run, record: Mapping[str, Floats]) -> Mapping[str, Floats]:
-    """The rows with the gas of both devices as that of the first, where there are two: they draw on one supply."""
-    if run.other is None:
-        return record
-    paths = [f"state.{name}" for name in GAS_TOTALS] + ([] if run.lines is None else [REGULATED])
-    return {**record, **{path: record[path] + record[f"{OTHER}{path}"] for path in paths}}
-
-
-def level_of_help(record: Mapping[str, Floats]) -> Floats:
-    """Level of help by sample, of two devices that of the one that helps less; 0 without a controller that says it."""
-    found = [record[path] for path in (SAFE_ROW, f"{OTHER}{SAFE_ROW}") if path in record]
-    return np.maximum.reduce(found) if found else np.zeros_like(record[FELL])
 
 
 def recording_of_reacting(
@@ -83,16 +64,7 @@ def recording_of_reacting(
     }
     for name in Fibres._fields:
         channels[f"{name}_activation"] = (record[f"walker.left.fibres.{name}.activation"], "-")
-    of_gas = gas_channels(configuration.device.gas, run, record)
-    # Energies of one device do not go with the gas of two.
-    of_gas = of_gas if run.other is None else {name: of_gas[name] for name in of_gas if name not in ENERGIES}
-    channels |= of_gas | dict(of_bottle) | controller_channels(record)
-    if run.other is not None:
-        of_other = behind(OTHER, record)
-        on_right = (
-            actuator_channels(run, of_other) | valve_and_ground_channels(of_other) | controller_channels(of_other)
-        )
-        channels |= {name: on_right[own] for name in OF_OTHER if (own := name.removeprefix(OTHER)) in on_right}
+    channels |= gas_channels(configuration.device.gas, run, record) | dict(of_bottle) | controller_channels(record)
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
     return Recording(f"walk, {configuration.name}", time, values, kind="simulated")
 

@@ -1,6 +1,6 @@
 """A wearer who reacts, in the file of a walk: whose reflexes, how strong which muscle is, how fast the walk begins.
 
-The device is on the left leg, or one is on either leg. A strength is that of a muscle of the left leg over the one that
+The device is on the left leg. A strength is that of a muscle of the left leg over the one that
 the wearer's file gives it; the body, the right leg and all gains are those of the file.
 """
 
@@ -12,7 +12,7 @@ from typing import Any
 from ppafo.engine.scheme.reacting import STANDING, ReactingState, Reflexes, WalkNow
 from ppafo.engine.scheme.walking import NO_CLEARANCE
 from ppafo.errors import DataError, ScenarioError, refused_as
-from ppafo.model.contact import FLAT, SWING
+from ppafo.model.contact import FLAT
 from ppafo.model.declaration import Quantity
 from ppafo.model.wearer.nerves import Nerves, settled_nerves
 from ppafo.model.wearer.reflexes import Gains
@@ -36,13 +36,6 @@ from ppafo.wearers.published import felt_at, first_answer, start_of, start_with_
 
 REACTS = "wearer.reacts"
 """Where the file of a walk names a wearer who reacts."""
-
-DEVICE_ON = "wearer.device_on"
-"""Where it says on which legs the wearer has a device."""
-
-LEFT, BOTH = "left", "both"
-LEGS = (LEFT, BOTH)
-"""What it can say."""
 
 STRENGTHS = tuple(
     Quantity(
@@ -94,14 +87,13 @@ class ReactingWearer:
     """A wearer who reacts: its file, the body with muscles and gains that this gives, and its numbers by name.
 
     ``settings`` has the numbers of ``REACTIONS``, without those of the way where there is a ``course``; each may be an
-    array (runs,). ``on_both`` is true where there is a device on the right leg too, like that on the left.
+    array (runs,).
     """
 
     file: WearerFile
     body: Wearer
     settings: Mapping[str, Any]
     course: WalkingCourse | None = None
-    on_both: bool = False
 
     @property
     def name(self) -> str:
@@ -137,15 +129,13 @@ class ReactingWearer:
 
 @dataclass(frozen=True, slots=True)
 class BodyStart:
-    """Where a wearer begins: the body, reflexes, nerves, and of both legs ankle [rad] and what counts the strides."""
+    """Where a wearer begins: body, reflexes, nerves, and of the left leg ankle [rad] and what counts the strides."""
 
     walker: Walker
     reflexes: Reflexes
     nerves: Nerves
     ankle: float
     walk: ReactingState
-    other_ankle: float
-    other_walk: ReactingState
 
 
 _AT_REST = Pose(x=0.0, y=0.0, lean=0.0, left=Limb(0.0, 0.0, 0.0), right=Limb(0.0, 0.0, 0.0))
@@ -163,24 +153,22 @@ def start_of_body(wearer: ReactingWearer) -> BodyStart:
         reflexes=Reflexes(ordered=first_answer(), due=1.0, until=0.0, umberger=0.0, bhargava=0.0),
         nerves=nerves,
         ankle=joints(pose.left, pose.lean).ankle,
-        walk=_begun(FLAT, pose.left, 0.5 * wearer.weight, load=1.0, other_load=0.0, since=0.0),
-        other_ankle=joints(pose.right, pose.lean).ankle,
-        other_walk=_begun(SWING, pose.right, 0.0 * wearer.weight, load=0.0, other_load=1.0, since=0.5 * FIRST_STRIDE),
+        walk=_standing(pose.left, 0.5 * wearer.weight),
     )
 
 
-def _begun(contact: float, limb: Limb, force: Any, load: float, other_load: float, since: float) -> ReactingState:
-    """A leg at the start, with this force [N] on heel and toes each, a time [s] after its last strike."""
+def _standing(limb: Limb, force: Any) -> ReactingState:
+    """The left leg as it strikes at the start, with this force [N] on heel and toes each."""
     return ReactingState(
-        contact=contact,
-        now=WalkNow(since / FIRST_STRIDE, limb.shank),
+        contact=FLAT,
+        now=WalkNow(0.0, limb.shank),
         external_torque=0.0,
         heel_force=force,
         toe_force=force,
         toes_first=0.0,
         lands=0.0,
         clearance=NO_CLEARANCE,
-        since=since,
+        since=0.0,
         stride_time=FIRST_STRIDE,
         strides=0.0,
         landings=0.0,
@@ -188,8 +176,8 @@ def _begun(contact: float, limb: Limb, force: Any, load: float, other_load: floa
         slap_rates=0.0,
         clearances=0.0,
         push_off_work=0.0,
-        load=load,
-        other_load=other_load,
+        load=1.0,
+        other_load=0.0,
         muscle_work=0.0,
         fall_time=STANDING,
         pushed=NOT_PUSHED,
@@ -217,9 +205,9 @@ def read_reacting(
     name = value_at(reading.document, REACTS)
     given = reading.document.get("wearer", {})
     if name is None:
-        for own_name in (*(item.name for item in REACTIONS), DEVICE_ON.partition(".")[2]):
-            if own_name in given:
-                raise reading.refusal(f"wearer.{own_name}", f'needs a wearer who reacts: give {REACTS} = "NAME"')
+        for item in REACTIONS:
+            if item.name in given:
+                raise reading.refusal(f"wearer.{item.name}", f'needs a wearer who reacts: give {REACTS} = "NAME"')
         return None
     if "gait" in instead:
         raise ScenarioError(f"{reading.file}: gait '{instead['gait']}' does not go with {REACTS} yet: leave it out")
@@ -227,11 +215,13 @@ def read_reacting(
         raise reading.refusal("gait", f"does not go with {REACTS} yet: leave one of both out")
     if course is not None:
         _check_way(reading, given, course)
-    known = {item.name for item in REACTIONS} | {"reacts", "device_on"}
-    for item in given:
-        if item not in known:
+    known = {item.name for item in REACTIONS} | {"reacts"}
+    for name_given in given:
+        if name_given not in known:
             words = f"{', '.join(item.name for item in (*STRENGTHS, START_SPEED))} and gains such as {GAINS[0].name}"
-            raise reading.refusal(f"wearer.{item}", f"is of a leg that a gait leads; a wearer who reacts has {words}")
+            raise reading.refusal(
+                f"wearer.{name_given}", f"is of a leg that a gait leads; a wearer who reacts has {words}"
+            )
     with refused_as(DataError, reading.quote(REACTS), DataError):
         file = find_wearer(folder / name if Path(name).suffix == ".toml" else name)
     own = {f"left_{name}": value for name, value in file.left_gains._asdict().items()}
@@ -239,5 +229,4 @@ def read_reacting(
     own |= {START_SPEED.name: file.speed}
     read = REACTIONS if course is None else tuple(item for item in REACTIONS if item not in OF_THE_WAY)
     numbers = tuple(replace(item, default=own.get(item.name, item.default)) for item in read)
-    on_both = value_at(reading.document, DEVICE_ON) == BOTH
-    return ReactingWearer(file, wearer_of(file), reading.section("wearer", numbers), course, on_both)
+    return ReactingWearer(file, wearer_of(file), reading.section("wearer", numbers), course)

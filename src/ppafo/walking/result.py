@@ -13,7 +13,7 @@ from ppafo.engine.lanes import BatchResult, Floats
 from ppafo.engine.program import LaneResult
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run
 from ppafo.metrics import METRICS, Metric, evaluate
-from ppafo.metrics.metric import LED, LED_SHANK, ONE_DEVICE, REACTS, REQUEST, STEADY, MetricKind, Metrics
+from ppafo.metrics.metric import LED, LED_SHANK, REACTS, REQUEST, STEADY, MetricKind, Metrics
 from ppafo.model.contact import SWING
 from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix, passive_torque
 from ppafo.signals import Channel, Recording
@@ -25,12 +25,12 @@ from ppafo.walking.bottle import UNITS, SupplyCourse
 from ppafo.walking.channels import Channels, actuator_channels, controller_channels, valve_and_ground_channels
 from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.course import PlannedCourse, pace_in_time
-from ppafo.walking.events import SAFE_ROW, SafetyEvent, events_of_legs, safety_events
+from ppafo.walking.events import SAFE_ROW, SafetyEvent, safety_events
 from ppafo.walking.gait_series import AnklePath, ankle_path, truncate
 from ppafo.walking.motion import walk_of
 from ppafo.walking.person import as_drawn
 from ppafo.walking.planning import course_of_walk, law_of
-from ppafo.walking.reacting import gas_of_all, level_of_help, reacting_metrics, recording_of_reacting
+from ppafo.walking.reacting import reacting_metrics, recording_of_reacting
 from ppafo.walking.strides import (
     Curves,
     SegmentResult,
@@ -250,7 +250,6 @@ def lacks(scenario: Scenario, kind: MetricKind) -> str:
             "a walk has no one reference that its torque follows: push_off_error is the error in push-off",
         ),
         (bool(kind.traced), "it needs the course of the whole run, which is not kept of a walk"),
-        (ONE_DEVICE in needs and motion.devices == 2, "it is of one device, and there are two"),
         (LED_SHANK in needs, "it needs a leg without ground, whose shank is that of a gait"),
         (REACTS in needs and not reacts, "it needs a wearer who reacts (wearer.reacts)"),
         (
@@ -332,7 +331,7 @@ def _reacting_result(
     fall_time = float(record[FELL][-1])
     stands = record[FELL] < 0.0
     stands[0] = True
-    time, rows = time[stands], {path: values[stands] for path, values in gas_of_all(run, record).items()}
+    time, rows = time[stands], {path: values[stands] for path, values in record.items()}
     recording = recording_of_reacting(
         scenario,
         run if supply is None else _with_cold_gas(run, supply, time),
@@ -342,7 +341,7 @@ def _reacting_result(
     )
     starts = stride_starts(rows["walk.strides"])
     strides = per_stride(rows, starts)
-    helped = helped_strides(level_of_help(rows), starts)
+    helped = helped_strides(rows.get(SAFE_ROW, np.zeros(time.size)), starts)
     metrics = reacting_metrics(recording, rows, starts, strides, helped, fall_time)
     if fall_time >= 0.0 and status.is_completed:
         status = Status("completed", None, f"completed: the wearer fell at t = {fall_time:.4g} s")
@@ -356,7 +355,7 @@ def _reacting_result(
         starts=starts,
         helped=helped,
         vented_metrics={},
-        events=events_of_legs(scenario, recording.time, rows),
+        events=safety_events(scenario, recording.time, rows),
         supply=supply,
     )
 

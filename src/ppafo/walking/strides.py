@@ -7,11 +7,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.control.walking.phases import PUSH_OFF
-from ppafo.control.walking.signs import HELPS
 from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE, SETTLING
 from ppafo.model.contact import FLAT, SWING
+from ppafo.model.helping import HELPS, PUSH_OFF
 from ppafo.signals import CHANNELS, Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import Scenario
@@ -183,10 +182,9 @@ def _tracking(recording: Recording, starts: NDArray[np.intp], chosen: NDArray[np
 
 def first_less_help(recording: Recording) -> dict[str, Metric]:
     """When the controller first helped less; nothing where it never did."""
-    levels = [recording[name] for name in ("safe_state", "other_safe_state") if name in recording]
-    if not any(level.any() for level in levels):
+    if "safe_state" not in recording or not recording["safe_state"].any():
         return {}
-    time = float(recording.time[int(np.argmax(np.maximum.reduce(levels) > 0.5))])
+    time = float(recording.time[int(np.argmax(recording["safe_state"] > 0.5))])
     return {"safe_state_time": Metric(time, "s", "time at which the controller first lifted only, paused or stopped")}
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ppafo.answers.display_units import display_values, title_with_unit
 from ppafo.answers.style import BLUE, GREY, VERMILION, house_style, mark_kind
 from ppafo.control.walking import event_on_off
-from ppafo.control.walking.signs import SIGNS, STOPPED
+from ppafo.control.walking.signs import SIGNS
 from ppafo.engine.lane_rows import LANES
 from ppafo.engine.lanes import STEPS_PER_CALL, Batch, BatchResult, Floats, begin_block, run_batch
 from ppafo.engine.rows import row_numbers
@@ -21,6 +21,7 @@ from ppafo.engine.run import NEVER_FAILED, batch_of
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE
+from ppafo.model.helping import STOPPED
 from ppafo.model.leg import passive_torque
 from ppafo.simulation.plan import MAXIMUM_STEPS
 from ppafo.simulation.sampled import run_sampled

@@ -41,18 +41,8 @@ def drawn(figure: "Figure", panel: int) -> list[list[float]]:
 def test_there_is_a_panel_for_each_quantity_that_was_recorded_and_no_other() -> None:
     assert titles(recording_figure(recording(torque=1.0, angle=1.0))) == ["Ankle angle (deg)", "Actuator torque (N m)"]
     whole = recording_figure(recording(**dict.fromkeys(CHANNELS, 1.0)))
-    assert titles(whole)[-1] == "Gas of both devices since the start (g)"
-    assert titles(whole)[:4:2] == ["Ankle angle, left leg (deg)", "Pressure, left leg (psig)"]
-    assert titles(whole)[1:4:2] == ["Ankle angle, right leg (deg)", "Pressure, right leg (psig)"]
-    assert len(whole.axes) == 9
-
-
-def test_a_device_on_the_other_leg_has_panels_of_its_own_and_gas_is_of_both() -> None:
-    one = {"angle": 1.0, "other_ankle_angle": 1.5, "torque": 2.0, "supplied_mass": 4e-4}
-    assert len(recording_figure(recording(**one)).axes) == 3
-    both = recording_figure(recording(**one, other_torque=3.0))
-    assert [drawn(both, panel)[0][0] for panel in (1, 2, 3)] == pytest.approx([np.degrees(1.5), 2.0, 3.0])
-    assert len(both.axes) == 5
+    assert titles(whole)[-1] == "Gas since the start (g)"
+    assert len(whole.axes) == 5
 
 
 def test_angles_are_drawn_in_degrees_and_gas_in_grams() -> None:

@@ -53,12 +53,12 @@ THERMAL = (
 )
 SLOW = ("valve.spool_frequency=30 Hz", "valve.slew_limit=20 1/s", "timing.kind=estimated")
 EVERYTHING = (*SEEN, *FAULTY, *THERMAL, *SLOW, "controller.rate=330 Hz", "run.step=0.4 ms")
-ON_BOTH = ("reacting", ("course=ramp-and-kerb", "wearer.device_on=both", *SEEN, *THERMAL))
+ON_RAMP = ("reacting", ("course=ramp-and-kerb", *SEEN, *THERMAL))
 VARIED: tuple[tuple[str, tuple[str, ...]], ...] = (
     *((name, ()) for name in list_walks()),
     ("proportional-regulators", EVERYTHING),
     ("proportional", ("course=first-steps",)),
-    ON_BOTH,
+    ON_RAMP,
 )
 """Every shipped walk, one with every further feature (sensors with faults, thermal gas, slow valve), and courses."""
 
@@ -131,7 +131,7 @@ def numbers_in_c(library: ctypes.CDLL, values: Values, rows: tuple[int, int]) ->
 def batches(name: str, overrides: tuple[str, ...], settings: tuple[Setting, ...]) -> Iterator[tuple[Values, Batch]]:
     """Settings as they are, then drawn ones, each with what Python plans of them."""
     draw = np.random.default_rng(15)
-    kinds = [text for text in overrides if "kind=" in text or text.startswith(("course", "wearer.device_on"))]
+    kinds = [text for text in overrides if "kind=" in text or text.startswith("course")]
     values = {item.path: item.value for item in settings}
     while True:
         try:
@@ -173,7 +173,7 @@ def samples_in_c(library: ctypes.CDLL, name: str, values: Values, outputs: int) 
 
 @pytest.mark.parametrize(
     ("name", "overrides"),
-    [pytest.param(*one, marks=pytest.mark.thorough) if one in (BY_NUMBA, ON_BOTH) else one for one in VARIED],
+    [pytest.param(*one, marks=pytest.mark.thorough) if one in (BY_NUMBA, ON_RAMP) else one for one in VARIED],
 )
 def test_every_sample_of_drawn_settings_has_the_bits_of_the_lanes(
     name: str, overrides: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -183,8 +183,7 @@ def test_every_sample_of_drawn_settings_has_the_bits_of_the_lanes(
     library = built(load_walk(name, overrides), tmp_path)
     paths = {"angle": "state.angle", "angular_velocity": "state.angular_velocity", "command": "result.command"}
     program = item.program.program
-    totals = {name: f"state.{name}" for name in ("supplied_mass", "leaked_mass")}
-    paths |= {} if program.devices == 2 else totals
+    paths |= {name: f"state.{name}" for name in ("supplied_mass", "leaked_mass")}
     paths |= {
         output: path for output, path in walk_traces(program).items() if path in row_numbers(program.state_rows())
     }
@@ -195,9 +194,6 @@ def test_every_sample_of_drawn_settings_has_the_bits_of_the_lanes(
         for output, path in paths.items():
             column = found[:, 1 + item.program.outputs.index(output)]
             assert column.tobytes() == record[:, rows[path]].tobytes(), output
-        for output, path in totals.items() if program.devices == 2 else ():
-            both = record[:, rows[path]] + record[:, rows[f"other_{path}"]]
-            assert found[:, 1 + item.program.outputs.index(output)].tobytes() == both.tobytes(), output
 
 
 def shown(folder: Path, name: str, *command: str) -> tuple[list[str], Samples, dict[str, float]]:

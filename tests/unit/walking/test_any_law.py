@@ -6,9 +6,9 @@ import pytest
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS, law_that_walks, walking_controllers
-from ppafo.control.walking.phases import MID_STANCE, PUSH_OFF
 from ppafo.errors import ScenarioError
 from ppafo.model.declaration import Quantity
+from ppafo.model.helping import MID_STANCE, PUSH_OFF
 from ppafo.model.valves.kind import VENT
 from ppafo.walking import load_walk, walk
 from ppafo.walking.planning import law_of

@@ -10,11 +10,11 @@ import pytest
 from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.control.walking import signs
 from ppafo.engine.lanes import Batch, run_batch
 from ppafo.engine.rows import leaf_paths, numbers
 from ppafo.engine.run import batch_of
 from ppafo.model.contact import TOE
+from ppafo.model.helping import HELPS, LIFTS
 from ppafo.model.plant import chamber_pressures
 from ppafo.model.sensors import Fault, GaitSensors
 from ppafo.simulation.sampled import state_row_numbers
@@ -121,11 +121,11 @@ def injected(name: str) -> Injected:
         records.append(record[:, [rows[item] for item in names]])
     level, *state = np.concatenate(records, axis=2).transpose(1, 0, 2)
     chambers = chamber_pressures(run.plant, *state)
-    lifted = level[-1] == signs.LIFTS
+    lifted = level[-1] == LIFTS
     vented = np.maximum(*chambers) - run.plant.atmospheric_pressure
-    pressure = np.where(lifted & (level > signs.HELPS), np.subtract(*chambers), vented)
+    pressure = np.where(lifted & (level > HELPS), np.subtract(*chambers), vented)
     time = np.arange(level.shape[0]) * run.step * RECORD_EVERY
-    found = np.where(level[-1] > signs.HELPS, time[np.argmax(level > signs.HELPS, axis=0)], np.inf)
+    found = np.where(level[-1] > HELPS, time[np.argmax(level > HELPS, axis=0)], np.inf)
     shape = (len(FAULTS), PHASES)
     tiled = np.tile(begins, (len(FAULTS), 1))
     return Injected(time, tiled, found.reshape(shape), pressure.reshape(-1, *shape), stride, lifted.reshape(shape))

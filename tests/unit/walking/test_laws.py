@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
-from ppafo.control.walking.phases import MID_STANCE, PUSH_OFF
 from ppafo.metrics.strides import SETTLING
+from ppafo.model.helping import MID_STANCE, PUSH_OFF
 from ppafo.model.valves.kind import VENT
 from ppafo.walking import WalkResult, load_walk, walk
 

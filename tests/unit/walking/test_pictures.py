@@ -1,7 +1,6 @@
 """Pictures of a walk: what they show is what was walked."""
 
 import io
-from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -9,11 +8,9 @@ import numpy as np
 import pytest
 
 from ppafo.answers.writing import text_of
-from ppafo.control.walking.signs import HELPS, PAUSED
 from ppafo.questions.walk.answer import comparison_table, wearers_answer
 from ppafo.signals import Channel, Recording
 from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk, walk_population
-from ppafo.walking.events import RIGHT_LEG
 from ppafo.walking.figures import over_time
 from ppafo.walking.figures.legs import animation, drags, frames_figure, last_phases, legs_of, strip_figure
 from ppafo.walking.figures.mean_stride import walk_figure
@@ -128,20 +125,6 @@ def test_the_walk_over_time_shows_the_fault_the_pause_and_how_long_it_helped() -
     assert [label.get_text() for label in phases.get_yticklabels()] == ["swing", "heel", "free", "push"]
     edges = [patch.get_x() for patch in level.patches]
     assert edges == pytest.approx([0.0, result.events[0].time])
-
-
-def test_a_device_on_each_leg_has_a_strip_of_its_own_over_time() -> None:
-    result = failing()
-    silent = np.where(result.recording.time < 5.0, HELPS, PAUSED)
-    recording = result.recording.with_channel("other_safe_state", silent, "-")
-    events = (*result.events, replace(result.events[0], time=5.0, leg=RIGHT_LEG))
-    figure = over_time_figure(replace(result, recording=recording, events=events))
-    gas, toes, _, left, right = figure.axes
-    marked = [[float(np.asarray(line.get_xdata())[0]) for line in axes.lines] for axes in (gas, toes)]
-    assert [5.0 in times for times in marked] == [True, False]
-    assert [axes.get_ylabel() for axes in (left, right)] == ["Left", "Right"]
-    assert [patch.get_x() for patch in left.patches] == pytest.approx([0.0, result.events[0].time])
-    assert [patch.get_x() for patch in right.patches] == pytest.approx([0.0, 5.0])
 
 
 def test_parts_of_the_plant_that_fail_are_marked_and_close_failures_have_one_label(

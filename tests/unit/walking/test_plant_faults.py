@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from ppafo.control.walking.signs import STOPPED
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
+from ppafo.model.helping import STOPPED
 from ppafo.model.plant_faults import NOT_FITTED, PLANT_FAULTS, SOUND, PlantFaults
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of, with_duration

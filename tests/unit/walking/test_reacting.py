@@ -27,6 +27,7 @@ from ppafo.questions.walk.answer import answer_of, walk_with_and_without
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.scenario import Scenario
+from ppafo.storage.opensim import opensim_recording
 from ppafo.translation.native import translated_text
 from ppafo.validation.measured import check_recording
 from ppafo.validation.replay import replay_recording, start_of
@@ -74,7 +75,7 @@ def test_each_step_of_the_lanes_is_the_step_of_plain_python_to_the_bit() -> None
         reflexes, nerves = group(reacting.Reflexes, "reflexes", sample), group(Nerves, "nerves", sample)
         assist, walker = reacting.assist_of(run.plant, walk.share, state, held), group(Walker, "walker", sample)
         reflexes = reacting.next_reflexes(walk.body, nerves, reflexes, walker) if reflexes.due else reflexes
-        body = reacting.next_body(walk.body, walker, reflexes, before, assist, reacting.no_assist(), run.step)
+        body = reacting.next_body(walk.body, walker, reflexes, before, assist, run.step)
         assert numbers(body.after) == numbers(group(Walker, "walker", sample + 1)), sample
         after: PlantState = group(PlantState, "state", sample + 1)
         pose, rates = body.after.pose, body.after.rates
@@ -281,6 +282,7 @@ def test_a_ratio_changes_a_gain_of_both_legs() -> None:
         ({"gait": "normal"}, "does not go with wearer.reacts yet"),
         ({"wearer": {"reacts": "geyer-herr", "body_mass": "70 kg"}}, "is of a leg that a gait leads"),
         ({"wearer": {"reacts": "geyer-her"}}, "did you mean 'geyer-herr'"),
+        ({"wearer": {"reacts": "geyer-herr", "device_on": "both"}}, "unknown key 'wearer.device_on'; allowed here: "),
         ({"run": {"step": "0.2 ms"}}, "at most 0.0001 s (largest step; 0.1 ms unless given)"),
     ],
 )
@@ -311,6 +313,8 @@ def test_what_needs_a_prescribed_gait_refuses_in_one_line() -> None:
         walk_population(scenario, 0.1, 8)
     assert "lowest_toes is over the ground" in lacking(scenario, METRICS["toe_clearance"])
     assert "it needs a wearer who reacts (wearer.reacts)" in lacking(load_walk("solenoid"), METRICS["fall_time"])
+    with pytest.raises(DataError, match="a wearer who reacts walks on two legs"):
+        opensim_recording(walk(load_walk(WALK, ["run.duration=6 s"])).recording)
 
 
 def test_a_wearer_file_beside_the_walk_is_found(tmp_path: Path) -> None:

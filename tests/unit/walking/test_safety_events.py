@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ppafo.control.walking.signs import PAUSED, SIGNS
+from ppafo.control.walking.signs import SIGNS
+from ppafo.model.helping import PAUSED
 from ppafo.walking.events import FINDING_ROW, SAFE_ROW, VENTINGS_ROW, safety_events
 from ppafo.walking.loading import load_walk
 

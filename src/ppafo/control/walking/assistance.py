@@ -17,6 +17,7 @@ from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.signs import SAFETY_QUANTITIES, SafetyRules
 from ppafo.control.walking.timing import GaitTime, follow_thresholds, threshold_time
 from ppafo.model.declaration import Quantity
+from ppafo.model.helping import MID_STANCE, PUSH_OFF
 from ppafo.model.sensors import GaitMeasurement, Measurement
 from ppafo.model.valves.kind import VENT
 
@@ -199,14 +200,14 @@ def requested_torque(rules: Assistance, phase: PhaseState, time: GaitTime, angle
     lifted = held - (landing if lands else swing)
     # On the heel nothing presses the toes down, and in the air little: an angle that is read too low asks for it.
     lifted = min(lifted, 0.0 if lands else LARGEST_PRESS)
-    pushed = profile_torque(rules.push_off, fraction) if phase.phase == phases.PUSH_OFF else 0.0
+    pushed = profile_torque(rules.push_off, fraction) if phase.phase == PUSH_OFF else 0.0
     torque = lifted if phases.lifts(phase.phase) else pushed
     return max(-rules.largest_torque, min(rules.largest_torque, torque))
 
 
 def same_task(before: float, after: float) -> bool:
     """True where two phases (0 to 3) have the same task: landing and swing both hold the foot."""
-    return phases.lifts(before) == phases.lifts(after) and (before == phases.PUSH_OFF) == (after == phases.PUSH_OFF)
+    return phases.lifts(before) == phases.lifts(after) and (before == PUSH_OFF) == (after == PUSH_OFF)
 
 
 def timed_phase(
@@ -234,9 +235,9 @@ def assess(
     rate = last.rate + (turned - period * last.rate) / (period + parameters.assistance.hold.rate_filter)
     torque = requested_torque(parameters.assistance, phase, time, measurement.angle, rate)
     # A foot that comes down on its toes turns far, and what is left in the chamber would then push on a loaded heel.
-    on_toes = phase.phase == phases.MID_STANCE and phase.in_phase >= phase.since_strike
+    on_toes = phase.phase == MID_STANCE and phase.in_phase >= phase.since_strike
     bends = on_toes and phase.since_strike < EASING_TIME and measurement.torque > EASED
-    works = phases.lifts(phase.phase) or phase.phase == phases.PUSH_OFF or bends
+    works = phases.lifts(phase.phase) or phase.phase == PUSH_OFF or bends
     return Assessment(
         phase=phase,
         clock=clock,

@@ -15,6 +15,7 @@ from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.signs import SAFETY_QUANTITIES, SafetyRules
 from ppafo.control.walking.timing import ThresholdClock, ThresholdRules
 from ppafo.model.declaration import Quantity
+from ppafo.model.helping import PUSH_OFF
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
 
@@ -56,7 +57,7 @@ def update(
     command = -1.0 if lifting > 0.5 or time.lands > 0.5 else VENT
     command = command if held else VENT
     in_time = time.since_strike < parameters.push_off_end * phase.stride_time
-    command = 1.0 if phase.phase == phases.PUSH_OFF and in_time else command
+    command = 1.0 if phase.phase == PUSH_OFF and in_time else command
     command, watch = safety.safe_command(watch, phase.phase, command, period)
     return command, EventOnOffState(phase=phase, clock=clock, safety=watch, lifting=lifting if held else 0.0)
 

@@ -29,6 +29,7 @@ from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.signs import SafetyRules
 from ppafo.control.walking.timing import ThresholdClock, ThresholdRules
 from ppafo.model.declaration import Quantity
+from ppafo.model.helping import PUSH_OFF
 from ppafo.model.sensors import GaitMeasurement
 
 KNOTS = 16
@@ -167,7 +168,7 @@ def update(
     assessment = assess(parameters, state, measurement, period)
     phase, torque, profile = assessment.phase, measurement.torque, parameters.assistance.push_off
     since_strike = assessment.time.since_strike
-    pushes = phase.phase == phases.PUSH_OFF
+    pushes = phase.phase == PUSH_OFF
     table = learn(
         parameters.learning,
         state.table,

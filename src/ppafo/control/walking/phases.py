@@ -8,11 +8,7 @@ of it, once the heel is off the ground, and ends where the heel comes down again
 from typing import NamedTuple
 
 from ppafo.model.declaration import Quantity
-
-SWING = 0.0
-LANDING = 1.0
-MID_STANCE = 2.0
-PUSH_OFF = 3.0
+from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF, SWING
 
 
 class PhaseRules(NamedTuple):

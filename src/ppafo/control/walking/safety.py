@@ -17,7 +17,8 @@ from typing import NamedTuple
 
 from ppafo.control.walking import observer, signs
 from ppafo.control.walking.observer import Observer
-from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState
+from ppafo.control.walking.phases import PhaseState
+from ppafo.model.helping import HELPS, LANDING, LIFTS, MID_STANCE, PAUSED, PUSH_OFF, STOPPED, SWING
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT, VENTS_ABOVE
 
@@ -86,7 +87,7 @@ class SafetyState(NamedTuple):
 
 
 START = SafetyState(
-    level=signs.HELPS,
+    level=HELPS,
     good_strides=0.0,
     ventings=0.0,
     finding=Finding(sign=signs.NO_SIGN, heel_force=0.0, toe_force=0.0, angle=0.0, pressure_1=0.0, pressure_2=0.0),
@@ -236,10 +237,10 @@ def level_after(rules: signs.SafetyRules, state: SafetyState, good_strides: floa
 
     A swing without end is that of who sits: standing up shows that both forces are sound.
     """
-    resting = (state.level == signs.PAUSED) & (state.finding.sign == signs.ENDLESS_PHASE)
-    resumes = (state.level < signs.STOPPED) & (good_strides >= rules.resume_strides)
-    lifted = signs.LIFTS if (state.level == signs.PAUSED) & (good_strides >= LIFT_STRIDES) else state.level
-    return signs.HELPS if resumes | (resting & (together > STANDS_UP)) else lifted
+    resting = (state.level == PAUSED) & (state.finding.sign == signs.ENDLESS_PHASE)
+    resumes = (state.level < STOPPED) & (good_strides >= rules.resume_strides)
+    lifted = LIFTS if (state.level == PAUSED) & (good_strides >= LIFT_STRIDES) else state.level
+    return HELPS if resumes | (resting & (together > STANDS_UP)) else lifted
 
 
 def remembered(
@@ -350,9 +351,9 @@ def permits(state: SafetyState, phase: float) -> bool:
     A push needs a heel that was loaded in this stance and has risen, and toes that carry in its place; a foot that is
     lifted has left the ground by turning, for that of somebody who sits is unloaded where it stands.
     """
-    pushes = (state.level < signs.LIFTS) & (state.stance.heel_seen > 0.5) & rolls_over(state.stance)
+    pushes = (state.level < LIFTS) & (state.stance.heel_seen > 0.5) & rolls_over(state.stance)
     steps = (phase > LANDING) | (state.stance.turned > 0.5)
-    return (state.level < signs.PAUSED) & steps & (pushes | (phase != PUSH_OFF))
+    return (state.level < PAUSED) & steps & (pushes | (phase != PUSH_OFF))
 
 
 def safe_command(state: SafetyState, phase: float, command: float, period: float) -> tuple[float, SafetyState]:

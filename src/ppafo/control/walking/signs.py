@@ -25,14 +25,10 @@ from ppafo.control.walking.observer import (
     NominalDevice,
     pressure_above,
 )
-from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, lifts
+from ppafo.control.walking.phases import PhaseState, lifts
 from ppafo.model.declaration import PRESSURE_LAG, VALVE_LAG, Quantity
+from ppafo.model.helping import HELPS, LANDING, LIFTS, MID_STANCE, PAUSED, PUSH_OFF, STOPPED, SWING
 from ppafo.model.sensors import GaitMeasurement
-
-HELPS = 0.0
-LIFTS = 1.0
-PAUSED = 2.0
-STOPPED = 3.0
 
 NO_SIGN = 0.0
 FORCE_RANGE = 1.0

@@ -16,9 +16,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from ppafo.control.walking import phases
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.model.declaration import FORCE_LAG, VALVE_DELAY, Quantity
+from ppafo.model.helping import LANDING, SWING
 from ppafo.model.sensors import GaitMeasurement
 
 
@@ -72,7 +72,7 @@ def follow_thresholds(
 
 def threshold_time(rules: ThresholdRules, clock: ThresholdClock, phase: PhaseState) -> GaitTime:
     """The time since the detected heel strike [s]; the foot lands once that was detected."""
-    return GaitTime(phase.since_strike, 1.0 if phase.phase == phases.LANDING else 0.0)
+    return GaitTime(phase.since_strike, 1.0 if phase.phase == LANDING else 0.0)
 
 
 THRESHOLDS = TimingKind(
@@ -175,10 +175,10 @@ def detection_delays(delays: Delays, phase_rules: PhaseRules, period: float) -> 
 
 def seen_events(before: PhaseState, phase: PhaseState) -> Events:
     """1 for each event that is detected at this sample, else 0; heel and toes only where they can be that event."""
-    enters = (before.phase == phases.SWING) & (phase.phase != phases.SWING)
-    toes_on = (before.toe.loaded < 0.5) & (phase.toe.loaded > 0.5) & (before.phase == phases.LANDING)
+    enters = (before.phase == SWING) & (phase.phase != SWING)
+    toes_on = (before.toe.loaded < 0.5) & (phase.toe.loaded > 0.5) & (before.phase == LANDING)
     heel_off = (before.heel.loaded > 0.5) & (phase.heel.loaded < 0.5) & (phase.toe.loaded > 0.5)
-    leaves = (before.phase != phases.SWING) & (phase.phase == phases.SWING)
+    leaves = (before.phase != SWING) & (phase.phase == SWING)
     return Events(
         strike=1.0 if enters else 0.0,
         toes_on=1.0 if toes_on else 0.0,
@@ -208,15 +208,15 @@ def latest_fraction(phase: PhaseState, come: Events, predicts: bool) -> float:
     It waits before a strike that it does not predict.
     """
     on_ground = come.toes_off if phase.heel.loaded < 0.5 else come.heel_off
-    on_ground = come.toes_on if phase.phase == phases.LANDING else on_ground
+    on_ground = come.toes_on if phase.phase == LANDING else on_ground
     awaited = on_ground if on_ground > 0.0 else 1.0
     strike = 1.0 + WAITS if predicts else 1.0 - WAITS
-    return strike if phase.phase == phases.SWING else awaited + WAITS
+    return strike if phase.phase == SWING else awaited + WAITS
 
 
 def last_event(clock: GaitClock, fraction: float, come: Events, seen: Events, phase: PhaseState) -> float:
     """The last event that has been passed; one whose fraction is not known is passed where it is detected."""
-    is_swing = phase.phase == phases.SWING
+    is_swing = phase.phase == SWING
     struck = (seen.strike > 0.5) | (is_swing & (clock.event == TOES_OFF) & (fraction >= 1.0))
     expected = is_swing & (clock.event == STRUCK)
     passed = clock.event if expected else event_of_stance(clock.event, fraction, come, seen, phase.toe.loaded)
@@ -366,11 +366,11 @@ def place_in_stride(clock: GaitClock, lead: float, phase: PhaseState) -> GaitTim
     """
     stride_time = phase.stride_time if phase.stride_time > 0.0 else 1.0
     ahead = clock.fraction + lead / stride_time
-    comes = (phase.phase == phases.SWING) & (ahead >= 1.0) & (clock.fraction < 1.0 + WAITS)
+    comes = (phase.phase == SWING) & (ahead >= 1.0) & (clock.fraction < 1.0 + WAITS)
     expected = comes & (clock.strides.even > 0.5)
     shown = ahead - 1.0 if expected else ahead
     time = max(0.0, shown) * stride_time
-    return GaitTime(time, 1.0 if (phase.phase == phases.LANDING) | expected else 0.0)
+    return GaitTime(time, 1.0 if (phase.phase == LANDING) | expected else 0.0)
 
 
 ANCHOR_WEIGHT = Quantity(

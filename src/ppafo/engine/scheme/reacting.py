@@ -5,17 +5,16 @@ pressures at its begin, and the ankle that the gas sees is the body's. Device an
 step, which is 0.1 ms long. What sensors, faults, controllers and metrics read of a walk has the same names in both.
 """
 
-from dataclasses import replace
 from typing import Any, NamedTuple
 
-from ppafo.engine.pieces import OTHER, LegScheme, Phases, RarePhase
+from ppafo.engine.pieces import LegScheme, Phases, RarePhase
 from ppafo.engine.scheme.motion import clamp_angle, with_motion
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers, held_pressures
 from ppafo.engine.scheme.walking import NO_CLEARANCE, DeviceShare
 from ppafo.model.contact import FLAT, HEEL, SWING, TOE
 from ppafo.model.places import friction_in_motion
 from ppafo.model.plant import PlantParameters, PlantState, actuator_torque
-from ppafo.model.plant_faults import PlantFaults, ShutOff, Unpowered, failed_plant
+from ppafo.model.plant_faults import PlantFaults, ShutOff, Unpowered
 from ppafo.model.sensors import GaitSeen, GaitSensors
 from ppafo.model.wearer.metabolic import rates_of_leg
 from ppafo.model.wearer.muscle import Fibre, Muscle, tendon_force
@@ -111,7 +110,7 @@ class Reflexes(NamedTuple):
 
 
 class FootEnd(NamedTuple):
-    """A foot at the begin of a step, and what a device did to its ankle.
+    """The foot with the device at the begin of a step, and what the device did to its ankle.
 
     ``heel_up`` and ``ball_up`` [N] under it, ``place`` of its ankle in front of the hip and height of its ``toes`` [m],
     torque ``given`` by both pressures [N m], ``damping`` of the vane with its friction [N m s/rad].
@@ -137,8 +136,7 @@ class BodyEnd(NamedTuple):
     balance: Balance
     due: float
     work: float
-    left: FootEnd
-    right: FootEnd
+    foot: FootEnd
 
 
 class AnkleStep(NamedTuple):
@@ -175,37 +173,20 @@ def work_of_leg(muscles: Muscles, before: Fibres, after: Fibres, pull: Pull) -> 
     return ankle + hip
 
 
-def no_assist() -> Assist:
-    """What is done to an ankle without a device."""
-    return Assist(0.0, 0.0, 0.0)
-
-
-def foot_end(leg: LegNow, assist: Assist) -> FootEnd:
-    """What is kept of a leg until the end of the step."""
-    return FootEnd(
-        heel_up=leg.heel_up,
-        ball_up=leg.ball_up,
-        place=leg.place,
-        toes=leg.toes,
-        given=assist.torque,
-        damping=assist.damping,
-    )
-
-
 def next_body(
     wearer: Wearer,
     walker: Walker,
     reflexes: Reflexes,
     walk: ReactingState,
-    to_left: Assist,
-    to_right: Assist,
+    assist: Assist,
     step: float,
 ) -> BodyEnd:
-    """The wearer after a step [s] with what devices do to the ankles; one who has fallen lies still."""
+    """The wearer after a step [s] with what the device does to the left ankle; one who has fallen lies still."""
     moving = 0.0 if walk.fall_time >= 0.0 else step
     push = push_now(walk.pushed, step)
     ordered = reflexes.ordered
-    stepped = next_walker(wearer, walker, ordered.to_left, ordered.to_right, to_left, to_right, push, moving)
+    to_right = Assist(0.0, 0.0, 0.0)
+    stepped = next_walker(wearer, walker, ordered.to_left, ordered.to_right, assist, to_right, push, moving)
     left: LegNow = stepped.left
     right: LegNow = stepped.right
     after = stepped.after
@@ -218,8 +199,14 @@ def next_body(
         balance=stepped.balance,
         due=reflexes.due,
         work=work,
-        left=foot_end(left, to_left),
-        right=foot_end(right, to_right),
+        foot=FootEnd(
+            heel_up=left.heel_up,
+            ball_up=left.ball_up,
+            place=left.place,
+            toes=left.toes,
+            given=assist.torque,
+            damping=assist.damping,
+        ),
     )
 
 
@@ -267,10 +254,6 @@ def advance_reacting(
     share: DeviceShare,
     walk: ReactingState,
     body: BodyEnd,
-    foot: FootEnd,
-    limb: Limb,
-    limb_rates: Limb,
-    other_felt: Felt,
     before: PlantState,
     after: PlantState,
     follow_rate: float,
@@ -279,9 +262,11 @@ def advance_reacting(
 ) -> ReactingState:
     """What the sensors show and what adds up over the strides; ``time`` [s] is that at the end of the step [s].
 
-    ``foot`` and ``limb`` are of the leg with the device, ``other_felt`` of the other one. A strike is the foot that
-    stands after the toes came by; what touches before is a scuff.
+    A strike is the foot that stands after the toes came by; what touches before is a scuff.
     """
+    foot: FootEnd = body.foot
+    limb: Limb = body.after.pose.left
+    limb_rates: Limb = body.after.rates.left
     stood = walk.fall_time < 0.0
     leg = wearer.body.thigh.length + wearer.body.shank.length
     pose = body.after.pose
@@ -335,7 +320,7 @@ def advance_reacting(
         clearances=walk.clearances + cleared,
         push_off_work=walk.push_off_work + work,
         load=load,
-        other_load=other_felt.load,
+        other_load=body.right_felt.load,
         muscle_work=muscle_work,
         fall_time=fall_time,
         pushed=pushed,
@@ -349,12 +334,9 @@ def find(_rows: Any) -> list[str]:
 
 def lead(rows: Any) -> Phases:
     """Phases before the gas: the body, and where few steps sample them, the nerves and the reflexes."""
-    add, has_other = rows.add, rows.program.of_other_leg is not None
-    others = [f"{OTHER}{name}" for name in ("state", "held")] if has_other else []
-    plant_of_other = _plant_of_other(rows) if has_other else []
-    to_other = f"{add(assist_of)}({OTHER}plant, share, {', '.join(others)})" if has_other else f"{add(no_assist)}()"
-    begun_of_other = f"{OTHER}begun = {_ankle(rows, f'{OTHER}plant', 'right')}"
-    stepped = f"{add(next_body)}(wearer, walker, reflexes, walk, assist, {OTHER}assist, length)"
+    add = rows.add
+    stepped = f"{add(next_body)}(wearer, walker, reflexes, walk, assist, length)"
+    limb = "body.after.pose.left, body.after.rates.left, body.after.pose.lean, body.after.rates.lean"
     ordered = f"{add(next_reflexes)}(wearer, nerves, reflexes, walker)"
     passed_on = f"{add(next_nerves)}(nerves, body.left_felt, body.right_felt, body.balance)"
     waits = f"{add(waiting_reflexes)}(reflexes, walk.fall_time, length)"
@@ -370,14 +352,11 @@ def lead(rows: Any) -> Phases:
             rows.cells["reflexes.due"],
         ),
         [
-            *[rows.load(name) for name in ("wearer", "walker", "reflexes", *others)],
+            *[rows.load(name) for name in ("wearer", "walker", "reflexes")],
             f"assist = {add(assist_of)}(plant, share, state, held)",
-            *plant_of_other,
-            f"{OTHER}assist = {to_other}",
             f"body = {stepped}",
-            f"begun = {_ankle(rows, 'plant', 'left')}",
+            f"begun = {add(ankle_of)}(plant, {limb}, walk.fall_time)",
             *rows.keep("body", "begun"),
-            *([begun_of_other, *rows.keep(f"{OTHER}begun")] if has_other else []),
             f"reflexes = {waits}",
             *rows.store("reflexes"),
         ],
@@ -391,26 +370,6 @@ def lead(rows: Any) -> Phases:
             rows.cells["body.due"],
         ),
     ]
-
-
-def _plant_of_other(rows: Any) -> list[str]:
-    """Lines that make the plant of a second device, with the faults that it has of its own."""
-    lines = [f"{OTHER}{rows.load('plant')}"]
-    if rows.program.fails:
-        failed = f"{rows.add(failed_plant)}({OTHER}plant, {OTHER}plant_faults, time)"
-        lines += [rows.load(f"{OTHER}plant_faults"), f"{OTHER}plant = {failed}"]
-    return lines
-
-
-def _ankle(rows: Any, plant: str, side: str) -> str:
-    """Expression for the ankle of a leg to which the body led it."""
-    limb = f"body.after.pose.{side}, body.after.rates.{side}, body.after.pose.lean, body.after.rates.lean"
-    return f"{rows.add(ankle_of)}({plant}, {limb}, walk.fall_time)"
-
-
-def led_already(_rows: Any) -> Phases:
-    """No phases: the body is one, and those of the first device have moved it."""
-    return []
 
 
 def assume(rows: Any) -> list[str]:
@@ -429,19 +388,9 @@ def reach(_rows: Any, _fed: str) -> Phases:
 
 
 def end(rows: Any) -> list[str]:
-    """Lines that lead to the state ``after`` the step, with the device on the left leg."""
-    return [*_end_of_leg(rows, "left", "right"), "walker_after = body.after"]
-
-
-def end_of_other(rows: Any) -> list[str]:
-    """The same of a device on the right leg."""
-    return _end_of_leg(rows, "right", "left")
-
-
-def _end_of_leg(rows: Any, side: str, other: str) -> list[str]:
+    """Lines that lead to the state ``after`` the step."""
     follow = rows.cells["gait_sensors.follow_rate"]
-    leg = f"body.{side}, body.after.pose.{side}, body.after.rates.{side}, body.{other}_felt"
-    given = f"wearer, share, walk, body, {leg}, state, after, {follow}, time + length, length"
+    given = f"wearer, share, walk, body, state, after, {follow}, time + length, length"
     return [
         *[rows.load(name) for name in ("begun", "ahead", "body", "wearer")],
         "held = ahead",
@@ -449,6 +398,7 @@ def _end_of_leg(rows: Any, side: str, other: str) -> list[str]:
         f"after = {rows.add(with_motion)}(fed, begun.angle, begun.rate)",
         f"walk_after = {rows.add(advance_reacting)}({given})",
         *rows.program.gas.move(rows, "after", "begun.angle", "after.angle"),
+        "walker_after = body.after",
     ]
 
 
@@ -481,13 +431,5 @@ def _scheme(fails: bool) -> LegScheme:
     )
 
 
-def _on_both(leg: LegScheme) -> LegScheme:
-    """The same with a second device on the right leg, whose steps find the body moved."""
-    return replace(leg, other=replace(leg, stored={"walk": "walk_after"}, lead=led_already, end=end_of_other))
-
-
 REACTING, FAILING_REACTING = _scheme(fails=False), _scheme(fails=True)
 """A leg of a wearer who reacts, and the same with a plant that may fail, or whose line has a shut-off valve."""
-
-REACTING_ON_BOTH, FAILING_REACTING_ON_BOTH = _on_both(REACTING), _on_both(FAILING_REACTING)
-"""Both legs of a wearer who reacts, with a device on each."""

@@ -9,10 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from ppafo.engine.lane_samples import OF_OTHER
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import SIGNAL_ROWS
-from ppafo.engine.pieces import OTHER
 from ppafo.engine.run import NEVER_FAILED
 from ppafo.engine.source_text import Collector
 from ppafo.exports import filled, in_comment, in_markdown, licence, template
@@ -58,14 +56,6 @@ OUTPUTS = {
     "controller_phase": ("-", "phase that the controller sees: 0 swing, 1 landing, 2 mid-stance, 3 push-off"),
     "safe_state": ("-", "0 the controller helps, 1 lifts only, 2 pauses, 3 has stopped"),
     "gait_fraction": ("-", "time in the stride that the controller goes by, in turns"),
-}
-OUTPUTS |= {
-    f"{OTHER}ankle_angle": ("rad", "angle of the ankle of the other leg"),
-    **{
-        f"{OTHER}{name}": (OUTPUTS[name][0], f"{OUTPUTS[name][1]}; of the other leg")
-        for name in OUTPUTS
-        if f"{OTHER}{name}" in OF_OTHER
-    },
 }
 """Unit and meaning of what can be read at each sample."""
 UNITS = {"1": "-", "Pa_a": "Pa, absolute", "Pa_d": "Pa, a difference"}

@@ -22,7 +22,7 @@ from ppafo.simulation.scenario import (
     worn_kind,
 )
 from ppafo.walking.declaration import FORCES
-from ppafo.walking.motion import check_one_device, walk_of
+from ppafo.walking.motion import walk_of
 from ppafo.walking.preparation import FaultSettings
 
 
@@ -211,7 +211,6 @@ def _led_vane(scenario: Scenario) -> Scenario:
 def _commanded_walk(walk: Scenario) -> Scenario:
     """The walk with a command that is handed in at every step, and sensors that nothing reads."""
     check_can_leave(walk)
-    check_one_device(walk, "a plant without its controller")
     step = step_counts(1.0, walk.time_step, 1.0, walk.control.period).step
     motion = walk_of(walk)
     # The forces under the foot are among the outputs.

@@ -8,7 +8,6 @@ from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.engine.lane_rows import indent
 from ppafo.engine.lanes import RECORDED_ANGLE, Segment
-from ppafo.engine.pieces import OTHER
 from ppafo.engine.program import LaneResult, LaneTiming, Program
 from ppafo.engine.rows import leaf_paths, leaves, numbers, row_expression
 from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
@@ -287,25 +286,17 @@ class Writing:
         program, add = self.program, self.add
         yield f"result = {add(LaneResult)}(0.0, {NEVER_FAILED!r}, 0.0)"
         yield f"pace = {add(Pace)}(step)"
-        yield from self._device_at_start("")
-        if program.devices == 2:
-            yield f"{OTHER}result = result"
-            yield from self._device_at_start(OTHER)
-
-    def _device_at_start(self, own: str) -> Iterator[str]:
-        """Lines that make the states of a device, whose names begin with ``own``, once there is its ``state``."""
-        program, add = self.program, self.add
         if program.gas.start is not None:
-            yield f"{own}masses = {add(program.gas.start)}(plant, {own}state)"
-        yield f"{own}valve_state = {add(program.valve.initial)}()"
+            yield f"masses = {add(program.gas.start)}(plant, state)"
+        yield f"valve_state = {add(program.valve.initial)}()"
         if program.controller is not None:
-            yield f"{own}controller_state = {self.constant(program.controller.initial, 'controller_state')}"
+            yield f"controller_state = {self.constant(program.controller.initial, 'controller_state')}"
         if program.has_lines:
-            yield f"{own}line_state = {add(lines_at_start)}(plant, lines)"
+            yield f"line_state = {add(lines_at_start)}(plant, lines)"
         if program.stated:
-            yield f"{own}at_start = {add(moment_at_start)}(plant, {own}state)"
+            yield f"at_start = {add(moment_at_start)}(plant, state)"
         for name, kind in program.stated.items():
-            yield f"{own}{name}_state = {add(kind.start)}({name}, {own}at_start)"
+            yield f"{name}_state = {add(kind.start)}({name}, at_start)"
 
 
 SAID = {

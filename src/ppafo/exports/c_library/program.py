@@ -21,7 +21,6 @@ from ppafo.engine.lane_rows import HANDED, indent
 from ppafo.engine.lane_samples import REQUEST, TRACED, walk_traces
 from ppafo.engine.lane_source import HEADER, INLINE, lane_loop
 from ppafo.engine.outline import Outline
-from ppafo.engine.pieces import OTHER
 from ppafo.engine.program import Program, link_program
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.run_source import LOOP_ARRAYS, LOOP_NUMBERS, run_loop
@@ -30,7 +29,6 @@ from ppafo.exports.c_library.boundary import Arrays, Boundary, Structs, struct_o
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import WALK, MetricKind, Readings
 from ppafo.model.columns import over_runs
-from ppafo.model.plant import with_gas_of
 from ppafo.simulation.ensemble.running import (
     ThermalTotals,
     Totals,
@@ -366,9 +364,6 @@ def metrics_entry(item: ExportedProgram, collector: Collector, boundary: Boundar
     add = collector.add
     for array in ("first", "states"):
         state = boundary.taken(array, "state", groups, collector.add)
-        if program.devices == 2:
-            other = boundary.taken(array, f"{OTHER}state", groups, collector.add)
-            state = f"{add(with_gas_of)}({state}, {other})"
         masses = f", {boundary.taken(array, 'masses', groups, collector.add)}" if program.has_true_masses else ""
         lines.append(f"{array}_total = {add(make)}({state}{masses}{further})")
     gains = ", ".join(f"{name}=states_total.{name} - first_total.{name}" for name in kind._fields)

@@ -9,7 +9,6 @@ from dataclasses import replace
 
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control.walking.catalog import walking_controllers
-from ppafo.engine.pieces import OTHER
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import Collector
 from ppafo.errors import ScenarioError
@@ -30,7 +29,7 @@ from ppafo.walking.course import flat_foot
 from ppafo.walking.declaration import PERSON, STEP, fault_numbers
 from ppafo.walking.gait_series import fit_rocker, gait_series, gait_timing
 from ppafo.walking.motion import interval_of, walk_of
-from ppafo.walking.planning import NO_REFERENCE, SHARED, course_of_walk, failing_of, law_of, sensor_settings
+from ppafo.walking.planning import NO_REFERENCE, course_of_walk, failing_of, law_of, sensor_settings
 from ppafo.walking.preparation import (
     DISTORTED,
     FROZEN,
@@ -42,7 +41,6 @@ from ppafo.walking.preparation import (
     gait_sensors,
     longest_delay,
     rocker_on_heel,
-    sensors_of_other,
     smallest_chamber,
     standing_on,
     vented_state,
@@ -205,9 +203,6 @@ def _gait_sensors(configuration: Scenario, writing: Writing) -> Iterator[str]:
     row = writing.row("SensorNumbers", writing.section("sensors", (*_FORCES, *_OTHERS)))
     faults = ", ".join(f"{sensor}_fault" for sensor in settings.faults)
     yield f"gait_sensors = {add(gait_sensors)}({row}, controller_period, {faults})"
-    if writing.program.devices == 2:
-        none = ", ".join([_fault(writing, "", {})] * len(settings.faults))
-        yield f"{OTHER}gait_sensors = {add(gait_sensors)}({row}, controller_period, {none})"
     yield f"signal_delay = {add(longest_delay)}(gait_sensors) * controller_period"
 
 
@@ -218,10 +213,6 @@ def _plant_faults(configuration: Scenario, writing: Writing) -> Iterator[str]:
         yield f"plant_faults = {writing.constant(failing[0], 'plant_faults')}"
         yield f"shut_off = {writing.constant(failing[1], 'shut_off')}"
         yield f"unpowered = {writing.constant(POWERED, 'unpowered')}"
-    shared = failing_of(configuration, SHARED) if writing.program.devices == 2 else None
-    if shared is not None:
-        yield f"{OTHER}plant_faults = {writing.constant(shared[0], f'{OTHER}plant_faults')}"
-        yield f"{OTHER}unpowered = unpowered"
 
 
 def _fault(writing: Writing, kind: str, names: Mapping[str, str]) -> str:
@@ -295,8 +286,3 @@ def _body_at_start(reacts: ReactingWearer, writing: Writing) -> Iterator[str]:
         yield f"{name} = {writing.constant(row, name)}"
     yield f"gait_seen = {writing.constant(NOTHING_SEEN, 'gait_seen')}"
     yield f"state = {add(vented_state)}(plant, {start.ankle!r}, 0.0)"
-    if reacts.on_both:
-        yield f"{OTHER}walk = {writing.constant(start.other_walk, f'{OTHER}walk')}"
-        yield f"{OTHER}gait_seen = gait_seen"
-        yield f"{OTHER}state = {add(vented_state)}(plant, {start.other_ankle!r}, 0.0)"
-        yield f"{OTHER}sensors = {add(sensors_of_other)}(sensors)"

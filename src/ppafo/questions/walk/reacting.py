@@ -51,13 +51,8 @@ ROWS = (
 _EXPLAINED = (
     "'Device off' is the same wearer with the same device and both chambers vented: it still rubs and has inertia. The "
     "first two strides are left out of the means, and those of gas, push-off and how the foot comes down also leave "
-    "out strides with less help."
+    "out strides with less help. The device is on the left leg, and a stride is one step of that leg."
 )
-_WHERE = {
-    1: "The device is on the left leg, and a stride is one step of that leg.",
-    2: "A device is on each leg. Gas is that of both; strides, toes and work of the device are those of the left leg.",
-}
-"""Whose numbers they are, by how many devices there are."""
 
 _EFFORT = (
     "Power and metabolic rate are of one set of reflexes. Those that other searches find differ by some percent: a "
@@ -120,7 +115,7 @@ def reacting_answer(comparison: Comparison) -> Answer:
             *_likeness_section(comparison),
             Section(
                 "How to read it",
-                (f"{_EXPLAINED} {_WHERE[walk_of(scenario).devices]}", _EFFORT, _LIMITS),
+                (_EXPLAINED, _EFFORT, _LIMITS),
                 is_detail=True,
             ),
             *over_time_sections(worn),
@@ -303,16 +298,6 @@ def stride_figure(comparison: Comparison) -> "Drawn":
                 axes.fill_between(100.0 * PHASES, 2.0 * mean - spread, spread, color=color, alpha=0.2, linewidth=0)
             if channel == "toe_height":
                 axes.axhline(0.0, color=GREY, linewidth=0.8)
-            other = comparison.with_device.averages.get("other_torque") if channel == "torque" else None
-            if other is not None:
-                axes.plot(
-                    100.0 * PHASES,
-                    other.mean,
-                    color=BLUE,
-                    linewidth=1.2,
-                    linestyle="--",
-                    label="with the device, right leg",
-                )
             axes.set_ylabel(title_with_unit(title, quantity) if quantity else title, fontsize=9)
             axes.set_xlim(0.0, 100.0)
         for axes in figure.axes[3:]:

@@ -15,10 +15,6 @@ _OVER_TIME = (
     "Gas, toes and phases over the whole walk. The strip at the bottom shows where the controller helps, only lifts "
     "the foot, pauses or has stopped. A red line is where there is less help, a dashed one where something fails."
 )
-_OF_LEGS = (
-    " Gas is that of both devices, and so are the lines on it; each leg has a strip. Toes and phases are those of the "
-    "left leg."
-)
 _FAR_ABOVE = 2.0
 """Largest pressure in a chamber over its supply, both absolute, above which it is said; healthy wearers stay below."""
 
@@ -41,8 +37,7 @@ def _shut_off_line(scenario: Scenario) -> list[str]:
     if not given:
         return []
     mass, power = 1.0e3 * float(given["mass"]), float(given["power"])
-    where = "on each leg a shut-off valve" if walk_of(scenario).devices > 1 else "shut-off valve"
-    return [f"{where}: {mass:.0f} g, {power:.2g} W as long as the device helps ({60.0 * power:.0f} J a minute)"]
+    return [f"shut-off valve: {mass:.0f} g, {power:.2g} W as long as the device helps ({60.0 * power:.0f} J a minute)"]
 
 
 def _limit_line(scenario: Scenario) -> list[str]:
@@ -62,21 +57,18 @@ def _limit_line(scenario: Scenario) -> list[str]:
 
 def _pressure_lines(worn: WalkResult) -> list[str]:
     """Return each chamber whose pressure comes far above its supply, as where the foot drives the vane to its end."""
-    supply, several = worn.scenario.device.supply, walk_of(worn.scenario).devices > 1
+    supply = worn.scenario.device.supply
     lines = []
     for channel, words, given in (
         ("pressure_1", "chamber 1", supply.pressure),
         ("pressure_2", "chamber 2", supply.dorsiflexion_pressure),
-        ("other_pressure_1", "chamber 1 of the right leg", supply.pressure),
-        ("other_pressure_2", "chamber 2 of the right leg", supply.dorsiflexion_pressure),
     ):
         largest = float(worn.recording[channel].max()) if channel in worn.recording else 0.0
         if not largest > _FAR_ABOVE * given:
             continue
-        where = f"{words} of the left leg" if several and channel.startswith("pressure") else words
         reached, fed = (display_value(value, "pressure", supply.atmospheric_pressure) for value in (largest, given))
         lines.append(
-            f"the pressure in {where} reaches {reached:.0f} psi_g, and its supply is set to {fed:.0f} psi_g: actuator, "
+            f"the pressure in {words} reaches {reached:.0f} psi_g, and its supply is set to {fed:.0f} psi_g: actuator, "
             "valves and tubing must withstand that"
         )
     return lines
@@ -86,6 +78,5 @@ def over_time_sections(worn: WalkResult) -> tuple[Section, ...]:
     """Return the walk over time, where something happened in it."""
     if not worn.events and not failures(worn.scenario):
         return ()
-    caption = _OVER_TIME + (_OF_LEGS if walk_of(worn.scenario).devices > 1 else "")
-    figure = Figure("over-time", caption, lambda: over_time_figure(worn))
+    figure = Figure("over-time", _OVER_TIME, lambda: over_time_figure(worn))
     return (Section("The walk over time", figure=figure, is_detail=True),)

@@ -13,16 +13,15 @@ from ppafo.engine.lane_samples import REQUEST as REQUEST_ROW
 from ppafo.engine.lane_source import SAME_MOMENT
 from ppafo.engine.lanes import Batch, BatchResult, Floats, add_meters, group_of, meters_of, run_blocks
 from ppafo.engine.led_leg import GAIT_SHANK
-from ppafo.engine.pieces import OTHER
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.errors import ScenarioError
 from ppafo.metrics import METRICS
 from ppafo.metrics.gas import ENERGIES
-from ppafo.metrics.metric import LED, LED_SHANK, ONE_DEVICE, REACTS, REQUEST, STEADY, WALK, MetricKind, Readings
+from ppafo.metrics.metric import LED, LED_SHANK, REACTS, REQUEST, STEADY, WALK, MetricKind, Readings
 from ppafo.model.gas import energy_per_content
-from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, TrueMasses, with_gas_of
+from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, TrueMasses
 from ppafo.simulation.sampled import run_in_turn
 from ppafo.simulation.scenario import FreeMotion, Scenario, worn_kind
 from ppafo.simulation.simulate import OPEN_LOOP
@@ -228,11 +227,9 @@ class _MeteredBatch:
 
 
 def _totals(program: Program, parameters: Floats, states: Floats) -> dict[str, Floats]:
-    """Gas in the chambers and totals of each run, by channel; what two devices took and vented, together."""
+    """Gas in the chambers and totals of each run, by channel."""
     groups = program.state_rows()
     state = group_of("state", groups, states)
-    if program.devices == 2:
-        state = with_gas_of(state, group_of(f"{OTHER}state", groups, states))
     if not program.has_true_masses:
         return totals(state)._asdict()
     masses = group_of("masses", groups, states)
@@ -253,7 +250,6 @@ def has_channels(program: Program, kind: MetricKind) -> bool:
         STEADY: not program.takes_course,
         LED: not program.reacts,
         REACTS: program.reacts,
-        ONE_DEVICE: program.devices == 1,
         LED_SHANK: program.shank is GAIT_SHANK,
         REQUEST: REQUEST_ROW in row_numbers(program.state_rows()),
     }
@@ -320,9 +316,8 @@ def _late_totals(plain: Batch, metrics: Mapping[str, MetricKind]) -> tuple[str, 
     needed = {channel for kind in metrics.values() for channel in kind.channels}
     if ends_there or needed.isdisjoint(ThermalTotals._fields):
         return ()
-    others = [f"{OTHER}{path}" for path in _OF_STATE] if program.devices == 2 else []
     of_gas = (path for name, row in program.gas.states.items() for path in leaf_paths(row, name))
-    return (*_OF_STATE, *others, *of_gas)
+    return (*_OF_STATE, *of_gas)
 
 
 def intervals(batch: Batch) -> Floats:

@@ -23,12 +23,11 @@ from ppafo.answers.style import (
     mark_kind,
 )
 from ppafo.constants import GRAMS_PER_KILOGRAM
-from ppafo.control.walking.signs import HELPS, LIFTS, PAUSED, STOPPED
 from ppafo.gait.gait import clinical_angle
+from ppafo.model.helping import HELPS, LIFTS, PAUSED, STOPPED
 from ppafo.model.source import Regulator
 from ppafo.signals.recording import Floats, Recording
 from ppafo.simulation.scenario import Scenario
-from ppafo.walking.events import RIGHT_LEG
 from ppafo.walking.figures.mean_stride import WITH, WITHOUT
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import gait_sensors_of
@@ -42,7 +41,6 @@ if TYPE_CHECKING:
 _SIZE = (9.4, 5.6)
 _MARGINS = Margins(left=1.3, right=0.2, top=0.62, bottom=0.55, row_gap=0.16, label=0.6)
 _HEIGHTS, _STRIP = (1.0, 1.2, 1.0), 0.35
-_STRIPS = {"safe_state": "Left", "other_safe_state": "Right"}
 _LEVELS = {
     HELPS: ("help", "#cfe3c9"),
     LIFTS: ("lift", "#e6e2a8"),
@@ -102,11 +100,10 @@ def over_time_figure(result: WalkResult) -> "Figure":
     scale, unit = (60.0, "min") if recording.time[-1] > _LONG else (1.0, "s")
     time = recording.time / scale
     with house_style():
-        strips = {name: text for name, text in _STRIPS.items() if name in recording}
-        heights = (*_HEIGHTS, *[_STRIP] * len(strips))
+        heights = (*_HEIGHTS, *([_STRIP] if "safe_state" in recording else []))
         figure, grid = figure_of_panels(_SIZE, _MARGINS, len(heights), heights=heights)
         rows = [axes for (axes,) in grid]
-        gas, toes, phases, *levels = rows
+        gas, toes, phases, *level = rows
         gas.plot(time, GRAMS_PER_KILOGRAM * recording["supplied_mass"], color=BLUE)
         gas.set_ylabel("Gas\n(g)")
         toes.plot(time, 100.0 * recording["toe_height"], color=BLUE, linewidth=0.9)
@@ -117,9 +114,8 @@ def over_time_figure(result: WalkResult) -> "Figure":
         phases.set_ylim(-0.3, len(_PHASES) - 0.7)
         if "controller_phase" in result.recording:
             phases.step(time, acting_phase(result.recording), where="post", color=BLACK, linewidth=0.9)
-        for axes, (name, text) in zip(levels, strips.items(), strict=True):
-            _levels(axes, recording[name], time)
-            axes.set_ylabel(text if len(strips) > 1 else "")
+        for axes in level:
+            _levels(axes, recording["safe_state"], time)
         rows[-1].set_xlabel(f"Time ({unit})")
         rows[-1].set_xlim(0.0, float(time[-1]))
         _marks(rows[: len(_HEIGHTS)], result, scale)
@@ -153,13 +149,10 @@ def _levels(axes: "Axes", found: Floats, time: Floats) -> None:
 
 
 def _marks(rows: "list[Axes]", result: WalkResult, scale: float) -> None:
-    """Draw a line at each pause and stop, and a dashed one with names where something fails.
-
-    Toes and phases are of the first device: lines of a second one are on its gas only.
-    """
+    """Draw a line at each pause and stop, and a dashed one with names where something fails."""
     for event in result.events:
         if event.sign is not None:
-            for axes in rows[:1] if event.leg == RIGHT_LEG else rows:
+            for axes in rows:
                 axes.axvline(event.time / scale, color=VERMILION, linewidth=0.9)
     end = float(result.recording.time[-1])
     named: list[tuple[float, list[str]]] = []

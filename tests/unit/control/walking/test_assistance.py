@@ -9,9 +9,10 @@ from ppafo.control.controllers.model_based import FeedbackLinearisationState, li
 from ppafo.control.walking import assistance
 from ppafo.control.walking.assistance import Assistance, Hold, TorqueProfile, profile_torque
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
-from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, Switch
+from ppafo.control.walking.phases import PhaseState, Switch
 from ppafo.control.walking.timing import ThresholdClock, ThresholdRules, threshold_time
 from ppafo.engine.rows import rebuild
+from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF, SWING
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
 

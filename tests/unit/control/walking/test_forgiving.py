@@ -12,8 +12,8 @@ import pytest
 
 from ppafo.control.walking import signs
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
-from ppafo.control.walking.phases import PUSH_OFF
 from ppafo.engine.rows import rebuild
+from ppafo.model.helping import HELPS, LIFTS, PAUSED, PUSH_OFF
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
 
@@ -127,7 +127,7 @@ def test_standing_needs_no_pause_and_the_first_step_is_helped(name: str, step: f
     first, stop = some(4), [*stride()[: round(0.3 * STRIDE / PERIOD)], *standing(20.0)]
     away = [*stride()[round(0.3 * STRIDE / PERIOD) :]]
     seen = walked(name, [*first, *stop, *away, *some(2)], step, sway)
-    assert set(seen.levels) == {signs.HELPS}
+    assert set(seen.levels) == {HELPS}
     stands = seen.commands[len(first) + 400 : len(first) + len(stop)]
     assert set(stands) == {VENT}, "and nothing is done while the wearer stands"
     swing = seen.commands[len(first) + len(stop) + len(away) - round(0.3 / PERIOD) :][: round(0.3 / PERIOD)]
@@ -140,9 +140,9 @@ def test_standing_needs_no_pause_and_the_first_step_is_helped(name: str, step: f
 def test_who_sits_has_a_free_foot_and_is_helped_again_after_standing_up(name: str) -> None:
     seen = walked(name, [*some(2), *lifted(3.0), *standing(2.0), *some(2)])
     sat, stood = 2 * len(stride()) + 3000, 2 * len(stride()) + 5000
-    assert seen.levels[sat - 1] == signs.PAUSED
+    assert seen.levels[sat - 1] == PAUSED
     assert seen.commands[sat - 1] == VENT
-    assert seen.levels[stood - 1] == signs.HELPS
+    assert seen.levels[stood - 1] == HELPS
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -153,10 +153,10 @@ def test_a_scuff_of_forty_milliseconds_stops_nothing(name: str, share: float, lo
     first = round(share * STRIDE / PERIOD)
     scuffed[first : first + 40] = [load] * 40
     seen = walked(name, [*some(4), *scuffed, *some(6)])
-    assert seen.levels.max() <= signs.PAUSED
-    assert seen.levels[-1] == signs.HELPS
+    assert seen.levels.max() <= PAUSED
+    assert seen.levels[-1] == HELPS
     if load[0] == 0.0:
-        assert seen.levels.max() == signs.HELPS, "the toes alone: the foot is held up again at once"
+        assert seen.levels.max() == HELPS, "the toes alone: the foot is held up again at once"
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -166,10 +166,10 @@ def test_stairs_on_the_forefoot_alone_are_lifted_and_not_pushed_and_level_ground
     seen = walked(name, [*some(4), *some(10, heel_first=False), *some(6)])
     first, last = 5 * len(stride()) + 20, 14 * len(stride())
     climbing = list(zip(seen.states, seen.commands, strict=True))[first:last]
-    assert set(seen.levels[first:last]) == {signs.LIFTS}
+    assert set(seen.levels[first:last]) == {LIFTS}
     assert min(command for _, command in climbing) < 0.0
     assert {command for state, command in climbing if state.phase.phase == PUSH_OFF} == {VENT}
-    assert seen.levels[-1] == signs.HELPS
+    assert seen.levels[-1] == HELPS
     assert signs.SIGNS[seen.states[-1].safety.finding.sign].name == "no_heel"
     assert seen.states[-1].safety.ventings == 1.0
 
@@ -184,7 +184,7 @@ def toes_then_heel() -> Forces:
 @pytest.mark.parametrize("name", LAWS)
 def test_a_foot_that_lands_on_its_toes_and_then_its_heel_is_helped(name: str) -> None:
     seen = walked(name, [*some(3), *[sample for _ in range(6) for sample in toes_then_heel()]])
-    assert set(seen.levels) == {signs.HELPS}
+    assert set(seen.levels) == {HELPS}
     last = [command for command in seen.commands[-len(stride()) :] if command != VENT]
     assert min(last) < 0.0 < max(last)
 
@@ -195,9 +195,9 @@ def test_a_vented_foot_that_lands_on_its_toes_gets_help_back_step_by_step(name: 
     walks = [sample for _ in range(5) for sample in toes_then_heel()]
     before = 3 * len(stride()) + len(trips)
     levels = walked(name, [*some(3), *trips, *walks]).levels
-    assert levels[before - 1] == signs.PAUSED
+    assert levels[before - 1] == PAUSED
     steps = levels[before + 20 :: len(stride())]
-    assert list(steps[:5]) == [signs.PAUSED, signs.LIFTS, signs.HELPS, signs.HELPS, signs.HELPS]
+    assert list(steps[:5]) == [PAUSED, LIFTS, HELPS, HELPS, HELPS]
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -205,8 +205,8 @@ def test_slow_steps_of_a_turn_and_a_stumble_do_not_stop_it(name: str) -> None:
     turn = [*some(1, seconds=1.6), *some(2, seconds=1.9), *stride()]
     stumble = [*stride()[: round(0.7 * STRIDE / PERIOD)], *standing(0.15, 0.0, 250.0), *lifted(0.1)]
     seen = walked(name, [*some(4), *turn, *some(4), *stumble, *some(6)])
-    assert seen.levels.max() <= signs.PAUSED
-    assert seen.levels[-1] == signs.HELPS
+    assert seen.levels.max() <= PAUSED
+    assert seen.levels[-1] == HELPS
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -216,5 +216,5 @@ def test_the_number_of_good_strides_is_a_setting(name: str, needed: float) -> No
     forces = [*some(3), *trips, *some(6)]
     levels = walked(name, forces, resume=needed).levels
     walks = len(forces) - 6 * len(stride())
-    back = (int(np.flatnonzero(levels > signs.HELPS)[-1]) + 1 - walks) / len(stride())
+    back = (int(np.flatnonzero(levels > HELPS)[-1]) + 1 - walks) / len(stride())
     assert back == pytest.approx(needed, abs=0.05)

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from ppafo.control.walking import phases, safety, signs
-from ppafo.control.walking.phases import PHASE_QUANTITIES, PUSH_OFF, SWING, PhaseRules, PhaseState, Switch
+from ppafo.control.walking.phases import PHASE_QUANTITIES, PhaseRules, PhaseState, Switch
 from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.signs import SAFETY_QUANTITIES, SafetyRules
 from ppafo.engine.rows import rebuilt
+from ppafo.model.helping import HELPS, LIFTS, PUSH_OFF, STOPPED, SWING
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
 
@@ -51,7 +52,7 @@ def watched(
 @pytest.mark.parametrize("late", [0.0, 0.03])
 def test_forces_in_time_are_no_sign(late: float) -> None:
     states = watched([0.0] * BEGINS + [late] * 4)
-    assert {state.level for state in states} == {signs.HELPS}
+    assert {state.level for state in states} == {HELPS}
 
 
 @pytest.mark.parametrize("late", [0.1, 0.15, 0.2])
@@ -59,16 +60,16 @@ def test_who_is_flat_before_the_heel_is_seen_is_lifted_and_not_pushed_after_two_
     states = watched([0.0] * BEGINS + [late] * 5)
     levels = np.array([state.level for state in states])
     assert not levels[: 1000 * BEGINS].any()
-    assert 0 < np.argmax(levels > signs.HELPS) < 1000 * (BEGINS + 2.4)
+    assert 0 < np.argmax(levels > HELPS) < 1000 * (BEGINS + 2.4)
     assert states[-1].finding.sign == signs.LATE_FORCES
-    assert states[-1].level == signs.LIFTS
+    assert states[-1].level == LIFTS
     assert safety.permits(states[-1], SWING)
     assert not safety.permits(states[-1], PUSH_OFF)
 
 
 def test_help_comes_back_once_the_forces_are_in_time() -> None:
-    assert watched([0.0] * BEGINS + [0.1] * 3)[-1].level == signs.LIFTS
-    assert watched([0.0] * BEGINS + [0.1] * 3 + [0.0] * 4)[-1].level == signs.HELPS
+    assert watched([0.0] * BEGINS + [0.1] * 3)[-1].level == LIFTS
+    assert watched([0.0] * BEGINS + [0.1] * 3 + [0.0] * 4)[-1].level == HELPS
 
 
 def test_one_late_strike_is_that_of_who_stops() -> None:
@@ -119,13 +120,13 @@ def emptied(late: float, command: float = VENT, turns: float = 0.0, noise: float
 @pytest.mark.parametrize(("late", "command"), [(0.02, VENT), (0.02, 1.0), (0.03, VENT), (0.03, 0.5)])
 def test_a_vented_chamber_whose_pressure_rises_stops(late: float, command: float) -> None:
     state = emptied(late, command)
-    assert (state.level, state.finding.sign) == (signs.STOPPED, signs.NO_FALL)
+    assert (state.level, state.finding.sign) == (STOPPED, signs.NO_FALL)
 
 
 @pytest.mark.parametrize("late", [0.0, 0.005])
 @pytest.mark.parametrize("noise", [0.0, 2.0e3])
 def test_a_pressure_in_time_falls_with_noise_too(late: float, noise: float) -> None:
-    assert emptied(late, noise=noise).level == signs.HELPS
+    assert emptied(late, noise=noise).level == HELPS
 
 
 def test_a_foot_that_moves_long_after_pumps_gas_into_a_vented_chamber() -> None:
@@ -133,8 +134,8 @@ def test_a_foot_that_moves_long_after_pumps_gas_into_a_vented_chamber() -> None:
     for shown in (low, *(high,) * 9):
         seen = GaitMeasurement(1.5, 1.02e5, shown, 0.0, 0.0, 0.0)
         state = safety.monitor(RULES, state, IN_THE_AIR, IN_THE_AIR, seen, PERIOD)
-    assert state.level == signs.HELPS
+    assert state.level == HELPS
 
 
 def test_an_ankle_that_compresses_the_chamber_may_raise_its_pressure() -> None:
-    assert emptied(0.02, turns=4.0).level == signs.HELPS
+    assert emptied(0.02, turns=4.0).level == HELPS

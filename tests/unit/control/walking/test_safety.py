@@ -5,10 +5,11 @@ import math
 import pytest
 
 from ppafo.control.walking import phases, safety, signs
-from ppafo.control.walking.phases import LANDING, MID_STANCE, PUSH_OFF, SWING, PhaseState, Switch
+from ppafo.control.walking.phases import PhaseState, Switch
 from ppafo.control.walking.safety import Finding, SafetyState, Stance, ValveTimes
 from ppafo.control.walking.signs import SAFETY_QUANTITIES, SafetyRules
 from ppafo.engine.rows import leaf_paths, rebuilt
+from ppafo.model.helping import HELPS, LANDING, LIFTS, MID_STANCE, PAUSED, PUSH_OFF, STOPPED, SWING
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
@@ -35,7 +36,7 @@ def found(
     """The sign that vents at a sample, 0 where none does."""
     after = now or phase(MID_STANCE, 0.1)
     watch = safety.monitor(rules, state, before or after, after, seen, PERIOD)
-    assert (watch.level > signs.HELPS) == (watch.finding.sign > signs.NO_SIGN)
+    assert (watch.level > HELPS) == (watch.finding.sign > signs.NO_SIGN)
     assert watch.level == signs.level_of(watch.finding.sign)
     return watch.finding.sign
 
@@ -75,7 +76,7 @@ def test_the_rules_are_declared_in_their_order() -> None:
 def test_a_reading_out_of_range_stops_at_once(change: dict[str, float], sign: float) -> None:
     assert not vents()
     assert found(GOOD._replace(**change)) == sign
-    assert signs.level_of(sign) == signs.STOPPED
+    assert signs.level_of(sign) == STOPPED
 
 
 def test_a_full_chamber_2_that_the_foot_squeezes_is_no_fault() -> None:
@@ -90,7 +91,7 @@ def test_every_sign_says_what_it_goes_by_and_those_of_faults_come_first() -> Non
     assert len({sign.name for sign in signs.SIGNS.values()}) == len(numbers)
     levels = [signs.level_of(number) for number in numbers]
     assert levels == sorted(levels, reverse=True)
-    assert set(levels) == {signs.LIFTS, signs.PAUSED, signs.STOPPED}
+    assert set(levels) == {LIFTS, PAUSED, STOPPED}
     settings = {item.name for item in SAFETY_QUANTITIES}
     assert all(set(sign.settings) <= settings for sign in signs.SIGNS.values())
     assert all(set(sign.readings) < set(GaitMeasurement._fields) for sign in signs.SIGNS.values())
@@ -103,7 +104,7 @@ def test_of_two_signs_the_one_that_stops_counts() -> None:
     paused = safety.monitor(RULES, safety.START, endless, endless, GOOD, PERIOD)
     assert paused.finding == Finding(signs.ENDLESS_PHASE, 300.0, 200.0, 1.5, 1.1e5, 1.05e5)
     stopped = safety.monitor(RULES, paused, endless, endless, GOOD._replace(angle=9.0), PERIOD)
-    assert (stopped.level, stopped.ventings) == (signs.STOPPED, 2.0)
+    assert (stopped.level, stopped.ventings) == (STOPPED, 2.0)
     assert stopped.finding == Finding(signs.ANGLE_RANGE, 300.0, 200.0, 9.0, 1.1e5, 1.05e5)
 
 
@@ -144,7 +145,7 @@ def test_standing_with_readings_that_never_change_goes_on_for_long_without_a_sig
     for sample in range(20_000):
         now = phase(MID_STANCE, sample * PERIOD, in_phase=sample * PERIOD)
         state = safety.monitor(RULES, state, now, now, GOOD, PERIOD)
-    assert (state.level, state.ventings) == (signs.HELPS, 0.0)
+    assert (state.level, state.ventings) == (HELPS, 0.0)
 
 
 def test_an_unloaded_force_that_stays_the_same_is_no_sign() -> None:
@@ -194,7 +195,7 @@ def test_a_large_force_that_is_gone_within_a_sample_stops_and_one_that_falls_qui
         return signs.gone_sign(RULES, last, seen, period)
 
     assert after(0.0) == signs.FORCE_GONE
-    assert signs.level_of(signs.FORCE_GONE) == signs.STOPPED
+    assert signs.level_of(signs.FORCE_GONE) == STOPPED
     assert after(100.0) == signs.NO_SIGN, "no step of a foot that slaps"
     assert after(0.0, period=0.01) == signs.NO_SIGN, "a slow controller sees a foot leave the ground in one sample"
 
@@ -252,9 +253,9 @@ def test_strides_without_the_heel_are_counted_in_a_row_and_those_that_only_begin
     swing, on_toes = phase(SWING, 1.3, 0.0, 0.0), phase(MID_STANCE, 0.0, 0.0, 1.0)
     missed = safety.START._replace(stance=Stance(0.0, 1.0, 0.0, 0.0))
     once = safety.monitor(RULES, missed, swing, on_toes, GOOD, PERIOD)
-    assert (once.toe_strides, once.level) == (1.0, signs.HELPS)
+    assert (once.toe_strides, once.level) == (1.0, HELPS)
     assert found(now=on_toes, before=swing, state=once) == signs.TOE_STRIDES
-    assert signs.level_of(signs.TOE_STRIDES) == signs.LIFTS
+    assert signs.level_of(signs.TOE_STRIDES) == LIFTS
     came = once._replace(stance=Stance(1.0, 1.0, 0.0, 0.0))
     assert not vents(now=on_toes, before=swing, state=came), "the heel came down after the toes"
     assert safety.monitor(RULES, came, swing, on_toes, GOOD, PERIOD).toe_strides == 0.0
@@ -284,8 +285,8 @@ def test_a_stance_without_end_in_which_a_force_comes_back_is_a_sign_and_leaving_
 def test_who_sat_is_helped_again_after_standing_up_and_not_with_one_force() -> None:
     sits = phase(SWING, 2.0, 0.0, 0.0, in_phase=1.21)
     paused = safety.monitor(RULES, safety.START, sits, sits, GOOD, PERIOD)
-    assert paused.level == signs.PAUSED
-    for heel, toe, level in ((1.0, 1.0, signs.HELPS), (0.0, 1.0, signs.PAUSED), (1.0, 0.0, signs.PAUSED)):
+    assert paused.level == PAUSED
+    for heel, toe, level in ((1.0, 1.0, HELPS), (0.0, 1.0, PAUSED), (1.0, 0.0, PAUSED)):
         state, stands = paused, phase(MID_STANCE, 0.1, heel, toe)
         for sample in range(510):
             seen = GOOD._replace(heel_force=300.0 + sample, toe_force=200.0 + sample, angle=1.5 + 1.0e-4 * sample)
@@ -294,7 +295,7 @@ def test_who_sat_is_helped_again_after_standing_up_and_not_with_one_force() -> N
 
 
 def test_after_a_pause_the_foot_is_lifted_first_and_pushed_later() -> None:
-    state = STEPS._replace(level=signs.PAUSED, finding=safety.START.finding._replace(sign=signs.NO_TOES))
+    state = STEPS._replace(level=PAUSED, finding=safety.START.finding._replace(sign=signs.NO_TOES))
     swing, lands = phase(SWING, 1.05, 0.0, 0.0, in_phase=0.4), phase(LANDING, 0.0, 1.0, 0.0)
     allowed = []
     for _ in range(3):
@@ -403,9 +404,9 @@ def test_a_chamber_that_the_ankle_compresses_may_still_vent_and_one_that_grows_o
     state = after_commands(VENT, vented)
     for sample in range(151):
         left = 4.0e4 * math.exp((150 - sample) * PERIOD / fall_time)
-        state = stood(state._replace(level=signs.HELPS), sample, **{name: 1.01e5 + left})
+        state = stood(state._replace(level=HELPS), sample, **{name: 1.01e5 + left})
         if 100 <= sample <= 150:
-            assert (state.level == signs.STOPPED) is is_sign
+            assert (state.level == STOPPED) is is_sign
 
 
 def stood(state: SafetyState, sample: int, **pressures: float) -> SafetyState:
@@ -419,10 +420,10 @@ def test_a_pressure_that_freezes_while_the_chamber_vents_is_found_soon() -> None
     state = after_commands(VENT, 0.252)._replace(slow_pressure_1=2.2e5)
     for sample in range(100):
         state = stood(state, sample, pressure_1=2.0e5 - 500.0 * sample)
-    assert state.level == signs.HELPS
+    assert state.level == HELPS
     for sample in range(100, 140):
         state = stood(state, sample, pressure_1=1.5e5)
-    assert state.level == signs.STOPPED
+    assert state.level == STOPPED
 
 
 @pytest.mark.parametrize("reading", [1.02e5, 1.2e5, 1.3e5, 2.0e5, 4.0e5])
@@ -478,9 +479,9 @@ def pushes_that_end_at(*angles: float) -> SafetyState:
 
 
 def test_toes_that_are_seen_to_leave_when_the_foot_has_long_turned_down_lift_only_from_the_second_time_on() -> None:
-    assert pushes_that_end_at(112.0, 119.0, 113.0, 125.0).level == signs.HELPS
+    assert pushes_that_end_at(112.0, 119.0, 113.0, 125.0).level == HELPS
     late = pushes_that_end_at(119.0, 130.0)
-    assert (late.level, late.finding.sign) == (signs.LIFTS, signs.LATE_FORCES)
+    assert (late.level, late.finding.sign) == (LIFTS, signs.LATE_FORCES)
     assert pushes_that_end_at(119.0, 130.0, 116.0).landing.late_toes == 2.0, "a dropped foot is not in time"
     assert pushes_that_end_at(119.0, 130.0, 114.0).landing.late_toes == 0.0
 
@@ -490,7 +491,7 @@ def test_a_shift_of_weight_after_seconds_of_rest_is_no_still_sensor() -> None:
     for seen, samples in ((GOOD, 5000), (shifted, 200), (GOOD._replace(toe_force=330.0), 100)):
         for _ in range(samples):
             state = safety.monitor(RULES, state, flat, flat, seen, PERIOD)
-    assert state.level == signs.HELPS
+    assert state.level == HELPS
     assert 0.0 < state.readings.heel_unchanged < RULES.frozen_time, "only the time of the shifts counts"
 
 
@@ -500,5 +501,5 @@ def test_a_chamber_may_be_thin_for_a_moment_only(sensor: str) -> None:
     for _ in range(130):
         state = safety.monitor(RULES, state, flat, flat, GOOD._replace(**{sensor: 5.5e4}), PERIOD)
         levels.append(state.level)
-    assert max(levels[:119]) == signs.HELPS
-    assert (levels[-1], state.finding.sign) == (signs.STOPPED, signs.PRESSURE_RANGE)
+    assert max(levels[:119]) == HELPS
+    assert (levels[-1], state.finding.sign) == (STOPPED, signs.PRESSURE_RANGE)

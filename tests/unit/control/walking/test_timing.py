@@ -14,6 +14,7 @@ from ppafo.control.walking.phases import PhaseRules
 from ppafo.control.walking.timing import TimingKind
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import ScenarioError
+from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
 
@@ -112,7 +113,7 @@ def test_a_strike_that_does_not_come_is_no_landing_for_ever() -> None:
 
 def test_the_delay_of_the_valve_is_a_lead() -> None:
     rules, clock = settings(timing.FRACTIONAL, valve_delay=0.03), gait_clock.CLOCK_START._replace(fraction=0.5)
-    stance = phases.START._replace(phase=phases.MID_STANCE, stride_time=1.2)
+    stance = phases.START._replace(phase=MID_STANCE, stride_time=1.2)
     assert timing.fractional_time(rules, clock, stance).since_strike == pytest.approx(0.5 * 1.2 + 0.03)
 
 
@@ -156,7 +157,7 @@ def test_a_clock_that_a_strike_left_before_it_is_not_moved_where_nothing_is_esti
     measurement = GaitMeasurement(1.6, 1.0e5, 1.0e5, 0.0, 0.0, 0.0)
     found = estimated_timing.passed_knot(rules.estimation, clock, at, 0.0, measurement)
     assert (found.clock.fraction, found.moved) == (fraction, 0.0)
-    assert estimated_timing.gait_time(rules, found, phases.START._replace(phase=phases.LANDING)).since_strike == 0.0
+    assert estimated_timing.gait_time(rules, found, phases.START._replace(phase=LANDING)).since_strike == 0.0
 
 
 def learnt(shape: Floats) -> LearntStride:
@@ -254,7 +255,7 @@ def test_nothing_pushes_on_a_loaded_heel_and_a_stop_is_for_good_whatever_is_pred
     for angle, on_heel, on_toe, wrong in zip(angles(phase % 1.0), heel, toe, noise, strict=True):
         measurement = GaitMeasurement(angle * wrong[0], 1.4e5, 1.4e5, 0.0, on_heel * wrong[1], on_toe * wrong[2])
         command, state = kind.update(parameters, state, 0.0, measurement, PERIOD)
-        pushed += command > 0.0 and command <= 1.0 and state.phase.phase == phases.PUSH_OFF
+        pushed += command > 0.0 and command <= 1.0 and state.phase.phase == PUSH_OFF
         assert state.phase.heel.loaded < 0.5 or not 0.0 < command <= 1.0
     assert pushed > 100
     broken = GaitMeasurement(1.6, 1.4e5, 1.4e5, 0.0, 9.0e3, 0.0)

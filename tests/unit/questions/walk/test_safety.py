@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from ppafo.constants import PASCALS_PER_PSI
-from ppafo.control.walking.signs import LIFTS, NOT_FLAT, SIGNS
+from ppafo.control.walking.signs import NOT_FLAT, SIGNS
+from ppafo.model.helping import LIFTS
 from ppafo.questions.walk.reacting import reacting_answer
 from ppafo.questions.walk.safety import safety_remarks
 from ppafo.signals import Channel
@@ -28,29 +29,28 @@ def test_the_answer_of_a_wearer_who_reacts_says_and_shows_where_help_was_less() 
     compared = compare_walks(load_walk("reacting"), 0.1)
     assert "The walk over time" not in {section.heading for section in reacting_answer(compared).sections}
     sign = SIGNS[NOT_FLAT]
-    event = SafetyEvent(2.0, LIFTS, sign, {"heel_force": 6e-33, "toe_force": 319.4}, leg="right leg")
+    event = SafetyEvent(2.0, LIFTS, sign, {"heel_force": 6e-33, "toe_force": 319.4})
     worn = compared.with_device
     helped = np.arange(worn.helped.size) < 1
     answer = reacting_answer(replace(compared, with_device=replace(worn, events=(event,), helped=helped)))
     assert "The walk over time" in {section.heading for section in answer.sections}
     first, second = answer.sections[0].remarks[-2:]
-    assert first.startswith("right leg: lift-only (no push-off) from 2.00 s: ")
+    assert first.startswith("lift-only (no push-off) from 2.00 s: ")
     assert first.endswith("; heel 0 N, toe 319 N")
     assert second == f"help in 1 of {helped.size} strides: fewer than half"
     ends = {name for name, *_ in answer.sections[0].table.rows}  # type: ignore[union-attr]
     assert "Strides with help, of gas and push-off" in ends
     (written,) = answer.data["events"]
-    assert (written["leg"], written["time"], written["sign"]) == ("right leg", 2.0, sign.name)
+    assert (written["time"], written["sign"]) == (2.0, sign.name)
 
 
 @pytest.mark.long
-def test_a_pressure_far_above_the_supply_is_said_with_its_chamber_and_leg() -> None:
+def test_a_pressure_far_above_the_supply_is_said_with_its_chamber() -> None:
     """Of a healthy wearer none is; gauge pressure counts from the atmosphere of the device."""
     overrides = ["supply.atmospheric_pressure=80 kPa_a", "supply.dorsiflexion_pressure=30 psi_g"]
     worn = compare_walks(load_walk("reacting", overrides=overrides), 0.1).with_device
     assert safety_remarks(worn) == []
     pressed = Channel(np.full(worn.recording.time.size, 80.0e3 + 100.0 * PASCALS_PER_PSI), "Pa")
-    for channel, words in (("pressure_2", "chamber 2"), ("other_pressure_2", "chamber 2 of the right leg")):
-        channels = {**worn.recording.channels, channel: pressed}
-        (said,) = safety_remarks(replace(worn, recording=replace(worn.recording, channels=channels)))
-        assert said.startswith(f"the pressure in {words} reaches 100 psi_g, and its supply is set to 30 psi_g: ")
+    channels = {**worn.recording.channels, "pressure_2": pressed}
+    (said,) = safety_remarks(replace(worn, recording=replace(worn.recording, channels=channels)))
+    assert said.startswith("the pressure in chamber 2 reaches 100 psi_g, and its supply is set to 30 psi_g: ")
