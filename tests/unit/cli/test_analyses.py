@@ -39,7 +39,7 @@ def commands(tuning: Path) -> dict[str, list[str]]:
             *("--width", "20 %", "--first-draws", "64", "--draws", "512", *SHORT),
         ],
         "sensitivity": [
-            *("sensitivity", STUDY, "--method", "morris", "--samples", "8", "--metric", "gas_supplied"),
+            *("sensitivity", STUDY, "--samples", "64", "--metric", "gas_supplied"),
             *("--configuration", "proportional", "--independent", *SHORT),
         ],
         "tune": ["tune", str(tuning)],
@@ -157,7 +157,7 @@ def test_an_interruption_leaves_nothing(
         (["montecarlo", STUDY, "--metric", "rms_eror", "--configuration", "solenoid"], "did you mean 'rms_error'"),
         (["montecarlo", STUDY, "--metric", "rms_error"], "choose one: proportional, solenoid"),
         (["montecarlo", "pressure-and-area", "--metric", "rms_error"], "varied over a grid or list"),
-        (["sensitivity", STUDY, "--method", "moris"], "there is no method 'moris', did you mean 'morris'"),
+        (["sensitivity", STUDY, "--method", "shaply"], "there is no method 'shaply', did you mean 'shapley'"),
         (["sensitivity", STUDY, "--method", "sobol", "--configuration", "solenoid"], "--independent"),
         (["tune"], "no tuning was given"),
         (["tune", "pid-gain"], "there is no tuning 'pid-gain', did you mean 'pid-gains'"),
