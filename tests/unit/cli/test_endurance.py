@@ -102,28 +102,6 @@ def test_the_old_names_of_gas_and_time_of_a_stride_are_read_for_one_version_and_
     assert "--step-time is now called --stride-time" in before.err
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ([], "give either a recording or --gas-per-stride"),
-        (["--gas-per-stride", "0.3"], "--gas-per-stride 0.3: a number without a unit does not fit"),
-        (["--gas-per-stride", "0.3 g", "--stride-time", "1 m"], "--stride-time 1 m"),
-        (["--gas-per-stride", "0.3 g", "--peak-flow", "0.1 g/s"], "at least the mean flow"),
-        (["--gas-per-stride", "0.3 g", "--bottle", "paper-co2"], "did you mean 'paper-co2-9oz'"),
-        (["--gas-per-stride", "0.3 g", "--set", "room.temprature=0 degC"], "did you mean 'room.temperature'"),
-        (["--gas-per-stride", "0.3 g", "--rest", "-1 min"], "rest must be at least 0 s"),
-        (["."], ".: contains no result of a walk or a simulation"),
-        (["absent.csv"], "absent.csv: cannot be read"),
-    ],
-)
-def test_mistakes_are_one_line(words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["endurance", *words]) == 2
-    printed = capsys.readouterr()
-    assert said in printed.err
-    assert printed.err.count("\n") == 1
-    assert printed.out == ""
-
-
 def test_a_largest_flow_beside_a_recording_is_refused(walk: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["endurance", str(walk), "--peak-flow", "5 g/s"]) == 2
     assert "--peak-flow belongs to --gas-per-stride" in capsys.readouterr().err
