@@ -59,9 +59,7 @@ format: $(READY)
 	$(BIN)/ruff format src tests benchmarks scripts
 	$(BIN)/ruff check --fix src tests benchmarks scripts
 
-# The benchmark also needs JAX, which is large; it goes into the same environment, from its own lock file.
 bench: $(READY)
-	$(call install,requirements-bench.lock)
 	$(BIN)/python -m benchmarks --out out/bench
 
 # Whether every run has its golden bits on several processors, by several compilers and on emulated machines: an hour or more.
@@ -104,13 +102,13 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 install_with = PATH="$$PATH:$(BIN)" uv pip install --quiet --python $(BIN)/python $(1) || $(PIP) $(1)
 install = $(call install_with,--require-hashes --requirement $(1))
 
-# Writes the lock files anew (needs uv); everybody else only reads them. Each of the last three holds one extra, in versions that go with the others.
+# Writes the lock files anew (needs uv); everybody else only reads them. Each of the last two holds one extra, in versions that go with the others.
 COMPILE := uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header
 lock:
 	$(COMPILE) --extra checkout --output-file requirements.lock pyproject.toml
 	$(COMPILE) --extra checkout --extra dev --constraint requirements.lock --output-file requirements-dev.lock pyproject.toml
 	echo uv | $(COMPILE) --output-file requirements-uv.lock -
-	for extra in bench docs release; do \
+	for extra in docs release; do \
 		$(COMPILE) --extra $$extra --constraint requirements-dev.lock --output-file requirements-$$extra.lock pyproject.toml || exit 1; done
 
 clean:

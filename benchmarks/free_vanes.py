@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from benchmarks.report import Line, Target, has_avx512
-from benchmarks.timing import Contender, time_in_turn
+from benchmarks.timing import time_in_turn
 from ppafo.engine.lanes import Batch, run_batch
 from ppafo.simulation.ensemble.planning import plan_ensemble
 from ppafo.simulation.loading import load_scenario
@@ -40,9 +40,9 @@ def measure_free_vanes(runs: int, repetitions: int, say: Callable[[str], None]) 
     say(f"{runs} step responses of free vanes, four kinds")
     batches = free_vanes(runs)
     simulated = runs * load_scenario(SCENARIO).duration
-    contenders = {name: Contender(partial(_run_all, group)) for name, group in batches.items()}
+    contenders = {name: partial(_run_all, group) for name, group in batches.items()}
     for contender in contenders.values():
-        contender.run()
+        contender()
     timings = time_in_turn(contenders, repetitions)
     return [
         Line(

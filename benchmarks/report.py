@@ -9,7 +9,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-PACKAGES = ("ppafo", "numpy", "numba", "llvmlite", "scipy", "scikit-sundae", "jax", "jaxlib")
+PACKAGES = ("ppafo", "numpy", "numba", "llvmlite", "scipy", "scikit-sundae")
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ def _version(package: str) -> str | None:
 
 SCHEMA_VERSION = 1
 HEADINGS = ("what", "value", "spread", "target", "met")
-MISSING_EXTRA = "not measured: pip install ppafo[bench]"
+MISSING_EXTRA = "not measured: pip install scikit-sundae"
 
 
 @dataclass(frozen=True, slots=True)

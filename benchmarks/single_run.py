@@ -15,7 +15,7 @@ from benchmarks.sampled_solvers import (
     solve_by_samples,
 )
 from benchmarks.task import torque_task, torque_task_scenario
-from benchmarks.timing import Contender, Timing, time_in_turn
+from benchmarks.timing import Timing, time_in_turn
 from ppafo.engine.lanes import Floats, run_batch
 from ppafo.engine.run import Run, batch_of
 from ppafo.simulation.simulate import simulate, simulate_many
@@ -72,15 +72,17 @@ def measure_single_run(duration: float, repetitions: int, say: Callable[[str], N
     """Lines about one run of ``duration`` [s]."""
     run = torque_task(duration)
     present = [competitor for competitor in COMPETITORS if competitor.is_installed()]
-    contenders = {"lanes": Contender(lambda: [lane_states(run) for _ in range(CALLS_PER_REPETITION)])}
+    contenders: dict[str, Callable[[], object]] = {
+        "lanes": lambda: [lane_states(run) for _ in range(CALLS_PER_REPETITION)]
+    }
     scenario = torque_task_scenario(duration)
     contenders |= {
-        "simulate": Contender(lambda: [simulate(scenario).metrics for _ in range(CALLS_PER_REPETITION)]),
-        "many": Contender(lambda: simulate_many([scenario] * MANY, threads=1)),
-        "many_read": Contender(lambda: [result.metrics for result in simulate_many([scenario] * MANY, threads=1)]),
+        "simulate": lambda: [simulate(scenario).metrics for _ in range(CALLS_PER_REPETITION)],
+        "many": lambda: simulate_many([scenario] * MANY, threads=1),
+        "many_read": lambda: [result.metrics for result in simulate_many([scenario] * MANY, threads=1)],
     }
     for name in ("simulate", "many_read"):
-        contenders[name].run()
+        contenders[name]()
     contenders |= {competitor.id: _contender(run, competitor) for competitor in present}
     say("one run: warming up")
     states = {"lanes": lane_states(run)} | {
@@ -97,8 +99,8 @@ def measure_single_run(duration: float, repetitions: int, say: Callable[[str], N
     return lines + _error_lines(run, states, say)
 
 
-def _contender(run: Run, competitor: Competitor) -> Contender:
-    return Contender(lambda: solve_by_samples(run, competitor.make(run, competitor.tolerance)))
+def _contender(run: Run, competitor: Competitor) -> Callable[[], object]:
+    return lambda: solve_by_samples(run, competitor.make(run, competitor.tolerance))
 
 
 def _lane_line(duration: float, lanes: Timing) -> Line:

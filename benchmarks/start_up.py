@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from benchmarks.report import Line, Target
-from benchmarks.timing import Contender, Timing, run_python, time_in_turn
+from benchmarks.timing import Timing, run_python, time_in_turn
 from ppafo.engine.cache import CACHE_VARIABLE
 from ppafo.errors import SimulationError
 
@@ -55,7 +55,7 @@ def _timed(words: Sequence[str], folder: Path, times: int) -> Timing | str:
             raise SimulationError(f"ppafo {words[0]}: {outcome.complaint}")
 
     try:
-        return time_in_turn({"command": Contender(call)}, times)["command"]
+        return time_in_turn({"command": call}, times)["command"]
     except SimulationError as error:
         return str(error)
 

@@ -71,32 +71,18 @@ class Timing:
         return Timing(self.seconds + other.seconds)
 
 
-def no_preparation() -> None:
-    """Nothing to do."""
-
-
-@dataclass(frozen=True, slots=True)
-class Contender:
-    """Something to time, and what must be done before each time without being timed."""
-
-    run: Callable[[], object]
-    prepare: Callable[[], None] = no_preparation
-
-
-def time_once(contender: Contender) -> float:
-    """Duration [s] of one run."""
-    contender.prepare()
+def _once(run: Callable[[], object]) -> float:
     start = time.perf_counter()
-    contender.run()
+    run()
     return time.perf_counter() - start
 
 
-def time_in_turn(contenders: Mapping[str, Contender], repetitions: int) -> dict[str, Timing]:
+def time_in_turn(contenders: Mapping[str, Callable[[], object]], repetitions: int) -> dict[str, Timing]:
     """Durations [s] by name; every round runs each contender once, and the rounds begin with another one in turn."""
     names = list(contenders)
     seconds: dict[str, list[float]] = {name: [] for name in names}
     for repetition in range(repetitions):
         first = repetition % max(1, len(names))
         for name in names[first:] + names[:first]:
-            seconds[name].append(time_once(contenders[name]))
+            seconds[name].append(_once(contenders[name]))
     return {name: Timing(tuple(values)) for name, values in seconds.items()}

@@ -39,7 +39,6 @@ def is_like(shown: str, printed: str) -> bool:
 def test_the_commands_of_the_page_print_what_it_shows(
     page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    pytest.importorskip("SALib")
     monkeypatch.chdir(tmp_path)
     for text in blocks(page, "toml"):
         name = re.search(r'^name = "(.+?)"$', text, re.MULTILINE)
@@ -55,7 +54,6 @@ def test_the_commands_of_the_page_print_what_it_shows(
 
 @pytest.mark.parametrize("page", PRINTED_BY_PYTHON)
 def test_the_python_of_the_page_prints_what_it_says(page: str, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("SALib")
     names: dict[str, Any] = {}
     exec(blocks(page, "python")[0], names)
     assert capsys.readouterr().out == PRINTED_BY_PYTHON[page]

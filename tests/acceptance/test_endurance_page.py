@@ -37,8 +37,8 @@ def test_the_commands_of_the_page_run_one_after_the_other_and_give_its_numbers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert len(COMMANDS) == 15
-    steps, savings = [], []
+    assert len(COMMANDS) == 12
+    steps = []
     for words in COMMANDS:
         if words[0] != "endurance" or "--list" in words or words[:2] == SEVERAL[:2]:
             assert main(words) == 0
@@ -47,15 +47,13 @@ def test_the_commands_of_the_page_run_one_after_the_other_and_give_its_numbers(
         else:
             document = results(words, capsys)
             steps.append(round(document["result"]["strides"]))  # type: ignore[index]
-            savings += [document["reuse"]["balance"]["returned_mass"]] if "reuse" in document else []  # type: ignore[index]
-    for count in steps[:-1]:
+    for count in steps:
         assert re.search(rf"\b{count} (strides|tasks)", TEXT), count
-    assert [f"{saved * 1e3:.3g}" for saved in savings] == re.findall(r"saves (\S+) g", TEXT)
     assert (tmp_path / "out" / "bottle" / "endurance.png").is_file()
-    saved = results([*SEVERAL[:2], "--reuse", "reservoir_volume=50 cm^3"], capsys)
+    life = results(SEVERAL[:2], capsys)
     exec(re.findall(r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)[0], {})
-    grams, minutes = 1e3 * saved["reuse"]["balance"]["returned_mass"], saved["result"]["walking_time"] / 60.0  # type: ignore[index]
-    assert capsys.readouterr().out == f"{grams:.3f} g less a stride, {minutes:.2f} min\n"
+    strides, minutes = life["result"]["strides"], life["result"]["walking_time"] / 60.0  # type: ignore[index]
+    assert capsys.readouterr().out == f"{strides:.0f} strides, {minutes:.2f} min\n"
 
 
 def shown_below(words: list[str]) -> list[str]:

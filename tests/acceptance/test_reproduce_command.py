@@ -197,35 +197,6 @@ def test_a_missed_window_is_named_and_fails_unless_values_were_changed(
     assert "missed: co2_solenoid" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (["--set", "supply.presure=60 psi_g"], "did you mean 'supply.pressure'"),
-        (["--set", "valve.area=-1 mm^2"], "valve"),
-        (["--set", "nonsense"], "PATH=VALUE"),
-        (["--set", "referense.level=4 N m"], "did you mean 'reference.level'?"),
-        (["--set", "controller.integral_gian=1"], "did you mean 'controller.integral_gain'?"),
-        (["--set", "valve.aera=1 mm^2"], "no value 'valve.aera', did you mean 'valve.area'?"),
-    ],
-)
-def test_bad_input_is_one_line_and_nothing_is_written(
-    words: list[str], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["reproduce", "--out", str(tmp_path / "out"), *words]) == 2
-    complaint = [line for line in capsys.readouterr().err.splitlines() if not line.endswith(" ...")]
-    assert len(complaint) == 1
-    assert told in complaint[0]
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_place_that_cannot_be_written_is_refused_in_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "file").write_text("in the way", encoding="utf-8")
-    assert main(["reproduce", "--out", str(tmp_path / "file")]) == 2
-    assert capsys.readouterr().err.endswith("file: is a file; a result of 'ppafo reproduce' needs a folder\n")
-
-
 def test_a_folder_of_somebody_elses_is_refused_before_anything_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -7,20 +7,17 @@ import pytest
 
 from benchmarks import __main__ as command
 from benchmarks import single_run, start_up, study
-from benchmarks.ensemble import Findings, _metrics_line, _scaling_line, _variants
-from benchmarks.ensemble_worker import JaxEnsemble, Order, largest_difference, metrics_of
-from benchmarks.jax_model import state_of, task_of
-from benchmarks.jax_program import Variant
+from benchmarks.ensemble import _metrics_line, _scaling_line
+from benchmarks.ensemble_worker import Order, metrics_of
 from benchmarks.report import MISSING_EXTRA, BenchReport, Line, Machine, Target, describe_machine, number_text
 from benchmarks.sampled_solvers import solve_by_samples
 from benchmarks.single_run import COMPETITORS, lane_states, measure_single_run, pressure_error
-from benchmarks.task import ensemble, named_rows, torque_task
-from benchmarks.timing import Contender, Timing, run_python, time_in_turn
-from ppafo.engine.lanes import run_batch
+from benchmarks.task import ensemble, named_rows, torque_task, volumes_of
+from benchmarks.timing import Timing, run_python, time_in_turn
 from ppafo.metrics import gas, switching, tracking
 from tests.judge.reference_solver import solve_reference
 
-MACHINE = Machine("a processor", "an OS", 2, True, "3.11.0", {"numpy": "2.0", "jax": None})
+MACHINE = Machine("a processor", "an OS", 2, True, "3.11.0", {"numpy": "2.0", "scikit-sundae": None})
 SHORT = 0.3
 
 
@@ -79,41 +76,15 @@ def test_all_runs_of_the_ensemble_differ_and_the_next_one_is_the_same():
 def test_all_runs_of_the_ensemble_start_at_atmospheric_pressure():
     batch = ensemble(8, 0.01)
     rows = named_rows(batch.program.parameter_rows(), batch.parameters)
-    start = state_of(batch, batch.states)
-    task = task_of(batch)
-    assert np.allclose(start.mass_1 * task.per_mass_1, rows["plant.atmospheric_pressure"], rtol=1e-12)
-    assert np.allclose(start.mass_2 * task.per_mass_2, rows["plant.atmospheric_pressure"], rtol=1e-12)
-
-
-def test_numbers_that_all_runs_share_become_constants_for_jax():
-    task = task_of(ensemble(8, 0.01))
-    assert isinstance(task.leak_conductance, float)
-    assert isinstance(task.valve_conductance, np.ndarray)
-
-
-@pytest.mark.parametrize("variant", [Variant(0, 1, 1), Variant(4, 2, 1)])
-def test_jax_gives_the_numbers_of_the_lanes(variant):
-    pytest.importorskip("jax")
-    batch = ensemble(16, SHORT)
-    assert largest_difference(batch, run_batch(batch).states, JaxEnsemble(batch, variant).run()) < 1e-9
-
-
-def test_a_difference_between_lanes_and_jax_is_seen():
-    batch = ensemble(4, 0.05)
-    lanes = run_batch(batch).states
-    same = state_of(batch, lanes)
-    assert largest_difference(batch, lanes, same) == 0.0
-    assert largest_difference(batch, lanes, same._replace(mass_2=same.mass_2 * (1.0 + 1e-6))) > 1e-7
+    start = named_rows(batch.program.state_rows(), batch.states)
+    for name, volume in zip(("mass_1", "mass_2"), volumes_of(batch), strict=True):
+        pressure = start[f"state.{name}"] * rows["plant.gas_product"] / volume
+        assert np.allclose(pressure, rows["plant.atmospheric_pressure"], rtol=1e-12)
 
 
 def test_an_order_to_a_worker_survives_the_way_there():
-    order = Order(64, 0.5, 3, (0, 1), (1, 2), (Variant(0, 1, 2), Variant(32, 4, 1)))
+    order = Order(64, 0.5, 3, (0, 1), (1, 2))
     assert Order.read(order.text()) == order
-
-
-def test_variants_of_jax_divide_the_runs():
-    for variant in _variants(1024, 3):
-        assert 1024 % (max(1, variant.block) * variant.devices) == 0
 
 
 def test_a_solver_that_is_not_installed_is_not_measured_and_no_error(monkeypatch):
@@ -136,16 +107,14 @@ def test_the_ratio_to_a_solver_is_its_time_over_ours():
 
 
 def test_scaling_is_the_best_of_one_thread_over_the_best_of_two():
-    findings = Findings()
-    findings.add({"seconds": {"lanes 1": [4.0, 2.0], "lanes 2": [1.25, 3.0]}, "difference": None}, "")
-    assert _scaling_line(findings).value == pytest.approx(1.6)
-    assert _scaling_line(findings).met is False
+    timings = {"lanes 1": Timing((4.0, 2.0)), "lanes 2": Timing((1.25, 3.0))}
+    assert _scaling_line(timings).value == pytest.approx(1.6)
+    assert _scaling_line(timings).met is False
 
 
 def test_speed_with_metrics_is_the_time_without_over_the_time_with():
-    findings = Findings()
-    findings.add({"seconds": {"lanes 2": [1.0, 0.9], "lanes with metrics 2": [1.0, 1.5]}, "difference": None}, "")
-    line = _metrics_line("id", "two threads", findings, 2)
+    timings = {"lanes 2": Timing((1.0, 0.9)), "lanes with metrics 2": Timing((1.0, 1.5))}
+    line = _metrics_line("id", "two threads", timings, 2)
     assert line.value == pytest.approx(0.9)
     assert line.spread == pytest.approx((0.6, 1.0))
     assert line.met is True
@@ -158,17 +127,6 @@ def test_the_metrics_that_are_timed_are_those_of_the_single_runs():
     assert all(values.shape == (3,) for values in timed.values())
     assert np.isfinite(timed["rms_error"]).all()
     assert np.unique(timed["gas_supplied"]).size == 3
-
-
-def test_the_best_of_jax_is_taken_over_all_flags_and_the_worst_difference():
-    findings = Findings()
-    findings.add({"seconds": {"lanes 1": [1.0], "a": [5.0]}, "difference": 1e-12}, "default")
-    findings.add({"seconds": {"lanes 1": [0.9], "a": [4.0, 6.0]}, "difference": 1e-14}, "fast")
-    name, timing = findings.best_jax()
-    assert (name, timing.best) == ("a, fast", 4.0)
-    assert findings.best_jax("default")[0] == "a, default"
-    assert findings.timings["lanes 1"].best == 0.9
-    assert findings.difference == 1e-12
 
 
 def test_a_command_that_fails_at_the_start_is_not_measured(monkeypatch):
@@ -194,14 +152,10 @@ def test_a_child_reports_its_exit_code_output_and_last_complaint():
     assert (outcome.code, outcome.output, outcome.complaint) == (3, "here\n", "b")
 
 
-def test_contenders_are_timed_in_turn_and_prepared_outside_the_time():
+def test_contenders_are_timed_in_turn():
     order = []
-    contenders = {
-        "a": Contender(lambda: order.append("a"), lambda: order.append("ready a")),
-        "b": Contender(lambda: order.append("b")),
-    }
-    timings = time_in_turn(contenders, 2)
-    assert order == ["ready a", "a", "b", "b", "ready a", "a"]
+    timings = time_in_turn({"a": lambda: order.append("a"), "b": lambda: order.append("b")}, 2)
+    assert order == ["a", "b", "b", "a"]
     assert len(timings["a"].seconds) == 2
 
 
@@ -228,7 +182,7 @@ def test_the_report_counts_its_targets_and_is_valid_json():
     document = json.loads(json.dumps(report_of(*lines).document(), allow_nan=False))
     assert document["targets"] == {"met": 1, "missed": 1, "not_measured": 1}
     assert [line["met"] for line in document["lines"]] == [True, False, None, None]
-    assert document["machine"]["packages"]["jax"] is None
+    assert document["machine"]["packages"]["scikit-sundae"] is None
 
 
 def test_the_text_shows_value_target_and_verdict_of_every_line():

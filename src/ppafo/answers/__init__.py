@@ -107,4 +107,4 @@ class Answer:
         return tuple(section.figure for section in self.sections if section.figure is not None)
 
 
-__all__ = ["Answer", "Column", "Figure", "LivePart", "Section", "Table"]
+__all__ = ["Answer", "Cell", "Column", "Figure", "LivePart", "Section", "Table"]

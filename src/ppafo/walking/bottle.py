@@ -431,17 +431,15 @@ def life_on_bottle(
     supply: BottleSupply,
     stride_time: float,
     schedule: Schedule,
-    saved: float = 0.0,
     progress: Callable[[float, float], None] = lambda _done, _total: None,
 ) -> BottleLife:
     """Walk until the bottle ends it: the same run as ``run_on_bottle``, with rests, and repeated where it is a course.
 
-    ``saved`` is the fraction of the gas that a reservoir gives back in every stride. The run is planned for as long as
-    may be walked at most.
+    The run is planned for as long as may be walked at most.
     """
     use = _Use([(0.0, supply.start(), supply.offers_first())])
     while use.ending is None and use.walked + use.rested < schedule.longest:
-        _use_bottle(run, device, supply, stride_time, use, progress, schedule, 1.0 - saved)
+        _use_bottle(run, device, supply, stride_time, use, progress, schedule)
     length = stride_time if run.walk is None or run.walk.course is None else batch_of(run).clock.step_count * run.step
     return BottleLife(_course_of_use(supply, use), use.walked, use.walked + use.rested, use.walked / length)
 
@@ -459,7 +457,6 @@ def _use_bottle(
     use: _Use,
     progress: Callable[[float, float], None],
     schedule: Schedule | None = None,
-    passed: float = 1.0,
 ) -> tuple[BatchResult, int]:
     """Walk a run on a bottle in ``use``, which is brought up to date; return its rows and the steps that were done."""
     batch = batch_of(run)
@@ -499,7 +496,7 @@ def _use_bottle(
         if use.ending is not None:
             break
         now_regulated = float(block.states[regulated, 0].sum())
-        mass, before = passed * (now_regulated - before), now_regulated
+        mass, before = now_regulated - before, now_regulated
         content = met[-1][2].content
         state = advance_supply(table, supply.line, supply.bottle.supply, state, content, mass, steps * run.step)
         now = supply.offers(state, content.temperature, mass)
@@ -519,7 +516,7 @@ def _use_bottle(
                 gauges, until_rest = [(done, 1.0)], round(schedule.walk / run.step)
                 if use.walked + use.rested >= schedule.longest:
                     break
-    use.regulated += passed * (before - first)
+    use.regulated += before - first
     return block.result(), done
 
 

@@ -91,12 +91,11 @@ def walk(
     return result_of_walk(chosen, run, outcome, supply)
 
 
-def bottle_life(scenario: Scenario, schedule: Schedule, saved: float = 0.0, progress: Progress = silent) -> BottleLife:
+def bottle_life(scenario: Scenario, schedule: Schedule, progress: Progress = silent) -> BottleLife:
     """Walk on the bottle of a walk until that ends it: the one answer to how long a device lasts.
 
     It is the run of ``walk`` on a bottle, for as long as ``schedule`` allows, with its rests; a course is repeated.
-    ``saved`` is the fraction of the gas that a reservoir gives back. Faults are left out: a device that has stopped
-    empties no bottle. ScenarioError for a walk on no bottle.
+    Faults are left out: a device that has stopped empties no bottle. ScenarioError for a walk on no bottle.
     """
     sound = dict.fromkeys(walk_of(scenario).faults, FaultSettings())
     scenario = replace(scenario, motion=replace(walk_of(scenario), faults=sound, broken={}))
@@ -116,7 +115,7 @@ def bottle_life(scenario: Scenario, schedule: Schedule, saved: float = 0.0, prog
     if planned is None:
         whole = replace(whole, output_interval=unrecorded)
     run = plan_walk(whole)
-    return life_on_bottle(run, fed_device(whole), motion.bottle, motion.gait.stride_time, schedule, saved, progress)
+    return life_on_bottle(run, fed_device(whole), motion.bottle, motion.gait.stride_time, schedule, progress)
 
 
 def lasting(scenario: Scenario, minutes: float | None) -> Scenario:

@@ -134,37 +134,6 @@ def test_an_interrupted_study_writes_nothing_and_ends_with_130(
     assert "interrupted; nothing is half written" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["design"], "no design was given: name one (push-off, torque-task) or give a .toml file"),
-        (["design", "torque-tusk"], "there is no design 'torque-tusk', did you mean 'torque-task'?"),
-        (["design", "torque-task", "--seed", "-1"], "--seed -1: must be a whole number, 0 or more"),
-        (
-            ["design", "torque-task", "--seed", "4294967296"],
-            "seed = 4294967296: must be a whole number from 0 to 429496",
-        ),
-        (["design", "push-off", "--threads", "0"], "--threads 0: must be a whole number, 1 or more"),
-        (["design", "push-off", "--seed", "1"], "push-off: nothing is drawn for a profile"),
-        (["design", "--mass", "70 kg", "--seed", "1"], "for a wearer give --torque, --pressure, --minutes too"),
-        (["design", "push-off", "--mass", "70 kg"], "--mass: the design file states what is wanted"),
-        (["size", "push-off"], "'size' is now part of 'design': 'ppafo design' takes the same arguments"),
-        (["schema", "size"], "the format 'size' is now part of 'design'; print that one"),
-        (["parts", "enfield"], "there is no part 'enfield'"),
-        (["parts", "--catalogue", "mine.toml"], "mine.toml: cannot be read"),
-    ],
-)
-def test_bad_input_is_one_line_and_2(
-    words: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main([*words, "--out", "out"]) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    assert message in said
-    assert not (tmp_path / "out").exists()
-
-
 def test_files_of_the_package_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["design", "--list"]) == 0
     assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == ["push-off", "torque-task"]

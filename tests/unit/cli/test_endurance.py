@@ -63,7 +63,7 @@ def test_a_recording_is_repeated(walk: Path, capsys: pytest.CaptureFixture[str])
 def test_the_folder_has_all_files_and_is_made_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
     assert main([*QUICK, "--out", str(out)]) == 0
-    assert main([*QUICK, "--reuse", "reservoir_volume=50 cm^3", "--out", str(out)]) == 0
+    assert main([*QUICK, "--out", str(out)]) == 0
     figures = {"endurance.png", "endurance.svg"}
     assert {path.name for path in out.iterdir()} == figures | {
         "bottle.csv",
@@ -76,9 +76,6 @@ def test_the_folder_has_all_files_and_is_made_again(tmp_path: Path, capsys: pyte
     assert course.kind == "simulated"
     assert course["bottle_mass"][0] == pytest.approx(0.255)
     report = (out / "report.html").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
-    assert "without reuse" in report
-    assert "<td>reservoir_volume</td><td>50 cm³</td><td>given</td>" in report
-    assert "<td>fill_pressure</td><td>50 psig</td>" in report
     assert "<td><code>bottle.room_heat_transfer</code></td><td>0.5 W/K</td><td>assumed</td>" in report
     assert (out / "endurance.png").stat().st_size > 10_000
 
@@ -103,30 +100,6 @@ def test_the_old_names_of_gas_and_time_of_a_stride_are_read_for_one_version_and_
     assert (before.out, now.err) == (now.out, "")
     assert "--gas-per-step is now called --gas-per-stride" in before.err
     assert "--step-time is now called --stride-time" in before.err
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ([], "give either a recording or --gas-per-stride"),
-        (["--gas-per-stride", "0.3"], "--gas-per-stride 0.3: a number without a unit does not fit"),
-        (["--gas-per-stride", "0.3 g", "--stride-time", "1 m"], "--stride-time 1 m"),
-        (["--gas-per-stride", "0.3 g", "--peak-flow", "0.1 g/s"], "at least the mean flow"),
-        (["--gas-per-stride", "0.3 g", "--bottle", "paper-co2"], "did you mean 'paper-co2-9oz'"),
-        (["--gas-per-stride", "0.3 g", "--set", "room.temprature=0 degC"], "did you mean 'room.temperature'"),
-        (["--gas-per-stride", "0.3 g", "--rest", "-1 min"], "rest must be at least 0 s"),
-        (["--gas-per-stride", "0.3 g", "--reuse", "reservoir_volume=50 cm^3"], "more than the 0.3 g"),
-        ([*QUICK[1:], *("--reuse", "reservoir_volume=50 cm^3") * 2], "--reuse reservoir_volume: given twice"),
-        (["."], ".: contains no result of a walk or a simulation"),
-        (["absent.csv"], "absent.csv: cannot be read"),
-    ],
-)
-def test_mistakes_are_one_line(words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["endurance", *words]) == 2
-    printed = capsys.readouterr()
-    assert said in printed.err
-    assert printed.err.count("\n") == 1
-    assert printed.out == ""
 
 
 def test_a_largest_flow_beside_a_recording_is_refused(walk: Path, capsys: pytest.CaptureFixture[str]) -> None:

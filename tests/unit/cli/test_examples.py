@@ -78,17 +78,3 @@ def test_what_is_there_is_not_touched(capsys: pytest.CaptureFixture[str]) -> Non
     assert main(["examples", "study", "--out", "mine"]) == 2
     assert "mine: already exists" in capsys.readouterr().err
     assert list(Path("mine").iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [(["studies"], "there is no example 'studies', did you mean 'study'?"), (["--out", "x"], "--out: needs the NAME")],
-)
-def test_a_wrong_request_is_refused_in_one_line(
-    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["examples", *words]) == 2
-    printed = capsys.readouterr().err
-    assert said in printed
-    assert printed.count("\n") == 1
-    assert list(Path().iterdir()) == []

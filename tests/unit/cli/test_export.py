@@ -79,13 +79,3 @@ def test_what_cannot_be_translated_is_refused_by_file_and_line_and_nothing_is_wr
     line = with_exponential.__code__.co_firstlineno + 4
     assert f"test_export.py:{line}: 'math.exp' is a function of a library" in capsys.readouterr().err
     assert not folder.exists()
-
-
-def test_bad_input_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "mine.txt").write_text("kept")
-    assert main(["export", "c", "step-response", "--out", str(tmp_path)]) == 2
-    assert main(["export", "c", "step-respons", "--out", str(tmp_path / "new")]) == 2
-    lines = capsys.readouterr().err.splitlines()
-    assert len(lines) == 2
-    assert "did you mean 'step-response'" in lines[1]
-    assert [item.name for item in tmp_path.iterdir()] == ["mine.txt"]

@@ -65,26 +65,14 @@ def test_the_schemas_describe_a_gait_file_and_a_map(capsys: pytest.CaptureFixtur
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["show", "falisse"], "there is no gait 'falisse'"),
-        (["show", "falisse2019-subject1", "--speed", "3 m/s"], "can be scaled from 1.06 to 1.6 m/s, not to 3 m/s"),
-        (["show", "falisse2019-subject1", "--speed", "1.2"], "--speed '1.2': a number without a unit"),
-        (["import", "WALK", "--body-mass", "62"], "--body-mass '62': a number without a unit"),
         (["import", "WALK", "--body-mass", "62 kg", "--stature", "180"], "--stature '180': a number without a unit"),
         (["import", "WALK", "--body-mass", "62 kg", "--stature", "180 m"], "a stature of 180 m is not plausible"),
-        (["import", "WALK", "--body-mass", "62 kg", "--side", "rigth"], "--side 'rigth': must be right or left"),
         (
             ["import", "WALK", "--body-mass", "62 kg", "--minimum-strides", "-"],
             "--minimum-strides '-': must be a whole",
         ),
         (["import", "WALK", "--body-mass", "62 kg", "--minimum-strides", "9"], "has 3 whole strides within"),
-        (["import", "none.mot", "--body-mass", "62 kg"], "none.mot: cannot be read: no such file"),
         (["import", "WALK", "--body-mass", "62 kg", "--map", "none.toml"], "none.toml: cannot be read"),
-        (["record", "falisse2019-subject1", "--out", "walk.txt"], "a recording is written as .csv"),
-        (
-            ["record", "falisse2019-subject1", "--strides", "0", "--out", "w.csv"],
-            "the number of strides must be from 1 to 100000, not 0",
-        ),
-        (["draw"], "invalid choice: 'draw'"),
     ],
 )
 def test_what_is_wrong_is_said_in_one_line(

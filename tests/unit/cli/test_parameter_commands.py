@@ -111,22 +111,6 @@ def test_a_line_break_in_a_name_does_not_break_the_line_of_the_message(capsys: p
         assert error.count("\n") == 1
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["sets", "show", "ppafo"],
-        ["audit", "nothing.toml"],
-        ["audit", "ppafo2011", "--set", "valve.area=12.6"],
-        ["schema", "paramters"],
-    ],
-)
-def test_bad_input_is_one_line_and_exit_code_2(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(words) == 2
-    error = capsys.readouterr().err
-    assert error.startswith("ppafo: ")
-    assert error.count("\n") == 1
-
-
 def test_the_schema_is_printed_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema", "parameters"]) == 0
     assert json.loads(capsys.readouterr().out)["title"] == "ppafo parameter set"

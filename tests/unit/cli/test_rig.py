@@ -62,30 +62,3 @@ def test_device_and_overrides_reach_the_rig(tmp_path: Path, capsys: pytest.Captu
     assert document["device"]["valve"]["orifice"]["area"] == pytest.approx(1e-5)
     assert document["preset"]["values"]["flow_sensor.noise"] == 0.0
     assert document["files"] == ["open-valve-flow.csv", "rig.json"]
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["step-respons"], "did you mean 'step-response'"),
-        (["static-torque", "--preset", "worn-seal"], "did you mean 'worn-seals'"),
-        (["static-torque", "--preset", "mine.toml"], "mine.toml: cannot be read"),
-        (["static-torque", "--seed", "one"], "--seed one: must be a whole number"),
-        (["static-torque", "--seed", "\uff11"], "--seed \uff11: must be a whole number"),
-        (["static-torque", "--seed", "-3"], "seed = -3"),
-        (["static-torque", "--device", "ppafo2010"], "did you mean 'ppafo2011'"),
-        (["static-torque", "--set", "friction.static=1"], "friction.static"),
-        (["static-torque", "--out", "file"], "--out file"),
-    ],
-)
-def test_bad_input_is_one_line_and_exit_code_2(
-    words: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "file").write_text("in the way")
-    assert main(["rig", "record", *words]) == 2
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert len(told.err.splitlines()) == 1
-    assert message in told.err
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]

@@ -116,28 +116,6 @@ def test_a_folder_with_other_files_is_refused_before_anything_runs(
     assert names(tmp_path) == ["thesis.txt"]
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["simulate"], "no scenario was given"),
-        (["simulate", "step-respons"], "did you mean 'step-response'"),
-        (["simulate", "step-response", "--set", "valve.area=3"], "area"),
-        (["plot", "nowhere"], "nowhere: is not a folder"),
-        (["plot", "nowhere", "--out", "figure.jpg"], r"must end in one of .png, .svg, .pdf"),
-    ],
-)
-def test_bad_input_is_one_line_and_exit_code_2(
-    words: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(words) == 2
-    error = capsys.readouterr().err
-    assert error.startswith("ppafo: ")
-    assert message in error
-    assert error.count("\n") == 1
-    assert names(tmp_path) == []
-
-
 def test_a_saved_result_is_drawn_again_without_running_it(
     saved: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

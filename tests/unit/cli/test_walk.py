@@ -173,8 +173,6 @@ def test_a_bottle_repeats_a_course_as_a_whole(tmp_path: Path, capsys: pytest.Cap
     folder = tmp_path / "along"
     assert main(["walk", "solenoid", "--course", "stairs", "--out", str(folder)]) == 0
     capsys.readouterr()
-    assert main(["endurance", str(folder), "--reuse", "reservoir_volume=50 cm^3"]) == 2
-    assert "the strides of course 'stairs' differ; take a walk without a course" in capsys.readouterr().err
     assert main(["endurance", str(folder), "--longest", "5 s"]) == 0
     assert "walk 'solenoid' on course 'stairs'" in capsys.readouterr().out
 
@@ -182,35 +180,6 @@ def test_a_bottle_repeats_a_course_as_a_whole(tmp_path: Path, capsys: pytest.Cap
 def test_the_schema_of_a_walk_file_is_published(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema", "walk"]) == 0
     assert "wearer" in json.loads(capsys.readouterr().out)["properties"]
-
-
-MISTAKES = {
-    "solenoit": "there is no walk 'solenoit', did you mean 'solenoid'?",
-    "--gait nobody": "there is no gait 'nobody'",
-    "solenoid --course corider": "there is no course 'corider', did you mean 'corridor'?",
-    "--minutes 0.01": "must be 0.087 min (5 strides) or more",
-    "--minutes nan": "a walk of nan min: must be",
-    "--minutes 1e9": "a walk of 1e+09 min: must be 0.087 min (5 strides) or more, and at most 60 min",
-    "--minutes -1": "a walk of -1 min: must be",
-    "--minutes soon": "--minutes 'soon': must be a number of minutes, or a time such as '90 s'",
-    "--set controller.unload_threshold=80N": "must be below controller.load_threshold, which is 60 N",
-    "--set controller.swing_angel=90deg": "did you mean 'controller.swing_angle'?",
-    "--wearers many": "--wearers many: must be a whole number",
-    "--wearers 0": "--wearers 0: must be a whole number, 1 or more",
-    "--wearers 3 --seed x": "--seed x: must be a whole number",
-    "--wearer 3 --configs x": "there is no option '--configs'",
-}
-
-
-@pytest.mark.parametrize("words", MISTAKES)
-def test_bad_input_is_one_line_and_writes_nothing(
-    words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["walk", *words.split(), "--out", str(tmp_path / "walk")]) == 2
-    shown = capsys.readouterr().err
-    assert MISTAKES[words] in shown
-    assert len(shown.splitlines()) == 1
-    assert names(tmp_path) == []
 
 
 def test_a_stop_is_told_with_its_sign_readings_settings_and_time(

@@ -327,22 +327,3 @@ def test_an_hour_of_samples_needs_little_memory() -> None:
     grown = tracemalloc.get_traced_memory()[0]
     tracemalloc.stop()
     assert grown / 20_000 < 200.0
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--duration", "10"], "--duration 10: "),
-        (["--duration", "-1 s"], "--duration -1 s: must be above 0 s"),
-        (["--patience", "0 s"], "--patience 0 s: must be above 0 s"),
-        (["--out", "bench.txt"], "--out bench.txt: must end in .csv"),
-    ],
-)
-def test_bad_words_are_one_line(
-    words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(["record", "--port", "udp:127.0.0.1:5000", "--out", "bench.csv", *words]) == 2
-    line = capsys.readouterr().err
-    assert said in line
-    assert len(line.splitlines()) == 1

@@ -58,15 +58,6 @@ QUESTION = Question(
             type=quantity("s"),
             default=86400.0,
         ),
-        Argument(
-            ("--reuse",),
-            "reuse",
-            "reuse the exhaust for dorsiflexion, for example 'reservoir_volume=50 cm^3'; values of the chambers "
-            "that are not given are taken from the walk; may be repeated",
-            metavar="NAME=VALUE",
-            action="append",
-            default=(),
-        ),
         SET,
     ),
     library="ppafo.parameters.bottles.bottle:FILE",

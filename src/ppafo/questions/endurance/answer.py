@@ -21,7 +21,6 @@ from ppafo.answers.style import (
     mark_kind,
 )
 from ppafo.model.cold_gas import heat_to_warm
-from ppafo.model.exhaust_reuse import ReuseBalance, ReuseCycle, reuse_balance
 from ppafo.model.source import bottle_content
 from ppafo.parameters.bottles.bottle import Bottle
 from ppafo.questions.endurance.discharge import Discharge
@@ -38,38 +37,20 @@ if TYPE_CHECKING:
     import matplotlib.figure
     from matplotlib.axes import Axes
 
-GIVEN = "given"
-
-
-@dataclass(frozen=True, slots=True)
-class Reuse:
-    """A cycle with a reservoir, and where its pressures and volumes come from, by name."""
-
-    cycle: ReuseCycle
-    origins: Mapping[str, str]
-
-    @property
-    def balance(self) -> ReuseBalance:
-        """The masses of a cycle once the reservoir has settled."""
-        return reuse_balance(self.cycle)
-
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Endurance(Solved):
     """The request and its result.
 
-    ``discharge`` is the requested course; ``without_reuse`` the same without reuse, where there is one.
-    ``strides_when_warm`` is the number of strides that a bottle which stays at room temperature gives: what cooling
-    costs. ``is_of_course`` is true where a stride is a course. ``others`` is the same for a walk or a run with other
-    readings of the paper's chambers, by their names.
+    ``discharge`` is the requested course. ``strides_when_warm`` is the number of strides that a bottle which stays at
+    room temperature gives: what cooling costs. ``is_of_course`` is true where a stride is a course. ``others`` is the
+    same for a walk or a run with other readings of the paper's chambers, by their names.
     """
 
     bottle: Bottle
     draw: Draw
     schedule: Schedule
     discharge: Discharge
-    reuse: Reuse | None
-    without_reuse: Discharge | None
     strides_when_warm: float
     is_of_course: bool = False
     others: Mapping[str, "Endurance"] = field(default_factory=dict)
@@ -137,17 +118,8 @@ _LEFT_OUT = (
     "Not in the model: a regulator that its gas cools or ices, unless somebody walks on the bottle; liquid carried out "
     "with the vapour, a bottle held upside down, leaking connections, and ice on the outside of the bottle."
 )
-_REUSE_ASSUMES = (
-    "A balance for ideal gas at constant temperature: pressures equalise, check valves have no losses, nothing "
-    "leaks, and the reservoir has settled over many strides."
-)
 _CAPTION = "Temperature, pressure and gas in the bottle from full to the end."
 _USE = (Column("gas use"), Column("gas per stride", "gas mass", ".3g"))
-_REUSED = (
-    Column("gas saved", "gas mass", ".3g"),
-    Column("walking with reuse", "duration"),
-    Column("strides with reuse"),
-)
 _COURSE = (Column("walking", "duration"), Column("strides"))
 
 
@@ -173,7 +145,6 @@ def _answer_of_one(found: Endurance) -> Answer:
             Section(table=Table((), tuple(_facts(found)))),
             Section("The bottle over time", figure=figure, remarks=(_LEFT_OUT,), is_detail=True),
             Section("Values", table=Table(head, rows, left=4), remarks=(properties,), is_detail=True),
-            *([] if found.reuse is None else [_reuse_section(found.reuse)]),
         ),
         data=_data(found),
         files={"bottle.csv": lambda: marked_csv_bytes(found.discharge.recording)},
@@ -183,9 +154,8 @@ def _answer_of_one(found: Endurance) -> Answer:
 def _answer_of_several(several: Endurances) -> Answer:
     uses = several.uses
     first = next(iter(uses.values()))
-    head = (*_USE, *_COURSE, *(_REUSED if first.reuse else ()), Column("ended"))
-    chambers = [f"{name}: {_chambers(one.reuse)}" for name, one in uses.items() if one.reuse is not None]
-    chambers += [f"{name} {words}: {text}" for name, one in uses.items() for words, text in _other_facts(one)]
+    head = (*_USE, *_COURSE, Column("ended"))
+    chambers = [f"{name} {words}: {text}" for name, one in uses.items() for words, text in _other_facts(one)]
     return Answer(
         name="endurance",
         kicker="Endurance",
@@ -202,12 +172,7 @@ def _answer_of_several(several: Endurances) -> Answer:
 
 def _cells(one: Endurance) -> tuple[str | float, ...]:
     course = one.discharge
-    last = (course.walking_time, strides_text(course.strides))
-    if one.reuse is None or one.without_reuse is None:
-        return one.draw.mass_per_stride, *last, course.ending.kind
-    saved, before = one.reuse.balance.returned_mass, one.without_reuse
-    first = (one.draw.mass_per_stride + saved, before.walking_time, strides_text(before.strides))
-    return *first, saved, *last, course.ending.kind
+    return one.draw.mass_per_stride, course.walking_time, strides_text(course.strides), course.ending.kind
 
 
 def _facts(found: Endurance) -> list[tuple[str, str]]:
@@ -233,7 +198,6 @@ def _facts(found: Endurance) -> list[tuple[str, str]]:
     ]
     if "liquid_mass" in recording:
         rows.append(("liquid used up", _dry_since(course)))
-    rows += _reuse_facts(found, found.reuse, found.without_reuse) if found.reuse and found.without_reuse else []
     return rows + _other_facts(found)
 
 
@@ -248,27 +212,10 @@ def _other_facts(found: Endurance) -> list[tuple[str, str]]:
     return [
         (
             f"with {name}",
-            f"{_gas(other.draw.mass_per_stride + _saved(other))} a stride, "
-            f"{f'{_gas(_saved(other))} of it saved, ' if other.reuse else ''}"
-            f"{minutes_text(other.discharge.walking_time)} of walking, {strides_text(other.discharge.strides)} strides"
-            f"{', without reuse' if found.reuse and not other.reuse else ''}",
+            f"{_gas(other.draw.mass_per_stride)} a stride, {minutes_text(other.discharge.walking_time)} of walking, "
+            f"{strides_text(other.discharge.strides)} strides",
         )
         for name, other in found.others.items()
-    ]
-
-
-def _saved(found: Endurance) -> float:
-    return found.reuse.balance.returned_mass if found.reuse else 0.0
-
-
-def _reuse_facts(found: Endurance, reused: Reuse, without: Discharge) -> list[tuple[str, str]]:
-    balance = reused.balance
-    before = found.draw.mass_per_stride + balance.returned_mass
-    saved = f"{_gas(balance.returned_mass)} a stride, {balance.returned_mass / before:.1%} of {_gas(before)}"
-    return [
-        ("exhaust reused", f"{saved}; the exhaust holds {_gas(balance.exhausted_mass)}"),
-        ("chambers", _chambers(reused)),
-        ("without reuse", f"{minutes_text(without.walking_time)} of walking, {strides_text(without.strides)} strides"),
     ]
 
 
@@ -288,42 +235,6 @@ def _dry_since(course: Discharge) -> str:
     return f"after {minutes_text(float(course.recording.time[dry[0]]))}"
 
 
-def _reuse_section(reused: Reuse) -> Section:
-    """Return the values on which the reuse of the exhaust rests, with where they come from."""
-    pressures = ("exhaust_pressure", "fill_pressure", "atmospheric_pressure")
-    kinds = dict.fromkeys(pressures, "pressure") | dict.fromkeys(
-        ("exhaust_volume", "fill_volume", "reservoir_volume"), "volume"
-    )
-    rows = tuple(
-        (name, quantity_text(getattr(reused.cycle, name), kind), reused.origins.get(name, "standard"))
-        for name, kind in kinds.items()
-    )
-    head = tuple(map(Column, ("value", "", "origin")))
-    return Section("Reuse of the exhaust", (_REUSE_ASSUMES,), Table(head, rows, left=3), is_detail=True)
-
-
-def _chambers(reused: Reuse) -> str:
-    """Return what the chambers hold when they vent and when they are filled, and where the numbers come from."""
-    cycle = reused.cycle
-    exhaust, fill = (
-        f"{quantity_text(pressure, 'pressure', '.1f')} in {quantity_text(volume, 'volume', '.1f')}"
-        for pressure, volume in (
-            (cycle.exhaust_pressure, cycle.exhaust_volume),
-            (cycle.fill_pressure, cycle.fill_volume),
-        )
-    )
-    return f"exhaust at {exhaust}, filled to {fill}, {_origin(reused)}"
-
-
-def _origin(reused: Reuse) -> str:
-    """Return where the values of the chambers come from, once where it is the same for all."""
-    origins = {name: text for name, text in reused.origins.items() if name != "reservoir_volume"}
-    if len(set(origins.values())) == 1:
-        return next(iter(origins.values()))
-    given = ", ".join(name for name, text in origins.items() if text == GIVEN)
-    return f"{next(text for text in origins.values() if text != GIVEN)}; {given} {GIVEN}"
-
-
 def _data(found: Endurance) -> dict[str, Any]:
     data: dict[str, Any] = {
         "format": FORMAT,
@@ -337,14 +248,9 @@ def _data(found: Endurance) -> dict[str, Any]:
     }
     if found.others:
         data["other_chambers"] = {
-            name: _course_data(other.discharge)
-            | {"gas_per_stride": other.draw.mass_per_stride + _saved(other), "gas_saved": _saved(other)}
+            name: _course_data(other.discharge) | {"gas_per_stride": other.draw.mass_per_stride}
             for name, other in found.others.items()
         }
-    if found.reuse is not None and found.without_reuse is not None:
-        cycle, balance = found.reuse.cycle._asdict(), found.reuse.balance._asdict()
-        data["reuse"] = {"cycle": cycle, "balance": balance, "without_reuse": _course_data(found.without_reuse)}
-        data["reuse"]["origins"] = dict(found.reuse.origins)
     return data
 
 

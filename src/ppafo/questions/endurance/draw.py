@@ -4,16 +4,13 @@ import math
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ppafo.constants import GRAMS_PER_KILOGRAM, STANDARD_ATMOSPHERE
+from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.errors import DataError, ParameterError, PpafoError, refused_as
-from ppafo.metrics.strides import SETTLING
-from ppafo.model.plant import chamber_1_volume, chamber_2_volume
 from ppafo.parameters.chamber_volumes import other_readings
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
@@ -32,8 +29,6 @@ _MAXIMUM_FALLEN = 0.1
 """Fraction of the gas used that may flow back: it waits in the line before the valve, and the next stride takes it."""
 WALK_FILE = "walk.json"
 FORMAT, FORMAT_OF_REACTING = "ppafo walk", "ppafo walk of a wearer who reacts"
-_VOLUMES = ("volume_per_angle", "dead_volume_1", "dead_volume_2")
-_CHANNELS = ("angle", "pressure_1", "pressure_2", "supplied_mass")
 _LEAST = 1.0e-12
 """Gas [kg] by which a walk that takes none may come out below 0: rounding of its totals."""
 
@@ -54,10 +49,6 @@ class Draw:
     def mean_flow(self) -> float:
         """Mass flow [kg/s] while walking, averaged over a stride."""
         return self.mass_per_stride / self.stride_time
-
-    def less(self, saved: float) -> "Draw":
-        """Return the draw with a mass [kg] saved in every stride; the largest flow stays, which is the safe side."""
-        return replace(self, mass_per_stride=self.mass_per_stride - saved)
 
 
 def draw_of_numbers(mass_per_stride: float, stride_time: float, peak_flow: float | None) -> Draw:
@@ -115,51 +106,26 @@ def largest_flow(recording: Recording) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Actuator:
-    """What the volumes of the chambers follow from: stops [rad], volume per angle [m^3/rad], dead volumes [m^3]."""
-
-    angle_min: float
-    angle_max: float
-    volume_per_angle: float
-    dead_volume_1: float
-    dead_volume_2: float
-
-
-@dataclass(frozen=True, slots=True)
 class WalkGas:
-    """A walk as far as its gas goes: name, recording, gas [kg] and time [s] of a stride, and the actuator.
+    """A walk as far as its gas goes: name, recording, gas [kg] and time [s] of a stride.
 
     ``gas_per_stride`` is that of the strides with help at the set pressure, 0 where the walk took none. A walk on a
-    ``course``, "" without one, is repeated as a whole: gas and time are then those of the course. The device lets gas
-    out into ``atmospheric_pressure`` [Pa absolute]. ``scenario`` is what was walked.
+    ``course``, "" without one, is repeated as a whole: gas and time are then those of the course. ``scenario`` is what
+    was walked.
     """
 
     name: str
     recording: Recording
     gas_per_stride: float
     stride_time: float
-    actuator: Actuator
     course: str = ""
-    atmospheric_pressure: float = STANDARD_ATMOSPHERE
     scenario: Scenario | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class FullChambers:
-    """Absolute pressure [Pa] and volume [m^3] of each chamber when it is fullest, mean over so many strides."""
-
-    exhaust_pressure: float
-    exhaust_volume: float
-    fill_pressure: float
-    fill_volume: float
-    strides: int
 
 
 def walk_gas(result: WalkResult) -> WalkGas:
     """Return the gas of a walk."""
     configuration, course = result.scenario, walk_of(result.scenario).course
     gas = result.metrics.get("gas" if course is None else "course_gas")
-    actuator = configuration.device.actuator
     # A wearer who reacts sets the pace, and one who took gas made strides.
     time = result.metrics.get("stride_time" if course is None else "course_time")
     return WalkGas(
@@ -167,9 +133,7 @@ def walk_gas(result: WalkResult) -> WalkGas:
         result.recording,
         0.0 if gas is None else gas.value,
         walk_of(configuration).gait.stride_time if time is None else time.value,
-        Actuator(**{name: getattr(actuator, name) for name in Actuator.__slots__}),
         course="" if course is None else course.name,
-        atmospheric_pressure=configuration.device.supply.atmospheric_pressure,
         scenario=configuration,
     )
 
@@ -193,24 +157,19 @@ def read_walk_gas(folder: Path) -> WalkGas:
     status = _table(document, "status", path).get("kind", "completed")
     if status != "completed":
         raise DataError(f"{path}: the walk {status}, so it cannot be repeated")
-    actuator = Actuator(
-        *(_number(document, f"configuration.device.actuator.{name}", path) for name in ("angle_min", "angle_max")),
-        *(_number(document, f"configuration.device.actuator.{name}", path, 0.0) for name in _VOLUMES),
-    )
     course = _table(document, "configuration", path).get("course")
     key = "gas" if course is None else "course_gas"
     has_gas = key in _table(document, "metrics", path)
     gas = _number(document, f"metrics.{key}.value", path, -_LEAST) if has_gas else 0.0
     time = "configuration.gait.stride_time" if course is None else "metrics.course_time.value"
+    stride_time = _number(document, time, path, 0.0)
     name = document["configuration"].get("name", folder.name)
     return WalkGas(
         str(name),
         _recording(folder),
         gas,
-        _number(document, time, path, 0.0),
-        actuator,
+        stride_time,
         "" if course is None else str(_table({"course": course}, "course", path).get("name", "course")),
-        _number(document, "configuration.device.supply.atmospheric_pressure", path, 0.0),
         _walked(document["configuration"], path),
     )
 
@@ -230,9 +189,8 @@ def _walked(configuration: Mapping[str, Any], file: Path) -> Scenario | None:
 
 def _recording(folder: Path) -> Recording:
     recording = read_recording(folder)
-    for name in _CHANNELS:
-        if name not in recording:
-            raise DataError(f"{recording.label}: has no channel '{name}'; write the walk again")
+    if "supplied_mass" not in recording:
+        raise DataError(f"{recording.label}: has no channel 'supplied_mass'; write the walk again")
     return recording
 
 
@@ -263,40 +221,6 @@ def draw_of_walk(walk: WalkGas) -> Draw:
     draw = draw_of_numbers(walk.gas_per_stride, walk.stride_time, peak)
     along = f" on course '{walk.course}'" if walk.course else ""
     return replace(draw, origin=f"walk '{walk.name}'{along}, {walk.recording.kind}, repeated")
-
-
-def full_chambers(walk: WalkGas) -> FullChambers:
-    """Return how full the chambers get, mean over strides: what can be reused, and what for.
-
-    The plantarflexion chamber is fullest when it begins to vent, at the end of push-off; the other one when it has been
-    filled. The first strides, in which the controller learns, and those without help are left out. DataError where no
-    whole stride is left.
-    """
-    if walk.course:
-        raise DataError(f"--reuse: the strides of course '{walk.course}' differ; take a walk without a course")
-    recording, actuator = walk.recording, walk.actuator
-    angle = recording["angle"]
-    volume_1 = chamber_1_volume(angle, actuator.angle_min, actuator.volume_per_angle, actuator.dead_volume_1)
-    volume_2 = chamber_2_volume(angle, actuator.angle_max, actuator.volume_per_angle, actuator.dead_volume_2)
-    edges = np.arange(SETTLING, recording.time[-1] / walk.stride_time + 1.0e-9) * walk.stride_time
-    if edges.size < 2:
-        raise DataError(
-            f"walk '{walk.name}': {recording.duration:.3g} s contain no complete stride after the first {SETTLING}"
-        )
-    bounds = np.searchsorted(recording.time, edges)
-    level = recording["safe_state"] if "safe_state" in recording else np.zeros(recording.time.size)
-    strides = [(first, last) for first, last in pairwise(bounds.tolist()) if not level[first:last].any()]
-    if not strides:
-        raise DataError(f"walk '{walk.name}': no stride after the first {SETTLING} had help throughout")
-    exhaust = _fullest(recording["pressure_1"], np.asarray(volume_1), strides)
-    fill = _fullest(recording["pressure_2"], np.asarray(volume_2), strides)
-    return FullChambers(*exhaust, *fill, strides=len(strides))
-
-
-def _fullest(pressure: Floats, volume: Floats, strides: list[tuple[int, int]]) -> tuple[float, float]:
-    """Return pressure and volume where a chamber holds the most gas, mean over strides from sample to sample."""
-    places = [first + int(np.argmax(pressure[first:last] * volume[first:last])) for first, last in strides]
-    return float(pressure[places].mean()), float(volume[places].mean())
 
 
 def other_draws(recording: str | Path, stride_time: float | None) -> dict[str, Draw]:

@@ -1,30 +1,21 @@
-"""How long one bottle lasts for a gas use, with and without reuse of the exhaust; for several uses side by side."""
+"""How long one bottle lasts for a gas use; for several uses side by side."""
 
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ppafo.answers.display_units import quantity_text
-from ppafo.constants import GRAMS_PER_KILOGRAM, STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, ParameterError, UnitError, nearest_name, one_line, refused_as
-from ppafo.model.declaration import Quantity
-from ppafo.model.exhaust_reuse import ReuseCycle
-from ppafo.model.plant import chamber_1_volume, chamber_2_volume
-from ppafo.parameters import load_device
+from ppafo.errors import DataError, ParameterError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle, load_bottle
 from ppafo.parameters.chamber_volumes import other_readings, own_reading
-from ppafo.parameters.declaration import is_within
-from ppafo.questions.endurance.answer import GIVEN, Endurance, Endurances, Reuse
+from ppafo.questions.endurance.answer import Endurance, Endurances
 from ppafo.questions.endurance.discharge import check_schedule, discharge, discharge_of_life, smallest_mass_when_warm
 from ppafo.questions.endurance.draw import (
     Draw,
-    FullChambers,
     WalkGas,
     draw_of_numbers,
     draw_of_recording,
     draw_of_walk,
-    full_chambers,
     is_walk_folder,
     other_draws,
     read_walk_gas,
@@ -34,120 +25,17 @@ from ppafo.signals import Recording
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.result_folder import read_recording
-from ppafo.units import parse_quantity
 from ppafo.walking import WalkResult
 from ppafo.walking.bottle import Schedule
 from ppafo.walking.loading import on_bottle
-from ppafo.walking.motion import SHORTEST_STRIDES, walk_of
+from ppafo.walking.motion import walk_of
 from ppafo.walking.walk import bottle_life
-from ppafo.walking.walk import walk as walk_for
-
-REUSE = (
-    Quantity("reservoir_volume", "m^3", "volume of the reservoir between the chambers", minimum=0.0, maximum=0.1),
-    Quantity("exhaust_pressure", "Pa_a", "pressure of the plantarflexion chamber when it vents", 0.0, 1e4, 5e6),
-    Quantity("fill_pressure", "Pa_a", "pressure that dorsiflexion needs", 0.0, 1e4, 5e6),
-    Quantity("exhaust_volume", "m^3", "volume of the plantarflexion chamber when it vents", 0.0, 1e-7, 1e-2),
-    Quantity("fill_volume", "m^3", "volume of the other chamber when it is filled", 0.0, 1e-7, 1e-2),
-)
-_BY_NAME = {item.name: item for item in REUSE}
-PAPER_DEVICE = "ppafo2011"
-TOE_OFF_ANGLE, NEUTRAL_ANGLE = "110 deg", "90 deg"
-"""Where the chambers vent and fill unless their volumes are given: 20 deg of plantarflexion at toe-off, and the
-neutral angle at which the paper holds the foot in swing."""
-_DEFAULT = "the regulator's pressure, and the paper's device at toe-off and in neutral position"
-
-
-def check_reuse(reused: Reuse, mass_per_stride: float) -> None:
-    """Refuse a cycle that does not belong to a gas use of ``mass_per_stride`` [kg] a stride without a reservoir.
-
-    ParameterError for pressures below the atmosphere, and for chambers that hold more than the stride takes.
-    """
-    for name in ("exhaust_pressure", "fill_pressure"):
-        if getattr(reused.cycle, name) < reused.cycle.atmospheric_pressure:
-            raise ParameterError(f"--reuse {name}: must be at least the atmospheric pressure")
-    balance = reused.balance
-    filled = balance.exhausted_mass + balance.returned_mass + balance.topped_up_mass
-    if filled > mass_per_stride:
-        raise ParameterError(
-            f"--reuse: the chambers take {filled * GRAMS_PER_KILOGRAM:.3g} g a stride at these pressures and volumes, "
-            f"more than the {mass_per_stride * GRAMS_PER_KILOGRAM:.3g} g of the gas use; give the exhaust_pressure, "
-            "fill_pressure, exhaust_volume and fill_volume of that gas use"
-        )
-
-
-def parse_reuse(
-    texts: Iterable[str],
-    bottle: Bottle,
-    chambers: FullChambers | None = None,
-    atmosphere: float = STANDARD_ATMOSPHERE,
-) -> Reuse:
-    """Return the cycle of texts such as ``reservoir_volume=50 cm^3``; the reservoir must be given.
-
-    What is not given of the chambers is that of ``chambers``, of a walk. Without a walk pressures are the regulator's
-    and volumes those of the paper's device at toe-off and in neutral. The device lets gas out into ``atmosphere`` [Pa
-    absolute], from which gauge pressures count.
-    """
-    values: dict[str, float] = {}
-    for text in texts:
-        name, separator, quantity = (part.strip() for part in one_line(text).partition("="))
-        if name not in _BY_NAME or not separator:
-            known = ", ".join(_BY_NAME)
-            raise ParameterError(
-                f"--reuse {name}: is not of the form NAME=VALUE{nearest_name(name, _BY_NAME)}; names are {known}"
-            )
-        if name in values:
-            raise ParameterError(f"--reuse {name}: given twice; give it once")
-        values[name] = _value(_BY_NAME[name], quantity, atmosphere)
-    if "reservoir_volume" not in values:
-        raise ParameterError(
-            "--reuse: give at least the volume of the reservoir, for example --reuse 'reservoir_volume=50 cm^3'"
-        )
-    found, origin = (_defaults(bottle), _DEFAULT) if chambers is None else _chamber_values(chambers)
-    cycle = ReuseCycle(
-        **(found | values),
-        atmospheric_pressure=atmosphere,
-        gas_product=bottle.fluid.table.gas_constant * bottle.room_temperature,
-    )
-    return Reuse(cycle, {item.name: GIVEN if item.name in values else origin for item in REUSE})
-
-
-def _value(quantity: Quantity, text: str, atmosphere: float) -> float:
-    with refused_as(ParameterError, f"--reuse {quantity.name}={text}", UnitError):
-        value = parse_quantity(text, quantity.unit, atmosphere)
-    if not is_within(value, quantity):
-        raise ParameterError(
-            f"--reuse {quantity.name}={text}: {quantity.summary} must be from {quantity.minimum:g} to "
-            f"{quantity.maximum:g} {quantity.unit}"
-        )
-    return value
-
-
-def _chamber_values(chambers: FullChambers) -> tuple[dict[str, float], str]:
-    """Return pressures and volumes of the chambers at their fullest, and the words for where they come from."""
-    names = ("exhaust_pressure", "exhaust_volume", "fill_pressure", "fill_volume")
-    return {name: getattr(chambers, name) for name in names}, f"from the walk, mean over {chambers.strides} strides"
-
-
-def _defaults(bottle: Bottle) -> dict[str, float]:
-    actuator = load_device(PAPER_DEVICE).actuator
-    toe_off, neutral = (parse_quantity(text, "rad") for text in (TOE_OFF_ANGLE, NEUTRAL_ANGLE))
-    return {
-        "exhaust_pressure": bottle.regulator.set_pressure,
-        "fill_pressure": bottle.regulator.set_pressure,
-        "exhaust_volume": chamber_1_volume(
-            toe_off, actuator.angle_min, actuator.volume_per_angle, actuator.dead_volume_1
-        ),
-        "fill_volume": chamber_2_volume(neutral, actuator.angle_max, actuator.volume_per_angle, actuator.dead_volume_2),
-    }
-
 
 GasUse = str | Path | Recording | WalkResult
 """A file, a result folder, the folder of a walk, or what was read or returned of them."""
 _BETWEEN_RESTS = 600.0
 _STRIDE_TIME = 1.1
 _LONGEST = 24.0 * 3600.0
-_FEW = 15.0
-"""Seconds that are walked to see how full other chambers get."""
 WITHOUT_REST = Schedule(_LONGEST, 0.0, _LONGEST)
 
 
@@ -160,7 +48,6 @@ def endurance(
     walk: float | None = None,
     rest: float | None = None,
     longest: float = _LONGEST,
-    reuse: Iterable[str] = (),
     overrides: Iterable[str] = (),
 ) -> Endurance | Endurances:
     """Return how long a full bottle lasts for a gas use that continues; ``Endurances`` for several recordings.
@@ -168,8 +55,7 @@ def endurance(
     A walk, its result or its folder, walks on the bottle until that ends it; ``bottle`` is its own, or the paper's,
     unless given. Any other gas use is that of ``recordings``, or else ``gas_per_stride`` [kg] every ``stride_time`` [s]
     (default 1.1 s) with at most ``peak_flow`` [kg/s] (the mean flow). ``walk`` [s], 10 min unless given, and ``rest``
-    [s] take turns, for at most ``longest`` [s]. ``reuse`` are texts such as ``reservoir_volume=50 cm^3``, and
-    ``overrides`` such as ``room.temperature=5 degC``.
+    [s] take turns, for at most ``longest`` [s]. ``overrides`` are texts such as ``room.temperature=5 degC``.
     ParameterError or DataError for bad input, SimulationError where the solver fails.
     """
     given = (recordings,) if isinstance(recordings, str | Path | Recording | WalkResult) else tuple(recordings)
@@ -177,82 +63,57 @@ def endurance(
         raise ParameterError("give either a recording or --gas-per-stride, for example --gas-per-stride '0.3 g'")
     if walk is not None and rest is None:
         raise ParameterError("--walk: is the time between two rests: give --rest too, or --longest for the whole time")
-    schedule, changes = Schedule(_BETWEEN_RESTS if walk is None else walk, rest or 0.0, longest), tuple(reuse)
+    schedule = Schedule(_BETWEEN_RESTS if walk is None else walk, rest or 0.0, longest)
     chosen = _Bottle(bottle, tuple(overrides))
     if gas_per_stride is not None:
-        full = chosen.load()
         draw = draw_of_numbers(gas_per_stride, _STRIDE_TIME if stride_time is None else stride_time, peak_flow)
-        return follow_bottle(full, draw, schedule, parse_reuse(changes, full) if changes else None)
+        return follow_bottle(chosen.load(), draw, schedule)
     if peak_flow is not None:
         raise ParameterError("--peak-flow belongs to --gas-per-stride; a recording has its own largest flow")
     names = [_name(use) for use in given]
     if len(set(names)) < len(names):
         raise ParameterError("the same recording is given twice")
     found = {
-        name: _endurance_of_use(use, stride_time, chosen, schedule, changes)
-        for name, use in zip(names, given, strict=True)
+        name: _endurance_of_use(use, stride_time, chosen, schedule) for name, use in zip(names, given, strict=True)
     }
     return found[names[0]] if len(found) == 1 else Endurances(found)
 
 
-def endurance_of_walk(
-    result: WalkResult, bottle: str | Path | None = None, reuse: Iterable[str] = ()
-) -> Endurance | None:
+def endurance_of_walk(result: WalkResult, bottle: str | Path | None = None) -> Endurance | None:
     """Return how long a bottle lasts when the walk continues without rest; None where the walk took no gas.
 
     The same device, without faults, walks on the bottle until that ends it, as ``ppafo walk --bottle`` does;
     ``bottle`` is its own, or the paper's, unless given. A stride is one of the leg with the device, or a whole
-    course. ``reuse`` are texts such as ``reservoir_volume=50 cm^3``: what they do not say of the chambers is taken from
-    the walk.
+    course.
     """
     gas = walk_gas(result)
-    return None if gas.gas_per_stride <= 0.0 else endurance_of_walk_gas(gas, bottle, WITHOUT_REST, reuse)
+    return None if gas.gas_per_stride <= 0.0 else endurance_of_walk_gas(gas, bottle, WITHOUT_REST)
 
 
 def endurance_of_walk_gas(
-    gas: WalkGas,
-    bottle: str | Path | None,
-    schedule: Schedule,
-    reuse: Iterable[str] = (),
-    overrides: Iterable[str] = (),
+    gas: WalkGas, bottle: str | Path | None, schedule: Schedule, overrides: Iterable[str] = ()
 ) -> Endurance:
     """Return how long a bottle lasts when a walk continues; DataError where it took no gas, or is not known."""
-    at_set_pressure, changes, zero = draw_of_walk(gas), tuple(reuse), gas.atmospheric_pressure
+    at_set_pressure = draw_of_walk(gas)
     if gas.scenario is None:
         raise DataError(f"{gas.name}: its folder does not say what was walked; write the walk again")
     own = walk_of(gas.scenario).bottle
     carried = on_bottle(gas.scenario, PAPER_BOTTLE if bottle is None and own is None else bottle, overrides)
-    supply = walk_of(carried).bottle
-    assert supply is not None, "it was put on one"
-    reused = parse_reuse(changes, supply.bottle, full_chambers(gas), zero) if changes else None
-    found = _walked_to_its_end(carried, at_set_pressure, schedule, reused)
+    found = _walked_to_its_end(carried, at_set_pressure, schedule)
     others = {}
     if own_reading(carried.device.actuator) is not None:
         for chambers in other_readings(carried.device.actuator):
-            its_draw, its_reuse = at_set_pressure, None
-            if changes:
-                shortest = (SHORTEST_STRIDES + 1) * walk_of(gas.scenario).gait.stride_time
-                few = max(shortest, min(_FEW, float(gas.recording.time[-1]))) / 60.0
-                its_gas = walk_gas(walk_for(with_numbers(gas.scenario, chambers.numbers()), few))
-                its_draw = draw_of_walk(its_gas)
-                with suppress(ParameterError):
-                    its_reuse = parse_reuse(changes, supply.bottle, full_chambers(its_gas), zero)
-                    check_reuse(its_reuse, its_draw.mass_per_stride)
             its_walk = with_numbers(carried, chambers.numbers())
-            others[chambers.name] = _walked_to_its_end(its_walk, its_draw, schedule, its_reuse)
-    without = None if reused is None else _walked_to_its_end(carried, at_set_pressure, schedule, None).discharge
-    return replace(found, others=others, is_of_course=bool(gas.course), without_reuse=without)
+            others[chambers.name] = _walked_to_its_end(its_walk, at_set_pressure, schedule)
+    return replace(found, others=others, is_of_course=bool(gas.course))
 
 
-def _walked_to_its_end(carried: Scenario, at_set_pressure: Draw, schedule: Schedule, reused: Reuse | None) -> Endurance:
+def _walked_to_its_end(carried: Scenario, at_set_pressure: Draw, schedule: Schedule) -> Endurance:
     """Return how long the bottle of a walk lasts; ``at_set_pressure`` is the draw of the same walk at room warmth."""
     supply = walk_of(carried).bottle
     assert supply is not None, "a walk on a bottle"
     check_schedule(schedule)
-    if reused is not None:
-        check_reuse(reused, at_set_pressure.mass_per_stride)
-    saved = 0.0 if reused is None else reused.balance.returned_mass / at_set_pressure.mass_per_stride
-    life = bottle_life(carried, schedule, saved)
+    life = bottle_life(carried, schedule)
     if walk_of(carried).reacts is not None:  # whose strides no gait sets
         life = replace(life, repeats=life.walked / at_set_pressure.stride_time)
     strides = max(life.repeats, 1.0e-9)
@@ -267,8 +128,6 @@ def _walked_to_its_end(carried: Scenario, at_set_pressure: Draw, schedule: Sched
         draw=taken,
         schedule=schedule,
         discharge=discharge_of_life(life, taken),
-        reuse=reused,
-        without_reuse=None,
         strides_when_warm=usable / taken.mass_per_stride,
     )
 
@@ -284,20 +143,15 @@ class _Bottle:
         return load_bottle(PAPER_BOTTLE if self.name is None else self.name, self.overrides)
 
 
-def follow_bottle(bottle: Bottle, draw: Draw, schedule: Schedule, reused: Reuse | None = None) -> Endurance:
-    """Return how long a full bottle lasts; ``reused`` takes the gas that a reservoir gives back off every stride."""
-    if reused is not None:
-        check_reuse(reused, draw.mass_per_stride)
-    taken = draw if reused is None else draw.less(reused.balance.returned_mass)
-    usable = bottle.mass - smallest_mass_when_warm(bottle, taken)
+def follow_bottle(bottle: Bottle, draw: Draw, schedule: Schedule) -> Endurance:
+    """Return how long a full bottle lasts."""
+    usable = bottle.mass - smallest_mass_when_warm(bottle, draw)
     return Endurance(
         bottle=bottle,
-        draw=taken,
+        draw=draw,
         schedule=schedule,
-        discharge=discharge(bottle, taken, schedule),
-        reuse=reused,
-        without_reuse=None if reused is None else discharge(bottle, draw, schedule),
-        strides_when_warm=usable / taken.mass_per_stride,
+        discharge=discharge(bottle, draw, schedule),
+        strides_when_warm=usable / draw.mass_per_stride,
     )
 
 
@@ -307,9 +161,7 @@ def _name(use: GasUse) -> str:
     return use.scenario.name if isinstance(use, WalkResult) else str(use)
 
 
-def _endurance_of_use(
-    use: GasUse, stride_time: float | None, chosen: _Bottle, schedule: Schedule, reuse: tuple[str, ...]
-) -> Endurance:
+def _endurance_of_use(use: GasUse, stride_time: float | None, chosen: _Bottle, schedule: Schedule) -> Endurance:
     gas = walk_gas(use) if isinstance(use, WalkResult) else None
     if isinstance(use, str | Path) and is_walk_folder(Path(use)):
         gas = read_walk_gas(Path(use))
@@ -317,11 +169,11 @@ def _endurance_of_use(
         stride = f"its whole course '{gas.course}'" if gas.course else "one stride of its walk"
         if stride_time is not None:
             raise ParameterError(f"--stride-time: a stride of {_name(use)} is {stride}; omit --stride-time")
-        return endurance_of_walk_gas(gas, chosen.name, schedule, reuse, chosen.overrides)
+        return endurance_of_walk_gas(gas, chosen.name, schedule, chosen.overrides)
     bottle = chosen.load()
     recording = use if isinstance(use, Recording) else read_recording(Path(str(use)))
     draw = draw_of_recording(recording, stride_time)
-    found = follow_bottle(bottle, draw, schedule, parse_reuse(reuse, bottle) if reuse else None)
+    found = follow_bottle(bottle, draw, schedule)
     if isinstance(use, Recording | WalkResult):
         return found
     others = other_draws(use, stride_time)

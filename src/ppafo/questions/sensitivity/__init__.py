@@ -1,10 +1,10 @@
-"""Which uncertain value matters? Morris screening, Sobol indices and Shapley effects."""
+"""Which uncertain value matters? Sobol indices, Shapley effects, and the signed change of a metric."""
 
 from ppafo.questions.question import CONFIDENCE, SEED, SET, THREADS, Argument, Question, maximum_failed, whole_number
 
 QUESTION = Question(
     name="sensitivity",
-    summary="rank uncertain values by their influence: Sobol, Shapley or Morris indices",
+    summary="rank uncertain values by their influence: Sobol or Shapley indices, signed changes",
     group="decide",
     solve="ppafo.questions.sensitivity.solve:sensitivity",
     arguments=(
@@ -12,8 +12,8 @@ QUESTION = Question(
         Argument(
             ("--method",),
             "method",
-            "default: sobol, or shapley if values are correlated; morris for screening",
-            metavar="sobol|shapley|morris",
+            "default: sobol, or shapley if values are correlated",
+            metavar="sobol|shapley",
         ),
         Argument(
             ("--metric",),
@@ -26,7 +26,7 @@ QUESTION = Question(
         Argument(
             ("--samples",),
             "samples",
-            "number of base points (sobol, default 8192), orders (shapley, 2048) or trajectories (morris, 128)",
+            "number of base points (sobol, default 8192) or orders (shapley, 2048)",
             metavar="N",
             type=whole_number,
         ),

@@ -1,14 +1,12 @@
-"""The methods by which influence is measured: Sobol, Morris and Shapley, each with its design and its indices.
+"""The methods by which influence is measured: Sobol and Shapley, each with design and indices; the signed change.
 
-A design is made of blocks that belong together: one trajectory of Morris, one base point of Sobol with its
-exchanged copies, one order of the values for Shapley. A block is the least that can be left out.
+A design is made of blocks that belong together: one base point of Sobol with its exchanged copies, one order of the
+values for Shapley. A block is the least that can be left out.
 """
 
-import importlib.util
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,16 +14,14 @@ from numpy.typing import NDArray
 from ppafo.errors import StudyError
 from ppafo.studies.distributions import Floats, jackknife_reach
 from ppafo.studies.draws import Uncertainty, replicate_seed
-from ppafo.studies.sampling import NOISE
 
 SCRAMBLES = 8
 """Independent scrambles of the Sobol sequence, to which the base points are dealt out in turn."""
-TAIL = 0.005
-"""Morris moves between the 0.5 and the 99.5 % quantile of each distribution: a normal one has no end to stand on."""
-_LEVELS = 4
 _INNER = 3
 """Draws of some values with the others held, for the variance that they leave (Song, Nelson and Staum, 2016)."""
 _SMALLEST = 2.0**-53
+_NEAREST = 0.2
+"""Fraction of the runs, nearest to an end of a value, that say what the metric is there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,14 +36,14 @@ class Indices:
 class Evaluated:
     """Whole blocks of a design: shares and inputs [SI] (rows, paths), values (rows,), and the numbers of the blocks.
 
-    ``ranges`` (paths,) [SI] is how far each input goes from its 0.5 to its 99.5 % quantile; ``seed`` made the design.
+    ``ends`` (2, paths) [SI] are the 5 and the 95 % quantile of each input, nan of the noise; ``seed`` made the design.
     """
 
     fractions: Floats
     inputs: Floats
     values: Floats
     blocks: NDArray[np.intp]
-    ranges: Floats
+    ends: Floats
     seed: int
 
 
@@ -56,17 +52,15 @@ class Method:
     """A design and its evaluation.
 
     ``shown`` are the indices that are drawn, the first of which ranks. ``takes_dependent`` tells whether they mean
-    something where values are correlated; ``follows_noise`` whether the noise of the sensors is one of the values, if
-    not, it is held within every block. There are ``fewest`` to ``most`` blocks, called by ``sizes_label`` and each by
-    ``block_label``; ``block_rows`` says how many runs belong together for a number of values. ``design`` takes an
+    something where values are correlated. There are ``fewest`` to ``most`` blocks, called by ``sizes_label`` and each
+    by ``block_label``; ``block_rows`` says how many runs belong together for a number of values. ``design`` takes an
     uncertainty, blocks and a seed and returns fractions in (0, 1), shape (blocks * block_rows, paths), block after
-    block; ``indices`` returns the indices of whole blocks with bands of a confidence.
+    block; each row is a draw of the values. ``indices`` returns the indices of whole blocks with bands of a confidence.
     """
 
     name: str
     shown: tuple[str, ...]
     takes_dependent: bool
-    follows_noise: bool
     fewest: int
     most: int
     sizes_label: str
@@ -74,16 +68,6 @@ class Method:
     block_rows: Callable[[int], int]
     design: Callable[[Uncertainty, int, int], Floats]
     indices: Callable[[Evaluated, float], Indices]
-
-
-def _check_salib() -> None:
-    if importlib.util.find_spec("SALib") is None:
-        raise StudyError("the method morris needs SALib, which is not installed: pip install 'ppafo[studies]'")
-
-
-def _problem(dimensions: int) -> dict[str, Any]:
-    names = [f"x{number}" for number in range(dimensions)]
-    return {"num_vars": dimensions, "names": names, "bounds": [[0.0, 1.0]] * dimensions}
 
 
 def _sobol_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
@@ -98,7 +82,7 @@ def _sobol_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
     for number in range(SCRAMBLES):
         own = replicate_seed(seed, number) % 2**32
         # Saltelli (2002): a point A, its copies in which value i is that of B, and B. `seed`, not `rng`: the points of
-        # SALib, from which earlier studies were made.
+        # earlier studies.
         points = qmc.Sobol(2 * dimensions, scramble=True, seed=own).random(each)
         design[:, number] = points[:, None, :dimensions]
         design[:, number, -1] = points[:, dimensions:]
@@ -135,7 +119,6 @@ SOBOL = Method(
     name="sobol",
     shown=("total", "first"),
     takes_dependent=False,
-    follows_noise=True,
     fewest=64,
     most=2**17,
     sizes_label="base points",
@@ -146,71 +129,9 @@ SOBOL = Method(
 )
 """Fractions of the variance: first-order (each value alone) and total (with all its interactions).
 
-Saltelli's design, that of SALib, on independent scrambles of the Sobol sequence; estimators of Saltelli et al.
+Saltelli's design on independent scrambles of the Sobol sequence; estimators of Saltelli et al.
 (2010) and Jansen (1999). The bands come from the spread between the scrambles, because the points of one sequence
 are not independent and resampling them gives bands that are several times too wide.
-"""
-
-
-def _morris_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
-    """Return fractions from TAIL to 1 - TAIL, and of the noise any, held in each block."""
-    _check_salib()
-    from SALib.sample import morris
-
-    moved = len(uncertainty.drawn) - uncertainty.has_noise
-    design = morris.sample(_problem(moved), blocks, num_levels=_LEVELS, seed=seed)
-    fractions = np.asarray(TAIL + (1.0 - 2.0 * TAIL) * design)
-    if not uncertainty.has_noise:
-        return fractions
-    held = np.repeat(np.random.default_rng([seed, 1]).random(blocks), moved + 1)
-    return np.insert(fractions, uncertainty.paths.index(NOISE), held, axis=1)
-
-
-def _morris_indices(found: Evaluated, confidence: float) -> Indices:
-    """Return ``mean_effect`` with a band, and ``spread`` [unit of the metric]."""
-    from scipy.special import stdtrit
-
-    blocks, paths = found.blocks.size, found.fractions.shape[1]
-    fractions, inputs = (table.reshape(blocks, -1, paths) for table in (found.fractions, found.inputs))
-    change = np.diff(found.values.reshape(blocks, -1), axis=1)
-    moves = np.diff(fractions, axis=1) != 0.0
-    way = np.sum(np.diff(inputs, axis=1) * moves, axis=1)
-    climb = np.sum(change[:, :, None] * moves, axis=1)
-    # Where a value takes few levels, a step may not change it: that says nothing.
-    effects = np.where(way != 0.0, climb / np.where(way != 0.0, way, 1.0) * found.ranges, math.nan)
-    effects = effects[:, moves.any(axis=(0, 1))]
-    known = np.count_nonzero(np.isfinite(effects), axis=0)
-    size = np.where(known > 0, np.nansum(np.abs(effects), axis=0) / np.maximum(known, 1), 0.0)
-    spread, of_size = (_deviation(item, known) for item in (effects, np.abs(effects)))
-    reach = stdtrit(np.maximum(known - 1, 1), 0.5 + 0.5 * confidence) * of_size / np.sqrt(np.maximum(known, 1))
-    return Indices({"mean_effect": size, "spread": spread}, {"mean_effect": reach})
-
-
-def _deviation(effects: Floats, known: NDArray[np.intp]) -> Floats:
-    """Return the standard deviation of each column of effects, 0 where fewer than two are known."""
-    away = effects - np.nansum(effects, axis=0) / np.maximum(known, 1)
-    return np.asarray(np.sqrt(np.nansum(away**2, axis=0) / np.maximum(known - 1, 1)))
-
-
-MORRIS = Method(
-    name="morris",
-    shown=("mean_effect", "spread"),
-    takes_dependent=False,
-    follows_noise=False,
-    fewest=8,
-    most=2**14,
-    sizes_label="trajectories",
-    block_label="trajectory",
-    block_rows=lambda dimensions: dimensions + 1,
-    design=_morris_design,
-    indices=_morris_indices,
-)
-"""Elementary effects: how much a metric changes when one value goes through its whole range, here and there.
-
-An effect is the change of the metric over that of the value, times the range of the value: in the unit of the
-metric, whatever the distribution. ``mean_effect`` is its mean size (Campolongo et al., 2007), ``spread`` its
-standard deviation: large where the effect depends on the other values. The noise of the sensors is the same along
-a trajectory.
 """
 
 
@@ -274,7 +195,6 @@ SHAPLEY = Method(
     name="shapley",
     shown=("shapley",),
     takes_dependent=True,
-    follows_noise=True,
     fewest=64,
     most=2**17,
     sizes_label="orders",
@@ -289,5 +209,45 @@ What two values explain together, because they act together or because they are 
 them (Owen, 2014). By random orders: each value gets what it adds to the variance that the values before it leave
 when all after it are held (Song, Nelson and Staum, 2016). Held values are drawn from the Gaussian copula.
 """
-METHODS = {method.name: method for method in (SOBOL, MORRIS, SHAPLEY)}
+METHODS = {method.name: method for method in (SOBOL, SHAPLEY)}
 """To add a method: its design, its indices, and its value here."""
+
+
+def changes(found: Evaluated, confidence: float) -> tuple[Floats, Floats]:
+    """Return the change of the metric (paths,) from the 5 to the 95 % quantile of each value, and its half band.
+
+    In the unit of the metric, above 0 where the metric grows with the value; nan for the noise. It is the difference of
+    two means of the metric, given that the value is at one or the other end and with all others as drawn, so that
+    correlated ones go along. Each mean is read from a straight line through the runs nearest to the end (Cleveland,
+    1979, without weights). The bands come from the spread between as many parts of the blocks as there are scrambles.
+    """
+    own = np.unique(found.blocks % SCRAMBLES, return_inverse=True)[1]
+    part = np.repeat(own, found.values.size // found.blocks.size)
+    values = found.values - np.mean(found.values)
+    levels = np.array(
+        [
+            [_levels(values, given, end, part) for end in ends]
+            for given, ends in zip(found.inputs.T, found.ends.T, strict=True)
+        ]
+    )
+    change = levels[:, 1] - levels[:, 0]
+    return change[:, 0], jackknife_reach(change[:, 1:].T, confidence)
+
+
+def _levels(values: Floats, given: Floats, end: float, part: NDArray[np.intp]) -> Floats:
+    """Return the mean of the metric where a value is at an end: from all parts, then without each (parts + 1,)."""
+    count = int(part.max()) + 1
+    if math.isnan(end):
+        return np.full(count + 1, math.nan)
+    away = np.abs(given - end)
+    near = away <= np.partition(away, int(_NEAREST * away.size))[int(_NEAREST * away.size)]
+    along = (given[near] - end) / (np.max(away[near]) or 1.0)
+    products = (np.ones(along.size), along, values[near], along * along, along * values[near])
+    sums = np.stack([np.bincount(part[near], product, count) for product in products])
+    whole = np.sum(sums, axis=1, keepdims=True)
+    size, first, level, square, mixed = np.concatenate([whole, whole - sums], axis=1)
+    spread = size * square - first**2
+    # A value that takes few levels may be the same in all of them: its mean needs no line.
+    slope_free = spread <= 1.0e-9 * size**2
+    line = (square * level - first * mixed) / np.where(slope_free, 1.0, spread)
+    return np.asarray(np.where(slope_free, level / size, line))

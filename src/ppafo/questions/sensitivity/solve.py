@@ -1,10 +1,11 @@
 """The sensitivity of metrics to what has a distribution in a study: the analysis at growing sizes, and the answer.
 
 Policy for runs that fail: where more than a fraction of all runs has no value it is refused, because the indices
-would be those of the survivors. Otherwise every block (trajectory or base point) with such a run is left out whole,
+would be those of the survivors. Otherwise every block (base point or order) with such a run is left out whole,
 since the formulas need whole blocks, and counted; the indices then hold for values with which the model runs.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -14,12 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.answers import Answer, Column, Figure, Section, Table
+from ppafo.answers import Answer, Cell, Column, Figure, Section, Table
 from ppafo.answers.display_units import (
-    axis_unit,
     change_text,
     display_difference,
-    display_unit,
     metric_quantity,
     metric_words,
 )
@@ -28,7 +27,7 @@ from ppafo.answers.style import BLUE, COLOURS, ORANGE, Margins, figure_of_free_p
 from ppafo.errors import StudyError, nearest_name
 from ppafo.progress import Report
 from ppafo.questions.question import Solved
-from ppafo.questions.sensitivity.methods import METHODS, TAIL, Evaluated, Indices, Method
+from ppafo.questions.sensitivity.methods import METHODS, Evaluated, Indices, Method, changes
 from ppafo.simulation.scenario import plain
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import (
@@ -51,7 +50,8 @@ if TYPE_CHECKING:
     import matplotlib.figure
     from matplotlib.axes import Axes
 
-_ENDS = (TAIL, 1.0 - TAIL)
+_ENDS = (0.05, 0.95)
+"""Fractions between which a value goes for the change of a metric."""
 _NEGLIGIBLE = 0.01
 _FEWEST_WHOLE = 4
 _SIZES = 6
@@ -79,10 +79,16 @@ class Settling:
 
 @dataclass(frozen=True, slots=True)
 class OfMetric:
-    """The indices of a metric at growing sizes, the last the result. ``mean`` and ``sd`` [SI] are of all runs."""
+    """The indices of a metric at growing sizes, the last the result. ``mean`` and ``sd`` [SI] are of all runs.
+
+    ``change`` (paths,) [SI] is that of the metric from the 5 to the 95 % quantile of each value, with its sign and the
+    half width of its band ``change_band``; nan for the noise.
+    """
 
     metric: str
     settling: tuple[Settling, ...]
+    change: Floats
+    change_band: Floats
     dropped_runs: int
     mean: float
     sd: float
@@ -135,7 +141,7 @@ def analyse(
             f"sensitivity: the indices of {method.name} need values that are independent, and the study has "
             "[[correlations]]; use '--method shapley', or treat the values as independent (--independent)"
         )
-    if len(uncertainty.drawn) - (uncertainty.has_noise and not method.follows_noise) < 2:
+    if len(uncertainty.drawn) < 2:
         raise StudyError("sensitivity: there is only one uncertain value; vary two or more")
     if not method.fewest <= settings.samples <= method.most:
         raise StudyError(
@@ -149,16 +155,14 @@ def analyse(
     columns = uncertainty.columns(design)
     outcomes = model(columns)
     check_failures(outcomes, settings.maximum_failed, "sensitivity")
-    ends = [
-        np.array([item.distribution.values(np.array(fraction)) for item in uncertainty.drawn]) for fraction in _ENDS
-    ]
+    ends = np.array([item.distribution.values(np.array(_ENDS)) for item in uncertainty.drawn]).T
+    ends[:, [path == NOISE for path in uncertainty.paths]] = np.nan
     inputs = np.stack([columns[path] for path in uncertainty.paths], axis=1)
     rows = design.shape[0] // settings.samples
     blocks = np.repeat(np.arange(settings.samples), rows)
-    whole = Evaluated(design, inputs, np.empty(0), blocks, ends[1] - ends[0], settings.seed)
+    whole = Evaluated(design, inputs, np.empty(0), blocks, ends, settings.seed)
     found = tuple(_of_metric(name, outcomes, whole, method, settings) for name in metrics)
-    paths = tuple(path for path in uncertainty.paths if method.follows_noise or path != NOISE)
-    return Sensitivity(method, settings, paths, found, outcomes.runs, outcomes.failures)
+    return Sensitivity(method, settings, uncertainty.paths, found, outcomes.runs, outcomes.failures)
 
 
 def _of_metric(name: str, outcomes: Outcomes, design: Evaluated, method: Method, settings: Settings) -> OfMetric:
@@ -177,9 +181,14 @@ def _of_metric(name: str, outcomes: Outcomes, design: Evaluated, method: Method,
             f"sensitivity: {int(np.count_nonzero(whole)):,} of {whole.size:,} {method.sizes_label} have '{name}' in "
             "all their runs, which is too few; use more samples, or fix what makes the runs fail"
         )
+    parts = [_first_blocks(design, values, whole, size) for size in sizes]
     return OfMetric(
         name,
-        tuple(_settling(design, values, whole, size, method, settings) for size in sizes),
+        tuple(
+            Settling(size, part.blocks.size, method.indices(part, settings.confidence))
+            for size, part in zip(sizes, parts, strict=True)
+        ),
+        *changes(parts[-1], settings.confidence),
         missing,
         float(np.mean(values[known])),
         float(np.std(values[known], ddof=1)),
@@ -197,16 +206,13 @@ def _varies(values: Floats, whole: NDArray[np.bool_], size: int, rows: int) -> b
     return len(kept) >= _FEWEST_WHOLE and float(np.ptp(kept)) > 0.0
 
 
-def _settling(
-    design: Evaluated, values: Floats, whole: NDArray[np.bool_], size: int, method: Method, settings: Settings
-) -> Settling:
+def _first_blocks(design: Evaluated, values: Floats, whole: NDArray[np.bool_], size: int) -> Evaluated:
     kept = np.flatnonzero(whole[:size])
     rows = np.flatnonzero(np.isin(design.blocks, kept))
-    found = Evaluated(design.fractions[rows], design.inputs[rows], values[rows], kept, design.ranges, design.seed)
-    return Settling(size, kept.size, method.indices(found, settings.confidence))
+    return Evaluated(design.fractions[rows], design.inputs[rows], values[rows], kept, design.ends, design.seed)
 
 
-DEFAULT_SAMPLES = {"sobol": 8192, "morris": 128, "shapley": 2048}
+DEFAULT_SAMPLES = {"sobol": 8192, "shapley": 2048}
 
 
 def sensitivity(
@@ -226,10 +232,10 @@ def sensitivity(
     """Return the sensitivity of metrics with regard to everything that has a distribution in a study.
 
     ``method`` is a name in ``METHODS``; by default Shapley effects where values are correlated, else Sobol indices.
-    ``metrics`` are those of the study by default; ``samples`` trajectories, base points or orders (8192 for Sobol,
-    128 for Morris, 2048 for Shapley). ``independent`` leaves the correlations of the study out. Noise of the sensors is
-    one of the values. StudyError for bad input, where SALib is missing, and where more than the fraction
-    ``maximum_failed`` of the runs fails; of fewer, whole blocks are left out and counted.
+    ``metrics`` are those of the study by default; ``samples`` base points or orders (8192 for Sobol, 2048 for
+    Shapley). ``independent`` leaves the correlations of the study out. Noise of the sensors is one of the values.
+    StudyError for bad input, and where more than the fraction ``maximum_failed`` of the runs fails; of fewer, whole
+    blocks are left out and counted.
     """
     if method is not None and method not in METHODS:
         raise StudyError(
@@ -256,8 +262,6 @@ _MAXIMUM_LINES = 5
 _TITLES = {
     "total": "total",
     "first": "first order",
-    "mean_effect": "mean effect",
-    "spread": "spread of effect",
     "shapley": "Shapley effect",
 }
 
@@ -277,24 +281,21 @@ def sensitivity_figure(found: Sensitivity) -> "matplotlib.figure.Figure":
             order = np.argsort(metric.indices.values[shown[0]])
             places = np.arange(order.size)
             for name, colour, shift in zip(shown, (BLUE, ORANGE), (0.14, -0.14), strict=False):
-                values = _in_display_unit(found, metric, metric.indices.values[name])[order]
-                band = metric.indices.bands.get(name)
-                reach = None if band is None else _in_display_unit(found, metric, band)[order]
                 bars.errorbar(
-                    values,
+                    metric.indices.values[name][order],
                     places + shift,
-                    xerr=reach,
+                    xerr=metric.indices.bands[name][order],
                     fmt="o",
                     color=colour,
                     markersize=5,
                     elinewidth=1.4,
-                    label=_TITLES[name].removesuffix(" of effect"),
+                    label=_TITLES[name],
                 )
             bars.set_yticks(places, [labels[row] for row in order])
             for label, colour in zip(reversed(bars.get_yticklabels()), COLOURS[:_MAXIMUM_LINES], strict=False):
                 label.set_color(colour)
             bars.axvline(0.0, color="#9a9a9a", linewidth=0.8)
-            bars.set_xlabel(_unit(found, metric))
+            bars.set_xlabel("Fraction of the variance")
             bars.set_title(metric_words(metric.metric))
             # The lower right is free: the smallest indices are there.
             bars.legend(loc="lower right", handlelength=1.0)
@@ -308,24 +309,13 @@ def _draw_settling(axes: "Axes", found: Sensitivity, metric: OfMetric) -> None:
     order = np.argsort(-metric.indices.values[name])[:_MAXIMUM_LINES]
     sizes = [each.blocks for each in metric.settling]
     for colour, row in zip(COLOURS, order, strict=False):
-        values = _in_display_unit(found, metric, np.array([each.indices.values[name][row] for each in metric.settling]))
-        bands = _in_display_unit(found, metric, np.array([each.indices.bands[name][row] for each in metric.settling]))
+        values = np.array([each.indices.values[name][row] for each in metric.settling])
+        bands = np.array([each.indices.bands[name][row] for each in metric.settling])
         axes.plot(sizes, values, "o-", color=colour, markersize=3.5, linewidth=1.2, label=found.paths[row])
         axes.fill_between(sizes, values - bands, values + bands, color=colour, alpha=0.15, linewidth=0)
     axes.set_xscale("log", base=2)
     axes.set_xlabel(f"{found.method.sizes_label[:1].upper()}{found.method.sizes_label[1:]}")
     axes.set_title(f"{_TITLES[name][:1].upper()}{_TITLES[name][1:]}, {order.size} largest")
-
-
-def _in_display_unit(found: Sensitivity, metric: OfMetric, values: Floats) -> Floats:
-    return values * display_difference(1.0, metric_quantity(metric.metric)) if found.method.name == "morris" else values
-
-
-def _unit(found: Sensitivity, metric: OfMetric) -> str:
-    if found.method.name != "morris":
-        return "Fraction of the variance"
-    unit = axis_unit(metric_quantity(metric.metric))
-    return f"Change over the range ({unit})" if unit else "Change over the range"
 
 
 _CAPTION = (
@@ -335,7 +325,7 @@ _CAPTION = (
 
 
 def answer_of(found: Sensitivity) -> Answer:
-    """Return the answer of a sensitivity analysis; indices of Morris are in the SI unit of the metric in its data."""
+    """Return the answer of a sensitivity analysis; changes of a metric are in its SI unit in the data."""
     figure = Figure("sensitivity", _CAPTION, lambda: sensitivity_figure(found))
     return Answer(
         name="sensitivity",
@@ -360,6 +350,8 @@ def answer_of(found: Sensitivity) -> Answer:
                     "mean": metric.mean,
                     "standard_deviation": metric.sd,
                     "runs_without_value": metric.dropped_runs,
+                    "change_from_5_to_95_percent": plain(metric.change.tolist()),
+                    "band_of_change": plain(metric.change_band.tolist()),
                     "settling": [
                         {
                             "blocks": each.blocks,
@@ -378,12 +370,12 @@ def answer_of(found: Sensitivity) -> Answer:
 
 def _metric_section(found: Sensitivity, metric: OfMetric) -> Section:
     # The head of the table of a metric.
-    unit = display_unit(metric_quantity(metric.metric)) if found.method.name == "morris" else ""
+    quantity = metric_quantity(metric.metric)
     names = []
     for name in metric.indices.values:
-        names.append(f"{_TITLES[name]} ({unit})" if unit else _TITLES[name])
-        names += ["band"] if name in metric.indices.bands else []
-    head = tuple(map(Column, ["value", *names]))
+        names += [_TITLES[name], "band"]
+    changed = Column("change, 5 to 95 %", quantity, "+.3g", is_change=True)
+    head = (*map(Column, ["value", *names]), changed, Column("band"))
     rows = tuple(map(tuple, table_rows(found, metric)))
     return Section(heading(found, metric), table=Table(head, rows), remarks=tuple(remarks(found, metric)))
 
@@ -406,10 +398,10 @@ def heading(found: Sensitivity, metric: OfMetric) -> str:
     return f"{metric.metric}: {spread}{dropped if metric.dropped_blocks else ''}"
 
 
-def table_rows(found: Sensitivity, metric: OfMetric) -> list[list[str]]:
+def table_rows(found: Sensitivity, metric: OfMetric) -> list[list[Cell]]:
     """Return a row for each uncertain value, the most important one first."""
     order = np.argsort(-metric.indices.values[found.method.shown[0]])
-    return [[found.paths[row], *_cells(found, metric, int(row))] for row in order]
+    return [[found.paths[row], *_cells(metric, int(row))] for row in order]
 
 
 def remarks(found: Sensitivity, metric: OfMetric) -> list[str]:
@@ -433,16 +425,11 @@ def _interactions(indices: Indices) -> str:
     return f"first-order indices sum to {alone:.3f} ± {error:.2g}: interactions, if any, are within this error"
 
 
-def _cells(found: Sensitivity, metric: OfMetric, row: int) -> list[str]:
-    def to_display(value: float) -> float:
-        return display_difference(value, metric_quantity(metric.metric)) if found.method.name == "morris" else value
-
-    cells = []
+def _cells(metric: OfMetric, row: int) -> list[Cell]:
+    cells: list[Cell] = []
     for name, values in metric.indices.values.items():
-        value = to_display(values[row])
-        cells.append(f"{value:.3g}" if found.method.name == "morris" else f"{round(value, 3) + 0.0:.3f}")
-        band = metric.indices.bands.get(name)
-        if band is not None:
-            reach = to_display(band[row])
-            cells.append(f"± {reach:.2g}" if found.method.name == "morris" else f"± {reach:.3f}")
-    return cells
+        cells += [f"{round(values[row], 3) + 0.0:.3f}", f"± {metric.indices.bands[name][row]:.3f}"]
+    change, band = float(metric.change[row]), float(metric.change_band[row])
+    if math.isnan(change):
+        return [*cells, None, None]
+    return [*cells, change, f"± {display_difference(band, metric_quantity(metric.metric)):.2g}"]

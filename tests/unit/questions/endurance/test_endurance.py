@@ -1,4 +1,4 @@
-"""How a run ends and why, rests, gas uses from recordings, and reuse in the study."""
+"""How a run ends and why, rests, and gas uses from recordings."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from ppafo.errors import DataError, ParameterError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.questions.endurance.answer import Endurance, Endurances
 from ppafo.questions.endurance.draw import draw_of_numbers, draw_of_recording
-from ppafo.questions.endurance.solve import check_reuse, endurance, follow_bottle, parse_reuse
+from ppafo.questions.endurance.solve import endurance, follow_bottle
 from ppafo.signals import Channel, Recording
 from ppafo.walking.bottle import Schedule
 
@@ -151,57 +151,6 @@ def test_recordings_that_say_nothing_of_a_gas_use_are_refused(
 ) -> None:
     with pytest.raises(DataError, match=words):
         draw_of_recording(recording, stride_time)
-
-
-def test_reuse_takes_what_it_saves_off_every_step_and_the_bottle_lasts_longer() -> None:
-    bottle = load_bottle(PAPER_BOTTLE)
-    draw = draw_of_numbers(1e-3, 1.1, None)
-    made = follow_bottle(bottle, draw, WITHOUT_REST, parse_reuse(["reservoir_volume=50 cm^3"], bottle))
-    assert made.reuse is not None
-    assert made.without_reuse is not None
-    assert made.draw.mass_per_stride == pytest.approx(1e-3 - made.reuse.balance.returned_mass, rel=1e-12)
-    assert made.without_reuse.strides == pytest.approx(lasting(1.0).discharge.strides, rel=1e-9)
-    assert made.discharge.strides > made.without_reuse.strides
-
-
-def test_a_reservoir_of_nothing_saves_nothing() -> None:
-    bottle = load_bottle(PAPER_BOTTLE)
-    made = follow_bottle(
-        bottle, draw_of_numbers(1e-3, 1.1, None), WITHOUT_REST, parse_reuse(["reservoir_volume=0 L"], bottle)
-    )
-    assert made.discharge.strides == lasting(1.0).discharge.strides
-
-
-def test_defaults_of_reuse_are_the_regulators_pressure_and_the_paper_devices_volumes() -> None:
-    cycle = parse_reuse(["reservoir_volume=50 cm^3", "fill_pressure=30 psi_g"], load_bottle(PAPER_BOTTLE)).cycle
-    assert cycle.reservoir_volume == pytest.approx(50e-6)
-    assert cycle.exhaust_pressure == pytest.approx(101325.0 + 50 * 6894.757, rel=1e-6)
-    assert cycle.fill_pressure == pytest.approx(101325.0 + 30 * 6894.757, rel=1e-6)
-    assert cycle.exhaust_volume == pytest.approx(2e-6 + 51e-6 * np.radians(90.0))
-    assert cycle.fill_volume == pytest.approx(2e-6 + 51e-6 * np.radians(40.0))
-
-
-@pytest.mark.parametrize(
-    ("texts", "words"),
-    [
-        (["fill_pressure=30 psi_g"], "reservoir_volume"),
-        (["reservoir_volum=30 cm^3"], "did you mean 'reservoir_volume'"),
-        (["reservoir_volume=30 psi_g"], "does not fit"),
-        (["reservoir_volume=-1 cm^3"], "must be from"),
-        (["reservoir_volume"], "NAME=VALUE"),
-    ],
-)
-def test_reuse_that_makes_no_sense_is_refused(texts: list[str], words: str) -> None:
-    with pytest.raises(ParameterError, match=words):
-        parse_reuse(texts, load_bottle(PAPER_BOTTLE))
-
-
-def test_chambers_that_hold_more_than_a_step_takes_are_refused() -> None:
-    plan = parse_reuse(["reservoir_volume=50 cm^3"], load_bottle(PAPER_BOTTLE))
-    with pytest.raises(ParameterError, match=r"more than the 0\.3 g"):
-        check_reuse(plan, 3e-4)
-    with pytest.raises(ParameterError, match="at least the atmospheric pressure"):
-        check_reuse(replace(plan, cycle=plan.cycle._replace(fill_pressure=9e4)), 1e-3)
 
 
 def test_the_verb_takes_numbers_as_the_command_takes_texts() -> None:

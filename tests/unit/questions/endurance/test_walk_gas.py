@@ -1,4 +1,4 @@
-"""The gas of a walk: how full its chambers get, from its folder as from its result, and what reuse makes of it."""
+"""The gas of a walk, from its folder as from its result, and how long a bottle lasts for it."""
 
 import json
 import re
@@ -11,20 +11,17 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.errors import DataError, ParameterError, ScenarioError
-from ppafo.model.plant import chamber_1_volume, chamber_2_volume
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
 from ppafo.questions.endurance.answer import Endurance
 from ppafo.questions.endurance.draw import (
     FORMAT,
-    Actuator,
     WalkGas,
     draw_of_walk,
-    full_chambers,
     largest_flow,
     read_walk_gas,
     walk_gas,
 )
-from ppafo.questions.endurance.solve import endurance, endurance_of_walk, endurance_of_walk_gas
+from ppafo.questions.endurance.solve import endurance, endurance_of_walk
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.numbers import with_numbers
 from ppafo.storage.netcdf import netcdf_bytes
@@ -33,7 +30,6 @@ from ppafo.walking.bottle import Schedule, SupplyBalance
 from ppafo.walking.loading import on_bottle
 from ppafo.walking.motion import walk_of, with_duration
 
-ACTUATOR = Actuator(0.35, 2.27, 5.1e-5, 2e-6, 2e-6)
 SMALL = ["bottle.gas_mass=20 g", "bottle.volume=30 cm^3"]
 """A bottle that is walked to its end in a second."""
 FEW = Schedule(60.0, 0.0, 5.0)
@@ -46,26 +42,17 @@ def solenoid() -> WalkResult:
 
 
 def pulses(strides: float) -> WalkGas:
-    """A made-up walk: chamber 1 peaks at 3 bar and 1.8 rad in each stride, chamber 2 later at 4 bar and 1.5 rad."""
+    """A made-up walk that takes 0.6 g a stride."""
     time = np.arange(0.0, strides * STRIDE + 5e-4, 1e-3)
-    phase = time % STRIDE
-    first, second = np.exp(-(((phase - 0.5) / 0.02) ** 2)), np.exp(-(((phase - 0.8) / 0.02) ** 2))
-    channels = {
-        "angle": Channel(1.6 + 0.2 * first - 0.1 * second, "rad"),
-        "pressure_1": Channel(1e5 + 2e5 * first, "Pa"),
-        "pressure_2": Channel(1e5 + 3e5 * second, "Pa"),
-        "supplied_mass": Channel(6e-4 * time / STRIDE, "kg"),
-    }
+    channels = {"supplied_mass": Channel(6e-4 * time / STRIDE, "kg")}
     recording = Recording("pulses", time, channels, kind="simulated")
-    return WalkGas("pulses", recording, 6e-4, STRIDE, ACTUATOR, scenario=load_walk("solenoid"))
+    return WalkGas("pulses", recording, 6e-4, STRIDE, scenario=load_walk("solenoid"))
 
 
 def folder_of(walk: WalkGas, path: Path) -> Path:
     """What ``ppafo walk`` writes, as far as the gas goes."""
     path.mkdir(parents=True)
-    actuator = {name: getattr(walk.actuator, name) for name in Actuator.__slots__}
-    device = {"actuator": actuator, "supply": {"atmospheric_pressure": walk.atmospheric_pressure}}
-    configuration = {"name": walk.name, "gait": {"stride_time": walk.stride_time}, "device": device}
+    configuration = {"name": walk.name, "gait": {"stride_time": walk.stride_time}}
     if walk.scenario is not None:
         origin = walk.scenario.origin
         said = {"content": origin.content, "overrides": list(origin.overrides), "file": origin.file}
@@ -77,44 +64,10 @@ def folder_of(walk: WalkGas, path: Path) -> Path:
     return path
 
 
-def test_chambers_are_taken_where_they_are_fullest_without_the_first_strides() -> None:
-    full = full_chambers(pulses(5.0))
-    assert full.strides == 3
-    assert full.exhaust_pressure == pytest.approx(3e5, rel=1e-3)
-    assert full.fill_pressure == pytest.approx(4e5, rel=1e-3)
-    assert full.exhaust_volume == pytest.approx(chamber_1_volume(1.8, 0.35, 5.1e-5, 2e-6), rel=1e-3)
-    assert full.fill_volume == pytest.approx(chamber_2_volume(1.5, 2.27, 5.1e-5, 2e-6), rel=1e-3)
-
-
-def test_a_walk_high_above_the_sea_lets_gas_out_into_its_own_atmosphere(tmp_path: Path) -> None:
-    read = read_walk_gas(folder_of(replace(pulses(5.0), atmospheric_pressure=83e3), tmp_path / "walk"))
-    given = ["reservoir_volume=5 cm^3", "fill_pressure=1 bar_g"]
-    reuse = endurance_of_walk_gas(read, PAPER_BOTTLE, FEW, given).reuse
-    assert reuse is not None
-    assert reuse.cycle.atmospheric_pressure == 83e3
-    assert reuse.cycle.fill_pressure == pytest.approx(183e3)
-
-
-def test_a_stride_that_differs_moves_the_mean() -> None:
-    made = pulses(5.0)
-    pressure = np.where(made.recording.time > 4.0, 0.5, 1.0) * made.recording["pressure_1"]
-    names = made.recording.names
-    channels = {name: Channel(made.recording[name], made.recording.unit(name)) for name in names}
-    changed = Recording("weak", made.recording.time, channels | {"pressure_1": Channel(pressure, "Pa")})
-    full = full_chambers(replace(made, recording=changed))
-    assert full.exhaust_pressure == pytest.approx((3e5 + 3e5 + 1.5e5) / 3.0, rel=1e-3)
-
-
-def test_a_walk_of_two_strides_says_nothing_of_a_settled_one() -> None:
-    with pytest.raises(DataError, match="contain no complete stride after the first 2"):
-        full_chambers(pulses(2.4))
-
-
 def test_a_folder_says_what_the_walk_says(tmp_path: Path) -> None:
     here = walk_gas(solenoid())
     read = read_walk_gas(folder_of(here, tmp_path / "walk"))
     assert replace(read, recording=here.recording, scenario=here.scenario) == here
-    assert full_chambers(read) == full_chambers(here)
     assert draw_of_walk(read) == draw_of_walk(here)
     assert read.gas_per_stride == solenoid().metrics["gas"].value
 
@@ -123,11 +76,11 @@ def test_a_folder_says_what_the_walk_says(tmp_path: Path) -> None:
     ("content", "words"),
     [
         ('{"format": "ppafo endurance"}', "is not the result of a ppafo walk"),
-        ('{"format": "ppafo walk", "configuration": {}}', "has no number at 'configuration.device.actuator.angle_min'"),
+        ('{"format": "ppafo walk", "configuration": {}}', "has no number at 'configuration.gait.stride_time'"),
         ('{"format": "ppafo walk", "status": {"kind": "diverged"}}', "the walk diverged, so it cannot be repeated"),
         ("[", "is not JSON"),
         ('{"format": "ppafo walk", "status": "completed"}', "'status' is not a table of names and values"),
-        ('{"format": "ppafo walk", "configuration": 3}', "has no number at 'configuration.device.actuator.angle_min'"),
+        ('{"format": "ppafo walk", "configuration": 3}', "'configuration' is not a table of names and values"),
     ],
 )
 def test_a_folder_that_says_too_little_is_refused(tmp_path: Path, content: str, words: str) -> None:
@@ -149,11 +102,6 @@ def test_a_folder_that_says_too_little_is_refused(tmp_path: Path, content: str, 
             "'configuration.gait.stride_time' is 0, which is impossible for a walk",
         ),
         ("configuration.gait", [], "has no number at 'configuration.gait.stride_time'"),
-        (
-            "configuration.device.actuator.dead_volume_1",
-            -1e-6,
-            "dead_volume_1' is -1e-06, which is impossible for a walk",
-        ),
     ],
 )
 def test_a_damaged_walk_is_refused_in_one_line(
@@ -174,53 +122,32 @@ def test_a_damaged_walk_is_refused_in_one_line(
     assert said.count("\n") == 1
 
 
-def test_a_recording_without_pressures_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_recording_without_gas_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = pulses(5.0)
-    channels = {name: Channel(made.recording[name], made.recording.unit(name)) for name in ("angle", "supplied_mass")}
-    bare = Recording("bare", made.recording.time, channels, kind="simulated")
+    bare = Recording("bare", made.recording.time, {"angle": Channel(0.0 * made.recording.time, "rad")})
     folder = folder_of(replace(made, recording=bare), tmp_path / "walk")
-    assert main(["endurance", str(folder), "--reuse", "reservoir_volume=50 cm^3"]) == 2
-    assert "has no channel 'pressure_1'" in capsys.readouterr().err
-
-
-def test_reuse_takes_the_chambers_from_the_walk_and_a_given_value_overrides() -> None:
-    made = endurance(solenoid(), reuse=["reservoir_volume=50 cm^3", "fill_pressure=20 psi_g"], overrides=SMALL)
-    assert isinstance(made, Endurance)
-    assert made.reuse is not None
-    assert made.without_reuse is not None
-    full = full_chambers(walk_gas(solenoid()))
-    assert made.reuse.cycle.exhaust_pressure == full.exhaust_pressure
-    assert made.reuse.cycle.exhaust_volume == full.exhaust_volume
-    assert made.reuse.cycle.fill_volume == full.fill_volume
-    assert made.reuse.cycle.fill_pressure == pytest.approx(101325.0 + 20 * 6894.757, rel=1e-6)
-    assert made.reuse.origins["fill_pressure"] == "given"
-    assert made.reuse.origins["exhaust_volume"].startswith("from the walk, mean over ")
-    assert made.reuse.balance.exhausted_mass > made.reuse.balance.returned_mass > 1e-5
-    assert made.discharge.strides > made.without_reuse.strides
+    assert main(["endurance", str(folder)]) == 2
+    assert "has no channel 'supplied_mass'" in capsys.readouterr().err
 
 
 def test_a_walk_lasts_the_same_with_and_without_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = folder_of(walk_gas(solenoid()), tmp_path / "walk")
-    assert main(["endurance", str(folder), "--reuse", "reservoir_volume=50cm^3", "--json", "--longest", "5 s"]) == 0
+    assert main(["endurance", str(folder), "--json", "--longest", "5 s"]) == 0
     document = json.loads(capsys.readouterr().out)
-    made = endurance(solenoid(), reuse=["reservoir_volume=50 cm^3"], longest=5.0)
+    made = endurance(solenoid(), longest=5.0)
     assert isinstance(made, Endurance)
     assert document["result"]["strides"] == pytest.approx(made.discharge.strides, rel=1e-6)
-    assert document["reuse"]["origins"]["exhaust_pressure"].startswith("from the walk")
 
 
 def test_several_recordings_stand_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     one, two = (folder_of(walk_gas(solenoid()), tmp_path / name) for name in ("one", "two"))
-    assert main(["endurance", str(one), str(two), "--reuse", "reservoir_volume=50cm^3", "--longest", "5 s"]) == 0
+    assert main(["endurance", str(one), str(two), "--longest", "5 s"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    titles = (
-        "gas use,gas per stride (g),walking (min),strides,gas saved (g),walking with reuse (min),strides with reuse"
-    )
-    assert re.split(r"\s{2,}", lines[2].replace("gas use", "gas use ")) == [*titles.split(","), "ended"]
+    titles = ["gas use", "gas per stride (g)", "walking (min)", "strides", "ended"]
+    assert re.split(r"\s{2,}", lines[2].replace("gas use", "gas use ")) == titles
     assert lines[3].split()[0] == str(one)
     assert lines[3].split()[1:] == lines[4].split()[1:]
-    assert lines[6].startswith(f"{one}: exhaust at ")
-    assert "from the walk, mean over " in lines[6]
+    assert lines[6].startswith(f"{one} with ppafo2011-consistent: ")
 
 
 @pytest.mark.parametrize(
@@ -251,12 +178,6 @@ def test_several_recordings_have_one_folder_and_none_comes_twice(
     names = ["endurance.json", "endurance.txt", "ppafo.json", "report.html"]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == names
     assert set(json.loads((tmp_path / "out" / "endurance.json").read_text())["recordings"]) == {folder, other}
-
-
-def test_a_walk_whose_chambers_hold_more_than_it_took_is_refused() -> None:
-    little = replace(pulses(5.0), gas_per_stride=1e-5)
-    with pytest.raises(ParameterError, match=r"more than the 0\.01 g"):
-        endurance_of_walk_gas(little, PAPER_BOTTLE, FEW, ["reservoir_volume=50 cm^3"])
 
 
 def test_a_walk_without_gas_lasts_for_ever() -> None:

@@ -12,7 +12,6 @@ import pytest
 
 import ppafo
 from ppafo.answers.writing import text_of
-from ppafo.cli.main import main
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
@@ -260,21 +259,6 @@ def test_what_has_no_linear_model_is_refused_in_one_line() -> None:
     fed = replace(ppafo.load_scenario(TASK), supply_lines=SupplyLines(1e9, 1e-2, 1e-5, 1e9, 1e-2, 1e-5, 0.0))
     with pytest.raises(ScenarioError, match="constant supplies; omit"):
         linearise(fed, 1.0)
-
-
-def test_the_command_ends_with_2_and_one_line_for_what_has_no_linear_model(capsys: pytest.CaptureFixture[str]) -> None:
-    for words, line in (
-        (["torque-task-solenoid", "--at", "1 s"], "on or off"),
-        ([TASK, "--at", "soon"], "--at 'soon': must be a time such as '1.5 s', or 'equilibrium'"),
-    ):
-        try:
-            code = main(["linearise", *words])
-        except SystemExit as ended:
-            code = int(str(ended.code))
-        said = capsys.readouterr().err
-        assert code == 2
-        assert line in said
-        assert said.count("\n") == 1
 
 
 def test_an_energy_balance_slows_what_isothermal_gas_does_at_once() -> None:

@@ -1,20 +1,17 @@
 """Sensitivity: indices of known functions, and of a study."""
 
-import importlib.util
 import itertools
 import math
-import sys
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import pytest
 
 from ppafo.errors import StudyError
-from ppafo.questions.sensitivity.methods import METHODS, SCRAMBLES
-from ppafo.questions.sensitivity.solve import Settings, analyse, remarks, sensitivity
+from ppafo.questions.sensitivity.methods import METHODS
+from ppafo.questions.sensitivity.solve import Settings, analyse, remarks, sensitivity, table_rows
 from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround, OneOf, UniformBetween
-from ppafo.studies.draws import Model, Outcomes, Uncertainty, replicate_seed
+from ppafo.studies.draws import Model, Outcomes, Uncertainty
 from ppafo.studies.study import Drawn
 
 METRIC = "rms_error"
@@ -69,18 +66,6 @@ def test_the_result_is_the_same_every_time() -> None:
     assert np.array_equal(one.metrics[0].indices.bands["total"], other.metrics[0].indices.bands["total"])
 
 
-def test_morris_gives_the_slopes_of_a_linear_model() -> None:
-    slopes = {"x1": 3.0, "x2": -1.0, "x3": 0.0}
-
-    def linear(columns: Mapping[str, Floats]) -> Outcomes:
-        values = sum((slope * columns[name] for name, slope in slopes.items()), np.zeros(columns["x1"].size))
-        return Outcomes({METRIC: values}, np.zeros(values.size, bool), "")
-
-    indices = analyse(linear, ANGLES, [METRIC], METHODS["morris"], Settings(32)).metrics[0].indices
-    assert indices.values["mean_effect"] == pytest.approx([3.0 * 2 * math.pi * 0.99, 2 * math.pi * 0.99, 0.0])
-    assert indices.values["spread"] == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
-
-
 def test_a_distribution_without_ends_has_finite_effects() -> None:
     normal = Uncertainty((Drawn("x1", NormalAround(0.0, 1.0)), Drawn("x2", NormalAround(5.0, 2.0))))
 
@@ -94,7 +79,7 @@ def test_a_distribution_without_ends_has_finite_effects() -> None:
         assert indices.values[method.shown[0]][1] == pytest.approx(0.0, abs=least)
 
 
-@pytest.mark.parametrize("method", ["sobol", "morris"])
+@pytest.mark.parametrize("method", METHODS)
 def test_a_failed_run_takes_its_whole_block_with_it(method: str) -> None:
     settings = Settings(128, maximum_failed=0.02)
     rows = METHODS[method].block_rows(3)
@@ -152,8 +137,8 @@ def test_bad_settings_are_one_line() -> None:
         return str(caught.value)
 
     assert "need a power of 2, such as 128" in refused(ANGLES, "sobol", Settings(100))
-    assert "morris needs 8 to" in refused(ANGLES, "morris", Settings(2))
-    assert "maximum_failed = 1.0" in refused(ANGLES, "morris", Settings(16, maximum_failed=1.0))
+    assert "shapley needs 64 to" in refused(ANGLES, "shapley", Settings(2))
+    assert "maximum_failed = 1.0" in refused(ANGLES, "sobol", Settings(64, maximum_failed=1.0))
     assert "seed = -1: must be 0 or more" in refused(ANGLES, "sobol", Settings(64, seed=-1))
     assert "vary two or more" in refused(Uncertainty(ANGLES.drawn[:1]), "sobol", Settings(64))
     correlated = Uncertainty(ANGLES.drawn[:2], ((1.0, 0.0), (0.6, 0.8)))
@@ -171,18 +156,6 @@ def test_the_bands_of_sobol_hold_and_are_not_far_too_wide(blocks: int) -> None:
         assert np.all(np.mean(bands, axis=0) / (1.96 * np.std(values, axis=0)) < 1.6)
 
 
-def test_the_indices_of_one_design_are_those_of_salib() -> None:
-    from SALib.analyze import sobol
-
-    design = METHODS["sobol"].design(ANGLES, 1024, 3)
-    values = ishigami(ANGLES.columns(design)).metrics[METRIC]
-    problem = {"num_vars": 3, "names": ["a", "b", "c"], "bounds": [[0.0, 1.0]] * 3}
-    known = sobol.analyze(problem, values, calc_second_order=False, num_resamples=2, seed=1)
-    found = analyse(ishigami, ANGLES, [METRIC], METHODS["sobol"], Settings(1024, 3)).metrics[0].indices
-    assert found.values["total"] == pytest.approx(known["ST"], abs=2e-3)
-    assert found.values["first"] == pytest.approx(known["S1"], abs=2e-3)
-
-
 def linear_in(slopes: Mapping[str, float]) -> Model:
     """A sum of slopes times values."""
 
@@ -193,23 +166,41 @@ def linear_in(slopes: Mapping[str, float]) -> Model:
     return run
 
 
-def test_the_mean_effect_of_morris_is_the_change_over_the_range_whatever_the_distribution() -> None:
-    from scipy import stats
+@pytest.mark.parametrize("method", METHODS)
+def test_the_change_of_ishigami_is_the_known_one_and_its_band_holds(method: str) -> None:
+    known = np.array([2.0 * math.sin(0.9 * math.pi) * (1.0 + B * math.pi**4 / 5.0), 0.0, 0.0])
+    found = [analyse(ishigami, ANGLES, [METRIC], METHODS[method], Settings(512, seed)) for seed in range(1, 41)]
+    away = np.array([item.metrics[0].change - known for item in found])
+    bands = np.array([item.metrics[0].change_band for item in found])
+    assert np.mean(np.abs(away) <= bands) >= 0.9
+    assert np.all(np.mean(bands, axis=0) < 2.0)
+    assert np.mean(away, axis=0) == pytest.approx([0.0, 0.0, 0.0], abs=0.1)
 
+
+def test_the_change_of_a_linear_function_is_slope_times_distance_of_the_ends_whatever_the_distribution() -> None:
     mixed = Uncertainty(
         (
             Drawn("x1", NormalAround(0.0, 2.0)),
             Drawn("x2", OneOf((3.0, 4.0), (0.5, 1.0))),
-            Drawn("x3", OneOf((0.0, 1.0), (0.9, 1.0))),
+            Drawn("x3", OneOf((0.0, 1.0), (0.97, 1.0))),
             Drawn("x4", LogNormalAround(1.0, 2.0)),
         )
     )
     model = linear_in({"x1": 1.0, "x2": -5.0, "x3": 2.0, "x4": 1.0})
-    indices = analyse(model, mixed, [METRIC], METHODS["morris"], Settings(32)).metrics[0].indices
-    normal = 2.0 * stats.norm.ppf(0.995)
-    ranges = [2.0 * normal, 5.0, 2.0, 2.0 ** (normal / 2.0) - 2.0 ** (-normal / 2.0)]
-    assert indices.values["mean_effect"] == pytest.approx(ranges)
-    assert indices.values["spread"] == pytest.approx(np.zeros(4), abs=1e-9)
+    found = analyse(model, mixed, [METRIC], METHODS["sobol"], Settings(4096)).metrics[0]
+    normal = 1.6448536269514722
+    known = [2.0 * 2.0 * normal, -5.0, 0.0, 2.0**normal - 2.0**-normal]
+    assert found.change == pytest.approx(known, abs=0.06)
+    assert np.all(found.change_band < 0.1)
+
+
+def test_a_correlated_value_goes_along_in_the_change() -> None:
+    # x2 does nothing by itself; where it is high, x1 is.
+    drawn = (Drawn("x1", NormalAround(0.0, 1.0)), Drawn("x2", NormalAround(5.0, 3.0)))
+    together = Uncertainty(drawn, ((1.0, 0.0), (-0.8, 0.6)))
+    found = analyse(linear_in({"x1": 2.0}), together, [METRIC], METHODS["shapley"], Settings(4096)).metrics[0]
+    whole = 2.0 * 2.0 * 1.6448536269514722
+    assert found.change == pytest.approx([whole, -0.8 * whole], abs=0.15)
 
 
 def shapley_of_linear(slopes: Floats, covariance: Floats) -> Floats:
@@ -253,33 +244,6 @@ def test_shapley_effects_of_independent_values_share_out_what_acts_together() ->
     assert found.values["shapley"] == pytest.approx(0.5 * (first + total), abs=0.03)
 
 
-def test_a_missing_library_is_said_with_its_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
-    real = importlib.util.find_spec
-
-    def without(name: str, *rest: Any) -> Any:
-        return None if name == "SALib" else real(name, *rest)
-
-    monkeypatch.setattr(importlib.util, "find_spec", without)
-    with pytest.raises(StudyError, match=r"needs SALib, which is not installed: pip install 'ppafo\[studies\]'"):
-        analyse(ishigami, ANGLES, [METRIC], METHODS["morris"], Settings(64))
-
-
-def test_the_default_method_needs_no_extra_and_has_the_points_of_salib(monkeypatch: pytest.MonkeyPatch) -> None:
-    sobol = pytest.importorskip("SALib.sample.sobol")
-    dimensions, each = len(ANGLES.drawn), 8
-    design = METHODS["sobol"].design(ANGLES, SCRAMBLES * each, 7).reshape(each, SCRAMBLES, -1, dimensions)
-    problem = {"num_vars": dimensions, "names": list("abc"), "bounds": [[0.0, 1.0]] * dimensions}
-    for number in range(SCRAMBLES):
-        own = replicate_seed(7, number) % 2**32
-        points = sobol.sample(problem, each, calc_second_order=False, seed=own).reshape(each, -1, dimensions)
-        assert (design[:, number] == points).all()
-    real = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *rest: None if name == "SALib" else real(name, *rest))
-    for name in [name for name in sys.modules if name.startswith("SALib")]:
-        monkeypatch.setitem(sys.modules, name, None)
-    assert analyse(ishigami, ANGLES, [METRIC], METHODS["sobol"], Settings(64)).metrics
-
-
 STUDY = "torque-task-uncertainty"
 
 
@@ -290,6 +254,8 @@ def test_what_matters_for_the_error_and_what_for_the_gas() -> None:
     error, gas = (dict(zip(found.paths, metric.indices.values["total"], strict=True)) for metric in found.metrics)
     assert {path for path, share in error.items() if share > 0.1} == {"supply.pressure", "actuator.torque_constant"}
     assert max(gas, key=lambda path: gas[path]) == "actuator.leak.area"
+    change = dict(zip(found.paths, found.metrics[1].change, strict=True))
+    assert change["actuator.leak.area"] > 0.0 > change["gas.temperature"]
     assert np.sum(found.metrics[0].indices.values["first"]) == pytest.approx(1.0, abs=0.1)
     assert found.runs == 256 * 10
 
@@ -310,19 +276,20 @@ def test_the_study_of_the_package_with_its_correlation_gets_shapley_effects() ->
     assert max(effects, key=lambda path: effects[path]) == "actuator.leak.area"
 
 
-@pytest.mark.parametrize("method", ["sobol", "morris"])
-def test_noise_of_the_sensors_is_one_of_the_values_or_held_along_a_trajectory(method: str) -> None:
+def test_noise_of_the_sensors_is_one_of_the_values_and_has_no_ends() -> None:
     noisy = ["run.duration=0.3 s", "sensors.pressure_noise=5 kPa_d"]
     found = sensitivity(
-        STUDY, method, ["rms_error"], 64, "proportional", overrides=noisy, independent=True, maximum_failed=0.0
+        STUDY, "sobol", ["rms_error"], 64, "proportional", overrides=noisy, independent=True, maximum_failed=0.0
     )
-    if method == "morris":
-        assert "sensors.seed" not in found.paths
-        assert found.metrics[0].indices.values["mean_effect"].size == 8
-        return
-    total = dict(zip(found.paths, found.metrics[0].indices.values["total"], strict=True))
+    (metric,) = found.metrics
+    total = dict(zip(found.paths, metric.indices.values["total"], strict=True))
     assert total["sensors.seed"] > 0.05
     assert found.runs == 64 * 11
+    assert [path for path, change in zip(found.paths, metric.change, strict=True) if math.isnan(change)] == [
+        "sensors.seed"
+    ]
+    (row,) = [row for row in table_rows(found, metric) if row[0] == "sensors.seed"]
+    assert row[-2:] == [None, None]
 
 
 def test_mistakes_are_one_line() -> None:

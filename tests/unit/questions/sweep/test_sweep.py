@@ -111,29 +111,6 @@ def test_failed_runs_are_told_and_only_all_of_them_are_a_failure(
     assert "6 runs: 6 refused" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("words", "expected"),
-    [
-        (["sweep"], "no study was given"),
-        (["sweep", "torque-task-uncertanty"], "did you mean 'torque-task-uncertainty'?"),
-        (["sweep", "pressure-and-area", "--draws", "5"], "the number of runs is that of its grid"),
-        (["sweep", "torque-task-uncertainty", "--draws", "0"], "--draws 0: must be a whole number, 1 or more"),
-        (["sweep", "torque-task-uncertainty", "--threads", "x"], "--threads x: must be a whole number"),
-        (["sweep", "torque-task-uncertainty", "--set", "valve.aera=1 mm^2"], "did you mean 'valve.area'?"),
-        (["sweep", "torque-task-uncertainty", "--set", "run.duration=-1 s"], "run.duration"),
-    ],
-)
-def test_bad_input_is_one_line_and_writes_nothing(
-    words: list[str], expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(words) == 2
-    said = capsys.readouterr().err
-    assert expected in said
-    assert said.count("\n") == 1
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_an_interruption_says_that_the_command_goes_on(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -94,23 +94,6 @@ def test_the_limit_of_the_controller_follows_the_wish_and_a_stature_that_is_assu
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ([], "or state what is wanted by --mass, --stature, --torque, --pressure, --minutes"),
-        (["--mass", "70 kg"], "for a wearer give --torque, --pressure, --minutes too, for example --mass"),
-        (["push-off", "--torque", "3 N m"], "--torque: the design file states what is wanted"),
-        (["--mass", "70", "--torque", "3 N m"], "70"),
-    ],
-)
-def test_what_is_missing_is_said_with_what_to_write(
-    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["design", *words]) == 2
-    error = capsys.readouterr().err
-    assert said in error
-
-
-@pytest.mark.parametrize(
     "change",
     [{"mass": 5.0}, {"mass": 400.0}, {"pressure": 9.0e4}, {"torque": 0.0}, {"minutes": 90.0}, {"stature": 0.9}],
 )
