@@ -353,7 +353,7 @@ def permits(state: SafetyState, phase: float) -> bool:
     """
     rolled = state.stance.rolled > 0.5
     pushes = (state.level < signs.LIFTS) & (state.stance.heel_seen > 0.5) & rolled
-    steps = (phase > LANDING) | ((state.stance.turned > 0.5) & rolled)
+    steps = (phase > LANDING) | ((state.stance.turned > 0.5) & (rolled | (phase == LANDING)))
     return (state.level < signs.PAUSED) & steps & (pushes | (phase != PUSH_OFF))
 
 
