@@ -36,8 +36,8 @@ class Stance(NamedTuple):
 
     Both times end where the other one begins; the second one ends in the swing too. ``flat_angle`` [rad] is the ankle
     angle while the heel carried last, 0 before the first sample; ``turned`` is 1 once the ankle has left it.
-    ``largest`` [N] is the larger force at most since the strike, ``on_toes`` [N] how far the toe force was above the
-    heel force at most since the heel carried last.
+    ``largest`` [N] is the larger force at most since the strike; ``rolled`` is 1 once the toes carry what the heel no
+    longer does, which tells both sensors from each other, until the foot stands flat again.
     """
 
     heel_seen: float
@@ -47,7 +47,7 @@ class Stance(NamedTuple):
     flat_angle: float = 0.0
     turned: float = 0.0
     largest: float = 0.0
-    on_toes: float = 0.0
+    rolled: float = 0.0
 
 
 class Finding(NamedTuple):
@@ -128,6 +128,10 @@ less than 0."""
 CARRIES = 100.0
 """Force [N] in a stance below which that is not judged: the foot of who sits has less."""
 
+SITS_DOWN = 1.0
+"""Stride times after a strike from which a foot may leave the ground without rolling over its toes: its wearer sits
+down. A step begins before, and nobody sits down so soon."""
+
 MINIMUM_OPENING = 0.1
 """Commands below this may lie within the overlap of a valve: they do not count as opening it."""
 
@@ -139,10 +143,11 @@ def next_stance(
     angle, heel_force, toe_force = measurement.angle, measurement.heel_force, measurement.toe_force
     # A strike is known some samples late: what loads the foot before belongs to the next stance.
     swings = phase.phase == SWING
+    strikes = (before.phase == SWING) & (not swings)
     larger = last.largest if swings else max(heel_force, toe_force)
-    more_on_toes = last.on_toes if swings else toe_force - heel_force
+    largest = larger if strikes else max(last.largest, larger)
+    rolls = (not swings) & (toe_force - heel_force > ROLLS * largest)
     heel, toe = phase.heel.loaded, phase.toe.loaded
-    strikes = (before.phase == SWING) & (phase.phase != SWING)
     both = min(heel, toe) > 0.5
     one = (phase.phase != SWING) & (min(heel, toe) < 0.5)
     flat = ((phase.phase == MID_STANCE) & (heel > 0.5)) | (last.flat_angle <= 0.0)
@@ -155,14 +160,9 @@ def next_stance(
         apart=last.apart + period if one else 0.0,
         flat_angle=flat_angle,
         turned=1.0 if turns | ((last.turned > 0.5) & (not flat)) else 0.0,
-        largest=larger if strikes else max(last.largest, larger),
-        on_toes=more_on_toes if strikes | flat else max(last.on_toes, more_on_toes),
+        largest=largest,
+        rolled=1.0 if rolls | ((last.rolled > 0.5) & (not flat)) else 0.0,
     )
-
-
-def rolls_over(stance: Stance) -> bool:
-    """True where the toes carry what the heel no longer does, which tells both sensors from each other."""
-    return stance.on_toes >= ROLLS * stance.largest
 
 
 def gait_sign(rules: signs.SafetyRules, before: PhaseState, phase: PhaseState, stance: Stance) -> float:
@@ -172,9 +172,10 @@ def gait_sign(rules: signs.SafetyRules, before: PhaseState, phase: PhaseState, s
     stays = (before.phase != SWING) & (phase.phase != SWING) & (before.since_strike > longest)
     returns = (phase.heel.loaded > before.heel.loaded) | (phase.toe.loaded > before.toe.loaded)
     skips_toes = (before.phase == LANDING) & (phase.phase == SWING) & (phase.strikes > 1.5)
-    # Who sits has unloaded both alike, but does not turn the ankle.
+    # Who sits down unloads both alike, and may turn the ankle then, but late.
     leaves = (phase.phase == SWING) & (stance.turned > 0.5) & (stance.largest > CARRIES)
-    found = signs.NO_TOE_OFF if leaves & (not rolls_over(stance)) else signs.NO_SIGN
+    leaves = leaves & (phase.since_strike < SITS_DOWN * phase.stride_time)
+    found = signs.NO_TOE_OFF if leaves & (stance.rolled < 0.5) else signs.NO_SIGN
     found = signs.NO_TOES if skips_toes else found
     found = signs.RESTLESS if stays & returns else found
     return signs.ENDLESS_PHASE if endless else found
@@ -349,10 +350,11 @@ def permits(state: SafetyState, phase: float) -> bool:
     """True where the device may act in a phase.
 
     A push needs a heel that was loaded in this stance and has risen, and toes that carry in its place; a foot that is
-    lifted has left the ground by turning, for that of somebody who sits is unloaded where it stands.
+    lifted has turned and left the ground by its toes, for that of somebody who sits is unloaded where it stands.
     """
-    pushes = (state.level < LIFTS) & (state.stance.heel_seen > 0.5) & rolls_over(state.stance)
-    steps = (phase > LANDING) | (state.stance.turned > 0.5)
+    rolled = state.stance.rolled > 0.5
+    pushes = (state.level < LIFTS) & (state.stance.heel_seen > 0.5) & rolled
+    steps = (phase > LANDING) | ((state.stance.turned > 0.5) & (rolled | (phase == LANDING)))
     return (state.level < PAUSED) & steps & (pushes | (phase != PUSH_OFF))
 
 

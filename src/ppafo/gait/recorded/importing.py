@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
+from ppafo.gait.agreement import check_side, delay_remarks, size_remarks
+from ppafo.gait.document import load_gait
 from ppafo.gait.gait import HARMONICS, REQUIRED, Curve, FitError, Gait, Origin, fit_curve
 from ppafo.gait.plausible import (
     MeanStride,
@@ -522,6 +524,8 @@ def _finish(
     with noted_in(wrong):
         check_scatter(curves, errors, walk)
     with noted_in(wrong):
+        # The ankle of the other foot looks like a wrong zero to what follows.
+        check_side(mean_stride, load_gait())
         check_plausible(mean_stride)
     with noted_in(wrong):
         check_way(walk, signs_from)
@@ -531,6 +535,7 @@ def _finish(
     said += knee_remarks(source.columns.knee, walk, settings.stature)
     said += sign_remarks(means["shank_angle"], means["ankle_angle"])
     said += moment_remarks(means["ankle_moment"]) if "ankle_moment" in means else []
+    said += delay_remarks(mean_stride) + size_remarks(mean_stride)
     said += _sampling_remarks(walk, taken)
     tilt = standing_tilt(means["shank_angle"], means["ankle_angle"])
     sign, taken_off = source.columns.ankle_angle.sign_and_neutral()

@@ -1,6 +1,7 @@
 """Each sign by which a controller of walking vents the chambers, by itself: whether it pauses or stops."""
 
 import math
+from itertools import pairwise
 
 import pytest
 
@@ -18,8 +19,8 @@ RULES = rebuilt(SafetyRules, [float(item.default or 0.0) for item in SAFETY_QUAN
 PERIOD = 1.0e-3
 GOOD = GaitMeasurement(1.5, 1.1e5, 1.05e5, 0.0, 300.0, 200.0)
 
-STEPS = safety.START._replace(stance=safety.START.stance._replace(flat_angle=1.0))
-"""A foot that has turned since it stood, as one that steps."""
+STEPS = safety.START._replace(stance=safety.START.stance._replace(flat_angle=1.0, turned=1.0, rolled=1.0))
+"""A foot that has turned and rolled over its toes since it stood, as one that steps."""
 
 
 def phase(name: float, since: float, heel: float = 1.0, toe: float = 1.0, in_phase: float = 0.1) -> PhaseState:
@@ -299,37 +300,44 @@ def test_after_a_pause_the_foot_is_lifted_first_and_pushed_later() -> None:
     swing, lands = phase(SWING, 1.05, 0.0, 0.0, in_phase=0.4), phase(LANDING, 0.0, 1.0, 0.0)
     allowed = []
     for _ in range(3):
-        stood = state._replace(stance=STEPS.stance._replace(heel_seen=1.0, toe_seen=1.0, turned=1.0))
+        stood = state._replace(stance=STEPS.stance._replace(heel_seen=1.0, toe_seen=1.0))
         allowed.append([safety.permits(stood, name) for name in (SWING, LANDING, PUSH_OFF)])
         state = safety.monitor(RULES, stood, swing, lands, GOOD, PERIOD)
     assert allowed == [[False, False, False], [True, True, False], [True, True, True]]
 
 
 def test_no_push_without_a_heel_that_was_loaded_in_this_stance() -> None:
-    rises = STEPS._replace(stance=Stance(1.0, 1.0, 0.0, 0.1, flat_angle=1.0, turned=1.0))
+    rises = STEPS._replace(stance=Stance(1.0, 1.0, 0.0, 0.1, flat_angle=1.0, turned=1.0, rolled=1.0))
     assert safety.safe_command(rises, PUSH_OFF, 1.0, PERIOD)[0] == 1.0
     missed = rises._replace(stance=rises.stance._replace(heel_seen=0.0))
     assert safety.safe_command(missed, PUSH_OFF, 1.0, PERIOD)[0] == VENT
     assert safety.safe_command(missed, SWING, -1.0, PERIOD)[0] == -1.0, "the foot is still held up"
 
 
-def after_a_stance(forces: list[tuple[float, float]]) -> SafetyState:
-    """The state at the toe-off of a stance with these forces [N] under heel and toes, flat but for the last one."""
-    lands, flat = phase(LANDING, 0.0, 1.0, 0.0), phase(MID_STANCE, 0.3)
-    heel, toe = forces[-1]
-    last = phase(PUSH_OFF, 0.5, heel=float(heel > 60.0))
-    state, before = STEPS, phase(SWING, 1.0, 0.0, 0.0, in_phase=0.4)
-    for now, (heel, toe) in zip([lands, *[flat] * (len(forces) - 2), last], forces, strict=True):
-        state = safety.monitor(RULES, state, before, now, GOOD._replace(heel_force=heel, toe_force=toe), PERIOD)
-        before = now
-    off = phase(SWING, 0.63, 0.0, 0.0, in_phase=0.0)
+def after_a_stance(forces: list[tuple[float, float]], since: float = 0.6) -> SafetyState:
+    """The state at a toe-off so long [s] after the strike; the forces [N] under heel and toes change along lines.
+
+    The foot stands flat but for the last of the forces.
+    """
+    flat, last = phase(MID_STANCE, 0.3), phase(PUSH_OFF, 0.5, heel=float(forces[-1][0] > 60.0))
+    state, before = safety.START, phase(SWING, 1.0, 0.0, 0.0, in_phase=0.4)
+    for number, (begins, ends) in enumerate(pairwise([(60.0, 60.0), *forces, (25.0, 25.0)])):
+        for share in (0.25, 0.5, 0.75, 1.0):
+            heel, toe = (first + share * (then - first) for first, then in zip(begins, ends, strict=True))
+            now = flat if number < len(forces) - 1 else last
+            state = safety.monitor(RULES, state, before, now, GOOD._replace(heel_force=heel, toe_force=toe), PERIOD)
+            before = now
+    off = phase(SWING, since, 0.0, 0.0, in_phase=0.0)
     return safety.monitor(RULES, state, before, off, GOOD._replace(heel_force=25.0, toe_force=25.0, angle=1.8), PERIOD)
+
+
+A_STEP = [(400.0, 0.0), (350.0, 350.0), (10.0, 600.0)]
 
 
 @pytest.mark.parametrize(
     ("forces", "sign"),
     [
-        ([(400.0, 0.0), (350.0, 350.0), (10.0, 600.0)], signs.NO_SIGN),
+        (A_STEP, signs.NO_SIGN),
         ([(400.0, 400.0), (350.0, 350.0), (25.0, 25.0)], signs.NO_TOE_OFF),
         ([(400.0, 320.0), (350.0, 350.0), (10.0, 130.0)], signs.NO_TOE_OFF),
         ([(0.0, 400.0), (350.0, 350.0), (600.0, 10.0)], signs.NO_TOE_OFF),
@@ -342,13 +350,27 @@ def test_a_step_that_does_not_end_on_the_toes_pauses_before_the_foot_is_lifted(
 ) -> None:
     state = after_a_stance(forces)
     assert state.finding.sign == sign
-    assert safety.permits(state, SWING) is (sign == signs.NO_SIGN)
+    assert safety.permits(state, SWING) is (forces is A_STEP)
+
+
+def test_who_sits_down_and_turns_the_foot_is_helped_again_after_standing_up() -> None:
+    stands = [(350.0, 350.0), (350.0, 350.0), (300.0, 300.0)]
+    state = after_a_stance(stands, since=1.1)
+    assert state.finding.sign == signs.NO_SIGN
+    assert not safety.permits(state, SWING)
+    sits = phase(SWING, 2.5, 0.0, 0.0, in_phase=1.3)
+    state = safety.monitor(RULES, state, sits, sits, GOOD._replace(heel_force=25.0, toe_force=25.0), PERIOD)
+    assert (state.level, state.finding.sign) == (signs.PAUSED, signs.ENDLESS_PHASE)
+    for sample in range(510):
+        stood, seen = phase(MID_STANCE, sample * PERIOD), GOOD._replace(angle=1.5 + 1.0e-4 * sample)
+        state = safety.monitor(RULES, state, stood, stood, seen, PERIOD)
+    assert state.level == signs.HELPS
 
 
 def test_a_push_needs_toes_that_carry_in_place_of_the_heel() -> None:
-    stance = Stance(1.0, 1.0, 0.0, 0.1, flat_angle=1.0, turned=1.0, largest=700.0, on_toes=300.0)
+    stance = Stance(1.0, 1.0, 0.0, 0.1, flat_angle=1.0, turned=1.0, largest=700.0, rolled=1.0)
     assert safety.permits(STEPS._replace(stance=stance), PUSH_OFF)
-    assert not safety.permits(STEPS._replace(stance=stance._replace(on_toes=250.0)), PUSH_OFF)
+    assert not safety.permits(STEPS._replace(stance=stance._replace(rolled=0.0)), PUSH_OFF)
 
 
 def test_a_swing_that_is_too_short_for_a_steady_stride_pauses() -> None:
@@ -360,7 +382,7 @@ def test_a_swing_that_is_too_short_for_a_steady_stride_pauses() -> None:
 
 
 def after_commands(command: float, seconds: float) -> SafetyState:
-    state = STEPS._replace(stance=STEPS.stance._replace(turned=1.0))
+    state = STEPS
     for _ in range(round(seconds / PERIOD)):
         _, state = safety.safe_command(state, SWING, command, PERIOD)
     return state
@@ -440,14 +462,16 @@ def test_no_single_reading_is_right_for_a_filled_and_a_vented_chamber(reading: f
 @pytest.mark.parametrize("turned", [0.04, 0.06])
 def test_who_sits_is_not_lifted_and_who_steps_is(turned: float) -> None:
     state = safety.START
-    sits, stands, air = (
+    sits, stands, rolls, air = (
         GOOD._replace(heel_force=20.0, toe_force=20.0),
         phase(MID_STANCE, 0.5),
+        phase(PUSH_OFF, 0.5, heel=0.0),
         phase(SWING, 0.6, 0.0, 0.0),
     )
-    for seen, before, now in ((GOOD, stands, stands), (sits, stands, air), (sits, air, air)):
+    toes = GOOD._replace(heel_force=10.0, toe_force=250.0)
+    for seen, before, now in ((GOOD, stands, stands), (toes, stands, rolls), (sits, rolls, air), (sits, air, air)):
         state = safety.monitor(RULES, state, before, now, seen, PERIOD)
-        assert not safety.permits(state, now.phase) or now is stands
+        assert not safety.permits(state, now.phase) or now in (stands, rolls)
     state = safety.monitor(RULES, state, air, air, sits._replace(angle=GOOD.angle + turned), PERIOD)
     assert safety.permits(state, SWING) is (turned > safety.RESTS)
     state = safety.monitor(RULES, state, air, air, sits, PERIOD)

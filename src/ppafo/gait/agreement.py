@@ -1,0 +1,163 @@
+"""Whether the curves of one stride agree: delay, side and size of each, estimated against the others.
+
+Healthy walking shows where each curve belongs. Just after toe-off the foot is furthest in plantarflexion, and then the
+shank furthest back; ankle moment and vertical force end the push-off together. While the foot stands flat the ankle
+turns as the shank does, and the largest moment of the push-off is the force times a lever as long as the forefoot. An
+impaired gait may differ in each of these, so that what is unusual is remarked and not refused; but an ankle that fits
+half a stride away is of the other foot.
+
+Ranges in brackets are of 13 recorded strides: 11 of one walker overground and both legs of another on a treadmill.
+"""
+
+import numpy as np
+
+from ppafo.constants import STANDARD_GRAVITY
+from ppafo.errors import DataError
+from ppafo.gait.gait import HARMONICS, Gait, fit_curve
+from ppafo.gait.plausible import MIDSTANCE, MeanStride
+from ppafo.signals.recording import Floats
+
+LARGEST_DELAY = 0.03
+"""Seconds by which a curve may be away from its usual place (0.016 at most)."""
+
+_USUALLY = {"shank_angle": 0.061, "ankle_angle": 0.041, "ankle_moment": -0.002}
+"""Strides from toe-off to the shank furthest back and to the peak of plantarflexion; of the moment, from the force."""
+_ABOUT_TOE_OFF = (-0.16, 0.22)
+"""Strides from toe-off within which both are looked for."""
+_PUSH_OFF_FROM = 0.35
+"""Of the stride; the largest load from there on is the one of the push-off."""
+_FORCE_ENDS = -0.06
+"""Strides from toe-off to half the largest force of the push-off (-0.060): for a moment without a force."""
+
+_OTHER_FOOT = 0.3
+"""Strides between ankle and shank from which the ankle is of the other foot, which is half a stride away."""
+_ALIKE, _UNLIKE = 0.65, 0.4
+"""Correlation with a usual ankle, at least where it fits best, and at most in its own place."""
+
+USUAL_LEVER = (0.1, 0.21)
+"""Metres from the ankle to the force at the largest moment of the push-off (0.140 to 0.154)."""
+USUAL_MOMENT = (0.9, 2.2)
+"""Largest ankle moment [N m/kg] (1.4 to 1.8), where no force gives the lever."""
+USUAL_SHANK = (48.0, 105.0)
+"""Degrees over which the shank turns in a stride (72 to 81)."""
+USUAL_ANKLE = (18.0, 45.0)
+"""Degrees over which the ankle turns in a stride (25 to 33)."""
+USUAL_FOLLOWING = (0.65, 1.4)
+"""Turn of the ankle over the turn of the shank while the foot stands (0.78 to 1.07)."""
+_RESTS = 0.2
+"""The same of an ankle that hardly turns there, which says nothing of its size."""
+
+_FINE = np.linspace(0.0, 1.0, 1000, endpoint=False)
+
+
+def check_side(walk: MeanStride, usual: Gait) -> None:
+    """Raise DataError for an ankle that moves half a stride from where its shank has it; ``usual`` is a healthy gait."""
+    shank, _, _ = _lag(walk, usual, "shank_angle")
+    ankle, best, own = _lag(walk, usual, "ankle_angle")
+    apart = abs((ankle - shank + 0.5) % 1.0 - 0.5)
+    if apart > _OTHER_FOOT and best > _ALIKE and own < _UNLIKE:
+        raise DataError(
+            f"{walk.file['ankle_angle']}: ankle_angle is {100.0 * apart:.0f} % of the stride from where this shank has "
+            "it: it is of the other foot; give the ankle of the same side as the shank"
+        )
+
+
+def _lag(walk: MeanStride, usual: Gait, name: str) -> tuple[float, float, float]:
+    """Return by how many strides a curve is behind the usual one, and the correlations there and without a shift."""
+    at = np.interp(_FINE, (0.0, walk.stance_share, 1.0), (0.0, usual.stance_share, 1.0))
+    found, expected = (
+        values - np.mean(values) for values in (_smooth(walk.curves[name], name), usual.curve(name).values_at(at))
+    )
+    spectrum = np.fft.rfft(found) * np.conj(np.fft.rfft(expected))
+    scale = float(np.sqrt(np.sum(found**2) * np.sum(expected**2)))
+    alike = np.fft.irfft(spectrum, _FINE.size) / scale
+    return float(_FINE[np.argmax(alike)]), float(np.max(alike)), float(alike[0])
+
+
+def _smooth(values: Floats, name: str) -> Floats:
+    """Return a curve of 101 samples by its series, at 1000 phases."""
+    return fit_curve(values, HARMONICS[name])[0].values_at(_FINE)
+
+
+def delays(walk: MeanStride) -> dict[str, float]:
+    """Return how far [s] each curve is behind the vertical force, or behind the shank where there is no force."""
+    share = walk.stance_share
+    shank = _peak(-_smooth(walk.curves["shank_angle"], "shank_angle"), share) - _USUALLY["shank_angle"]
+    ankle = _peak(_smooth(walk.curves["ankle_angle"], "ankle_angle"), share) - _USUALLY["ankle_angle"]
+    has_force = "vertical_force" in walk.curves
+    found = {"shank_angle": shank, "ankle_angle": ankle} if has_force else {"ankle_angle": ankle - shank}
+    if "ankle_moment" in walk.curves:
+        moment = _end(_smooth(walk.curves["ankle_moment"], "ankle_moment")) - _USUALLY["ankle_moment"]
+        force = _end(_smooth(walk.curves["vertical_force"], "vertical_force")) if has_force else share + _FORCE_ENDS
+        found["ankle_moment"] = moment - force - (0.0 if has_force else shank)
+    return {name: walk.stride_time * strides for name, strides in found.items()}
+
+
+def _peak(values: Floats, share: float) -> float:
+    """Return the strides from toe-off to the largest of 1000 values about it."""
+    low, high = _ABOUT_TOE_OFF
+    after = (_FINE - share - low) % 1.0 + low
+    return float(after[np.argmax(np.where(after < high, values, -np.inf))])
+
+
+def _end(values: Floats) -> float:
+    """Return the phase at which a load falls below half its largest value of the push-off, 1 where it does not."""
+    first = int(np.argmax(np.where(_FINE > _PUSH_OFF_FROM, values, -np.inf)))
+    fallen = np.flatnonzero(values[first:] < 0.5 * values[first])
+    return float(_FINE[first + fallen[0]]) if fallen.size else 1.0
+
+
+def delay_remarks(walk: MeanStride) -> list[str]:
+    """Return which curves of a mean stride are on another clock than the force, or the shank, and by how much."""
+    other = "vertical_force" if "vertical_force" in walk.curves else "shank_angle"
+    return [
+        f"{name} is about {1000.0 * abs(late):.0f} ms {'behind' if late > 0.0 else 'ahead of'} {other}, by healthy "
+        f"walking: are both on one clock? Add {-late:+.3f} s to the times of {name}, or compare the delays of filters"
+        for name, late in delays(walk).items()
+        if abs(late) > LARGEST_DELAY
+    ]
+
+
+def following(walk: MeanStride) -> float:
+    """Return by how much the ankle turns for each turn of the shank while the foot stands; 1 for a foot that rests."""
+    shank, ankle = (walk.curves[name][MIDSTANCE] for name in ("shank_angle", "ankle_angle"))
+    lean = shank - np.mean(shank)
+    return float(np.sum(lean * ankle) / np.sum(lean**2))
+
+
+def lever(walk: MeanStride) -> float | None:
+    """Return the lever [m] of the vertical force about the ankle at the largest moment; None where one is missing."""
+    if not {"ankle_moment", "vertical_force"} <= set(walk.curves):
+        return None
+    at = int(np.argmax(walk.curves["ankle_moment"]))
+    return float(walk.curves["ankle_moment"][at] / (STANDARD_GRAVITY * walk.curves["vertical_force"][at]))
+
+
+def size_remarks(walk: MeanStride) -> list[str]:
+    """Return which curves of a mean stride are larger or smaller than the others let expect, with the numbers."""
+    said = []
+    for name, usual in (("shank_angle", USUAL_SHANK), ("ankle_angle", USUAL_ANKLE)):
+        turns = float(np.ptp(np.degrees(walk.curves[name])))
+        if not usual[0] <= turns <= usual[1]:
+            said.append(
+                f"{name} covers {turns:.0f} deg in a stride, usual are {usual[0]:g} to {usual[1]:g} deg: check its scale"
+            )
+    follows, (low, high) = following(walk), USUAL_FOLLOWING
+    if follows > high or _RESTS < follows < low:
+        said.append(
+            f"ankle_angle turns {follows:.2g} times as far as shank_angle while the foot stands, usual are {low:g} to "
+            f"{high:g}: check the scale of both"
+        )
+    moment = float(np.max(walk.curves["ankle_moment"])) if "ankle_moment" in walk.curves else 0.0
+    arm, why = lever(walk), "check its scale: N m/kg is per body mass, not per stature or weight"
+    if arm is not None and not USUAL_LEVER[0] <= arm <= USUAL_LEVER[1]:
+        said.append(
+            f"ankle_moment reaches {moment:.3g} N m/kg, which is the vertical force at {100.0 * arm:.0f} cm from the "
+            f"ankle, usual are {100.0 * USUAL_LEVER[0]:.0f} to {100.0 * USUAL_LEVER[1]:.0f} cm: {why}"
+        )
+    elif arm is None and moment > 0.0 and not USUAL_MOMENT[0] <= moment <= USUAL_MOMENT[1]:
+        said.append(
+            f"ankle_moment reaches {moment:.3g} N m/kg, usual are {USUAL_MOMENT[0]:g} to {USUAL_MOMENT[1]:g} N m/kg: "
+            f"{why}"
+        )
+    return said
