@@ -4,6 +4,7 @@ Every pair of valve and actuator walks a few strides; those with the torque walk
 lasts. That walk, whole, is the suggestion; where none does, walks say what would have to be given up.
 """
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -52,6 +53,12 @@ _KEPT = 0.9
 """Torque in the walk on the bottle over the wanted one: that at which a walk on a bottle ends."""
 _MORE_PRESSURE = (1.1, 1.25, 1.5, 1.8, 2.2)
 """Times the gauge pressure that are tried where no torque suffices."""
+_LESS_TORQUE = tuple(0.95 - 0.05 * place for place in range(14))
+"""Times the torque that are offered where no device has it for as long, the first that a walk on its bottle has."""
+_LESS_PRESSURE = (0.5, 0.65, 0.8, 1.0)
+"""Times the gauge pressure that are tried with each of them, the least gas first."""
+_OFFERED = 3
+"""Pairs of parts that such an offer is sought with: those with the most torque for their gas."""
 _USED = 0.75
 """Share of its gas that a bottle gives before it is too cold, about; a walk on it decides."""
 _LIVES = 8
@@ -219,7 +226,10 @@ _OF_ACTUATOR = ("torque_constant", "volume_per_angle")
 def _lightest_first(tried: list[Tried], bottles: list[Part], seconds: float) -> Iterator[tuple[Tried, Part]]:
     """Yield pairs of design and bottle by mass, those whose gas alone would do."""
     pairs = [(one, bottle) for one in tried for bottle in bottles if bottle.values["content"] >= one.flow * seconds]
-    yield from sorted(pairs, key=lambda pair: pair[0].mass + pair[1].full_mass)[:_LIVES]
+    lightest = sorted(pairs, key=lambda pair: pair[0].mass + pair[1].full_mass)
+    yield from lightest[:_LIVES]
+    # Where eight do not last, that with the least gas on the largest bottle decides whether any does.
+    yield from sorted(lightest[_LIVES:], key=lambda pair: (-pair[1].values["content"], pair[0].flow))[:1]
 
 
 def _on(one: Tried, bottle: Part) -> Any:
@@ -264,9 +274,9 @@ def _instead(wish: Wish, tried: list[Tried], strong: list[Tried], bottles: list[
         return
     if strong:
         thrifty = min(strong, key=lambda one: one.flow)
-        lasts = _life(thrifty, largest, wish.seconds)
+        lasts = math.floor(_life(thrifty, largest, wish.seconds) / 0.6) * 0.6  # hundredths of a minute, rounded down
         yield (
-            f"fewer minutes: {lasts / 60.0:.3g} min with {_named(thrifty)} on {largest.name}, the largest bottle, at "
+            f"fewer minutes: {lasts / 60.0:.4g} min with {_named(thrifty)} on {largest.name}, the largest bottle, at "
             f"{quantity_text(thrifty.torque, 'torque')}"
         )
     else:
@@ -275,12 +285,37 @@ def _instead(wish: Wish, tried: list[Tried], strong: list[Tried], bottles: list[
         found = next(_more_pressure(wish, tried, largest), None)
         if found is not None:
             yield found
-    weaker = sorted((one for one in tried if one.torque < wish.torque), key=lambda one: -one.torque)
-    usable = _USED * largest.values["content"]
-    for one in [one for one in weaker if usable >= one.flow * wish.seconds][:3]:
-        if _lasts(one, largest, wish.seconds):
-            yield (f"less torque: {_held(one)} for {wish.seconds / 60.0:.3g} min with {_named(one)} on {largest.name}")
-            break
+    weaker = next(_less_torque(wish, tried, largest), None)
+    if weaker is not None:
+        asked, one = weaker
+        yield (
+            f"less torque: {quantity_text(asked.torque, 'torque')} at {quantity_text(asked.pressure, 'pressure')} for "
+            f"{asked.seconds / 60.0:.3g} min with {_named(one)} on {largest.name}"
+        )
+
+
+def _less_torque(wish: Wish, tried: list[Tried], bottle: Part) -> Iterator[tuple[Wish, Tried]]:
+    """Yield wishes of less torque, at this or at less pressure, with what walked on the bottle for the time."""
+    strongest = max(tried, key=lambda one: one.torque)
+    thrifty = sorted((one for one in tried if one.flow > 0.0), key=lambda one: -one.torque / one.flow)[:_OFFERED]
+    gauge = wish.pressure - STANDARD_ATMOSPHERE
+    wanted = {strongest.torque, *(share * wish.torque for share in _LESS_TORQUE)}
+    for torque in sorted(
+        (math.floor(100.0 * torque) / 100.0 for torque in wanted if torque < wish.torque), reverse=True
+    ):
+        for share, one in itertools.product(_LESS_PRESSURE, dict.fromkeys([strongest, *thrifty])):
+            if torque <= 0.0 or one.actuator.values["torque_constant"] * share * gauge < torque:
+                continue
+            asked = replace(wish, torque=torque, pressure=STANDARD_ATMOSPHERE + share * gauge)
+            for again in _few_strides(asked, one.valve, one.actuator):
+                fits = again.torque >= torque and _USED * bottle.values["content"] >= again.flow * wish.seconds
+                if fits and _lasts(again, bottle, wish.seconds) and _torque_on(again, bottle, wish) >= _KEPT * torque:
+                    yield asked, again
+
+
+def _torque_on(one: Tried, bottle: Part, wish: Wish) -> float:
+    """Return the peak torque [N m] of the mean stride of a walk on a bottle for the time that is wanted."""
+    return float(walk(_on(one, bottle), wish.seconds / 60.0).averages["torque"].mean.max())
 
 
 def _held(one: Tried) -> str:
