@@ -4,6 +4,7 @@ Every pair of valve and actuator walks a few strides; those with the torque walk
 lasts. That walk, whole, is the suggestion; where none does, walks say what would have to be given up.
 """
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -13,7 +14,7 @@ import numpy as np
 
 from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import quantity_text
-from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.control.walking.assistance import ASSISTANCE_QUANTITIES
 from ppafo.errors import ScenarioError, StudyError
 from ppafo.model.catalog import VALVES
@@ -27,12 +28,12 @@ from ppafo.questions.endurance.solve import endurance_of_walk
 from ppafo.questions.parts.solve import doubts_data, doubts_sections, titles_section
 from ppafo.questions.question import Solved
 from ppafo.version import __version__
-from ppafo.walking.bottle import WALKED, Schedule, lasting_text, minutes_text
+from ppafo.walking.bottle import WALKED, lasting_text, minutes_text
 from ppafo.walking.figures.over_time import bottle_figure, peak_torques
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import LONGEST_MINUTES, walk_of
 from ppafo.walking.result import WalkResult
-from ppafo.walking.walk import bottle_life, walk
+from ppafo.walking.walk import walk
 from ppafo.walking.wearer import SCALED_MASS, STATURES, WEARER, paper_subject, who_walks
 
 WALKS = {"solenoid": "solenoid-regulators", "proportional": "proportional-regulators"}
@@ -41,6 +42,8 @@ _REQUESTS = (1.0, 1.3, 1.7)
 """Torque that a torque controller is told, over the torque that is wanted: it lags behind its reference."""
 _LIMIT = next(item.default or 0.0 for item in ASSISTANCE_QUANTITIES if item.name == "largest_torque")
 """Torque [N m] above which a controller of walking requests no more, unless it is told."""
+_SHORTEST = 6.0
+"""Time [s] that a walk on a bottle takes at least."""
 _FEW = 0.15
 """Minutes of the walks that are compared at a constant supply."""
 _DORSIFLEXION = 0.9
@@ -52,10 +55,14 @@ _KEPT = 0.9
 """Torque in the walk on the bottle over the wanted one: that at which a walk on a bottle ends."""
 _MORE_PRESSURE = (1.1, 1.25, 1.5, 1.8, 2.2)
 """Times the gauge pressure that are tried where no torque suffices."""
-_USED = 0.75
-"""Share of its gas that a bottle gives before it is too cold, about; a walk on it decides."""
-_LIVES = 8
-"""Walks on a bottle that are tried at most before the answer is that there is none."""
+_LESS_PRESSURE = tuple(0.95 - 0.05 * place for place in range(12))
+"""Times the gauge pressure that are tried where no bottle lasts."""
+_OFFERED = 5
+"""Pairs of parts that are tried at less pressure: those with the most torque for their gas."""
+_USED = 0.8
+"""Share of its gas above which no walk on a bottle is tried for an offer; the walk decides."""
+_THIRSTIER = 1.15
+"""Gas of a pair over that of one that did not last on a bottle, from which it is not tried on that bottle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,18 +141,13 @@ def size_for_wearer(wish: Wish, report: Report) -> WearerSizing:
         report(Progress(f"walking with {valve.name}", place, len(pairs), noun="pairs"))
         tried += _few_strides(wish, valve, actuator)
     bottles = sorted(catalogue.groups["bottles"].values(), key=lambda bottle: bottle.full_mass)
-    strong = [one for one in tried if one.torque >= wish.torque]
-    for one, bottle in _lightest_first(strong, bottles, wish.seconds):
-        report(Progress(f"walking on {bottle.name}", 0, 0, noun="bottles"))
-        if not _lasts(one, bottle, wish.seconds):
-            continue
-        walked = walk(_on(one, bottle), wish.seconds / 60.0)
-        if walked.averages["torque"].mean.max() < _KEPT * wish.torque:
-            continue
-        life = endurance_of_walk(walked)
-        assert life is not None, "a walk on a bottle that has a torque took gas"
-        return WearerSizing(wish, tuple(tried), _device(wish, catalogue, one, bottle, walked, life), ())
-    return WearerSizing(wish, tuple(tried), None, tuple(_instead(wish, tried, strong, bottles)))
+    found = _lightest(wish, tried, bottles, report)
+    if found is None:
+        return WearerSizing(wish, tuple(tried), None, tuple(_instead(wish, tried, bottles, report)))
+    one, bottle, walked = found
+    life = endurance_of_walk(walked)
+    assert life is not None, "a walk on a bottle that has a torque took gas"
+    return WearerSizing(wish, tuple(tried), _device(wish, catalogue, one, bottle, walked, life), ())
 
 
 def _check(wish: Wish) -> None:
@@ -159,7 +161,7 @@ def _check(wish: Wish) -> None:
         raise StudyError("--pressure: must be above the atmosphere, for example '50 psi_g'")
     if not 0.0 < wish.torque < 100.0:
         raise StudyError(f"--torque: {wish.torque:g} N m: must be above 0 and below 100 N m")
-    if not 6.0 <= wish.seconds <= 60.0 * LONGEST_MINUTES:
+    if not _SHORTEST <= wish.seconds <= 60.0 * LONGEST_MINUTES:
         raise StudyError(
             f"--minutes: {wish.seconds / 60.0:g} min: a walk on a bottle is followed for 0.1 to {LONGEST_MINUTES:g} min"
         )
@@ -216,28 +218,48 @@ def _requesting(torque: float) -> list[str]:
 _OF_ACTUATOR = ("torque_constant", "volume_per_angle")
 
 
-def _lightest_first(tried: list[Tried], bottles: list[Part], seconds: float) -> Iterator[tuple[Tried, Part]]:
-    """Yield pairs of design and bottle by mass, those whose gas alone would do."""
-    pairs = [(one, bottle) for one in tried for bottle in bottles if bottle.values["content"] >= one.flow * seconds]
-    yield from sorted(pairs, key=lambda pair: pair[0].mass + pair[1].full_mass)[:_LIVES]
+def _lightest(
+    wish: Wish, tried: list[Tried], bottles: list[Part], report: Report
+) -> tuple[Tried, Part, WalkResult] | None:
+    """Return the lightest pair and bottle that walk for the time with the torque, with that walk; None if none does.
+
+    No pair whose gas might do is left out, so that what was offered is found when it is asked for.
+    """
+    strong = {one.overrides: one for one in sorted(tried, key=lambda one: -one.mass) if one.torque >= wish.torque}
+    pairs = [(one, bottle) for one in strong.values() for bottle in bottles]
+    too_thirsty: dict[str, float] = {}
+    for one, bottle in sorted(pairs, key=lambda pair: pair[0].mass + pair[1].full_mass):
+        largest_flow = min(bottle.values["content"] / wish.seconds, too_thirsty.get(bottle.name, np.inf))
+        if one.flow > largest_flow:
+            continue
+        report(Progress(f"walking on {bottle.name}", 0, 0, noun="bottles"))
+        walked = _walked(one, bottle, wish.seconds)
+        if _time(walked) < wish.seconds:
+            too_thirsty[bottle.name] = min(largest_flow, _THIRSTIER * one.flow)
+        elif _keeps(walked, wish.torque):
+            assert walked is not None, "it lasts"
+            return one, bottle, walked
+    return None
 
 
-def _on(one: Tried, bottle: Part) -> Any:
-    return load_walk(WALKS[one.valve.kind], one.overrides, bottle=bottle.name)
-
-
-def _lasts(one: Tried, bottle: Part, seconds: float) -> bool:
-    """True where a bottle lasts for a time [s]; one that cannot feed the device at all does not."""
-    return _life(one, bottle, seconds) >= seconds
-
-
-def _life(one: Tried, bottle: Part, longest: float) -> float:
-    """Return how long a bottle lasts [s], at most ``longest``; 0 where it cannot feed the device at all."""
+def _walked(one: Tried, bottle: Part, seconds: float) -> WalkResult | None:
+    """Walk for a time [s], or until the bottle ends it; None where it cannot feed the device at all."""
     try:
-        life = bottle_life(_on(one, bottle), Schedule(longest, 0.0, longest))
+        return walk(load_walk(WALKS[one.valve.kind], one.overrides, bottle=bottle.name), seconds / 60.0)
     except ScenarioError:
+        return None
+
+
+def _time(walked: WalkResult | None) -> float:
+    """Return how long a walk on a bottle lasts [s], infinite where its bottle did not end it."""
+    if walked is None or walked.supply is None or not walked.status.is_completed:
         return 0.0
-    return longest if life.course.ending.kind == WALKED else life.walked
+    return math.inf if walked.supply.ending.kind == WALKED else float(walked.recording.time[-1])
+
+
+def _keeps(walked: WalkResult | None, torque: float) -> bool:
+    """True where the mean stride of a walk on a bottle has most of a torque [N m]."""
+    return walked is not None and bool(walked.averages) and walked.averages["torque"].mean.max() >= _KEPT * torque
 
 
 def _device(wish: Wish, catalogue: Catalogue, one: Tried, bottle: Part, walked: WalkResult, life: Endurance) -> Device:
@@ -256,63 +278,103 @@ def _device(wish: Wish, catalogue: Catalogue, one: Tried, bottle: Part, walked: 
     return Device(one, bottle, walked, life, electrical, masses)
 
 
-def _instead(wish: Wish, tried: list[Tried], strong: list[Tried], bottles: list[Part]) -> Iterator[str]:
-    """Yield what would do instead, each from a walk: less torque, more pressure, fewer minutes."""
+def _instead(wish: Wish, tried: list[Tried], bottles: list[Part], report: Report) -> Iterator[str]:
+    """Yield what would do instead, each as it walked on the largest bottle: who asks for exactly that gets it."""
     largest = max(bottles, key=lambda bottle: bottle.values["content"])
     if not tried:
         yield "no pair of valve and actuator may have this pressure, or none helps: take another pressure"
         return
-    if strong:
-        thrifty = min(strong, key=lambda one: one.flow)
-        lasts = _life(thrifty, largest, wish.seconds)
-        yield (
-            f"fewer minutes: {lasts / 60.0:.3g} min with {_named(thrifty)} on {largest.name}, the largest bottle, at "
-            f"{quantity_text(thrifty.torque, 'torque')}"
-        )
-    else:
-        best = max(tried, key=lambda one: one.torque)
-        yield f"less torque: {_held(best)} at this pressure with {_named(best)}{_lasting(best, largest, wish.seconds)}"
-        found = next(_more_pressure(wish, tried, largest), None)
+    lower = [(wish, one) for one in tried] + list(_at_less_pressure(wish, tried, report))
+    strong = sorted((item for item in lower if item[1].torque >= wish.torque), key=lambda item: item[1].flow)
+    weak = sorted((item for item in lower if item[1].torque < wish.torque), key=lambda item: -item[1].torque)
+    report(Progress(f"walking on {largest.name}", 0, 0, noun="bottles"))
+    first = _offered(*(strong or weak)[0], largest)
+    if first is not None:
+        yield _offer_text(wish, *first, largest)
+    if not strong:
+        more = (_offered(*item, largest) for item in _at_more_pressure(wish, tried))
+        yield from itertools.islice((_offer_text(wish, *found, largest) for found in more if found is not None), 1)
+    if first is None or first[0].seconds < wish.seconds:
+        found = _lasting(wish, weak, largest)
         if found is not None:
-            yield found
-    weaker = sorted((one for one in tried if one.torque < wish.torque), key=lambda one: -one.torque)
-    usable = _USED * largest.values["content"]
-    for one in [one for one in weaker if usable >= one.flow * wish.seconds][:3]:
-        if _lasts(one, largest, wish.seconds):
-            yield (f"less torque: {_held(one)} for {wish.seconds / 60.0:.3g} min with {_named(one)} on {largest.name}")
-            break
+            yield _offer_text(wish, *found, largest)
 
 
-def _held(one: Tried) -> str:
-    """Return the torque of a pair, rounded down: who requests that much gets it."""
-    return quantity_text(math.floor(100.0 * one.torque) / 100.0, "torque")
+def _lasting(wish: Wish, weak: list[tuple[Wish, Tried]], bottle: Part) -> tuple[Wish, Tried] | None:
+    """Return what walks on a bottle for all of the time, of pairs with the most torque first; None if none does."""
+    largest_flow = _USED * bottle.values["content"] / wish.seconds
+    for asked, one in weak:
+        if one.flow > largest_flow:
+            continue
+        found = _offered(asked, one, bottle)
+        if found is not None and found[0].seconds == wish.seconds:
+            return found
+        lasted = 0.0 if found is None else found[0].seconds
+        largest_flow = min(0.99 * one.flow, one.flow * max(lasted / wish.seconds, 0.5) * _THIRSTIER)
+    return None
 
 
-def _lasting(one: Tried, bottle: Part, seconds: float) -> str:
-    """Return for how long a pair walks on a bottle, where that is less than requested."""
-    lasts = _life(one, bottle, seconds)
-    return "" if lasts >= seconds else f", for {lasts / 60.0:.3g} min on {bottle.name}, the largest bottle"
+def _offered(asked: Wish, one: Tried, bottle: Part) -> tuple[Wish, Tried] | None:
+    """Return what a pair has of a wish, rounded down, as it walked on a bottle; None where that is nothing."""
+    if one.torque < asked.torque:
+        asked = replace(asked, torque=math.floor(100.0 * one.torque) / 100.0)
+    for again in _few_strides(asked, one.valve, one.actuator):
+        walked = _walked(again, bottle, asked.seconds)
+        hundredths = math.floor(min(_time(walked), asked.seconds) / 0.6)  # of a minute
+        lasts = asked.seconds if _time(walked) >= asked.seconds else 0.6 * hundredths
+        if again.torque >= asked.torque > 0.0 and lasts >= _SHORTEST and _keeps(walked, asked.torque):
+            return replace(asked, seconds=lasts), again
+    return None
 
 
-def _more_pressure(wish: Wish, tried: list[Tried], bottle: Part) -> Iterator[str]:
-    """Yield at which higher pressures the strongest pair of a kind of valve has the torque, the lowest first."""
+def _offer_text(wish: Wish, asked: Wish, one: Tried, bottle: Part) -> str:
+    """Return a wish that is offered for another, whole, with what it changes in front and the parts that walked."""
+    changes = [
+        *(["less torque"] if asked.torque < wish.torque else []),
+        *(["less pressure"] if asked.pressure < wish.pressure else []),
+        *(["more pressure"] if asked.pressure > wish.pressure else []),
+        *(["fewer minutes"] if asked.seconds < wish.seconds else []),
+    ]
+    return f"{', '.join(changes)}: {_wished(asked)} with {one.valve.name} and {one.actuator.name} on {bottle.name}"
+
+
+def _wished(wish: Wish) -> str:
+    pressure = quantity_text(wish.pressure, "pressure", ".4g")
+    return f"{quantity_text(wish.torque, 'torque')} at {pressure} for {wish.seconds / 60.0:.4g} min"
+
+
+def _at_gauge(wish: Wish, share: float) -> Wish:
+    """Return a wish at a share of its gauge pressure, rounded to a tenth of a psi."""
+    gauge = round(share * (wish.pressure - STANDARD_ATMOSPHERE) / PASCALS_PER_PSI, 1)
+    return replace(wish, pressure=STANDARD_ATMOSPHERE + gauge * PASCALS_PER_PSI)
+
+
+def _at_less_pressure(wish: Wish, tried: list[Tried], report: Report) -> Iterator[tuple[Wish, Tried]]:
+    """Yield a few strides at less pressure, with the pairs that have the most torque for their gas."""
+    thrifty = sorted((one for one in tried if one.flow > 0.0), key=lambda one: -one.torque / one.flow)
+    pairs = list({(one.valve.name, one.torque, one.flow): one for one in thrifty}.values())[:_OFFERED]
+    for place, share in enumerate(_LESS_PRESSURE):
+        report(Progress("walking at less pressure", place, len(_LESS_PRESSURE), noun="pressures"))
+        asked = _at_gauge(wish, share)
+        if STANDARD_ATMOSPHERE < asked.pressure < wish.pressure:
+            for one in pairs:
+                yield from ((asked, again) for again in _few_strides(asked, one.valve, one.actuator))
+
+
+def _at_more_pressure(wish: Wish, tried: list[Tried]) -> Iterator[tuple[Wish, Tried]]:
+    """Yield what has the torque at more pressure, of the strongest pair of each kind of valve, the lowest first."""
     strongest = [
         max((one for one in tried if one.valve.kind == kind), key=lambda one: one.torque)
         for kind in dict.fromkeys(one.valve.kind for one in tried)
     ]
     for more in _MORE_PRESSURE:
-        higher = replace(wish, pressure=STANDARD_ATMOSPHERE + more * (wish.pressure - STANDARD_ATMOSPHERE))
+        asked = _at_gauge(wish, more)
         for one in strongest:
-            if min(part.values.get("largest_pressure", np.inf) for part in (one.valve, one.actuator)) < higher.pressure:
+            if min(part.values.get("largest_pressure", np.inf) for part in (one.valve, one.actuator)) < asked.pressure:
                 continue
-            for again in _few_strides(higher, one.valve, one.actuator):
+            for again in _few_strides(asked, one.valve, one.actuator):
                 if again.torque >= wish.torque:
-                    lasting = _lasting(again, bottle, wish.seconds)
-                    yield f"more pressure: {quantity_text(higher.pressure, 'pressure')} with {_named(one)}{lasting}"
-
-
-def _named(one: Tried) -> str:
-    return f"{one.valve.name} and {one.actuator.name}"
+                    yield asked, again
 
 
 _HEAD = (
@@ -341,10 +403,7 @@ def answer_of(sizing: WearerSizing) -> Answer:
     )
     tried = Section("What was walked with", table=Table(_HEAD, rows, left=2), is_detail=device is not None)
     stature = f"{_stature(wish):.4g} m{' (assumed: give --stature)' if wish.stature is None else ''}"
-    lead = (
-        f"a wearer of {wish.mass:.4g} kg and {stature}; {quantity_text(wish.torque, 'torque')} at "
-        f"{quantity_text(wish.pressure, 'pressure')} for {wish.seconds / 60.0:.4g} min"
-    )
+    lead = f"a wearer of {wish.mass:.4g} kg and {stature}; {_wished(wish)}"
     parts = [] if device is None else [device.tried.valve, device.tried.actuator, device.bottle, device.electrical.cell]
     doubtful = [(part, name) for part in parts for name in part.doubtful]
     sections = (

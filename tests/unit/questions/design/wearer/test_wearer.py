@@ -1,5 +1,6 @@
 """From a wearer to a device: the parts that are chosen walk as they are printed, or the answer says what to give up."""
 
+import re
 import shlex
 from functools import cache
 from pathlib import Path
@@ -79,6 +80,24 @@ def test_where_nothing_does_it_the_answer_says_what_to_give_up() -> None:
     assert "less torque: " in said
     assert "more pressure: " in said
     assert "fewer minutes: " in text_of(too_long.answer())
+
+
+@pytest.mark.usefixtures("little")
+def test_an_offer_of_less_torque_is_granted_when_it_is_asked_for_and_may_be_of_less_pressure() -> None:
+    offers = [line for line in sized(4.0, 12.0).instead if " psi_g for 12 min with " in line]
+    (torque, pressure) = re.fullmatch(r"less torque: (\S+) N m at (\S+) psi_g for .*", offers[0]).groups()  # type: ignore[union-attr]
+    assert float(pressure) < 50.0
+    gauge = 101325.0 + float(pressure) * PSI
+    again = ppafo.design(mass=72.5, stature=1.75, torque=float(torque), pressure=gauge, minutes=12.0)
+    assert isinstance(again, WearerSizing)
+    assert again.device is not None
+    assert again.device.life.discharge.walking_time >= 12 * 60.0
+
+
+@pytest.mark.usefixtures("little")
+def test_fewer_minutes_that_are_offered_are_granted() -> None:
+    (offer,) = (line for line in sized(2.5, 30.0).instead if line.startswith("fewer minutes: "))
+    assert sized(2.5, float(offer.split()[2])).device is not None
 
 
 def test_the_limit_of_the_controller_follows_the_wish_and_a_stature_that_is_assumed_is_said() -> None:
