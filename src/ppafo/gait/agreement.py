@@ -51,7 +51,7 @@ _FINE = np.linspace(0.0, 1.0, 1000, endpoint=False)
 
 
 def check_side(walk: MeanStride, usual: Gait) -> None:
-    """Raise DataError for an ankle that moves half a stride from where its shank has it; ``usual`` is a healthy gait."""
+    """Raise DataError for an ankle half a stride away from its shank; ``usual`` is a healthy gait."""
     shank, _, _ = _lag(walk, usual, "shank_angle")
     ankle, best, own = _lag(walk, usual, "ankle_angle")
     apart = abs((ankle - shank + 0.5) % 1.0 - 0.5)
@@ -140,7 +140,7 @@ def size_remarks(walk: MeanStride) -> list[str]:
         turns = float(np.ptp(np.degrees(walk.curves[name])))
         if not usual[0] <= turns <= usual[1]:
             said.append(
-                f"{name} covers {turns:.0f} deg in a stride, usual are {usual[0]:g} to {usual[1]:g} deg: check its scale"
+                f"{name} covers {turns:.0f} deg in a stride, usually {usual[0]:g} to {usual[1]:g} deg: check its scale"
             )
     follows, (low, high) = following(walk), USUAL_FOLLOWING
     if follows > high or _RESTS < follows < low:
