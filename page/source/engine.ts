@@ -140,9 +140,10 @@ export class Engine {
   private faultOf(settings: number): string {
     const found = this.exports.check(settings);
     if (found < 0) return "";
-    const setting = this.program.settings[found];
-    if (setting !== undefined) return `${setting.key} is out of range, or contradicts another setting`;
-    return "this change needs a different compiled program, which this page does not contain: a setting that is 0 there has to stay 0, one that is not has to stay above 0, and samples have to fall on steps (run.output_interval, run.step, controller.period)";
+    const known = this.program.settings;
+    const key = known[found % known.length]?.key ?? "";
+    if (found < known.length) return `${key} is out of range, or contradicts another setting`;
+    return `${key} needs a different compiled program, which this page does not contain: a setting that is 0 there has to stay 0, one that is not has to stay above 0, and samples have to fall on steps (run.output_interval, run.step, controller.period)`;
   }
 
   /** Memory that is taken meanwhile is given back. */

@@ -255,7 +255,9 @@ def test_a_setting_that_no_file_could_have_is_refused_by_name(
     assert step.call("bad_setting", run.settings, returns=ctypes.c_char_p) == named.encode()
 
 
-@pytest.mark.parametrize(("setting", "value"), [("valve_delay", 0.01), ("sensors_angle_noise", 0.01)])
+@pytest.mark.parametrize(
+    ("setting", "value"), [("valve_delay", 0.01), ("sensors_angle_noise", 0.01), ("sensors_pressure_noise", 100.0)]
+)
 def test_settings_that_need_other_functions_are_refused(step: Loaded, setting: str, value: float) -> None:
     run = Run(step, **{setting: value})
     assert (run.size, run.status) == (0, OTHER_PROGRAM)

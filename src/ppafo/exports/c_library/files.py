@@ -201,7 +201,6 @@ def run_words(library: Library) -> dict[str, str]:
         "output_count": str(len(program.outputs)),
         "metric_count": str(len(program.metrics)),
         "setting_count": str(len(library.settings)),
-        "other_program": other_program_of(library),
     }
 
 
@@ -231,7 +230,7 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "is_whole": _IS_WHOLE if _rules_of_times(library) else "",
         "needs_other": "\n".join(
             f'    if ({condition}) {{\n        return "{name}";\n    }}'
-            for condition, name in _conditions_of_program(library)
+            for condition, name in conditions_of_program(library)
         ),
         "csv_head": ",".join(outputs),
         "csv_form": ",".join(["%.17g"] * len(outputs)),
@@ -277,19 +276,17 @@ def _said(quantity: Quantity) -> str:
     return f"{quantity.summary or quantity.name}{'; ' if limits else ''}{limits}"
 
 
-def other_program_of(library: Library) -> str:
-    """Conditions in C, each behind an ``or``, under which the settings ask for another program than this one."""
-    return "".join(f"\n        || {condition}" for condition, _ in _conditions_of_program(library))
-
-
-def _conditions_of_program(library: Library) -> list[tuple[str, str]]:
+def conditions_of_program(library: Library) -> list[tuple[str, str]]:
     """Conditions in C under which the settings ask for another program, with the setting that is named."""
-    switched = []
+    values = {item.name: item.value for item in library.settings}
+    found = []
     for item in library.switches:
-        on = [(f"settings->{name} > 0.0", name) for name in item.names]
-        none = f"!({' || '.join(condition for condition, _ in on)})"
-        switched += [(none, item.names[0])] if item.is_above else on
-    return [*switched, *library.other_program]
+        if item.is_above:
+            was_above = next(name for name in item.names if values[name] > 0.0)
+            found.append((f"!({' || '.join(f'settings->{name} > 0.0' for name in item.names)})", was_above))
+        else:
+            found += [(f"settings->{name} > 0.0", name) for name in item.names]
+    return [*found, *library.other_program]
 
 
 def conditions_of(library: Library) -> list[tuple[str, str]]:

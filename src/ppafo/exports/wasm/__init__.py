@@ -12,8 +12,8 @@ Memory
 
 One run, with S settings, C channels (the first is ``time``) and M metrics as listed in the description
     ``check(settings)`` is -1 where the S numbers at ``settings`` are good, the place of the first one that is out of
-    range or contradicts another, or S where they need other functions than there are here: what is ``kept`` was not,
-    or samples come more often than steps.
+    range or contradicts another, or S more than the place of one for which they need other functions than there are
+    here: what is ``kept`` was not, or samples come more often than steps.
     ``samples(settings)`` is the number of samples N of the run, 0 where ``check`` is not -1.
     ``run(settings, columns, metrics, good)`` returns a status. It writes C columns of N numbers, one after the other,
     and M metrics, NaN where one has no value, and all of them where the run was not completed. ``good`` is the place of
@@ -88,7 +88,7 @@ from ppafo.exports.c_library.files import (
     Setting,
     c_identifier,
     conditions_of,
-    other_program_of,
+    conditions_of_program,
     run_words,
 )
 from ppafo.exports.c_library.program import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, c_text, outline_of
@@ -354,7 +354,6 @@ def source_of(library: Library) -> str:
 def _unit(library: Library, functions: str) -> str:
     """The translation unit around functions."""
     program, names = library.program, [item.name for item in library.settings]
-    refused = "    if (!({})) {{\n        return SETTING_{};\n    }}"
     words = {
         **run_words(library),
         **_array_words(library),
@@ -363,11 +362,12 @@ def _unit(library: Library, functions: str) -> str:
         "go_on": _chosen_loop(program, ""),
         "go_on_together": _chosen_loop(program, TOGETHER),
         "members": "\n".join(f"    double {name};" for name in names),
-        "conditions": "\n".join(refused.format(holds, name.upper()) for holds, name in conditions_of(library)),
+        "conditions": "\n".join(_REFUSED.format(f"!({holds})", name.upper()) for holds, name in conditions_of(library)),
     }
     return filled(template("wasm", "module.c"), words)
 
 
+_REFUSED = "    if ({}) {{\n        return SETTING_{};\n    }}"
 _ARRAYS = {
     "given": "SETTINGS",
     "prepared->parameters": "PARAMETERS",
@@ -390,7 +390,10 @@ def _array_words(library: Library) -> dict[str, str]:
         "parameter_count": str(len(program.parameter_places)),
         "count_count": str(len(COUNTS)),
         "prepare": "\n".join(f"    {line}" for line in lines),
-        "other_program": _COUNT.sub(lambda found: f"counts[COUNT_{found[1].upper()}]", other_program_of(library)),
+        "needs_other": _COUNT.sub(
+            lambda found: f"counts[COUNT_{found[1].upper()}]",
+            "\n".join(_REFUSED.format(condition, name.upper()) for condition, name in conditions_of_program(library)),
+        ),
     }
     return {**words, "prepared_run": filled(template("wasm", "prepared_run.c"), words)}
 

@@ -105,7 +105,8 @@ int32_t SHOWN(check)(const run_settings *settings)
         return bad;
     }
     prepare_run(settings, &prepared);
-    return is_other_program(settings, &prepared) ? SETTINGS : -1;
+    const int32_t other = needs_other_program(settings, &prepared);
+    return other < SETTINGS ? SETTINGS + other : -1;
 }
 
 static run_clock clock_of(const double *counts)

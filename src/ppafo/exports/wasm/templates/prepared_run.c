@@ -27,9 +27,16 @@ static ppafo_array array_of(double *values, int64_t first, int64_t second, int64
     return made;
 }
 
-/* True where Python would run other functions for these settings than there are here. */
-static bool is_other_program(const @settings_type@ *settings, const prepared_run *prepared)
+/* The place of the setting for which Python would run other functions than there are here, SETTINGS where there is none. */
+static int32_t needs_other_program(const @settings_type@ *settings, const prepared_run *prepared)
 {
     (void)settings;
-    return prepared->counts[COUNT_INTERVAL] < 1.0 || prepared->counts[COUNT_STEPS] > 1.0e9@other_program@;
+    if (prepared->counts[COUNT_INTERVAL] < 1.0) {
+        return SETTING_RUN_OUTPUT_INTERVAL;
+    }
+    if (prepared->counts[COUNT_STEPS] > 1.0e9) {
+        return SETTING_RUN_DURATION;
+    }
+@needs_other@
+    return SETTINGS;
 }
