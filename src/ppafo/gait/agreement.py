@@ -14,7 +14,7 @@ import numpy as np
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import DataError
 from ppafo.gait.gait import HARMONICS, Gait, fit_curve
-from ppafo.gait.plausible import MIDSTANCE, MeanStride, force_remarks
+from ppafo.gait.plausible import MIDSTANCE, STANCE_FRACTION, MeanStride, force_remarks
 from ppafo.signals.recording import Floats
 
 LARGEST_DELAY = 0.03
@@ -54,6 +54,9 @@ _FINE = np.linspace(0.0, 1.0, 1000, endpoint=False)
 
 def check_side(walk: MeanStride, usual: Gait) -> None:
     """Raise DataError for an ankle that moves half a stride from where its shank does; ``usual`` is a healthy gait."""
+    if not STANCE_FRACTION[0] <= walk.stance_share <= STANCE_FRACTION[1]:
+        # Nothing has a place in such a stride, which is refused by itself.
+        return
     shank, _, in_place = _lag(walk, usual, "shank_angle")
     ankle, best, own = _lag(walk, usual, "ankle_angle")
     apart = abs((ankle - shank + 0.5) % 1.0 - 0.5)
