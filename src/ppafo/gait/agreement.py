@@ -14,13 +14,13 @@ import numpy as np
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import DataError
 from ppafo.gait.gait import HARMONICS, Gait, fit_curve
-from ppafo.gait.plausible import MIDSTANCE, MeanStride
+from ppafo.gait.plausible import MIDSTANCE, STANCE_FRACTION, MeanStride, force_remarks
 from ppafo.signals.recording import Floats
 
 LARGEST_DELAY = 0.03
 """Seconds by which a curve may be away from its usual place (0.016 at most)."""
 
-_USUALLY = {"shank_angle": 0.061, "ankle_angle": 0.041, "ankle_moment": -0.002}
+_USUALLY = {"shank_angle": 0.052, "ankle_angle": 0.041, "ankle_moment": -0.002}
 """Strides from toe-off to the shank furthest back and to the peak of plantarflexion; of the moment, from the force."""
 _ABOUT_TOE_OFF = (-0.16, 0.22)
 """Strides from toe-off within which both are looked for."""
@@ -32,7 +32,9 @@ _FORCE_ENDS = -0.06
 _OTHER_FOOT = 0.3
 """Strides between ankle and shank from which the ankle is of the other foot, which is half a stride away."""
 _ALIKE, _UNLIKE = 0.65, 0.4
-"""Correlation with a usual ankle, at least where it fits best, and at most in its own place."""
+"""Correlation with a usual ankle, at least where it fits best (0.76), and at most in its own place."""
+_ALIKE_SHANK = 0.8
+"""Correlation of the shank with a usual one in its own place (0.97): one that is counted the other way has less."""
 
 USUAL_LEVER = (0.1, 0.21)
 """Metres from the ankle to the force at the largest moment of the push-off (0.140 to 0.154)."""
@@ -51,11 +53,14 @@ _FINE = np.linspace(0.0, 1.0, 1000, endpoint=False)
 
 
 def check_side(walk: MeanStride, usual: Gait) -> None:
-    """Raise DataError for an ankle half a stride away from its shank; ``usual`` is a healthy gait."""
-    shank, _, _ = _lag(walk, usual, "shank_angle")
+    """Raise DataError for an ankle that moves half a stride from where its shank does; ``usual`` is a healthy gait."""
+    if not STANCE_FRACTION[0] <= walk.stance_share <= STANCE_FRACTION[1]:
+        # Nothing has a place in such a stride, which is refused by itself.
+        return
+    shank, _, in_place = _lag(walk, usual, "shank_angle")
     ankle, best, own = _lag(walk, usual, "ankle_angle")
     apart = abs((ankle - shank + 0.5) % 1.0 - 0.5)
-    if apart > _OTHER_FOOT and best > _ALIKE and own < _UNLIKE:
+    if apart > _OTHER_FOOT and in_place > _ALIKE_SHANK and best > _ALIKE and own < _UNLIKE:
         raise DataError(
             f"{walk.file['ankle_angle']}: ankle_angle is {100.0 * apart:.0f} % of the stride from where this shank has "
             "it: it is of the other foot; give the ankle of the same side as the shank"
@@ -110,12 +115,18 @@ def _end(values: Floats) -> float:
 def delay_remarks(walk: MeanStride) -> list[str]:
     """Return which curves of a mean stride are on another clock than the force, or the shank, and by how much."""
     other = "vertical_force" if "vertical_force" in walk.curves else "shank_angle"
-    return [
-        f"{name} is about {1000.0 * abs(late):.0f} ms {'behind' if late > 0.0 else 'ahead of'} {other}, by healthy "
-        f"walking: are both on one clock? Add {-late:+.3f} s to the times of {name}, or compare the delays of filters"
-        for name, late in delays(walk).items()
-        if abs(late) > LARGEST_DELAY
-    ]
+    late = {name: seconds for name, seconds in delays(walk).items() if abs(seconds) > LARGEST_DELAY}
+    together = max(late.values(), default=0.0) - min(late.values(), default=0.0) < LARGEST_DELAY
+    groups = [tuple(late)] if late and together else [(name,) for name in late]
+    said = []
+    for names in groups:
+        seconds, which = float(np.mean([late[name] for name in names])), " and ".join(names)
+        way = "behind" if seconds > 0.0 else "ahead of"
+        said.append(
+            f"{which}: about {1000.0 * abs(seconds):.0f} ms {way} {other}, by healthy walking; are they on one clock, "
+            f"with the same filters? Adding {-seconds:+.3f} s to their times would bring them together"
+        )
+    return said
 
 
 def following(walk: MeanStride) -> float:
@@ -126,8 +137,11 @@ def following(walk: MeanStride) -> float:
 
 
 def lever(walk: MeanStride) -> float | None:
-    """Return the lever [m] of the vertical force about the ankle at the largest moment; None where one is missing."""
-    if not {"ankle_moment", "vertical_force"} <= set(walk.curves):
+    """Return the lever [m] of the vertical force about the ankle at the largest moment.
+
+    None where one of them is missing, or the scale of the force is in doubt itself.
+    """
+    if not {"ankle_moment", "vertical_force"} <= set(walk.curves) or force_remarks(walk.curves["vertical_force"]):
         return None
     at = int(np.argmax(walk.curves["ankle_moment"]))
     return float(walk.curves["ankle_moment"][at] / (STANDARD_GRAVITY * walk.curves["vertical_force"][at]))
@@ -140,7 +154,8 @@ def size_remarks(walk: MeanStride) -> list[str]:
         turns = float(np.ptp(np.degrees(walk.curves[name])))
         if not usual[0] <= turns <= usual[1]:
             said.append(
-                f"{name} covers {turns:.0f} deg in a stride, usually {usual[0]:g} to {usual[1]:g} deg: check its scale"
+                f"{name} covers {turns:.0f} deg in a stride, usual are {usual[0]:g} to {usual[1]:g} deg: "
+                "check its scale"
             )
     follows, (low, high) = following(walk), USUAL_FOLLOWING
     if follows > high or _RESTS < follows < low:

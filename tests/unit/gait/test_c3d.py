@@ -201,3 +201,15 @@ def test_a_file_that_brings_the_library_down_is_refused_in_one_line(
     with pytest.raises(DataError, match=rf"walk\.c3d: ({told})"):
         read_table(path)
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 500_000
+
+
+def test_an_analog_channel_that_is_named_like_a_coordinate_takes_no_markers_place(
+    written: Callable[..., Path], normative: Gait
+) -> None:
+    import ezc3d
+
+    path = written(plate=True)
+    file = ezc3d.c3d(str(path))
+    file["parameters"]["ANALOG"]["LABELS"]["value"] = ["RKNE.x"]
+    file.write(str(path))
+    assert same(import_gait([path], ImportSettings(normative.body_mass)).gait, normative)

@@ -71,7 +71,9 @@ def read_c3d(path: str | Path) -> MotionTable:
     analogs: Floats = content["data"]["analogs"][0]
     if analogs.shape[0] and frames:
         for name, values, unit in _channels(parameters["ANALOG"], analogs, frames):
-            columns[name], units[name] = values, unit
+            # A channel named like a coordinate of a point must not take its place.
+            if name not in columns:
+                columns[name], units[name] = values, unit
     for name, values in _plates(content, frames):
         columns[name], units[name] = values, "N"
     first = max(0, int(content["header"]["points"].get("first_frame", 0)))

@@ -1,0 +1,130 @@
+"""Delay, side and size of each curve of an imported gait, against the others."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.errors import DataError
+from ppafo.gait import at_speed, load_gait, walk_recording
+from ppafo.gait.recorded import ImportSettings, import_gait
+from ppafo.gait.recorded.mapping import Side
+from ppafo.signals.recording import Floats
+
+SHANK, ANKLE, MOMENT, FORCE = "shank_angle [rad]", "ankle_angle [rad]", "ankle_moment [N m/kg]", "vertical_force [-]"
+HALF_A_STRIDE, PER_SECOND = 104, 200
+
+
+@pytest.fixture
+def remarks_of(csv_of: Callable[..., Path]) -> Callable[[dict[str, Floats]], tuple[str, ...]]:
+    """Remarks on a walk whose knee and centre of pressure are left out."""
+
+    def said(columns: dict[str, Floats]) -> tuple[str, ...]:
+        kept = {name: values for name, values in columns.items() if name in (SHANK, ANKLE, MOMENT, FORCE)}
+        return import_gait([csv_of(kept)], ImportSettings(62.0)).remarks
+
+    return said
+
+
+def later(columns: dict[str, Floats], names: tuple[str, ...], seconds: float) -> dict[str, Floats]:
+    """These columns later than the others; the walk repeats."""
+    shift = round(PER_SECOND * seconds)
+    return columns | {name: np.roll(columns[name][:-1], shift)[np.r_[: columns[name].size - 1, 0]] for name in names}
+
+
+@pytest.mark.parametrize("seconds", [-0.1, -0.05, 0.05, 0.1])
+@pytest.mark.parametrize("names", [(SHANK, ANKLE), (SHANK,), (ANKLE,)])
+def test_angles_on_another_clock_than_the_plates_are_said_with_the_delay(
+    columns: dict[str, Floats],
+    remarks_of: Callable[[dict[str, Floats]], tuple[str, ...]],
+    names: tuple[str, ...],
+    seconds: float,
+) -> None:
+    remark = next(line for line in remarks_of(later(columns, names, seconds)) if "on one clock" in line)
+    which = " and ".join(name.partition(" ")[0] for name in names)
+    assert remark.startswith(f"{which}: about ")
+    assert float(remark.partition("about ")[2].split()[0]) == pytest.approx(1000.0 * abs(seconds), abs=12.0)
+    assert (" behind vertical_force" in remark) is (seconds > 0.0)
+
+
+def test_an_ankle_on_another_clock_than_the_shank_is_said_without_a_force(
+    columns: dict[str, Floats], remarks_of: Callable[[dict[str, Floats]], tuple[str, ...]]
+) -> None:
+    angles = {name: columns[name] for name in (SHANK, ANKLE)}
+    assert not [line for line in remarks_of(angles) if "clock" in line]
+    (remark,) = (line for line in remarks_of(later(angles, (ANKLE,), 0.05)) if "clock" in line)
+    assert "behind shank_angle" in remark
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "words"),
+    [
+        (MOMENT, 1.0 / 1.75, "8 cm from the ankle, usual are 10 to 21 cm: check its scale: N m/kg is per body mass"),
+        (MOMENT, 0.5, "7 cm from the ankle"),
+        (MOMENT, 2.0, "29 cm from the ankle"),
+        (ANKLE, 2.0, "ankle_angle turns 1.9 times as far as shank_angle while the foot stands"),
+        (ANKLE, 0.5, "ankle_angle covers 16 deg in a stride"),
+        (SHANK, 0.5, "shank_angle covers 36 deg in a stride"),
+    ],
+)
+def test_a_curve_of_another_size_than_the_others_let_expect_is_said(
+    columns: dict[str, Floats],
+    remarks_of: Callable[[dict[str, Floats]], tuple[str, ...]],
+    name: str,
+    factor: float,
+    words: str,
+) -> None:
+    middle = float(np.mean(columns[name])) if "rad" in name else 0.0
+    scaled = middle + factor * (columns[name] - middle)
+    assert any(words in line for line in remarks_of(columns | {name: scaled}))
+
+
+def test_a_moment_without_a_force_is_judged_by_its_peak(
+    columns: dict[str, Floats], remarks_of: Callable[[dict[str, Floats]], tuple[str, ...]]
+) -> None:
+    given = {name: columns[name] for name in (SHANK, ANKLE, MOMENT)}
+    assert not any("ankle_moment" in line for line in remarks_of(given))
+    said = remarks_of(given | {MOMENT: given[MOMENT] / 1.75})
+    assert any("ankle_moment reaches 0.832 N m/kg, usual are 0.9 to 2.2 N m/kg" in line for line in said)
+
+
+def test_the_ankle_of_the_other_foot_is_refused_as_such_and_not_as_a_wrong_zero(
+    columns: dict[str, Floats], remarks_of: Callable[[dict[str, Floats]], tuple[str, ...]]
+) -> None:
+    other = later(columns, (ANKLE,), HALF_A_STRIDE / PER_SECOND)
+    with pytest.raises(DataError, match=r"ankle_angle is 50 % of the stride from where this shank has it: it is of"):
+        remarks_of(other)
+
+
+@pytest.mark.parametrize("speed", [1.07, 1.2, 1.46, 1.59])
+def test_the_built_in_gait_at_other_speeds_has_no_remark(
+    csv_of: Callable[..., Path], remarks_of: Callable[[dict[str, Floats]], tuple[str, ...]], speed: float
+) -> None:
+    walk = walk_recording(at_speed(load_gait(), speed), 4)
+    given = {f"{name} [{walk.unit(name)}]": np.array(walk[name]) for name in ("shank_angle", "ankle_angle")}
+    given |= {MOMENT: np.array(walk["ankle_moment"]), FORCE: np.array(walk["vertical_force"])}
+    assert import_gait([csv_of(given, walk.time)], ImportSettings(62.0)).remarks == ()
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_real_angles_half_a_stride_or_50_ms_away_from_their_plates_are_said(
+    shared_data: Path, tmp_path: Path, side: Side
+) -> None:
+    folder = shared_data / "gait" / "opensim_subject01"
+    angles, plates = folder / "subject01_walk1_ik.mot", folder / "subject01_walk1_grf_15s.mot"
+    assert not any("clock" in line for line in import_gait([angles, plates], ImportSettings(72.6, side)).remarks)
+    lines = angles.read_text().splitlines()
+    first = next(number for number, line in enumerate(lines) if line.strip() == "endheader") + 2
+    rows = [line.split() for line in lines[first:] if line.strip()]
+    late = tmp_path / "late.mot"
+    moved = ["\t".join([f"{float(row[0]) + 0.05:.6f}", *row[1:]]) for row in rows]
+    late.write_text("\n".join([*lines[:first], *moved]) + "\n")
+    remarks = import_gait([late, plates], ImportSettings(72.6, side)).remarks
+    assert any(line.startswith("shank_angle and ankle_angle: about ") and "behind" in line for line in remarks)
+    names = lines[first - 1].split()
+    own, other = (names.index(f"ankle_angle_{foot}") for foot in ("rl" if side == "right" else "lr"))
+    swapped = ["\t".join([*row[:own], row[other], *row[own + 1 :]]) for row in rows]
+    late.write_text("\n".join([*lines[:first], *swapped]) + "\n")
+    with pytest.raises(DataError, match="it is of the other foot"):
+        import_gait([late, plates], ImportSettings(72.6, side))
