@@ -61,8 +61,8 @@ _OFFERED = 5
 """Pairs of parts that are tried at less pressure: those with the most torque for their gas."""
 _USED = 0.8
 """Share of its gas above which no walk on a bottle is tried for an offer; the walk decides."""
-_THIRSTIER = 1.15
-"""Gas of a pair over that of one that did not last on a bottle, from which it is not tried on that bottle."""
+_ALLOWANCE = 1.15
+"""Gas that a pair may need over what another got out of a bottle, to be tried on it as well."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,7 +223,7 @@ def _lightest(
 ) -> tuple[Tried, Part, WalkResult] | None:
     """Return the lightest pair and bottle that walk for the time with the torque, with that walk; None if none does.
 
-    No pair whose gas might do is left out, so that what was offered is found when it is asked for.
+    No pair whose gas might do is left out, so that what is offered is found when it is asked for.
     """
     strong = {one.overrides: one for one in sorted(tried, key=lambda one: -one.mass) if one.torque >= wish.torque}
     pairs = [(one, bottle) for one in strong.values() for bottle in bottles]
@@ -235,7 +235,7 @@ def _lightest(
         report(Progress(f"walking on {bottle.name}", 0, 0, noun="bottles"))
         walked = _walked(one, bottle, wish.seconds)
         if _time(walked) < wish.seconds:
-            too_thirsty[bottle.name] = min(largest_flow, _THIRSTIER * one.flow)
+            too_thirsty[bottle.name] = _lasting_flow(one, _time(walked), wish.seconds)
         elif _keeps(walked, wish.torque):
             assert walked is not None, "it lasts"
             return one, bottle, walked
@@ -255,6 +255,11 @@ def _time(walked: WalkResult | None) -> float:
     if walked is None or walked.supply is None or not walked.status.is_completed:
         return 0.0
     return math.inf if walked.supply.ending.kind == WALKED else float(walked.recording.time[-1])
+
+
+def _lasting_flow(one: Tried, lasted: float, seconds: float) -> float:
+    """Return the flow [kg/s] above which no pair lasts on a bottle, from one that does not, with some allowance."""
+    return one.flow * min(0.99, max(0.5, _ALLOWANCE * lasted / seconds))
 
 
 def _keeps(walked: WalkResult | None, torque: float) -> bool:
@@ -309,8 +314,7 @@ def _lasting(wish: Wish, weak: list[tuple[Wish, Tried]], bottle: Part) -> tuple[
         found = _offered(asked, one, bottle)
         if found is not None and found[0].seconds == wish.seconds:
             return found
-        lasted = 0.0 if found is None else found[0].seconds
-        largest_flow = min(0.99 * one.flow, one.flow * max(lasted / wish.seconds, 0.5) * _THIRSTIER)
+        largest_flow = _lasting_flow(one, 0.0 if found is None else found[0].seconds, wish.seconds)
     return None
 
 

@@ -14,6 +14,7 @@ from ppafo.cli.main import main
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import load_catalogue
 from ppafo.parameters.parts.catalogue import Catalogue
+from ppafo.progress import report_nothing
 from ppafo.questions.design.wearer import solve as wearer
 from ppafo.questions.design.wearer.electrical import electrical_of, valve_power
 from ppafo.questions.design.wearer.solve import WearerSizing
@@ -43,9 +44,9 @@ def little(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wearer, "load_catalogue", few)
 
 
-def sized(torque: float, minutes: float, stature: float | None = 1.75) -> WearerSizing:
-    pressure = 101325.0 + 50.0 * PSI
-    found = ppafo.design(mass=72.5, stature=stature, torque=torque, pressure=pressure, minutes=minutes)
+def sized(torque: float, minutes: float, pressure: float = 50.0) -> WearerSizing:
+    supply = 101325.0 + pressure * PSI
+    found = ppafo.design(mass=72.5, stature=1.75, torque=torque, pressure=supply, minutes=minutes)
     assert isinstance(found, WearerSizing)
     return found
 
@@ -71,33 +72,43 @@ def test_what_is_suggested_is_the_walk_that_is_shown(tmp_path: Path, capsys: pyt
 
 
 @pytest.mark.usefixtures("little")
-def test_where_nothing_does_it_the_answer_says_what_to_give_up() -> None:
-    too_strong, too_long = sized(5.0, 1.0), sized(2.5, 30.0)
+def test_where_nothing_does_it_what_is_offered_is_granted_when_it_is_asked_for() -> None:
+    too_strong, too_long = sized(5.0, 8.0), sized(2.5, 30.0)
     for found in (too_strong, too_long):
         assert found.device is None
         assert not found.answer().passed
-    said = text_of(too_strong.answer())
-    assert "less torque: " in said
-    assert "more pressure: " in said
-    assert "fewer minutes: " in text_of(too_long.answer())
+    changes = [line.partition(":")[0] for line in (*too_strong.instead, *too_long.instead)]
+    assert changes == [
+        "less torque, fewer minutes",
+        "more pressure, fewer minutes",
+        "less torque, less pressure",
+        "less pressure, fewer minutes",
+    ]
+    line = too_strong.instead[2]
+    words = re.search(r": (\S+) N m at (\S+) psi_g for (\S+) min with (\S+) and (\S+) on (\S+)$", line)
+    assert words is not None, line
+    torque, pressure, minutes = (float(word) for word in words.groups()[:3])
+    again = sized(torque, minutes, pressure=pressure).device
+    assert again is not None, line
+    assert again.life.discharge.walking_time >= minutes * 60.0
 
 
-@pytest.mark.usefixtures("little")
-def test_an_offer_of_less_torque_is_granted_when_it_is_asked_for_and_may_be_of_less_pressure() -> None:
-    offers = [line for line in sized(4.0, 12.0).instead if " psi_g for 12 min with " in line]
-    (torque, pressure) = re.fullmatch(r"less torque: (\S+) N m at (\S+) psi_g for .*", offers[0]).groups()  # type: ignore[union-attr]
-    assert float(pressure) < 50.0
-    gauge = 101325.0 + float(pressure) * PSI
-    again = ppafo.design(mass=72.5, stature=1.75, torque=float(torque), pressure=gauge, minutes=12.0)
-    assert isinstance(again, WearerSizing)
-    assert again.device is not None
-    assert again.device.life.discharge.walking_time >= 12 * 60.0
-
-
-@pytest.mark.usefixtures("little")
-def test_fewer_minutes_that_are_offered_are_granted() -> None:
-    (offer,) = (line for line in sized(2.5, 30.0).instead if line.startswith("fewer minutes: "))
-    assert sized(2.5, float(offer.split()[2])).device is not None
+def test_a_pressure_that_wastes_gas_is_answered_with_less_pressure_and_that_is_granted() -> None:
+    parts = few().groups
+    valve, actuator, bottle = (
+        parts["valves"]["festo-vovg-5v-pair"],
+        parts["actuators"]["smc-crb2bw40-90d"],
+        parts["bottles"]["co2-3_5oz"],
+    )
+    wish = wearer.Wish(72.5, 1.75, 1.2, 101325.0 + 80.0 * PSI, 150.0)
+    tried = wearer._few_strides(wish, valve, actuator)
+    assert tried[0].torque > 1.2
+    assert wearer._lightest(wish, tried, [bottle], report_nothing) is None
+    (offer,) = wearer._instead(wish, tried, [bottle], report_nothing)
+    words = re.fullmatch(r"less pressure: 1.2 N m at (\S+) psi_g for 2.5 min with .* on co2-3_5oz", offer)
+    assert words is not None, offer
+    asked = wearer.Wish(72.5, 1.75, 1.2, 101325.0 + float(words[1]) * PSI, 150.0)
+    assert wearer._lightest(asked, wearer._few_strides(asked, valve, actuator), [bottle], report_nothing) is not None
 
 
 def test_the_limit_of_the_controller_follows_the_wish_and_a_stature_that_is_assumed_is_said() -> None:
