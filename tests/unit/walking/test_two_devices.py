@@ -65,7 +65,7 @@ def test_a_wearer_who_begins_mirrored_walks_mirrored_to_the_bit(further: tuple[s
 
 def test_a_study_reads_what_a_walk_reads_and_gas_is_that_of_both() -> None:
     result = walk(load_walk(WALK, [BOTH, SHORT]))
-    names = ["gas", "total_gas", "gas_supplied", "walking_speed", "lowest_toes", "push_off_work"]
+    names = ["gas", "total_gas", "gas_supplied", "walking_speed", "lowest_toes", "net_push_off_work"]
     scenario = load_walk(WALK, [BOTH, SHORT])
     push, walks = "wearer.push", [result, walk(load_walk(WALK, [BOTH, SHORT, "wearer.push=900 N"]))]
     assert [item.metrics["stays_up"].value for item in walks] == [1.0, 0.0]
