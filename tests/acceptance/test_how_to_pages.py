@@ -222,7 +222,7 @@ def test_the_controller_of_the_page_walks() -> None:
     walked = ppafo.walk("proportional", 0.1, ["controller.kind=hysteresis", "controller.band=0.5 N m"])
     assert walked.status.is_completed
     assert "safe_state_time" not in walked.metrics
-    assert walked.metrics["push_off_work"].value > 0.5
+    assert walked.metrics["net_push_off_work"].value > 0.5
     command = walked.recording["command"]
     assert set(command.round(12)) <= {-1.0, 0.0, 1.0, VENT}
 

@@ -17,6 +17,7 @@ from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.endurance.draw import FORMAT
 from ppafo.questions.question import Solved
 from ppafo.questions.walk.course import (
+    WOULD_DRAG,
     bottle_data,
     bottle_files,
     bottle_remark,
@@ -184,9 +185,9 @@ _ROWS = (
     ("body_mass", "Body mass of the wearer", "mass", 1),
     ("gas", "Gas per stride", "gas mass", 3),
     ("total_gas", "Gas of the whole walk", "gas mass", 2),
-    ("push_off_work", "Work on the wearer in push-off", "energy", 2),
+    ("positive_push_off_work", "Positive work on the wearer in push-off", "energy", 2),
     ("push_off_share", "... of the healthy ankle's positive work", "fraction", 1),
-    ("slap_rate", "Rate of the foot as it comes down", "angular velocity", 0),
+    ("net_push_off_work", "Net work on the wearer in push-off", "energy", 2),
     ("lowest_toes", "Lowest toes over the ground in mid-swing", "body length", 1),
     ("toe_landing", "Strides that begin on the toes", "fraction", 0),
     ("dorsiflexor_moment", "Moment of the wearer's dorsiflexors, mean", "torque", 2),
@@ -194,11 +195,10 @@ _ROWS = (
     ("counted_strides", "Strides with these means", "", 0),
 )
 """Metric, title, kind of quantity and digits behind the point of each row."""
-_SAME_RATE = 0.1
-"""Rates of a foot [rad/s] that differ by less are alike."""
 _EXPLAINED = (
-    "'Without' is the same wearer with the same device and both chambers vented. 'Healthy' is the gait itself. The "
-    "first two strides, in which the controller learns the stride time, are left out, and so is one that has begun "
+    "'Without' is the same wearer without a device: no plate, torque or friction, and the ankle's own range of motion. "
+    "'Healthy' is the gait itself. The swing has no ground: of toes that reach it only that they would drag is known. "
+    "The first two strides, in which the controller learns the stride time, are left out, and so is one that has begun "
     "when the walk ends. The device is on one leg, so a "
     "stride is one step of that leg. A stride with less help (lifted only, paused or stopped) is not in 'with' but in "
     "'less help', where there is one."
@@ -235,7 +235,6 @@ def _pair_answer(pair: WalkPair) -> Answer:
         *person_remarks(configuration),
         _bottle(pair),
         *safety_remarks(worn),
-        _slap(comparison),
         trust_remark(configuration),
     ]
     remarks += [f"{item.scenario.name}: {item.status.message}" for item in (worn, bare) if not item.status.is_completed]
@@ -268,7 +267,7 @@ def _pair_answer(pair: WalkPair) -> Answer:
             **course_files(comparison),
             **bottle_files(worn),
         },
-        live=lambda: live_part([configuration, bare.scenario]),
+        live=lambda: live_part([configuration]),
     )
 
 
@@ -290,7 +289,7 @@ def comparison_table(comparison: Comparison) -> Table:
     Strides with less help have a column of their own, where there are any.
     """
     healthy = dict(comparison.healthy)
-    if "push_off_work" in healthy:
+    if "positive_push_off_work" in healthy:
         healthy["push_off_share"] = Metric(1.0, "-", "")
     worn, bare = comparison.with_device, comparison.without_device
     person = {"body_mass": Metric(walk_of(worn.scenario).wearer.body_mass, "kg", "who walks")}
@@ -301,7 +300,11 @@ def comparison_table(comparison: Comparison) -> Table:
         (
             title_with_unit(title, quantity),
             *(
-                None if one is None else rounded_text(one.value, quantity, digits)
+                None
+                if one is None
+                else WOULD_DRAG
+                if name == "lowest_toes" and one.value < 0.0
+                else rounded_text(one.value, quantity, digits)
                 for one in (metrics.get(name) for metrics in columns)
             ),
         )
@@ -309,14 +312,6 @@ def comparison_table(comparison: Comparison) -> Table:
         if any(name in metrics for metrics in columns)
     ]
     return Table(tuple(map(Column, head)), tuple(rows))
-
-
-def _slap(comparison: Comparison) -> str:
-    """Return what is to be known of a slap that is worse with the device, "" where it is not."""
-    worn, bare = (side.metrics.get("slap_rate") for side in (comparison.with_device, comparison.without_device))
-    if worn is None or bare is None or worn.value > bare.value - _SAME_RATE:
-        return ""
-    return "remark: the foot comes down faster than without the device: it is lifted, and falls further"
 
 
 def _along(configuration: Scenario) -> str:
@@ -408,7 +403,7 @@ def walk_with_and_without(
     overrides: Sequence[str] = (),
     progress: Report | None = None,
 ) -> WalkPair | Wearers:
-    """Walk with the device, with it switched off, and beside the healthy gait; or let many wearers walk with it.
+    """Walk with the device, without it, and beside the healthy gait; or let many wearers walk with it.
 
     ``configuration`` is a walk file, its name or a loaded one; ``minutes`` the length of the walk [min], one or
     that of its course unless given; ``gait``, ``course`` and ``bottle`` stand in place of those of the configuration;

@@ -135,15 +135,14 @@ _HEAD = (
     Column("push, heel loaded (N m)"),
     Column("less help at (s)"),
 )
+WOULD_DRAG = "would drag"
+"""What is said of toes that would be in the ground."""
 _WHOLE, _PART = "whole course", "as far as walked"
-_COURSE = (
-    "The course over time. Grey: every other segment. 'Without' is the same course with the same device and both "
-    "chambers vented."
-)
+_COURSE = "The course over time. Grey: every other segment. 'Without' is the same course without a device."
 _EXPLAINED = (
     "A stride counts for the segment in which its foot strikes; it is helped where the controller neither lifts only "
-    "nor pauses nor has stopped before the next strike. Work is that on the wearer while the foot rolls over the toes. "
-    "Lowest toes are over the ground, in the middle part of a swing. A push with the heel loaded is torque in "
+    "nor pauses nor has stopped before the next strike. Work is net work on the wearer while the foot rolls over the "
+    "toes. Lowest toes are over the ground, in the middle part of a swing. A push with the heel loaded is torque in "
     "plantarflexion while the heel carries more than a tenth of the body weight.",
     "Angles go with the length of the stride, which goes with the square root of the speed, as the strides per second "
     "do: a constant walk ratio. Standing is a vertical shank over a flat foot. The forces of a stride and the fraction "
@@ -182,9 +181,9 @@ def _row(segment: SegmentResult, bare: SegmentResult | None) -> tuple[str | None
         f"{segment.strides}",
         f"{segment.helped}",
         _text(segment.gas, "gas mass", 2),
-        _text(segment.push_off_work, "energy", 1),
-        _text(segment.lowest_toes, "body length", 1),
-        _text(None if bare is None else bare.lowest_toes, "body length", 1),
+        _text(segment.net_push_off_work, "energy", 1),
+        _toes(segment.lowest_toes),
+        _toes(None if bare is None else bare.lowest_toes),
         _text(segment.flat_push, "torque", 1),
         _text(segment.safe_time, "time", 2),
     )
@@ -203,11 +202,16 @@ def _whole(comparison: Comparison) -> tuple[str | None, ...]:
         f"{sum(segment.helped for segment in worn.segments)}",
         _text(numbers["course_gas"], "gas mass", 2),
         _text(numbers["course_work"], "energy", 1),
-        _text(numbers.get("course_lowest_toes"), "body length", 1),
-        _text(None if toes is None else toes.value, "body length", 1),
+        _toes(numbers.get("course_lowest_toes")),
+        _toes(None if toes is None else toes.value),
         _text(numbers["course_flat_push"], "torque", 1),
         _text(numbers.get("safe_state_time"), "time", 2),
     )
+
+
+def _toes(height: float | None) -> str | None:
+    """Return how high the toes are [cm]; of toes below the ground only that they would drag."""
+    return WOULD_DRAG if height is not None and height < 0.0 else _text(height, "body length", 1)
 
 
 def _text(value: float | None, quantity: str, digits: int) -> str | None:
@@ -247,7 +251,7 @@ _UNITS = {
     "strides": "-",
     "helped": "-",
     "gas": "kg",
-    "push_off_work": "J",
+    "net_push_off_work": "J",
     "lowest_toes": "m",
     "flat_push": "N m",
     "safe_time": "s",

@@ -123,7 +123,7 @@ def _row(one: VolumeReading) -> tuple[str | float | None, ...]:
         metrics["gas"].value,
         one.gas_work,
         one.shaft_work,
-        metrics["push_off_work"].value,
+        metrics["positive_push_off_work"].value,
         one.peak_torque,
     )
 
@@ -149,7 +149,7 @@ def volumes_data(read: tuple[VolumeReading, ...]) -> list[Mapping[str, Any]]:
             "stride_time": walk_of(one.result.scenario).gait.stride_time,
             "gas_work": one.gas_work,
             "shaft_work": one.shaft_work,
-            "push_off_work": one.result.metrics["push_off_work"].value,
+            "positive_push_off_work": one.result.metrics["positive_push_off_work"].value,
             "peak_torque": one.peak_torque,
             **(
                 {} if one.on_bottle is None else {"walking_time": _lasts(one), "ending": one.on_bottle.ending._asdict()}
@@ -207,13 +207,13 @@ def wearers_volumes_sections(read: Mapping[str, Population]) -> tuple[Section, .
 
 def _wearers_row(population: Population) -> tuple[float | None, ...]:
     gas = np.quantile(population.outcomes["gas"], _QUANTILES).tolist() if population.count else [None] * 3
-    work = float(np.median(population.outcomes["push_off_work"])) if population.count else None
+    work = float(np.median(population.outcomes["positive_push_off_work"])) if population.count else None
     return population.count, *gas, work
 
 
 def wearers_volumes_data(read: Mapping[str, Population]) -> list[dict[str, Any]]:
     """Return the readings as plain data in SI units."""
-    names = ("wearers", "gas_low", "gas_median", "gas_high", "push_off_work_median")
+    names = ("wearers", "gas_low", "gas_median", "gas_high", "positive_push_off_work_median")
     return [
         {"chambers": name, **dict(zip(names, _wearers_row(population), strict=True))}
         for name, population in read.items()
