@@ -1,4 +1,4 @@
-"""What a walk gives: strides, mean stride, metrics, comparison with the device switched off, files for OpenSim."""
+"""What a walk gives: strides, mean stride, metrics, comparison with a leg without device, files for OpenSim."""
 
 import re
 from dataclasses import replace
