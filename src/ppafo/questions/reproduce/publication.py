@@ -1,7 +1,6 @@
 """A publication as a file of claims: what it states, where, what is assumed, and how our number is computed."""
 
 import math
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
@@ -15,11 +14,10 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.toml_text import label
 from ppafo.errors import ScenarioError, SimulationError, UnitError, nearest_name, refused_as
 from ppafo.parameters import load_device
-from ppafo.parameters.audit.evidence import digits
 from ppafo.parameters.chamber_volumes import PRINTED_VOLUMES, ChamberVolumes, readings
 from ppafo.parameters.publications.publication import FILE, PAPER, ClaimEntry, read_publication
 from ppafo.progress import Progress, Report
-from ppafo.questions.reproduce.claim import Verdict, range_text
+from ppafo.questions.reproduce.claim import Verdict
 from ppafo.questions.reproduce.event_times import WEARERS, rms_of, timed_events, uneven_course
 from ppafo.units import from_si, parse_quantity
 from ppafo.walking.loading import load_walk
@@ -36,7 +34,6 @@ PAIR, RECYCLING = "solenoid", "solenoid-recycling"
 KEEPS_GAIT = "wearer.keeps_gait=1"
 """A nondisabled wearer: muscles keep the measured ankle."""
 Values = Mapping[str, str | float]
-_NUMBER_AND_UNIT = re.compile(r"([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,28 +188,9 @@ class PublishedClaim:
 
     def value(self) -> float | None:
         """Return our number in the unit of the claim, None where nothing is computed; SimulationError if it fails."""
-        return None if self.computation is None else self._computed(self.arguments)
-
-    def left_open(self) -> tuple[float, float] | None:
-        """Return the least and the largest number that the readings of the chambers leave open, or the printed digits.
-
-        None where nothing is computed, or its arguments leave nothing open.
-        """
-        units = {} if self.computation is None else self.computation.arguments
-        varied: list[dict[str, str | float]] = []
-        if CHAMBERS in units:
-            varied = [{**self.arguments, CHAMBERS: name} for name in chamber_names()]
-        elif "pressure" in units:
-            # The argument was read before: it starts with a number.
-            number, unit = _NUMBER_AND_UNIT.fullmatch(self.entry.arguments["pressure"].strip()).groups()  # type: ignore[union-attr]
-            ends = [parse_quantity(f"{end} {unit}", units["pressure"]) for end in digits(float(number))]
-            varied = [{**self.arguments, "pressure": end} for end in ends]
-        found = [self._computed(item) for item in varied]
-        return (min(found), max(found)) if found else None
-
-    def _computed(self, arguments: Mapping[str, str | float]) -> float:
-        assert self.computation is not None, "something is computed"
-        return from_si(self.computation.compute(arguments), self.entry.unit, self.computation.unit)
+        if self.computation is None:
+            return None
+        return from_si(self.computation.compute(self.arguments), self.entry.unit, self.computation.unit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -304,15 +282,11 @@ def published_text(entry: ClaimEntry) -> str:
 
 @dataclass(frozen=True, slots=True)
 class JudgedClaim:
-    """A claim of a publication with our number in its unit, None where nothing is computed, and the verdict.
-
-    ``left_open`` are the ends of what readings of the chambers, or the printed digits of a pressure, leave open.
-    """
+    """A claim of a publication with our number in its unit, None where nothing is computed, and the verdict."""
 
     claim: PublishedClaim
     value: float | None
     verdict: Verdict
-    left_open: tuple[float, float] | None = None
 
     @property
     def published(self) -> str:
@@ -324,11 +298,6 @@ class JudgedClaim:
     def ours(self) -> str:
         """Our number as it is shown."""
         return quantity(self.value, self.claim.entry.unit or "-", 3)
-
-    @property
-    def open_range(self) -> str:
-        """What is left open of our number, as it is shown."""
-        return range_text(self.left_open, self.claim.entry.unit)
 
     @property
     def note(self) -> str:
@@ -347,12 +316,10 @@ class JudgedClaim:
             "direction": entry.direction,
             "own": entry.own,
             "value": self.value,
-            "left_open": None if self.left_open is None else list(self.left_open),
             "unit": entry.unit,
             "agrees_from": entry.at_least,
             "agrees_to": entry.at_most,
             "verdict": self.verdict,
-            "synthetic": False,
             "computation": entry.computation,
             "arguments": dict(entry.arguments),
             "assumptions": list(entry.assumed),
@@ -403,8 +370,10 @@ def judge(claim: PublishedClaim) -> JudgedClaim:
         return JudgedClaim(claim, None, "not_testable")
     low = entry.at_least is None or value >= entry.at_least
     high = entry.at_most is None or value <= entry.at_most
-    held: Verdict = "reproduced_with_assumptions" if entry.assumed else "reproduced"
-    return JudgedClaim(claim, value, held if low and high else "contradicted", claim.left_open())
+    # A model with assumptions that does not agree is no evidence against what was measured.
+    holds: Verdict = "plausible" if entry.assumed else "consistent"
+    parts: Verdict = "undetermined" if entry.assumed else "inconsistent_as_reported"
+    return JudgedClaim(claim, value, holds if low and high else parts)
 
 
 def _run(publication: Publication, report: Report) -> Study:
