@@ -23,7 +23,7 @@ SCENARIOS = (
     "torque-task-solenoid",
 )
 WALKS = ("off", "proportional", "proportional-learning", "proportional-regulators", "solenoid", "solenoid-regulators")
-SETS = ("ppafo2011", "ppafo2011-consistent", "ppafo2011-printed")
+SETS = ("ppafo2011", "ppafo2011-printed")
 
 LINES: dict[str, str] = {
     **{f"simulate-{name}": f"simulate {name} --out {{out}}" for name in SCENARIOS},

@@ -60,7 +60,7 @@ def test_everything_that_the_text_tells_of_the_torque_task_shows(reproduction: R
 @pytest.fixture(scope="module")
 def told() -> dict[str, Observation]:
     """What the step response with the fitted volumes shows, by sentence."""
-    found = simulate("step-response", ["device.set=ppafo2011-fitted"])
+    found = simulate("step-response")
     supply = found.scenario.device.supply
     levels = Levels(supply.pressure, supply.atmospheric_pressure)
     observations = step_observations(found.recording, levels, step_events(found.recording))

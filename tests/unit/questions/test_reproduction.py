@@ -20,7 +20,7 @@ from ppafo.questions.reproduce.claim import (
     load_printed,
     verdict_counts,
 )
-from ppafo.questions.reproduce.solve import COMPLETED_SET, EXPERIMENTS, ORDER, reproduce
+from ppafo.questions.reproduce.solve import EXPERIMENTS, ORDER, reproduce
 from ppafo.questions.reproduce.torque_task import phased_runs, readings_of_u, torque_task_observations
 from ppafo.simulation.simulate import Result, Status, simulate
 
@@ -183,7 +183,7 @@ def test_an_override_of_the_device_reaches_all_experiments_and_is_listed() -> No
 def test_an_override_of_a_scenario_reaches_those_that_have_the_value() -> None:
     changed = reproduce(["controller.proportional_gain=0.2 1/(N m)"])
     assert changed.proportional.scenario.control.settings["proportional_gain"] == pytest.approx(0.2)
-    assert changed.step.scenario.origin.overrides == changed.solenoid.scenario.origin.overrides == COMPLETED_SET
+    assert changed.step.scenario.origin.overrides == changed.solenoid.scenario.origin.overrides == ()
 
 
 def test_an_override_that_nothing_knows_is_refused_with_the_nearest_name() -> None:

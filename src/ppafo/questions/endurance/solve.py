@@ -1,7 +1,6 @@
 """How long one bottle lasts for a gas use, with and without reuse of the exhaust; for several uses side by side."""
 
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,7 +12,6 @@ from ppafo.model.exhaust_reuse import ReuseCycle
 from ppafo.model.plant import chamber_1_volume, chamber_2_volume
 from ppafo.parameters import load_device
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle, load_bottle
-from ppafo.parameters.chamber_volumes import other_readings, own_reading
 from ppafo.parameters.declaration import is_within
 from ppafo.questions.endurance.answer import GIVEN, Endurance, Endurances, Reuse
 from ppafo.questions.endurance.discharge import check_schedule, discharge, discharge_of_life, smallest_mass_when_warm
@@ -26,21 +24,18 @@ from ppafo.questions.endurance.draw import (
     draw_of_walk,
     full_chambers,
     is_walk_folder,
-    other_draws,
     read_walk_gas,
     walk_gas,
 )
 from ppafo.signals import Recording
-from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.result_folder import read_recording
 from ppafo.units import parse_quantity
 from ppafo.walking import WalkResult
 from ppafo.walking.bottle import Schedule
 from ppafo.walking.loading import on_bottle
-from ppafo.walking.motion import SHORTEST_STRIDES, walk_of
+from ppafo.walking.motion import walk_of
 from ppafo.walking.walk import bottle_life
-from ppafo.walking.walk import walk as walk_for
 
 REUSE = (
     Quantity("reservoir_volume", "m^3", "volume of the reservoir between the chambers", minimum=0.0, maximum=0.1),
@@ -226,22 +221,8 @@ def endurance_of_walk_gas(
     assert supply is not None, "it was put on one"
     reused = parse_reuse(changes, supply.bottle, full_chambers(gas), zero) if changes else None
     found = _walked_to_its_end(carried, at_set_pressure, schedule, reused)
-    others = {}
-    if own_reading(carried.device.actuator) is not None:
-        for chambers in other_readings(carried.device.actuator):
-            its_draw, its_reuse = at_set_pressure, None
-            if changes:
-                shortest = (SHORTEST_STRIDES + 1) * walk_of(gas.scenario).gait.stride_time
-                few = max(shortest, min(_FEW, float(gas.recording.time[-1]))) / 60.0
-                its_gas = walk_gas(walk_for(with_numbers(gas.scenario, chambers.numbers()), few))
-                its_draw = draw_of_walk(its_gas)
-                with suppress(ParameterError):
-                    its_reuse = parse_reuse(changes, supply.bottle, full_chambers(its_gas), zero)
-                    check_reuse(its_reuse, its_draw.mass_per_stride)
-            its_walk = with_numbers(carried, chambers.numbers())
-            others[chambers.name] = _walked_to_its_end(its_walk, its_draw, schedule, its_reuse)
     without = None if reused is None else _walked_to_its_end(carried, at_set_pressure, schedule, None).discharge
-    return replace(found, others=others, is_of_course=bool(gas.course), without_reuse=without)
+    return replace(found, is_of_course=bool(gas.course), without_reuse=without)
 
 
 def _walked_to_its_end(carried: Scenario, at_set_pressure: Draw, schedule: Schedule, reused: Reuse | None) -> Endurance:
@@ -321,8 +302,4 @@ def _endurance_of_use(
     bottle = chosen.load()
     recording = use if isinstance(use, Recording) else read_recording(Path(str(use)))
     draw = draw_of_recording(recording, stride_time)
-    found = follow_bottle(bottle, draw, schedule, parse_reuse(reuse, bottle) if reuse else None)
-    if isinstance(use, Recording | WalkResult):
-        return found
-    others = other_draws(use, stride_time)
-    return replace(found, others={name: follow_bottle(bottle, other, schedule) for name, other in others.items()})
+    return follow_bottle(bottle, draw, schedule, parse_reuse(reuse, bottle) if reuse else None)

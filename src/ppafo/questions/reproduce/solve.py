@@ -47,7 +47,6 @@ ORDER = (
     "not_published",
 )
 """Every claim: what the reported numbers decide, what is simulated, what is left."""
-COMPLETED_SET = ("device.set=ppafo2011-fitted",)
 
 
 @overload
@@ -161,7 +160,7 @@ def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
         having = [name for name, document in documents.items() if _has(document, path)]
         for name in having or EXPERIMENTS:
             meant[name].append(override)
-    return {name: load_scenario(name, (*COMPLETED_SET, *chosen)) for name, chosen in meant.items()}
+    return {name: load_scenario(name, chosen) for name, chosen in meant.items()}
 
 
 def _has(document: dict[str, Any], path: str) -> bool:
