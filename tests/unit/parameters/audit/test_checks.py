@@ -219,7 +219,7 @@ def with_key(path: str, key: str) -> list[Finding]:
 
 
 def test_a_value_with_the_key_of_a_statement_is_the_number_that_this_states() -> None:
-    assert BASE.numbers["reported.walking_torque"].key == "jrrd-2011/peak_torque_printed_volume"
+    assert BASE.numbers["reported.walking_torque"].key == "jrrd-2011/peak_torque"
     assert with_key("reported.walking_torque", "jrrd-2011/torque_at_rest") == []
     assert with_key("reported.walking_torque_pressure", "jrrd-2011/torque_at_rest.pressure") == []
     (found,) = with_key("reported.walking_torque_pressure", "jmd-2016/rated_torque.pressure")
