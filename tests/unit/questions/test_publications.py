@@ -135,13 +135,6 @@ def test_a_mistake_in_a_file_is_one_line_with_what_is_allowed(
     assert "\n" not in str(caught.value)
 
 
-def test_chambers_that_do_not_exist_are_refused_with_those_that_do(tmp_path: Path) -> None:
-    text = TEXT.replace("held_torque", "swept_volume").replace("N m", "cm^3/rad")
-    text = text.replace('pressure = "90 psi_g"', 'chambers = "ppafo2012"')
-    with pytest.raises(ScenarioError, match="there are no chambers 'ppafo2012', did you mean 'ppafo2011'"):
-        load_publication(written(tmp_path, text))
-
-
 def test_a_claim_that_is_there_twice_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match="'held' is there twice"):
         load_publication(written(tmp_path, TEXT + TEXT[TEXT.index("[[claims]]") :]))

@@ -177,8 +177,8 @@ def test_defaults_of_reuse_are_the_regulators_pressure_and_the_paper_devices_vol
     assert cycle.reservoir_volume == pytest.approx(50e-6)
     assert cycle.exhaust_pressure == pytest.approx(101325.0 + 50 * 6894.757, rel=1e-6)
     assert cycle.fill_pressure == pytest.approx(101325.0 + 30 * 6894.757, rel=1e-6)
-    assert cycle.exhaust_volume == pytest.approx(2e-6 + 51e-6 * np.radians(90.0))
-    assert cycle.fill_volume == pytest.approx(2e-6 + 51e-6 * np.radians(40.0))
+    assert cycle.exhaust_volume == pytest.approx(26.5e-6 + 23.5e-6 * np.radians(90.0))
+    assert cycle.fill_volume == pytest.approx(26.5e-6 + 23.5e-6 * np.radians(40.0))
 
 
 @pytest.mark.parametrize(

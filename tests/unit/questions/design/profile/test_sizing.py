@@ -10,7 +10,6 @@ import jsonschema
 import numpy as np
 import pytest
 
-from ppafo.answers.writing import text_of
 from ppafo.control.profiles import KNOTS
 from ppafo.errors import PpafoError
 from ppafo.parameters.parts import load_catalogue
@@ -21,7 +20,6 @@ from ppafo.questions.design.profile.problem import choose_knots
 from ppafo.questions.design.profile.search import Floats, Trials, ceiling, ceiling_pressure, cut_error
 from ppafo.questions.design.solve import design
 from ppafo.signals import Channel, Recording
-from ppafo.simulation.loading import load_scenario
 from ppafo.storage import write_csv
 
 SHIPPED = Path(__file__).parents[5] / "src" / "ppafo" / "questions" / "design" / "library" / "push-off.toml"
