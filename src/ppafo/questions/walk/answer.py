@@ -31,15 +31,6 @@ from ppafo.questions.walk.course import (
 from ppafo.questions.walk.document import versions, walk_data, walk_document
 from ppafo.questions.walk.reacting import reacting_answer
 from ppafo.questions.walk.safety import over_time_sections, safety_remarks
-from ppafo.questions.walk.volumes import (
-    VolumeReading,
-    volumes_data,
-    volumes_sections,
-    walks_by_volume,
-    wearers_by_volume,
-    wearers_volumes_data,
-    wearers_volumes_sections,
-)
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import UNITS, Scenario, plain
 from ppafo.storage.comma_separated import marked_csv_bytes
@@ -53,7 +44,17 @@ from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
 from ppafo.walking.planning import law_of
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES
-from ppafo.walking.walk import OUTCOMES, SHOWN, TRAITS, Comparison, Number, Population, compare_walks, population_figure
+from ppafo.walking.walk import (
+    OUTCOMES,
+    SHOWN,
+    TRAITS,
+    Comparison,
+    Number,
+    Population,
+    compare_walks,
+    population_figure,
+    walk_population,
+)
 from ppafo.walking.wearer import CORRELATION, MASS_VARIATION, MAXIMUM_DEVIATIONS, STATURE_VARIATION
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -65,7 +66,7 @@ _WEARERS_CAPTION = (
 )
 
 
-def wearers_answer(population: Population, volumes: Mapping[str, Population]) -> Answer:
+def wearers_answer(population: Population) -> Answer:
     """Return the answer of many wearers; no figure where every walk diverged."""
     configuration = population.scenario
     tables = {**population.outcomes, **population.traits}
@@ -92,10 +93,9 @@ def wearers_answer(population: Population, volumes: Mapping[str, Population]) ->
         lead=(f"{configuration.name}: {population.count} wearers, {population.minutes:.3g} min each",),
         sections=(
             Section(table=Table(head, tuple(rows)), remarks=tuple(remarks)),
-            *wearers_volumes_sections(volumes),
             *((Section("The wearers", figure=figure, is_detail=True),) if population.count else ()),
         ),
-        data=_wearers_data(population) | {"volumes": wearers_volumes_data(volumes)},
+        data=_wearers_data(population),
         passed=not population.diverged,
         files={"wearers.csv": lambda: wearers_csv(population)},
         command="walk",
@@ -161,21 +161,16 @@ def _values(values: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class WalkPair(Solved):
-    """A walk with the device and without it.
-
-    ``volumes`` has the walk and the same with the other readings of the paper's chambers; none for chambers of its own.
-    """
+    """A walk with the device and without it."""
 
     comparison: Comparison
-    volumes: tuple[VolumeReading, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Wearers(Solved):
-    """What many wearers get; ``volumes`` is the same for fewer of them with other readings of the paper's chambers."""
+    """What many wearers get."""
 
     population: Population
-    volumes: Mapping[str, Population]
 
 
 SCHEMA_VERSION = 1
@@ -222,7 +217,7 @@ def answer_of(solved: WalkPair | Wearers) -> Answer:
     """Return the answer of one wearer's walks, or of many wearers."""
     if isinstance(solved, WalkPair) and walk_of(solved.comparison.with_device.scenario).reacts is not None:
         return reacting_answer(solved.comparison)
-    return wearers_answer(solved.population, solved.volumes) if isinstance(solved, Wearers) else _pair_answer(solved)
+    return wearers_answer(solved.population) if isinstance(solved, Wearers) else _pair_answer(solved)
 
 
 def _pair_answer(pair: WalkPair) -> Answer:
@@ -248,13 +243,12 @@ def _pair_answer(pair: WalkPair) -> Answer:
             *course_sections(comparison),
             Section(table=comparison_table(comparison), remarks=tuple(text for text in remarks if text)),
             *bottle_sections(worn),
-            *volumes_sections(pair.volumes),
             Section("How to read it", (_EXPLAINED, _LIMITS), is_detail=True),
             *(over_time_sections(worn) if walked.course is None else ()),
             *(course_pictures(comparison) if walked.course is not None else _pictures(comparison)),
             *_assumptions_section({item.path: item.note for item in configuration.assumptions}),
         ),
-        data=_data(comparison) | {"volumes": volumes_data(pair.volumes)},
+        data=_data(comparison),
         passed=comparison.is_completed and worn.is_helped,
         files={
             "recording.nc": lambda: netcdf_bytes(worn.recording, None),
@@ -346,7 +340,7 @@ def _bottle(pair: WalkPair) -> str:
     """Return how long the bottle of the walk lasts and what ended it, or how to see that; empty without gas."""
     worn = pair.comparison.with_device
     if worn.supply is not None:
-        return bottle_remark(worn, [one.on_bottle for one in pair.volumes[1:]])
+        return bottle_remark(worn)
     gas = worn.metrics.get("gas")
     if gas is None or gas.value <= 0.0:
         return ""
@@ -416,10 +410,8 @@ def walk_with_and_without(
     report = progress or report_nothing
     if wearers is not None:
         advance = _reporter(report, "walking", "wearers", 0.0)
-        return Wearers(*wearers_by_volume(chosen, minutes, wearers, seed, advance))
-    comparison = compare_walks(chosen, minutes, _reporter(report, "walking", "min", _LONG))
-    reads = walk_of(chosen).reacts is None
-    return WalkPair(comparison, walks_by_volume(comparison.with_device, minutes) if reads else ())
+        return Wearers(walk_population(chosen, minutes, wearers, seed, advance))
+    return WalkPair(compare_walks(chosen, minutes, _reporter(report, "walking", "min", _LONG)))
 
 
 def list_files() -> list[dict[str, Any]]:

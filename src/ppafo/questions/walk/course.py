@@ -1,6 +1,6 @@
 """What a walk on a course or on its bottle adds to the answer: tables, remarks, data, files, pictures."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import asdict, fields
 from typing import Any
 
@@ -13,7 +13,7 @@ from ppafo.gait.gait import speed_range
 from ppafo.questions.endurance.answer import strides_text
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
-from ppafo.walking.bottle import SupplyCourse, lasted, lasting_text
+from ppafo.walking.bottle import SupplyCourse, lasted, minutes_text
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.over_time import bottle_figure, course_figure, peak_torques
 from ppafo.walking.motion import walk_of
@@ -48,13 +48,12 @@ def bottle_sections(worn: WalkResult) -> tuple[Section, ...]:
     )
 
 
-def bottle_remark(worn: WalkResult, others: Sequence[SupplyCourse | None]) -> str:
-    """Return what ended a walk on its bottle, and when; ``others`` are bottles with other readings of its chambers."""
+def bottle_remark(worn: WalkResult) -> str:
+    """Return what ended a walk on its bottle, and when."""
     supply = worn.supply
     assert supply is not None, "said of a walk on a bottle"
     time = lasted(supply)
-    times = [None if other is None else lasted(other) for other in others]
-    ended = "" if time is None else f"lasts {lasting_text(time, times)}: "
+    ended = "" if time is None else f"lasts {minutes_text(time)}: "
     return f"bottle {supply.supply.bottle.name}: {ended}{supply.ending.message}"
 
 

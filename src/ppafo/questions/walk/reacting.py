@@ -98,7 +98,7 @@ def reacting_answer(comparison: Comparison) -> Answer:
     scenario = worn.scenario
     wearer = wearer_of_walk(scenario)
     remarks = [*person_remarks(scenario), *weak_remarks(wearer), *fall_remarks(comparison)]
-    remarks += [] if worn.supply is None else [bottle_remark(worn, [])]
+    remarks += [] if worn.supply is None else [bottle_remark(worn)]
     remarks += safety_remarks(worn)
     stays = worn.metrics["stays_up"].value > 0.5
     strides = f"{worn.metrics['strides'].value:.0f} strides"
