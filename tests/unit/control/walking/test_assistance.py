@@ -113,7 +113,7 @@ def one_stride() -> list[GaitMeasurement]:
 def test_a_law_acts_in_its_phases_and_leaves_the_foot_free_in_mid_stance(name: str) -> None:
     kind = WALKING_CONTROLLERS[name]
     parameters, state = default_parameters(name), kind.initial
-    stepping = state.safety.stance._replace(flat_angle=1.5)
+    stepping = state.safety.stance._replace(flat_angle=1.5, rolled=1.0)
     state = state._replace(safety=state.safety._replace(stance=stepping))
     found: dict[float, list[float]] = {}
     for measurement in one_stride():

@@ -106,7 +106,7 @@ def pressure(time: float) -> float:
 
 def emptied(late: float, command: float = VENT, turns: float = 0.0, noise: float = 0.0) -> SafetyState:
     """The state after chamber 2 was fed and emptied; its pressure is seen late [s], the ankle turns [rad/s]."""
-    stepping = safety.START.stance._replace(flat_angle=1.0)
+    stepping = safety.START.stance._replace(flat_angle=1.0, rolled=1.0)
     state, draws = safety.START._replace(stance=stepping), np.random.default_rng(1)
     for sample in range(250):
         time = sample * PERIOD
