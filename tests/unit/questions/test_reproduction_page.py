@@ -58,7 +58,7 @@ def test_the_table_begins_with_what_it_does_not_show_and_ends_with_what_u_decide
     assert first == "No experimental result is confirmed independently of fitted settings."
     assert any(line.startswith("16 claims: ") for line in lines)
     assert lines[-1] == (
-        "15 % needs 'U is the opening' and a level beyond the supply's reach; the saving needs nothing."
+        "15 % needs 'U is the opening' and a level beyond the supply's reach; the saving needs neither."
     )
 
 

@@ -373,7 +373,7 @@ def result_on_u(rows: Sequence[ReadingOfU]) -> tuple[str, ...]:
     is_beyond_reach = not any(low <= row.error_within_reach <= high for row in rows)
     if not (is_opening_alone and is_beyond_reach and all(row.gas >= least for row in rows)):
         return ()
-    return ("15 % needs 'U is the opening' and a level beyond the supply's reach; the saving needs nothing.",)
+    return ("15 % needs 'U is the opening' and a level beyond the supply's reach; the saving needs neither.",)
 
 
 def _paper_answer(reproduction: Reproduction) -> Answer:

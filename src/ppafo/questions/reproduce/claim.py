@@ -145,9 +145,9 @@ def stated_claim(
 def told_claim(
     identifier: str, statement: str, observations: Sequence[Observation], assumptions: tuple[str, ...]
 ) -> Claim:
-    """Return the claim on what the text tells, sentence by sentence, of a recording."""
+    """Return the claim on what the text tells, statement by statement, of a recording."""
     missing = [item.id for item in observations if not item.holds]
-    note = "Each sentence with its numbers is listed below."
+    note = "Each statement with its numbers is listed below."
     if missing:
         note = f"Not shown: {', '.join(missing)}."
     return Claim(
@@ -157,10 +157,10 @@ def told_claim(
         value=float(len(observations) - len(missing)),
         unit="-",
         verdict="undetermined" if missing else "met_by_fitted_settings",
-        source=observations[0].source,
+        source="; ".join(dict.fromkeys(item.source for item in observations)),
         note=note,
         assumptions=assumptions,
-        words=f"{len(observations)} sentences",
+        words=f"{len(observations)} statements",
         found=f"{len(observations) - len(missing)} shown",
     )
 

@@ -145,12 +145,19 @@ def _fills_early(step: _Step) -> str:
     )
 
 
-def _rises_again(step: _Step) -> str:
-    pressure, (_, lowest) = step.recording["pressure_1"], step.peak_and_lowest()
-    rise = float(pressure[step.events.stop] - pressure[lowest])
-    if rise < _SAME * step.levels.range:
-        return ""
-    return f"it rises again by {rise / PASCALS_PER_PSI:.1f} psi before the stop"
+def _rises_in_motion(step: _Step) -> str:
+    """The text has pressure 1 fall from breakaway to the stop."""
+    pressure, (peak, lowest) = step.recording["pressure_1"], step.peak_and_lowest()
+    late = float(pressure[peak] - pressure[step.events.breakaway])
+    again = float(pressure[step.events.stop] - pressure[lowest])
+    said = []
+    if late >= _SAME * step.levels.range:
+        said.append(
+            f"from breakaway it goes on rising by {late / PASCALS_PER_PSI:.1f} psi, until {step.milliseconds(peak)}"
+        )
+    if again >= _SAME * step.levels.range:
+        said.append(f"it rises again by {again / PASCALS_PER_PSI:.1f} psi before the stop")
+    return ", and ".join(said)
 
 
 def _more_than_slows(step: _Step) -> str:
@@ -237,7 +244,7 @@ _Judge = Callable[[_Step], tuple[bool, str]]
 _SAID: tuple[tuple[str, _Judge, Callable[[_Step], str] | None], ...] = (
     ("vane_turns_through_its_range", _turns, None),
     ("pressure_1_rises_until_breakaway", _rises, _fills_early),
-    ("pressure_1_falls_in_motion", _falls_in_motion, _rises_again),
+    ("pressure_1_falls_in_motion", _falls_in_motion, _rises_in_motion),
     ("pressure_1_goes_to_supply", _to_supply, None),
     ("pressure_2_falls_from_supply", _falls, None),
     ("pressure_2_slows_in_motion", _slows, _more_than_slows),

@@ -147,7 +147,6 @@ def test_several_recordings_stand_side_by_side(tmp_path: Path, capsys: pytest.Ca
     assert re.split(r"\s{2,}", lines[2].replace("gas use", "gas use ")) == titles
     assert lines[3].split()[0] == str(one)
     assert lines[3].split()[1:] == lines[4].split()[1:]
-    assert lines[6].startswith(f"{one} with ppafo2011-consistent: ")
 
 
 @pytest.mark.parametrize(
