@@ -14,7 +14,7 @@ from ppafo.answers.style import PAGE_LOOKS
 from ppafo.errors import PpafoError, ScenarioError, UnitError
 from ppafo.exports.wasm import WasmModule, module_of
 from ppafo.live.opening import computed_opening, first_settings, opening_like, opening_of
-from ppafo.live.page import block_of, check_start, packed_once, page_of, policy_of_block, values_of_changes
+from ppafo.live.page import block_of, packed_once, page_of, policy_of_block
 from ppafo.live.still import still_of
 from ppafo.live.words import words
 from ppafo.loading import load_scenario
@@ -23,7 +23,7 @@ from ppafo.parameters.overrides import over
 from ppafo.simulation.declaration import OF_A_VANE, PRESSURE_WORDS
 from ppafo.simulation.overrides import apply_overrides, is_of_device
 from ppafo.simulation.scenario import FreeMotion, Scenario, vane_motion, worn_kind
-from ppafo.units import conversion, from_si, to_si
+from ppafo.units import conversion, from_si, parse_quantity, to_si
 from ppafo.version import __version__
 
 Interval = tuple[float, float]
@@ -131,6 +131,11 @@ def usual_changes(scenario: Scenario) -> dict[str, str]:
     from ppafo.walking.motion import SHORTEST_STRIDES, walk_of
 
     return {"run.duration": f"{max(_WALKED, math.ceil(SHORTEST_STRIDES * walk_of(scenario).gait.stride_time))} s"}
+
+
+def usual_values(scenario: Scenario) -> dict[str, float]:
+    """Return ``usual_changes`` as numbers in SI by key: all of them are times."""
+    return {key: parse_quantity(text, "s") for key, text in usual_changes(scenario).items()}
 
 
 def _relations_of_files(described: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -333,24 +338,15 @@ _STEP = "Step response"
 def workbench(
     scenarios: Iterable[str] = DEFAULT,
     overrides: Sequence[str] = (),
-    title: str = TITLE,
-    start: Sequence[Mapping[str, Any]] = (),
-    summary: str = "",
 ) -> bytes:
     """Return a page, one file of HTML, in which scenarios are simulated again while their numbers are changed.
 
     ``scenarios`` are names or files of scenarios and walks; those with the same kind of motion share a tab.
-    ``overrides`` change all of them.
-    ``start`` are the configurations that the page opens with, at most four for a tab: a ``program`` (the name of a
-    scenario) and ``changes``, texts by key. Without it each tab opens with its first two scenarios. ``summary`` is
-    what a page of one tab says of it.
-    ScenarioError for none, too many, two of one name, or a start that the page does not have; ProgramError where a
-    program has to be built and cannot be.
+    ``overrides`` change all of them. Each tab opens with its first two scenarios.
+    ScenarioError for none, too many or two of one name; ProgramError where a program has to be built and cannot be.
     """
-    content, modules, still = _content(list(scenarios), overrides, title, "page", start)
-    for tab in content["tabs"]:
-        tab["summary"] = summary if summary and len(content["tabs"]) == 1 else tab["summary"]
-    return page_of(title, content, modules, still)
+    content, modules, still = _content(list(scenarios), overrides, "page")
+    return page_of(TITLE, content, modules, still)
 
 
 def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
@@ -360,7 +356,7 @@ def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
     """
     named = {item if isinstance(item, str) else item.name: item for item in reversed(scenarios)}
     try:
-        content, modules, _ = _content(list(reversed(named.values())), (), TITLE, "block", ())
+        content, modules, _ = _content(list(reversed(named.values())), (), "block")
     except PpafoError:
         return None
     differences = [_difference(item) for item in named.values() if isinstance(item, Scenario)]
@@ -380,9 +376,7 @@ def _difference(scenario: Scenario) -> str:
 def _content(
     scenarios: "Sequence[str | Scenario]",
     overrides: Sequence[str],
-    title: str,
     form: str,
-    start: Sequence[Mapping[str, Any]],
 ) -> tuple[dict[str, Any], dict[str, str], str]:
     """Content of a page, its modules by name, where programs that are the same are there once, and a still picture."""
     if not 1 <= len(scenarios) <= MOST_SCENARIOS:
@@ -400,21 +394,18 @@ def _content(
     for item in simulated:
         name = names.setdefault(packed_once(item.module.wasm), f"module-{len(names) + 1}")
         programs.append(program_content(item, name, intervals))
-    content = page_content(title, form, _tabs(simulated), programs)
-    check_start(start, content)
+    content = page_content(TITLE, form, _tabs(simulated), programs)
     by_name = {item.scenario.name: item for item in simulated}
     described = {program["name"]: program for program in programs}
     stills = []
     for tab in content["tabs"]:
-        tab["start"] = [dict(item) for item in start if item["program"] in tab["programs"]] or tab["start"]
         openings = []
         for item in tab["start"]:
             one = by_name[item["program"]]
             if form == "block":
                 openings.append(opening_like(one.module))
                 continue
-            given = values_of_changes(item["changes"], described[item["program"]], content["units"])
-            openings.append(opening_of(one.scenario, one.module, given, tab["claims"]))
+            openings.append(opening_of(one.scenario, one.module, usual_values(one.scenario), tab["claims"]))
         shown = [described[item["program"]] for item in tab["start"]]
         tab["first"] = first_settings(openings, shown)
         tab["questions"] = [one for one in tab["questions"] if any(_takes(program, one) for program in shown)]
@@ -433,8 +424,8 @@ def openings_of(names: Iterable[str]) -> dict[str, dict[str, Any]]:
     for name in names:
         item = Simulated(load_scenario(name), module_of(load_scenario(name)), name)
         content = page_content(TITLE, "page", _tabs([item]), [program_content(item, "", {})])
-        given = values_of_changes(usual_changes(item.scenario), content["programs"][0], content["units"])
-        found[name] = computed_opening(item.scenario, item.module, given, content["tabs"][0]["claims"])
+        claims = content["tabs"][0]["claims"]
+        found[name] = computed_opening(item.scenario, item.module, usual_values(item.scenario), claims)
     return found
 
 

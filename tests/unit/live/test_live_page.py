@@ -2,7 +2,6 @@
 
 import base64
 import gzip
-import json
 import os
 import random
 import re
@@ -13,17 +12,16 @@ from typing import Any
 
 import pytest
 
-from ppafo.errors import ScenarioError
 from ppafo.exports import wasm
 from ppafo.live import page as pages
-from ppafo.live.page import check_start, packed, packed_once
+from ppafo.live.page import packed, packed_once
 from ppafo.live.workbench import DEFAULT, known_intervals, workbench
 from ppafo.simulation.loading import load_scenario
 from ppafo.units import parse_quantity
 from ppafo.walking import list_walks, load_walk
 from scripts.known_intervals import known_intervals as intervals_of_study
 from scripts.live_page import check_bits, check_damage, check_refusals, missing, opened, programs_by_tab
-from scripts.page_states import address_of, hard_states
+from scripts.page_states import address_of
 
 MOST_BYTES = 250_000
 HARD_TEXTS = (
@@ -96,76 +94,6 @@ def test_every_default_of_the_page_is_what_its_text_says() -> None:
         assert "supply.pressure" in texts
         for setting in texts.values():
             assert parse_quantity(setting["text"], setting["unit"]) == setting["value"]
-
-
-@pytest.mark.parametrize(
-    ("start", "said"),
-    [
-        ({"program": "torque-task-solenoid"}, "must be a table of 'program' and 'changes'"),
-        ({"program": "torque-task-selenoid", "changes": {}}, "did you mean 'torque-task-solenoid'?"),
-        ({"program": "torque-task-solenoid", "changes": {"valve.aera": "3 mm^2"}}, "did you mean 'valve.area'?"),
-        ({"program": "torque-task-solenoid", "changes": {"valve.area": 3}}, "must be a text"),
-        *(
-            ({"program": "torque-task-solenoid", "changes": {key: text}}, said)
-            for key, text, said in (
-                ("valve.area", "five", "valve.area: 'five' does not start with a number"),
-                ("valve.area", "3 parsec", "'3 parsec' has a unit that does not fit here; allowed: mm^2, cm^2, m^2"),
-                ("valve.area", "-3 mm^2", "'-3 mm^2' is outside of its range, 0 to 10,000 mm^2"),
-                ("valve.area", "1e400", "is outside of its range"),
-                ("valve.area", "3 mm^2;valve.area=4 mm^2", "a semicolon or a line break"),
-                ("valve.switching_interval", "0 ms", "must stay above 0 on this page"),
-                ("sensors.pressure_noise", "1 psi_d", "must stay 0 on this page"),
-                ("sensors.seed", "1.5", "must be a whole number"),
-                ("supply.atmospheric_pressure", "-1 psi_a", "is outside of its range"),
-                ("supply.pressure", "half", "does not start with a number"),
-            )
-        ),
-    ],
-)
-def test_a_start_that_the_page_does_not_have_is_refused_in_one_line(start: dict[str, Any], said: str) -> None:
-    with pytest.raises(ScenarioError, match=re.escape(said)):
-        workbench(["torque-task-solenoid"], start=[start])
-
-
-@has_browser
-def test_page_and_python_refuse_the_same_texts_of_a_start(chromium: Any, file: Path) -> None:
-    page, rng = opened(chromium, file), random.Random(12)
-    content = page.evaluate("workbench.content")
-    state = json.loads(page.evaluate("workbench.file()"))
-    given = []
-    for place, (tab, program) in enumerate(programs_by_tab(page)):
-        hard = [one for one in hard_states(program, content["units"], 60, rng) if one]
-        texts = [{key: text} for key in ("valve.area", "supply.pressure", "run.step") for text in HARD_TEXTS]
-        chosen = [*rng.sample(hard, min(400, len(hard))), *(texts if place == 0 else ())]
-        given += [(tab, {"program": program["name"], "changes": changes}) for changes in chosen]
-    files = [json.dumps({**state, "benches": _with(state["benches"], tab, one)}) for tab, one in given]
-    # None of them is run: the last state is the usual one again.
-    script = "files => { const said = files.map(text => workbench.openFile(text)); workbench.open(''); return said; }"
-    said = page.evaluate(script, files)
-    assert 0.1 < sum(map(bool, said)) / len(said) < 0.9
-    # That two settings contradict each other is found where both have their numbers: in the page.
-    single = [(one, words) for (_, one), words in zip(given, said, strict=True) if not _CONTRADICTION.search(words)]
-    assert len(single) > 0.5 * len(said)
-    differing = [(one, words) for one, words in single if _refusal(one, content) != bool(words)]
-    assert differing == []
-
-
-_CONTRADICTION = re.compile(
-    r"[a-z_.]+ must (be (at most|at least|below|above)|divide) .*[a-z]|would end after the stride"
-)
-
-
-def _with(benches: list[Any], tab: int, one: dict[str, Any]) -> list[Any]:
-    return [[one] if place == tab else bench for place, bench in enumerate(benches, 1)]
-
-
-def _refusal(start: dict[str, Any], content: dict[str, Any]) -> bool:
-    try:
-        check_start([start], content)
-    except ScenarioError as error:
-        assert "\n" not in str(error)
-        return True
-    return False
 
 
 def test_a_pipe_is_no_page_and_is_not_waited_for(tmp_path: Path) -> None:
