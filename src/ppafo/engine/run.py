@@ -11,7 +11,7 @@ from ppafo.engine.lane_step import MAXIMUM_PARTS
 from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_blocks
 from ppafo.engine.led_leg import LedLeg
 from ppafo.engine.program import LaneResult, LaneTiming, NoParameters, Program, composed_with
-from ppafo.engine.rows import leaf_paths, leaves, rebuilt, table
+from ppafo.engine.rows import leaves, rebuilt, table
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import Pace
 from ppafo.model.columns import larger, over_runs, truncated
@@ -217,14 +217,6 @@ def gas_at_start(run: Run) -> Any:
         return composed.function(*parts)
 
     return over_runs(alone, *(number for row in given for number in leaves(row)))
-
-
-def gas_by_path(run: Run) -> dict[str, Any]:
-    """Numbers of the gas of a run at its beginning, by their paths among the rows of states."""
-    found = {"state.mass_1": run.initial.mass_1, "state.mass_2": run.initial.mass_2}
-    for name, row in run.program.gas.states.items():
-        found |= dict(zip(leaf_paths(row, name), leaves(gas_at_start(run)), strict=True))
-    return found
 
 
 def states_at_start(run: Run) -> list[Any]:

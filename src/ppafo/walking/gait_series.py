@@ -171,10 +171,6 @@ class AnklePath:
         """Height of the toes over the ankle [m], for sine and cosine of the sole's tilt: numbers or expressions."""
         return self.toe_lever * sine - self.height * cosine
 
-    def ankle_height(self, phase: float) -> float:
-        """Height of the ankle over the ground [m] at a phase from 0 to 1."""
-        return float(np.interp(phase % 1.0, _GRID, self.up))
-
     def _sole(self, tilt: Floats, lever: float) -> Floats:
         along, up = np.cos(tilt), np.sin(tilt)
         return np.stack([lever * along + self.height * up, lever * up - self.height * along], axis=1)

@@ -131,11 +131,6 @@ def next_fibre(muscle: Muscle, fibre: Fibre, stimulation: float, whole: float, s
     return Fibre(activation=activation, length=fibre.length + step * velocity, velocity=velocity)
 
 
-def pull_of(muscle: Muscle, fibre: Fibre, whole: float) -> float:
-    """Force of the tendon [N] at a length of muscle and tendon [m]."""
-    return muscle.force * tendon_force(muscle, whole - fibre.length)
-
-
 def arm_and_way(lever: Lever, angle: float) -> tuple[float, float]:
     """Moment arm [m] at a joint angle [rad], and how far the fibres have moved from rest [m] as that angle grew."""
     sine, cosine = sine_and_cosine_of_turns((angle - lever.largest_at) * TURNS_OF_RADIAN)
