@@ -25,9 +25,10 @@ from ppafo.engine.loading import load_source, with_arrays
 from ppafo.engine.program import python_place
 from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.engine.run import Run, batch_of, states_at_start
-from ppafo.engine.scheme.actuators import driving_torque_of, measurement_of
+from ppafo.engine.scheme.actuators import measurement_of
 from ppafo.errors import SimulationError
 from ppafo.model.places import at_valve, friction_at_rest, shown_signals
+from ppafo.model.plant import gravity_torque, net_driving_torque
 from ppafo.model.sensors import Measurement, measure
 from tests.judge.reference_slopes import (
     PLANT_UNKNOWNS,
@@ -254,9 +255,10 @@ class _Solution:
         return mode_at_rest(self.plant_at(y), y[0], self.torque(self.time, y))
 
     def torque(self, time: float, y: Sequence[float]) -> float:
-        """Driving torque [N m] with unknowns at a time [s]."""
-        run = self.run
-        alone = driving_torque_of(run.program.actuator, run.plant, y[0], y[2], y[3])
+        """Torque before friction and damping [N m] with unknowns at a time [s]. Equation (1)."""
+        run, plant, actuator = self.run, self.run.plant, self.run.program.actuator
+        driven = actuator.torque(plant, y[0], *actuator.pressures(plant, y[0], y[2], y[3]))
+        alone = net_driving_torque(driven, gravity_torque(y[0], plant.gravity_torque), plant.external_torque)
         return alone if run.leg is None else alone + torque_of_leg(run.program, run.leg, time, y[0])
 
     def is_thrown_at_its_stop(self) -> bool:

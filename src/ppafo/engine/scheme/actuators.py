@@ -148,9 +148,3 @@ def torque_of(actuator: ActuatorModel, plant: Any, angle: Any, pressure_1: Any, 
 def measurement_of(actuator: ActuatorModel, plant: Any, seen: Measurement) -> Measurement:
     """What the sensors show, with the torque that the actuator would have at the angle and pressures shown."""
     return seen._replace(torque=actuator.torque(plant, seen.angle, seen.pressure_1, seen.pressure_2))
-
-
-def driving_torque_of(actuator: ActuatorModel, plant: Any, angle: float, mass_1: float, mass_2: float) -> float:
-    """Torque before friction and damping [N m] at an angle [rad] with two masses [kg]. Equation (1)."""
-    torque = actuator.torque(plant, angle, *actuator.pressures(plant, angle, mass_1, mass_2))
-    return net_driving_torque(torque, gravity_torque(angle, plant.gravity_torque), plant.external_torque)
