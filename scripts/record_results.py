@@ -31,7 +31,7 @@ WALKS = (
     "solenoid-regulators",
     "reacting",
 )
-SETS = ("ppafo2011", "ppafo2011-consistent", "ppafo2011-printed")
+SETS = ("ppafo2011", "ppafo2011-printed")
 
 LINES: dict[str, str] = {
     **{f"simulate-{name}": f"simulate {name} --out {{out}}" for name in SCENARIOS},

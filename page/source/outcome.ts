@@ -24,7 +24,7 @@ interface Row {
 const ROUNDING = 1e-12;
 const GAS = ["gas_supplied", "gas"];
 const MINUTES: Metric = { name: "minutes", unit: "s", shown: "min", label: "How long a full bottle lasts" };
-const TOLD = ["rms_error", "gas_supplied", "switchings", "gas", "push_off_work", "toe_clearance"];
+const TOLD = ["rms_error", "gas_supplied", "switchings", "gas", "positive_push_off_work", "toe_clearance"];
 
 export class OutcomeTable {
   private rows: Row[] = [];

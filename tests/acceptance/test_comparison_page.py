@@ -24,3 +24,15 @@ def test_a_row_is_what_both_runs_give(override: str, error: str, gas: str) -> No
     )
     less = [100.0 * (1.0 - spool[name].value / pair[name].value) for name in ("rms_error", "gas_supplied")]
     assert [f"{value:.1f}" for value in less] == [error, gas]
+
+
+def test_walks_at_equal_work_are_what_the_script_of_the_page_prints(capsys: pytest.CaptureFixture[str]) -> None:
+    (script,), (shown,) = (
+        re.findall(rf"^```{kind}\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE) for kind in ("python", "text")
+    )
+    exec(script, {})
+    assert capsys.readouterr().out == shown
+    at_50, at_lowest = re.findall(r"proportional valve less pair: ([+-]\d+) %", shown)
+    lead = PAGE.partition("\n## ")[0]
+    assert f"takes {at_50.removeprefix('+')} % more gas a stride" in lead
+    assert f"and {at_lowest.removeprefix('-')} % less where each has the lowest supply pressure" in lead

@@ -57,7 +57,8 @@ def test_what_was_planted_in_the_rig_is_found(document: dict[str, Any]) -> None:
         assert estimates[path]["verdict"] == "identified"
         # Three standard errors: 3/1.96 half widths.
         assert abs(estimates[path]["value"] - planted) < 3.0 / 1.96 * half_width, path
-        assert half_width < 0.01 * planted
+        # Static friction shows only where the vane breaks away.
+        assert half_width < (0.03 if path == "friction.static_torque" else 0.01) * planted
 
 
 def test_the_trigger_was_not_late_and_nothing_is_left_but_noise(document: dict[str, Any]) -> None:

@@ -41,7 +41,7 @@ def test_the_study_of_the_page_is_the_one_that_is_shipped() -> None:
         "half-the-area",
         "twice-the-area",
         "40-ms-late",
-        "30-cm3-dead-volume",
+        "twice-the-dead-volume",
     ]
     assert sorted(len(axis.values) for axis in study.axes) == [5, 7]
     assert 5 * 5 * 7 * study.sample.runs == 700

@@ -72,7 +72,7 @@ def test_the_push_off_is_tuned_for_the_bad_end_of_people() -> None:
     quick = replace(problem, spread=replace(problem.spread, draws=4), effort=effort)
     tuned = tune(quick)
     alone = walk(with_overrides(problem.scenario, problem.lines(tuned.after.gains)))
-    assert tuned.after.result.metrics["push_off_work"].value == alone.metrics["push_off_work"].value
+    assert tuned.after.result.metrics["net_push_off_work"].value == alone.metrics["net_push_off_work"].value
 
 
 def test_the_python_of_the_page_runs() -> None:

@@ -166,8 +166,8 @@ def meters(draw: random.Random) -> Iterator[Entry]:
         stride = StrideSample(
             supplied_mass=1.0e-4 * number,
             strides=float(number // 8),
-            push_off_work=0.1 * number,
-            slap_rates=-0.3 * (number // 8),
+            positive_push_off_work=0.1 * number,
+            net_push_off_work=0.1 * number - 0.2 * (number // 8),
             clearances=-0.01 * (number // 8),
             toe_landings=float(number // 20),
             phase=float(number % 4),

@@ -88,11 +88,11 @@ def test_virtual_work_wants_torque_constant_and_volume_per_angle_equal() -> None
     assert side(finding, "volume per angle") / side(finding, "torque constant") == pytest.approx(3.5, abs=0.02)
 
 
-def test_the_gas_use_favours_the_larger_volume() -> None:
+def test_the_gas_use_needs_more_than_the_torque_constant_sweeps_and_lines_have_a_part_of_it() -> None:
     finding = FOUND["virtual-work"]
     assert side(finding, "volume that the gas use needs") == pytest.approx(65e-6, abs=0.5e-6)
     assert "6.12 mg" in finding.paragraph
-    assert "favours the volume per angle" in finding.paragraph
+    assert "lines and clearance hold a part of that gas" in finding.paragraph
 
 
 def test_the_volume_of_chamber_2_is_negative_within_figure_7() -> None:

@@ -142,6 +142,6 @@ def _text(result: "Result", error: "ErrorEstimate | None", check: "Check | None"
     checked = [repr(check), ""] if check is not None else [] if error is None else [error.sentence, ""]
     files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", "report.html"]
     written = ", ".join(files if check is None else [*files, CHECK_FILE])
-    walked = f"'ppafo walk {result.scenario.origin.file}' compares it with the device off and with a healthy ankle"
+    walked = f"'ppafo walk {result.scenario.origin.file}' compares it with no device and with a healthy ankle"
     beside = [] if worn_kind(result.scenario) is None else [walked]
     return "\n".join([str(result), "", *checked, *beside, f"written: {folder} ({written})"])

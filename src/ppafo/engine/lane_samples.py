@@ -245,7 +245,8 @@ TRACED_IN_WALKS: dict[str, str] = {
     "external_torque": "walk.external_torque",
     "heel_force": "walk.heel_force",
     "toe_force": "walk.toe_force",
-    "push_off_work": "walk.push_off_work",
+    "positive_push_off_work": "walk.positive_push_off_work",
+    "net_push_off_work": "walk.net_push_off_work",
     "controller_phase": "controller_state.phase.phase",
     "safe_state": "controller_state.safety.level",
     "gait_fraction": "clock.fraction",
@@ -388,7 +389,7 @@ def _row(name: str, values: dict[str, str]) -> str:
 
 def _stride_values(rows: Rows) -> dict[str, str]:
     """Where a walk is in its stride."""
-    totals = ("strides", "push_off_work", "slap_rates", "clearances", "toe_landings")
+    totals = ("strides", "positive_push_off_work", "net_push_off_work", "clearances", "toe_landings")
     return {
         "supplied_mass": "state.supplied_mass",
         **{name: f"walk.{name}" for name in totals},

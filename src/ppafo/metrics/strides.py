@@ -29,12 +29,10 @@ class Quantity:
 
 PER_STRIDE: dict[str, Quantity] = {
     "gas": Quantity("kg", "gas taken from the supply in one stride", "state.supplied_mass"),
-    "push_off_work": Quantity("J", "work of T_ex while the foot rolls over the toes", "walk.push_off_work"),
-    "slap_rate": Quantity(
-        "rad/s",
-        "rate of the toes as they come down after the heel, below 0; 0 where they came first",
-        "walk.slap_rates",
+    "positive_push_off_work": Quantity(
+        "J", "positive work of T_ex while the foot rolls over the toes", "walk.positive_push_off_work"
     ),
+    "net_push_off_work": Quantity("J", "net work of T_ex while the foot rolls over the toes", "walk.net_push_off_work"),
     "toe_clearance": Quantity("m", "lowest toe height in mid-swing, relative to the healthy gait", "walk.clearances"),
     "toe_landing": Quantity("-", "1 where the toes met the ground before the heel", "walk.toe_landings"),
 }
@@ -44,11 +42,11 @@ NOT_YET = -1.0
 
 
 class StrideTotals(NamedTuple):
-    """Totals since the start, or what a stride adds to them: gas [kg], work [J], rate [rad/s], height [m], landings."""
+    """Totals since the start, or what a stride adds to them: gas [kg], works [J], height [m], landings."""
 
     gas: float
-    push_off_work: float
-    slap_rate: float
+    positive_push_off_work: float
+    net_push_off_work: float
     toe_clearance: float
     toe_landing: float
 
@@ -69,12 +67,11 @@ class StrideNow(NamedTuple):
 
 
 class Counted(NamedTuple):
-    """Whole strides: how many there are, had help, count for means, and slapped of these; their sums and errors."""
+    """Whole strides: how many there are, had help and count for means; their sums and errors."""
 
     whole: float
     helped: float
     counted: float
-    slaps: float
     sums: StrideTotals
     squares: float
     samples: float
@@ -98,8 +95,8 @@ def totals_at(now: StrideSample) -> StrideTotals:
     """Totals since the start."""
     return StrideTotals(
         gas=now.supplied_mass,
-        push_off_work=now.push_off_work,
-        slap_rate=now.slap_rates,
+        positive_push_off_work=now.positive_push_off_work,
+        net_push_off_work=now.net_push_off_work,
         toe_clearance=now.clearances,
         toe_landing=now.toe_landings,
     )
@@ -109,15 +106,18 @@ def sum_with(sums: StrideTotals, now: StrideTotals, begun: StrideTotals, on_toes
     """Sums with those of a stride that went from one to the other; ``on_toes`` is 1 where it began on the toes."""
     return StrideTotals(
         gas=sums.gas + (now.gas - begun.gas),
-        push_off_work=sums.push_off_work + (now.push_off_work - begun.push_off_work),
-        slap_rate=sums.slap_rate + (now.slap_rate - begun.slap_rate),
+        positive_push_off_work=sums.positive_push_off_work
+        + (now.positive_push_off_work - begun.positive_push_off_work),
+        net_push_off_work=sums.net_push_off_work + (now.net_push_off_work - begun.net_push_off_work),
         toe_clearance=sums.toe_clearance + (now.toe_clearance - begun.toe_clearance),
         toe_landing=sums.toe_landing + on_toes,
     )
 
 
 def _start(_course: Course, sample: Sample) -> Strides:
-    nothing = StrideTotals(gas=0.0, push_off_work=0.0, slap_rate=0.0, toe_clearance=0.0, toe_landing=0.0)
+    nothing = StrideTotals(
+        gas=0.0, positive_push_off_work=0.0, net_push_off_work=0.0, toe_clearance=0.0, toe_landing=0.0
+    )
     return Strides(
         strikes=sample.stride.strides,
         first_gas=sample.stride.supplied_mass,
@@ -125,7 +125,7 @@ def _start(_course: Course, sample: Sample) -> Strides:
         stride=StrideNow(
             is_whole=0.0, on_toes=0.0, begun=totals_at(sample.stride), was_vented=0.0, squares=0.0, samples=0.0
         ),
-        counted=Counted(whole=0.0, helped=0.0, counted=0.0, slaps=0.0, sums=nothing, squares=0.0, samples=0.0),
+        counted=Counted(whole=0.0, helped=0.0, counted=0.0, sums=nothing, squares=0.0, samples=0.0),
         safe_time=sample.stride.time if sample.stride.level > HELPS else NOT_YET,
     )
 
@@ -167,12 +167,10 @@ def count(counted: Counted, stride: StrideNow, sample: Sample) -> Counted:
     now = totals_at(sample.stride)
     helps = stride.is_whole > 0.5 and stride.was_vented < 0.5
     counts = helps and counted.whole >= float(SETTLING)
-    slaps = counts and now.slap_rate - stride.begun.slap_rate < 0.0
     return Counted(
         whole=counted.whole + stride.is_whole,
         helped=counted.helped + (1.0 if helps else 0.0),
         counted=counted.counted + (1.0 if counts else 0.0),
-        slaps=counted.slaps + (1.0 if slaps else 0.0),
         sums=sum_with(counted.sums, now, stride.begun, stride.on_toes) if counts else counted.sums,
         squares=counted.squares + (stride.squares if counts else 0.0),
         samples=counted.samples + (stride.samples if counts else 0.0),
@@ -196,14 +194,14 @@ def _gas(readings: Readings) -> Floats:
     return mean_of(counted.sums.gas, counted.counted)
 
 
-def _work(readings: Readings) -> Floats:
+def _positive_work(readings: Readings) -> Floats:
     counted = readings.meters["strides"].counted
-    return mean_of(counted.sums.push_off_work, counted.counted)
+    return mean_of(counted.sums.positive_push_off_work, counted.counted)
 
 
-def _slap_rate(readings: Readings) -> Floats:
+def _net_work(readings: Readings) -> Floats:
     counted = readings.meters["strides"].counted
-    return mean_of(counted.sums.slap_rate, counted.slaps)
+    return mean_of(counted.sums.net_push_off_work, counted.counted)
 
 
 def _clearance(readings: Readings) -> Floats:
@@ -270,8 +268,8 @@ def _mean(name: str, read: Callable[[Readings], Floats], *needs: str) -> MetricK
 
 METRICS = (
     _mean("gas", _gas),
-    _mean("push_off_work", _work),
-    _mean("slap_rate", _slap_rate),
+    _mean("positive_push_off_work", _positive_work),
+    _mean("net_push_off_work", _net_work),
     _mean("toe_clearance", _clearance, LED),
     _mean("toe_landing", _landing),
     _kind("counted_strides", "-", "strides over which the means are taken", _counted, STEADY),

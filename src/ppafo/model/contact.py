@@ -17,7 +17,7 @@ FLAT = 2.0
 TOE = 3.0
 
 FADING_TIME = 0.02
-"""Time [s] in which a difference of angle at a hand-over falls to a third: about that of a foot slap."""
+"""Time [s] in which a difference of angle at a hand-over falls to a third: about that of a foot that falls flat."""
 
 NEARLY_FLAT = 0.05235987755982989
 """The measured foot stands on heel and toes while within this angle [rad], 3 deg, of flat; beyond it the heel is up.
@@ -40,7 +40,6 @@ class Landing(NamedTuple):
     contact: float
     offset: float
     strikes: float
-    slaps: float
     leaves: float
 
 
@@ -78,20 +77,19 @@ def landing(
     strikes = contact == SWING and stance
     flat_angle = now.shank + QUARTER_TURN - timing.ground_angle
     touches_angle = flat_angle - (NEARLY_FLAT if keeps_gait > 0.5 else 0.0)
-    slaps = contact == HEEL and angle >= touches_angle and now.phase < timing.heel_off
+    falls_flat = contact == HEEL and angle >= touches_angle and now.phase < timing.heel_off
     rises = contact > 0.5 and contact < 2.5 and now.phase >= timing.heel_off
     leaves = contact != SWING and not stance
     after = HEEL if strikes else contact
-    after = FLAT if slaps else after
+    after = FLAT if falls_flat else after
     after = TOE if rises else after
     after = SWING if leaves else after
-    difference = angle - (now.ankle if keeps_gait > 0.5 else flat_angle) if slaps else offset
+    difference = angle - (now.ankle if keeps_gait > 0.5 else flat_angle) if falls_flat else offset
     difference = angle - now.ankle if rises else difference
     return Landing(
         contact=after,
         offset=difference,
         strikes=1.0 if strikes else 0.0,
-        slaps=1.0 if slaps else 0.0,
         leaves=1.0 if leaves else 0.0,
     )
 

@@ -23,15 +23,15 @@ class FootSample(NamedTuple):
 class StrideSample(NamedTuple):
     """Where a walk is in its stride.
 
-    ``supplied_mass`` [kg], ``strides``, ``push_off_work`` [J], ``slap_rates`` [rad/s], ``clearances`` [m] and
-    ``toe_landings`` are totals since the start, as in the state of the leg; ``phase`` is the one that the controller
-    sees, ``level`` how much it helps. ``time`` [s] since the start.
+    ``supplied_mass`` [kg], ``strides``, ``positive_push_off_work`` and ``net_push_off_work`` [J], ``clearances`` [m]
+    and ``toe_landings`` are totals since the start, as in the state of the leg; ``phase`` is the one that the
+    controller sees, ``level`` how much it helps. ``time`` [s] since the start.
     """
 
     supplied_mass: float
     strides: float
-    push_off_work: float
-    slap_rates: float
+    positive_push_off_work: float
+    net_push_off_work: float
     clearances: float
     toe_landings: float
     phase: float

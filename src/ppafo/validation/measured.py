@@ -140,6 +140,8 @@ _KILOPASCALS_AS_PSI = 1.0e3 / PASCALS_PER_PSI
 _LEAST_OF_SUPPLY = 0.5
 """Factor that a wrong unit needs, and fraction of the supply that a chamber then reaches at least."""
 _ABOVE_SUPPLY = 0.05
+_ROUNDING = 1.0e-9
+"""Fraction of a pressure [-] that is no difference: a chamber that has settled stands at its supply but for this."""
 _MAXIMUM_RANGES = 20.0
 _MINIMUM_CHANGE = 0.01
 
@@ -232,7 +234,7 @@ def _check_pressures(recording: Recording, device: Device, file: str) -> None:
     allowed = highest + _ABOVE_SUPPLY * (highest - supply.atmospheric_pressure)
     for name in (name for name in (PRESSURE_1, PRESSURE_2) if name in recording):
         level = max(float(recording[name][0]), float(np.median(recording[name])))
-        if level > allowed:
+        if level > allowed * (1.0 + _ROUNDING):
             atmosphere, is_recorded = supply.atmospheric_pressure, SUPPLY in recording
             shown = [f"{from_si(one, 'psi_g', 'Pa_a', atmosphere):.4g} psi_g" for one in (level, highest)]
             owner = f"the recorded '{SUPPLY}'" if is_recorded else f"the supply of {device.name}"

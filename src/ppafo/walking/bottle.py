@@ -7,7 +7,7 @@ parameters of any program with lines. The walk ends where the bottle no longer f
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -392,13 +392,6 @@ class BottleLife:
 def lasted(course: SupplyCourse) -> float | None:
     """Return how long a bottle lasted [s], None where the walk ended before it, or left what is possible."""
     return None if course.ending.kind in (WALKED, DIVERGED) else course.ending.time
-
-
-def lasting_text(seconds: float, others: Iterable[float | None]) -> str:
-    """Return how long a bottle lasts in minutes, with the interval that the other readings of its chambers span [s]."""
-    known = [seconds, *(time for time in others if time is not None)]
-    low, high = minutes_text(min(known)).removesuffix(" min"), minutes_text(max(known))
-    return f"{minutes_text(seconds)}{f' ({low} to {high} depending on the volume of the chambers)' * (len(known) > 1)}"
 
 
 def minutes_text(seconds: float) -> str:

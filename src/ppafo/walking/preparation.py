@@ -128,14 +128,12 @@ def walk_from(now: GaitNow, contact: float, shown_force: float) -> WalkState:
         heel_force=shown_force,
         toe_force=shown_force,
         toes_first=0.0,
-        slap_rate=0.0,
         clearance=NO_CLEARANCE,
         strides=0.0,
-        landings=0.0,
         toe_landings=0.0,
-        slap_rates=0.0,
         clearances=0.0,
-        push_off_work=0.0,
+        positive_push_off_work=0.0,
+        net_push_off_work=0.0,
     )
 
 

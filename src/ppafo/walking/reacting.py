@@ -146,7 +146,6 @@ def reacting_metrics(
             found[kind.name] = Metric(value, kind.unit, kind.summary)
     for name, item in PER_STRIDE.items():
         own = strides[name][counted & helped]
-        own = own[own < 0.0] if name == "slap_rate" else own
         if own.size and name != "toe_clearance":
             found[name] = Metric(float(own.mean()), item.unit, f"{item.summary}, mean")
     found["counted_strides"] = Metric(float((counted & helped).sum()), "-", "strides over which the means are taken")

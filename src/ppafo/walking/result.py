@@ -301,7 +301,7 @@ def _walk_result(
     events = safety_events(scenario, recording.time, record)
     segments: tuple[SegmentResult, ...] = ()
     if planned is not None:
-        segments = segment_results(scenario, planned, recording, strides["push_off_work"], starts)
+        segments = segment_results(scenario, planned, recording, strides["net_push_off_work"], starts)
         metrics |= course_metrics(planned, segments, recording, int((helped & steady).sum()))
     return WalkResult(
         scenario=walked,

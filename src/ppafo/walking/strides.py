@@ -133,18 +133,16 @@ def stride_metrics(
     over = "" if walk_of(configuration).course is None else " over the strides at an even speed on level ground"
     for name, item in PER_STRIDE.items():
         values = strides[name][chosen]
-        if name == "slap_rate":
-            values = values[values < 0.0]
         if values.size:
             found[name] = Metric(float(values.mean()), item.unit, f"{item.summary}, mean{over}")
     found["counted_strides"] = Metric(float(chosen.sum()), "-", "strides over which the means are taken")
     healthy = healthy_positive_work(configuration)
     if healthy > 0.0:
         found["healthy_positive_work"] = Metric(healthy, "J", "positive work of the healthy ankle in one stride")
-        if "push_off_work" in found:
-            fraction = found["push_off_work"].value / healthy
+        if "positive_push_off_work" in found:
+            fraction = found["positive_push_off_work"].value / healthy
             found["push_off_share"] = Metric(
-                fraction, "-", "work of T_ex in push-off over the healthy ankle's positive work"
+                fraction, "-", "positive work of T_ex in push-off over the healthy ankle's positive work"
             )
     if "dorsiflexor_moment" in averages:
         moment = float(averages["dorsiflexor_moment"].mean[:-1].mean())
@@ -164,7 +162,9 @@ def lowest_toes(configuration: Scenario, height: Floats) -> Metric:
     timing = gait_timing(walk_of(configuration).gait)
     first, last = np.searchsorted(PHASES, [timing.clearance_from, timing.clearance_to])
     return Metric(
-        float(height[first:last].min()), "m", "lowest toe height above ground in mid-swing of the mean stride"
+        float(height[first:last].min()),
+        "m",
+        "lowest toe height above ground in mid-swing of the mean stride; below 0 they would drag",
     )
 
 
@@ -212,7 +212,7 @@ class SegmentResult:
     """One segment of a course, from ``start`` to ``end`` [s], SI units.
 
     ``strides`` begin in it with a strike, ``helped`` are those of them in which the controller was not in its safe
-    state up to the next strike, or to the end. ``gas`` [kg], ``push_off_work`` [J] of the strides that begin in it,
+    state up to the next strike, or to the end. ``gas`` [kg], ``net_push_off_work`` [J] of the strides that begin in it,
     ``lowest_toes`` [m] over the ground in the middle of its swings, None without one. ``flat_push`` [N m] is the
     largest torque in plantarflexion with a loaded heel, ``safe_time`` [s] when the controller first helped less (lifted
     only, paused or stopped), None where it did not.
@@ -225,7 +225,7 @@ class SegmentResult:
     strides: int
     helped: int
     gas: float
-    push_off_work: float
+    net_push_off_work: float
     lowest_toes: float | None
     flat_push: float
     safe_time: float | None
@@ -276,7 +276,7 @@ def _segment(
         strides=begun.size,
         helped=_helped(recording, begun, starts),
         gas=float(gas[1] - gas[0]),
-        push_off_work=float(works[begun[begun < works.size]].sum()),
+        net_push_off_work=float(works[begun[begun < works.size]].sum()),
         lowest_toes=_lowest_toes(configuration, recording, own),
         flat_push=max(float(push.max()), 0.0) if push.size else 0.0,
         safe_time=_safe_time(recording, own),
@@ -340,7 +340,7 @@ def course_metrics(
         "course_strides": Metric(float(sum(item.strides for item in segments)), "-", "strides of the course"),
         "course_gas": Metric(gas, "kg", "gas taken from the supply on the course"),
         "course_work": Metric(
-            sum(item.push_off_work for item in segments), "J", "work of T_ex while the foot rolls over the toes"
+            sum(item.net_push_off_work for item in segments), "J", "net work of T_ex while the foot rolls over the toes"
         ),
         "course_flat_push": Metric(
             max((item.flat_push for item in segments), default=0.0),

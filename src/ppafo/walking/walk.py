@@ -1,4 +1,4 @@
-"""Runs a walk, or one of many wearers; compares it with the device switched off and with a healthy ankle."""
+"""Runs a walk, or one of many wearers; compares it with the same without a device and with a healthy ankle."""
 
 import math
 from collections import Counter
@@ -23,6 +23,7 @@ from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE
 from ppafo.model.helping import STOPPED
 from ppafo.model.leg import passive_torque
+from ppafo.parameters.device import Actuator, FootPlate, Friction
 from ppafo.simulation.plan import MAXIMUM_STEPS
 from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
@@ -31,7 +32,6 @@ from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.course import turns_walked
 from ppafo.walking.declaration import THRESHOLDS
 from ppafo.walking.events import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
-from ppafo.walking.gait_series import landing_phase
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import SHORTEST_STRIDES, check_led, duration_problems, walk_of, with_duration
 from ppafo.walking.person import crowd_of, draw_gaits
@@ -140,7 +140,10 @@ def _run_in_parts(batch: Batch, step: float, progress: Progress) -> BatchResult:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """A walk with the device, the same with both chambers vented, and numbers of the healthy gait by name."""
+    """A walk with the device, the same without it, and numbers of the healthy gait by name.
+
+    Without is without a device; of a wearer who reacts it is with the device off.
+    """
 
     with_device: WalkResult
     without_device: WalkResult
@@ -153,7 +156,7 @@ class Comparison:
 
 
 def compare_walks(configuration: Scenario, minutes: float | None = None, progress: Progress = silent) -> Comparison:
-    """Walk ``minutes`` [min], or a whole course, with the device and with it off.
+    """Walk ``minutes`` [min], or a whole course, with the device and without; of a wearer who reacts with it off.
 
     ScenarioError for bad input, SimulationError where its bottle ends the walk before there is anything to compare.
     """
@@ -168,8 +171,10 @@ def compare_walks(configuration: Scenario, minutes: float | None = None, progres
         )
     # As long as the bottle lasted, where one ended the walk.
     as_long = minutes if ending is None else float(worn.recording.time[-1]) / 60.0
-    bare = walk(with_device_off(configuration), as_long, progress=progress)
-    healthy = healthy_metrics(configuration) if walk_of(configuration).reacts is None else {}
+    reacts = walk_of(configuration).reacts is not None
+    other = with_device_off(configuration) if reacts else without_device(configuration)
+    bare = walk(other, as_long, progress=progress)
+    healthy = {} if reacts else healthy_metrics(configuration)
     return Comparison(worn, bare, healthy)
 
 
@@ -183,11 +188,36 @@ def with_device_off(configuration: Scenario) -> Scenario:
     return replace(configuration, name=name, control=control, motion=motion, supply_lines=None, links=links)
 
 
+ANKLE_RANGE = math.radians(45.0), math.radians(140.0)
+"""Range [rad] of an ankle without a device: 45 deg in dorsiflexion, of a loaded foot, to 50 deg in plantarflexion.
+
+The second is a usual norm of passive motion; the first is assumed, beyond what any gait here asks.
+"""
+
+_NO_CHAMBER = 1.0e-3
+"""Volume [m^3] that stands for no chamber: at rest, and too large for its gas to ask for short steps."""
+
+
+def without_device(configuration: Scenario) -> Scenario:
+    """The same wearer without a device: no plate, torque or friction, and the ankle's own range of motion.
+
+    It is one walk for every device and valve; what fails of a device is gone with it.
+    """
+    off = with_device_off(configuration)
+    device, motion = off.device, walk_of(off)
+    lowest, highest = ANKLE_RANGE
+    ankle = Actuator(0.0, 0.0, lowest, highest, _NO_CHAMBER, _NO_CHAMBER, 0.0, device.actuator.leak)
+    leg = replace(
+        device, actuator=ankle, friction=Friction(0.0, 0.0, 0.0), foot_plate=FootPlate(0.0, 0.0), effects={}, links={}
+    )
+    intact = replace(motion, faults=dict.fromkeys(motion.faults, FaultSettings()), broken={}, shut_off={})
+    return replace(off, name=f"{configuration.name}-without", device=leg, motion=intact)
+
+
 def healthy_metrics(configuration: Scenario) -> dict[str, Metric]:
     """The metrics of a walk with a healthy ankle, SI units; without a moment curve there is no work."""
     gait = walk_of(configuration).gait
     found = {
-        "slap_rate": Metric(_landing_rate(configuration), "rad/s", "rate of the measured foot as it comes down"),
         "toe_clearance": Metric(0.0, "m", "0 by definition: measured from the healthy gait"),
         "lowest_toes": lowest_toes(configuration, healthy_toe_height(configuration)),
         "toe_landing": Metric(0.0, "-", "the heel comes first"),
@@ -195,7 +225,7 @@ def healthy_metrics(configuration: Scenario) -> dict[str, Metric]:
     }
     if gait.ankle_moment is not None:
         work = healthy_positive_work(configuration)
-        found["push_off_work"] = Metric(work, "J", "positive work of the ankle moment in one stride")
+        found["positive_push_off_work"] = Metric(work, "J", "positive work of the ankle moment in one stride")
         if walk_of(configuration).wearer.keeps_gait >= 0.5:
             found["dorsiflexor_moment"] = _dorsiflexor_moment(configuration)
     return found
@@ -210,13 +240,6 @@ def _dorsiflexor_moment(configuration: Scenario) -> Metric:
     return Metric(float(moment[:-1].mean()), "N m", "moment of the wearer's dorsiflexors, mean over the stride")
 
 
-def _landing_rate(configuration: Scenario) -> float:
-    """Rate of the measured foot as it comes down [rad/s], below 0; taken where a walk takes it, at the landing."""
-    gait = walk_of(configuration).gait
-    phase = landing_phase(gait)
-    return gait.shank_angle.rate(phase, gait.stride_time) - gait.ankle_angle.rate(phase, gait.stride_time)
-
-
 MAXIMUM_WEARERS = 1_000_000
 
 STEPS_AT_ONCE = 1.0e8
@@ -224,8 +247,8 @@ STEPS_AT_ONCE = 1.0e8
 
 SHOWN = {
     "gas": ("Gas per stride", "gas mass", 3),
-    "push_off_work": ("Work on the wearer in push-off", "energy", 2),
-    "slap_rate": ("Rate of the foot as it comes down", "angular velocity", 0),
+    "positive_push_off_work": ("Positive work on the wearer in push-off", "energy", 2),
+    "net_push_off_work": ("Net work on the wearer in push-off", "energy", 2),
     "toe_clearance": ("Lowest toe height in mid-swing, relative to healthy", "body length", 1),
     "toe_landing": ("Strides that begin on the toes", "fraction", 0),
     "body_mass": ("Body mass", "mass", 1),
@@ -237,8 +260,8 @@ SHOWN = {
 
 _SIZE = (9.4, 5.6)
 _DRAWN_QUANTILES = (0.05, 0.5, 0.95)
-_HISTOGRAMS = ("gas", "push_off_work", "slap_rate", "toe_clearance")
-_PAIRS = (("stride_time", "gas"), ("body_mass", "push_off_work"))
+_HISTOGRAMS = ("gas", "positive_push_off_work", "net_push_off_work", "toe_clearance")
+_PAIRS = (("stride_time", "gas"), ("body_mass", "positive_push_off_work"))
 _BINS = 40
 _MAXIMUM_POINTS = 2000
 
@@ -331,8 +354,8 @@ def walk_population(
     walked = run.step * run.step_count
     # Numbers of each wearer from the totals; ``strides`` walked, parts of one included.
     strides = walked * gaits.timing["frequency"] if planned is None else turns_walked(planned.course, walked)
-    strikes, landings = np.maximum(rows["walk.strides"], 1.0), np.maximum(rows["walk.landings"], 1.0)
-    over = {"slap_rate": landings, "toe_clearance": strikes, "toe_landing": strikes}
+    strikes = np.maximum(rows["walk.strides"], 1.0)
+    over = {"toe_clearance": strikes, "toe_landing": strikes}
     outcomes = {name: rows[item.total] / over.get(name, strides) for name, item in PER_STRIDE.items()}
     traits = {
         "body_mass": walk_of(configuration).wearer.body_mass * build.mass,

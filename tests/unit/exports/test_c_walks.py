@@ -242,7 +242,7 @@ def test_every_sample_of_a_walk_has_the_bits_of_python(
     assert {"strides", "helped_strides", "total_gas"} <= set(known)
     assert known == pytest.approx({head: result.metrics[head].value for head in known}, rel=1e-12, abs=1e-15)
     has_strides = result.metrics["counted_strides"].value > 0.0
-    assert ("push_off_work" in known) == (walk_of(walked).course is None and has_strides)
+    assert ("net_push_off_work" in known) == (walk_of(walked).course is None and has_strides)
 
 
 def test_a_walk_of_every_feature_is_clean_under_the_sanitizers_and_the_same_in_c_plus_plus(tmp_path: Path) -> None:

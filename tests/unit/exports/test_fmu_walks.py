@@ -92,7 +92,10 @@ def test_wearer_controller_and_sensors_are_parameters_and_metrics_can_be_read(lo
     assert {"controller.peak_torque", "sensors.force_bandwidth", "valve.area"} <= set(found)
     instance = Instance(loop, {"run.duration": SECONDS})
     instance.go_to(SECONDS)
-    read = {name: instance.get(f"metrics.{name}") for name in ("gas", "push_off_work", "slap_rate", "strides")}
+    read = {
+        name: instance.get(f"metrics.{name}")
+        for name in ("gas", "positive_push_off_work", "net_push_off_work", "strides")
+    }
     assert read == pytest.approx({name: walked.metrics[name].value for name in read}, rel=1e-12)
     instance.close()
 
@@ -119,7 +122,7 @@ def test_a_parameter_that_is_tuned_acts_and_one_that_would_change_the_steps_is_r
     tuned.set("controller.peak_torque", 3.0)
     for instance in (plain, tuned):
         instance.go_to(4.0)
-    assert tuned.get("push_off_work") < plain.get("push_off_work")
+    assert tuned.get("net_push_off_work") < plain.get("net_push_off_work")
     tuned.set("valve.area", 100.0e-6)
     with pytest.raises(Exception, match="DoStep"):
         tuned.go_to(4.1)

@@ -24,8 +24,8 @@ def totals() -> dict[str, np.ndarray]:
         "strides": strides,
         "toe_landings": landings,
         "supplied_mass": time**2,
-        "push_off_work": time**3,
-        "slap_rates": -strides,
+        "positive_push_off_work": time**3,
+        "net_push_off_work": time**3 - 0.1 * strides,
         "clearances": 0.01 * strides,
     }
 

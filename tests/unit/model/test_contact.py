@@ -30,7 +30,7 @@ def test_a_foot_that_meets_the_ground_with_its_toes_loads_them_first(contact: fl
 
 @pytest.mark.parametrize(("keeps_gait", "contact"), [(0.0, ground.HEEL), (1.0, ground.FLAT)])
 def test_the_foot_of_who_keeps_the_gait_is_flat_while_it_is_nearly_so(keeps_gait: float, contact: float) -> None:
-    """A measured foot rolls its last degrees for a tenth of a stride; a free one slaps through them."""
+    """A measured foot rolls its last degrees for a tenth of a stride; a free one falls through them."""
     nearly = FLAT_ANGLE - 0.9 * ground.NEARLY_FLAT
     landed = ground.landing(ground.HEEL, TIMING, NOW._replace(ankle=nearly), nearly, 0.0, keeps_gait)
     assert landed.contact == contact

@@ -69,32 +69,23 @@ def test_every_computation_is_used_by_a_shipped_claim() -> None:
 def test_the_torque_at_rest_is_the_measured_slope_times_the_pressure(tmp_path: Path) -> None:
     (claim,) = studied(tmp_path, TEXT).studies[0].claims
     assert claim.value == pytest.approx(1.451e-5 * 90.0 * 6894.757, rel=1e-6)
-    assert claim.verdict == "reproduced"
-
-
-@pytest.mark.parametrize("pressure", ["90 psi_g", "90psi_g", "620.5 kPa_g"])
-def test_the_printed_digits_of_a_pressure_leave_a_range(tmp_path: Path, pressure: str) -> None:
-    (claim,) = studied(tmp_path, TEXT.replace("90 psi_g", pressure)).studies[0].claims
-    assert claim.left_open is not None
-    half = 0.05 if pressure.startswith("620") else 0.5 * 6.894757
-    assert claim.left_open[1] - claim.left_open[0] == pytest.approx(2e3 * half * 1.451e-5, rel=1e-3)
-    assert claim.left_open[0] < claim.value < claim.left_open[1]
-
-
-def test_the_readings_of_the_chambers_leave_a_range(tmp_path: Path) -> None:
-    chambers = TEXT.replace("held_torque", "swept_volume").replace('pressure = "90 psi_g"', 'chambers = "ppafo2011"')
-    chambers = chambers.replace('"N m"', '"cm^3/rad"').replace("at_least = 8.5\nat_most = 9.5", "at_most = 60")
-    (claim,) = studied(tmp_path, chambers).studies[0].claims
-    assert (claim.value, claim.left_open) == (pytest.approx(51.0), pytest.approx((18.1, 51.0)))
+    assert claim.verdict == "consistent"
 
 
 @pytest.mark.parametrize(
     ("change", "verdict"),
     [
-        (("at_most = 9.5", 'at_most = 9.5\nassumed = ["a reason"]'), "reproduced_with_assumptions"),
-        (("at_most = 9.5", "at_most = 8.9", "published = 9.0", "published = 8.8"), "contradicted"),
-        (("at_least = 8.5\nat_most = 9.5", "at_least = 9.1", "published = 9.0", "published = 9.2"), "contradicted"),
-        (("at_least = 8.5\nat_most = 9.5", "at_most = 9.1"), "reproduced"),
+        (("at_most = 9.5", 'at_most = 9.5\nassumed = ["a reason"]'), "plausible"),
+        (("at_most = 9.5", "at_most = 8.9", "published = 9.0", "published = 8.8"), "inconsistent_as_reported"),
+        (
+            ("at_least = 8.5\nat_most = 9.5", "at_least = 9.1", "published = 9.0", "published = 9.2"),
+            "inconsistent_as_reported",
+        ),
+        (("at_least = 8.5\nat_most = 9.5", "at_most = 9.1"), "consistent"),
+        (
+            ("at_most = 9.5", 'at_most = 8.9\nassumed = ["a reason"]', "published = 9.0", "published = 8.8"),
+            "undetermined",
+        ),
     ],
 )
 def test_a_claim_is_judged_by_the_range_that_its_file_gives(
@@ -144,13 +135,6 @@ def test_a_mistake_in_a_file_is_one_line_with_what_is_allowed(
     assert "\n" not in str(caught.value)
 
 
-def test_chambers_that_do_not_exist_are_refused_with_those_that_do(tmp_path: Path) -> None:
-    text = TEXT.replace("held_torque", "swept_volume").replace("N m", "cm^3/rad")
-    text = text.replace('pressure = "90 psi_g"', 'chambers = "ppafo2012"')
-    with pytest.raises(ScenarioError, match="there are no chambers 'ppafo2012', did you mean 'ppafo2011'"):
-        load_publication(written(tmp_path, text))
-
-
 def test_a_claim_that_is_there_twice_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match="'held' is there twice"):
         load_publication(written(tmp_path, TEXT + TEXT[TEXT.index("[[claims]]") :]))
@@ -174,7 +158,7 @@ def test_a_study_is_written_as_claims_text_and_page(tmp_path: Path) -> None:
     out = tmp_path / "out"
     answer = studied(tmp_path, TEXT).answer()
     assert answer.data["claims"][0]["value"] == pytest.approx(9.0, rel=1e-3)
-    assert answer.data["counts"]["reproduced"] == 1
+    assert answer.data["counts"]["consistent"] == 1
     assert main(["reproduce", "--study", written(tmp_path, TEXT), "--out", str(out)]) == 0
     assert {"claims.json", "claims.txt", "report.html"} <= {file.name for file in out.iterdir()}
     page = (out / "report.html").read_text(encoding="utf-8")

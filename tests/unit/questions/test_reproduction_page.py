@@ -11,12 +11,14 @@ from ppafo.identification.bench.result import synthetic_figure_3
 from ppafo.live.page import bundled, digest
 from ppafo.questions.reproduce.answer import (
     DEVICE_FIGURE,
+    IDENTIFICATION_FIGURE,
     STEP_FIGURE,
     TORQUE_FIGURE,
     Reproduction,
     answer_of,
     holding_torque,
     reproduction_page,
+    result_on_u,
 )
 from ppafo.questions.reproduce.bench import NoEvidence, SyntheticEvidence
 from ppafo.questions.reproduce.figures import step_response_figure, torque_task_figure
@@ -46,18 +48,25 @@ def test_the_table_has_a_line_for_every_claim_and_fits_a_terminal(reproduction: 
 
 
 def test_the_table_aligns_its_columns(reproduction: Reproduction) -> None:
-    head, *rows = text_of(answer_of(reproduction)).splitlines()[: 1 + len(reproduction.claims)]
+    _, _, head, *rows = text_of(answer_of(reproduction)).splitlines()[: 3 + len(reproduction.claims)]
     column = head.index("verdict")
     assert all(row[column - 2 : column] == "  " and row[column] != " " for row in rows)
 
 
-def test_below_the_table_verdicts_are_counted_and_what_nothing_tests_is_listed(reproduction: Reproduction) -> None:
-    *_, counts, _, untested, first, second = text_of(answer_of(reproduction)).splitlines()
-    assert counts.startswith(f"{len(reproduction.claims)} claims: ")
-    assert untested == "stated, and tested by nothing here:"
-    assert first.startswith("  unmodelled_dynamics: ")
-    assert second.startswith("  temperature_would_help: ")
-    assert [entry.id for entry in reproduction.unread] == ["unmodelled_dynamics", "temperature_would_help"]
+def test_the_table_begins_with_what_it_does_not_show_and_ends_with_what_u_decides(reproduction: Reproduction) -> None:
+    first, *lines = text_of(answer_of(reproduction)).splitlines()
+    assert first == "No experimental result is confirmed independently of fitted settings."
+    assert any(line.startswith("16 claims: ") for line in lines)
+    assert lines[-1] == (
+        "15 % needs 'U is the opening' and a level beyond the supply's reach; the saving needs neither."
+    )
+
+
+def test_the_sentence_on_u_is_said_only_where_the_readings_come_to_it(reproduction: Reproduction) -> None:
+    rows = reproduction.readings_of_u
+    assert result_on_u(rows)
+    for changed in ({"error": 2.0}, {"gas": 10.0}, {"error_within_reach": 15.0}):
+        assert result_on_u((dataclasses.replace(rows[0], **changed), *rows[1:])) == ()
 
 
 def test_figure_7_has_the_four_panels_of_the_paper_in_its_units(reproduction: Reproduction) -> None:
@@ -106,8 +115,8 @@ def test_the_page_states_every_claim_with_both_numbers_and_the_verdict(reproduct
     for claim in reproduction.claims:
         assert words(typeset(claim.statement)) in text
         assert words(typeset(claim.note)) in text
-    assert "contradicted" in text
-    assert "shown on synthetic data" in text
+    assert "No experimental result is confirmed independently of fitted settings." in text
+    assert "the dissertations of K. A. Shorter (2011) and Y. Li (2013)" in text
 
 
 def test_the_page_holds_its_three_figures_and_fetches_nothing(page: str) -> None:
@@ -156,22 +165,15 @@ def test_without_the_rig_the_page_says_why_and_shows_nothing_synthetic(reproduct
     assert 'id="identification"' not in told
 
 
-def test_the_page_shows_what_was_identified_on_both_presets_beside_what_was_planted(
-    reproduction: Reproduction, page: str
-) -> None:
-    evidence = reproduction.synthetic
-    assert isinstance(evidence, SyntheticEvidence)
-    text = words(page)
-    assert "ideal-laboratory" in text
-    assert "paper-bench" in text
-    table = page.partition('id="identification"')[2].partition("</table>")[0]
-    assert table.count("<tr>") == 1 + len(evidence.bench.values)
+def test_figure_3_on_the_page_says_that_its_slope_is_not_the_reported_one(reproduction: Reproduction) -> None:
+    told = words(reproduction_page(reproduction, {**DRAWN, IDENTIFICATION_FIGURE: b"<svg>three</svg>"}))
+    assert re.search(r"Its slope is .3\.\d 1/s where the paper reports .0\.4", told)
 
 
 def test_figure_3_says_in_each_panel_that_it_is_synthetic(reproduction: Reproduction) -> None:
     evidence = reproduction.synthetic
     assert isinstance(evidence, SyntheticEvidence)
-    figure = synthetic_figure_3(evidence.bench.torque, evidence.bench.decay)
+    figure = synthetic_figure_3(evidence.torque, evidence.decay)
     assert all("synthetic" in axes.get_title(loc="left") for axes in figure.axes)
     rising, falling = figure.axes[0].lines[:2]
     assert (rising.get_marker(), falling.get_marker()) == ("x", "o")
@@ -183,7 +185,7 @@ def test_figure_7_names_the_synthetic_measurement_and_shows_below_what_it_differ
     evidence = reproduction.synthetic
     assert isinstance(evidence, SyntheticEvidence)
     recording = reproduction.step.recording
-    figure = step_response_figure(recording, LEVELS, None, evidence.step.measured)
+    figure = step_response_figure(recording, LEVELS, None, evidence.step)
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["model", "synthetic measurement"]
     angle, below = figure.axes[0], figure.axes[2]
     model, measured = (line.get_ydata() for line in angle.lines[:2])

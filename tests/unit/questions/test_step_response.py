@@ -74,6 +74,32 @@ def test_gas_that_only_vents_ever_more_slowly_does_not_count_as_compressed() -> 
     assert held(recording(pressure_2=venting))["pressure_2_slows_in_motion"] is False
 
 
+def test_a_pressure_1_that_peaks_while_the_vane_sets_off_falls_in_motion() -> None:
+    peaked = pressure(
+        {0.0: 0.0, BREAKAWAY: 40.0, BREAKAWAY + 0.003: 42.0, 0.15: 38.5, STOP: 40.0, 0.35: 55.0, 0.4: 55.0}
+    )
+    assert held(recording(pressure_1=peaked))["pressure_1_falls_in_motion"] is True
+
+
+def test_a_pressure_1_that_rises_beyond_breakaway_says_how_far() -> None:
+    peaked = recording(
+        pressure_1=pressure({0.0: 0.0, BREAKAWAY: 40.0, BREAKAWAY + 0.003: 42.0, 0.15: 30.0, STOP: 30.0})
+    )
+    told = {item.id: item for item in step_observations(peaked, LEVELS, step_events(peaked))}
+    assert told["pressure_1_falls_in_motion"].difference == "from breakaway it goes on rising by 2.0 psi, until 53 ms"
+
+
+def test_a_peak_of_pressure_1_late_in_the_motion_is_no_fall_from_the_start() -> None:
+    late = pressure({0.0: 0.0, BREAKAWAY: 40.0, 0.2: 48.0, STOP: 40.0, 0.35: 55.0, 0.4: 55.0})
+    assert held(recording(pressure_1=late))["pressure_1_falls_in_motion"] is False
+
+
+@pytest.mark.parametrize(("rise", "holds"), [(0.9, True), (1.1, False), (44.0, False)])
+def test_a_fall_of_pressure_2_that_slows_may_rise_by_one_psi_and_no_more(rise: float, holds: bool) -> None:
+    compressed = pressure({0.0: 55.0, BREAKAWAY: 35.0, 0.2: 35.0 + rise, STOP: 20.0, 0.3: 0.0, 0.4: 0.0})
+    assert held(recording(pressure_2=compressed))["pressure_2_slows_in_motion"] is holds
+
+
 def test_a_vane_that_turns_elsewhere_is_not_the_one_of_figure_7() -> None:
     angle = Channel(np.radians(drawn({0.0: 20.0, BREAKAWAY: 20.0, STOP: 100.0, 0.4: 100.0})), "rad")
     assert held(recording(angle=angle))["vane_turns_through_its_range"] is False

@@ -92,7 +92,7 @@ def test_a_row_of_columns_has_the_bits_of_the_single_walk(name: str) -> None:
 def test_metrics_of_rows_are_those_of_the_walks_alone() -> None:
     base = load_walk("proportional", ["run.duration=8 s"])
     columns = {"supply.dorsiflexion_pressure": np.array([2.5e5, 3.1e5]), "wearer.body_mass": np.array([60.0, 90.0])}
-    names = ("gas", "push_off_work", "toe_clearance", "counted_strides", "total_gas", "push_off_error", "strides")
+    names = ("gas", "net_push_off_work", "toe_clearance", "counted_strides", "total_gas", "push_off_error", "strides")
     found = run_ensemble(base, columns, names)
     for row in range(2):
         words = [f"supply.dorsiflexion_pressure={columns['supply.dorsiflexion_pressure'][row].item()!r} Pa_a"]

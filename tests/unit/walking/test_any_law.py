@@ -71,4 +71,4 @@ def test_the_law_of_the_paper_walks_and_follows_the_torque_of_its_phases() -> No
     phase, command = result.recording["controller_phase"], result.recording["command"]
     assert set(command[phase == MID_STANCE]) == {VENT}
     assert set(command[phase == PUSH_OFF]) <= {-1.0, 1.0, VENT}
-    assert result.metrics["push_off_work"].value > 0.5
+    assert result.metrics["net_push_off_work"].value > 0.5

@@ -67,11 +67,23 @@ def test_supplies_that_let_no_gas_back_ask_for_room_above_their_pressure(name: s
         load_walk(name, ["controller.highest_pressure=600 kPa_a"])
 
 
+REPORTED_VANE = (
+    "actuator.volume_per_angle=51 cm^3/rad",
+    "actuator.dead_volume_1=2 cm^3",
+    "actuator.dead_volume_2=2 cm^3",
+)
+
+
 @pytest.mark.parametrize("name", [name for name in list_walks() if name != "off"])
 def test_no_shipped_walk_compresses_a_chamber_by_more_than_is_asked_for(name: str) -> None:
-    result = walk(name, 0.15)
-    highest = max(result.recording[chamber].max() for chamber in ("pressure_1", "pressure_2"))
-    assert 1.0 < highest / result.scenario.device.supply.pressure < 0.98 * COMPRESSION
+    def compressed(*overrides: str) -> float:
+        result = walk(load_walk(name, overrides), 0.15)
+        highest = max(result.recording[chamber].max() for chamber in ("pressure_1", "pressure_2"))
+        return float(highest / result.scenario.device.supply.pressure)
+
+    # The room is for short lines and the reported vane too, which compress most.
+    assert compressed() < 0.98 * COMPRESSION
+    assert 1.0 < compressed(*REPORTED_VANE) < 0.98 * COMPRESSION
 
 
 @pytest.mark.parametrize("overrides", ON_A_PROPORTIONAL_VALVE)

@@ -7,6 +7,8 @@ from ppafo.walking.walk import walk
 BEYOND = (
     "actuator.angle_max=81.7 deg",
     "actuator.volume_per_angle=100.8 cm^3/rad",
+    "actuator.dead_volume_1=2 cm^3",
+    "actuator.dead_volume_2=2 cm^3",
     "valve.discharge_coefficient=0.0116",
 )
 

@@ -46,7 +46,7 @@ def test_a_law_walks_and_follows_its_torque_in_push_off(walked: Callable[[str], 
     assert result.metrics["strides"].value >= 10
     assert "safe_state_time" not in result.metrics
     assert result.metrics["push_off_error"].value < LARGEST_ERROR[name]
-    assert result.metrics["push_off_work"].value > 1.0
+    assert result.metrics["net_push_off_work"].value > 1.0
     assert result.metrics["toe_landing"].value == 0.0
 
 
@@ -64,7 +64,7 @@ def test_the_foot_is_free_in_mid_stance_and_clears_the_ground_in_mid_swing(
 def test_solenoid_valves_lift_the_toes_too_because_the_push_off_ends_in_time() -> None:
     in_time, late = (walk(load_walk("solenoid", given), MINUTES) for given in ([], ["controller.push_off_end=0.65"]))
     assert in_time.metrics["lowest_toes"].value > 0.0 > late.metrics["lowest_toes"].value
-    assert in_time.metrics["push_off_work"].value > 0.8
+    assert in_time.metrics["net_push_off_work"].value > 0.8
 
 
 @pytest.mark.parametrize("zone", [[], ["controller.dead_zone=1 N m", "controller.release=0.3 N m"]])
@@ -72,7 +72,7 @@ def test_the_dead_zone_works_on_solenoid_valves(zone: list[str]) -> None:
     result = walk(load_walk("solenoid", ["controller.kind=event_on_off_dead_zone", *zone]), MINUTES)
     assert result.status.is_completed
     assert "safe_state_time" not in result.metrics
-    assert result.metrics["push_off_work"].value > 0.8
+    assert result.metrics["net_push_off_work"].value > 0.8
     assert result.metrics["toe_landing"].value == 0.0
 
 

@@ -57,7 +57,10 @@ def test_a_valve_stuck_open_is_found_and_only_a_shut_off_takes_its_torque_away(p
         assert result.events[0].sign.name in ("valve_open", "valve_shut")
         assert result.events[0].time < FAILS + 2.0 * walk_of(result.scenario).gait.stride_time
     settled = bare.recording.time > bare.events[0].time + 0.5
-    assert np.abs(bare.recording["torque"][settled]).max() > 8.0
+    device = bare.scenario.device
+    held = device.actuator.torque_constant * (device.supply.pressure - device.supply.atmospheric_pressure)
+    # The leg turns the vane against gas that cannot leave, which gives more than the supply holds.
+    assert np.abs(bare.recording["torque"][settled]).max() > 1.2 * held
     assert np.abs(safe.recording["torque"][safe.recording.time > safe.events[0].time + 0.5]).max() < 2.0
 
 
@@ -68,7 +71,8 @@ def test_the_sign_names_the_cause() -> None:
         ("regulator_2", "frozen", ("supply_low",)),
         ("bottle", "empty", ("supply_low", "supply_lost")),
         ("hose_1", "off", ("supply_lost",)),
-        ("hose_2", "kinked", ("supply_low",)),
+        # It fills too little and vents too slowly: both signs name a kinked hose.
+        ("hose_2", "kinked", ("supply_low", "valve_shut")),
     ):
         (event, *_) = broken("solenoid", part, kind).events
         assert event.sign is not None

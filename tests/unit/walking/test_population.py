@@ -39,9 +39,8 @@ def test_the_first_wearer_is_that_of_the_configuration(name: str) -> None:
     alone = run_batch(batch_of(run)).states[:, 0]
     strides = run.step * run.step_count / walk_of(configuration).gait.stride_time
     assert people.outcomes["gas"][0] * strides == pytest.approx(alone[rows["state.supplied_mass"]], rel=1e-9)
-    assert people.outcomes["push_off_work"][0] * strides == pytest.approx(alone[rows["walk.push_off_work"]], rel=1e-9)
-    slaps = alone[rows["walk.slap_rates"]] / alone[rows["walk.landings"]]
-    assert people.outcomes["slap_rate"][0] == pytest.approx(slaps, rel=1e-9)
+    for work in ("positive_push_off_work", "net_push_off_work"):
+        assert people.outcomes[work][0] * strides == pytest.approx(alone[rows[f"walk.{work}"]], rel=1e-9)
 
 
 def varied(curve: Curve | None, series: SeriesOfMany, index: int) -> Curve:
@@ -97,10 +96,8 @@ def test_any_wearer_walks_as_it_would_alone() -> None:
         assert value == pytest.approx(own, rel=1e-9, abs=1e-12), path
     rows, states = state_row_numbers(run), run_batch(batch_of(run)).states[:, 0]
     strides = run.step * run.step_count / gait.stride_time
-    for name, row in (("gas", "state.supplied_mass"), ("push_off_work", "walk.push_off_work")):
+    for name, row in (("gas", "state.supplied_mass"), ("net_push_off_work", "walk.net_push_off_work")):
         assert people.outcomes[name][index] * strides == pytest.approx(states[rows[row]], rel=1e-5), name
-    slap = states[rows["walk.slap_rates"]] / states[rows["walk.landings"]]
-    assert people.outcomes["slap_rate"][index] == pytest.approx(slap, rel=1e-5)
     assert people.traits["body_mass"][index] == wearer.body_mass
 
 
@@ -171,5 +168,6 @@ def test_progress_of_many_wearers_is_told(monkeypatch: pytest.MonkeyPatch) -> No
     assert told == [(32.0, 70.0), (64.0, 70.0), (70.0, 70.0)]
     monkeypatch.undo()
     np.testing.assert_array_equal(
-        grouped.outcomes["push_off_work"], walk_population(configuration, MINUTES, 70, 1).outcomes["push_off_work"]
+        grouped.outcomes["net_push_off_work"],
+        walk_population(configuration, MINUTES, 70, 1).outcomes["net_push_off_work"],
     )

@@ -83,7 +83,7 @@ def test_a_tenfold_droop_costs_work_and_a_smaller_step_changes_little() -> None:
     assert base.supply_lines is not None
     drooping = replace(base, supply_lines=base.supply_lines._replace(droop_1=10.0 * base.supply_lines.droop_1))
     found = {
-        name: walk(configuration, 0.1).metrics["push_off_work"].value
+        name: walk(configuration, 0.1).metrics["net_push_off_work"].value
         for name, configuration in {"base": base, "fine": replace(base, time_step=1.0e-4), "drooping": drooping}.items()
     }
     assert found["drooping"] < 0.95 * found["base"]

@@ -66,10 +66,15 @@ def test_a_drop_foot_hangs_without_the_device_and_is_lifted_with_it(walked: Call
 
 
 def test_the_device_gives_work_in_push_off_and_uses_gas(walked: Callable[[str], Any]) -> None:
-    assert walked("off")["walk.push_off_work"][-1] < 0.0
+    off = walked("off")
+    assert off["walk.net_push_off_work"][-1] < 0.0 <= off["walk.positive_push_off_work"][-1]
+    gain, net = np.diff(off["walk.positive_push_off_work"]), np.diff(off["walk.net_push_off_work"])
+    np.testing.assert_allclose(gain[net >= 0.0], net[net >= 0.0], atol=1e-12)
+    assert (gain >= 0.0).all()
+    assert gain.sum() > net.sum() + 1.0, "the friction of a vented device brakes"
     assert walked("off")["state.supplied_mass"][-1] == 0.0
     for name in ("event_on_off", "event_proportional"):
-        assert walked(name)["walk.push_off_work"][-1] > 0.5
+        assert walked(name)["walk.net_push_off_work"][-1] > 0.5
         assert walked(name)["state.supplied_mass"][-1] > 1e-3
 
 
@@ -84,7 +89,7 @@ def test_metrics_at_one_kilohertz_are_within_two_per_cent(walk_plan: Callable[[s
             run = plan_walk(replace(walk_plan(name), time_step=step))
             rows = state_row_numbers(run)
             states = run_batch(batch_of(run)).states[:, 0]
-            names = ("walk.slap_rates", "walk.push_off_work", "state.supplied_mass")
+            names = ("walk.positive_push_off_work", "walk.net_push_off_work", "state.supplied_mass")
             found.append([states[rows[item]] for item in names])
         np.testing.assert_allclose(found[0], found[1], rtol=0.02)
 
@@ -117,7 +122,7 @@ def test_a_stride_that_begins_without_heel_strike_gets_no_push_before_its_time(
     assert (walk["controller_state.phase.phase"][walk.time < 3.3] == 3.0).any()
 
 
-def test_a_foot_that_comes_first_with_its_toes_loads_them_and_does_not_slap(
+def test_a_foot_that_comes_first_with_its_toes_loads_them(
     walked: Callable[[str], Any], walk_plan: Callable[[str], Any]
 ) -> None:
     plan = walk_plan("off")
@@ -126,10 +131,7 @@ def test_a_foot_that_comes_first_with_its_toes_loads_them_and_does_not_slap(
     lifted = walked("event_on_off")
     stiff = type(lifted)(plan_walk(replace(plan, motion=replace(walk_of(plan), wearer=wearer))))
     assert stiff["walk.toe_landings"][-1] >= 6
-    # The walk begins at a heel strike with the healthy ankle.
-    assert stiff["walk.landings"][-1] == 1
-    assert lifted["walk.landings"][-1] >= 6
-    assert lifted["walk.slap_rates"][-1] / lifted["walk.landings"][-1] < -5.0
+    assert lifted["walk.toe_landings"][-1] == 0
     early = {walk: (walk["walk.now.phase"] < 0.05) & (walk.time > 2.0) for walk in (stiff, lifted)}
     assert np.max((stiff["walk.heel_force"] - 0.5 * stiff["walk.toe_force"])[early[stiff]]) < 10.0
     assert np.max(lifted["walk.toe_force"][early[lifted]]) < 10.0

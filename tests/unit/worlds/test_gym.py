@@ -128,8 +128,8 @@ def test_another_seed_draws_another_episode_and_the_same_the_same() -> None:
     assert np.array_equal(first[0], second[0])
     assert not np.array_equal(first[0], third[0])
     scenario = env.episode()
-    half = 5.5e-6
-    assert abs(scenario.device.actuator.dead_volume_1 - 32.0e-6) <= half
+    half = 3.7e-6
+    assert abs(scenario.device.actuator.dead_volume_1 - 26.5e-6) <= half
     assert 1.0 <= scenario.reference.settings["level"] <= 4.5
 
 

@@ -1,6 +1,6 @@
 """What torque a walking device requests in each phase of the gait, whatever law then tracks it.
 
-Landing: a profile in dorsiflexion against the slap, about a spring and damper that hold the foot. Mid-stance: free.
+Landing: a profile in dorsiflexion that lets the foot down, about a spring and damper that hold it. Mid-stance: free.
 Push-off: a profile in plantarflexion. Swing: a profile in dorsiflexion about the same spring and damper.
 
 The profile has the four parameters that the exoskeleton literature uses, of J. Zhang et al., Science 356 (2017) 1280:

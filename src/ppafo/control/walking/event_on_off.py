@@ -1,6 +1,6 @@
 """Event-based control of a pair of solenoid valves: each phase of the gait has its valve configuration.
 
-Landing: the dorsiflexion side, against the slap. Swing: the same side holds the foot up, at an angle within a band.
+Landing: the dorsiflexion side, which lets the foot down. Swing: the same side holds it up, at an angle within a band.
 Mid-stance: both chambers vented, free motion. Push-off: the plantarflexion side, vented again before the toes leave
 the ground, so that its gas does not hold the foot down in the swing. The functional tasks of figure 1A of the paper.
 """

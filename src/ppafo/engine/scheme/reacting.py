@@ -66,10 +66,9 @@ class WalkNow(NamedTuple):
 class ReactingState(NamedTuple):
     """Where the foot with the device stands, what the wearer gets, and totals since the start; as in ``WalkState``.
 
-    ``lands`` is 1 while the toes have yet to come down after the heel. ``since`` [s] the strike, ``stride_time`` [s] of
-    the stride before. ``load`` and ``other_load`` [body weights] of both feet, ``muscle_work`` [J] that all muscles did
-    as they shortened, ``fall_time`` [s], below 0 before a fall. ``clearance`` [m] is over the ground. ``pushed`` is
-    the push on the trunk.
+    ``since`` [s] the strike, ``stride_time`` [s] of the stride before. ``load`` and ``other_load`` [body weights] of
+    both feet, ``muscle_work`` [J] that all muscles did as they shortened, ``fall_time`` [s], below 0 before a fall.
+    ``clearance`` [m] is over the ground. ``pushed`` is the push on the trunk.
     """
 
     contact: float
@@ -78,16 +77,14 @@ class ReactingState(NamedTuple):
     heel_force: float
     toe_force: float
     toes_first: float
-    lands: float
     clearance: float
     since: float
     stride_time: float
     strides: float
-    landings: float
     toe_landings: float
-    slap_rates: float
     clearances: float
-    push_off_work: float
+    positive_push_off_work: float
+    net_push_off_work: float
     load: float
     other_load: float
     muscle_work: float
@@ -280,8 +277,6 @@ def advance_reacting(
     strikes = stood and passed and load > LOADED and foot.place >= PASSING * leg
     lowest = min(walk.clearance, foot.toes if watched else walk.clearance)
     touches_first = ball > heel
-    slaps = walk.lands > 0.5 and ball > 0.0 and not strikes
-    lands = (0.0 if touches_first else 1.0) if strikes else (0.0 if slaps or load <= 0.0 else walk.lands)
     acceleration = (after.angular_velocity - before.angular_velocity) / max(step, 1.0e-30)
     given = foot.given - foot.damping * after.angular_velocity - share.inertia * acceleration
     turned = after.angle - before.angle
@@ -289,13 +284,12 @@ def advance_reacting(
     since = 0.0 if strikes else walk.since + step
     falls = stood and not (pose.y - footing(wearer.way, pose.x).height > FALLEN * leg)
     work = 0.5 * (given + walk.external_torque) * turned if contact == TOE and stood else 0.0
+    positive_work = max(work, 0.0)
     stride_time = walk.since if strikes and walk.strides > 0.5 else walk.stride_time
     muscle_work = walk.muscle_work + (body.work if stood else 0.0)
     toes_first = (1.0 if touches_first else 0.0) if strikes else walk.toes_first
     on_toes = 1.0 if strikes and touches_first else 0.0
     struck = 1.0 if strikes else 0.0
-    slapped = 1.0 if slaps else 0.0
-    slap_rate = limb_rates.foot if slaps else 0.0
     external_torque = given if stood else 0.0
     clearance = NO_CLEARANCE if strikes else lowest
     cleared = lowest if strikes else 0.0
@@ -309,16 +303,14 @@ def advance_reacting(
         heel_force=walk.heel_force + (heel - walk.heel_force) * follows,
         toe_force=walk.toe_force + (ball - walk.toe_force) * follows,
         toes_first=toes_first,
-        lands=lands,
         clearance=clearance,
         since=since,
         stride_time=stride_time,
         strides=walk.strides + struck,
-        landings=walk.landings + slapped,
         toe_landings=walk.toe_landings + on_toes,
-        slap_rates=walk.slap_rates + slap_rate,
         clearances=walk.clearances + cleared,
-        push_off_work=walk.push_off_work + work,
+        positive_push_off_work=walk.positive_push_off_work + positive_work,
+        net_push_off_work=walk.net_push_off_work + work,
         load=load,
         other_load=body.right_felt.load,
         muscle_work=muscle_work,

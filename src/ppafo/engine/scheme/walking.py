@@ -137,9 +137,8 @@ class WalkState(NamedTuple):
 
     ``contact`` as in ``model.contact``; ``offset`` [rad] of the ankle to what the ground prescribes;
     ``external_torque`` T_ex [N m]; forces that the sensors show [N]; ``toes_first`` 1 in a stride that began with the
-    toes; ``slap_rate`` of the toes at the last landing [rad/s]; ``clearance`` lowest of the toes in this swing against
-    the healthy gait [m]. Totals: strikes, landings of the toes after the heel, strikes with the toes first, sums of
-    slap rates [rad/s] and clearances [m], work of T_ex while the foot rolls over the toes [J].
+    toes; ``clearance`` lowest of the toes in this swing against the healthy gait [m]. Totals: strikes, strikes with the
+    toes first, sum of clearances [m], positive and net work of T_ex while the foot rolls over the toes [J].
     """
 
     contact: float
@@ -150,14 +149,12 @@ class WalkState(NamedTuple):
     heel_force: float
     toe_force: float
     toes_first: float
-    slap_rate: float
     clearance: float
     strides: float
-    landings: float
     toe_landings: float
-    slap_rates: float
     clearances: float
-    push_off_work: float
+    positive_push_off_work: float
+    net_push_off_work: float
 
 
 class WalkStep(NamedTuple):
@@ -343,19 +340,14 @@ def advance_walk(
     toes_first = (1.0 if touches_first else 0.0) if strikes else walk.toes_first
     heel, toe = ground.ground_forces(landed.contact, timing, now, toes_first)
     share = follow_rate * step / (1.0 + follow_rate * step)
-    foot_rate = now.shank_rate - state.angular_velocity
     watched = now.phase >= timing.clearance_from and now.phase <= timing.clearance_to
     lowest = min(walk.clearance, height if watched else walk.clearance)
     on_toes = walk.contact == ground.TOE
-    # A foot that met the ground with its toes brings its heel down: that is no slap.
-    slaps = landed.slaps > 0.5 and foot_rate < 0.0
-    slap_rate = foot_rate if slaps else walk.slap_rate
     clearance = NO_CLEARANCE if strikes else lowest
-    landing = 1.0 if slaps else 0.0
     toe_landing = 1.0 if strikes and touches_first else 0.0
-    counted_rate = foot_rate if slaps else 0.0
     counted_clearance = lowest if strikes and lowest < NO_CLEARANCE else 0.0
     work = 0.5 * (given + walk.external_torque) * turned if on_toes else 0.0
+    positive_work = max(work, 0.0)
     # Numba takes more than 15 keywords only where no choice stands among them.
     return WalkState(
         contact=landed.contact,
@@ -366,14 +358,12 @@ def advance_walk(
         heel_force=walk.heel_force + (heel - walk.heel_force) * share,
         toe_force=walk.toe_force + (toe - walk.toe_force) * share,
         toes_first=toes_first,
-        slap_rate=slap_rate,
         clearance=clearance,
         strides=walk.strides + landed.strikes,
-        landings=walk.landings + landing,
         toe_landings=walk.toe_landings + toe_landing,
-        slap_rates=walk.slap_rates + counted_rate,
         clearances=walk.clearances + counted_clearance,
-        push_off_work=walk.push_off_work + work,
+        positive_push_off_work=walk.positive_push_off_work + positive_work,
+        net_push_off_work=walk.net_push_off_work + work,
     )
 
 

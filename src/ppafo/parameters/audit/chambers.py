@@ -75,7 +75,6 @@ def _gas_use(
     density = density_change(gas, supply - evidence.atmosphere())
     used, turn = evidence.number(path) or 0.0, abs(angles[3] - angles[1])
     needed, by_torque, by_volume = used / density, torque_constant * turn, volume_per_angle * turn
-    nearer = "volume per angle" if abs(needed - by_volume) < abs(needed - by_torque) else "torque constant"
     sides = (
         Side("volume that the gas use needs", needed, "m^3"),
         Side("volume swept by the torque constant", by_torque, "m^3"),
@@ -86,7 +85,7 @@ def _gas_use(
         f"{evidence.in_set_unit(path, used)} of one filling occupy {1e6 * needed:.3g} cm^3; over the whole "
         "range the vane "
         f"sweeps {1e6 * by_torque:.3g} cm^3 by the torque constant and {1e6 * by_volume:.3g} cm^3 by the volume per "
-        f"angle. The gas use favours the {nearer}."
+        "angle; lines and clearance hold a part of that gas."
     )
     return (path, _SUPPLY, angles[0], angles[2]), sides, text
 

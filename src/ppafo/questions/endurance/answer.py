@@ -2,7 +2,7 @@
 
 import textwrap
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,7 +30,7 @@ from ppafo.signals.recording import Floats
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.units import format_quantity
 from ppafo.version import __version__
-from ppafo.walking.bottle import Schedule, lasting_text, minutes_text
+from ppafo.walking.bottle import Schedule, minutes_text
 from ppafo.walking.figures.over_time import draw_bottle_pressure, draw_gas_left
 
 if TYPE_CHECKING:
@@ -43,8 +43,7 @@ class Endurance(Solved):
     """The request and its result.
 
     ``discharge`` is the requested course. ``strides_when_warm`` is the number of strides that a bottle which stays at
-    room temperature gives: what cooling costs. ``is_of_course`` is true where a stride is a course. ``others`` is the
-    same for a walk or a run with other readings of the paper's chambers, by their names.
+    room temperature gives: what cooling costs. ``is_of_course`` is true where a stride is a course.
     """
 
     bottle: Bottle
@@ -53,7 +52,6 @@ class Endurance(Solved):
     discharge: Discharge
     strides_when_warm: float
     is_of_course: bool = False
-    others: Mapping[str, "Endurance"] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -155,7 +153,6 @@ def _answer_of_several(several: Endurances) -> Answer:
     uses = several.uses
     first = next(iter(uses.values()))
     head = (*_USE, *_COURSE, Column("ended"))
-    chambers = [f"{name} {words}: {text}" for name, one in uses.items() for words, text in _other_facts(one)]
     return Answer(
         name="endurance",
         kicker="Endurance",
@@ -163,7 +160,6 @@ def _answer_of_several(several: Endurances) -> Answer:
         lead=(first.bottle.title,),
         sections=(
             Section(table=Table(head, tuple((name, *_cells(one)) for name, one in uses.items()))),
-            Section(remarks=tuple(chambers)),
             Section("What is not in the model", (_LEFT_OUT,), is_detail=True),
         ),
         data={"recordings": {name: _data(one) for name, one in uses.items()}},
@@ -181,7 +177,7 @@ def _facts(found: Endurance) -> list[tuple[str, str]]:
     recording = course.recording
     flows = [quantity_text(flow, "mass flow") for flow in (draw.mean_flow, draw.peak_flow)]
     rows = [
-        ("run time", f"{_lasting(found)} of walking, {minutes_text(course.total_time)} in total"),
+        ("run time", f"{minutes_text(course.walking_time)} of walking, {minutes_text(course.total_time)} in total"),
         ("strides", strides_text(course.strides)),
         (
             "strides without cooling",
@@ -198,25 +194,7 @@ def _facts(found: Endurance) -> list[tuple[str, str]]:
     ]
     if "liquid_mass" in recording:
         rows.append(("liquid used up", _dry_since(course)))
-    return rows + _other_facts(found)
-
-
-def _lasting(found: Endurance) -> str:
-    """Return how long the bottle lasts, with the interval of a walk; a recording is one draw, whatever takes it."""
-    time = found.discharge.walking_time
-    return lasting_text(time, [other.discharge.walking_time for other in found.others.values()])
-
-
-def _other_facts(found: Endurance) -> list[tuple[str, str]]:
-    """Return what the same walk comes to with the other readings of the paper's chambers, docs/decisions/0014."""
-    return [
-        (
-            f"with {name}",
-            f"{_gas(other.draw.mass_per_stride)} a stride, {minutes_text(other.discharge.walking_time)} of walking, "
-            f"{strides_text(other.discharge.strides)} strides",
-        )
-        for name, other in found.others.items()
-    ]
+    return rows
 
 
 def _lacking_heat(found: Endurance) -> str:
@@ -246,11 +224,6 @@ def _data(found: Endurance) -> dict[str, Any]:
         "schedule": found.schedule._asdict(),
         "bottle": _bottle_data(found),
     }
-    if found.others:
-        data["other_chambers"] = {
-            name: _course_data(other.discharge) | {"gas_per_stride": other.draw.mass_per_stride}
-            for name, other in found.others.items()
-        }
     return data
 
 

@@ -11,14 +11,11 @@ import numpy as np
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.errors import DataError, ParameterError, PpafoError, refused_as
-from ppafo.parameters.chamber_volumes import other_readings
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
-from ppafo.simulation.loading import ScenarioRequest, scenario_from_dict, scenario_of
-from ppafo.simulation.numbers import with_numbers
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario, scenario_document
-from ppafo.simulation.simulate import simulate
-from ppafo.storage.result_folder import RUN_FILE, read_document, read_json, read_recording
+from ppafo.simulation.loading import ScenarioRequest, scenario_of
+from ppafo.simulation.scenario import Scenario
+from ppafo.storage.result_folder import read_json, read_recording
 from ppafo.walking import WalkResult
 from ppafo.walking.loading import WALKING
 from ppafo.walking.motion import walk_of
@@ -221,33 +218,3 @@ def draw_of_walk(walk: WalkGas) -> Draw:
     draw = draw_of_numbers(walk.gas_per_stride, walk.stride_time, peak)
     along = f" on course '{walk.course}'" if walk.course else ""
     return replace(draw, origin=f"walk '{walk.name}'{along}, {walk.recording.kind}, repeated")
-
-
-def other_draws(recording: str | Path, stride_time: float | None) -> dict[str, Draw]:
-    """Return the gas use of a result folder with the other chambers, by name; {} where it cannot be run again.
-
-    That is a file without a folder, a law in Python, chambers of its own, or a device that has changed since.
-    """
-    folder = Path(recording)
-    if not (folder / RUN_FILE).is_file():
-        return {}
-    scenario = _again(read_document(folder).get("scenario"))
-    if scenario is None:
-        return {}
-    found = {}
-    for chambers in other_readings(scenario.device.actuator):
-        result = simulate(with_numbers(scenario, chambers.numbers()))
-        if result.status.is_completed:
-            found[chambers.name] = draw_of_recording(result.recording, stride_time)
-    return found
-
-
-def _again(document: Any) -> Scenario | None:
-    """Return the scenario of a result as what it was made from, None unless that gives the same device."""
-    try:
-        origin = document["origin"]
-        scenario = scenario_from_dict(origin["content"], origin["overrides"])
-    except (KeyError, TypeError, PpafoError):
-        return None
-    same = scenario_document(scenario)["device"] == document.get("device")
-    return scenario if same and scenario.control.kind != PYTHON_CONTROLLER else None

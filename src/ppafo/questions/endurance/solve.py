@@ -7,7 +7,6 @@ from pathlib import Path
 from ppafo.answers.display_units import quantity_text
 from ppafo.errors import DataError, ParameterError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle, load_bottle
-from ppafo.parameters.chamber_volumes import other_readings, own_reading
 from ppafo.questions.endurance.answer import Endurance, Endurances
 from ppafo.questions.endurance.discharge import check_schedule, discharge, discharge_of_life, smallest_mass_when_warm
 from ppafo.questions.endurance.draw import (
@@ -17,12 +16,10 @@ from ppafo.questions.endurance.draw import (
     draw_of_recording,
     draw_of_walk,
     is_walk_folder,
-    other_draws,
     read_walk_gas,
     walk_gas,
 )
 from ppafo.signals import Recording
-from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.result_folder import read_recording
 from ppafo.walking import WalkResult
@@ -100,12 +97,7 @@ def endurance_of_walk_gas(
     own = walk_of(gas.scenario).bottle
     carried = on_bottle(gas.scenario, PAPER_BOTTLE if bottle is None and own is None else bottle, overrides)
     found = _walked_to_its_end(carried, at_set_pressure, schedule)
-    others = {}
-    if own_reading(carried.device.actuator) is not None:
-        for chambers in other_readings(carried.device.actuator):
-            its_walk = with_numbers(carried, chambers.numbers())
-            others[chambers.name] = _walked_to_its_end(its_walk, at_set_pressure, schedule)
-    return replace(found, others=others, is_of_course=bool(gas.course))
+    return replace(found, is_of_course=bool(gas.course))
 
 
 def _walked_to_its_end(carried: Scenario, at_set_pressure: Draw, schedule: Schedule) -> Endurance:
@@ -173,8 +165,4 @@ def _endurance_of_use(use: GasUse, stride_time: float | None, chosen: _Bottle, s
     bottle = chosen.load()
     recording = use if isinstance(use, Recording) else read_recording(Path(str(use)))
     draw = draw_of_recording(recording, stride_time)
-    found = follow_bottle(bottle, draw, schedule)
-    if isinstance(use, Recording | WalkResult):
-        return found
-    others = other_draws(use, stride_time)
-    return replace(found, others={name: follow_bottle(bottle, other, schedule) for name, other in others.items()})
+    return follow_bottle(bottle, draw, schedule)

@@ -2,7 +2,7 @@
 
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -10,29 +10,26 @@ from ppafo.answers import Answer, Column, Figure, Section, Table
 from ppafo.answers.display_units import metric_level
 from ppafo.answers.writing import inline_figure, quantity, render_page, sentence
 from ppafo.identification.bench.result import synthetic_figure_3
-from ppafo.identification.estimate import Estimate
 from ppafo.live.workbench import live_part
 from ppafo.metrics import Metric
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.audit import Finding
-from ppafo.parameters.publications.publication import ClaimEntry, paper_entries
+from ppafo.parameters.publications.publication import paper_entries
 from ppafo.questions.question import Solved
 from ppafo.questions.reproduce.bench import (
-    IDEAL,
-    REALISTIC,
+    BENCH_PRESET,
     RIG_SEED,
-    STEP_PRESET,
     TASK_PRESET,
     AssumedValue,
-    IdentifiedValue,
     NoEvidence,
     SyntheticEvidence,
 )
 from ppafo.questions.reproduce.claim import (
+    MEANINGS,
+    NOT_PUBLISHED,
     VERDICTS,
     Claim,
     Observation,
-    Printed,
     Verdict,
     count_sentence,
     count_words,
@@ -43,6 +40,7 @@ from ppafo.questions.reproduce.drawing import device_figure
 from ppafo.questions.reproduce.figures import step_response_figure, torque_task_figure
 from ppafo.questions.reproduce.publication import ALL, SEED, Study
 from ppafo.questions.reproduce.step_response import Levels, StepEvents
+from ppafo.questions.reproduce.torque_task import WITHIN_REACH, ReadingOfU
 from ppafo.simulation.simulate import Result
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.version import __version__
@@ -62,6 +60,7 @@ class Reproduction(Solved):
     claims: tuple[Claim, ...]
     step_observations: tuple[Observation, ...]
     torque_observations: tuple[Observation, ...]
+    readings_of_u: tuple[ReadingOfU, ...]
     step: Result
     step_events: StepEvents | None
     solenoid: Result
@@ -73,14 +72,6 @@ class Reproduction(Solved):
     completed_set: str
     completed_findings: tuple[Finding, ...]
     overrides: tuple[str, ...]
-
-    @property
-    def unread(self) -> list[ClaimEntry]:
-        """Statements of the paper that nothing here tests: no claim, no observation, no value of a set."""
-        of_sets = {entry.key.partition("/")[2] for entry in load_printed().parameter_set.numbers.values()}
-        observed = (item.id for item in (*self.step_observations, *self.torque_observations))
-        read = {*of_sets, *(claim.id for claim in self.claims), *observed}
-        return [entry for entry in paper_entries().values() if entry.id not in read]
 
     @property
     def missed(self) -> tuple[Claim, ...]:
@@ -99,10 +90,11 @@ class Studies(Solved):
 TEMPLATE = "reproduction.html.jinja"
 _EXPERIMENTS = {STEP: "step response", SOLENOID: "torque task, solenoid", PROPORTIONAL: "torque task, proportional"}
 _SYMBOLS: dict[Verdict, str] = {
-    "reproduced": "✓",
-    "reproduced_with_assumptions": "≈",
-    "shown_on_synthetic": "◇",
-    "contradicted": "✗",
+    "consistent": "✓",
+    "inconsistent_as_reported": "✗",
+    "met_by_fitted_settings": "≈",
+    "plausible": "~",
+    "undetermined": "?",
     "not_testable": "○",
 }
 _TASK_METRICS = (
@@ -138,6 +130,9 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
         "notes": _of_severity(printed, "note"),
         "kept": [finding for finding in reproduction.completed_findings if finding.severity != "note"],
         **_synthetic(reproduction, drawn.get(IDENTIFICATION_FIGURE)),
+        "readings_of_u": [(row.name, *_reading_texts(row)) for row in reproduction.readings_of_u],
+        "result_on_u": result_on_u(reproduction.readings_of_u) if reproduction.readings_of_u else (),
+        "within_reach": f"{WITHIN_REACH:g}",
         "device_figure": inline_figure(drawn[DEVICE_FIGURE]),
         "step_figure": inline_figure(drawn[STEP_FIGURE]),
         "torque_figure": inline_figure(drawn[TORQUE_FIGURE]),
@@ -165,10 +160,15 @@ def _summary(reproduction: Reproduction) -> dict[str, Any]:
     counts = verdict_counts(reproduction.claims)
     return {
         "paper": citation,
+        "nothing_confirmed": NOTHING_CONFIRMED,
         "count_sentence": count_sentence(reproduction.claims),
-        "counts": [(verdict, VERDICTS[verdict], _SYMBOLS[verdict], count) for verdict, count in counts.items()],
+        "counts": [
+            (verdict, VERDICTS[verdict], _SYMBOLS[verdict], MEANINGS[verdict], count)
+            for verdict, count in counts.items()
+        ],
         "claims": [_claim_row(claim) for claim in reproduction.claims],
-        "unread": [(entry.statement, entry.where, entry.not_testable) for entry in reproduction.unread],
+        "not_published": [(entry.statement, entry.where) for entry in map(paper_entries().get, NOT_PUBLISHED) if entry],
+        "not_read": NOT_READ,
         "missed": [claim.id for claim in reproduction.missed],
         "overrides": reproduction.overrides,
         "step_observations": reproduction.step_observations,
@@ -182,16 +182,16 @@ def _claim_row(claim: Claim) -> dict[str, Any]:
         "statement": claim.statement,
         "source": claim.source,
         "paper": claim.published,
-        "own": claim.own,
-        "ours": quantity(claim.value, claim.unit),
-        "left_open": claim.open_range,
-        "open_by": claim.open_by,
+        "ours": claim.ours,
         "verdict": claim.verdict,
-        "word": claim.verdict_words,
+        "word": VERDICTS[claim.verdict],
         "symbol": _SYMBOLS[claim.verdict],
         "note": claim.note,
-        "is_assumed": claim.verdict == "reproduced_with_assumptions",
     }
+
+
+def _reading_texts(row: ReadingOfU) -> tuple[str, str, str]:
+    return f"{row.error:.0f} %", f"{row.gas:.0f} %", f"{row.error_within_reach:.0f} %"
 
 
 def _of_severity(findings: Sequence[Finding], severity: str) -> list[Finding]:
@@ -222,80 +222,42 @@ def _command(overrides: Sequence[str]) -> list[str]:
     return ["ppafo", "reproduce", "--out", "out/reproduce", *changed]
 
 
-_NAMES = {
-    "actuator.torque_constant": "torque per pressure difference",
-    "friction.static_torque": "static friction",
-    "friction.viscous_damping": "rotary damping",
-    "friction.dynamic_torque": "dynamic friction",
-    "valves.proportional.discharge_coefficient": "Cd of the proportional valve",
-    "valves.solenoid.discharge_coefficient": "Cd of the solenoid valves",
-    "actuator.leak.area": "area of the leak",
-}
-_STEP_CLAIMS = "step_rms_"
-
-
 def _synthetic(reproduction: Reproduction, figure: bytes | None) -> dict[str, Any]:
     """Return what the template needs of the synthetic measurements; without them only why there are none."""
     evidence = reproduction.synthetic
     if isinstance(evidence, NoEvidence):
         return {"synthetic": None, "no_synthetic": evidence.reason}
+    decay = evidence.decay
     printed = load_printed()
     return {
         "no_synthetic": "",
         "synthetic": {
             "figure": None if figure is None else inline_figure(figure),
-            "rows": [_value_row(printed, value) for value in evidence.bench.values],
-            "errors": [_error_row(claim) for claim in reproduction.claims if claim.id.startswith(_STEP_CLAIMS)],
-            "ideal": IDEAL,
-            "realistic": REALISTIC,
-            "step_preset": STEP_PRESET,
+            "preset": BENCH_PRESET,
             "task_preset": TASK_PRESET,
             "seed": RIG_SEED,
-            "delay": f"{1e3 * evidence.step.delay.correction:.1f} ms",
+            "slope": f"{-decay['friction.viscous_damping'].value / printed.in_si('foot_plate.inertia'):.1f}",
+            "reported_slope": f"{printed.number('reported.velocity_over_acceleration'):g}",
         },
     }
-
-
-def _value_row(printed: Printed, value: IdentifiedValue) -> tuple[str, str, str, str, str]:
-    """Return name, experiment, planted value and what both presets gave, in the paper's unit."""
-    return (
-        _NAMES[value.path],
-        value.experiment,
-        _number_text(printed, value.path, value.planted),
-        _estimate_text(printed, value.path, value.ideal),
-        _estimate_text(printed, value.path, value.realistic),
-    )
-
-
-def _number_text(printed: Printed, path: str, number: float) -> str:
-    return quantity(
-        printed.in_printed_unit(path, number), "-" if path.endswith("discharge_coefficient") else printed.unit(path), 4
-    )
-
-
-def _estimate_text(printed: Printed, path: str, estimate: Estimate) -> str:
-    """Return value and half the width of its interval in percent; the ends would not differ within four digits."""
-    half_width = 50.0 * (estimate.high - estimate.low) / abs(estimate.value)
-    return f"{_number_text(printed, path, estimate.value)} \u00b1 {half_width:.2g} %"
-
-
-def _error_row(claim: Claim) -> tuple[str, str, str, str]:
-    name = claim.statement.rpartition(" of the ")[2].rstrip(".")
-    return name, claim.published, quantity(claim.value, claim.unit, 2), claim.verdict_words
 
 
 DEVICE_FIGURE = "device"
 IDENTIFICATION_FIGURE = "figure-3-identification"
 STEP_FIGURE = "figure-7-step-response"
 TORQUE_FIGURE = "figure-8-torque-task"
-_HEAD = ("claim", "paper", "ours", "left open", "verdict")
+_HEAD = ("claim", "paper", "ours", "verdict")
 _PAPER = "'ppafo reproduce' without --study makes the page of these claims, with sources, figures and assumptions."
-_STUDIES_HEAD = ("study", "claim", "published", "ours", "left open", "verdict")
+_STUDIES_HEAD = ("study", "claim", "published", "ours", "verdict")
 _RULE = (
-    "'Ours' is computed anew whenever this is run. 'Reproduced' follows from printed numbers alone; 'with assumptions' "
-    "rests on values and experiments that the publication does not print; 'contradicted' lies outside what is listed "
-    "as agreeing; 'not testable' has no number of ours, for the reason in its note. 'Left open' is what readings of "
-    "the chambers' volumes give, or the printed digits of a pressure. Nothing here was measured."
+    "'Ours' is computed anew whenever this is run. "
+    + " ".join(f"{VERDICTS[verdict].capitalize()}: {meaning}." for verdict, meaning in MEANINGS.items())
+    + " Nothing here was measured."
+)
+NOTHING_CONFIRMED = "No experimental result is confirmed independently of fitted settings."
+NOT_READ = (
+    "Not read, and likely to settle what is open: the dissertations of K. A. Shorter (2011) and Y. Li (2013), the "
+    "journal article of 2012 in Mechatronics, the volume table of the maker of the vane."
 )
 
 
@@ -305,7 +267,7 @@ def answer_of(solved: Reproduction | Studies) -> Answer:
 
 
 def _studies_answer(solved: Studies) -> Answer:
-    """Return the table of studies; a contradicted claim of another publication is a result, no failure."""
+    """Return the table of studies; a claim of another publication that is not met is a result, no failure."""
     rows, claims, verdicts = _paper_part(solved.reproduction)
     for study in solved.studies:
         name = study.publication.name
@@ -315,7 +277,6 @@ def _studies_answer(solved: Studies) -> Answer:
                 item.claim.entry.id,
                 item.published or _own_sum(item.claim.entry.own),
                 item.ours,
-                item.open_range or None,
                 VERDICTS[item.verdict],
             )
             for item in study.claims
@@ -392,16 +353,27 @@ def _own_sum(own: str) -> str | None:
 
 
 def _paper_rows(reproduction: Reproduction) -> tuple[tuple[str | None, ...], ...]:
-    return tuple(
-        (
-            claim.id,
-            claim.published or _own_sum(claim.own),
-            None if claim.value is None else quantity(claim.value, claim.unit),
-            claim.open_range or None,
-            claim.verdict_words,
-        )
-        for claim in reproduction.claims
-    )
+    return tuple((claim.id, claim.published, claim.ours, VERDICTS[claim.verdict]) for claim in reproduction.claims)
+
+
+def _readings_table(rows: Sequence[ReadingOfU]) -> Section:
+    """Return what each meaning of U makes of the comparison."""
+    head = ("U is", "RMS error less by", "CO2 less by", f"error less by at {WITHIN_REACH:g} N m")
+    cells = tuple((row.name, *_reading_texts(row)) for row in rows)
+    return Section(table=Table(tuple(map(Column, head)), cells, left=1), remarks=("", *result_on_u(rows)))
+
+
+def result_on_u(rows: Sequence[ReadingOfU]) -> tuple[str, ...]:
+    """Return what the readings come to in one sentence, where they come to it."""
+    entries = paper_entries()
+    error, saving = entries["torque_rms_improvement"], entries["co2_saving"]
+    low, high, least = error.at_least or 0.0, error.at_most or 0.0, saving.at_least or 0.0
+    opening, *volts = rows
+    is_opening_alone = low <= opening.error <= high and not any(low <= row.error <= high for row in volts)
+    is_beyond_reach = not any(low <= row.error_within_reach <= high for row in rows)
+    if not (is_opening_alone and is_beyond_reach and all(row.gas >= least for row in rows)):
+        return ()
+    return ("15 % needs 'U is the opening' and a level beyond the supply's reach; the saving needs neither.",)
 
 
 def _paper_answer(reproduction: Reproduction) -> Answer:
@@ -415,22 +387,23 @@ def _paper_answer(reproduction: Reproduction) -> Answer:
         name="claims",
         kicker="Reproduction",
         title="The paper's claims",
-        lead=_override_remarks(reproduction.overrides),
+        lead=(NOTHING_CONFIRMED, *_override_remarks(reproduction.overrides)),
         sections=(
             Section(
                 table=table,
                 remarks=(
                     "",
                     count_sentence(reproduction.claims),
-                    *_left_open(reproduction),
                     *_missed_claims(reproduction),
                 ),
             ),
+            *((_readings_table(reproduction.readings_of_u),) if reproduction.readings_of_u else ()),
             *(Section(figure=figure, is_detail=True) for figure in _figures(reproduction)),
         ),
         data={
             "counts": verdict_counts(reproduction.claims),
             "claims": [claim.document() for claim in reproduction.claims],
+            "readings_of_u": [asdict(row) for row in reproduction.readings_of_u],
             "overrides": list(reproduction.overrides),
             "versions": dict(reproduction.step.versions),
         },
@@ -449,16 +422,6 @@ def _override_remarks(overrides: tuple[str, ...]) -> tuple[str, ...]:
     return (f"{words}; the verdicts compare it with the paper all the same",)
 
 
-def _left_open(reproduction: Reproduction) -> list[str]:
-    """Return what the column of ranges is, and what nothing tests."""
-    unread = [f"  {entry.id}: {entry.not_testable.rstrip('.')}" for entry in reproduction.unread]
-    return [
-        "left open: by the printed digits, or by an interval of the identification",
-        "stated, and tested by nothing here:",
-        *unread,
-    ]
-
-
 def _missed_claims(reproduction: Reproduction) -> list[str]:
     return [
         f"missed: {claim.id} is outside {claim.window[0]:g} to {claim.window[1]:g} {claim.unit}"
@@ -475,8 +438,8 @@ def _figures(reproduction: Reproduction) -> list[Figure]:
     ]
     evidence = reproduction.synthetic
     if not isinstance(evidence, NoEvidence):
-        bench = evidence.bench
-        figures.append(Figure(IDENTIFICATION_FIGURE, "", partial(synthetic_figure_3, bench.torque, bench.decay)))
+        figure = partial(synthetic_figure_3, evidence.torque, evidence.decay)
+        figures.append(Figure(IDENTIFICATION_FIGURE, "", figure))
     return figures
 
 
@@ -484,7 +447,7 @@ def _step_figure(reproduction: Reproduction) -> "Drawing":
     supply = reproduction.step.scenario.device.supply
     levels = Levels(supply.pressure, supply.atmospheric_pressure)
     evidence = reproduction.synthetic
-    measured = None if isinstance(evidence, NoEvidence) else evidence.step.measured
+    measured = None if isinstance(evidence, NoEvidence) else evidence.step
     return step_response_figure(reproduction.step.recording, levels, reproduction.step_events, measured)
 
 

@@ -1,7 +1,6 @@
 """A publication as a file of claims: what it states, where, what is assumed, and how our number is computed."""
 
 import math
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
@@ -15,11 +14,9 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.toml_text import label
 from ppafo.errors import ScenarioError, SimulationError, UnitError, nearest_name, refused_as
 from ppafo.parameters import load_device
-from ppafo.parameters.audit.evidence import digits
-from ppafo.parameters.chamber_volumes import PRINTED_VOLUMES, ChamberVolumes, readings
 from ppafo.parameters.publications.publication import FILE, PAPER, ClaimEntry, read_publication
 from ppafo.progress import Progress, Report
-from ppafo.questions.reproduce.claim import Verdict, range_text
+from ppafo.questions.reproduce.claim import Verdict
 from ppafo.questions.reproduce.event_times import WEARERS, rms_of, timed_events, uneven_course
 from ppafo.units import from_si, parse_quantity
 from ppafo.walking.loading import load_walk
@@ -27,8 +24,7 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult, integral_of_a_stride
 from ppafo.walking.walk import healthy_metrics, walk
 
-CHAMBERS = "chambers"
-"""Stands for the unit of an argument that names a reading of the chambers' volumes."""
+DEVICE = "ppafo2011"
 MINUTES = 0.5
 """A walk without noise repeats itself stride by stride, so that longer ones say the same."""
 PAIR, RECYCLING = "solenoid", "solenoid-recycling"
@@ -36,7 +32,6 @@ PAIR, RECYCLING = "solenoid", "solenoid-recycling"
 KEEPS_GAIT = "wearer.keeps_gait=1"
 """A nondisabled wearer: muscles keep the measured ankle."""
 Values = Mapping[str, str | float]
-_NUMBER_AND_UNIT = re.compile(r"([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,23 +44,14 @@ class Computation:
     compute: Callable[[Values], float]
 
 
-def chamber_names() -> tuple[str, ...]:
-    """Return the names of the readings of the chambers' volumes."""
-    return tuple(reading.name for reading in readings())
-
-
-def _chambers(values: Values) -> ChamberVolumes:
-    return next(reading for reading in readings() if reading.name == values["chambers"])
-
-
 def _pressure(values: Values) -> float:
     return float(values["pressure"])
 
 
 @lru_cache(maxsize=16)
-def _walked(name: str, chambers: ChamberVolumes, overrides: tuple[str, ...]) -> WalkResult:
-    """Return a shipped walk with some chambers; SimulationError where it does not reach its end with help."""
-    result = walk(load_walk(name, (*overrides, *chambers.overrides())), MINUTES)
+def _walked(name: str, overrides: tuple[str, ...]) -> WalkResult:
+    """Return a shipped walk; SimulationError where it does not reach its end with help."""
+    result = walk(load_walk(name, overrides), MINUTES)
     if not (result.status.is_completed and result.is_helped):
         raise SimulationError(f"{name}: {result.status.message}; the claims need a walk with help in most strides")
     return result
@@ -73,7 +59,7 @@ def _walked(name: str, chambers: ChamberVolumes, overrides: tuple[str, ...]) -> 
 
 def _nondisabled(name: str, values: Values) -> WalkResult:
     held = (f"valve.holding_time={values['holding_time']!r} s",) if name == RECYCLING else ()
-    return _walked(name, _chambers(values), (KEEPS_GAIT, *held))
+    return _walked(name, (KEEPS_GAIT, *held))
 
 
 def _work_of_a_stride(result: WalkResult) -> float:
@@ -83,7 +69,7 @@ def _work_of_a_stride(result: WalkResult) -> float:
 
 def held_torque(values: Values) -> float:
     """Torque [N m] that a gauge pressure holds at rest: torque constant times pressure. Equation (2)."""
-    constant = load_device(PRINTED_VOLUMES).actuator.torque_constant
+    constant = load_device(DEVICE).actuator.torque_constant
     return constant * (_pressure(values) - STANDARD_ATMOSPHERE)
 
 
@@ -94,15 +80,15 @@ def share_of_healthy_moment(values: Values) -> float:
     return held_torque(values) / (walk_of(configuration).wearer.body_mass * float(moment.max()))
 
 
-def swept_volume(values: Values) -> float:
-    """Volume per angle [m^3/rad] of a reading of the chambers."""
-    return _chambers(values).volume_per_angle
+def swept_volume(_values: Values) -> float:
+    """Volume per angle [m^3/rad] of the device."""
+    return load_device(DEVICE).actuator.volume_per_angle
 
 
 def walking_torque(values: Values) -> float:
     """Largest torque [N m] of the mean stride of the walk 'solenoid' at a supply pressure."""
     overrides = (f"supply.pressure={_pressure(values)!r} Pa_a",)
-    return float(_walked(PAIR, _chambers(values), overrides).averages["torque"].mean.max())
+    return float(_walked(PAIR, overrides).averages["torque"].mean.max())
 
 
 def dorsiflexor_share(values: Values) -> float:
@@ -123,34 +109,32 @@ def recycling_work(values: Values) -> float:
     return recycling / plain
 
 
-def event_reduction(wearer: str, values: Values) -> float:
+def event_reduction(wearer: str, _values: Values) -> float:
     """Share [-] by which state estimation lowers the error of event times of one wearer, against thresholds."""
     configuration = load_walk(PAIR, WEARERS[wearer])
-    chambers = _chambers(values).overrides()
     course = uneven_course(2.0 / walk_of(configuration).gait.stride_time)
     errors = []
     for timing in ("thresholds", "estimated"):
-        walked = load_walk(PAIR, (*WEARERS[wearer], f"timing.kind={timing}", *chambers))
+        walked = load_walk(PAIR, (*WEARERS[wearer], f"timing.kind={timing}"))
         walked = replace(walked, motion=replace(walk_of(walked), course=course))
         errors.append(rms_of([event.errors for event in timed_events(walked, 1.0).values()]))
     return 1.0 - errors[1] / errors[0]
 
 
-_OF_PRESSURE, _OF_CHAMBERS = {"pressure": "Pa_a"}, {"chambers": CHAMBERS}
-_OF_RECYCLING = _OF_CHAMBERS | {"holding_time": "s"}
+_OF_PRESSURE, _OF_RECYCLING = {"pressure": "Pa_a"}, {"holding_time": "s"}
 COMPUTATIONS: dict[str, Computation] = {
     "held_torque": Computation("torque constant times gauge pressure", "N m", _OF_PRESSURE, held_torque),
     "share_of_healthy_moment": Computation(
         "the same over the largest ankle moment of the built-in gait", "1", _OF_PRESSURE, share_of_healthy_moment
     ),
-    "swept_volume": Computation("volume per angle of the chambers", "m^3/rad", _OF_CHAMBERS, swept_volume),
+    "swept_volume": Computation("volume per angle of the chambers", "m^3/rad", {}, swept_volume),
     "walking_torque": Computation(
-        "largest torque of the mean stride of the walk 'solenoid'", "N m", _OF_PRESSURE | _OF_CHAMBERS, walking_torque
+        "largest torque of the mean stride of the walk 'solenoid'", "N m", _OF_PRESSURE, walking_torque
     ),
     "dorsiflexor_share": Computation(
         "moment of the dorsiflexors of a nondisabled wearer with the device over that without",
         "1",
-        _OF_CHAMBERS,
+        {},
         dorsiflexor_share,
     ),
     "recycling_saving": Computation(
@@ -168,13 +152,13 @@ COMPUTATIONS: dict[str, Computation] = {
     "healthy_event_reduction": Computation(
         "error of event times less with state estimation than with thresholds, nondisabled wearer, uneven strides",
         "1",
-        _OF_CHAMBERS,
+        {},
         partial(event_reduction, "healthy"),
     ),
     "impaired_event_reduction": Computation(
         "error of event times less with state estimation than with thresholds, drop foot, uneven strides",
         "1",
-        _OF_CHAMBERS,
+        {},
         partial(event_reduction, "impaired"),
     ),
 }
@@ -191,28 +175,9 @@ class PublishedClaim:
 
     def value(self) -> float | None:
         """Return our number in the unit of the claim, None where nothing is computed; SimulationError if it fails."""
-        return None if self.computation is None else self._computed(self.arguments)
-
-    def left_open(self) -> tuple[float, float] | None:
-        """Return the least and the largest number that the readings of the chambers leave open, or the printed digits.
-
-        None where nothing is computed, or its arguments leave nothing open.
-        """
-        units = {} if self.computation is None else self.computation.arguments
-        varied: list[dict[str, str | float]] = []
-        if CHAMBERS in units:
-            varied = [{**self.arguments, CHAMBERS: name} for name in chamber_names()]
-        elif "pressure" in units:
-            # The argument was read before: it starts with a number.
-            number, unit = _NUMBER_AND_UNIT.fullmatch(self.entry.arguments["pressure"].strip()).groups()  # type: ignore[union-attr]
-            ends = [parse_quantity(f"{end} {unit}", units["pressure"]) for end in digits(float(number))]
-            varied = [{**self.arguments, "pressure": end} for end in ends]
-        found = [self._computed(item) for item in varied]
-        return (min(found), max(found)) if found else None
-
-    def _computed(self, arguments: Mapping[str, str | float]) -> float:
-        assert self.computation is not None, "something is computed"
-        return from_si(self.computation.compute(arguments), self.entry.unit, self.computation.unit)
+        if self.computation is None:
+            return None
+        return from_si(self.computation.compute(self.arguments), self.entry.unit, self.computation.unit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,12 +240,6 @@ def _arguments(entry: ClaimEntry, computation: Computation, place: str) -> dict[
 
 
 def _argument(text: str, unit: str, place: str) -> str | float:
-    if unit == CHAMBERS:
-        if text not in chamber_names():
-            hint = nearest_name(text, chamber_names())
-            known = "; ".join(chamber_names())
-            raise ScenarioError(f"{place}: there are no chambers '{text}'{hint}; available: {known}")
-        return text
     with refused_as(ScenarioError, place, UnitError):
         value = parse_quantity(text, unit)
     # An absolute pressure and a time: neither lies below 0.
@@ -304,15 +263,11 @@ def published_text(entry: ClaimEntry) -> str:
 
 @dataclass(frozen=True, slots=True)
 class JudgedClaim:
-    """A claim of a publication with our number in its unit, None where nothing is computed, and the verdict.
-
-    ``left_open`` are the ends of what readings of the chambers, or the printed digits of a pressure, leave open.
-    """
+    """A claim of a publication with our number in its unit, None where nothing is computed, and the verdict."""
 
     claim: PublishedClaim
     value: float | None
     verdict: Verdict
-    left_open: tuple[float, float] | None = None
 
     @property
     def published(self) -> str:
@@ -324,11 +279,6 @@ class JudgedClaim:
     def ours(self) -> str:
         """Our number as it is shown."""
         return quantity(self.value, self.claim.entry.unit or "-", 3)
-
-    @property
-    def open_range(self) -> str:
-        """What is left open of our number, as it is shown."""
-        return range_text(self.left_open, self.claim.entry.unit)
 
     @property
     def note(self) -> str:
@@ -347,12 +297,10 @@ class JudgedClaim:
             "direction": entry.direction,
             "own": entry.own,
             "value": self.value,
-            "left_open": None if self.left_open is None else list(self.left_open),
             "unit": entry.unit,
             "agrees_from": entry.at_least,
             "agrees_to": entry.at_most,
             "verdict": self.verdict,
-            "synthetic": False,
             "computation": entry.computation,
             "arguments": dict(entry.arguments),
             "assumptions": list(entry.assumed),
@@ -403,8 +351,10 @@ def judge(claim: PublishedClaim) -> JudgedClaim:
         return JudgedClaim(claim, None, "not_testable")
     low = entry.at_least is None or value >= entry.at_least
     high = entry.at_most is None or value <= entry.at_most
-    held: Verdict = "reproduced_with_assumptions" if entry.assumed else "reproduced"
-    return JudgedClaim(claim, value, held if low and high else "contradicted", claim.left_open())
+    # A model with assumptions that does not agree is no evidence against what was measured.
+    holds: Verdict = "plausible" if entry.assumed else "consistent"
+    parts: Verdict = "undetermined" if entry.assumed else "inconsistent_as_reported"
+    return JudgedClaim(claim, value, holds if low and high else parts)
 
 
 def _run(publication: Publication, report: Report) -> Study:

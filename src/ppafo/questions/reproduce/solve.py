@@ -9,16 +9,17 @@ from ppafo.parameters.audit import audit
 from ppafo.parameters.overrides import override_set
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.reproduce.answer import PROPORTIONAL, SOLENOID, STEP, Reproduction, Studies
-from ppafo.questions.reproduce.bench import (
-    assumed_values,
-    measured_claims,
-    synthetic_evidence,
-    values_used_by,
-)
-from ppafo.questions.reproduce.claim import arithmetic_claims, load_printed
+from ppafo.questions.reproduce.bench import assumed_values, synthetic_evidence, values_used_by
+from ppafo.questions.reproduce.claim import arithmetic_claims, load_printed, not_published_claim, told_claim
 from ppafo.questions.reproduce.publication import ALL, SEED, check_study, run_studies
 from ppafo.questions.reproduce.step_response import Levels, step_events, step_observations
-from ppafo.questions.reproduce.torque_task import control_claims, torque_task_claims, torque_task_observations
+from ppafo.questions.reproduce.torque_task import (
+    control_claims,
+    phased_runs,
+    readings_of_u,
+    torque_task_claims,
+    torque_task_observations,
+)
 from ppafo.simulation.declaration import value_at
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.overrides import apply_overrides, chosen_by, is_of_device, scenario_paths, unknown_value
@@ -28,36 +29,24 @@ from ppafo.simulation.simulate import Result, simulate
 EXPERIMENTS = (STEP, SOLENOID, PROPORTIONAL)
 """Shipped scenarios that stand for the paper's experiments."""
 ORDER = (
-    "c1",
-    "c2",
-    "critical_pressure_ratio",
-    "k_actuator",
-    "static_friction",
-    "rotary_damping",
-    "dynamic_friction",
-    "discharge_coefficient_solenoid",
-    "discharge_coefficient_proportional",
-    "leak_area",
-    "step_rms_position",
-    "step_rms_pressure_1",
-    "step_rms_pressure_2",
-    "step_rms_pressure_difference",
-    "step_percent_position",
-    "step_percent_pressure_1",
-    "step_percent_pressure_2",
-    "step_percent_pressure_difference",
-    "step_error_correlation",
+    "orifice_constants",
+    "step_percentages",
+    "damping_and_friction",
+    "discharge_coefficient",
+    "swept_volume",
+    "figure_7_words",
     "torque_rms_improvement",
     "co2_solenoid",
     "co2_proportional",
     "co2_saving",
+    "oscillation_words",
+    "limited_by_switching",
     "gains_minimise_error",
     "dead_zone_amplifies_delay",
-    "limited_by_switching",
     "beyond_improved_control",
-    "large_and_heavy",
+    "not_published",
 )
-"""Every claim, in the order of the paper."""
+"""Every claim: what the reported numbers decide, what is simulated, what is left."""
 
 
 @overload
@@ -84,7 +73,7 @@ def reproduce(
     """Run the paper's experiments with the shipped scenarios and judge every claim, or those of other publications.
 
     ``overrides`` change the experiments (not the paper's printed numbers): a path of a scenario reaches those that
-    have it, a path of the device all of them. The virtual rig stands in for the paper's measurements, where it can.
+    have it, a path of the device all of them. The figures have synthetic measurements of the virtual rig, where it can.
     ``progress`` hears what is being done; ``study`` is a publication, by name or by its file, or ``all``.
     SimulationError where a run diverges, ScenarioError for a study that is none.
     """
@@ -105,23 +94,41 @@ def _reproduce_paper(overrides: Sequence[str], report: Report) -> Reproduction:
     # The rig records with the overrides of the simulations.
     meant = {name: scenario.origin.overrides for name, scenario in scenarios.items()}
     tasks = {"solenoid": meant[SOLENOID], "proportional": meant[PROPORTIONAL]}
-    synthetic = synthetic_evidence(scenarios[STEP], tasks, meant[STEP])
+    synthetic = synthetic_evidence(tasks, meant[STEP])
     report(Progress("checking the paper's own numbers"))
     printed = load_printed()
     completed = load_parameter_set(step.scenario.origin.parameter_set)
     assumed = assumed_values(scenarios)
-    claims = [
-        *arithmetic_claims(printed),
-        *measured_claims(printed, synthetic, values_used_by(assumed, STEP)),
-        *torque_task_claims(solenoid, proportional, values_used_by(assumed, SOLENOID, PROPORTIONAL)),
-        *control_claims(solenoid, proportional),
-    ]
+    of_step, of_task = values_used_by(assumed, STEP), values_used_by(assumed, SOLENOID, PROPORTIONAL)
     events, supply = step_events(step.recording), step.scenario.device.supply
     levels = Levels(supply.pressure, supply.atmospheric_pressure)
+    step_told = tuple(step_observations(step.recording, levels, events))
+    torque_told = tuple(torque_task_observations(solenoid, proportional))
+    report(Progress(f"simulating {SOLENOID} over the phase of its decisions"))
+    phased = phased_runs(solenoid)
+    claims = [
+        *arithmetic_claims(printed),
+        told_claim(
+            "figure_7_words",
+            "What the text tells of the pressures and the angle of the step response.",
+            step_told,
+            tuple(value.sentence() for value in of_step),
+        ),
+        *torque_task_claims(phased, proportional, of_task),
+        told_claim(
+            "oscillation_words",
+            "What the text tells of the oscillation with both valves.",
+            torque_told,
+            tuple(value.sentence() for value in of_task),
+        ),
+        *control_claims(solenoid, proportional, phased),
+        not_published_claim(),
+    ]
     return Reproduction(
         claims=tuple(sorted(claims, key=lambda claim: ORDER.index(claim.id))),
-        step_observations=tuple(step_observations(step.recording, levels, events)),
-        torque_observations=tuple(torque_task_observations(solenoid, proportional)),
+        step_observations=step_told,
+        torque_observations=torque_told,
+        readings_of_u=readings_of_u(solenoid, proportional),
         step=step,
         step_events=events,
         solenoid=solenoid,

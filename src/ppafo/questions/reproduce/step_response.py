@@ -25,6 +25,10 @@ _NOTABLE_TIME = 2.0e-3
 """Fractions of the pressure range: a change has to be clear, a level reached or kept may be off by the second."""
 _SLOWED = 0.5
 """The fall has slowed where its rate is at most this fraction of the steepest before and after."""
+_LARGEST_RISE = 1.0 * PASCALS_PER_PSI
+"""A fall that slows may turn into a rise of this much [Pa]; the text tells of none."""
+_SETS_OFF = 0.02
+"""Pressure 1 peaks before the vane has gone this fraction of its travel: it still fills while the vane sets off."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +112,18 @@ class _Step:
     def at_stop(self, name: str) -> Floats:
         return self.recording[name][self.events.stop :]
 
+    def peak_and_lowest(self) -> tuple[int, int]:
+        """Samples at which pressure 1 peaks while the vane sets off, and is lowest from there to the stop."""
+        pressure, angle = self.recording["pressure_1"], self.recording["angle"]
+        gone = np.abs(angle - angle[0]) > _SETS_OFF * np.abs(angle[-1] - angle[0])
+        peak = int(np.argmax(pressure[: int(np.argmax(gone)) + 1]))
+        return peak, peak + int(np.argmin(pressure[peak : self.events.stop + 1]))
+
+    def largest_rise(self, name: str) -> float:
+        """Largest rise above an earlier value, while the vane moves."""
+        moving = self.moving(name)
+        return float(np.max(moving - np.minimum.accumulate(moving)))
+
     def is_same(self, pressure: float, other: float) -> bool:
         return bool(abs(pressure - other) < _SAME * self.levels.range)
 
@@ -129,17 +145,23 @@ def _fills_early(step: _Step) -> str:
     )
 
 
-def _rises_again(step: _Step) -> str:
-    moving = step.moving("pressure_1")
-    rise = float(moving[-1] - np.min(moving))
-    if rise < _SAME * step.levels.range:
-        return ""
-    return f"it rises again by {rise / PASCALS_PER_PSI:.1f} psi before the stop"
+def _rises_in_motion(step: _Step) -> str:
+    """The text has pressure 1 fall from breakaway to the stop."""
+    pressure, (peak, lowest) = step.recording["pressure_1"], step.peak_and_lowest()
+    late = float(pressure[peak] - pressure[step.events.breakaway])
+    again = float(pressure[step.events.stop] - pressure[lowest])
+    said = []
+    if late >= _SAME * step.levels.range:
+        said.append(
+            f"from breakaway it goes on rising by {late / PASCALS_PER_PSI:.1f} psi, until {step.milliseconds(peak)}"
+        )
+    if again >= _SAME * step.levels.range:
+        said.append(f"it rises again by {again / PASCALS_PER_PSI:.1f} psi before the stop")
+    return ", and ".join(said)
 
 
 def _more_than_slows(step: _Step) -> str:
-    moving = step.moving("pressure_2")
-    rise = float(np.max(moving - np.minimum.accumulate(moving)))
+    rise = step.largest_rise("pressure_2")
     if rise < _SAME * step.levels.range:
         return ""
     return f"it does more than slow: it rises by {rise / PASCALS_PER_PSI:.1f} psi"
@@ -165,11 +187,10 @@ def _rises(step: _Step) -> tuple[bool, str]:
 
 
 def _falls_in_motion(step: _Step) -> tuple[bool, str]:
-    moving = step.moving("pressure_1")
-    lowest = int(np.argmin(moving))
-    holds = moving[0] - moving[lowest] > _CLEAR * step.levels.range
-    at = step.milliseconds(step.events.breakaway + lowest)
-    return bool(holds), f"from {step.gauge(moving[0])} psig down to {step.gauge(moving[lowest])} psig at {at}"
+    pressure, (peak, lowest) = step.recording["pressure_1"], step.peak_and_lowest()
+    first, last = float(pressure[peak]), float(pressure[lowest])
+    holds = first - last > _CLEAR * step.levels.range
+    return holds, f"from {step.gauge(first)} psig down to {step.gauge(last)} psig at {step.milliseconds(lowest)}"
 
 
 def _to_supply(step: _Step) -> tuple[bool, str]:
@@ -188,12 +209,15 @@ def _falls(step: _Step) -> tuple[bool, str]:
 
 
 def _slows(step: _Step) -> tuple[bool, str]:
-    """The slowest fall in motion lies between two steeper ones; gas that only vents would fall ever more slowly."""
+    """The slowest fall in motion lies between two steeper ones; gas that only vents would fall ever more slowly.
+
+    Gas that is compressed far above what it was does not slow its fall: it rises.
+    """
     rate = -np.diff(step.recording["pressure_2"]) / np.diff(step.recording.time)
     start, end = step.events.breakaway, step.events.stop
     slowest = start + int(np.argmin(rate[start:end]))
     before, after = float(np.max(rate[: slowest + 1])), float(np.max(rate[slowest:]))
-    holds = rate[slowest] <= _SLOWED * min(before, after)
+    holds = rate[slowest] <= _SLOWED * min(before, after) and step.largest_rise("pressure_2") <= _LARGEST_RISE
     first, least, last = (value / (1e3 * PASCALS_PER_PSI) for value in (before, rate[slowest], after))
     at = step.milliseconds(slowest)
     slowed = f"rises by {-least:.2f} psi/ms" if least < 0.0 else f"falls by {least:.2f} psi/ms"
@@ -220,7 +244,7 @@ _Judge = Callable[[_Step], tuple[bool, str]]
 _SAID: tuple[tuple[str, _Judge, Callable[[_Step], str] | None], ...] = (
     ("vane_turns_through_its_range", _turns, None),
     ("pressure_1_rises_until_breakaway", _rises, _fills_early),
-    ("pressure_1_falls_in_motion", _falls_in_motion, _rises_again),
+    ("pressure_1_falls_in_motion", _falls_in_motion, _rises_in_motion),
     ("pressure_1_goes_to_supply", _to_supply, None),
     ("pressure_2_falls_from_supply", _falls, None),
     ("pressure_2_slows_in_motion", _slows, _more_than_slows),

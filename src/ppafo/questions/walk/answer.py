@@ -17,6 +17,7 @@ from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.endurance.draw import FORMAT
 from ppafo.questions.question import Solved
 from ppafo.questions.walk.course import (
+    WOULD_DRAG,
     bottle_data,
     bottle_files,
     bottle_remark,
@@ -30,15 +31,6 @@ from ppafo.questions.walk.course import (
 from ppafo.questions.walk.document import versions, walk_data, walk_document
 from ppafo.questions.walk.reacting import reacting_answer
 from ppafo.questions.walk.safety import over_time_sections, safety_remarks
-from ppafo.questions.walk.volumes import (
-    VolumeReading,
-    volumes_data,
-    volumes_sections,
-    walks_by_volume,
-    wearers_by_volume,
-    wearers_volumes_data,
-    wearers_volumes_sections,
-)
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import UNITS, Scenario, plain
 from ppafo.storage.comma_separated import marked_csv_bytes
@@ -52,7 +44,17 @@ from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
 from ppafo.walking.planning import law_of
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES
-from ppafo.walking.walk import OUTCOMES, SHOWN, TRAITS, Comparison, Number, Population, compare_walks, population_figure
+from ppafo.walking.walk import (
+    OUTCOMES,
+    SHOWN,
+    TRAITS,
+    Comparison,
+    Number,
+    Population,
+    compare_walks,
+    population_figure,
+    walk_population,
+)
 from ppafo.walking.wearer import CORRELATION, MASS_VARIATION, MAXIMUM_DEVIATIONS, STATURE_VARIATION
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -64,7 +66,7 @@ _WEARERS_CAPTION = (
 )
 
 
-def wearers_answer(population: Population, volumes: Mapping[str, Population]) -> Answer:
+def wearers_answer(population: Population) -> Answer:
     """Return the answer of many wearers; no figure where every walk diverged."""
     configuration = population.scenario
     tables = {**population.outcomes, **population.traits}
@@ -91,10 +93,9 @@ def wearers_answer(population: Population, volumes: Mapping[str, Population]) ->
         lead=(f"{configuration.name}: {population.count} wearers, {population.minutes:.3g} min each",),
         sections=(
             Section(table=Table(head, tuple(rows)), remarks=tuple(remarks)),
-            *wearers_volumes_sections(volumes),
             *((Section("The wearers", figure=figure, is_detail=True),) if population.count else ()),
         ),
-        data=_wearers_data(population) | {"volumes": wearers_volumes_data(volumes)},
+        data=_wearers_data(population),
         passed=not population.diverged,
         files={"wearers.csv": lambda: wearers_csv(population)},
         command="walk",
@@ -160,21 +161,16 @@ def _values(values: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class WalkPair(Solved):
-    """A walk with the device and without it.
-
-    ``volumes`` has the walk and the same with the other readings of the paper's chambers; none for chambers of its own.
-    """
+    """A walk with the device and without it."""
 
     comparison: Comparison
-    volumes: tuple[VolumeReading, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Wearers(Solved):
-    """What many wearers get; ``volumes`` is the same for fewer of them with other readings of the paper's chambers."""
+    """What many wearers get."""
 
     population: Population
-    volumes: Mapping[str, Population]
 
 
 SCHEMA_VERSION = 1
@@ -184,9 +180,9 @@ _ROWS = (
     ("body_mass", "Body mass of the wearer", "mass", 1),
     ("gas", "Gas per stride", "gas mass", 3),
     ("total_gas", "Gas of the whole walk", "gas mass", 2),
-    ("push_off_work", "Work on the wearer in push-off", "energy", 2),
+    ("positive_push_off_work", "Positive work on the wearer in push-off", "energy", 2),
     ("push_off_share", "... of the healthy ankle's positive work", "fraction", 1),
-    ("slap_rate", "Rate of the foot as it comes down", "angular velocity", 0),
+    ("net_push_off_work", "Net work on the wearer in push-off", "energy", 2),
     ("lowest_toes", "Lowest toes over the ground in mid-swing", "body length", 1),
     ("toe_landing", "Strides that begin on the toes", "fraction", 0),
     ("dorsiflexor_moment", "Moment of the wearer's dorsiflexors, mean", "torque", 2),
@@ -194,11 +190,10 @@ _ROWS = (
     ("counted_strides", "Strides with these means", "", 0),
 )
 """Metric, title, kind of quantity and digits behind the point of each row."""
-_SAME_RATE = 0.1
-"""Rates of a foot [rad/s] that differ by less are alike."""
 _EXPLAINED = (
-    "'Without' is the same wearer with the same device and both chambers vented. 'Healthy' is the gait itself. The "
-    "first two strides, in which the controller learns the stride time, are left out, and so is one that has begun "
+    "'Without' is the same wearer without a device: no plate, torque or friction, and the ankle's own range of motion. "
+    "'Healthy' is the gait itself. The swing has no ground: of toes that reach it only that they would drag is known. "
+    "The first two strides, in which the controller learns the stride time, are left out, and so is one that has begun "
     "when the walk ends. The device is on one leg, so a "
     "stride is one step of that leg. A stride with less help (lifted only, paused or stopped) is not in 'with' but in "
     "'less help', where there is one."
@@ -222,7 +217,7 @@ def answer_of(solved: WalkPair | Wearers) -> Answer:
     """Return the answer of one wearer's walks, or of many wearers."""
     if isinstance(solved, WalkPair) and walk_of(solved.comparison.with_device.scenario).reacts is not None:
         return reacting_answer(solved.comparison)
-    return wearers_answer(solved.population, solved.volumes) if isinstance(solved, Wearers) else _pair_answer(solved)
+    return wearers_answer(solved.population) if isinstance(solved, Wearers) else _pair_answer(solved)
 
 
 def _pair_answer(pair: WalkPair) -> Answer:
@@ -235,7 +230,6 @@ def _pair_answer(pair: WalkPair) -> Answer:
         *person_remarks(configuration),
         _bottle(pair),
         *safety_remarks(worn),
-        _slap(comparison),
         trust_remark(configuration),
     ]
     remarks += [f"{item.scenario.name}: {item.status.message}" for item in (worn, bare) if not item.status.is_completed]
@@ -249,13 +243,12 @@ def _pair_answer(pair: WalkPair) -> Answer:
             *course_sections(comparison),
             Section(table=comparison_table(comparison), remarks=tuple(text for text in remarks if text)),
             *bottle_sections(worn),
-            *volumes_sections(pair.volumes),
             Section("How to read it", (_EXPLAINED, _LIMITS), is_detail=True),
             *(over_time_sections(worn) if walked.course is None else ()),
             *(course_pictures(comparison) if walked.course is not None else _pictures(comparison)),
             *_assumptions_section({item.path: item.note for item in configuration.assumptions}),
         ),
-        data=_data(comparison) | {"volumes": volumes_data(pair.volumes)},
+        data=_data(comparison),
         passed=comparison.is_completed and worn.is_helped,
         files={
             "recording.nc": lambda: netcdf_bytes(worn.recording, None),
@@ -268,7 +261,7 @@ def _pair_answer(pair: WalkPair) -> Answer:
             **course_files(comparison),
             **bottle_files(worn),
         },
-        live=lambda: live_part([configuration, bare.scenario]),
+        live=lambda: live_part([configuration]),
     )
 
 
@@ -290,7 +283,7 @@ def comparison_table(comparison: Comparison) -> Table:
     Strides with less help have a column of their own, where there are any.
     """
     healthy = dict(comparison.healthy)
-    if "push_off_work" in healthy:
+    if "positive_push_off_work" in healthy:
         healthy["push_off_share"] = Metric(1.0, "-", "")
     worn, bare = comparison.with_device, comparison.without_device
     person = {"body_mass": Metric(walk_of(worn.scenario).wearer.body_mass, "kg", "who walks")}
@@ -301,7 +294,11 @@ def comparison_table(comparison: Comparison) -> Table:
         (
             title_with_unit(title, quantity),
             *(
-                None if one is None else rounded_text(one.value, quantity, digits)
+                None
+                if one is None
+                else WOULD_DRAG
+                if name == "lowest_toes" and one.value < 0.0
+                else rounded_text(one.value, quantity, digits)
                 for one in (metrics.get(name) for metrics in columns)
             ),
         )
@@ -309,14 +306,6 @@ def comparison_table(comparison: Comparison) -> Table:
         if any(name in metrics for metrics in columns)
     ]
     return Table(tuple(map(Column, head)), tuple(rows))
-
-
-def _slap(comparison: Comparison) -> str:
-    """Return what is to be known of a slap that is worse with the device, "" where it is not."""
-    worn, bare = (side.metrics.get("slap_rate") for side in (comparison.with_device, comparison.without_device))
-    if worn is None or bare is None or worn.value > bare.value - _SAME_RATE:
-        return ""
-    return "remark: the foot comes down faster than without the device: it is lifted, and falls further"
 
 
 def _along(configuration: Scenario) -> str:
@@ -351,7 +340,7 @@ def _bottle(pair: WalkPair) -> str:
     """Return how long the bottle of the walk lasts and what ended it, or how to see that; empty without gas."""
     worn = pair.comparison.with_device
     if worn.supply is not None:
-        return bottle_remark(worn, [one.on_bottle for one in pair.volumes[1:]])
+        return bottle_remark(worn)
     gas = worn.metrics.get("gas")
     if gas is None or gas.value <= 0.0:
         return ""
@@ -408,7 +397,7 @@ def walk_with_and_without(
     overrides: Sequence[str] = (),
     progress: Report | None = None,
 ) -> WalkPair | Wearers:
-    """Walk with the device, with it switched off, and beside the healthy gait; or let many wearers walk with it.
+    """Walk with the device, without it, and beside the healthy gait; or let many wearers walk with it.
 
     ``configuration`` is a walk file, its name or a loaded one; ``minutes`` the length of the walk [min], one or
     that of its course unless given; ``gait``, ``course`` and ``bottle`` stand in place of those of the configuration;
@@ -421,10 +410,8 @@ def walk_with_and_without(
     report = progress or report_nothing
     if wearers is not None:
         advance = _reporter(report, "walking", "wearers", 0.0)
-        return Wearers(*wearers_by_volume(chosen, minutes, wearers, seed, advance))
-    comparison = compare_walks(chosen, minutes, _reporter(report, "walking", "min", _LONG))
-    reads = walk_of(chosen).reacts is None
-    return WalkPair(comparison, walks_by_volume(comparison.with_device, minutes) if reads else ())
+        return Wearers(walk_population(chosen, minutes, wearers, seed, advance))
+    return WalkPair(compare_walks(chosen, minutes, _reporter(report, "walking", "min", _LONG)))
 
 
 def list_files() -> list[dict[str, Any]]:

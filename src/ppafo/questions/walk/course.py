@@ -1,6 +1,6 @@
 """What a walk on a course or on its bottle adds to the answer: tables, remarks, data, files, pictures."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import asdict, fields
 from typing import Any
 
@@ -13,7 +13,7 @@ from ppafo.gait.gait import speed_range
 from ppafo.questions.endurance.answer import strides_text
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
-from ppafo.walking.bottle import SupplyCourse, lasted, lasting_text
+from ppafo.walking.bottle import SupplyCourse, lasted, minutes_text
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.over_time import bottle_figure, course_figure, peak_torques
 from ppafo.walking.motion import walk_of
@@ -48,13 +48,12 @@ def bottle_sections(worn: WalkResult) -> tuple[Section, ...]:
     )
 
 
-def bottle_remark(worn: WalkResult, others: Sequence[SupplyCourse | None]) -> str:
-    """Return what ended a walk on its bottle, and when; ``others`` are bottles with other readings of its chambers."""
+def bottle_remark(worn: WalkResult) -> str:
+    """Return what ended a walk on its bottle, and when."""
     supply = worn.supply
     assert supply is not None, "said of a walk on a bottle"
     time = lasted(supply)
-    times = [None if other is None else lasted(other) for other in others]
-    ended = "" if time is None else f"lasts {lasting_text(time, times)}: "
+    ended = "" if time is None else f"lasts {minutes_text(time)}: "
     return f"bottle {supply.supply.bottle.name}: {ended}{supply.ending.message}"
 
 
@@ -135,15 +134,14 @@ _HEAD = (
     Column("push, heel loaded (N m)"),
     Column("less help at (s)"),
 )
+WOULD_DRAG = "would drag"
+"""What is said of toes that would be in the ground."""
 _WHOLE, _PART = "whole course", "as far as walked"
-_COURSE = (
-    "The course over time. Grey: every other segment. 'Without' is the same course with the same device and both "
-    "chambers vented."
-)
+_COURSE = "The course over time. Grey: every other segment. 'Without' is the same course without a device."
 _EXPLAINED = (
     "A stride counts for the segment in which its foot strikes; it is helped where the controller neither lifts only "
-    "nor pauses nor has stopped before the next strike. Work is that on the wearer while the foot rolls over the toes. "
-    "Lowest toes are over the ground, in the middle part of a swing. A push with the heel loaded is torque in "
+    "nor pauses nor has stopped before the next strike. Work is net work on the wearer while the foot rolls over the "
+    "toes. Lowest toes are over the ground, in the middle part of a swing. A push with the heel loaded is torque in "
     "plantarflexion while the heel carries more than a tenth of the body weight.",
     "Angles go with the length of the stride, which goes with the square root of the speed, as the strides per second "
     "do: a constant walk ratio. Standing is a vertical shank over a flat foot. The forces of a stride and the fraction "
@@ -182,9 +180,9 @@ def _row(segment: SegmentResult, bare: SegmentResult | None) -> tuple[str | None
         f"{segment.strides}",
         f"{segment.helped}",
         _text(segment.gas, "gas mass", 2),
-        _text(segment.push_off_work, "energy", 1),
-        _text(segment.lowest_toes, "body length", 1),
-        _text(None if bare is None else bare.lowest_toes, "body length", 1),
+        _text(segment.net_push_off_work, "energy", 1),
+        _toes(segment.lowest_toes),
+        _toes(None if bare is None else bare.lowest_toes),
         _text(segment.flat_push, "torque", 1),
         _text(segment.safe_time, "time", 2),
     )
@@ -203,11 +201,16 @@ def _whole(comparison: Comparison) -> tuple[str | None, ...]:
         f"{sum(segment.helped for segment in worn.segments)}",
         _text(numbers["course_gas"], "gas mass", 2),
         _text(numbers["course_work"], "energy", 1),
-        _text(numbers.get("course_lowest_toes"), "body length", 1),
-        _text(None if toes is None else toes.value, "body length", 1),
+        _toes(numbers.get("course_lowest_toes")),
+        _toes(None if toes is None else toes.value),
         _text(numbers["course_flat_push"], "torque", 1),
         _text(numbers.get("safe_state_time"), "time", 2),
     )
+
+
+def _toes(height: float | None) -> str | None:
+    """Return how high the toes are [cm]; of toes below the ground only that they would drag."""
+    return WOULD_DRAG if height is not None and height < 0.0 else _text(height, "body length", 1)
 
 
 def _text(value: float | None, quantity: str, digits: int) -> str | None:
@@ -247,7 +250,7 @@ _UNITS = {
     "strides": "-",
     "helped": "-",
     "gas": "kg",
-    "push_off_work": "J",
+    "net_push_off_work": "J",
     "lowest_toes": "m",
     "flat_push": "N m",
     "safe_time": "s",

@@ -36,12 +36,12 @@ ROWS = (
     ("stride_time", "Time of a stride", "time", 3),
     ("lowest_toes", "Lowest toes over the ground in mid-swing, mean", "body length", 1),
     ("toe_landing", "Strides that begin on the toes", "fraction", 0),
-    ("slap_rate", "Rate of the foot as it comes down", "angular velocity", 0),
     ("muscle_work", "Work of all muscles in one stride", "energy", 1),
     ("muscle_power", "Power of all muscles", "power", 1),
     ("metabolic_power_umberger", "Metabolic rate of all muscles, Umberger 2010", "power", 0),
     ("metabolic_power_bhargava", "Metabolic rate of all muscles, Bhargava 2004", "power", 0),
-    ("push_off_work", "Work of the device in push-off", "energy", 2),
+    ("positive_push_off_work", "Positive work of the device in push-off", "energy", 2),
+    ("net_push_off_work", "Net work of the device in push-off", "energy", 2),
     ("gas", "Gas per stride", "gas mass", 3),
     ("total_gas", "Gas of the whole walk", "gas mass", 2),
     ("counted_strides", "Strides with help, of gas and push-off", "", 0),
@@ -50,8 +50,8 @@ ROWS = (
 
 _EXPLAINED = (
     "'Device off' is the same wearer with the same device and both chambers vented: it still rubs and has inertia. The "
-    "first two strides are left out of the means, and those of gas, push-off and how the foot comes down also leave "
-    "out strides with less help. The device is on the left leg, and a stride is one step of that leg."
+    "first two strides are left out of the means, and those of gas and push-off also leave out strides with less help. "
+    "The device is on the left leg, and a stride is one step of that leg."
 )
 
 _EFFORT = (
@@ -98,7 +98,7 @@ def reacting_answer(comparison: Comparison) -> Answer:
     scenario = worn.scenario
     wearer = wearer_of_walk(scenario)
     remarks = [*person_remarks(scenario), *weak_remarks(wearer), *fall_remarks(comparison)]
-    remarks += [] if worn.supply is None else [bottle_remark(worn, [])]
+    remarks += [] if worn.supply is None else [bottle_remark(worn)]
     remarks += safety_remarks(worn)
     stays = worn.metrics["stays_up"].value > 0.5
     strides = f"{worn.metrics['strides'].value:.0f} strides"

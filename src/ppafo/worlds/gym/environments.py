@@ -31,8 +31,6 @@ from ppafo.worlds.gym.episodes import (
 from ppafo.worlds.gym.pictures import picture
 from ppafo.worlds.gym.tasks import BAR, LONGEST_SINCE, TASKS, Task
 
-CONSISTENT = "device.set=ppafo2011-consistent"
-"""The shipped set that has intervals."""
 FLAWED_SENSORS = (
     "sensors.delay=3 ms",
     "sensors.angle_noise=0.2 deg",
@@ -53,10 +51,10 @@ FLAWED_WALK_SENSORS = (
 )
 """Late from the beginning, which is a fault with a delay and nothing else."""
 DEFAULTS: Mapping[str, tuple[str, tuple[str, ...]]] = {
-    "torque": ("torque-task-proportional", (CONSISTENT, *FLAWED_SENSORS)),
+    "torque": ("torque-task-proportional", FLAWED_SENSORS),
     "angle": (
         "step-response",
-        ("motion.kind=free", CONSISTENT, "controller.rate=1 kHz", "run.duration=1 s", *FLAWED_SENSORS),
+        ("motion.kind=free", "controller.rate=1 kHz", "run.duration=1 s", *FLAWED_SENSORS),
     ),
     "walk": ("proportional", FLAWED_WALK_SENSORS),
 }

@@ -22,7 +22,7 @@ BEGINS = 3
 
 SHARES = (0.0, 0.06, 0.40, 0.46, 0.63, 0.80, 1.0)
 ANKLE = (1.50, 1.75, 1.35, 1.33, 1.92, 1.50, 1.50)
-"""Ankle angle [rad] at times after a strike [s]: it slaps, rolls over the foot, pushes and is lifted."""
+"""Ankle angle [rad] at times after a strike [s]: it falls flat, rolls over the foot, pushes and is lifted."""
 
 
 def forces(time: float, toes: float = 0.06) -> tuple[float, float]:
@@ -81,7 +81,7 @@ def test_a_foot_that_is_still_lifted_when_it_strikes_is_no_sign() -> None:
     assert watched([0.0] * 7, turning_up)[-1].ventings == 0.0
 
 
-def test_a_foot_that_slaps_after_it_was_lifted_through_its_strike_is_no_sign() -> None:
+def test_a_foot_that_falls_flat_after_it_was_lifted_through_its_strike_is_no_sign() -> None:
     shares = (0.0, 0.045, 0.085, 0.40, 0.46, 0.63, 0.96, 1.0)
     ankle = (1.77, 1.63, 1.69, 1.35, 1.33, 1.92, 1.85, 1.77)
     assert watched([0.0] * 7, ankle, shares, toes=0.085)[-1].ventings == 0.0

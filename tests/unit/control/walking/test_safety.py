@@ -197,7 +197,7 @@ def test_a_large_force_that_is_gone_within_a_sample_stops_and_one_that_falls_qui
 
     assert after(0.0) == signs.FORCE_GONE
     assert signs.level_of(signs.FORCE_GONE) == STOPPED
-    assert after(100.0) == signs.NO_SIGN, "no step of a foot that slaps"
+    assert after(100.0) == signs.NO_SIGN, "no step of a foot that falls flat"
     assert after(0.0, period=0.01) == signs.NO_SIGN, "a slow controller sees a foot leave the ground in one sample"
 
 

@@ -147,7 +147,6 @@ def test_several_recordings_stand_side_by_side(tmp_path: Path, capsys: pytest.Ca
     assert re.split(r"\s{2,}", lines[2].replace("gas use", "gas use ")) == titles
     assert lines[3].split()[0] == str(one)
     assert lines[3].split()[1:] == lines[4].split()[1:]
-    assert lines[6].startswith(f"{one} with ppafo2011-consistent: ")
 
 
 @pytest.mark.parametrize(
@@ -204,10 +203,10 @@ def test_every_door_says_how_long_a_device_lasts_in_the_same_words(
     assert main(["walk", "solenoid-regulators", *words, "--out", "on-bottle"]) == 0
     said = re.search(rf"bottle {PAPER_BOTTLE}: lasts (.*?): (.*)", capsys.readouterr().out)
     assert said is not None
-    assert re.fullmatch(r"[\d.]+ min \([\d.]+ to [\d.]+ min depending on the volume of the chambers\)", said[1])
+    assert re.fullmatch(r"[\d.]+ min", said[1])
     assert said[1] in (tmp_path / "on-bottle" / "report.html").read_text()
     assert main(["walk", "solenoid-regulators", "--minutes", "0.1", "--out", "short"]) == 0
-    assert "min (" not in capsys.readouterr().out, "a walk at a constant supply says nothing of a bottle's minutes"
+    assert "lasts" not in capsys.readouterr().out.replace("how long a bottle lasts", ""), "no bottle, no minutes"
     for folder in ("on-bottle", "short"):
         assert main(["endurance", folder]) == 0
         out = capsys.readouterr().out
@@ -215,7 +214,7 @@ def test_every_door_says_how_long_a_device_lasts_in_the_same_words(
         assert said[2] in out
     made = endurance_of_walk(walk("solenoid-regulators", 0.1))
     assert made is not None
-    assert f"{made.discharge.walking_time / 60.0:.3g} min" == said[1].partition(" (")[0]
+    assert f"{made.discharge.walking_time / 60.0:.3g} min" == said[1]
 
 
 def test_a_time_between_rests_without_a_rest_is_refused() -> None:

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,8 +13,6 @@ from ppafo.answers.style import BLACK, BLUE, GREEN, GREY, ORANGE, REFERENCE, VER
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.errors import ParameterError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle, scaled_entries
-from ppafo.parameters.chamber_volumes import ChamberVolumes, other_readings
-from ppafo.parameters.device import Actuator
 from ppafo.parameters.parts import Part
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.questions.design.profile.problem import SizingProblem
@@ -45,30 +43,6 @@ from ppafo.walking.bottle import Schedule
 if TYPE_CHECKING:
     import matplotlib.figure
     from matplotlib.axes import Axes
-
-
-@dataclass(frozen=True, slots=True)
-class OtherChambers:
-    """A valve at a pressure with other chambers: RMS error [N m], gas per repetition [kg], total with the reserve [kg].
-
-    ``keeps`` tells whether the error limit is kept with the best gains.
-    """
-
-    name: str
-    keeps: bool
-    error: float
-    gas: float
-    gas_in_all: float
-
-
-def other_sentences(others: Sequence[OtherChambers]) -> list[str]:
-    """Return a sentence for each reading."""
-    return [
-        f"with {one.name}: RMS error {quantity_text(one.error, 'torque')}"
-        f"{'' if one.keeps else ', above the limit'}, {quantity_text(one.gas, 'gas mass')} per repetition, "
-        f"{quantity_text(one.gas_in_all, 'gas mass')} in total"
-        for one in others
-    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +93,7 @@ class Sizing(Solved):
     """The result of a sizing study: every valve, and the place of the lightest that works with a bottle, if any.
 
     ``recording`` is the suggestion on the profile, None without one. ``failures`` maps reasons of failed runs to how
-    many had them. ``others`` is the suggestion with other readings of the paper's chambers.
+    many had them.
     ``streams`` of noise were met by every trial, its error the largest of them; 0 without noise.
     """
 
@@ -130,7 +104,6 @@ class Sizing(Solved):
     runs: int
     failures: Mapping[str, int]
     seconds: float
-    others: tuple[OtherChambers, ...]
     streams: int = 0
 
     @property
@@ -298,7 +271,7 @@ def answer_of(sizing: Sizing) -> Answer:
         lead=(*([problem.description] if problem.description else []), _profile_sentence(problem)),
         sections=(
             *sections,
-            Section(remarks=(suggestion, *other_sentences(sizing.others), *_remarks(sizing))),
+            Section(remarks=(suggestion, *_remarks(sizing))),
             Section(
                 "Error and gas over pressure",
                 figure=Figure("profile", _CAPTION, lambda: sizing_figure(sizing)),
@@ -415,7 +388,6 @@ def _data(sizing: Sizing, suggestion: str) -> dict[str, Any]:
         "suggested": None if sizing.choice is None else sizing.choice.valve.name,
         "summary": suggestion,
         "valves": [_valve_data(item) for item in sizing.valves],
-        "other_chambers": [asdict(one) for one in sizing.others],
         "noise_streams": sizing.streams,
         "runs": sizing.runs,
         "failures": [{"reason": reason, "runs": count} for reason, count in sizing.failures.items()],
@@ -444,35 +416,6 @@ def _valve_data(item: SizedValve) -> dict[str, Any]:
     }
 
 
-def with_other_chambers(
-    problem: SizingProblem, valve: Part, pressure: float, threads: int | None
-) -> tuple[OtherChambers, ...]:
-    """Return a valve at a supply pressure [Pa absolute] with each other reading; none for chambers of its own."""
-    return tuple(
-        _tried(problem, valve, pressure, chambers, threads) for chambers in other_readings(_actuator_of(problem))
-    )
-
-
-def _actuator_of(problem: SizingProblem) -> Actuator:
-    """Return the actuator that was sized: that of the scenario with the figures of the part."""
-    own = problem.scenario.device.actuator
-    if problem.actuator is None:
-        return own
-    values = problem.actuator.values
-    return replace(own, torque_constant=values["torque_constant"], volume_per_angle=values["volume_per_angle"])
-
-
-def _tried(
-    problem: SizingProblem, valve: Part, pressure: float, chambers: ChamberVolumes, threads: int | None
-) -> OtherChambers:
-    scenario = with_numbers(problem.scenario, chambers.numbers())
-    # Without the part, whose printed volume per angle would stand in for that of the reading.
-    trial = Trials(replace(problem, scenario=scenario, actuator=None), threads).best(valve, np.array([pressure]))
-    error, gas = float(trial.error[0]), float(trial.gas[0])
-    keeps = error <= problem.largest_error
-    return OtherChambers(chambers.name, keeps, error, gas, gas * problem.repetitions * (1.0 + problem.reserve))
-
-
 def size_for_profile(problem: SizingProblem, threads: int | None = None, report: Report = report_nothing) -> Sizing:
     """Return the lowest pressure and smallest bottle of each valve for a profile; StudyError where all runs fail."""
     begun = time.perf_counter()
@@ -486,7 +429,6 @@ def size_for_profile(problem: SizingProblem, threads: int | None = None, report:
     suggested = min(good, key=lambda place: (sized[place].mass, sized[place].pressure), default=None)
     choice = None if suggested is None else sized[suggested]
     recording = None if choice is None else _recording(trials, choice)
-    others = () if choice is None else with_other_chambers(problem, choice.valve, choice.pressure, threads)
     return Sizing(
         problem=problem,
         valves=tuple(sized),
@@ -495,7 +437,6 @@ def size_for_profile(problem: SizingProblem, threads: int | None = None, report:
         runs=trials.runs,
         failures=dict(trials.failures),
         seconds=time.perf_counter() - begun,
-        others=others,
         streams=trials.seeds.size,
     )
 

@@ -28,7 +28,7 @@ from ppafo.questions.endurance.solve import endurance_of_walk
 from ppafo.questions.parts.solve import doubts_data, doubts_sections, titles_section
 from ppafo.questions.question import Solved
 from ppafo.version import __version__
-from ppafo.walking.bottle import WALKED, lasting_text, minutes_text
+from ppafo.walking.bottle import WALKED, minutes_text
 from ppafo.walking.figures.over_time import bottle_figure, peak_torques
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import LONGEST_MINUTES, walk_of
@@ -436,11 +436,10 @@ def _sections(wish: Wish, device: Device) -> tuple[Section, ...]:
     walked, supply = device.walked, device.walked.supply
     assert supply is not None, "it walked on a bottle"
     peaks = peak_torques(walked)
-    others = [other.discharge.walking_time for other in device.life.others.values()]
     low, high = (share * walk_of(walked.scenario).gait.body_mass for share in SCALED_MASS)
     facts = (
         ("controller", f"{walked.scenario.control.kind}, walk '{WALKS[device.tried.valve.kind]}'"),
-        ("lasts", f"{lasting_text(device.life.discharge.walking_time, others)}, of {wish.seconds / 60.0:.4g} min"),
+        ("lasts", f"{minutes_text(device.life.discharge.walking_time)}, of {wish.seconds / 60.0:.4g} min"),
         ("then", device.life.discharge.ending.message),
         ("peak torque", f"{quantity_text(device.torque, 'torque')} in the mean stride{_short(wish, device)}, "
          f"{quantity_text(float(peaks[-1]), 'torque')} in the last"),
@@ -488,9 +487,6 @@ def _data(sizing: WearerSizing, doubtful: list[tuple[Part, str]]) -> dict[str, A
             "walk": WALKS[device.tried.valve.kind],
             "overrides": list(device.tried.overrides),
             "lasts": device.life.discharge.walking_time,
-            "lasts_with_other_chambers": {
-                name: other.discharge.walking_time for name, other in device.life.others.items()
-            },
             "torque": device.torque,
             "masses": dict(device.masses),
             "electrical_power": dict(device.electrical.powers),

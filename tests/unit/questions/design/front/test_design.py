@@ -211,6 +211,8 @@ def test_pressures_above_what_parts_are_made_for_break_a_constraint(folder: Path
     text = FILE.replace('"smc-crb2bw40-90d", "smc-crb2bw30-90d"', '"parker-prn30d-90-45"').replace(
         "90 psi_g", "200 psi_g"
     )
+    # At such pressures the loop oscillates with the paper's derivative gain.
+    text = text.replace('"reference.level', '"controller.derivative_gain=0 s/(N m)", "reference.level')
     (folder / "rated.toml").write_text(text)
     evaluation = Evaluation(load_design(folder / "rated.toml"))
     places = np.full((2, 4), 0.5)

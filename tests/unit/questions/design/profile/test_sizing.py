@@ -10,7 +10,6 @@ import jsonschema
 import numpy as np
 import pytest
 
-from ppafo.answers.writing import text_of
 from ppafo.control.profiles import KNOTS
 from ppafo.errors import PpafoError
 from ppafo.parameters.parts import load_catalogue
@@ -21,7 +20,6 @@ from ppafo.questions.design.profile.problem import choose_knots
 from ppafo.questions.design.profile.search import Floats, Trials, ceiling, ceiling_pressure, cut_error
 from ppafo.questions.design.solve import design
 from ppafo.signals import Channel, Recording
-from ppafo.simulation.loading import load_scenario
 from ppafo.storage import write_csv
 
 SHIPPED = Path(__file__).parents[5] / "src" / "ppafo" / "questions" / "design" / "library" / "push-off.toml"
@@ -246,39 +244,6 @@ def test_a_recording_that_is_no_profile_is_one_line(tmp_path: Path, content: str
     with pytest.raises(PpafoError, match=re.escape(message)) as caught:
         load_design(tmp_path / "wrong.toml")
     assert "\n" not in str(caught.value)
-
-
-def test_the_suggestion_is_tried_with_the_other_chambers_of_the_paper(sizing: Sizing) -> None:
-    assert sizing.choice is not None
-    consistent, short = sizing.others
-    assert consistent.gas == pytest.approx(sizing.choice.gas, rel=0.15)
-    assert consistent.gas != sizing.choice.gas
-    for one in sizing.others:
-        assert one.keeps == (one.error <= sizing.problem.largest_error)
-        assert one.gas_in_all == pytest.approx(one.gas * 100 * (1.0 + sizing.problem.reserve))
-    assert f"with {short.name}: RMS error" in text_of(sizing.answer())
-
-
-def test_other_chambers_come_to_what_a_scenario_with_them_comes_to(sizing: Sizing) -> None:
-    choice, problem = sizing.choice, sizing.problem
-    assert choice is not None
-    changes = ["device.set=ppafo2011-consistent", "actuator.dead_volume_1=2 cm^3", "actuator.dead_volume_2=2 cm^3"]
-    device = load_scenario("torque-task-proportional", changes).device
-    scenario = dataclasses.replace(problem.scenario, device=device)
-    own = dataclasses.replace(problem, scenario=scenario, actuator=None)
-    trial = Trials(own).best(choice.valve, np.array([choice.pressure]))
-    assert sizing.others[1].gas == trial.gas[0]
-    assert sizing.others[1].error == trial.error[0]
-
-
-def test_an_actuator_of_its_own_has_no_other_chambers(folder: Path) -> None:
-    path = folder / "own.toml"
-    path.write_text(
-        FILE.replace("smc-crb2bw40-90d", "smc-crb2bw30-90d").replace('rms_error = "0.4 N m"', 'rms_error = "2 N m"')
-    )
-    found = design(path)
-    assert found.choice is not None
-    assert found.others == ()
 
 
 def test_a_limit_is_kept_in_every_noise_stream_and_the_seed_of_the_scenario_decides_nothing(

@@ -64,8 +64,12 @@ def test_what_is_suggested_is_the_walk_that_is_shown(tmp_path: Path, capsys: pyt
     # The printed command walks the same walk, with the same torque.
     words = shlex.split(device.command)[1:]
     assert main([*words, "--out", str(tmp_path / "again")]) == 0
-    peak = f"{device.torque:.2f}"
-    assert peak in capsys.readouterr().out
+    shown, again = (
+        re.search(r"peak torque .*, (\S+) N m in the last", text) for text in (said, capsys.readouterr().out)
+    )
+    assert shown is not None
+    assert again is not None
+    assert again[1] == shown[1]
     life = ppafo.endurance_of_walk(device.walked)
     assert life is not None
     assert life.discharge.walking_time == device.life.discharge.walking_time
