@@ -126,7 +126,8 @@ def test_energy_balance_closes_with_what_was_supplied_vented_warmed_and_worked(n
     record = result.recording
     gained = {channel: float(record[channel][-1] - record[channel][0]) for channel in ENERGIES}
     assert abs(result.metrics["energy_imbalance"].value) < 1e-5 * gained["supplied_enthalpy"]
-    assert abs(gained["wall_heat"]) > 1e-3 * gained["supplied_enthalpy"]
+    # Both ways counted: over a step response the walls give about as much as they take.
+    assert np.abs(np.diff(record["wall_heat"])).sum() > 1e-2 * gained["supplied_enthalpy"]
     # Gas from the supply is at the reference temperature: it brings c_p T.
     per_mass = RATIO / (RATIO - 1.0) * plan_run(result.scenario).plant.gas_product
     assert gained["supplied_enthalpy"] == pytest.approx(per_mass * result.metrics["gas_supplied"].value, rel=1e-9)
