@@ -40,12 +40,12 @@ def run(parsed: argparse.Namespace) -> int:
     """Measure, print and write; 1 where a target is not met and ``--check`` asks."""
     from benchmarks.study import FULL, QUICK, measure_speed
 
-    check_output(parsed)
+    check_output(parsed.out, COMMAND)
     report = measure_speed(QUICK if parsed.quick else FULL, tell)
     document = report.document()
     if parsed.out is not None:
         texts = (f"{report.text()}\n", report.markdown(), f"{json_text(document)}\n")
-        write_files(parsed, {name: text.encode() for name, text in zip(FILES, texts, strict=True)})
+        write_files(parsed.out, {name: text.encode() for name, text in zip(FILES, texts, strict=True)}, COMMAND)
     print_result(report.text(), document, parsed.json)
     return EXIT_CHECK_FAILED if parsed.check and report.missed else EXIT_GOOD
 

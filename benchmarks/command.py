@@ -4,7 +4,9 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 
-from ppafo.cli.main import EXIT_BAD_INPUT, EXIT_INTERRUPTED, CommandParser, check_options
+from ppafo.cli.command_line import CommandParser, check_options
+from ppafo.cli.main import EXIT_BAD_INPUT
+from ppafo.cli.output import EXIT_INTERRUPTED
 from ppafo.errors import PpafoError, one_line
 
 

@@ -46,7 +46,7 @@ def commands(folder: Path, scenario: str) -> dict[str, tuple[str, list[str]]]:
     """Return code and words of the commands by what they are called."""
     return {
         "ppafo --help": (ENTRY, ["--help"]),
-        "ppafo sets": (ENTRY, ["sets"]),
+        "ppafo sets list": (ENTRY, ["sets", "list"]),
         f"ppafo simulate {scenario}": (ENTRY, ["simulate", scenario, "--out", str(folder / "run")]),
         f"ppafo.simulate({scenario!r})": (f"import ppafo; ppafo.simulate({scenario!r})", []),
         f"ppafo walk {WALK}": (ENTRY, ["walk", WALK, "--out", str(folder / "walk")]),

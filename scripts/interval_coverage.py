@@ -18,10 +18,11 @@ if not __package__:
     sys.path[0] = str(Path(__file__).parents[1])
 
 from benchmarks.command import run_command
-from ppafo.cli.main import EXIT_INTERRUPTED
+from ppafo.cli.arguments import counting_number, whole_number
 from ppafo.cli.output import (
     EXIT_CHECK_FAILED,
     EXIT_GOOD,
+    EXIT_INTERRUPTED,
     add_output_arguments,
     check_output,
     load_drawing,
@@ -29,7 +30,6 @@ from ppafo.cli.output import (
     tell,
     write_files,
 )
-from ppafo.questions.question import counting_number, whole_number
 
 COMMAND = "coverage"
 """What the mark of a result folder calls it."""
@@ -71,10 +71,10 @@ def run(parsed: argparse.Namespace) -> int:
     draws, seed, processes = parsed.draws, parsed.seed, parsed.threads
     fits = FITS.format(truths="drawn" if parsed.from_prior else "fixed", seed=seed)
     tasks = tasks_of(parsed.noise or tuple(NOISE_KINDS), draws, seed, parsed.from_prior)
-    check_output(parsed, _files_to_keep(parsed.out) if parsed.out is not None else None)
+    check_output(parsed.out, COMMAND, _files_to_keep(parsed.out) if parsed.out is not None else None)
     if parsed.out is not None:
         # The folder is marked as ours before the first fit is kept in it.
-        write_files(parsed, {fits: b""} | _files_to_keep(parsed.out))
+        write_files(parsed.out, {fits: b""} | _files_to_keep(parsed.out), COMMAND)
     file = None if parsed.out is None else parsed.out / fits
     try:
         lines = run_tasks(tasks, file, processes or os.cpu_count() or 1, tell, _warn)
@@ -89,7 +89,7 @@ def run(parsed: argparse.Namespace) -> int:
         figures = render_figure(ranks_figure(lines), ("png", "svg"))
         contents = {f"{FIGURE}.{ending}": content for ending, content in figures.items()}
         contents |= {"coverage.txt": f"{text}\n".encode(), "coverage.json": f"{json_text(document)}\n".encode()}
-        write_files(parsed, contents | _files_to_keep(parsed.out))
+        write_files(parsed.out, contents | _files_to_keep(parsed.out), COMMAND)
     print_result(text, document, parsed.json)
     return EXIT_GOOD if is_good(lines, parsed.from_prior) else EXIT_CHECK_FAILED
 

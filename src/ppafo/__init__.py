@@ -16,6 +16,17 @@ from ppafo.engine.compilers import Compiler, offer
 from ppafo.version import __version__ as __version__
 
 if TYPE_CHECKING:
+    from ppafo.cli.verbs.analyses import bottle as bottle
+    from ppafo.cli.verbs.analyses import compare as compare
+    from ppafo.cli.verbs.analyses import design as design
+    from ppafo.cli.verbs.analyses import find as find
+    from ppafo.cli.verbs.analyses import linearise as linearise
+    from ppafo.cli.verbs.analyses import monte_carlo as monte_carlo
+    from ppafo.cli.verbs.analyses import reproduce as reproduce
+    from ppafo.cli.verbs.analyses import sensitivity as sensitivity
+    from ppafo.cli.verbs.analyses import tune as tune
+    from ppafo.cli.verbs.bench import identify as identify
+    from ppafo.cli.verbs.bench import validate as validate
     from ppafo.errors import DataError as DataError
     from ppafo.errors import IdentificationError as IdentificationError
     from ppafo.errors import KindError as KindError
@@ -46,37 +57,26 @@ if TYPE_CHECKING:
     from ppafo.parameters.parts import Part as Part
     from ppafo.parameters.parts import load_catalogue as load_catalogue
     from ppafo.questions.compare.answer import Comparison as Comparison
-    from ppafo.questions.compare.solve import compare as compare
     from ppafo.questions.design.front.answer import Design as Design
     from ppafo.questions.design.loading import load_design as load_design
     from ppafo.questions.design.profile.answer import Sizing as Sizing
-    from ppafo.questions.design.solve import design as design
     from ppafo.questions.endurance.answer import Endurance as Endurance
-    from ppafo.questions.endurance.solve import endurance as endurance
     from ppafo.questions.endurance.solve import endurance_of_walk as endurance_of_walk
     from ppafo.questions.find.solve import Found as Found
-    from ppafo.questions.find.solve import find as find
     from ppafo.questions.identify.answer import Identification as Identification
-    from ppafo.questions.identify.solve import identify as identify
     from ppafo.questions.linearise.answer import LinearModel as LinearModel
-    from ppafo.questions.linearise.solve import linearise as linearise
     from ppafo.questions.montecarlo.solve import MonteCarlo as MonteCarlo
-    from ppafo.questions.montecarlo.solve import monte_carlo as monte_carlo
     from ppafo.questions.parts.solve import Parts as Parts
     from ppafo.questions.parts.solve import parts as parts
     from ppafo.questions.reproduce.answer import Reproduction as Reproduction
-    from ppafo.questions.reproduce.solve import reproduce as reproduce
     from ppafo.questions.sensitivity.solve import Sensitivity as Sensitivity
-    from ppafo.questions.sensitivity.solve import sensitivity as sensitivity
     from ppafo.questions.sweep.answer import StudyResults as StudyResults
     from ppafo.questions.sweep.results import load_study_results as load_study_results
     from ppafo.questions.sweep.solve import sweep as sweep
     from ppafo.questions.tune.answer import Tuning as Tuning
     from ppafo.questions.tune.problem import list_tunings as list_tunings
     from ppafo.questions.tune.problem import load_tuning as load_tuning
-    from ppafo.questions.tune.solve import tune as tune
     from ppafo.questions.validate.solve import Validation as Validation
-    from ppafo.questions.validate.solve import validate as validate
     from ppafo.running import simulate as simulate
     from ppafo.signals import Channel as Channel
     from ppafo.signals import Recording as Recording
@@ -96,6 +96,18 @@ if TYPE_CHECKING:
     from ppafo.walking.walk import walk as walk
 
 _HOMES = {
+    "ppafo.cli.verbs.analyses": (
+        "bottle",
+        "compare",
+        "design",
+        "find",
+        "linearise",
+        "monte_carlo",
+        "reproduce",
+        "sensitivity",
+        "tune",
+    ),
+    "ppafo.cli.verbs.bench": ("identify", "validate"),
     "ppafo.errors": (
         "DataError",
         "IdentificationError",
@@ -118,30 +130,24 @@ _HOMES = {
     "ppafo.parameters.device": ("Device",),
     "ppafo.parameters.parts": ("Catalogue", "Part", "load_catalogue"),
     "ppafo.questions.compare.answer": ("Comparison",),
-    "ppafo.questions.compare.solve": ("compare",),
     "ppafo.questions.design.front.answer": ("Design",),
     "ppafo.questions.design.loading": ("load_design",),
     "ppafo.questions.design.profile.answer": ("Sizing",),
-    "ppafo.questions.design.solve": ("design",),
     "ppafo.questions.endurance.answer": ("Endurance",),
-    "ppafo.questions.endurance.solve": ("endurance", "endurance_of_walk"),
-    "ppafo.questions.find.solve": ("Found", "find"),
+    "ppafo.questions.endurance.solve": ("endurance_of_walk",),
+    "ppafo.questions.find.solve": ("Found",),
     "ppafo.questions.identify.answer": ("Identification",),
-    "ppafo.questions.identify.solve": ("identify",),
     "ppafo.questions.linearise.answer": ("LinearModel",),
-    "ppafo.questions.linearise.solve": ("linearise",),
-    "ppafo.questions.montecarlo.solve": ("MonteCarlo", "monte_carlo"),
+    "ppafo.questions.montecarlo.solve": ("MonteCarlo",),
     "ppafo.questions.parts.solve": ("Parts", "parts"),
     "ppafo.questions.reproduce.answer": ("Reproduction",),
-    "ppafo.questions.reproduce.solve": ("reproduce",),
-    "ppafo.questions.sensitivity.solve": ("Sensitivity", "sensitivity"),
+    "ppafo.questions.sensitivity.solve": ("Sensitivity",),
     "ppafo.questions.sweep.answer": ("StudyResults",),
     "ppafo.questions.sweep.results": ("load_study_results",),
     "ppafo.questions.sweep.solve": ("sweep",),
     "ppafo.questions.tune.answer": ("Tuning",),
     "ppafo.questions.tune.problem": ("list_tunings", "load_tuning"),
-    "ppafo.questions.tune.solve": ("tune",),
-    "ppafo.questions.validate.solve": ("Validation", "validate"),
+    "ppafo.questions.validate.solve": ("Validation",),
     "ppafo.running": ("simulate",),
     "ppafo.signals": ("Channel", "Recording"),
     "ppafo.simulation.loading": ("list_scenarios",),
@@ -163,6 +169,7 @@ _RENAMED = {
     "run_study": "sweep",
     "size": "design",
     "load_sizing": "load_design",
+    "endurance": "bottle",
 }
 """Names of earlier versions and what they are called now."""
 

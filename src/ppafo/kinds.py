@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping, MutableMapping
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ppafo.errors import KindError, one_line
 
@@ -26,15 +26,8 @@ logger = logging.getLogger("ppafo")
 _OBJECT = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 
 
-class Named(Protocol):
-    """What a catalogue holds has a name."""
-
-    @property
-    def name(self) -> str:
-        """Its name in files and on the command line."""
-
-
-Kind = TypeVar("Kind", bound=Named)
+Kind = TypeVar("Kind")
+"""What a catalogue holds: it has a ``name``, or is a function of another package, which its entry point names."""
 
 
 class Kinds(MutableMapping[str, Kind], Generic[Kind]):
@@ -143,8 +136,9 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         if not isinstance(kind, self._kind_type):
             is_a = f"is of type {type(kind).__name__}, not {self._kind_type.__name__}"
             raise KindError(f"{where} {is_a}")
-        if ":" not in point.name and kind.name != point.name:
-            raise KindError(f"{where} calls itself '{one_line(kind.name)}'; entry point and kind need one name")
+        name = getattr(kind, "name", point.name)
+        if ":" not in point.name and name != point.name:
+            raise KindError(f"{where} calls itself '{one_line(name)}'; entry point and kind need one name")
         return kind
 
 

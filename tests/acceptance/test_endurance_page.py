@@ -20,7 +20,7 @@ COMMANDS = [
 ]
 ROWS = re.findall(r"^\| `([^`]+=[^`]+)` \| (\d+) \| ([a-z ]+) \|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
 
-SEVERAL = ["endurance", "out/walk-solenoid", "out/walk-proportional"]
+SEVERAL = ["bottle", "out/walk-solenoid", "out/walk-proportional"]
 REGULATED = re.findall(
     r"^\| `([\w-]+)` \| (-|`supply_line\.[^`]+`) \| (.*) \|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE
 )
@@ -40,7 +40,7 @@ def test_the_commands_of_the_page_run_one_after_the_other_and_give_its_numbers(
     assert len(COMMANDS) == 12
     steps = []
     for words in COMMANDS:
-        if words[0] != "endurance" or "--list" in words or words[:2] == SEVERAL[:2]:
+        if words[0] != "bottle" or "--list" in words or words[:2] == SEVERAL[:2]:
             assert main(words) == 0
             said = capsys.readouterr().out
             assert words[:2] != SEVERAL[:2] or said.splitlines() == shown_below(words)
@@ -92,7 +92,7 @@ def test_strides_of_a_warm_bottle_are_those_of_the_page(capsys: pytest.CaptureFi
 def test_a_row_of_the_table_is_what_comes_out(
     change: str, strides: str, ends: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    result = results(["endurance", "--gas-per-stride", "0.4 g", "--set", change], capsys)["result"]
+    result = results(["bottle", "--gas-per-stride", "0.4 g", "--set", change], capsys)["result"]
     assert result["ending"]["kind"] == ends  # type: ignore[index]
     assert round(result["strides"]) == int(strides)  # type: ignore[index]
 

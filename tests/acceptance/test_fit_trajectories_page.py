@@ -43,8 +43,8 @@ def document(folder: Path) -> dict[str, Any]:
 
 def test_the_page_records_twice_and_identifies_once() -> None:
     assert [shlex.split(command)[:3] for command in COMMANDS] == [
-        ["ppafo", "rig", "record"],
-        ["ppafo", "rig", "record"],
+        ["ppafo", "rig", "simulate"],
+        ["ppafo", "rig", "simulate"],
         ["ppafo", "identify", "problem.toml"],
     ]
 

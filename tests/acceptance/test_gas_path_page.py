@@ -30,7 +30,7 @@ def test_a_gas_path_of_the_page_has_the_toes_the_gas_and_the_time_that_it_says(r
 def test_the_bottle_of_the_page_lasts_as_long_as_it_says() -> None:
     assert len(ROWS) == 5
     for _, _, gas, time, minutes in ROWS:
-        lasts = ppafo.endurance(gas_per_stride=1e-3 * float(gas), stride_time=float(time), bottle="paper-co2-9oz")
+        lasts = ppafo.bottle(gas_per_stride=1e-3 * float(gas), stride_time=float(time), bottle="paper-co2-9oz")
         assert lasts.to_dict()["result"]["walking_time"] / 60.0 == pytest.approx(float(minutes), abs=0.06)
 
 

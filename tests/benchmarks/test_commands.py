@@ -47,7 +47,7 @@ def test_a_folder_of_others_is_refused_before_anything_runs(
 
 
 def test_a_result_of_another_command_is_refused(refuses: Callable[[Path], bool], tmp_path: Path) -> None:
-    assert package(["schema", "scenario", "--out", str(tmp_path / "out")]) == 0
+    assert package(["doctor", "--schema", "scenario", "--out", str(tmp_path / "out")]) == 0
     before = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
     assert refuses(tmp_path / "out")
     assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == before

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from ppafo.cli.schema import FORMATS
+from ppafo.cli.doctor import FORMATS
 from ppafo.documents.json_text import MAXIMUM_LEVELS, is_nested_too_deeply, json_document
 from ppafo.errors import DataError, PpafoError
 from ppafo.gait.document import load_gait

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.cli.main import COMMANDS, main
+from ppafo.cli.commands import COMMANDS
+from ppafo.cli.main import main
 from ppafo.storage.result_folder import MARK
 from tests.virtual_wire import free_port, sending_bench
 
@@ -22,41 +23,41 @@ FOLDERS: dict[str, list[str]] = {
     "walk": ["--minutes", "0.1"],
     "walk --wearers": ["--wearers", "2"],
     "validate": ["ppafo2011", "bench.csv"],
-    "rig": ["record", "step-response"],
+    "rig": ["simulate", "step-response"],
     "identify": ["problem.toml"],
     "gait": ["show", "falisse2019-subject1"],
     "gait import": ["import", "walk.mot", "--body-mass", "62 kg"],
-    "endurance": ["--gas-per-stride", "0.3 g"],
+    "bottle": ["--gas-per-stride", "0.3 g"],
     "design": ["torque-task"],
     "design of a profile": ["push-off"],
-    "sets": [],
+    "sets list": ["list"],
     "sets show": ["show", "ppafo2011"],
-    "parts": [],
-    "audit": ["ppafo2011"],
-    "schema": ["scenario"],
-    "cache": [],
+    "sets parts": ["parts"],
+    "sets audit": ["audit", "ppafo2011"],
+    "doctor --schema": ["--schema", "scenario"],
+    "doctor": [],
     "export c": ["c", "step-response"],
     "export fmu": ["fmu", "step-response"],
     "export opensim": ["opensim", "solenoid", "--minutes", "0.05"],
     "export controller": ["controller", "torque-task-solenoid"],
-    "firmware": ["torque-task-solenoid"],
-    "chip": ["torque-task-solenoid"],
+    "export firmware": ["firmware", "torque-task-solenoid"],
+    "export firmware --try": ["firmware", "torque-task-solenoid", "--try"],
     "hil": ["torque-task-solenoid", "--port", "udp:127.0.0.1:5000"],
 }
 """The words of every command that writes a folder; ``walk --wearers`` is ``walk`` with other words."""
 
 FILES = {
-    "plot": (["{result}"], "figure.png"),
+    "export figure": (["{result}"], "figure.png"),
     "new scenario": (["mine"], "mine.toml"),
     "gait record": (["falisse2019-subject1", "--strides", "1"], "walk.csv"),
     "workbench": (["step-response"], "page.html"),
-    "record": (["--port", "udp:127.0.0.1:{port}"], "bench.csv"),
+    "rig record": (["--port", "udp:127.0.0.1:{port}"], "bench.csv"),
 }
 """The words of every command that writes one file, and the file."""
 
 QUICK = (
-    *("sets", "sets show", "parts", "audit", "schema", "cache", "gait", "endurance"),
-    *("export c", "export controller", "firmware"),
+    *("sets list", "sets show", "sets parts", "sets audit", "doctor --schema", "doctor", "gait", "bottle"),
+    *("export c", "export controller", "export firmware"),
 )
 
 
@@ -71,17 +72,15 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def test_every_command_is_here() -> None:
     tried = {name.partition(" ")[0] for name in (*FOLDERS, *FILES)}
-    missing = [
-        f'    "{name}": ["the words", "that it needs"],' for name in COMMANDS if name not in {*tried, "examples"}
-    ]
+    missing = [f'    "{name}": ["the words", "that it needs"],' for name in COMMANDS if name not in tried]
     assert missing == [], "paste into FOLDERS of tests/contract/test_output_folders.py:\n" + "\n".join(missing)
-    assert tried == set(COMMANDS) - {"examples"}
+    assert tried == set(COMMANDS)
 
 
 def test_an_example_takes_only_a_folder_that_is_absent(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["examples", "study", "--out", str(tmp_path / "study")]) == 0
+    assert main(["new", "example", "study", "--out", str(tmp_path / "study")]) == 0
     before = contents(tmp_path)
-    assert main(["examples", "study", "--out", str(tmp_path / "study")]) == 2
+    assert main(["new", "example", "study", "--out", str(tmp_path / "study")]) == 2
     assert contents(tmp_path) == before
 
 
@@ -106,7 +105,7 @@ def test_result_of_another_command_is_refused(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    other = "schema" if name != "schema" else "parts"
+    other = "sets show" if name != "sets show" else "sets parts"
     assert main(words_of(other, tmp_path / "out")) == 0
     before = contents(tmp_path)
     assert main(words_of(name, tmp_path / "out")) == 2
@@ -148,8 +147,8 @@ def test_own_earlier_result_is_replaced_whole_and_holds_nothing_else(
 
 def test_smaller_result_leaves_nothing_of_a_larger_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
-    assert main(["audit", "ppafo2011", "--out", str(out)]) == 0
-    assert main(["audit", "ppafo2011-printed", "--out", str(out)]) == 1
+    assert main(["sets", "audit", "ppafo2011", "--out", str(out)]) == 0
+    assert main(["sets", "audit", "ppafo2011-printed", "--out", str(out)]) == 1
     assert {path.name for path in out.iterdir()} == {
         MARK,
         "audit-ppafo2011-printed.txt",
@@ -159,23 +158,23 @@ def test_smaller_result_leaves_nothing_of_a_larger_one(tmp_path: Path, capsys: p
 
 def test_mark_that_names_no_files_lets_nothing_be_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
-    assert main(["parts", "--out", str(out)]) == 0
+    assert main(["sets", "parts", "--out", str(out)]) == 0
     document = json.loads((out / MARK).read_text())
     (out / MARK).write_text(json.dumps(document | {"sha256": 3}))
-    assert main(["parts", "--out", str(out)]) == 2
+    assert main(["sets", "parts", "--out", str(out)]) == 2
 
 
 def test_rig_adds_an_experiment_and_replaces_nothing_of_others(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    record = ["rig", "record", "valve-map", "--preset", "ideal-laboratory", "--out", str(out)]
+    record = ["rig", "simulate", "valve-map", "--preset", "ideal-laboratory", "--out", str(out)]
     assert main(record) == 0
     (out / "problem.toml").write_text("mine")
     assert main(record) == 0
     (out / "step-response.csv").write_text("mine")
     capsys.readouterr()
-    assert main(["rig", "record", "step-response", "--out", str(out)]) == 2
+    assert main(["rig", "simulate", "step-response", "--out", str(out)]) == 2
     assert "has a step-response.csv that the rig did not write" in capsys.readouterr().err
     assert (out / "step-response.csv").read_text() == "mine"
 

@@ -1,92 +1,110 @@
-"""Every question of the catalogue: its arguments are those of its function, it is a verb, its answer can be written.
+"""Every verb: its signature is read, its defaults are those of what solves it, its answer can be written.
 
-That of the how-to page is installed as a package of its own would be, and is a command by that.
+The command of the how-to page is installed as a package of its own would be, and is a command by that.
 """
 
 import inspect
 import json
+import re
 import sys
-import typing
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 import ppafo
+from ppafo.cli.command_line import Command, Group, option_of, parameters_of
+from ppafo.cli.commands import COMMANDS, OTHERS, RENAMED
 from ppafo.cli.main import build_parser, main
-from ppafo.documents.toml_text import TomlKind
-from ppafo.questions.catalogue import QUESTIONS
-from ppafo.questions.question import Solved, load_name
+from ppafo.exports.hil.wire import DEFAULT_BAUD, RATE
+from ppafo.kinds import kind_at
 from tests.page_code import code_blocks, write_package
 
-NAMES = list(QUESTIONS)
-NO_VERB_OF_ITS_OWN = {
-    "walk": "compare_walks and walk_population are its verbs",
-    "sweep": "the command also chooses the folder; ppafo.sweep is given it",
+VERBS: dict[str, Command] = {
+    f"{name} {action}".strip(): command
+    for name, one in COMMANDS.items()
+    for action, command in (one.actions if isinstance(one, Group) else {"": one}).items()
 }
+SOLVERS = {
+    "bottle": "ppafo.questions.endurance.solve:endurance",
+    "compare": "ppafo.questions.compare.solve:compare",
+    "design": "ppafo.questions.design.solve:design",
+    "find": "ppafo.questions.find.solve:find",
+    "identify": "ppafo.questions.identify.solve:identify",
+    "linearise": "ppafo.questions.linearise.solve:linearise",
+    "montecarlo": "ppafo.questions.montecarlo.solve:monte_carlo",
+    "reproduce": "ppafo.questions.reproduce.solve:reproduce",
+    "sensitivity": "ppafo.questions.sensitivity.solve:sensitivity",
+    "sweep": "ppafo.questions.sweep.solve:sweep_into_folder",
+    "tune": "ppafo.questions.tune.solve:tune",
+    "validate": "ppafo.questions.validate.solve:validate",
+    "walk": "ppafo.questions.walk.answer:walk_with_and_without",
+}
+NO_VERB_OF_THEIR_NAME = ("montecarlo", "sweep", "walk")
+MOST_COMMANDS = 22
 
 
-def solved_types(name: str) -> list[type]:
-    """The classes that solving a question may return."""
-    returned = typing.get_type_hints(QUESTIONS[name].solver())["return"]
-    return list(typing.get_args(returned)) or [returned]
+def test_there_are_at_most_as_many_commands_as_somebody_can_look_over() -> None:
+    assert len(COMMANDS) <= MOST_COMMANDS
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_every_argument_is_a_parameter_of_what_solves_the_question(name: str) -> None:
-    declared = QUESTIONS[name]
-    signature = inspect.signature(declared.solver())
-    given = {argument.parameter: None for argument in declared.arguments}
-    assert all(sum(other.parameter == one for other in declared.arguments) == 1 for one in given if one != "highest")
-    bound = signature.bind(**given, **({"progress": None} if "progress" in signature.parameters else {}))
-    bound.apply_defaults()
-    assert set(given) <= set(bound.arguments)
+@pytest.mark.parametrize("name", VERBS)
+def test_every_parameter_of_a_verb_has_its_help_and_every_option_one_meaning(name: str) -> None:
+    verb = VERBS[name].function()
+    for parameter, reading in parameters_of(verb):
+        said = re.search(rf"^{parameter.name}: \S", inspect.getdoc(verb) or "", re.MULTILINE)
+        assert said is not None or reading.word.help, parameter.name
+    options = [option_of(parameter, reading.word) for parameter, reading in parameters_of(verb)]
+    named = [option for option in options if option]
+    assert len(set(named)) == len(named)
+    parser = build_parser(name.split())
+    assert {*named, "--json", "--out"} <= parser.options()
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_defaults_of_the_command_are_those_of_the_verb(name: str) -> None:
-    declared = QUESTIONS[name]
-    parameters = inspect.signature(declared.solver()).parameters
-    for argument in declared.arguments:
-        default = parameters[argument.parameter].default
-        if default is not inspect.Parameter.empty:
-            assert argument.default == default or not (argument.default or default), argument.words
+@pytest.mark.parametrize("name", SOLVERS)
+def test_defaults_of_a_verb_are_those_of_what_solves_it(name: str) -> None:
+    solver = inspect.signature(kind_at(SOLVERS[name])).parameters
+    verb = inspect.signature(VERBS[name].function()).parameters
+    assert set(verb) == set(solver)
+    for each in verb.values():
+        default = solver[each.name].default
+        if default is not inspect.Parameter.empty and each.default is not inspect.Parameter.empty:
+            assert each.default == default, each.name
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_what_a_question_comes_to_answers_draws_saves_and_becomes_data(name: str) -> None:
-    for kind in solved_types(name):
-        assert issubclass(kind, Solved)
-        assert list(inspect.signature(load_name(f"{kind.__module__}:answer_of")).parameters)
+def test_defaults_of_the_wire_are_those_of_the_protocol() -> None:
+    hil = inspect.signature(VERBS["hil"].function()).parameters
+    record = inspect.signature(VERBS["rig record"].function()).parameters
+    assert (hil["rate"].default, hil["baud"].default, record["baud"].default) == (RATE, DEFAULT_BAUD, DEFAULT_BAUD)
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name not in NO_VERB_OF_ITS_OWN])
-def test_every_question_is_a_verb_with_its_errors_documented(name: str) -> None:
-    solver, (home, _, verb) = QUESTIONS[name].solver(), QUESTIONS[name].solve.partition(":")
-    result = solved_types(name)[0]
-    names = {result.__name__: result.__module__, verb: home}
-    imports = [f"    from {place} import {name} as {name}" for name, place in names.items()]
-    homes = [f'    "{place}": ({", ".join(repr(n) for n in names if names[n] == place)},),' for place in names.values()]
-    assert getattr(ppafo, verb, None) is solver, "\n".join(
-        [
-            "paste into src/ppafo/__init__.py, below TYPE_CHECKING:",
-            *imports,
-            "and into _HOMES:",
-            *dict.fromkeys(homes),
-            "then: python scripts/public_api.py",
-        ]
-    )
-    assert solver.__doc__ is not None
-    assert "Error" in solver.__doc__
+@pytest.mark.parametrize("name", [name for name in SOLVERS if name not in NO_VERB_OF_THEIR_NAME])
+def test_the_function_of_a_command_is_the_verb_of_python_with_its_errors_documented(name: str) -> None:
+    verb = VERBS[name].function()
+    assert getattr(ppafo, name) is verb
+    assert "Error" in (verb.__doc__ or "")
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_the_parser_of_the_command_is_made_without_loading_what_solves_it(name: str) -> None:
-    declared = QUESTIONS[name]
-    help_text = build_parser(name).format_help()
-    assert name in help_text
-    if declared.library:
-        assert isinstance(load_name(declared.library), TomlKind)
+@pytest.mark.parametrize("old", RENAMED)
+def test_an_old_command_answers_with_the_new_line(old: str, capsys: pytest.CaptureFixture[str]) -> None:
+    words = [word.lower() for word in old.split()]
+    assert main(words) == 2
+    said = capsys.readouterr().err
+    assert f"is now 'ppafo {RENAMED[old]}'" in said
+    assert said.count("\n") == 1
+    now = [word for word in RENAMED[old].split() if not word.startswith("-")]
+    assert " ".join(now) in VERBS or now == ["new", "example"]
+
+
+def test_a_verb_that_is_mistyped_is_refused_with_the_nearest_one(capsys: pytest.CaptureFixture[str]) -> None:
+    for words, said in (
+        (["sets", "lst"], "there is no 'ppafo sets lst', did you mean 'list'?; available: list, show, audit, parts"),
+        (["sets"], "ppafo sets: give one of list, show, audit, parts"),
+        (["doctr"], "there is no command 'doctr', did you mean 'doctor'?"),
+        (["sets", "audit", "x", "--parnt", "y"], "there is no option '--parnt', did you mean '--parent'?"),
+    ):
+        assert main(words) == 2
+        assert said in capsys.readouterr().err
 
 
 PAGE = "how-to/add-a-question.md"
@@ -95,45 +113,45 @@ WORDS = ("torque-task-proportional", "--pressure", "30 psi_g", "--pressure", "60
 
 @pytest.fixture
 def _installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """The package of the page, as an installer leaves it, with one more question that cannot be loaded."""
+    """The package of the page, as an installer leaves it, with one more command that cannot be loaded."""
     (module,), (entry_points,) = code_blocks(PAGE, "python"), code_blocks(PAGE, "toml")
     write_package(
-        tmp_path / "site", "my_questions.pressures", module, f'{entry_points}broken = "my_questions.nothing:QUESTION"\n'
+        tmp_path / "site", "my_questions.pressures", module, f'{entry_points}broken = "my_questions.nothing:broken"\n'
     )
     monkeypatch.syspath_prepend(tmp_path / "site")
     monkeypatch.chdir(tmp_path)
     yield
-    for name in set(QUESTIONS) - set(NAMES):
-        del QUESTIONS[name]
+    for name in list(OTHERS):
+        del OTHERS[name]
     for name in [name for name in sys.modules if name.split(".")[0] == "my_questions"]:
         del sys.modules[name]
 
 
 @pytest.mark.usefixtures("_installed")
-def test_a_question_of_another_package_is_a_command_that_answers_what_its_page_shows(
+def test_a_function_of_another_package_is_a_command_that_answers_what_its_page_shows(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (shown,) = code_blocks(PAGE, "text")
     assert main(["pressures", *WORDS]) == 0
     assert capsys.readouterr().out == shown
-    assert main(["my_questions.pressures:QUESTION", *WORDS, "--json", "--out", str(tmp_path / "out")]) == 0
+    assert main(["my_questions.pressures:pressures", *WORDS, "--json", "--out", str(tmp_path / "out")]) == 0
     runs = json.loads(capsys.readouterr().out)["runs"]
     assert [run["supply"] for run in runs] == ["30 psi_g", "60 psi_g"]
     assert {"pressures.png", "pressures.json", "report.html"} <= {path.name for path in (tmp_path / "out").iterdir()}
 
 
 @pytest.mark.usefixtures("_installed")
-def test_a_question_of_another_package_is_in_the_help_and_in_hints_and_is_refused_in_one_line(
+def test_a_command_of_another_package_is_in_the_help_and_in_hints_and_is_refused_in_one_line(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert main(["pressure", *WORDS]) == 2
     assert "there is no command 'pressure', did you mean 'pressures'?" in capsys.readouterr().err
-    assert "  pressures    show what a lower supply pressure costs" in build_parser(None).format_help()
+    assert "  pressures    show what a lower supply pressure costs" in build_parser([]).format_help()
     for words, said in (
         (["pressures", "torque-task"], "the following arguments are required: --pressure"),
         (["pressures", "torque-task", "--pressure", "40"], "there is no scenario or walk 'torque-task'"),
         (["pressures", "torque-task-solenoid", "--presure", "40"], "no option '--presure', did you mean '--pressure'"),
-        (["broken"], "question 'broken' of package 'my-questions' cannot be loaded: ModuleNotFoundError"),
+        (["broken"], "command 'broken' of package 'my-questions' cannot be loaded: ModuleNotFoundError"),
     ):
         assert main(words) == 2
         printed = capsys.readouterr().err

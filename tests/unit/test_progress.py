@@ -5,7 +5,7 @@ import logging
 
 import pytest
 
-from ppafo.cli.question import progress_line
+from ppafo.cli.output import progress_line
 from ppafo.progress import Progress, ProgressLine, time_text
 
 

@@ -1,11 +1,11 @@
-"""``ppafo audit SET``: what a parameter set changed against its parent, and where it contradicts itself."""
+"""``ppafo sets audit SET``: what a parameter set changed against its parent, and where it contradicts itself."""
 
-import argparse
 import textwrap
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from ppafo.cli import output
+from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, Said
 
 if TYPE_CHECKING:
     from ppafo.parameters import ParameterSet
@@ -16,44 +16,28 @@ _INDENT = "    "
 _SEVERITIES = ("error", "warning", "note")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of this command."""
-    parser.add_argument(
-        "names", metavar="SET", nargs="+", help="name of a set, or a .toml file; several are shown side by side"
-    )
-    parser.add_argument(
-        "--parent", metavar="SET", help="show what changed against this set, in place of the one that the file names"
-    )
-    parser.add_argument(
-        "--all", action="store_true", help="print what concerns no changed value too, of a set with a parent or --set"
-    )
-    output.add_override_argument(parser)
-    output.add_output_arguments(parser)
-
-
-def run(parsed: argparse.Namespace) -> int:
-    """Print changes and findings of one set, or a table of several; 1 where a finding is an error, else 0."""
+def audit_sets(names: Sequence[str], against: str | None, shows_all: bool, overrides: Sequence[str]) -> Said:
+    """Return changes and findings of one set, or a table of several; exit code 1 where a finding is an error."""
     from ppafo.parameters import apply_overrides, load_parameter_set
     from ppafo.parameters.audit import audit, changed_paths
 
-    output.check_output(parsed)
-    sets = [apply_overrides(load_parameter_set(name), parsed.overrides) for name in parsed.names]
-    parents = [_parent(parameter_set, parsed.parent) for parameter_set in sets]
+    sets = [apply_overrides(load_parameter_set(name), overrides) for name in names]
+    parents = [_parent(parameter_set, against) for parameter_set in sets]
     found = [(one, audit(one, parent)) for one, parent in zip(sets, parents, strict=True)]
     documents = [
-        _document(*one, parsed.overrides) | _changes_document(one[0], parent)
+        _document(*one, overrides) | _changes_document(one[0], parent)
         for one, parent in zip(found, parents, strict=True)
     ]
-    if len(found) == 1:
-        compares = parents[0] is not None or bool(parsed.overrides)
-        changed = changed_paths(sets[0], parents[0]) if compares and not parsed.all else None
-        text = _text(*found[0], changed)
-        if documents[0]["parent"] is not None:
-            text = f"{_changes_text(documents[0])}\n\n{text}"
-        output.deliver(f"audit-{sets[0].name}", text, documents[0], parsed)
-    else:
-        output.deliver("audit", _table(found), {"sets": documents}, parsed)
-    return output.EXIT_CHECK_FAILED if any(_counts(findings)["error"] for _, findings in found) else output.EXIT_GOOD
+    has_errors = any(_counts(findings)["error"] for _, findings in found)
+    code = EXIT_CHECK_FAILED if has_errors else EXIT_GOOD
+    if len(found) > 1:
+        return Said(_table(found), {"sets": documents}, "audit", code)
+    compares = parents[0] is not None or bool(overrides)
+    changed = changed_paths(sets[0], parents[0]) if compares and not shows_all else None
+    text = _text(*found[0], changed)
+    if documents[0]["parent"] is not None:
+        text = f"{_changes_text(documents[0])}\n\n{text}"
+    return Said(text, documents[0], f"audit-{sets[0].name}", code)
 
 
 def _parent(parameter_set: "ParameterSet", given: str | None) -> "ParameterSet | None":
@@ -85,10 +69,10 @@ def _changes_text(document: dict[str, Any]) -> str:
     return "\n".join([f"{name} changes {count} of its parent {parent}", *(_INDENT + line for line in table)])
 
 
-def _document(parameter_set: "ParameterSet", findings: "list[Finding]", overrides: list[str]) -> dict[str, Any]:
+def _document(parameter_set: "ParameterSet", findings: "list[Finding]", overrides: Sequence[str]) -> dict[str, Any]:
     return {
         "set": parameter_set.name,
-        "overrides": overrides,
+        "overrides": list(overrides),
         "counts": _counts(findings),
         "findings": [finding.document() for finding in findings],
     }

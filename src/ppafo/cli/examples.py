@@ -1,6 +1,5 @@
-"""``ppafo examples``: the files and scripts of the how-to pages, ready to run."""
+"""``ppafo new example``: the files and scripts of the how-to pages, ready to run."""
 
-import argparse
 import os
 import tomllib
 from dataclasses import dataclass
@@ -8,7 +7,7 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path, PurePosixPath
 
-from ppafo.cli import output
+from ppafo.cli.output import Said
 from ppafo.errors import DataError, nearest_name
 
 _FOLDER = resources.files("ppafo") / "examples"
@@ -44,37 +43,24 @@ def _contents(folder: Traversable, path: PurePosixPath) -> list[tuple[PurePosixP
     return found
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of this command."""
-    parser.add_argument("name", metavar="NAME", nargs="?", help="the example to write; default: list them")
-    output.add_json_argument(parser)
-    parser.add_argument("--out", metavar="DIR", type=Path, help="the new folder; default NAME")
-
-
-def run(parsed: argparse.Namespace) -> int:
-    """List the examples, or write one and say what to run."""
+def list_examples() -> Said:
+    """Return the examples with what each shows."""
     examples = load_examples()
-    if parsed.name is None:
-        if parsed.out is not None:
-            raise DataError("--out: needs the NAME of the example to write")
-        width = max(map(len, examples))
-        lines = [f"{name:<{width}}  {example.summary}" for name, example in examples.items()]
-        document = {"examples": [{"name": name, **_document(example)} for name, example in examples.items()]}
-        output.print_result(
-            "\n".join([*lines, "", "ppafo examples NAME writes one into a new folder."]), document, parsed.json
-        )
-    elif parsed.name not in examples:
-        hint = nearest_name(parsed.name, examples)
-        raise DataError(f"there is no example '{parsed.name}'{hint}; available: {', '.join(examples)}")
-    else:
-        _write(parsed.name, examples[parsed.name], parsed.out or Path(parsed.name), parsed.json)
-    return output.EXIT_GOOD
+    width = max(map(len, examples))
+    lines = [f"{name:<{width}}  {example.summary}" for name, example in examples.items()]
+    document = {"examples": [{"name": name, **_document(example)} for name, example in examples.items()]}
+    return Said("\n".join([*lines, "", "ppafo new example NAME writes one into a new folder."]), document)
 
 
-def _write(name: str, example: Example, folder: Path, as_json: bool) -> None:
-    """Write the files of an example, all or none, into a folder that is not there yet."""
+def write_example(name: str, folder: Path) -> Said:
+    """Write the files of an example, all or none, into a folder that is not there yet, and say what to run."""
     from ppafo.storage.files import replace_folder
 
+    examples = load_examples()
+    if name not in examples:
+        hint = nearest_name(name, examples)
+        raise DataError(f"there is no example '{name}'{hint}; available: {', '.join(examples)}")
+    example = examples[name]
     if os.path.lexists(folder):
         raise DataError(f"{folder}: already exists; remove it or choose another with --out")
     files = example_files(name)
@@ -82,7 +68,7 @@ def _write(name: str, example: Example, folder: Path, as_json: bool) -> None:
     lines = [f"written: {folder}, {', '.join(map(str, files))}", f"page: {example.page}"]
     lines += ["run there:", *(f"  {command}" for command in example.commands)]
     document = {"name": name, "folder": str(folder), "files": [str(path) for path in files], **_document(example)}
-    output.print_result("\n".join(lines), document, as_json)
+    return Said("\n".join(lines), document)
 
 
 def _document(example: Example) -> dict[str, object]:

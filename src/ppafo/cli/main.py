@@ -1,63 +1,26 @@
-"""Entry point of the command line: the commands, their parser, and errors as one line and an exit code.
-
-The parser is like any of argparse, but a mistake is one error, and it names what was mistyped.
-"""
+"""Entry point of the command line: the parser of what was called for, and errors as one line and an exit code."""
 
 import argparse
 import gc
-import importlib
-import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
-from itertools import takewhile
-from typing import TYPE_CHECKING, NoReturn, final
 
 from ppafo import interrupts
-from ppafo.cli.output import flush_output, printing
-from ppafo.errors import PpafoError, nearest_name, one_line
-from ppafo.questions.catalogue import QUESTIONS
+from ppafo.cli.command_line import (
+    Command,
+    CommandParser,
+    Group,
+    UsageError,
+    add_parameters,
+    check_options,
+    present_options,
+    run,
+)
+from ppafo.cli.commands import COMMANDS, OTHERS, check_words, list_commands
+from ppafo.cli.output import EXIT_INTERRUPTED
+from ppafo.errors import PpafoError, one_line
 from ppafo.version import __version__
-
-if TYPE_CHECKING:
-    from _typeshed import SupportsWrite
-
-
-SUBCOMMANDS: dict[str, dict[str, str]] = {
-    "the paper": {},
-    "your device": {
-        "new": "write an input file to start from: a template, or a copy of a shipped one",
-        "examples": "list the examples of the how-to pages, or write one into a folder, ready to run",
-        "simulate": "run a scenario and write its recording, metrics and figure",
-        "workbench": "write scenarios as one page that simulates them while sliders are dragged",
-        "plot": "redraw the figures of a result folder",
-        "sets": "list parameter sets, or show one with the source of every value",
-        "audit": "check a parameter set for contradictions",
-    },
-    "from bench to model": {
-        "record": "record a bench that speaks the protocol of 'ppafo hil'",
-        "rig": "record synthetic bench data on the virtual test rig",
-    },
-    "decide": {},
-    "walk": {
-        "gait": "list, show and import gaits",
-    },
-    "tools": {
-        "export": "write a scenario or a walk for other tools: a library in C, an FMU, a controller for 'ppafo hil'",
-        "firmware": "write the controller of a scenario as firmware for a small processor",
-        "chip": "run a scenario with its controller on the simulator of a small processor",
-        "hil": "run a scenario's plant in real time against a controller at a serial port or over UDP",
-        "cache": "show, compile or remove the compiled models of this computer",
-        "schema": "print the JSON Schema of a file format",
-    },
-}
-"""Headings of the help, by what somebody has come for, and under each the subcommands that are no questions.
-
-A subcommand is a module of ``cli`` with ``add_arguments`` and ``run``. Questions say their heading themselves.
-"""
-
-COMMANDS = (*(name for group in SUBCOMMANDS.values() for name in group), *QUESTIONS)
-"""The commands of this package; questions of other packages are commands too."""
 
 FIRST_STEPS = """\
 Model-based design of pneumatic powered orthoses. Start with one of these:
@@ -73,152 +36,12 @@ your device
   ppafo design push-off                     from a torque profile to valve, pressure and bottle; also from a wearer
   ppafo identify FILE                       from bench recordings to parameters with intervals
 learn
-  ppafo examples                            the examples of the how-to pages, ready to run
+  ppafo new example                         the examples of the how-to pages, ready to run
 
 All commands: ppafo --help"""
 """What ``ppafo`` alone prints."""
 
-MOVED: dict[str, str] = {
-    "bench": "'python -m benchmarks' or 'make bench'",
-    "coverage": "'python scripts/interval_coverage.py'",
-}
-"""Commands that the package had once, and what does the same in a checkout of the repository."""
-
-JOINED: dict[str, str] = {"size": "design"}
-"""Commands that are part of another one, which takes the same words."""
-
-
-_BAD_VALUE = re.compile(r"argument (?:--?\w+/)*(\S+): (?!invalid )(.+: .+)")
-"""What argparse makes of an ArgumentTypeError."""
-
-_NEGATIVE_NUMBER = re.compile(r"-\d+|-\d*\.\d+")
-
-
-RENAMED = {
-    "--first": "--first-draws",
-    "--maximum": "--draws",
-    "--most": "--draws",
-    "--most-failed": "--maximum-failed",
-    "--runs": "--draws",
-    "--least-strides": "--minimum-strides",
-}
-"""Options of version 0.1 and what they are called now."""
-
-STILL_READ = {"--gas-per-step": "--gas-per-stride", "--step-time": "--stride-time"}
-"""Options of 0.2 and their present names, under which they are read for one more version; then they are ``RENAMED``."""
-
-REMOVED = {"--config": "name what is run without it, as in 'ppafo walk solenoid'"}
-"""Options of version 0.1 that are none any more, and what to write instead."""
-
-
-class UsageError(PpafoError):
-    """The words after ``ppafo`` are not an order that it knows."""
-
-
-@final
-class CommandParser(argparse.ArgumentParser):
-    """A parser that raises ``UsageError`` where argparse would print its usage and end the process."""
-
-    list_commands: Callable[[], str] | None = None
-    """What follows the description in the help; made only there, as it loads every question."""
-
-    def format_help(self) -> str:
-        """Return the help, with the commands where there are some."""
-        if self.list_commands is not None:
-            self.description, self.list_commands = f"{self.description}\n\n{self.list_commands()}", None
-        return super().format_help()
-
-    def error(self, message: str) -> NoReturn:
-        """Raise the message of argparse as an error of one line that names the help to look at."""
-        bad_value = _BAD_VALUE.fullmatch(message)
-        if bad_value is not None:
-            raise UsageError(f"{bad_value[1]} {bad_value[2]}")
-        raise UsageError(f"{message.removeprefix('argument ')}; see '{self.prog} --help'")
-
-    def _print_message(self, message: str, file: "SupportsWrite[str] | None" = None) -> None:
-        """Print a help text; some versions of Python leave it to the caller that it cannot be written."""
-        with printing():
-            super()._print_message(message, file)
-
-    def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
-        """End the process after ``--help`` or ``--version``, once their text has really been written."""
-        flush_output()
-        super().exit(status, message)
-
-    def options(self) -> set[str]:
-        """Return every option of this parser and of the subcommands that it knows."""
-        found = {name for action in self._actions for name in action.option_strings}
-        for action in self._actions:
-            if isinstance(action.choices, Mapping):
-                found = found.union(*(parser.options() for parser in action.choices.values()))
-        return found
-
-
-def check_command(word: str | None) -> None:
-    """Refuse a word in the place of the command that names none; argparse would list them without the nearest.
-
-    KindError for a question of another package that is there and cannot be used.
-    """
-    if word is None or word in COMMANDS:
-        return
-    if word in MOVED:
-        raise UsageError(f"'{word}' is no longer a command of the package: run {MOVED[word]} in a checkout of ppafo")
-    if word in JOINED:
-        raise UsageError(f"'{word}' is now part of '{JOINED[word]}': 'ppafo {JOINED[word]}' takes the same arguments")
-    if word not in QUESTIONS:
-        known = tuple(dict.fromkeys((*COMMANDS, *QUESTIONS)))
-        hint = nearest_name(word, known)
-        raise UsageError(f"there is no command '{word}'{hint}; available: {', '.join(known)}")
-
-
-def present_options(words: list[str], parser: CommandParser) -> list[str]:
-    """Return the words with options by their present names; one line for each that has another."""
-    known, present = parser.options(), list(words)
-    for place, word in enumerate(takewhile(lambda word: word != "--", words)):
-        name, equals, value = word.partition("=")
-        now = STILL_READ.get(name)
-        if now in known:
-            print(f"ppafo: {name} is now called {now}; the old name is read in this version only", file=sys.stderr)
-            present[place] = f"{now}{equals}{value}"
-    return present
-
-
-def check_options(words: Sequence[str], parser: CommandParser) -> None:
-    """Refuse an option that no part of the parser has, before argparse complains of what it finds missing besides."""
-    known = sorted(parser.options())
-    for word in takewhile(lambda word: word != "--", words):
-        name = word.partition("=")[0]
-        if name in RENAMED and name not in known and RENAMED[name] in known:
-            raise UsageError(f"{name} is now called {RENAMED[name]}")
-        if _looks_like_option(word) and not any(_stands_for(name, option) for option in known):
-            if name in REMOVED:
-                raise UsageError(f"there is no option '{name}' any more: {REMOVED[name]}")
-            raise UsageError(
-                f"there is no option '{name}'{_nearest_option(name, known)}; available: {', '.join(known)}"
-            )
-
-
-def _nearest_option(name: str, known: Sequence[str]) -> str:
-    """Return the hint; the dashes, which all have in common, would make strangers look alike."""
-    hint = nearest_name(name.strip("-"), [option.removeprefix("--") for option in known if option.startswith("--")])
-    return hint.replace("'", "'--", 1)
-
-
-def _looks_like_option(word: str) -> bool:
-    """Tell whether argparse takes a word for an option: a dash alone, numbers and words with a space are values."""
-    is_number = _NEGATIVE_NUMBER.fullmatch(word) is not None
-    return word.startswith("-") and len(word) > 1 and " " not in word and not is_number
-
-
-def _stands_for(name: str, option: str) -> bool:
-    """Tell whether a name is an option, the beginning of a long one, or a short one with its value behind it."""
-    if name.startswith("--"):
-        return option.startswith(name)
-    return name == option or (len(option) == 2 and name.startswith(option))
-
-
 EXIT_BAD_INPUT = 2
-EXIT_INTERRUPTED = 130
 _LONGEST_MESSAGE = 1000
 _DURATION = "run.duration"
 
@@ -226,8 +49,9 @@ OBJECTS_BETWEEN_COLLECTIONS = 1_000_000
 """The usual 700 make Python look for garbage hundreds of times while it imports, which is a tenth of a start."""
 
 
-def build_parser(chosen: str | None) -> CommandParser:
-    """Return the parser; only the chosen subcommand's module is imported, so that help is quick."""
+def build_parser(words: Sequence[str]) -> CommandParser:
+    """Return the parser; only the module of the verb that the words name is imported, so that help is quick."""
+    chosen = [word for word in words if not word.startswith("-")]
     parser = CommandParser(
         prog="ppafo",
         usage="ppafo [-h] [--version] COMMAND ...",
@@ -235,39 +59,36 @@ def build_parser(chosen: str | None) -> CommandParser:
         epilog="'ppafo COMMAND --help' shows what a command takes.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.list_commands = _list_commands
+    parser.list_commands = list_commands
     parser.add_argument("--version", action="version", version=f"ppafo {__version__}")
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", prog="ppafo", help=argparse.SUPPRESS)
-    plain = {name: summary for group in SUBCOMMANDS.values() for name, summary in group.items()}
-    for name in dict.fromkeys((*COMMANDS, *QUESTIONS)):
-        if name != chosen:
+    for name in dict.fromkeys((*COMMANDS, *OTHERS)):
+        if name not in chosen[:1]:
             subparsers.add_parser(name)
-        elif name in plain:
-            subparser = subparsers.add_parser(name, description=plain[name])
-            module = importlib.import_module(f"ppafo.cli.{name}")
-            module.add_arguments(subparser)
-            subparser.set_defaults(run=module.run)
+            continue
+        command = COMMANDS.get(name) or Command("", found=OTHERS[name])
+        if isinstance(command, Group):
+            _add_group(subparsers.add_parser(name, description=_sentence(command.summary)), name, command, chosen[1:2])
         else:
-            from ppafo.cli import question as runner
-
-            declared = QUESTIONS[name]
-            subparser = subparsers.add_parser(name, description=declared.summary)
-            runner.add_arguments(subparser, declared)
-            subparser.set_defaults(run=partial(runner.run, question=declared))
+            _add_command(subparsers.add_parser(name, description=_sentence(command.summary)), name, command)
     return parser
 
 
-def _list_commands() -> str:
-    """Return the commands with what each does, group by group, with the questions of other packages."""
-    QUESTIONS.load_all()
-    groups = {heading: dict(group) for heading, group in SUBCOMMANDS.items()}
-    for name, declared in QUESTIONS.loaded().items():
-        groups.setdefault(declared.group, {})[name] = declared.summary
-    width = max(len(name) for group in groups.values() for name in group)
-    return "\n\n".join(
-        "\n".join([f"{heading}:", *(f"  {name:<{width}}  {summary}" for name, summary in group.items())])
-        for heading, group in groups.items()
-    )
+def _add_group(parser: argparse.ArgumentParser, name: str, group: Group, chosen: Sequence[str]) -> None:
+    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
+    for action, command in group.actions.items():
+        subparser = actions.add_parser(action, help=command.summary, description=_sentence(command.summary))
+        if action in chosen:
+            _add_command(subparser, f"{name} {action}", command)
+
+
+def _add_command(parser: argparse.ArgumentParser, name: str, command: Command) -> None:
+    add_parameters(parser, command)
+    parser.set_defaults(run=partial(run, name=name, command=command))
+
+
+def _sentence(summary: str) -> str:
+    return f"{summary[:1].upper()}{summary[1:]}."
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -287,9 +108,8 @@ def _run(words: list[str]) -> int:
         for word in words:
             if not word.isascii() and any("\ud800" <= character <= "\udfff" for character in word):
                 raise UsageError(f"'{one_line(word)}' is not text in UTF-8; give the file or folder another name")
-        chosen = next((word for word in words if not word.startswith("-")), None)
-        check_command(chosen)
-        parser = build_parser(chosen)
+        check_words(words)
+        parser = build_parser(words)
         words = present_options(words, parser)
         check_options(words, parser)
         parsed = parser.parse_args(words)

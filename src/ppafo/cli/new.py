@@ -1,6 +1,5 @@
-"""``ppafo new KIND NAME``: an input file to start from, a commented template or a copy of a file of the package."""
+"""``ppafo new KIND NAME``: an input file to start from, a template or a copy of a shipped one; or an example."""
 
-import argparse
 import json
 import os
 import re
@@ -9,12 +8,14 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
-from ppafo.cli import output
+from ppafo.cli.examples import list_examples, write_example
+from ppafo.cli.output import Said
 from ppafo.errors import DataError, nearest_name, one_line
+from ppafo.kinds import kind_at
 
 _SUFFIX = ".toml"
 _SCHEMAS = {"set": "parameters"}
-"""Kinds that ``ppafo schema`` has under another name."""
+"""Kinds that ``ppafo doctor --schema`` has under another name."""
 _TEMPLATES = resources.files("ppafo.cli") / "templates"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 _NAME_LINE = re.compile(r"""^name *= *(["'])(.*?)\1""", re.MULTILINE)
@@ -39,7 +40,7 @@ KINDS: dict[str, _NewFile] = {
     "scenario": _NewFile(
         "scenario", "scenarios", "ppafo.simulation.loading:load_scenario", "ppafo simulate FILE --out out/NAME"
     ),
-    "set": _NewFile("parameter set", "parameters/sets", "ppafo.parameters:load_parameter_set", "ppafo audit FILE"),
+    "set": _NewFile("parameter set", "parameters/sets", "ppafo.parameters:load_parameter_set", "ppafo sets audit FILE"),
     "study": _NewFile(
         "study", "studies/library", "ppafo.studies.loading:load_study", "ppafo sweep FILE --out out/NAME"
     ),
@@ -65,48 +66,44 @@ KINDS: dict[str, _NewFile] = {
         "bottle",
         "parameters/bottles/files",
         "ppafo.parameters.bottles.bottle:load_bottle",
-        "ppafo endurance --bottle FILE --gas-per-stride '0.3 g' --out out/NAME",
+        "ppafo bottle --bottle FILE --gas-per-stride '0.3 g' --out out/NAME",
     ),
     "parts": _NewFile(
         "catalogue of parts",
         "parameters/parts/catalogues",
         "ppafo.parameters.parts:load_catalogue",
-        "ppafo parts --catalogue FILE",
+        "ppafo sets parts --catalogue FILE",
     ),
 }
 """What can be begun. To add one: a template of that name in ``templates``, and an entry here."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of this command."""
-    parser.add_argument("kind", metavar="KIND", help=f"one of: {', '.join(KINDS)}")
-    parser.add_argument("name", metavar="NAME", help="name of the file and of what it describes")
-    parser.add_argument(
-        "--from", dest="source", metavar="SOURCE", help="copy this one: a shipped name, or a .toml file"
-    )
-    output.add_json_argument(parser)
-    parser.add_argument("--out", metavar="FILE", type=Path, help="the .toml file to write; default NAME.toml")
+EXAMPLE = "example"
 
 
-def run(parsed: argparse.Namespace) -> int:
-    """Write the file, see that it loads, and say what to run next."""
-    if parsed.kind not in KINDS:
-        hint = nearest_name(parsed.kind, KINDS)
-        raise DataError(f"there is no kind of file '{parsed.kind}'{hint}; available: {', '.join(KINDS)}")
-    if not _NAME.fullmatch(parsed.name):
-        raise DataError(
-            f"NAME {one_line(parsed.name)}: must consist of letters, digits, - and _; use --out for the path"
-        )
-    kind, path = KINDS[parsed.kind], parsed.out or Path(parsed.name + _SUFFIX)
+def begin(kind: str, name: str | None, source: str | None, out: Path | None) -> Said:
+    """Write the file, see that it loads, and say what to run next; or list the examples, or write one."""
+    if kind == EXAMPLE:
+        if source is not None or (name is None and out is not None):
+            raise DataError(
+                "--from: is not for an example" if source else "--out: needs the NAME of the example to write"
+            )
+        return list_examples() if name is None else write_example(name, out or Path(name))
+    known = (*KINDS, EXAMPLE)
+    if kind not in known:
+        raise DataError(f"there is no kind of file '{kind}'{nearest_name(kind, known)}; available: {', '.join(known)}")
+    if name is None or not _NAME.fullmatch(name):
+        given = "is missing, and" if name is None else f"{one_line(name)}:"
+        raise DataError(f"NAME {given} must consist of letters, digits, - and _; use --out for the path")
+    chosen, path = KINDS[kind], out or Path(name + _SUFFIX)
     if path.suffix != _SUFFIX:
         raise DataError(f"--out {path}: the name must end in {_SUFFIX}")
     if os.path.lexists(path):
         raise DataError(f"{path}: already exists; remove it or choose another name")
-    from ppafo.questions.question import load_name
     from ppafo.storage.files import write_file
 
-    load = load_name(kind.load)
-    write_file(path, _content(parsed.kind, parsed.source, parsed.name, path).encode())
+    load = kind_at(chosen.load)
+    write_file(path, _content(kind, source, name, path).encode())
     # What does not load, such as a file with a path relative to another folder, is not left.
     is_good = False
     try:
@@ -115,10 +112,9 @@ def run(parsed: argparse.Namespace) -> int:
     finally:
         if not is_good:
             path.unlink(missing_ok=True)
-    command = kind.command.replace("FILE", shlex.quote(str(path))).replace("NAME", parsed.name)
-    document = {"kind": parsed.kind, "name": parsed.name, "file": str(path), "next": command}
-    output.print_result(f"written: {path}; next: {command}", document, parsed.json)
-    return output.EXIT_GOOD
+    command = chosen.command.replace("FILE", shlex.quote(str(path))).replace("NAME", name)
+    document = {"kind": kind, "name": name, "file": str(path), "next": command}
+    return Said(f"written: {path}; next: {command}", document)
 
 
 def _content(kind: str, source: str | None, name: str, path: Path) -> str:
@@ -136,7 +132,7 @@ def _content(kind: str, source: str | None, name: str, path: Path) -> str:
         return text
     head, rest = text[: named.start()], text[named.end() :]
     if kind == "set" and source is not None:
-        # What the copy changes is shown by 'ppafo audit'; what the source changed is not its matter.
+        # What the copy changes is shown by 'ppafo sets audit'; what the source changed is not its matter.
         parent = source if source in files.names() else os.path.relpath(source, path.parent)
         rest = f"\nparent = {json.dumps(parent, ensure_ascii=False)}{_PARENT_LINE.sub('', rest, count=1)}"
     text = f'{head}name = "{name}"{rest}'

@@ -1,4 +1,4 @@
-"""Arguments that commands share, printing as text or JSON, and files that are never half written."""
+"""Delivery of a result: printed as text or JSON, written into a folder whole or not at all, an exit code."""
 
 import argparse
 import contextlib
@@ -9,12 +9,14 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError, one_line, reason
+from ppafo.progress import ProgressLine
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 
 EXIT_GOOD = 0
 EXIT_CHECK_FAILED = 1
+EXIT_INTERRUPTED = 130
 
 
 def add_output_arguments(parser: argparse.ArgumentParser, default: str = "") -> None:
@@ -38,28 +41,16 @@ def add_json_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
 
 
-def add_override_argument(parser: argparse.ArgumentParser) -> None:
-    """Add ``--set PATH=VALUE``, which every command that takes a device has."""
-    parser.add_argument(
-        "--set",
-        dest="overrides",
-        metavar="PATH=VALUE",
-        action="append",
-        default=[],
-        help="override one value, for example valve.area=12.6mm^2; may be repeated",
-    )
-
-
-def check_output(parsed: argparse.Namespace, kept: Mapping[str, bytes] | None = None) -> None:
+def check_output(out: Path | None, command: str, kept: Mapping[str, bytes] | None = None) -> None:
     """Refuse, before anything runs, a folder of ``--out`` that is not absent, empty or this command's own result.
 
     Files that will be ``kept`` as they are may have grown since it was written.
     """
-    if parsed.out is not None:
+    if out is not None:
         from ppafo.storage.result_folder import check_owned_folder, marked_folder
 
         with blame_out_option():
-            check_owned_folder(parsed.out, marked_folder(_command(parsed)), kept or {})
+            check_owned_folder(out, marked_folder(command), kept or {})
 
 
 def check_new_file(path: Path) -> None:
@@ -77,59 +68,76 @@ def blame_out_option() -> Iterator[None]:
         raise DataError(f"--out {error}") from error
 
 
-def _command(parsed: argparse.Namespace) -> str:
-    """Return the command with its action, such as ``gait show``."""
-    return " ".join(word for word in (parsed.command, getattr(parsed, "action", None)) if word)
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What a command that solves no question says: its text, its JSON document, and what else it leaves behind.
+
+    ``name`` is that of the files in the folder of ``--out``, in which ``draw`` makes a figure. ``aside`` is a line
+    for standard error after the result.
+    """
+
+    text: str
+    document: Mapping[str, Any]
+    name: str = ""
+    exit_code: int = EXIT_GOOD
+    aside: str = ""
+    draw: "Callable[[], Figure] | None" = None
+
+
+class Answering(Protocol):
+    """What a solved question can do."""
+
+    def answer(self) -> "Answer":
+        """Return sections for people and data for programs."""
 
 
 def deliver(
-    name: str,
-    text: str,
-    document: Mapping[str, Any],
-    parsed: argparse.Namespace,
-    draw: "Callable[[], Figure] | None" = None,
-) -> None:
-    """Write text and JSON document as ``NAME.txt`` and ``NAME.json`` where requested, and print one of them.
+    found: "Said | Answer | Answering", as_json: bool, out: Path | None, command: str, *, has_written: bool = False
+) -> int:
+    """Write what a verb returned into a folder where requested, print it as text or JSON, and return the exit code.
 
-    A figure, which is drawn only then, is written beside them.
+    ``has_written`` is true of a verb which writes itself; the data of its answer name the folder.
     """
-    if parsed.out is not None:
-        contents = {f"{name}.txt": text, f"{name}.json": json_text(document)}
-        files = {file: f"{content}\n".encode() for file, content in contents.items()}
-        if draw is not None:
-            load_drawing()
-            from ppafo.answers.style import render_figure
+    if isinstance(found, Said):
+        if out is not None:
+            write_files(out, said_files(found), command)
+        print_result(found.text, found.document, as_json)
+        if found.aside:
+            print(f"ppafo: {found.aside}", file=sys.stderr)
+        return found.exit_code
+    from ppafo.answers import Answer
+    from ppafo.answers.writing import REPORT, text_of
 
-            files |= {f"{name}.{form}": content for form, content in render_figure(draw(), ("png", "svg")).items()}
-        write_files(parsed, files)
-    print_result(text, document, parsed.json)
-
-
-def deliver_answer(answer: "Answer", parsed: argparse.Namespace, filled: str | None = None) -> int:
-    """Write an answer where requested, print it as text or JSON, and return the exit code.
-
-    ``filled`` is a folder that has the files already.
-    """
-    from ppafo.answers.writing import text_of
-
-    text, folder = text_of(answer), filled
-    if filled is None and parsed.out is not None:
+    answer = found if isinstance(found, Answer) else found.answer()
+    text, folder = text_of(answer), str(answer.data["folder"]) if has_written else None
+    if out is not None:
         load_drawing()
         from ppafo.answers.writing import files_of
 
-        write_files(parsed, files_of(answer))
-        folder = str(parsed.out)
+        write_files(out, files_of(answer), command)
+        folder = str(out)
     if folder is not None:
-        from ppafo.answers.writing import REPORT
-
         text += f"\n\nreport: {folder}/{REPORT}"
-    document = answer.data if folder is None else {**answer.data, "folder": folder}
-    print_result(text, document, parsed.json)
+    print_result(text, answer.data if folder is None else {**answer.data, "folder": folder}, as_json)
     return EXIT_GOOD if answer.passed else EXIT_CHECK_FAILED
 
 
+def said_files(said: Said) -> dict[str, bytes]:
+    """Return text, JSON document and figure as the files of a result folder."""
+    contents = {f"{said.name}.txt": said.text, f"{said.name}.json": json_text(said.document)}
+    files = {file: f"{content}\n".encode() for file, content in contents.items()}
+    if said.draw is None:
+        return files
+    load_drawing()
+    from ppafo.answers.style import render_figure
+
+    return files | {
+        f"{said.name}.{form}": content for form, content in render_figure(said.draw(), ("png", "svg")).items()
+    }
+
+
 def print_result(text: str, document: Mapping[str, Any], as_json: bool) -> None:
-    """Print the text, or the document as JSON; ends quietly where the reader has gone, as in ``ppafo sets | head``."""
+    """Print the text, or the document as JSON; ends quietly where the reader has gone, as in ``... | head``."""
     with printing():
         shown = json_text(document) if as_json else text
         encoding = sys.stdout.encoding or "utf-8"
@@ -161,12 +169,36 @@ def _drop_output() -> None:
     os.close(nowhere)
 
 
-def write_files(parsed: argparse.Namespace, contents: Mapping[str, bytes]) -> None:
+def write_files(out: Path, contents: Mapping[str, bytes], command: str) -> None:
     """Make the folder of ``--out`` hold exactly these files, and the mark by which it is known: all of them or none."""
     from ppafo.storage.result_folder import write_marked_folder
 
     with blame_out_option():
-        write_marked_folder(parsed.out, contents, _command(parsed))
+        write_marked_folder(out, contents, command)
+
+
+def write_for(out: Path, contents: Mapping[str, bytes], following: str, **more: Any) -> Said:
+    """Return what is said of files that were written for another tool, and of what to do next with them."""
+    document = {"folder": str(out), **more, "files": list(contents), "next": following}
+    return Said(f"written: {out} ({', '.join(contents)}); next: {following}", document)
+
+
+@contextmanager
+def progress_line() -> Iterator[ProgressLine]:
+    """Show progress on the side for the length of a ``with`` block; what is logged begins on a line of its own."""
+    line = ProgressLine(sys.stderr)
+    logger = logging.getLogger("ppafo")
+
+    def end_line(_record: logging.LogRecord) -> bool:
+        line.close()
+        return True
+
+    logger.addFilter(end_line)
+    try:
+        yield line
+    finally:
+        logger.removeFilter(end_line)
+        line.close()
 
 
 def tell(text: str) -> None:

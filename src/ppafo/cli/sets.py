@@ -1,10 +1,10 @@
-"""``ppafo sets``: which parameter sets there are, and what is in one, value by value."""
+"""``ppafo sets list`` and ``show``: which parameter sets there are, and what is in one, value by value."""
 
-import argparse
 import textwrap
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from ppafo.cli import output
+from ppafo.cli.output import Said
 
 if TYPE_CHECKING:
     from ppafo.parameters import ParameterSet
@@ -14,42 +14,23 @@ _SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow", "eff
 _COLUMNS = ("path", "value", "unit", "origin", "source")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of this command."""
-    output.add_output_arguments(parser)
-    actions = parser.add_subparsers(dest="action", metavar="ACTION")
-    show = actions.add_parser(
-        "show",
-        help="show one set",
-        description="Show every value of a set and its source.",
-        argument_default=argparse.SUPPRESS,
-    )
-    show.add_argument("name", metavar="SET", help="name of a set, or a .toml file")
-    output.add_override_argument(show)
-    output.add_output_arguments(show)
-
-
-def run(parsed: argparse.Namespace) -> int:
-    """List the sets, or show one."""
-    output.check_output(parsed)
-    if parsed.action == "show":
-        from ppafo.parameters import apply_overrides, load_parameter_set
-
-        parameter_set = apply_overrides(load_parameter_set(parsed.name), parsed.overrides)
-        output.deliver(parameter_set.name, _text(parameter_set), _document(parameter_set), parsed)
-    else:
-        _list(parsed)
-    return output.EXIT_GOOD
-
-
-def _list(parsed: argparse.Namespace) -> None:
+def list_sets() -> Said:
+    """Return names and titles of the sets of the package."""
     from ppafo.parameters import list_sets, load_parameter_set
 
     sets = [load_parameter_set(name) for name in list_sets()]
     width = max(len(item.name) for item in sets)
     text = "\n".join(f"{item.name:<{width}}  {item.title}" for item in sets)
     document = {"sets": [{"name": item.name, "title": item.title, "valves": dict(item.valve_kinds)} for item in sets]}
-    output.deliver("sets", text, document, parsed)
+    return Said(text, document, "sets")
+
+
+def show_set(name: str, overrides: Sequence[str]) -> Said:
+    """Return every value of a set with its source."""
+    from ppafo.parameters import apply_overrides, load_parameter_set
+
+    parameter_set = apply_overrides(load_parameter_set(name), overrides)
+    return Said(_text(parameter_set), _document(parameter_set), parameter_set.name)
 
 
 def _document(parameter_set: "ParameterSet") -> dict[str, Any]:

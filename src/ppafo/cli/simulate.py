@@ -1,13 +1,12 @@
 """``ppafo simulate SCENARIO``: runs a scenario and writes a result folder, with a report that simulates."""
 
-import argparse
-import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ppafo.cli import output
+from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, Said
 from ppafo.documents.json_text import json_text
-from ppafo.errors import ScenarioError
 
 if TYPE_CHECKING:
     from ppafo.answers import Answer
@@ -20,41 +19,19 @@ CHECK_FILE = "check.json"
 FIGURE = "figure"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of this command."""
-    parser.add_argument(
-        "scenario", metavar="SCENARIO", nargs="?", help="name of a scenario or of a walk, or a .toml file"
-    )
-    output.add_override_argument(parser)
-    parser.add_argument("--list", action="store_true", help="list the scenarios and walks that come with the package")
-    parser.add_argument(
-        "--check",
-        action="store_true",
-        help="run again with finer steps and from a start moved by 1e-7, and report which metrics can be repeated",
-    )
-    output.add_json_argument(parser)
-    parser.add_argument(
-        "--out", metavar="DIR", type=Path, help="result folder with the report; default out/NAME of the scenario"
-    )
-
-
-def run(parsed: argparse.Namespace) -> int:
-    """Run a scenario and say what came of it; 1 where the run diverged, or a check finds it numerically sensitive."""
-    if parsed.list:
-        return _list(parsed)
-    if parsed.scenario is None:
-        raise ScenarioError("no scenario was given: name one or give a .toml file; 'ppafo simulate --list' shows them")
+def simulate_scenario(name: str, check_it: bool, overrides: Sequence[str], out: Path | None) -> Said:
+    """Run a scenario and write its folder; exit code 1 where it diverged, or a check finds it numerically sensitive."""
     from ppafo.loading import load_scenario
     from ppafo.storage import check_result_folder
 
-    scenario = load_scenario(parsed.scenario, parsed.overrides)
-    folder = parsed.out if parsed.out is not None else DEFAULT_FOLDER / scenario.name
+    scenario = load_scenario(name, overrides)
+    folder = out if out is not None else DEFAULT_FOLDER / scenario.name
     with output.blame_out_option():
         check_result_folder(folder)
     from ppafo.simulation.simulate import simulate
 
     result = simulate(scenario)
-    check = result.check() if parsed.check and result.status.is_completed else None
+    check = result.check() if check_it and result.status.is_completed else None
     error = _error(result) if check is None else check.error
     output.load_drawing()
     from ppafo.answers.recording_figure import figure_files
@@ -75,11 +52,13 @@ def run(parsed: argparse.Namespace) -> int:
         **({} if check is None else {"check": check.document()}),
         "folder": str(folder),
     }
-    output.print_result(_text(result, error, check, folder), document, parsed.json)
-    if result.status.is_completed:
-        return output.EXIT_GOOD if check is None or check.is_determined else output.EXIT_CHECK_FAILED
-    print(f"ppafo: {scenario.name}: {result.status.message}", file=sys.stderr)
-    return output.EXIT_CHECK_FAILED
+    is_good = result.status.is_completed and (check is None or check.is_determined)
+    return Said(
+        _text(result, error, check, folder),
+        document,
+        exit_code=EXIT_GOOD if is_good else EXIT_CHECK_FAILED,
+        aside="" if result.status.is_completed else f"{scenario.name}: {result.status.message}",
+    )
 
 
 def _error(result: "Result") -> "ErrorEstimate | None":
@@ -125,15 +104,11 @@ def _answer(result: "Result", check: "Check | None") -> "Answer":
     )
 
 
-def _list(parsed: argparse.Namespace) -> int:
+def list_descriptions() -> list[dict[str, Any]]:
+    """Return name and description of each scenario and walk of the package."""
     from ppafo.loading import list_all_scenarios, load_scenario
 
-    summaries = {name: load_scenario(name).description for name in list_all_scenarios()}
-    width = max(len(name) for name in summaries)
-    text = "\n".join(f"{name:<{width}}  {' '.join(summary.split())}" for name, summary in summaries.items())
-    document = {"scenarios": [{"name": name, "description": summary} for name, summary in summaries.items()]}
-    output.print_result(text, document, parsed.json)
-    return output.EXIT_GOOD
+    return [{"name": name, "description": load_scenario(name).description} for name in list_all_scenarios()]
 
 
 def _text(result: "Result", error: "ErrorEstimate | None", check: "Check | None", folder: Path) -> str:

@@ -32,7 +32,7 @@ def beside(name: str, folder: Path, known: Collection[str] = ()) -> str:
 
 @dataclass(frozen=True, slots=True)
 class TomlKind:
-    """A kind of file: what messages call it, its name for ``ppafo schema``, those of the package, the error raised."""
+    """A kind of file: what messages call it, its name for ``--schema``, those of the package, the error raised."""
 
     noun: str
     schema: str
@@ -65,7 +65,7 @@ class TomlKind:
         except UnicodeDecodeError as error:
             raise self.error(f"{file}: is not a text file in UTF-8 (byte {error.start})") from error
         if not text.strip():
-            raise self.error(f"{file}: is empty; 'ppafo schema {self.schema}' prints its format")
+            raise self.error(f"{file}: is empty; 'ppafo doctor --schema {self.schema}' prints its format")
         if _DEEP_KEY.search(text):
             raise self.error(f"{file}: {_TOO_DEEP}")
         try:

@@ -383,7 +383,7 @@ def _why_not_private(folder: Path, found: os.stat_result, above: list[os.stat_re
     if found.st_uid != os.geteuid():
         return f"{folder} belongs to another user"
     if found.st_mode & WRITTEN_BY_OTHERS:
-        return f"others can write into {folder}; 'ppafo cache --clear' and 'chmod 700' make it safe"
+        return f"others can write into {folder}; 'ppafo doctor --clear' and 'chmod 700' make it safe"
     is_exchanged = any(_can_be_exchanged(place) for place in above)
     return f"others can put another folder in the place of {folder}" if is_exchanged else ""
 

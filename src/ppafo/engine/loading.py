@@ -172,7 +172,7 @@ def _load_by(source: str, compilers: tuple[Compiler, ...]) -> ModuleType:
             raise SimulationError(f"{failure}; {remedy}") from failure
         with _LEAVING_OUT:
             if compiler.identity() not in _FAILED:  # another thread may have found it at the same time
-                until = "in this run" if failure.passing else "for a day, or until 'ppafo cache --clear'"
+                until = "in this run" if failure.passing else "for a day, or until 'ppafo doctor --clear'"
                 logger.warning("ppafo: %s; models are compiled by %s instead %s", failure, left[0].name, until)
             _leave_out(failed, failure)
         return _load_by(source, left)

@@ -39,7 +39,7 @@ AT_REST = LaneResult(command=0.0, failure_time=NEVER_FAILED, too_many_parts=0.0)
 """A device before its first step."""
 TOO_MANY_PARTS = (
     f"a step was cut into {MAXIMUM_PARTS:,} parts and was still not done: try a smaller run.step, and check the delays "
-    "of the valve, the inertia and the volumes (ppafo audit)"
+    "of the valve, the inertia and the volumes (ppafo sets audit)"
 )
 """Remedy for a run that ``LaneResult.too_many_parts`` ended."""
 WHOLE = 1.0e-9

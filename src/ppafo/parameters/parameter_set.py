@@ -85,7 +85,7 @@ class Citation(StrictTable):
 class Accepted(StrictTable):
     """A contradiction that the author of the set knows of and keeps, with the reason."""
 
-    finding: Annotated[Text, Field(description="identifier of the finding, as 'ppafo audit' prints it")]
+    finding: Annotated[Text, Field(description="identifier of the finding, as 'ppafo sets audit' prints it")]
     reason: Text
 
 

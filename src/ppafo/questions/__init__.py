@@ -1,1 +1,1 @@
-"""Questions beyond one run: a folder each, with what it declares, its file, its solution, its answer; catalogue.py."""
+"""Questions beyond one run: a folder each, with its file, its solution and its answer."""

@@ -226,7 +226,7 @@ def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Pres
 def _parse(document: dict[str, Any], file: str) -> Preset:
     """Check keys, units and ranges of a document; every value must be there."""
     if not document:
-        raise ParameterError(f"{file}: holds no values; 'ppafo schema rig' prints its format")
+        raise ParameterError(f"{file}: holds no values; 'ppafo doctor --schema rig' prints its format")
     _check_names(document, (*_HEAD, *SECTIONS), "", file)
     if document.get("schema_version") != 1:
         raise ParameterError(f"{file}: schema_version must be 1, it is {quote(document.get('schema_version'))}")

@@ -55,7 +55,7 @@ OPEN_LOOP = "constant"
 
 REMEDY = (
     "the step may be too long for this device, or a value unrealistic: try a smaller run.step, "
-    "and check the inertia, the volumes and the valve area (ppafo audit)"
+    "and check the inertia, the volumes and the valve area (ppafo sets audit)"
 )
 
 _OF_STEPS = ("result.failure_time", "result.too_many_parts", "pace.", "valve_state.", "controller_state.")

@@ -72,7 +72,7 @@ def replay_recording(
     failed = float(outcome.states[rows["result.failure_time"], 0])
     if failed < NEVER_FAILED or not np.isfinite(outcome.record).all():
         until = min(failed, run.step * run.step_count)
-        remedy = "check the volumes, the inertia and the valve of the set (ppafo audit)"
+        remedy = "check the volumes, the inertia and the valve of the set (ppafo sets audit)"
         if outcome.states[rows["result.too_many_parts"], 0]:
             remedy = TOO_MANY_PARTS
         raise SimulationError(f"{measured.file}: the model diverged {until:.6g} s after the first sample; {remedy}")

@@ -1,4 +1,4 @@
-"""``ppafo design`` and ``ppafo parts``, from files to files."""
+"""``ppafo design`` and ``ppafo sets parts``, from files to files."""
 
 import json
 from pathlib import Path
@@ -140,16 +140,16 @@ def test_files_of_the_package_are_listed(capsys: pytest.CaptureFixture[str]) -> 
 
 
 def test_parts_are_listed_with_what_is_doubtful_and_what_is_not_known(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["parts"]) == 0
+    assert main(["sets", "parts"]) == 0
     printed = capsys.readouterr().out
     assert all(part.name in printed for part in load_catalogue().parts)
-    assert main(["parts", "enfield-ls-v05s"]) == 0
+    assert main(["sets", "parts", "enfield-ls-v05s"]) == 0
     printed = capsys.readouterr().out
     assert "31.6 mm^2  published" in printed
     assert "not known: largest_pressure, nominal_flow, spool_frequency" in printed
 
 
-@pytest.mark.parametrize("name", ["parts", "design"])
+@pytest.mark.parametrize("name", ["sets", "parts", "design"])
 def test_the_layouts_of_the_files_are_published(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["schema", name]) == 0
+    assert main(["doctor", "--schema", name]) == 0
     assert json.loads(capsys.readouterr().out)["$schema"].startswith("https://json-schema.org")

@@ -1,4 +1,4 @@
-"""``ppafo examples``: what the how-to pages show, as files."""
+"""``ppafo new example``: what the how-to pages show, as files."""
 
 import json
 import re
@@ -48,13 +48,13 @@ def test_every_command_is_one_and_every_file_that_it_names_is_there(name: str) -
     for command in example.commands:
         words = shlex.split(command)
         if words[0] == "ppafo" and f'\n{words[1]} = "' not in example_files(name).get(PYPROJECT, b"").decode("utf-8"):
-            build_parser(words[1]).parse_args(words[1:])
+            build_parser(words[1:]).parse_args(words[1:])
         named = {word.split(":")[0] for word in words if PurePosixPath(word.split(":")[0]).suffix in (".toml", ".py")}
         assert named <= known, command
 
 
 def test_they_are_listed_with_what_they_show(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["examples"]) == 0
+    assert main(["new", "example"]) == 0
     printed = capsys.readouterr().out
     assert all(
         re.search(rf"^{name} +{re.escape(item.summary)}$", printed, re.MULTILINE) for name, item in EXAMPLES.items()
@@ -62,7 +62,7 @@ def test_they_are_listed_with_what_they_show(capsys: pytest.CaptureFixture[str])
 
 
 def test_one_is_written_whole_with_its_folders(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["examples", "add-a-controller", "--json"]) == 0
+    assert main(["new", "example", "add-a-controller", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["files"] == [
         "my_laws/__init__.py",
         "my_laws/hysteresis.py",
@@ -75,6 +75,6 @@ def test_one_is_written_whole_with_its_folders(capsys: pytest.CaptureFixture[str
 
 def test_what_is_there_is_not_touched(capsys: pytest.CaptureFixture[str]) -> None:
     Path("mine").mkdir()
-    assert main(["examples", "study", "--out", "mine"]) == 2
+    assert main(["new", "example", "study", "--out", "mine"]) == 2
     assert "mine: already exists" in capsys.readouterr().err
     assert list(Path("mine").iterdir()) == []

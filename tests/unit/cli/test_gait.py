@@ -56,7 +56,7 @@ def test_an_imported_gait_is_written_whole_and_can_be_used_by_its_file(
 
 def test_the_schemas_describe_a_gait_file_and_a_map(capsys: pytest.CaptureFixture[str]) -> None:
     for name, table in (("gait", "stride"), ("gait-map", "vertical_force")):
-        assert main(["schema", name]) == 0
+        assert main(["doctor", "--schema", name]) == 0
         schema = json.loads(capsys.readouterr().out)
         jsonschema.Draft202012Validator.check_schema(schema)
         assert table in schema["properties"]
@@ -65,11 +65,11 @@ def test_the_schemas_describe_a_gait_file_and_a_map(capsys: pytest.CaptureFixtur
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["import", "WALK", "--body-mass", "62 kg", "--stature", "180"], "--stature '180': a number without a unit"),
+        (["import", "WALK", "--body-mass", "62 kg", "--stature", "180"], "--stature 180: a number without a unit"),
         (["import", "WALK", "--body-mass", "62 kg", "--stature", "180 m"], "a stature of 180 m is not plausible"),
         (
             ["import", "WALK", "--body-mass", "62 kg", "--minimum-strides", "-"],
-            "--minimum-strides '-': must be a whole",
+            "--minimum-strides -: must be a whole",
         ),
         (["import", "WALK", "--body-mass", "62 kg", "--minimum-strides", "9"], "has 3 whole strides within"),
         (["import", "WALK", "--body-mass", "62 kg", "--map", "none.toml"], "none.toml: cannot be read"),

@@ -11,8 +11,8 @@ import pytest
 from ppafo import load_device, load_parameter_set, load_scenario, load_study, load_walk, simulate
 from ppafo.cli.main import build_parser, main
 from ppafo.cli.new import KINDS
+from ppafo.kinds import kind_at
 from ppafo.parameters.audit import audit
-from ppafo.questions.question import load_name
 
 SHIPPED = [
     (kind, Path(item.name).stem)
@@ -36,7 +36,7 @@ def test_there_is_one_template_for_each_kind() -> None:
 def test_every_template_loads_as_it_is_under_its_new_name(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["new", kind, "my-own", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["file"] == "my-own.toml"
-    made = load_name(KINDS[kind].load)("my-own.toml")
+    made = kind_at(KINDS[kind].load)("my-own.toml")
     assert getattr(made, "name", "my-own") == "my-own"
     text = Path("my-own.toml").read_text(encoding="utf-8")
     assert 'name = "template"' not in text
@@ -61,12 +61,12 @@ def test_what_a_copy_of_a_set_accepts_lapses_where_it_changes_a_value_of_the_fin
     assert (changed["flow-of-solenoid"].severity, changed["flow-of-solenoid"].accepted) == ("error", "")
     assert changed["flow-of-proportional"].accepted == same["flow-of-proportional"]
     capsys.readouterr()
-    assert main(["audit", "own.toml"]) == 1
+    assert main(["sets", "audit", "own.toml"]) == 1
     few = capsys.readouterr().out
     assert "[flow-of-solenoid]" in few
     assert "[flow-of-proportional]" not in few
     assert "of them concern no changed value: --all" in few
-    assert main(["audit", "own.toml", "--all"]) == 1
+    assert main(["sets", "audit", "own.toml", "--all"]) == 1
     assert "[flow-of-proportional]" in capsys.readouterr().out
 
 
@@ -125,7 +125,7 @@ def test_the_next_command_is_one_that_there_is(kind: str, capsys: pytest.Capture
     assert len(line) == 1
     words = shlex.split(line[0].partition("; next: ")[2])
     assert "out of the way/mine.toml" in words
-    assert build_parser(words[1]).parse_args(words[1:]).command == words[1]
+    assert build_parser(words[1:]).parse_args(words[1:]).command == words[1]
 
 
 def test_a_file_that_is_there_is_not_overwritten(capsys: pytest.CaptureFixture[str]) -> None:

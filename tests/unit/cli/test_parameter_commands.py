@@ -1,4 +1,4 @@
-"""``ppafo sets``, ``ppafo audit`` and ``ppafo schema``."""
+"""``ppafo sets list``, ``ppafo sets audit`` and ``ppafo doctor --schema``."""
 
 import importlib
 import json
@@ -11,7 +11,7 @@ from ppafo.cli.main import main
 
 
 def test_the_list_names_every_set(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["sets"]) == 0
+    assert main(["sets", "list"]) == 0
     printed = capsys.readouterr().out
     assert "ppafo2011 " in printed
     assert "ppafo2011-printed" in printed
@@ -33,20 +33,20 @@ def test_json_holds_every_value_and_is_the_only_thing_printed(capsys: pytest.Cap
 
 
 def test_the_audit_fails_on_the_printed_set_and_passes_on_the_completed_one(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["audit", "ppafo2011-printed"]) == 1
+    assert main(["sets", "audit", "ppafo2011-printed"]) == 1
     assert "ppafo2011-printed: 9 errors" in capsys.readouterr().out
-    assert main(["audit", "ppafo2011"]) == 0
+    assert main(["sets", "audit", "ppafo2011"]) == 0
 
 
 def test_the_audit_takes_overrides_and_prints_json(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["audit", "ppafo2011", "--json", "--set", "friction.static_torque=9 N m"]) == 1
+    assert main(["sets", "audit", "ppafo2011", "--json", "--set", "friction.static_torque=9 N m"]) == 1
     document = json.loads(capsys.readouterr().out)
     assert [finding["id"] for finding in document["findings"] if finding["severity"] == "error"] == ["torque-ceiling"]
 
 
 def test_out_writes_text_and_json_and_leaves_nothing_else(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "folder"
-    main(["audit", "ppafo2011", "--out", str(folder)])
+    main(["sets", "audit", "ppafo2011", "--out", str(folder)])
     assert sorted(item.name for item in folder.iterdir()) == [
         "audit-ppafo2011.json",
         "audit-ppafo2011.txt",
@@ -57,9 +57,9 @@ def test_out_writes_text_and_json_and_leaves_nothing_else(tmp_path: Path) -> Non
 def test_an_unwritable_folder_is_one_line_and_exit_code_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "file"
     file.write_text("")
-    assert main(["audit", "ppafo2011", "--out", str(file)]) == 2
+    assert main(["sets", "audit", "ppafo2011", "--out", str(file)]) == 2
     captured = capsys.readouterr()
-    assert captured.err.startswith(f"ppafo: --out {file}: is a file; a result of 'ppafo audit' needs a folder")
+    assert captured.err.startswith(f"ppafo: --out {file}: is a file; a result of 'ppafo sets audit' needs a folder")
     assert captured.err.count("\n") == 1
     assert captured.out == ""
 
@@ -67,10 +67,10 @@ def test_an_unwritable_folder_is_one_line_and_exit_code_2(tmp_path: Path, capsys
 @pytest.mark.parametrize(
     ("words", "work"),
     [
-        (["audit", "ppafo2011"], "ppafo.parameters.load_parameter_set"),
-        (["sets"], "ppafo.parameters.load_parameter_set"),
+        (["sets", "audit", "ppafo2011"], "ppafo.parameters.load_parameter_set"),
+        (["sets", "list"], "ppafo.parameters.load_parameter_set"),
         (["sets", "show", "ppafo2011"], "ppafo.parameters.load_parameter_set"),
-        (["schema", "scenario"], "ppafo.loading.json_schema"),
+        (["doctor", "--schema", "scenario"], "ppafo.loading.json_schema"),
         (["reproduce"], "ppafo.questions.reproduce.solve.reproduce"),
         (["simulate", "step-response"], "ppafo.simulation.simulate.simulate"),
     ],
@@ -104,7 +104,12 @@ def test_a_folder_in_the_place_of_a_file_is_found_before_any_work(
 
 
 def test_a_line_break_in_a_name_does_not_break_the_line_of_the_message(capsys: pytest.CaptureFixture[str]) -> None:
-    for words in (["plot", "a\nb"], ["audit", "a\nb"], ["simulate", "a\nb.toml"], ["schema", "a\nb"]):
+    for words in (
+        ["export", "figure", "a\nb"],
+        ["sets", "audit", "a\nb"],
+        ["simulate", "a\nb.toml"],
+        ["doctor", "--schema", "a\nb"],
+    ):
         assert main(words) == 2
         error = capsys.readouterr().err
         assert "a b" in error
@@ -112,24 +117,24 @@ def test_a_line_break_in_a_name_does_not_break_the_line_of_the_message(capsys: p
 
 
 def test_the_schema_is_printed_as_json(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["schema", "parameters"]) == 0
+    assert main(["doctor", "--schema", "parameters"]) == 0
     assert json.loads(capsys.readouterr().out)["title"] == "ppafo parameter set"
 
 
 def test_several_sets_are_audited_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["audit", "ppafo2011", "ppafo2011-printed"]) == 1
+    assert main(["sets", "audit", "ppafo2011", "ppafo2011-printed"]) == 1
     head, *rows = (line.split() for line in capsys.readouterr().out.splitlines())
     assert head == ["finding", "ppafo2011", "ppafo2011-printed"]
     assert ["virtual-work", "note", "warning"] in rows
     assert ["flow-of-solenoid", "accepted", "error"] in rows
-    assert main(["audit", "ppafo2011", "ppafo2011-printed", "--json"]) == 1
+    assert main(["sets", "audit", "ppafo2011", "ppafo2011-printed", "--json"]) == 1
     document = json.loads(capsys.readouterr().out)
     assert [one["set"] for one in document["sets"]] == ["ppafo2011", "ppafo2011-printed"]
     assert document["sets"][1]["counts"]["error"] == 9
 
 
 def test_an_audit_shows_first_what_the_set_changes_of_its_parent(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["audit", "ppafo2011"]) == 0
+    assert main(["sets", "audit", "ppafo2011"]) == 0
     shown = "\n".join(capsys.readouterr().out.splitlines()[:6])
     page = (Path(__file__).parents[3] / "docs/how-to/add-a-parameter-set.md").read_text(encoding="utf-8")
     assert shown.startswith("ppafo2011 changes 25 values of its parent ppafo2011-printed\n")
@@ -139,9 +144,11 @@ def test_an_audit_shows_first_what_the_set_changes_of_its_parent(capsys: pytest.
 def test_a_set_without_a_parent_begins_with_its_findings_and_may_be_compared_with_any(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    main(["audit", "cylinder-lever", "--json"])
+    main(["sets", "audit", "cylinder-lever", "--json"])
     assert json.loads(capsys.readouterr().out)["parent"] is None
-    main(["audit", "cylinder-lever", "--parent", "cylinder-lever", "--set", "gas.temperature=30 degC", "--json"])
+    main(
+        ["sets", "audit", "cylinder-lever", "--parent", "cylinder-lever", "--set", "gas.temperature=30 degC", "--json"]
+    )
     document = json.loads(capsys.readouterr().out)
     assert document["parent"] == "cylinder-lever"
     (change,) = document["changes"]
@@ -158,10 +165,10 @@ def test_the_copy_of_a_set_names_it_as_parent_from_wherever_it_lies(
     file.write_text(file.read_text().replace("value = 23.5", "value = 31.5"))
     main(["new", "set", "second", "--from", "first.toml", "--out", "below/second.toml"])
     capsys.readouterr()
-    main(["audit", "first.toml"])
+    main(["sets", "audit", "first.toml"])
     assert capsys.readouterr().out.startswith("first changes 1 value of its parent ppafo2011\n")
-    main(["audit", "below/second.toml"])
+    main(["sets", "audit", "below/second.toml"])
     assert capsys.readouterr().out.startswith("second changes nothing of its parent first\n")
     file.unlink()
-    assert main(["audit", "below/second.toml"]) == 2
+    assert main(["sets", "audit", "below/second.toml"]) == 2
     assert "below/second.toml: parent: below/../first.toml: cannot be read" in capsys.readouterr().err

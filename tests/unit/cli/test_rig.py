@@ -10,12 +10,12 @@ from ppafo.storage import read_csv
 
 
 def test_the_list_names_experiments_and_presets(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["rig", "list"]) == 0
+    assert main(["rig", "simulate", "--list"]) == 0
     printed = capsys.readouterr().out
     assert "synthetic" in printed
     assert "vane-leak" in printed
     assert "worn-seals" in printed
-    assert main(["rig", "list", "--json"]) == 0
+    assert main(["rig", "simulate", "--list", "--json"]) == 0
     listed = json.loads(capsys.readouterr().out)
     assert "step-response" in [item["name"] for item in listed["experiments"]]
     assert [item["name"] for item in listed["presets"]] == ["ideal-laboratory", "paper-bench", "worn-seals"]
@@ -25,7 +25,7 @@ def test_recordings_of_one_bench_share_a_folder_and_its_truth(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for experiment in ("static-torque", "valve-map"):
-        assert main(["rig", "record", experiment, "--seed", "7", "--out", str(tmp_path)]) == 0
+        assert main(["rig", "simulate", experiment, "--seed", "7", "--out", str(tmp_path)]) == 0
     assert "synthetic" in capsys.readouterr().out
     assert sorted(path.name for path in tmp_path.iterdir()) == ["rig.json", "static-torque.csv", "valve-map.csv"]
     truth = json.loads((tmp_path / "rig.json").read_text())
@@ -39,7 +39,7 @@ def test_recordings_of_one_bench_share_a_folder_and_its_truth(
 
 
 def test_the_same_command_gives_the_same_bytes(tmp_path: Path) -> None:
-    words = ["rig", "record", "step-response", "--preset", "worn-seals", "--seed", "3", "--out"]
+    words = ["rig", "simulate", "step-response", "--preset", "worn-seals", "--seed", "3", "--out"]
     for folder in ("one", "two"):
         assert main([*words, str(tmp_path / folder)]) == 0
     for name in ("step-response.csv", "rig.json"):
@@ -57,7 +57,7 @@ def test_device_and_overrides_reach_the_rig(tmp_path: Path, capsys: pytest.Captu
         "--set",
         "rig.flow_sensor.noise=0 kg/s",
     ]
-    assert main(["rig", "record", "open-valve-flow", *words, "--json", "--out", str(tmp_path)]) == 0
+    assert main(["rig", "simulate", "open-valve-flow", *words, "--json", "--out", str(tmp_path)]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["device"]["valve"]["orifice"]["area"] == pytest.approx(1e-5)
     assert document["preset"]["values"]["flow_sensor.noise"] == 0.0

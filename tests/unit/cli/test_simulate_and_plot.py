@@ -1,4 +1,4 @@
-"""``ppafo simulate`` and ``ppafo plot``."""
+"""``ppafo simulate`` and ``ppafo export figure``."""
 
 import dataclasses
 import html
@@ -123,7 +123,7 @@ def test_a_saved_result_is_drawn_again_without_running_it(
         raise AssertionError("it ran")
 
     monkeypatch.setattr("ppafo.simulation.simulate.simulate", never)
-    assert main(["plot", str(saved), "--out", str(tmp_path / "new" / "again.png")]) == 0
+    assert main(["export", "figure", str(saved), "--out", str(tmp_path / "new" / "again.png")]) == 0
     assert (tmp_path / "new" / "again.png").read_bytes() == (saved / "figure.png").read_bytes()
 
 
@@ -132,7 +132,7 @@ def test_without_a_file_the_figures_in_the_folder_are_drawn_again(
 ) -> None:
     before = (saved / "figure.svg").read_bytes()
     (saved / "figure.svg").unlink()
-    assert main(["plot", str(saved), "--json"]) == 0
+    assert main(["export", "figure", str(saved), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["files"] == [str(saved / "figure.png"), str(saved / "figure.svg")]
     assert (saved / "figure.svg").read_bytes() == before
     assert names(saved) == FILES
@@ -143,14 +143,14 @@ def test_the_end_of_a_walk_is_drawn_and_the_folder_stays_that_of_the_walk(tmp_pa
     recording = Recording("left leg", time, {"angle": Channel(1.5 + 0.1 * np.sin(time), "rad")}, kind="simulated")
     folder = tmp_path / "walk"
     write_marked_folder(folder, {"recording.nc": netcdf_bytes(recording, None), "walk.json": b"{}"}, "walk")
-    assert main(["plot", str(folder)]) == 0
+    assert main(["export", "figure", str(folder)]) == 0
     assert names(folder) == ["figure.png", "figure.svg", "ppafo.json", "recording.nc", "walk.json"]
     check_owned_folder(folder, marked_folder("walk"))
-    assert main(["plot", str(folder)]) == 0
-    assert main(["plot", str(folder), "--out", str(tmp_path / "end.pdf")]) == 0
+    assert main(["export", "figure", str(folder)]) == 0
+    assert main(["export", "figure", str(folder), "--out", str(tmp_path / "end.pdf")]) == 0
     (tmp_path / "foreign").mkdir()
     (folder / "recording.nc").rename(tmp_path / "foreign" / "recording.nc")
-    assert main(["plot", str(tmp_path / "foreign")]) == 2
+    assert main(["export", "figure", str(tmp_path / "foreign")]) == 2
     assert names(tmp_path / "foreign") == ["recording.nc"]
 
 
@@ -160,10 +160,10 @@ def test_recordings_of_the_rig_are_drawn_each_on_its_own(tmp_path: Path, capsys:
         (tmp_path / f"{name}.csv").write_bytes(marked_csv_bytes(recording))
     (tmp_path / "rig.json").write_text('{"format": "ppafo rig", "recordings": {}}')
     before = names(tmp_path)
-    assert main(["plot", str(tmp_path), "--out", str(tmp_path / "one.png")]) == 2
+    assert main(["export", "figure", str(tmp_path), "--out", str(tmp_path / "one.png")]) == 2
     assert f"{tmp_path} has 2 figures, free-decay, step-response; without --out" in capsys.readouterr().err
     assert names(tmp_path) == before
-    assert main(["plot", str(tmp_path)]) == 0
+    assert main(["export", "figure", str(tmp_path)]) == 0
     assert {"free-decay.png", "free-decay.svg", "step-response.png", "step-response.svg"} <= set(names(tmp_path))
 
 
@@ -179,10 +179,10 @@ def test_gauge_pressure_of_a_bench_and_of_a_walk_counts_from_the_atmosphere_of_t
     write_marked_folder(tmp_path / "walk", walked, "walk")
     drawn = figure_files(recording_figure(recording, atmosphere=83e3))["figure.png"]
     for figure in (tmp_path / "rig" / "high.png", tmp_path / "walk" / "figure.png"):
-        assert main(["plot", str(figure.parent)]) == 0
+        assert main(["export", "figure", str(figure.parent)]) == 0
         assert figure.read_bytes() == drawn
     (tmp_path / "walk" / "walk.json").write_text('{"configuration": {"device": [3]}}')
-    assert main(["plot", str(tmp_path / "walk")]) == 2
+    assert main(["export", "figure", str(tmp_path / "walk")]) == 2
 
 
 def test_the_end_of_a_walk_is_drawn_in_the_look_of_its_valve_and_says_what_ended_it(tmp_path: Path) -> None:
@@ -195,7 +195,7 @@ def test_the_end_of_a_walk_is_drawn_in_the_look_of_its_valve_and_says_what_ended
     }
     files = {"recording.nc": netcdf_bytes(recording, None), "walk.json": json.dumps(document).encode()}
     write_marked_folder(tmp_path, files, "walk")
-    assert main(["plot", str(tmp_path)]) == 0
+    assert main(["export", "figure", str(tmp_path)]) == 0
     remark = "no gas; the wearer falls at 9.0 s; the last 5 s of 9 s"
     expected = recording_figure(recording.between(4.0, 9.0), "walk", remark, valve="solenoid")
     assert (tmp_path / "figure.png").read_bytes() == figure_files(expected)["figure.png"]
@@ -206,7 +206,7 @@ def test_a_message_without_end_makes_no_picture_without_end(tmp_path: Path) -> N
     document = {"status": {"kind": "unsteady", "message": "no gas " * 10_000}}
     files = {"recording.nc": netcdf_bytes(recording, None), "walk.json": json.dumps(document).encode()}
     write_marked_folder(tmp_path, files, "walk")
-    assert main(["plot", str(tmp_path)]) == 0
+    assert main(["export", "figure", str(tmp_path)]) == 0
     assert int.from_bytes((tmp_path / "figure.png").read_bytes()[20:24], "big") < 1000, "height in pixels"
 
 
@@ -220,7 +220,7 @@ def test_a_mark_that_says_its_files_in_another_form_is_refused(
     document = json.loads(mark.read_text())
     assert damage.keys() <= document.keys()
     mark.write_text(json.dumps(document | damage))
-    assert main(["plot", str(tmp_path)]) == 2
+    assert main(["export", "figure", str(tmp_path)]) == 2
     assert capsys.readouterr().err == f"ppafo: {mark}: does not state what its files are\n"
     assert names(tmp_path) == ["ppafo.json", "recording.nc"]
 
@@ -233,7 +233,7 @@ def test_a_time_of_a_fall_that_is_none_is_refused(
     document = f'{{"metrics": {{"fall_time": {{"value": {value}}}}}}}'
     files = {"recording.nc": netcdf_bytes(recording, None), "walk.json": document.encode()}
     write_marked_folder(tmp_path, files, "walk")
-    assert main(["plot", str(tmp_path)]) == 2
+    assert main(["export", "figure", str(tmp_path)]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
     assert not (tmp_path / "figure.png").exists()
 
@@ -257,14 +257,14 @@ def test_a_folder_that_has_its_figures_or_none_says_so_and_what_to_open(
     write_marked_folder(tmp_path / "a", {"change.png": b"", "report.html": b"", "compare.txt": b""}, "compare")
     write_marked_folder(tmp_path / "b", {"sets.txt": b"", "sets.json": b"{}"}, "sets")
     before = names(tmp_path / "a")
-    assert main(["plot", str(tmp_path / "a")]) == 0
-    assert main(["plot", str(tmp_path / "b"), "--json"]) == 0
+    assert main(["export", "figure", str(tmp_path / "a")]) == 0
+    assert main(["export", "figure", str(tmp_path / "b"), "--json"]) == 0
     first, _, second = capsys.readouterr().out.partition("\n")
     assert first.endswith(
         f"result of 'ppafo compare' has its figures (change.png); open {tmp_path / 'a' / 'report.html'}"
     )
     assert json.loads(second)["open"] == str(tmp_path / "b" / "sets.txt")
-    assert main(["plot", str(tmp_path / "a"), "--out", str(tmp_path / "new.png")]) == 2
+    assert main(["export", "figure", str(tmp_path / "a"), "--out", str(tmp_path / "new.png")]) == 2
     assert "nothing is drawn anew" in capsys.readouterr().err
     assert names(tmp_path / "a") == before
     assert names(tmp_path) == ["a", "b"]
@@ -276,7 +276,7 @@ def test_a_damaged_result_is_one_line_and_exit_code_2(
     for name in FILES:
         (tmp_path / name).write_bytes((saved / name).read_bytes())
     (tmp_path / "recording.nc").write_bytes((saved / "recording.nc").read_bytes()[:5000])
-    assert main(["plot", str(tmp_path)]) == 2
+    assert main(["export", "figure", str(tmp_path)]) == 2
     error = capsys.readouterr().err
     assert "recording.nc: is not the file that was written" in error
     assert error.count("\n") == 1

@@ -60,7 +60,8 @@ def test_a_library_that_is_there_already_is_not_touched() -> None:
 
 def test_main_leaves_the_garbage_collection_of_a_calling_program_alone() -> None:
     code = (
-        "import gc\nbefore = gc.get_threshold()\nfrom ppafo.cli.main import main\nmain(['schema', 'scenario'])\n"
+        "import gc\nbefore = gc.get_threshold()\nfrom ppafo.cli.main import main\n"
+        "main(['doctor', '--schema', 'scenario'])\n"
         "print(gc.isenabled() and gc.get_threshold() == before)"
     )
     assert printed_by(code).splitlines()[-1] == "True"
@@ -81,14 +82,14 @@ class Interrupt:
                 raise
 
 sys.meta_path.insert(0, Interrupt())
-sys.argv = ["ppafo", "schema", "scenario"]
+sys.argv = ["ppafo", "doctor", "--schema", "scenario"]
 from ppafo.__main__ import start
 sys.exit(start())
 """
 
 
 @pytest.mark.parametrize("wrapped", [False, True])
-@pytest.mark.parametrize("module", ["ppafo.cli.main", "argparse", "ppafo.cli.schema", "pydantic"])
+@pytest.mark.parametrize("module", ["ppafo.cli.main", "argparse", "ppafo.cli.doctor", "pydantic"])
 def test_interrupt_while_modules_load_is_one_line(module: str, wrapped: bool) -> None:
     code = INTERRUPTED.replace("MODULE", repr(module)).replace("WRAPPED", repr(wrapped))
     done = subprocess.run(
@@ -123,7 +124,7 @@ def test_closed_streams_take_neither_the_result_nor_the_exit_code(numbers: tuple
     def run(*words: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=False)
 
-    done = run("sets", "--out", str(tmp_path / "sets"))
+    done = run("sets", "list", "--out", str(tmp_path / "sets"))
     assert (done.returncode, done.stderr) == (0, "")
     written = (tmp_path / "sets" / "sets.txt").read_text(encoding="utf-8")
     assert done.stdout == ("" if 1 in numbers else written)

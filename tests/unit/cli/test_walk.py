@@ -175,12 +175,12 @@ def test_a_bottle_repeats_a_course_as_a_whole(tmp_path: Path, capsys: pytest.Cap
     folder = tmp_path / "along"
     assert main(["walk", "solenoid", "--course", "stairs", "--out", str(folder)]) == 0
     capsys.readouterr()
-    assert main(["endurance", str(folder), "--longest", "5 s"]) == 0
+    assert main(["bottle", str(folder), "--longest", "5 s"]) == 0
     assert "walk 'solenoid' on course 'stairs'" in capsys.readouterr().out
 
 
 def test_the_schema_of_a_walk_file_is_published(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["schema", "walk"]) == 0
+    assert main(["doctor", "--schema", "walk"]) == 0
     assert "wearer" in json.loads(capsys.readouterr().out)["properties"]
 
 

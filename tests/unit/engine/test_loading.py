@@ -97,7 +97,7 @@ def test_a_compiler_without_headers_is_reported_once_and_the_next_one_compiles(
     assert result_of(text("x[0, 0] * 3.0")) == 6.0
     assert caplog.messages == [
         "ppafo: clang does not compile a model: program.c:1:10: fatal error: math.h: No such file or directory; "
-        "models are compiled by gcc instead for a day, or until 'ppafo cache --clear'"
+        "models are compiled by gcc instead for a day, or until 'ppafo doctor --clear'"
     ]
     assert list_left_out(fresh_cache) == {
         "clang": "clang does not compile a model: program.c:1:10: fatal error: math.h: No such file or directory"
@@ -147,7 +147,7 @@ def test_a_folder_whose_libraries_cannot_be_loaded_is_reported_once_for_all_comp
     (said,) = caplog.messages
     assert said == (
         f"ppafo: libraries in {fresh_cache} cannot be loaded (it is mounted noexec); "
-        "models are compiled by numba instead for a day, or until 'ppafo cache --clear'"
+        "models are compiled by numba instead for a day, or until 'ppafo doctor --clear'"
     )
 
 
@@ -191,7 +191,7 @@ def test_a_compiler_that_never_ends_is_stopped_with_what_it_started_and_the_next
     assert result_of(text("x[0, 0] + 0.75")) == 2.75
     assert caplog.messages[0] == (
         "ppafo: gcc did not end within 0.5 s and was stopped; "
-        "models are compiled by numba instead for a day, or until 'ppafo cache --clear'"
+        "models are compiled by numba instead for a day, or until 'ppafo doctor --clear'"
     )
     # Whoever takes over what has lost its parent may not ask how it ended: then it is dead and still there.
     state = Path(f"/proc/{started.read_text(encoding='utf-8').strip()}/stat")

@@ -327,7 +327,7 @@ def test_a_port_that_is_none_is_one_line(
     if text.startswith("serial:/"):
         pytest.importorskip("serial")
     monkeypatch.chdir(tmp_path)
-    for words in (["hil", TASK], ["record", "--out", "bench.csv"]):
+    for words in (["hil", TASK], ["rig", "record", "--out", "bench.csv"]):
         assert main([*words, "--port", text]) == 2
         line = capsys.readouterr().err
         assert f"--port {text}: {said}" in line

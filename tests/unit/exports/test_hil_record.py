@@ -189,7 +189,7 @@ def test_a_recording_goes_straight_into_identify(
     bench = threading.Thread(target=play_static_test, args=(port, stop))
     bench.start()
     try:
-        assert main(["record", "--port", f"udp:127.0.0.1:{port}", "--out", "static.csv"]) == 0
+        assert main(["rig", "record", "--port", f"udp:127.0.0.1:{port}", "--out", "static.csv"]) == 0
     finally:
         stop.set()
         bench.join()
@@ -221,7 +221,16 @@ def test_whoever_sends_first_is_not_the_bench_unless_it_sends_a_packet(
     stranger = threading.Thread(target=send_garbage)
     stranger.start()
     time.sleep(0.05)
-    words = ["record", "--port", f"udp:127.0.0.1:{port}", "--patience", "20 s", "--out", str(tmp_path / "bench.csv")]
+    words = [
+        "rig",
+        "record",
+        "--port",
+        f"udp:127.0.0.1:{port}",
+        "--patience",
+        "20 s",
+        "--out",
+        str(tmp_path / "bench.csv"),
+    ]
     try:
         with sending_bench(port, 0.5):
             assert main(words) == 0
@@ -244,7 +253,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_anything_is_recorded(
 ) -> None:
     port = free_port()
     with sending_bench(port):
-        assert main(["record", "--port", f"udp:127.0.0.1:{port}", "--out", "/dev/null/x.csv"]) == 2
+        assert main(["rig", "record", "--port", f"udp:127.0.0.1:{port}", "--out", "/dev/null/x.csv"]) == 2
     said = capsys.readouterr().err
     assert "/dev/null" in said
     assert len(said.splitlines()) == 1  # it has not even listened
@@ -254,7 +263,7 @@ def test_a_file_that_is_there_is_not_replaced(tmp_path: Path, capsys: pytest.Cap
     recording = played([packet(number) for number in range(3)]).recording
     path = write_csv(tmp_path / "mine.csv", recording)
     before = path.read_bytes()
-    assert main(["record", "--port", "udp:127.0.0.1:5000", "--out", str(path)]) == 2
+    assert main(["rig", "record", "--port", "udp:127.0.0.1:5000", "--out", str(path)]) == 2
     assert "already exists" in capsys.readouterr().err
     assert path.read_bytes() == before
 
@@ -302,7 +311,7 @@ def test_a_recording_whose_file_cannot_be_written_stays_aside(tmp_path: Path) ->
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL here")
 def test_a_recording_that_is_killed_loses_a_second(tmp_path: Path) -> None:
     port = free_port()
-    words = ["record", "--port", f"udp:127.0.0.1:{port}", "--out", "bench.csv"]
+    words = ["rig", "record", "--port", f"udp:127.0.0.1:{port}", "--out", "bench.csv"]
     with subprocess.Popen([sys.executable, "-m", "ppafo", *words], cwd=tmp_path, stderr=subprocess.PIPE) as process:
         assert process.stderr is not None
         assert b"listening" in process.stderr.readline()

@@ -209,7 +209,7 @@ def test_a_run_of_an_ensemble_whose_lever_comes_to_its_dead_centre_is_refused_an
     [
         ["walk", "proportional", "--set", "device.set=cylinder-lever"],
         ["linearise", str(EXAMPLE / "torque-task-cylinder.toml")],
-        ["rig", "record", "step-response", "--device", "cylinder-lever", "--out", "out"],
+        ["rig", "simulate", "step-response", "--device", "cylinder-lever", "--out", "out"],
     ],
     ids=lambda command: command[0],
 )

@@ -265,7 +265,7 @@ def test_a_folder_is_the_rig_s_again_whenever_a_writer_is_killed(
 def test_an_empty_preset_points_to_the_schema(tmp_path: Path) -> None:
     for text in ("", "# nothing yet\n"):
         (tmp_path / "mine.toml").write_text(text)
-        with pytest.raises(ParameterError, match="'ppafo schema rig' prints its format"):
+        with pytest.raises(ParameterError, match="'ppafo doctor --schema rig' prints its format"):
             load_preset(tmp_path / "mine.toml")
 
 

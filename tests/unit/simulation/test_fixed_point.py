@@ -106,5 +106,5 @@ def test_a_chip_takes_the_integer_form_of_a_controller_with_its_gains() -> None:
 
 
 def test_whole_numbers_have_no_exported_library() -> None:
-    with pytest.raises(ProgramError, match="no library yet; 'ppafo firmware' writes it"):
+    with pytest.raises(ProgramError, match="no library yet; 'ppafo export firmware' writes it"):
         c_library(load_scenario("torque-task-solenoid", ("controller.kind=on_off_on_chip",)))

@@ -55,5 +55,5 @@ def test_the_schema_knows_every_controller_and_profile_and_their_settings() -> N
 
 
 def test_the_command_line_prints_the_schema(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["schema", "scenario"]) == 0
+    assert main(["doctor", "--schema", "scenario"]) == 0
     assert json.loads(capsys.readouterr().out)["title"] == "ppafo scenario"

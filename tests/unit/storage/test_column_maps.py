@@ -226,7 +226,7 @@ def test_the_only_map_of_a_file_needs_no_name_and_a_problem_file_will_do(tmp_pat
 @pytest.mark.parametrize(
     ("text", "name", "message"),
     [
-        ("", None, "is empty; 'ppafo schema columns' prints its format"),
+        ("", None, "is empty; 'ppafo doctor --schema columns' prints its format"),
         ("a = 1\n", None, "columns"),
         (MAPS + MAPS.replace("logger", "scope"), None, "has several column maps; name one as"),
         (MAPS, "loger", "no column map 'loger', did you mean 'logger'"),

@@ -230,7 +230,7 @@ def test_files_are_named_in_messages_and_scenarios_are_relative_to_them(tmp_path
     with pytest.raises(StudyError, match=r"mine\.toml: "):
         load_study(path)
     path.write_text("", encoding="utf-8")
-    with pytest.raises(StudyError, match="is empty; 'ppafo schema study' prints its format"):
+    with pytest.raises(StudyError, match="is empty; 'ppafo doctor --schema study' prints its format"):
         load_study(path)
 
 

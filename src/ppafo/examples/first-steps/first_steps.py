@@ -100,6 +100,6 @@ print(f"the valve was shut in {controller.shut} of {len(own.recording)} samples"
 own.plot().savefig(folder / "own-controller.png")
 
 # %% Keep a result
-# Recording as NetCDF and CSV, and everything that led to it in run.json. 'ppafo plot FOLDER' draws it again.
+# Recording as NetCDF and CSV, and everything that led to it in run.json. 'ppafo export figure FOLDER' draws it again.
 own.save(folder / "own-controller")
 print(f"written: {folder}")

@@ -191,7 +191,9 @@ def find_columns(
     hint = nearest_name(missing, known)
     why = f"there is no column {missing!r}{hint}" if missing not in known else "no file has all of its columns"
     said = "".join(f"; {remark}" for table in tables for remark in table.remarks)
-    raise DataError(f"{curve}: {why} ({files}: {shown}{said}); name the columns in a gait map, 'ppafo schema gait-map'")
+    raise DataError(
+        f"{curve}: {why} ({files}: {shown}{said}); name the columns in a gait map, 'ppafo doctor --schema gait-map'"
+    )
 
 
 _SLOW = np.radians(25.0)

@@ -87,7 +87,7 @@ def optimum(residuals: Residuals, search: Search, report: Report = report_nothin
         if best is None or found.cost < best.cost:
             best = found
     if best is None:
-        raise IdentificationError("the model diverges at every start; check start values and bounds (ppafo audit)")
+        raise IdentificationError("the model diverges at every start; check start values and bounds (ppafo sets audit)")
     others = _without_one(residuals, best, search, report)
     evaluations += sum(one.evaluations for one in others)
     for one in others:
@@ -228,7 +228,7 @@ def _starts(residuals: Residuals, search: Search) -> list[Floats]:
     starts = [first] if np.isfinite(residuals.of_data(first[None, :])).all() else []
     if search.other_starts == 0:
         if not starts:
-            raise IdentificationError("the model diverges at the start values; check them (ppafo audit)")
+            raise IdentificationError("the model diverges at the start values; check them (ppafo sets audit)")
         return starts
     # Drawn between the bounds, on the log scale at most a factor of 4.5 from the start.
     low, high = coordinate_bounds(residuals.ranges)

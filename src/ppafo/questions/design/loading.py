@@ -23,7 +23,7 @@ def read_design_file(name_or_path: str | Path) -> tuple[DesignFile | SizingFile,
     if document.keys() <= known - {"profile", "task"}:
         raise StudyError(
             f"{file}: says neither which torque is wanted nor in which tasks; write a table [profile] with time and "
-            "torque or recording, or tables [[task]]; 'ppafo schema design' prints the format of both"
+            "torque or recording, or tables [[task]]; 'ppafo doctor --schema design' prints the format of both"
         )
     if "profile" in document:
         return validate(SizingFile, document, file, StudyError), file

@@ -37,6 +37,8 @@ def design(
     report = progress or report_nothing
     if problem is None:
         missing = [f"--{name}" for name, value in wished.items() if value is None]
+        if len(missing) == len(wished) and stature is None:
+            raise StudyError(f"no design was given: name one, give a .toml file, or for a wearer {FOR_A_WEARER}")
         if mass is None or torque is None or pressure is None or minutes is None:
             raise StudyError(f"for a wearer give {', '.join(missing)} too, for example {FOR_A_WEARER}")
         if seed is not None:

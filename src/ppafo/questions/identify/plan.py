@@ -154,7 +154,7 @@ def rig_requests(plan: Plan) -> str:
     for number, one in enumerate(plan.following.chosen, start=1):
         changes = " ".join(f'--set "{item}"' for item in one.overrides)
         lines.append(
-            f"ppafo rig record {one.rig_experiment} --preset ideal-laboratory --device {device}{valve} "
+            f"ppafo rig simulate {one.rig_experiment} --preset ideal-laboratory --device {device}{valve} "
             f'--seed {100 + number} --set "rig.sampling.rate={plan.rate}"{changes_of_device} {changes} '
             f"--out {one.label}"
         )

@@ -70,7 +70,9 @@ def doubts_sections(doubtful: Iterable[tuple[Part, str]]) -> tuple[Section, ...]
     by_part: dict[str, list[str]] = {}
     for part, name in pairs:
         by_part.setdefault(part.name, []).append(f"{name.replace('_', ' ')} ({part.figures[name].origin})")
-    where = "quoted from a document that was not itself consulted, or assumed; 'ppafo parts PART' gives the reasons"
+    where = (
+        "quoted from a document that was not itself consulted, or assumed; 'ppafo sets parts PART' gives the reasons"
+    )
     rows = tuple((name, ", ".join(figures)) for name, figures in by_part.items())
     return (
         Section("Check before buying", (where,), Table((), rows)),

@@ -58,7 +58,7 @@ def bottle_remark(worn: WalkResult) -> str:
 
 
 def _walked(worn: WalkResult, seconds: float) -> str:
-    """Return how many strides were walked in a time [s], as ``ppafo endurance`` counts; of a course the whole ones."""
+    """Return how many strides were walked in a time [s], as ``ppafo bottle`` counts; of a course the whole ones."""
     motion = walk_of(worn.scenario)
     if motion.course is not None or motion.reacts is not None:
         return f"after {worn.helped.size} whole strides"

@@ -183,7 +183,7 @@ def test_a_bench_richer_than_the_model_identifies_nothing(tmp_path: Path, monkey
     # Each seed is a bench with zeros of its own; a prediction is for the sensors as they are.
     settings = ("run.duration=0.5 s", "rig.angle_sensor.offset=0 deg", "rig.pressure_sensor.offset=0 Pa_d")
     changed = [word for setting in settings for word in ("--set", setting)]
-    record = ["rig", "record", "step-response", "--preset", "paper-bench", *changed]
+    record = ["rig", "simulate", "step-response", "--preset", "paper-bench", *changed]
     for seed in ("1", "2"):
         assert main([*record, "--seed", seed, "--out", seed]) == 0
     paths = "".join(f"[[trajectory.parameters]]\npath = '{path}'\n" for path in FIVE_PARAMETERS)

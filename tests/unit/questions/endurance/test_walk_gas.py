@@ -116,7 +116,7 @@ def test_a_damaged_walk_is_refused_in_one_line(
         node = node[part]
     node[last] = value
     file.write_text(json.dumps(document))
-    assert main(["endurance", str(folder)]) == 2
+    assert main(["bottle", str(folder)]) == 2
     said = capsys.readouterr().err
     assert re.search(words, said)
     assert said.count("\n") == 1
@@ -126,13 +126,13 @@ def test_a_recording_without_gas_is_refused(tmp_path: Path, capsys: pytest.Captu
     made = pulses(5.0)
     bare = Recording("bare", made.recording.time, {"angle": Channel(0.0 * made.recording.time, "rad")})
     folder = folder_of(replace(made, recording=bare), tmp_path / "walk")
-    assert main(["endurance", str(folder)]) == 2
+    assert main(["bottle", str(folder)]) == 2
     assert "has no channel 'supplied_mass'" in capsys.readouterr().err
 
 
 def test_a_walk_lasts_the_same_with_and_without_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = folder_of(walk_gas(solenoid()), tmp_path / "walk")
-    assert main(["endurance", str(folder), "--json", "--longest", "5 s"]) == 0
+    assert main(["bottle", str(folder), "--json", "--longest", "5 s"]) == 0
     document = json.loads(capsys.readouterr().out)
     made = endurance(solenoid(), longest=5.0)
     assert isinstance(made, Endurance)
@@ -141,7 +141,7 @@ def test_a_walk_lasts_the_same_with_and_without_its_folder(tmp_path: Path, capsy
 
 def test_several_recordings_stand_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     one, two = (folder_of(walk_gas(solenoid()), tmp_path / name) for name in ("one", "two"))
-    assert main(["endurance", str(one), str(two), "--longest", "5 s"]) == 0
+    assert main(["bottle", str(one), str(two), "--longest", "5 s"]) == 0
     lines = capsys.readouterr().out.splitlines()
     titles = ["gas use", "gas per stride (g)", "walking (min)", "strides", "ended"]
     assert re.split(r"\s{2,}", lines[2].replace("gas use", "gas use ")) == titles
@@ -161,7 +161,7 @@ def test_what_does_not_belong_to_a_walk_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], words: str
 ) -> None:
     folder = folder_of(pulses(5.0), tmp_path / "walk")
-    assert main(["endurance", str(folder), *more]) == 2
+    assert main(["bottle", str(folder), *more]) == 2
     assert words in capsys.readouterr().err
 
 
@@ -169,11 +169,11 @@ def test_several_recordings_have_one_folder_and_none_comes_twice(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = str(folder_of(pulses(5.0), tmp_path / "walk"))
-    assert main(["endurance", folder, folder, "--out", str(tmp_path / "out")]) == 2
+    assert main(["bottle", folder, folder, "--out", str(tmp_path / "out")]) == 2
     assert "given twice" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
     other = str(folder_of(pulses(6.0), tmp_path / "other"))
-    assert main(["endurance", folder, other, "--longest", "2 s", "--out", str(tmp_path / "out")]) == 0
+    assert main(["bottle", folder, other, "--longest", "2 s", "--out", str(tmp_path / "out")]) == 0
     names = ["endurance.json", "endurance.txt", "ppafo.json", "report.html"]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == names
     assert set(json.loads((tmp_path / "out" / "endurance.json").read_text())["recordings"]) == {folder, other}
@@ -208,7 +208,7 @@ def test_every_door_says_how_long_a_device_lasts_in_the_same_words(
     assert main(["walk", "solenoid-regulators", "--minutes", "0.1", "--out", "short"]) == 0
     assert "lasts" not in capsys.readouterr().out.replace("how long a bottle lasts", ""), "no bottle, no minutes"
     for folder in ("on-bottle", "short"):
-        assert main(["endurance", folder]) == 0
+        assert main(["bottle", folder]) == 0
         out = capsys.readouterr().out
         assert f"{said[1]} of walking" in out
         assert said[2] in out

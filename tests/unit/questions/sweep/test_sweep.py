@@ -69,7 +69,7 @@ def test_a_study_is_run_printed_and_written(study: Path, tmp_path: Path, capsys:
     assert (out / "study.toml").read_bytes() == study.read_bytes()
     drawn = (out / "figure.svg").read_bytes()
     (out / "figure.svg").unlink()
-    assert main(["plot", str(out)]) == 0
+    assert main(["export", "figure", str(out)]) == 0
     assert (out / "figure.svg").read_bytes() == drawn
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "A few runs." in page
@@ -150,7 +150,7 @@ def test_the_schema_describes_the_studies_of_the_package(capsys: pytest.CaptureF
 
     from ppafo.studies.loading import list_studies, load_study
 
-    assert main(["schema", "study"]) == 0
+    assert main(["doctor", "--schema", "study"]) == 0
     schema = json.loads(capsys.readouterr().out)
     for name in list_studies():
         jsonschema.validate(json.loads(json.dumps(load_study(name).document)), schema)

@@ -1,4 +1,4 @@
-"""``ppafo cache`` shows, compiles and removes the compiled models."""
+"""``ppafo doctor`` shows, compiles and removes the compiled models."""
 
 import json
 from pathlib import Path
@@ -18,13 +18,13 @@ SOURCE = 'from numba import njit\n\n\n@njit("float64(float64)", cache=True)\ndef
 
 def test_cache_is_shown_and_cleared(fresh_cache: Path, capsys: pytest.CaptureFixture[str]) -> None:
     load_generated(SOURCE, NumbaCompiler())
-    assert main(["cache", "--json"]) == 0
+    assert main(["doctor", "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)
     assert shown["folder"] == str(fresh_cache)
     assert shown["not_used"] is None
     assert [item["name"].startswith("ppafo_numba_") for item in shown["programs"]] == [True]
     assert shown["size"] == shown["programs"][0]["size"] > 1000
-    assert main(["cache", "--clear", "--json"]) == 0
+    assert main(["doctor", "--clear", "--json"]) == 0
     cleared = json.loads(capsys.readouterr().out)
     assert cleared["freed"] == shown["size"]
     assert cleared["programs"] == []
@@ -34,9 +34,9 @@ def test_cache_is_shown_and_cleared(fresh_cache: Path, capsys: pytest.CaptureFix
 def test_cache_says_why_a_folder_is_not_used(fresh_cache: Path, capsys: pytest.CaptureFixture[str]) -> None:
     fresh_cache.mkdir()
     fresh_cache.chmod(0o777)
-    assert main(["cache"]) == 0
+    assert main(["doctor"]) == 0
     assert "not used: others can write into" in capsys.readouterr().out
-    assert main(["cache", "--warm"]) == 2
+    assert main(["doctor", "--warm"]) == 2
     assert "cannot be kept: others can write into" in capsys.readouterr().err
 
 
@@ -47,7 +47,7 @@ def test_warming_compiles_every_scenario_of_the_package(
 
     asked: list[Scenario] = []
     monkeypatch.setattr(simulate, "compile_models", asked.extend)
-    assert main(["cache", "--warm"]) == 0
+    assert main(["doctor", "--warm"]) == 0
     assert [scenario.name for scenario in asked] == list(list_scenarios())
     assert "programs: 0" in capsys.readouterr().out
 

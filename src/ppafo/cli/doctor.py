@@ -1,40 +1,68 @@
-"""``ppafo cache``: the compiled models on this computer: where they are, how much they take, compile, remove."""
+"""``ppafo doctor``: compilers and compiled models of this computer, and the JSON Schemas of the file formats."""
 
-import argparse
+import importlib
 import time
 from pathlib import Path
 from typing import Any
 
-from ppafo.cli import output
-from ppafo.errors import SimulationError
+from ppafo.cli.output import Said
+from ppafo.documents.json_text import json_text
+from ppafo.errors import DataError, SimulationError, nearest_name
 
 _DAY = 86400.0
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of this command."""
-    orders = parser.add_mutually_exclusive_group()
-    orders.add_argument("--warm", action="store_true", help="compile the models of the scenarios of the package")
-    orders.add_argument("--clear", action="store_true", help="remove all compiled models, and try each compiler again")
-    output.add_output_arguments(parser)
+FORMATS: dict[str, str] = {
+    "parameters": "ppafo.parameters.loading",
+    "scenario": "ppafo.loading",
+    "study": "ppafo.studies.declaration",
+    "tuning": "ppafo.questions.tune.problem",
+    "parts": "ppafo.parameters.parts.catalogue",
+    "design": "ppafo.questions.design.loading",
+    "walk": "ppafo.walking.declaration",
+    "course": "ppafo.walking.course",
+    "identification": "ppafo.identification.problem",
+    "columns": "ppafo.storage.foreign",
+    "rig": "ppafo.rig.preset",
+    "gait": "ppafo.gait.document",
+    "gait-map": "ppafo.gait.recorded.mapping",
+    "bottle": "ppafo.parameters.bottles.bottle",
+    "publication": "ppafo.parameters.publications.publication",
+}
+"""Each file format and the module whose ``json_schema()`` describes it. To add one: one line here."""
+
+JOINED: dict[str, str] = {"size": "design"}
+"""Formats that are now part of another one."""
 
 
-def run(parsed: argparse.Namespace) -> int:
-    """Compile or remove programs as requested, and list what is there."""
+def schema_of(name: str) -> Said:
+    """Return the schema of a file format, which is JSON in any case."""
+    if name in JOINED:
+        raise DataError(f"the format '{name}' is now part of '{JOINED[name]}'; print that one")
+    if name not in FORMATS:
+        hint = nearest_name(name, FORMATS)
+        raise DataError(f"there is no file format '{name}'{hint}; available: {', '.join(FORMATS)}")
+    document = importlib.import_module(FORMATS[name]).json_schema()
+    return Said(json_text(document), document, f"{name}.schema")
+
+
+def examine(warm: bool, clears: bool) -> Said:
+    """Compile or remove programs as requested, and return what is there."""
     from ppafo.engine.cache import cache_folder, clear, clear_kept, refusal
 
-    output.check_output(parsed)
+    if warm and clears:
+        raise DataError("--clear: not allowed with --warm")
     folder = cache_folder()
-    cleared = clear_kept(folder) + clear(folder) if parsed.clear and folder is not None else 0
-    why_not = "" if parsed.clear else refusal(folder)
-    if parsed.warm:
+    cleared = clear_kept(folder) + clear(folder) if clears and folder is not None else 0
+    why_not = "" if clears else refusal(folder)
+    if warm:
         if why_not:
             raise SimulationError(f"--warm: compiled models cannot be kept: {why_not}")
         from ppafo.simulation.loading import list_scenarios, load_scenario
         from ppafo.simulation.simulate import compile_models
 
         compile_models(load_scenario(name) for name in list_scenarios())
-    document = _document(folder, why_not) | ({"freed": cleared} if parsed.clear else {})
+    document = _document(folder, why_not) | ({"freed": cleared} if clears else {})
     lines = [f"folder: {document['folder'] or 'none'}"]
     if document["not_used"]:
         lines.append(f"not used: {document['not_used']}")
@@ -49,8 +77,7 @@ def run(parsed: argparse.Namespace) -> int:
     ]
     lines += [f"left out for a day: {name}: {why}" for name, why in document["left_out"].items()]
     limits = f"{document['kept_unused_days']:.0f} days unused, or above {_megabytes(document['most_bytes'])} in all"
-    output.deliver("cache", "\n".join([*lines, f"removed by themselves: after {limits}"]), document, parsed)
-    return output.EXIT_GOOD
+    return Said("\n".join([*lines, f"removed by themselves: after {limits}"]), document, "doctor")
 
 
 def _document(folder: Path | None, why_not: str) -> dict[str, Any]:

@@ -1,10 +1,10 @@
-"""``ppafo plot DIR``: draws what a folder of results holds again, without running anything again."""
+"""``ppafo export figure DIR``: draws what a folder of results holds again, without running anything again."""
 
-import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ppafo.cli import output
+from ppafo.cli.output import Said
 from ppafo.errors import DataError, reason
 
 if TYPE_CHECKING:
@@ -16,50 +16,40 @@ _PICTURES = (".png", ".gif")
 _NAMED = 6
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of this command."""
-    parser.add_argument("folder", metavar="DIR", type=Path, help="a result folder written by ppafo")
-    output.add_json_argument(parser)
-    parser.add_argument(
-        "--out", metavar="FILE", type=Path, help="a .png, .svg or .pdf file; default figure.png and figure.svg in DIR"
-    )
-
-
-def run(parsed: argparse.Namespace) -> int:
+def draw_again(folder: Path, out: Path | None) -> Said:
     """Draw the figures of the folder and write them; where the folder has its figures already, say which."""
     from ppafo.answers.recording_figure import FIGURE_FORMATS
     from ppafo.answers.style import render_figure
     from ppafo.storage.files import write_file
     from ppafo.storage.result_folder import add_to_folder
 
-    if parsed.out is not None and parsed.out.suffix.removeprefix(".") not in FIGURE_FORMATS:
+    if out is not None and out.suffix.removeprefix(".") not in FIGURE_FORMATS:
         allowed = ", ".join(f".{name}" for name in FIGURE_FORMATS)
-        raise DataError(f"--out {parsed.out}: the name must end in one of {allowed}")
-    if parsed.out is not None:
-        output.check_new_file(parsed.out)
-    names = _names(parsed.folder)
+        raise DataError(f"--out {out}: the name must end in one of {allowed}")
+    if out is not None:
+        output.check_new_file(out)
+    names = _names(folder)
     output.load_drawing()
-    drawn = _draw_folder(parsed.folder, names)
+    drawn = _draw_folder(folder, names)
     if not drawn:
-        return _say_what_is_there(parsed, names)
-    if parsed.out is not None and len(drawn) > 1:
+        return _what_is_there(folder, out, names)
+    if out is not None and len(drawn) > 1:
         raise DataError(
-            f"--out {parsed.out}: {parsed.folder} has {len(drawn)} figures, {', '.join(drawn)}; without --out each is "
+            f"--out {out}: {folder} has {len(drawn)} figures, {', '.join(drawn)}; without --out each is "
             "written beside its recording"
         )
-    if parsed.out is not None:
-        (content,) = render_figure(next(iter(drawn.values())), [parsed.out.suffix.removeprefix(".")]).values()
-        written = [str(write_file(parsed.out, content))]
+    if out is not None:
+        (content,) = render_figure(next(iter(drawn.values())), [out.suffix.removeprefix(".")]).values()
+        written = [str(write_file(out, content))]
     else:
         files = {
             f"{stem}.{form}": content
             for stem, figure in drawn.items()
             for form, content in render_figure(figure, _FORMATS).items()
         }
-        add_to_folder(parsed.folder, files)
-        written = [str(parsed.folder / name) for name in files]
-    output.print_result(f"written: {', '.join(written)}", {"files": written}, parsed.json)
-    return output.EXIT_GOOD
+        add_to_folder(folder, files)
+        written = [str(folder / name) for name in files]
+    return Said(f"written: {', '.join(written)}", {"files": written})
 
 
 def _names(folder: Path) -> list[str]:
@@ -129,22 +119,19 @@ def _document(file: Path) -> dict[str, Any]:
     return document
 
 
-def _say_what_is_there(parsed: argparse.Namespace, names: list[str]) -> int:
+def _what_is_there(folder: Path, out: Path | None, names: list[str]) -> Said:
     """Say which figures a folder of ppafo has and which file to open; DataError where the folder is another."""
     from ppafo.storage.result_folder import MARK, marking_command
 
     if MARK not in names:
-        raise DataError(f"{parsed.folder}: is not a result folder of ppafo")
-    command = marking_command(parsed.folder)
+        raise DataError(f"{folder}: is not a result folder of ppafo")
+    command = marking_command(folder)
     pictures = [name for name in names if name.endswith(_PICTURES)]
     page = next((name for name in names if name.endswith(".html")), None)
     shown = ", ".join(pictures[:_NAMED]) + (", ..." if len(pictures) > _NAMED else "")
     has = f"has its figures ({shown})" if pictures else "has no figures"
     opened = page or next((name for name in names if name.endswith(".txt")), MARK)
-    said = f"{parsed.folder}: the result of 'ppafo {command}' {has}; open {parsed.folder / opened}"
-    if parsed.out is not None:
-        raise DataError(f"--out {parsed.out}: nothing is drawn anew: {said}")
-    output.print_result(
-        said, {"files": [], "command": command, "figures": pictures, "open": str(parsed.folder / opened)}, parsed.json
-    )
-    return output.EXIT_GOOD
+    said = f"{folder}: the result of 'ppafo {command}' {has}; open {folder / opened}"
+    if out is not None:
+        raise DataError(f"--out {out}: nothing is drawn anew: {said}")
+    return Said(said, {"files": [], "command": command, "figures": pictures, "open": str(folder / opened)})

@@ -1,4 +1,4 @@
-"""``ppafo endurance``: what it prints and writes, and what it refuses."""
+"""``ppafo bottle``: what it prints and writes, and what it refuses."""
 
 import json
 from pathlib import Path
@@ -11,7 +11,7 @@ from ppafo.parameters.bottles.bottle import list_bottles
 from ppafo.signals import Channel, Recording
 from ppafo.storage.comma_separated import read_csv, write_csv
 
-QUICK = ["endurance", "--gas-per-stride", "1 g", "--stride-time", "1.1 s"]
+QUICK = ["bottle", "--gas-per-stride", "1 g", "--stride-time", "1.1 s"]
 
 
 @pytest.fixture
@@ -23,7 +23,7 @@ def walk(tmp_path: Path) -> Path:
 
 
 def test_the_bottles_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["endurance", "--list"]) == 0
+    assert main(["bottle", "--list"]) == 0
     listed = capsys.readouterr().out
     assert all(name in listed for name in list_bottles())
 
@@ -36,7 +36,7 @@ def test_text_says_run_time_steps_and_why_it_ended(capsys: pytest.CaptureFixture
 
 
 def test_a_long_run_time_is_in_whole_minutes(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["endurance", "--gas-per-stride", "0.001 g", "--stride-time", "1.1 s"]) == 0
+    assert main(["bottle", "--gas-per-stride", "0.001 g", "--stride-time", "1.1 s"]) == 0
     assert "run time                           1440 min of walking" in capsys.readouterr().out
 
 
@@ -52,10 +52,10 @@ def test_json_is_in_si_and_says_simulated(capsys: pytest.CaptureFixture[str]) ->
 
 
 def test_a_recording_is_repeated(walk: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["endurance", str(walk), "--stride-time", "2 s", "--json"]) == 0
+    assert main(["bottle", str(walk), "--stride-time", "2 s", "--json"]) == 0
     repeated = json.loads(capsys.readouterr().out)
     assert repeated["draw"]["mass_per_stride"] == pytest.approx(1e-3)
-    assert main(["endurance", "--gas-per-stride", "1 g", "--stride-time", "2 s", "--json"]) == 0
+    assert main(["bottle", "--gas-per-stride", "1 g", "--stride-time", "2 s", "--json"]) == 0
     given = json.loads(capsys.readouterr().out)
     assert repeated["result"]["strides"] == pytest.approx(given["result"]["strides"], rel=1e-6)
 
@@ -95,7 +95,7 @@ def test_the_old_names_of_gas_and_time_of_a_stride_are_read_for_one_version_and_
 ) -> None:
     assert main(QUICK) == 0
     now = capsys.readouterr()
-    assert main(["endurance", "--gas-per-step", "1 g", "--step-time=1.1 s"]) == 0
+    assert main(["bottle", "--gas-per-step", "1 g", "--step-time=1.1 s"]) == 0
     before = capsys.readouterr()
     assert (before.out, now.err) == (now.out, "")
     assert "--gas-per-step is now called --gas-per-stride" in before.err
@@ -103,10 +103,10 @@ def test_the_old_names_of_gas_and_time_of_a_stride_are_read_for_one_version_and_
 
 
 def test_a_largest_flow_beside_a_recording_is_refused(walk: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["endurance", str(walk), "--peak-flow", "5 g/s"]) == 2
+    assert main(["bottle", str(walk), "--peak-flow", "5 g/s"]) == 2
     assert "--peak-flow belongs to --gas-per-stride" in capsys.readouterr().err
 
 
 def test_the_schema_of_a_bottle_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["schema", "bottle"]) == 0
+    assert main(["doctor", "--schema", "bottle"]) == 0
     assert json.loads(capsys.readouterr().out)["title"] == "ppafo bottle"

@@ -1,0 +1,365 @@
+"""The reader of signatures: a verb's parameters become the arguments of its command, its docstring the help.
+
+The parser is like any of argparse, but a mistake is one error, and it names what was mistyped.
+"""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+import re
+import sys
+import types
+import typing
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import takewhile
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, final
+
+from ppafo.cli import output
+from ppafo.cli.arguments import Word, number, whole_number
+from ppafo.errors import PpafoError, nearest_name
+from ppafo.kinds import kind_at
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
+
+    from ppafo.documents.toml_text import TomlKind
+
+PROGRESS = "progress"
+"""The parameter of a verb that reports how far it is; no word of the line fills it."""
+OUT = "out"
+"""The parameter of a verb that writes its folder or file itself; every other command has ``--out DIR``."""
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A command: its verb as ``module:function``, and what its signature does not say.
+
+    ``library`` is the ``TomlKind`` of the files that come with the package (``module:NAME``), for ``--list``, and
+    ``listing`` what returns the entries of that list (``module:function``), by default the words of the files;
+    ``listed`` is what these are called. ``default_folder`` takes the values of the parameters by name and returns where
+    the result is written unless ``--out`` says so; without it nothing is.
+    """
+
+    verb: str
+    library: str = ""
+    listing: str = ""
+    listed: str = ""
+    default_folder: str = ""
+    found: Callable[..., Any] | None = None
+    """The verb itself, of another package, in place of where it is."""
+
+    def function(self) -> Callable[..., Any]:
+        """Load and return the verb."""
+        function: Callable[..., Any] = self.found or kind_at(self.verb)
+        return function
+
+    @property
+    def summary(self) -> str:
+        """The first line of the docstring of the verb, as an entry of a list has it."""
+        first = (self.function().__doc__ or "").strip().partition("\n")[0].rstrip(".")
+        return first[:1].lower() + first[1:]
+
+    @property
+    def lists(self) -> bool:
+        """True where the command has ``--list``."""
+        return bool(self.library or self.listing)
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Commands that share their first word."""
+
+    summary: str
+    actions: Mapping[str, Command]
+
+
+_PLAIN: Mapping[type, Word] = {
+    str: Word("TEXT"),
+    int: Word("N", whole_number),
+    float: Word("NUMBER", number),
+    Path: Word("FILE", Path),
+}
+"""How a type without a ``Word`` is read."""
+
+_PARAMETER = re.compile(r"(\w+): (.*)")
+
+
+@dataclass(frozen=True, slots=True)
+class _Reading:
+    """What an annotation says of the text of a parameter."""
+
+    word: Word
+    is_flag: bool = False
+    is_repeated: bool = False
+    choices: tuple[str, ...] | None = field(default=None)
+
+
+def _help_by_parameter(verb: Callable[..., Any], names: Sequence[str]) -> dict[str, str]:
+    """Return the lines ``name: help`` of the docstring; more indented lines go on with them."""
+    found: dict[str, str] = {}
+    latest = ""
+    for line in (inspect.getdoc(verb) or "").splitlines():
+        begun = _PARAMETER.fullmatch(line)
+        if begun is not None and begun[1] in names:
+            latest = begun[1]
+            found[latest] = begun[2]
+        elif latest and line.startswith(" "):
+            found[latest] += f" {line.strip()}"
+        else:
+            latest = ""
+    return found
+
+
+def reading_of(annotation: Any) -> _Reading:
+    """Return how the text of a parameter with an annotation is read."""
+    word, is_repeated = None, False
+    while True:
+        origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
+        if origin is Annotated:
+            word = word or next((item for item in reversed(inner) if isinstance(item, Word)), None)
+            annotation = inner[0]
+        elif origin in (typing.Union, types.UnionType):
+            annotation = next(item for item in inner if item is not types.NoneType)
+        elif isinstance(origin, type) and issubclass(origin, Iterable):
+            is_repeated, annotation = True, inner[0]
+        elif origin is typing.Literal:
+            return _Reading(word or Word("|".join(inner)), choices=inner)
+        else:
+            is_flag = annotation is bool
+            word = word or _PLAIN.get(annotation, Word("TEXT"))
+            return _Reading(word, is_flag, is_repeated or word.is_repeated)
+
+
+def parameters_of(verb: Callable[..., Any]) -> Iterator[tuple[inspect.Parameter, _Reading]]:
+    """Return each parameter that words of the line fill, with how its text is read."""
+    names = vars(sys.modules[verb.__module__])
+    for parameter in inspect.signature(verb).parameters.values():
+        if parameter.name != PROGRESS:
+            annotation = parameter.annotation
+            # The texts of annotations are evaluated for the command that runs, and for no other.
+            yield parameter, reading_of(eval(annotation, names) if isinstance(annotation, str) else annotation)
+
+
+def option_of(parameter: inspect.Parameter, word: Word) -> str:
+    """Return the option that fills a parameter, empty where its place in the line does."""
+    if word.option or parameter.kind is not inspect.Parameter.KEYWORD_ONLY:
+        return word.option
+    return f"--{parameter.name.strip('_').replace('_', '-')}"
+
+
+def add_parameters(parser: argparse.ArgumentParser, command: Command) -> None:
+    """Add the parameters of a verb, ``--list`` where there is one, ``--json`` and ``--out`` to the parser."""
+    verb = command.function()
+    readings = list(parameters_of(verb))
+    names = [parameter.name for parameter, _ in readings]
+    helps = _help_by_parameter(verb, names)
+    for parameter, reading in readings:
+        _add_parameter(parser, parameter, reading, helps.get(parameter.name, reading.word.help), command.lists)
+    if command.lists:
+        parser.add_argument("--list", action="store_true", help="list what comes with the package")
+    if OUT in names:
+        output.add_json_argument(parser)
+    else:
+        default = "one in out/ named after what ran" if command.default_folder else ""
+        output.add_output_arguments(parser, default)
+
+
+def _add_parameter(
+    parser: argparse.ArgumentParser, parameter: inspect.Parameter, reading: _Reading, said: str, lists: bool
+) -> None:
+    word, is_required = reading.word, parameter.default is inspect.Parameter.empty
+    default = None if is_required else parameter.default
+    said = said.replace("{default}", f"{100.0 * default:g}%") if isinstance(default, float) else said
+    options: dict[str, Any] = {"help": said.replace("%", "%%"), "default": default}
+    option = option_of(parameter, word)
+    if option:
+        options["dest"] = parameter.name
+    if reading.is_flag:
+        parser.add_argument(option, action="store_true", **options)
+        if word.off:
+            parser.add_argument(
+                word.off, action="store_false", dest=parameter.name, default=default, help=word.help.replace("%", "%%")
+            )
+        return
+    options |= {"metavar": word.metavar, "type": word.read, "choices": reading.choices}
+    if not option:
+        if reading.is_repeated:
+            options["nargs"] = "+" if is_required else "*"
+        elif not is_required or lists:
+            options["nargs"] = "?"
+        parser.add_argument(parameter.name, **options)
+        return
+    options["required"] = is_required
+    if reading.is_repeated:
+        options |= {"action": "append", "default": list(default or ())}
+    if word.const is not None:
+        options |= {"nargs": "?", "const": word.const}
+    parser.add_argument(option, **options)
+
+
+def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
+    """Call the verb of a command with what the line says, deliver what it returns, and return the exit code."""
+    if command.lists and parsed.list:
+        return _list(command, parsed.json)
+    verb = command.function()
+    parameters = inspect.signature(verb).parameters
+    values = {each: getattr(parsed, each) for each in parameters if each != PROGRESS}
+    for each, value in values.items():
+        if command.lists and value is None and parameters[each].default is inspect.Parameter.empty:
+            noun = reading_of_name(verb, each).metavar.lower()
+            raise UsageError(
+                f"no {noun} was given: name one or give a .toml file; 'ppafo {name} --list' shows what there is"
+            )
+    folder = None
+    if OUT not in parameters:
+        folder = parsed.out
+        if folder is None and command.default_folder:
+            folder = kind_at(command.default_folder)(values)
+        output.check_output(folder, name)
+    with output.progress_line() as progress:
+        found = verb(**values, **({PROGRESS: progress} if PROGRESS in parameters else {}))
+    return output.deliver(found, parsed.json, folder, name, has_written=OUT in parameters)
+
+
+def reading_of_name(verb: Callable[..., Any], name: str) -> Word:
+    """Return the word of one parameter."""
+    return next(reading.word for parameter, reading in parameters_of(verb) if parameter.name == name)
+
+
+def _list(command: Command, as_json: bool) -> int:
+    """Print what comes with the package: names with their descriptions, all columns where these are more."""
+    from ppafo.answers.writing import align_columns
+
+    library: TomlKind | None = kind_at(command.library) if command.library else None
+    if command.listing:
+        listed: output.Said | list[dict[str, Any]] = kind_at(command.listing)()
+        if isinstance(listed, output.Said):
+            return output.deliver(listed, as_json, None, "")
+    else:
+        assert library is not None
+        files = {name: library.parse(library.read(name), name) for name in library.names()}
+        listed = [
+            {"name": name} | {key: str(file[key]) for key in ("title", "description") if key in file}
+            for name, file in files.items()
+        ]
+    rows = [[f"{value:,} {key}" if isinstance(value, int) else value for key, value in one.items()] for one in listed]
+    rows = rows if command.listing else [[row[0], row[-1]] for row in rows]
+    noun = command.listed or (library.noun if library is not None else "")
+    plural = f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}s"
+    output.print_result("\n".join(align_columns(rows, len(rows[0]))), {plural: listed}, as_json)
+    return output.EXIT_GOOD
+
+
+_BAD_VALUE = re.compile(r"argument (?:--?\w+/)*(\S+): (?!invalid )(.+: .+)")
+"""What argparse makes of an ArgumentTypeError."""
+
+_NEGATIVE_NUMBER = re.compile(r"-\d+|-\d*\.\d+")
+
+
+class UsageError(PpafoError):
+    """The words after ``ppafo`` are not an order that it knows."""
+
+
+@final
+class CommandParser(argparse.ArgumentParser):
+    """A parser that raises ``UsageError`` where argparse would print its usage and end the process."""
+
+    list_commands: Callable[[], str] | None = None
+    """What follows the description in the help; made only there, as it loads every verb."""
+
+    def format_help(self) -> str:
+        """Return the help, with the commands where there are some."""
+        if self.list_commands is not None:
+            self.description, self.list_commands = f"{self.description}\n\n{self.list_commands()}", None
+        return super().format_help()
+
+    def error(self, message: str) -> NoReturn:
+        """Raise the message of argparse as an error of one line that names the help to look at."""
+        bad_value = _BAD_VALUE.fullmatch(message)
+        if bad_value is not None:
+            raise UsageError(f"{bad_value[1]} {bad_value[2]}")
+        raise UsageError(f"{message.removeprefix('argument ')}; see '{self.prog} --help'")
+
+    def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
+        """Print a help text; some versions of Python leave it to the caller that it cannot be written."""
+        with output.printing():
+            super()._print_message(message, file)
+
+    def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
+        """End the process after ``--help`` or ``--version``, once their text has really been written."""
+        output.flush_output()
+        super().exit(status, message)
+
+    def options(self) -> set[str]:
+        """Return every option of this parser and of the subcommands that it knows."""
+        found = {name for action in self._actions for name in action.option_strings}
+        for action in self._actions:
+            if isinstance(action.choices, Mapping):
+                found = found.union(*(parser.options() for parser in action.choices.values()))
+        return found
+
+
+RENAMED = {
+    "--first": "--first-draws",
+    "--maximum": "--draws",
+    "--most": "--draws",
+    "--most-failed": "--maximum-failed",
+    "--runs": "--draws",
+    "--least-strides": "--minimum-strides",
+}
+"""Options of version 0.1 and what they are called now."""
+
+STILL_READ = {"--gas-per-step": "--gas-per-stride", "--step-time": "--stride-time"}
+"""Options of 0.2 and their present names, under which they are read for one more version; then they are ``RENAMED``."""
+
+REMOVED = {"--config": "name what is run without it, as in 'ppafo walk solenoid'"}
+"""Options of version 0.1 that are none any more, and what to write instead."""
+
+
+def present_options(words: list[str], parser: CommandParser) -> list[str]:
+    """Return the words with options by their present names; one line for each that has another."""
+    known, present = parser.options(), list(words)
+    for place, word in enumerate(takewhile(lambda word: word != "--", words)):
+        name, equals, value = word.partition("=")
+        now = STILL_READ.get(name)
+        if now in known:
+            print(f"ppafo: {name} is now called {now}; the old name is read in this version only", file=sys.stderr)
+            present[place] = f"{now}{equals}{value}"
+    return present
+
+
+def check_options(words: Sequence[str], parser: CommandParser) -> None:
+    """Refuse an option that no part of the parser has, before argparse complains of what it finds missing besides."""
+    known = sorted(parser.options())
+    for word in takewhile(lambda word: word != "--", words):
+        name = word.partition("=")[0]
+        if name in RENAMED and name not in known and RENAMED[name] in known:
+            raise UsageError(f"{name} is now called {RENAMED[name]}")
+        if _looks_like_option(word) and not any(_stands_for(name, option) for option in known):
+            if name in REMOVED:
+                raise UsageError(f"there is no option '{name}' any more: {REMOVED[name]}")
+            raise UsageError(
+                f"there is no option '{name}'{_nearest_option(name, known)}; available: {', '.join(known)}"
+            )
+
+
+def _nearest_option(name: str, known: Sequence[str]) -> str:
+    """Return the hint; the dashes, which all have in common, would make strangers look alike."""
+    hint = nearest_name(name.strip("-"), [option.removeprefix("--") for option in known if option.startswith("--")])
+    return hint.replace("'", "'--", 1)
+
+
+def _looks_like_option(word: str) -> bool:
+    """Tell whether argparse takes a word for an option: a dash alone, numbers and words with a space are values."""
+    is_number = _NEGATIVE_NUMBER.fullmatch(word) is not None
+    return word.startswith("-") and len(word) > 1 and " " not in word and not is_number
+
+
+def _stands_for(name: str, option: str) -> bool:
+    """Tell whether a name is an option, the beginning of a long one, or a short one with its value behind it."""
+    if name.startswith("--"):
+        return option.startswith(name)
+    return name == option or (len(option) == 2 and name.startswith(option))

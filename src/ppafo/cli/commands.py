@@ -1,0 +1,175 @@
+"""Every command, under the heading of the help where it stands; to add one: a verb in ``verbs/`` and one line here.
+
+Commands of other packages are plain functions, found by entry points of the group ``ppafo.commands``.
+"""
+
+from types import FunctionType
+
+from ppafo.cli.command_line import Command, Group, UsageError
+from ppafo.errors import nearest_name
+from ppafo.kinds import Kinds
+
+_ANALYSES, _BENCH, _DEVICE = "ppafo.cli.verbs.analyses", "ppafo.cli.verbs.bench", "ppafo.cli.verbs.device"
+_TOOLS, _WALKING = "ppafo.cli.verbs.tools", "ppafo.cli.verbs.walking"
+
+HEADINGS: dict[str, dict[str, Command | Group]] = {
+    "the paper": {
+        "reproduce": Command(
+            f"{_ANALYSES}:reproduce",
+            library="ppafo.questions.reproduce.publication:FILE",
+            listing="ppafo.questions.reproduce.publication:list_studies",
+        ),
+    },
+    "your device": {
+        "new": Command(f"{_DEVICE}:new"),
+        "simulate": Command(f"{_DEVICE}:simulate", listing="ppafo.cli.simulate:list_descriptions", listed="scenario"),
+        "workbench": Command(f"{_DEVICE}:workbench"),
+        "sets": Group(
+            "list, show and audit parameter sets; list real parts",
+            {
+                "list": Command(f"{_DEVICE}:sets_list"),
+                "show": Command(f"{_DEVICE}:sets_show"),
+                "audit": Command(f"{_DEVICE}:sets_audit"),
+                "parts": Command(f"{_DEVICE}:sets_parts"),
+            },
+        ),
+    },
+    "from bench to model": {
+        "rig": Group(
+            "record a bench, or synthetic data on the simulated test bench",
+            {
+                "simulate": Command(f"{_BENCH}:rig_simulate", listing="ppafo.cli.rig:list_rig", listed="experiment"),
+                "record": Command(f"{_BENCH}:rig_record"),
+            },
+        ),
+        "identify": Command(f"{_BENCH}:identify"),
+        "validate": Command(f"{_BENCH}:validate"),
+    },
+    "decide": {
+        "sweep": Command(
+            f"{_ANALYSES}:sweep",
+            library="ppafo.studies.loading:STUDY_FILES",
+            listing="ppafo.questions.sweep.solve:studies_of_the_package",
+        ),
+        "compare": Command(f"{_ANALYSES}:compare"),
+        "sensitivity": Command(f"{_ANALYSES}:sensitivity"),
+        "montecarlo": Command(f"{_ANALYSES}:monte_carlo"),
+        "find": Command(f"{_ANALYSES}:find"),
+        "tune": Command(f"{_ANALYSES}:tune", library="ppafo.questions.tune.problem:TUNING"),
+        "linearise": Command(f"{_ANALYSES}:linearise"),
+        "design": Command(f"{_ANALYSES}:design", library="ppafo.questions.design.loading:FILE"),
+        "bottle": Command(f"{_ANALYSES}:bottle", library="ppafo.parameters.bottles.bottle:FILE"),
+    },
+    "walk": {
+        "gait": Group(
+            "list, show and import gaits",
+            {
+                "list": Command(f"{_WALKING}:gait_list"),
+                "show": Command(f"{_WALKING}:gait_show"),
+                "import": Command(f"{_WALKING}:gait_import"),
+                "record": Command(f"{_WALKING}:gait_record"),
+            },
+        ),
+        "walk": Command(
+            f"{_WALKING}:walk",
+            library="ppafo.walking.loading:FILE",
+            listing="ppafo.questions.walk.answer:list_files",
+            default_folder="ppafo.questions.walk.answer:default_folder",
+        ),
+    },
+    "tools": {
+        "export": Group(
+            "write a scenario or a walk for other tools: C, an FMU, OpenSim, firmware; figures of a result",
+            {
+                "c": Command(f"{_TOOLS}:export_c"),
+                "controller": Command(f"{_TOOLS}:export_controller"),
+                "firmware": Command(f"{_TOOLS}:export_firmware"),
+                "fmu": Command(f"{_TOOLS}:export_fmu"),
+                "opensim": Command(f"{_TOOLS}:export_opensim"),
+                "figure": Command(f"{_TOOLS}:export_figure"),
+            },
+        ),
+        "hil": Command(f"{_TOOLS}:hil"),
+        "doctor": Command(f"{_TOOLS}:doctor"),
+    },
+}
+"""Headings of the help, by what somebody has come for, and under each the commands."""
+
+COMMANDS: dict[str, Command | Group] = {name: one for group in HEADINGS.values() for name, one in group.items()}
+"""The commands of this package by name."""
+
+OTHERS: Kinds[FunctionType] = Kinds("ppafo.commands", "command", FunctionType, {})
+"""The commands of other packages: functions, found when a word names none of ours."""
+
+OF_OTHERS = "of other packages"
+"""The heading of the help for them."""
+
+RENAMED: dict[str, str] = {
+    "audit": "sets audit",
+    "cache": "doctor",
+    "chip": "export firmware --try",
+    "endurance": "bottle",
+    "examples": "new example",
+    "firmware": "export firmware",
+    "gait export": "export opensim",
+    "parts": "sets parts",
+    "plot": "export figure",
+    "record": "rig record",
+    "rig list": "rig simulate --list",
+    "rig record EXPERIMENT": "rig simulate",
+    "schema": "doctor --schema",
+    "size": "design",
+}
+"""Commands of the version before and what is written instead; a word in capitals stands for any that is no option."""
+
+MOVED: dict[str, str] = {
+    "bench": "'python -m benchmarks' or 'make bench'",
+    "coverage": "'python scripts/interval_coverage.py'",
+}
+"""Commands that the package had once, and what does the same in a checkout of the repository."""
+
+
+def check_words(words: list[str]) -> None:
+    """Refuse words that begin as no command does: with the new line of an old one, else with the nearest name.
+
+    KindError for a command of another package that is there and cannot be used.
+    """
+    given = [word for word in words if not word.startswith("-")]
+    if not given:
+        return
+    for old, now in RENAMED.items():
+        parts = old.split()
+        pairs = zip(parts, words, strict=False)
+        if len(words) >= len(parts) and all(
+            part == word or (part.isupper() and not word.startswith("-")) for part, word in pairs
+        ):
+            shown = " ".join(part for part in parts if not part.isupper())
+            raise UsageError(f"'ppafo {shown}' is now 'ppafo {now}', with the same arguments")
+    word = given[0]
+    if word in MOVED:
+        raise UsageError(f"'{word}' is no longer a command of the package: run {MOVED[word]} in a checkout of ppafo")
+    if word not in COMMANDS and word not in OTHERS:
+        known = tuple(dict.fromkeys((*COMMANDS, *OTHERS)))
+        raise UsageError(f"there is no command '{word}'{nearest_name(word, known)}; available: {', '.join(known)}")
+    command = COMMANDS.get(word)
+    if isinstance(command, Group) and "-h" not in words and "--help" not in words:
+        actions, action = list(command.actions), given[1] if len(given) > 1 else None
+        if action is None:
+            raise UsageError(f"ppafo {word}: give one of {', '.join(actions)}; see 'ppafo {word} --help'")
+        if action not in actions:
+            hint = nearest_name(action, actions)
+            raise UsageError(f"there is no 'ppafo {word} {action}'{hint}; available: {', '.join(actions)}")
+
+
+def list_commands() -> str:
+    """Return the commands with what each does, heading by heading, with the commands of other packages."""
+    OTHERS.load_all()
+    groups = {heading: {name: one.summary for name, one in group.items()} for heading, group in HEADINGS.items()}
+    others = {name: Command("", found=verb).summary for name, verb in OTHERS.loaded().items()}
+    if others:
+        groups[OF_OTHERS] = others
+    width = max(len(name) for group in groups.values() for name in group)
+    return "\n\n".join(
+        "\n".join([f"{heading}:", *(f"  {name:<{width}}  {summary}" for name, summary in group.items())])
+        for heading, group in groups.items()
+    )

@@ -1,0 +1,383 @@
+"""Analyses: the paper again, studies, searches, linear models, designs and bottles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, overload
+
+from ppafo.cli.arguments import (
+    Confidence,
+    Count,
+    Flow,
+    Length,
+    Mass,
+    MaximumFailed,
+    Metrics,
+    Minutes,
+    Name,
+    Overrides,
+    Pressure,
+    Seed,
+    Threads,
+    Time,
+    Torque,
+    Whole,
+    Word,
+    point,
+    task,
+)
+
+if TYPE_CHECKING:
+    from ppafo.progress import Report
+    from ppafo.questions.compare.answer import Comparison
+    from ppafo.questions.design.front.answer import Design
+    from ppafo.questions.design.front.problem import DesignProblem
+    from ppafo.questions.design.profile.answer import Sizing
+    from ppafo.questions.design.profile.problem import SizingProblem
+    from ppafo.questions.design.wearer.solve import WearerSizing
+    from ppafo.questions.endurance.answer import Endurance, Endurances
+    from ppafo.questions.endurance.solve import GasUse
+    from ppafo.questions.find.solve import Found
+    from ppafo.questions.linearise.answer import LinearModel
+    from ppafo.questions.montecarlo.solve import MonteCarlo
+    from ppafo.questions.reproduce.answer import Reproduction, Studies
+    from ppafo.questions.sensitivity.solve import Sensitivity
+    from ppafo.questions.sweep.answer import StudyResults
+    from ppafo.questions.tune.answer import Tuning
+    from ppafo.questions.tune.problem import Problem
+    from ppafo.simulation.scenario import Scenario
+    from ppafo.studies.study import Configurations
+    from ppafo.studies.study import Study as StudyObject
+
+Study = Annotated["StudyObject | str | Path | Mapping[str, Any]", Word("STUDY")]
+Distributed = Annotated[
+    "StudyObject | str | Path | Mapping[str, Any]",
+    Word("STUDY", help="a study with distributions: a name, or a .toml file"),
+]
+Simulated = Annotated["Scenario | str | Path", Word("SCENARIO", help="name of a scenario, or a .toml file")]
+Compared = Annotated["Sequence[str] | Configurations", Word("SCENARIO", is_repeated=True)]
+Tasks = Annotated[
+    "Mapping[str, Sequence[str]] | Sequence[tuple[str, Sequence[str]]]",
+    Word("NAME:PATH=VALUE[,PATH=VALUE]", task, option="--task", is_repeated=True),
+]
+Designed = Annotated["DesignProblem | SizingProblem | str | Path", Word("DESIGN")]
+Tuned = Annotated["Problem | str | Path | Mapping[str, Any]", Word("TUNING")]
+Used = Annotated["GasUse | Sequence[GasUse]", Word("RECORDING", Path, is_repeated=True)]
+
+
+@overload
+def reproduce(
+    *, study: Literal["ppafo-2011"] = ..., overrides: Overrides = ..., progress: Report | None = ...
+) -> Reproduction: ...
+
+
+@overload
+def reproduce(
+    *, study: str = ..., overrides: Overrides = ..., progress: Report | None = ...
+) -> Reproduction | Studies: ...
+
+
+def reproduce(
+    *, study: Name = "ppafo-2011", overrides: Overrides = (), progress: Report | None = None
+) -> Reproduction | Studies:
+    """Reproduce the paper's experiments and check its claims.
+
+    ``overrides`` change the experiments (not the paper's printed numbers): a path of a scenario reaches those that
+    have it, a path of the device all of them. SimulationError where a run diverges, ScenarioError for a study that is
+    none.
+
+    study: publication to run again: a name, a .toml file of claims, or 'all'; default ppafo-2011, the paper
+    """
+    from ppafo.questions.reproduce.solve import reproduce
+
+    return reproduce(overrides, progress, study)
+
+
+def sweep(
+    study: Study,
+    *,
+    out: Annotated[str | Path, Word("DIR")] | None = None,
+    overrides: Overrides = (),
+    draws: Count | None = None,
+    seed: Seed | None = None,
+    threads: Threads | None = None,
+    scheduler: Annotated[str, Word("ADDRESS")] | None = None,
+    agreed: Annotated[bool, Word(option="--yes")] = False,
+    progress: Report | None = None,
+) -> StudyResults:
+    """Run a study: many runs, one row each, resumable.
+
+    study: name of a study, or a .toml file
+    out: folder or address for the results; default out/NAME with the name of the study
+    draws: number of draws, instead of the number in the file
+    scheduler: address of a Dask scheduler whose workers compute the chunks
+    agreed: start even if the results will fill much of the disk
+    """
+    from ppafo.cli.output import load_drawing
+    from ppafo.questions.sweep.solve import sweep_into_folder
+
+    load_drawing()
+    return sweep_into_folder(study, out, overrides, draws, seed, threads, scheduler, agreed, progress)
+
+
+def compare(
+    configurations: Compared | None = None,
+    study: Annotated[Study, Word("STUDY", option="--study")] | None = None,
+    *,
+    tasks: Tasks = (),
+    overrides: Overrides = (),
+    baseline: Name | None = None,
+    draws: Whole = 4096,
+    seed: Seed | None = None,
+    confidence: Confidence = 0.95,
+    maximum_failed: MaximumFailed = 0.01,
+    threads: Threads | None = None,
+    progress: Report | None = None,
+) -> Comparison:
+    """Compare configurations, also over an uncertain device.
+
+    All have common random numbers. ``configurations`` are scenarios by name (or a list of names, files or Scenario
+    objects). Draws are randomised Sobol replicates whatever the study's sampling method; where a controller receives
+    noise, each has a noise stream of its own, the same in all configurations, and without a study the noise alone is
+    drawn. StudyError for bad input and where more than the fraction ``maximum_failed`` of a configuration's runs fails;
+    fewer are left out in pairs.
+
+    configurations: names of scenarios or .toml files; default: the configurations of --study
+    study: study file that gives the distributions and, without SCENARIO, the configurations
+    tasks: a task for all configurations, for example 'slow:reference.ramp_time=2 s'; default: as the scenarios are
+        written
+    baseline: configuration that all others are compared with; default: the first
+    draws: draws of the uncertain values; default 4096
+    """
+    from ppafo.questions.compare.solve import compare
+
+    return compare(
+        configurations, study, tasks, overrides, baseline, draws, seed, confidence, maximum_failed, threads, progress
+    )
+
+
+def sensitivity(
+    study: Distributed,
+    *,
+    method: Annotated[str, Word("sobol|shapley")] | None = None,
+    metrics: Metrics = (),
+    samples: Whole | None = None,
+    configuration: Name | None = None,
+    independent: bool = False,
+    overrides: Overrides = (),
+    seed: Seed | None = None,
+    confidence: Confidence = 0.95,
+    maximum_failed: MaximumFailed = 0.02,
+    threads: Threads | None = None,
+    progress: Report | None = None,
+) -> Sensitivity:
+    """Rank uncertain values by their influence: Sobol or Shapley indices, signed changes.
+
+    Noise of the sensors is one of the values. StudyError for bad input, and where more than the fraction
+    ``maximum_failed`` of the runs fails; of fewer, whole blocks are left out and counted.
+
+    method: default: sobol, or shapley if values are correlated
+    metrics: metric to analyse, may be repeated; default: the metrics of the study
+    samples: number of base points (sobol, default 8192) or orders (shapley, 2048)
+    configuration: configuration of the study, needed if it has several
+    independent: ignore the correlations of the study
+    """
+    from ppafo.questions.sensitivity.solve import sensitivity
+
+    return sensitivity(
+        study,
+        method,
+        metrics,
+        samples,
+        configuration,
+        overrides,
+        independent,
+        seed,
+        confidence,
+        maximum_failed,
+        threads,
+        progress,
+    )
+
+
+def monte_carlo(
+    study: Distributed,
+    metric: Annotated[str, Word("NAME", option="--metric")],
+    statistic: Annotated[str, Word("WORDS", option="--statistic")] = "mean",
+    *,
+    width: Annotated[str, Word("WIDTH")] | None = None,
+    also: Annotated[Sequence[str], Word("NAME")] = (),
+    configuration: Name | None = None,
+    first_draws: Whole = 256,
+    draws: Whole = 2**20,
+    overrides: Overrides = (),
+    seed: Seed | None = None,
+    confidence: Confidence = 0.95,
+    maximum_failed: MaximumFailed = 0.01,
+    threads: Threads | None = None,
+    progress: Report | None = None,
+) -> MonteCarlo:
+    """Draw until the interval of a statistic is narrow enough.
+
+    Draws are those that the interval needs, whatever the study's sampling method: randomised Sobol replicates for a
+    mean, else independent ones. StudyError for bad input and where more than the fraction ``maximum_failed`` of the
+    runs fails.
+
+    metric: name of a metric, such as rms_error
+    statistic: mean (default), 'quantile 0.95', 'probability above 1.2 N m', 'probability below 0.5 g'
+    width: target width of the interval: '1 %' of the value (default), or '0.01 N m'; of a probability, 0.02
+    also: a further metric, whose mean over the same draws is given; may be repeated
+    configuration: configuration of the study, needed if it has several
+    first_draws: draws before the first estimate; default 256
+    draws: maximum number of draws; default 1,048,576
+    """
+    from ppafo.questions.montecarlo.solve import monte_carlo
+
+    return monte_carlo(
+        study,
+        metric,
+        statistic,
+        width,
+        configuration,
+        overrides,
+        seed,
+        first_draws,
+        draws,
+        confidence,
+        maximum_failed,
+        threads,
+        progress,
+        also,
+    )
+
+
+def find(
+    scenario: Simulated,
+    vary: Annotated[str, Word("PATH=LOW..HIGH", option="--vary")],
+    such_that: Annotated[str, Word("CONDITION", option="--such-that")],
+    *,
+    highest: Annotated[bool, Word(off="--lowest", help="find the lowest value (default)")] = False,
+    grid: Count = 64,
+    overrides: Overrides = (),
+    threads: Threads | None = None,
+    progress: Report | None = None,
+) -> Found:
+    """Find the lowest or highest value that meets a condition on a metric.
+
+    A grid of values over the range is run side by side; between the last one that does not meet the condition and the
+    first one that does, the bracket is divided again and again down to 1e-6 of the range. What happens between two
+    values of the grid on one side of the condition is not seen. StudyError or ScenarioError for bad input, and where
+    every run fails.
+
+    vary: a number of the scenario or its device, and its range, for example 'supply.pressure=20..90 psi_g'
+    such_that: a metric, <= or >=, and a limit, for example 'final_error <= 0.3 N m'
+    highest: find the highest value
+    grid: number of evenly spaced values to try first; default 64
+    """
+    from ppafo.questions.find.solve import find
+
+    return find(scenario, vary, such_that, highest, grid, overrides, threads, progress)
+
+
+def tune(
+    tuning: Tuned,
+    *,
+    overrides: Overrides = (),
+    seed: Seed | None = None,
+    threads: Threads | None = None,
+    progress: Report | None = None,
+) -> Tuning:
+    """Tune gains for an objective under constraints, optionally robust.
+
+    Every generation is one ensemble, and every candidate sees the same draws. StudyError for bad input, and where a
+    goal has no scale because the scenario as it is gives 0 or nothing.
+
+    tuning: name of a tuning, or a .toml file
+    """
+    from ppafo.questions.tune.solve import tune
+
+    return tune(tuning, overrides, seed, threads, progress)
+
+
+def linearise(
+    scenario: Simulated,
+    *,
+    at: Annotated[float | str, Word("TIME", point)] = "equilibrium",
+    overrides: Overrides = (),
+) -> LinearModel:
+    """Make a linear model of the plant near one point, for control design.
+
+    The equilibrium is the steady state whose torque is the last value of the reference, or, where the controller is a
+    constant command, whose command is that one; the ankle stands where the run leaves it. Derivatives are exact.
+    ScenarioError for a time outside the run, where there is no equilibrium, and for a valve that is on or off.
+
+    at: a time of the run, such as '1.5 s', or 'equilibrium' (default): the steady state that holds the last value of
+        the reference
+    """
+    from ppafo.questions.linearise.solve import linearise
+
+    return linearise(scenario, at, overrides)
+
+
+def design(
+    problem: Designed | None = None,
+    *,
+    seed: Seed | None = None,
+    threads: Threads | None = None,
+    mass: Mass | None = None,
+    stature: Length | None = None,
+    torque: Torque | None = None,
+    pressure: Pressure | None = None,
+    minutes: Minutes | None = None,
+    progress: Report | None = None,
+) -> Design | Sizing | WearerSizing:
+    """Find a device: for a wearer, for a torque profile, or Pareto-optimal in error, gas and mass.
+
+    A wearer has a body mass and may have a stature; torque, pressure and minutes of walking are what the device is for.
+    StudyError or ParameterError for bad input, and where every run with a valve fails.
+
+    problem: name of a design file, or a .toml file
+    mass: body mass of the wearer, '72.5 kg'
+    stature: height of the wearer, '1.75 m'
+    torque: peak torque of push-off, '2.5 N m'
+    pressure: supply pressure, '50 psi_g'
+    minutes: minutes of walking on one bottle
+    """
+    from ppafo.questions.design.solve import design
+
+    return design(problem, seed, threads, mass, stature, torque, pressure, minutes, progress)
+
+
+def bottle(
+    recordings: Used = (),
+    *,
+    gas_per_stride: Mass | None = None,
+    stride_time: Time | None = None,
+    peak_flow: Flow | None = None,
+    bottle: Annotated[str | Path, Word("BOTTLE")] | None = None,
+    walk: Time | None = None,
+    rest: Time | None = None,
+    longest: Time = 86400.0,
+    overrides: Overrides = (),
+) -> Endurance | Endurances:
+    """Compute how long a bottle of gas lasts, and why it ends.
+
+    A walk, its result or its folder, walks on the bottle until that ends it. Any other gas use is that of
+    ``recordings``, or else ``gas_per_stride`` every ``stride_time`` with at most ``peak_flow``. ``overrides`` are texts
+    such as ``room.temperature=5 degC``. ParameterError or DataError for bad input, SimulationError where the solver
+    fails.
+
+    recordings: a .csv or .nc file with supplied_mass, or the result folder of a run or a walk; repeated until the
+        bottle ends; several are compared side by side
+    gas_per_stride: gas per stride, for example '0.3 g'
+    stride_time: time of one stride; default: '1.1 s', the whole recording, one stride of a walk, or its whole course
+    peak_flow: largest flow, for example '4.5 g/s'; default: the mean flow
+    bottle: name of a bottle or a .toml file; default: that of the walk, or the paper's bottle
+    walk: time of walking between two rests, with --rest; default '10 min'
+    rest: time of each rest; default '0 s' (no rest)
+    longest: maximum simulated time; default '1440 min'
+    """
+    from ppafo.questions.endurance.solve import endurance
+
+    return endurance(recordings, gas_per_stride, stride_time, peak_flow, bottle, walk, rest, longest, overrides)

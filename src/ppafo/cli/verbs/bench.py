@@ -1,0 +1,149 @@
+"""From bench to model: recordings of a bench, real or simulated, a parameter set from them, and how well it agrees."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from ppafo.cli.arguments import (
+    Count,
+    File,
+    Folder,
+    Name,
+    Overrides,
+    Patience,
+    Port,
+    Time,
+    Volume,
+    Whole,
+    Word,
+    counting_number,
+)
+from ppafo.progress import Report, report_nothing
+
+if TYPE_CHECKING:
+    from ppafo.cli.output import Said
+    from ppafo.questions.identify.answer import Identification
+    from ppafo.questions.validate.solve import Validation
+    from ppafo.storage.foreign import ColumnMap
+
+Columns = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
+
+
+def rig_simulate(
+    experiment: Annotated[str, Word("EXPERIMENT")],
+    *,
+    preset: Annotated[str, Word("PRESET")] = "paper-bench",
+    seed: Whole = 1,
+    device: Annotated[str, Word("SET")] = "ppafo2011",
+    valve: Name | None = None,
+    overrides: Overrides = (),
+    out: Folder = Path("out/rig"),
+) -> Said:
+    """Run an experiment on the simulated test bench, and write the recording of a laboratory, marked as synthetic.
+
+    experiment: name of an experiment
+    preset: preset or .toml file; default paper-bench
+    seed: random seed of noise and offsets; default 1
+    device: parameter set or .toml file; default ppafo2011
+    valve: valve of the parameter set; default: its default valve
+    out: folder of the recording and of rig.json with the true values; default out/rig
+    """
+    from ppafo.cli.rig import simulate_bench
+
+    return simulate_bench(experiment, preset, seed, device, valve, overrides, out)
+
+
+def rig_record(
+    *, port: Port, baud: Count = 921600, duration: Time | None = None, patience: Patience = 5.0, out: File
+) -> Said:
+    """Record a bench that speaks the protocol of 'ppafo hil'.
+
+    port: where the bench sends: udp:HOST:PORT or serial:DEVICE (extra 'hil'); UDP listens at the address
+    baud: bits per second of a serial line; default 921600
+    duration: end after this time of the bench, for example '10 s'
+    patience: end, or give up, after this time without a sample; default '5 s'
+    out: the .csv file to write
+    """
+    from ppafo.cli.record import record_bench
+
+    return record_bench(port, baud, duration, patience, out)
+
+
+def identify(
+    problem: Annotated[str | Path, Word("PROBLEM", Path)],
+    *,
+    following: Annotated[int, Word("N", counting_number, option="--next", const=1)] = 0,
+    progress: Report = report_nothing,
+) -> Identification:
+    """Identify a parameter set, with uncertainty, from bench recordings.
+
+    The procedures of the problem file run in the recommended order; the trajectory fit comes last and starts from what
+    they found. Estimates are in SI units. IdentificationError for a problem that makes no sense, ParameterError for a
+    set that does not, and DataError for a recording that cannot be read; each in one line that begins with the file.
+
+    problem: a problem file (.toml); see 'ppafo doctor --schema identification'
+    following: also propose the next experiment, or a batch of N, within what the table [bench.can] allows
+    """
+    from ppafo.questions.identify.solve import identify
+
+    return identify(problem, progress, following)
+
+
+def validate(
+    parameter_set: Annotated[str | Path, Word("PARAMETERS")],
+    recordings: Sequence[Annotated[str | Path, Word("RECORDING")]],
+    *,
+    against: Annotated[Sequence[str], Word("SET[:PATH=VALUE,...]")] = (),
+    valve: Name | None = None,
+    overrides: Overrides = (),
+    motion: Annotated[str, Word("free|measured|held|leg")] = "free",
+    volume: Volume | None = None,
+    initial: Annotated[Sequence[str], Word("CHANNEL=VALUE")] = (),
+    thresholds: Annotated[Sequence[str], Word("[CHANNEL=]LIMIT", option="--threshold")] = (),
+    longest_delay: Time = 0.02,
+    columns: Columns | None = None,
+    progress: Report | None = None,
+) -> Validation:
+    """Compare a parameter set with recordings, channel by channel.
+
+    The model is run on the recorded command, supply pressure and external torque; errors are model less measured. With
+    no threshold it is 10 % of full range, at least half of the variance of a signal beside its noise is explained, and
+    no single change of record, set or model may explain the recordings better than noise of the sensors could. The
+    result has ``passes`` and, in ``recordings``, one ``RecordingAgreement`` each: ``measured`` and ``model`` are
+    recordings, their channels of shape (samples,) in SI; ``channels`` has RMS error, bias, largest error and delay [s]
+    of each channel in its SI unit (rad, Pa, N m). DataError, ParameterError or SimulationError for bad input.
+
+    parameter_set: name of a parameter set, or a .toml file
+    recordings: a .csv or .nc file, or a result folder; several may be given
+    against: another set, or a set with other values or another level of the model, to be compared by log predictive
+        density: 'fitted.toml', 'ppafo2011:friction.static_torque=0 N m'; may be repeated
+    valve: valve of the parameter set; default: its default valve
+    motion: free: the model moves the vane; measured: the vane follows the recorded angle; held: the vane stays at its
+        initial angle; leg: the model moves vane and foot on the fixture of step-response (default free)
+    volume: no vane: the valve fills and vents chamber 1 of this fixed volume, for example '60 cm^3'; pressure_1 is
+        compared
+    initial: initial value of a channel that was not recorded, for example 'pressure_2=0 psi_g'
+    thresholds: maximum RMS error, as a fraction of full range or with a unit: 5%, angle=10%, 'pressure_1=3.7 psi_d';
+        default: 10%, and half of the variance of the signal is explained
+    longest_delay: maximum delay of the measurement to estimate; default '20 ms', '0 s' for none
+    columns: file with a column map [columns.NAME], for recordings with other column names; a problem file may contain
+        it
+    """
+    from ppafo.questions.validate.solve import validate
+
+    return validate(
+        parameter_set,
+        recordings,
+        valve,
+        overrides,
+        motion,
+        volume,
+        initial,
+        thresholds,
+        longest_delay,
+        columns,
+        against,
+        progress,
+    )

@@ -1,0 +1,149 @@
+"""Walking with the device, and the gaits of those who walk."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from ppafo.cli.arguments import (
+    Angle,
+    Count,
+    File,
+    Frequency,
+    Gait,
+    Length,
+    Mass,
+    Minutes,
+    Name,
+    Overrides,
+    Speed,
+    Time,
+    Whole,
+    Word,
+)
+
+if TYPE_CHECKING:
+    from ppafo.answers import Answer
+    from ppafo.cli.output import Said
+    from ppafo.progress import Report
+    from ppafo.questions.walk.answer import WalkPair, Wearers
+    from ppafo.simulation.scenario import Scenario
+
+Walk = Annotated["Scenario | str | Path", Word("WALK")]
+
+
+def walk(
+    configuration: Walk = "solenoid",
+    *,
+    gait: Gait | None = None,
+    course: Annotated[str | Path, Word("COURSE")] | None = None,
+    bottle: Annotated[str | Path, Word("BOTTLE")] | None = None,
+    minutes: Minutes | None = None,
+    wearers: Count | None = None,
+    seed: Whole = 1,
+    overrides: Overrides = (),
+    progress: Report | None = None,
+) -> WalkPair | Wearers:
+    """Simulate walking with the device, without it, and healthy.
+
+    configuration: name of a walk configuration, or a .toml file; default solenoid
+    gait: name of a gait, or a gait file; default: the gait of the configuration
+    course: what the wearer does one after the other: a name or a .toml file; 'ppafo walk --list' has the names
+    bottle: supply the device from a bottle: a name ('ppafo bottle --list') or a .toml file; the walk ends with it
+    minutes: time to walk; default 1, up to 10 on a bottle, or a whole course
+    wearers: number of different wearers to simulate instead of one
+    seed: random seed of the wearers; default 1
+    """
+    from ppafo.questions.walk.answer import walk_with_and_without
+
+    return walk_with_and_without(configuration, minutes, gait, course, bottle, wearers, seed, overrides, progress)
+
+
+def gait_list() -> Said:
+    """List the gaits that come with the package."""
+    from ppafo.cli.gait import list_gaits
+
+    return list_gaits()
+
+
+def gait_show(gait: Gait, *, speed: Speed | None = None) -> Answer:
+    """Show and draw a gait.
+
+    speed: walking speed to scale to, such as '1.2 m/s'
+    """
+    from ppafo.gait import at_speed, load_gait
+    from ppafo.gait.answer import gait_answer
+
+    return gait_answer(load_gait(gait) if speed is None else at_speed(load_gait(gait), speed))
+
+
+def gait_import(
+    files: Sequence[File],
+    *,
+    body_mass: Mass | None = None,
+    side: Literal["right", "left"] = "right",
+    map_: File | None = None,
+    speed: Speed | None = None,
+    stature: Length | None = None,
+    low_pass: Frequency | None = None,
+    minimum_strides: Count | None = None,
+    form: Annotated[str, Word("FORM")] = "",
+    start: Time | None = None,
+    end: Time | None = None,
+    fill_gaps: Time = 0.0,
+    ankle_neutral: Angle | None = None,
+    name: Name = "imported-gait",
+    title: str = "",
+) -> Answer:
+    """Make a gait from recorded files (.mot, .sto, .csv, .c3d, .trc).
+
+    files: files of one walk, on one clock
+    body_mass: mass of the wearer, such as '62 kg'; default: what a C3D file states
+    side: which foot; default right
+    map_: gait map (.toml): which columns, units and signs
+    speed: walking speed, such as '1.2 m/s'; needed to scale the gait later
+    stature: stature of the wearer, such as '1.75 m'; gives the thigh length that OpenSim files lack
+    low_pass: cutoff of a low-pass filter, such as '6 Hz'; default: none
+    minimum_strides: minimum number of whole strides; default 2, overground 1
+    form: form of the files, such as opensim; default: what they look like
+    start: leave out what is before, such as '1.2 s'
+    end: leave out what is after, such as '3.4 s'
+    fill_gaps: fill gaps up to this length, such as '0.1 s'; default: none
+    ankle_neutral: reading of the ankle with the foot square to the shank, such as '3 deg'
+    name: name of the gait and of its file
+    title: one line: who walks, and how
+    """
+    from ppafo.gait.answer import gait_answer
+    from ppafo.gait.recorded import ImportSettings, import_gait
+    from ppafo.gait.recorded.mapping import load_map
+
+    settings = ImportSettings(
+        body_mass=body_mass,
+        side=side,
+        columns=None if map_ is None else load_map(map_),
+        walking_speed=speed,
+        low_pass=low_pass,
+        least_strides=minimum_strides,
+        name=name,
+        title=title,
+        stature=stature,
+        start=start,
+        end=end,
+        form=form,
+        longest_gap=fill_gaps,
+        ankle_neutral=ankle_neutral,
+    )
+    imported = import_gait(files, settings)
+    return gait_answer(imported.gait, imported)
+
+
+def gait_record(gait: Gait, *, strides: Count = 10, out: File) -> Said:
+    """Write some strides of a gait as a synthetic recording.
+
+    strides: number of strides; default 10
+    out: the .csv file to write
+    """
+    from ppafo.cli.gait import record_gait
+
+    return record_gait(gait, strides, out)
