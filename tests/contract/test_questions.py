@@ -99,7 +99,7 @@ def test_an_old_command_answers_with_the_new_line(old: str, capsys: pytest.Captu
 def test_a_verb_that_is_mistyped_is_refused_with_the_nearest_one(capsys: pytest.CaptureFixture[str]) -> None:
     for words, said in (
         (["sets", "lst"], "there is no 'ppafo sets lst', did you mean 'list'?; available: list, show, audit, parts"),
-        (["sets"], "ppafo sets: give one of list, show, audit, parts"),
+        (["sets"], "ppafo: sets: give one of list, show, audit, parts"),
         (["doctr"], "there is no command 'doctr', did you mean 'doctor'?"),
         (["sets", "audit", "x", "--parnt", "y"], "there is no option '--parnt', did you mean '--parent'?"),
     ):

@@ -210,9 +210,7 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
     for each, value in values.items():
         if command.lists and value is None and parameters[each].default is inspect.Parameter.empty:
             noun = reading_of_name(verb, each).metavar.lower()
-            raise UsageError(
-                f"no {noun} was given: name one or give a .toml file; 'ppafo {name} --list' shows what there is"
-            )
+            raise UsageError(f"no {noun} was given; 'ppafo {name} --list' shows what there is")
     folder = None
     if OUT not in parameters:
         folder = parsed.out

@@ -155,7 +155,7 @@ def check_words(words: list[str]) -> None:
     if isinstance(command, Group) and "-h" not in words and "--help" not in words:
         actions, action = list(command.actions), given[1] if len(given) > 1 else None
         if action is None:
-            raise UsageError(f"ppafo {word}: give one of {', '.join(actions)}; see 'ppafo {word} --help'")
+            raise UsageError(f"{word}: give one of {', '.join(actions)}; see 'ppafo {word} --help'")
         if action not in actions:
             hint = nearest_name(action, actions)
             raise UsageError(f"there is no 'ppafo {word} {action}'{hint}; available: {', '.join(actions)}")

@@ -63,7 +63,7 @@ def examine(warm: bool, clears: bool) -> Said:
 
         compile_models(load_scenario(name) for name in list_scenarios())
     document = _document(folder, why_not) | ({"freed": cleared} if clears else {})
-    lines = [f"folder: {document['folder'] or 'none'}"]
+    lines = [f"compilers: {', '.join(document['compilers'])}", f"folder: {document['folder'] or 'none'}"]
     if document["not_used"]:
         lines.append(f"not used: {document['not_used']}")
     if "freed" in document:
@@ -82,10 +82,12 @@ def examine(warm: bool, clears: bool) -> Said:
 
 def _document(folder: Path | None, why_not: str) -> dict[str, Any]:
     from ppafo.engine.cache import LONGEST_UNUSED, MAXIMUM_BYTES, kept_sizes, list_left_out, list_programs
+    from ppafo.engine.loading import compilers_to_try
 
     programs = [] if folder is None else list_programs(folder)
     now = time.time()
     return {
+        "compilers": [compiler.name for compiler in compilers_to_try()],
         "folder": None if folder is None else str(folder),
         "not_used": why_not or None,
         "size": sum(program.size for program in programs),

@@ -63,7 +63,9 @@ def try_firmware(
 
 def _checked(target: str | None) -> str | None:
     if target is not None and target not in TARGETS:
-        raise ScenarioError(f"--target {target}{nearest_name(target, TARGETS)}; available: {', '.join(TARGETS)}")
+        raise ScenarioError(
+            f"there is no target '{target}'{nearest_name(target, TARGETS)}; available: {', '.join(TARGETS)}"
+        )
     return target
 
 

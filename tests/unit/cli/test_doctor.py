@@ -21,6 +21,7 @@ def test_cache_is_shown_and_cleared(fresh_cache: Path, capsys: pytest.CaptureFix
     assert main(["doctor", "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)
     assert shown["folder"] == str(fresh_cache)
+    assert shown["compilers"] == [compiler.name for compiler in loading.compilers_to_try()]
     assert shown["not_used"] is None
     assert [item["name"].startswith("ppafo_numba_") for item in shown["programs"]] == [True]
     assert shown["size"] == shown["programs"][0]["size"] > 1000

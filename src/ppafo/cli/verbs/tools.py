@@ -32,6 +32,7 @@ Interface = Annotated[
         help="the closed loop, or the plant alone under a command and the motion of its ankle; default loop",
     ),
 ]
+Strikes = Annotated["tuple[float, ...]", Word("T1,T2,...", times)]
 
 
 def export_c(scenario: Scenario, *, interface: Interface = "loop", overrides: Overrides = (), out: Folder) -> Said:
@@ -68,7 +69,7 @@ def export_firmware(
     """Write the controller of a scenario as firmware for a small processor, or run it on the simulator of that one.
 
     scenarios: name of a scenario, or a .toml file; with --try several
-    target: the processor; default atmega328p; with --table all of them
+    target: the processor: msp430f2013 (default), cortex-m0 or cortex-m4; with --table all of them
     try_: run the scenario with its controller on the simulator of the processor, and compare every decision
     samples: with --try: compare N drawn samples with the integer controller instead, with edges, jumps and sensor
         faults
@@ -108,7 +109,7 @@ def export_opensim(
     gait: Gait | None = None,
     minutes: Minutes | None = None,
     side: Literal["right", "left"] = "right",
-    strikes: Annotated[tuple[float, ...], Word("T1,T2,...", times)] | None = None,
+    strikes: Strikes | None = None,
     body_mass: Mass | None = None,
     overrides: Overrides = (),
     out: Folder,
