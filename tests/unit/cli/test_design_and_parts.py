@@ -149,7 +149,7 @@ def test_parts_are_listed_with_what_is_doubtful_and_what_is_not_known(capsys: py
     assert "not known: largest_pressure, nominal_flow, spool_frequency" in printed
 
 
-@pytest.mark.parametrize("name", ["sets", "parts", "design"])
+@pytest.mark.parametrize("name", ["parts", "design"])
 def test_the_layouts_of_the_files_are_published(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["doctor", "--schema", name]) == 0
     assert json.loads(capsys.readouterr().out)["$schema"].startswith("https://json-schema.org")

@@ -74,12 +74,12 @@ _model_construction.create_schema_validator = lambda *_, **__: SchemaValidator(c
 REFUSED = """
 from ppafo.cli import simulate
 from ppafo.errors import ScenarioError
-def interrupted(parsed):
+def interrupted(*given):
     try:
         os.kill(os.getpid(), signal.NAME)
     except BaseException:
         raise ScenarioError("file: is wrong") from None
-simulate.run = interrupted
+simulate.simulate_scenario = interrupted
 """
 """A signal of which somebody makes a mistake of the user."""
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ppafo.cli.arguments import quantity
 from ppafo.errors import DataError, PpafoError
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
-from ppafo.questions.question import quantity
 from ppafo.questions.validate.solve import validate
 from ppafo.signals import Channel, Recording
 from ppafo.validation import parse_thresholds

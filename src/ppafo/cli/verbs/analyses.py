@@ -63,6 +63,19 @@ Tasks = Annotated[
 ]
 Designed = Annotated["DesignProblem | SizingProblem | str | Path", Word("DESIGN")]
 Tuned = Annotated["Problem | str | Path | Mapping[str, Any]", Word("TUNING")]
+Place = Annotated["str | Path", Word("DIR")]
+Address = Annotated[str, Word("ADDRESS")]
+Bottle = Annotated["str | Path", Word("BOTTLE")]
+Method = Annotated[str, Word("sobol|shapley")]
+Width = Annotated[str, Word("WIDTH")]
+Range = Annotated[str, Word("PATH=LOW..HIGH", option="--vary")]
+Condition = Annotated[str, Word("CONDITION", option="--such-that")]
+Highest = Annotated[bool, Word(off="--lowest", help="find the lowest value (default)")]
+Point = Annotated[float | str, Word("TIME", point)]
+Metric = Annotated[str, Word("NAME", option="--metric")]
+Statistic = Annotated[str, Word("WORDS", option="--statistic")]
+OneStudy = Annotated["StudyObject | str | Path | Mapping[str, Any]", Word("STUDY", option="--study")]
+Agreed = Annotated[bool, Word(option="--yes")]
 Used = Annotated["GasUse | Sequence[GasUse]", Word("RECORDING", Path, is_repeated=True)]
 
 
@@ -97,13 +110,13 @@ def reproduce(
 def sweep(
     study: Study,
     *,
-    out: Annotated[str | Path, Word("DIR")] | None = None,
+    out: Place | None = None,
     overrides: Overrides = (),
     draws: Count | None = None,
     seed: Seed | None = None,
     threads: Threads | None = None,
-    scheduler: Annotated[str, Word("ADDRESS")] | None = None,
-    agreed: Annotated[bool, Word(option="--yes")] = False,
+    scheduler: Address | None = None,
+    agreed: Agreed = False,
     progress: Report | None = None,
 ) -> StudyResults:
     """Run a study: many runs, one row each, resumable.
@@ -123,7 +136,7 @@ def sweep(
 
 def compare(
     configurations: Compared | None = None,
-    study: Annotated[Study, Word("STUDY", option="--study")] | None = None,
+    study: OneStudy | None = None,
     *,
     tasks: Tasks = (),
     overrides: Overrides = (),
@@ -160,7 +173,7 @@ def compare(
 def sensitivity(
     study: Distributed,
     *,
-    method: Annotated[str, Word("sobol|shapley")] | None = None,
+    method: Method | None = None,
     metrics: Metrics = (),
     samples: Whole | None = None,
     configuration: Name | None = None,
@@ -203,11 +216,11 @@ def sensitivity(
 
 def monte_carlo(
     study: Distributed,
-    metric: Annotated[str, Word("NAME", option="--metric")],
-    statistic: Annotated[str, Word("WORDS", option="--statistic")] = "mean",
+    metric: Metric,
+    statistic: Statistic = "mean",
     *,
-    width: Annotated[str, Word("WIDTH")] | None = None,
-    also: Annotated[Sequence[str], Word("NAME")] = (),
+    width: Width | None = None,
+    also: Sequence[Name] = (),
     configuration: Name | None = None,
     first_draws: Whole = 256,
     draws: Whole = 2**20,
@@ -254,10 +267,10 @@ def monte_carlo(
 
 def find(
     scenario: Simulated,
-    vary: Annotated[str, Word("PATH=LOW..HIGH", option="--vary")],
-    such_that: Annotated[str, Word("CONDITION", option="--such-that")],
+    vary: Range,
+    such_that: Condition,
     *,
-    highest: Annotated[bool, Word(off="--lowest", help="find the lowest value (default)")] = False,
+    highest: Highest = False,
     grid: Count = 64,
     overrides: Overrides = (),
     threads: Threads | None = None,
@@ -303,7 +316,7 @@ def tune(
 def linearise(
     scenario: Simulated,
     *,
-    at: Annotated[float | str, Word("TIME", point)] = "equilibrium",
+    at: Point = "equilibrium",
     overrides: Overrides = (),
 ) -> LinearModel:
     """Make a linear model of the plant near one point, for control design.
@@ -355,7 +368,7 @@ def bottle(
     gas_per_stride: Mass | None = None,
     stride_time: Time | None = None,
     peak_flow: Flow | None = None,
-    bottle: Annotated[str | Path, Word("BOTTLE")] | None = None,
+    bottle: Bottle | None = None,
     walk: Time | None = None,
     rest: Time | None = None,
     longest: Time = 86400.0,

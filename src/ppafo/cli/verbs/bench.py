@@ -28,6 +28,14 @@ if TYPE_CHECKING:
     from ppafo.questions.validate.solve import Validation
     from ppafo.storage.foreign import ColumnMap
 
+Problem = Annotated["str | Path", Word("PROBLEM", Path)]
+Batch = Annotated[int, Word("N", counting_number, option="--next", const=1)]
+Set = Annotated["str | Path", Word("PARAMETERS")]
+Recording = Annotated["str | Path", Word("RECORDING")]
+Against = Annotated[str, Word("SET[:PATH=VALUE,...]")]
+Motion = Annotated[str, Word("free|measured|held|leg")]
+Initial = Annotated[str, Word("CHANNEL=VALUE")]
+Limits = Annotated[Sequence[str], Word("[CHANNEL=]LIMIT", option="--threshold")]
 Columns = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
 
 
@@ -72,9 +80,9 @@ def rig_record(
 
 
 def identify(
-    problem: Annotated[str | Path, Word("PROBLEM", Path)],
+    problem: Problem,
     *,
-    following: Annotated[int, Word("N", counting_number, option="--next", const=1)] = 0,
+    following: Batch = 0,
     progress: Report = report_nothing,
 ) -> Identification:
     """Identify a parameter set, with uncertainty, from bench recordings.
@@ -92,16 +100,16 @@ def identify(
 
 
 def validate(
-    parameter_set: Annotated[str | Path, Word("PARAMETERS")],
-    recordings: Sequence[Annotated[str | Path, Word("RECORDING")]],
+    parameter_set: Set,
+    recordings: Sequence[Recording],
     *,
-    against: Annotated[Sequence[str], Word("SET[:PATH=VALUE,...]")] = (),
+    against: Sequence[Against] = (),
     valve: Name | None = None,
     overrides: Overrides = (),
-    motion: Annotated[str, Word("free|measured|held|leg")] = "free",
+    motion: Motion = "free",
     volume: Volume | None = None,
-    initial: Annotated[Sequence[str], Word("CHANNEL=VALUE")] = (),
-    thresholds: Annotated[Sequence[str], Word("[CHANNEL=]LIMIT", option="--threshold")] = (),
+    initial: Sequence[Initial] = (),
+    thresholds: Limits = (),
     longest_delay: Time = 0.02,
     columns: Columns | None = None,
     progress: Report | None = None,
