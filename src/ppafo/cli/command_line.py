@@ -229,26 +229,20 @@ def reading_of_name(verb: Callable[..., Any], name: str) -> Word:
 
 def _list(command: Command, as_json: bool) -> int:
     """Print what comes with the package: names with their descriptions, all columns where these are more."""
-    from ppafo.answers.writing import align_columns
-
     library: TomlKind | None = kind_at(command.library) if command.library else None
+    noun = command.listed or (library.noun if library is not None else "")
     if command.listing:
         listed: output.Said | list[dict[str, Any]] = kind_at(command.listing)()
-        if isinstance(listed, output.Said):
-            return output.deliver(listed, as_json, None, "")
+        said = listed if isinstance(listed, output.Said) else output.listing(noun, listed)
     else:
         assert library is not None
         files = {name: library.parse(library.read(name), name) for name in library.names()}
-        listed = [
+        rows = [
             {"name": name} | {key: str(file[key]) for key in ("title", "description") if key in file}
             for name, file in files.items()
         ]
-    rows = [[f"{value:,} {key}" if isinstance(value, int) else value for key, value in one.items()] for one in listed]
-    rows = rows if command.listing else [[row[0], row[-1]] for row in rows]
-    noun = command.listed or (library.noun if library is not None else "")
-    plural = f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}s"
-    output.print_result("\n".join(align_columns(rows, len(rows[0]))), {plural: listed}, as_json)
-    return output.EXIT_GOOD
+        said = output.listing(noun, rows, ("name", list(rows[0])[-1]))
+    return output.deliver(said, as_json, None, "")
 
 
 _BAD_VALUE = re.compile(r"argument (?:--?\w+/)*(\S+): (?!invalid )(.+: .+)")

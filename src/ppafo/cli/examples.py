@@ -2,12 +2,12 @@
 
 import os
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path, PurePosixPath
 
-from ppafo.cli.output import Said
+from ppafo.cli.output import Said, listing
 from ppafo.errors import DataError, nearest_name
 
 _FOLDER = resources.files("ppafo") / "examples"
@@ -45,11 +45,10 @@ def _contents(folder: Traversable, path: PurePosixPath) -> list[tuple[PurePosixP
 
 def list_examples() -> Said:
     """Return the examples with what each shows."""
-    examples = load_examples()
-    width = max(map(len, examples))
-    lines = [f"{name:<{width}}  {example.summary}" for name, example in examples.items()]
-    document = {"examples": [{"name": name, **_document(example)} for name, example in examples.items()]}
-    return Said("\n".join([*lines, "", "ppafo new example NAME writes one into a new folder."]), document)
+    said = listing(
+        "example", [{"name": name, **_document(one)} for name, one in load_examples().items()], ("name", "summary")
+    )
+    return replace(said, text=f"{said.text}\n\nppafo new example NAME writes one into a new folder.")
 
 
 def write_example(name: str, folder: Path) -> Said:

@@ -29,13 +29,16 @@ def firmware_of(scenarios: Sequence[str], target: str | None, overrides: Sequenc
     if len(scenarios) != 1 or out is None:
         raise ScenarioError("give one SCENARIO and --out DIR, or --try; see 'ppafo export firmware --help'")
     chosen = _checked(target) or TARGETS[0]
-    output.check_output(out, COMMAND)
     from ppafo.exports.firmware import firmware
     from ppafo.simulation.loading import load_scenario
 
-    contents = firmware(load_scenario(scenarios[0], overrides), chosen)
-    output.write_files(out, contents, COMMAND)
-    return output.write_for(out, contents, f"make -C {shlex.quote(str(out))}", target=chosen)
+    return output.export(
+        out,
+        COMMAND,
+        lambda: firmware(load_scenario(scenarios[0], overrides), chosen),
+        lambda _: f"make -C {shlex.quote(str(out))}",
+        target=chosen,
+    )
 
 
 def try_firmware(

@@ -7,7 +7,7 @@ import importlib.util
 import logging
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -177,10 +177,34 @@ def write_files(out: Path, contents: Mapping[str, bytes], command: str) -> None:
         write_marked_folder(out, contents, command)
 
 
-def write_for(out: Path, contents: Mapping[str, bytes], following: str, **more: Any) -> Said:
-    """Return what is said of files that were written for another tool, and of what to do next with them."""
-    document = {"folder": str(out), **more, "files": list(contents), "next": following}
-    return Said(f"written: {out} ({', '.join(contents)}); next: {following}", document)
+def export(
+    out: Path,
+    command: str,
+    make: Callable[[], Mapping[str, bytes]],
+    following: Callable[[Sequence[str]], str],
+    **more: Any,
+) -> Said:
+    """Write the files of a scenario for another tool, and return which they are and what to do next with them."""
+    check_output(out, command)
+    contents = make()
+    write_files(out, contents, command)
+    files = list(contents)
+    said = following(files)
+    document = {"folder": str(out), **more, "files": files, "next": said}
+    return Said(f"written: {out} ({', '.join(files)}); next: {said}", document)
+
+
+def listing(noun: str, rows: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> Said:
+    """Return a list of what there is: a row each, of these columns (all without), and all of it as data."""
+    from ppafo.answers.writing import align_columns
+
+    shown = [[row[name] for name in columns or row] for row in rows]
+    cells = [
+        [f"{cell:,} {name}" if isinstance(cell, int) else cell for cell, name in zip(row, rows[0], strict=False)]
+        for row in shown
+    ]
+    plural = f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}s"
+    return Said("\n".join(align_columns(cells, len(cells[0]))), {plural: list(rows)}, plural)
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""``ppafo sets list`` and ``show``: which parameter sets there are, and what is in one, value by value."""
+"""``ppafo sets show``: what is in a parameter set, value by value."""
 
 import textwrap
 from collections.abc import Sequence
@@ -12,17 +12,6 @@ if TYPE_CHECKING:
 _WIDTH = 110
 _SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow", "effects", "valves", "reported")
 _COLUMNS = ("path", "value", "unit", "origin", "source")
-
-
-def list_sets() -> Said:
-    """Return names and titles of the sets of the package."""
-    from ppafo.parameters import list_sets, load_parameter_set
-
-    sets = [load_parameter_set(name) for name in list_sets()]
-    width = max(len(item.name) for item in sets)
-    text = "\n".join(f"{item.name:<{width}}  {item.title}" for item in sets)
-    document = {"sets": [{"name": item.name, "title": item.title, "valves": dict(item.valve_kinds)} for item in sets]}
-    return Said(text, document, "sets")
 
 
 def show_set(name: str, overrides: Sequence[str]) -> Said:

@@ -58,9 +58,17 @@ def rig_simulate(
     valve: valve of the parameter set; default: its default valve
     out: folder of the recording and of rig.json with the true values; default out/rig
     """
-    from ppafo.cli.rig import simulate_bench
+    from ppafo.cli.output import Said, blame_out_option
+    from ppafo.rig.experiments import NOTICE, check_rig_folder, find_experiment, record, write_rig_recording
 
-    return simulate_bench(experiment, preset, seed, device, valve, overrides, out)
+    find_experiment(experiment)
+    with blame_out_option():
+        check_rig_folder(out, experiment)
+    made = record(experiment, preset, seed, device, overrides, valve)
+    files = write_rig_recording(out, made)
+    counted = f"{len(made.recording)} samples of {', '.join(made.recording.names)}"
+    text = f"{experiment}: {NOTICE}\n{counted}\nwritten: {out} ({', '.join(files)})"
+    return Said(text, {"folder": str(out), "files": list(files), **made.truth})
 
 
 def rig_record(

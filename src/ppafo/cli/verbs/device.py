@@ -53,16 +53,28 @@ def workbench(
     scenarios: names of scenarios and walks, or .toml files; default: the torque task, step response and a walk
     out: the page to write; default out/workbench.html
     """
-    from ppafo.cli.workbench import write_workbench
+    from ppafo.cli.output import Said, check_new_file
+    from ppafo.live.page import is_page
+    from ppafo.live.workbench import DEFAULT, workbench
+    from ppafo.storage.files import write_file
 
-    return write_workbench(scenarios, overrides, out)
+    if not is_page(out):
+        check_new_file(out)
+    names = list(scenarios) or list(DEFAULT)
+    page = workbench(names, overrides)
+    write_file(out, page)
+    document = {"file": str(out), "bytes": len(page), "scenarios": names}
+    return Said(f"written: {out} ({len(page) / 1e3:.0f} kB, {', '.join(names)})", document)
 
 
 def sets_list() -> Said:
     """List the parameter sets that come with the package."""
-    from ppafo.cli.sets import list_sets
+    from ppafo.cli.output import listing
+    from ppafo.parameters import list_sets, load_parameter_set
 
-    return list_sets()
+    sets = [load_parameter_set(name) for name in list_sets()]
+    rows = [{"name": item.name, "title": item.title, "valves": dict(item.valve_kinds)} for item in sets]
+    return listing("set", rows, ("name", "title"))
 
 
 def sets_show(name: Set, *, overrides: Overrides = ()) -> Said:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -40,9 +41,14 @@ def export_c(scenario: Scenario, *, interface: Interface = "loop", overrides: Ov
 
     out: the folder to write
     """
-    from ppafo.cli.export import c_files
+    from ppafo.cli.output import export
+    from ppafo.exports.c_library import c_library
+    from ppafo.exports.c_library.plant import plant_library
+    from ppafo.loading import load_scenario
 
-    return c_files(scenario, interface, overrides, out)
+    library = {"loop": c_library, "plant": plant_library}[interface]
+    following = f"make -C {shlex.quote(str(out))} check"
+    return export(out, "export c", lambda: library(load_scenario(scenario, overrides)), lambda _: following)
 
 
 def export_controller(scenario: Scenario, *, overrides: Overrides = (), out: Folder) -> Said:
@@ -51,9 +57,16 @@ def export_controller(scenario: Scenario, *, overrides: Overrides = (), out: Fol
     scenario: name of a scenario, or a .toml file
     out: the folder to write
     """
-    from ppafo.cli.export import controller_files
+    from ppafo.cli.output import export
+    from ppafo.exports.hil.run import example_controller
+    from ppafo.simulation.loading import load_scenario
 
-    return controller_files(scenario, overrides, out)
+    return export(
+        out,
+        "export controller",
+        lambda: example_controller(load_scenario(scenario, overrides)),
+        lambda _: f"make -C {shlex.quote(str(out))}",
+    )
 
 
 def export_firmware(
@@ -98,9 +111,19 @@ def export_fmu(
     platforms: what it is to run on, separated by commas: linux64, win64, ...; default: this computer
     out: the folder to write
     """
-    from ppafo.cli.export import unit_files
+    from ppafo.cli.output import export
+    from ppafo.exports.fmu import closed_loop, functional_unit, host_platform, plant_alone
+    from ppafo.loading import load_scenario
 
-    return unit_files(scenario, interface, fmi, platforms, overrides, out)
+    made = {"loop": closed_loop, "plant": plant_alone}[interface]
+    chosen = [host_platform()] if platforms is None else platforms.split(",")
+    wanted = list(dict.fromkeys(one.strip() for one in chosen if one is not None))
+    return export(
+        out,
+        "export fmu",
+        lambda: functional_unit(made(load_scenario(scenario, overrides)), int(fmi), wanted),
+        lambda files: f"fmpy simulate {shlex.quote(str(out / files[0]))} --show-plot",
+    )
 
 
 def export_opensim(
@@ -125,7 +148,7 @@ def export_opensim(
     body_mass: of a recording: for moments and forces per mass, such as '62 kg'
     out: the folder to write
     """
-    from ppafo.cli.export import opensim_tables
+    from ppafo.cli.opensim import opensim_tables
 
     return opensim_tables(walk, gait, minutes, side, strikes, body_mass, overrides, out)
 

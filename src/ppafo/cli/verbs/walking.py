@@ -62,9 +62,10 @@ def walk(
 
 def gait_list() -> Said:
     """List the gaits that come with the package."""
-    from ppafo.cli.gait import list_gaits
+    from ppafo.cli.output import listing
+    from ppafo.gait import list_gaits, load_gait
 
-    return list_gaits()
+    return listing("gait", [{"name": name, "title": load_gait(name).title} for name in list_gaits()])
 
 
 def gait_show(gait: Gait, *, speed: Speed | None = None) -> Answer:
@@ -144,6 +145,15 @@ def gait_record(gait: Gait, *, strides: Count = 10, out: File) -> Said:
     strides: number of strides; default 10
     out: the .csv file to write
     """
-    from ppafo.cli.gait import record_gait
+    from ppafo.cli.output import Said, check_new_file
+    from ppafo.errors import DataError
+    from ppafo.gait import load_gait, walk_recording
+    from ppafo.storage import write_csv
 
-    return record_gait(gait, strides, out)
+    if out.suffix.lower() != ".csv":
+        raise DataError(f"--out {out}: a recording is written as .csv")
+    check_new_file(out)
+    recording = walk_recording(load_gait(gait), strides)
+    write_csv(out, recording)
+    document = {"file": str(out), "samples": len(recording), "channels": list(recording.names)}
+    return Said(f"written: {out} ({len(recording)} samples, synthetic)", document)
