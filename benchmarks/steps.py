@@ -77,7 +77,7 @@ def steps_of_run(scenario: str, folder: Path) -> list[dict[str, Any]]:
     step("imports to run it", lambda: load("ppafo.simulation.simulate"))
     step("run", lambda: sys.modules["ppafo.simulation.simulate"].simulate(state["scenario"]))
     result = state["run"]
-    step("imports to draw", sys.modules["ppafo.cli.output"].load_drawing)
+    step("imports to draw", importlib.import_module("ppafo.answers.drawing").load_drawing)
     step("figure", lambda: load("ppafo.answers.recording_figure")[0].figure_files(result.plot()))
     answer = command._answer(result, None)
     drawn = {command.FIGURE: state["figure"][f"{command.FIGURE}.svg"]}

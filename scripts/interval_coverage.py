@@ -25,7 +25,6 @@ from ppafo.cli.output import (
     EXIT_INTERRUPTED,
     add_output_arguments,
     check_output,
-    load_drawing,
     print_result,
     tell,
     write_files,
@@ -83,6 +82,8 @@ def run(parsed: argparse.Namespace) -> int:
         return EXIT_INTERRUPTED
     text, document = coverage_text(lines, parsed.from_prior), coverage_document(lines, parsed.from_prior)
     if parsed.out is not None:
+        from ppafo.answers.drawing import load_drawing
+
         load_drawing()
         from ppafo.answers.style import render_figure
 

@@ -296,31 +296,15 @@ class CommandParser(argparse.ArgumentParser):
 
 RENAMED = {
     "--first": "--first-draws",
+    "--gas-per-step": "--gas-per-stride",
+    "--least-strides": "--minimum-strides",
     "--maximum": "--draws",
     "--most": "--draws",
     "--most-failed": "--maximum-failed",
     "--runs": "--draws",
-    "--least-strides": "--minimum-strides",
+    "--step-time": "--stride-time",
 }
-"""Options of version 0.1 and what they are called now."""
-
-STILL_READ = {"--gas-per-step": "--gas-per-stride", "--step-time": "--stride-time"}
-"""Options of 0.2 and their present names, under which they are read for one more version; then they are ``RENAMED``."""
-
-REMOVED = {"--config": "name what is run without it, as in 'ppafo walk solenoid'"}
-"""Options of version 0.1 that are none any more, and what to write instead."""
-
-
-def present_options(words: list[str], parser: CommandParser) -> list[str]:
-    """Return the words with options by their present names; one line for each that has another."""
-    known, present = parser.options(), list(words)
-    for place, word in enumerate(takewhile(lambda word: word != "--", words)):
-        name, equals, value = word.partition("=")
-        now = STILL_READ.get(name)
-        if now in known:
-            print(f"ppafo: {name} is now called {now}; the old name is read in this version only", file=sys.stderr)
-            present[place] = f"{now}{equals}{value}"
-    return present
+"""Options of earlier versions and what they are called now."""
 
 
 def check_options(words: Sequence[str], parser: CommandParser) -> None:
@@ -331,8 +315,6 @@ def check_options(words: Sequence[str], parser: CommandParser) -> None:
         if name in RENAMED and name not in known and RENAMED[name] in known:
             raise UsageError(f"{name} is now called {RENAMED[name]}")
         if _looks_like_option(word) and not any(_stands_for(name, option) for option in known):
-            if name in REMOVED:
-                raise UsageError(f"there is no option '{name}' any more: {REMOVED[name]}")
             raise UsageError(
                 f"there is no option '{name}'{_nearest_option(name, known)}; available: {', '.join(known)}"
             )

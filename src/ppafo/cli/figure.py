@@ -29,7 +29,9 @@ def draw_again(folder: Path, out: Path | None) -> Said:
     if out is not None:
         output.check_new_file(out)
     names = _names(folder)
-    output.load_drawing()
+    from ppafo.answers.drawing import load_drawing
+
+    load_drawing()
     drawn = _draw_folder(folder, names)
     if not drawn:
         return _what_is_there(folder, out, names)

@@ -46,7 +46,9 @@ def run_hardware(name: str, wire: Wire, overrides: Sequence[str], out: Path | No
         check_result_folder(folder)
     with stop_by_interrupt() as is_stopped:
         found = _run(wire, scenario, is_stopped)
-        output.load_drawing()
+        from ppafo.answers.drawing import load_drawing
+
+        load_drawing()
         from ppafo.answers.recording_figure import figure_files
 
         found.save(folder, figure_files(found.plot_signals()))

@@ -14,7 +14,6 @@ from ppafo.cli.command_line import (
     UsageError,
     add_parameters,
     check_options,
-    present_options,
     run,
 )
 from ppafo.cli.commands import COMMANDS, OTHERS, check_words, list_commands
@@ -110,7 +109,6 @@ def _run(words: list[str]) -> int:
                 raise UsageError(f"'{one_line(word)}' is not text in UTF-8; give the file or folder another name")
         check_words(words)
         parser = build_parser(words)
-        words = present_options(words, parser)
         check_options(words, parser)
         parsed = parser.parse_args(words)
         if parsed.command is None:

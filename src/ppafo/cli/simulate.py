@@ -33,7 +33,9 @@ def simulate_scenario(name: str, check_it: bool, overrides: Sequence[str], out: 
     result = simulate(scenario)
     check = result.check() if check_it and result.status.is_completed else None
     error = _error(result) if check is None else check.error
-    output.load_drawing()
+    from ppafo.answers.drawing import load_drawing
+
+    load_drawing()
     from ppafo.answers.recording_figure import figure_files
     from ppafo.answers.writing import REPORT, page_of
 

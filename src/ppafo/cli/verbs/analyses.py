@@ -127,7 +127,7 @@ def sweep(
     scheduler: address of a Dask scheduler whose workers compute the chunks
     agreed: start even if the results will fill much of the disk
     """
-    from ppafo.cli.output import load_drawing
+    from ppafo.answers.drawing import load_drawing
     from ppafo.questions.sweep.solve import sweep_into_folder
 
     load_drawing()
