@@ -166,6 +166,7 @@ Folder = Annotated[Path, Word("DIR", Path)]
 File = Annotated[Path, Word("FILE", Path)]
 FileOrName = Annotated["str | Path", Word("FILE")]
 Scenario = Annotated[str, Word("SCENARIO", help="name of a scenario or of a walk, or a .toml file")]
+SetName = Annotated[str, Word("SET", help="name of a parameter set, or a .toml file")]
 Gait = Annotated["str | Path", Word("GAIT", help="name of a gait, or a gait file (.toml)")]
 Overrides = Annotated[
     Sequence[str],

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from ppafo.cli.arguments import Overrides, SetName
 from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, Said
 
 if TYPE_CHECKING:
@@ -16,24 +17,32 @@ _INDENT = "    "
 _SEVERITIES = ("error", "warning", "note")
 
 
-def audit_sets(names: Sequence[str], against: str | None, shows_all: bool, overrides: Sequence[str]) -> Said:
-    """Return changes and findings of one set, or a table of several; exit code 1 where a finding is an error."""
+def sets_audit(
+    names: Sequence[SetName], *, parent: SetName | None = None, all_: bool = False, overrides: Overrides = ()
+) -> Said:
+    """Check a parameter set for contradictions.
+
+    Changes and findings of one set, or a table of several; exit code 1 where a finding is an error.
+
+    names: name of a set, or a .toml file; several are shown side by side
+    parent: show what changed against this set, in place of the one that the file names
+    all_: print what concerns no changed value too, of a set with a parent or --set
+    """
     from ppafo.parameters import apply_overrides, load_parameter_set
     from ppafo.parameters.audit import audit, changed_paths
 
     sets = [apply_overrides(load_parameter_set(name), overrides) for name in names]
-    parents = [_parent(parameter_set, against) for parameter_set in sets]
-    found = [(one, audit(one, parent)) for one, parent in zip(sets, parents, strict=True)]
+    parents = [_parent(parameter_set, parent) for parameter_set in sets]
+    found = [(one, audit(one, other)) for one, other in zip(sets, parents, strict=True)]
     documents = [
-        _document(*one, overrides) | _changes_document(one[0], parent)
-        for one, parent in zip(found, parents, strict=True)
+        _document(*one, overrides) | _changes_document(one[0], other) for one, other in zip(found, parents, strict=True)
     ]
     has_errors = any(_counts(findings)["error"] for _, findings in found)
     code = EXIT_CHECK_FAILED if has_errors else EXIT_GOOD
     if len(found) > 1:
         return Said(_table(found), {"sets": documents}, "audit", code)
     compares = parents[0] is not None or bool(overrides)
-    changed = changed_paths(sets[0], parents[0]) if compares and not shows_all else None
+    changed = changed_paths(sets[0], parents[0]) if compares and not all_ else None
     text = _text(*found[0], changed)
     if documents[0]["parent"] is not None:
         text = f"{_changes_text(documents[0])}\n\n{text}"

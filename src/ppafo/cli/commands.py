@@ -21,15 +21,17 @@ HEADINGS: dict[str, dict[str, Command | Group]] = {
         ),
     },
     "your device": {
-        "new": Command(f"{_DEVICE}:new"),
-        "simulate": Command(f"{_DEVICE}:simulate", listing="ppafo.cli.simulate:list_descriptions", listed="scenario"),
+        "new": Command("ppafo.cli.new:new"),
+        "simulate": Command(
+            "ppafo.cli.simulate:simulate", listing="ppafo.cli.simulate:list_descriptions", listed="scenario"
+        ),
         "workbench": Command(f"{_DEVICE}:workbench"),
         "sets": Group(
             "list, show and audit parameter sets; list real parts",
             {
                 "list": Command(f"{_DEVICE}:sets_list"),
-                "show": Command(f"{_DEVICE}:sets_show"),
-                "audit": Command(f"{_DEVICE}:sets_audit"),
+                "show": Command("ppafo.cli.sets:sets_show"),
+                "audit": Command("ppafo.cli.audit:sets_audit"),
                 "parts": Command(f"{_DEVICE}:sets_parts"),
             },
         ),
@@ -39,7 +41,7 @@ HEADINGS: dict[str, dict[str, Command | Group]] = {
             "record a bench, or synthetic data on the simulated test bench",
             {
                 "simulate": Command(f"{_BENCH}:rig_simulate", listing="ppafo.cli.rig:list_rig", listed="experiment"),
-                "record": Command(f"{_BENCH}:rig_record"),
+                "record": Command("ppafo.cli.record:rig_record"),
             },
         ),
         "identify": Command(f"{_BENCH}:identify"),
@@ -83,14 +85,14 @@ HEADINGS: dict[str, dict[str, Command | Group]] = {
             {
                 "c": Command(f"{_TOOLS}:export_c"),
                 "controller": Command(f"{_TOOLS}:export_controller"),
-                "firmware": Command(f"{_TOOLS}:export_firmware"),
+                "firmware": Command("ppafo.cli.firmware:export_firmware"),
                 "fmu": Command(f"{_TOOLS}:export_fmu"),
-                "opensim": Command(f"{_TOOLS}:export_opensim"),
-                "figure": Command(f"{_TOOLS}:export_figure"),
+                "opensim": Command("ppafo.cli.opensim:export_opensim"),
+                "figure": Command("ppafo.cli.figure:export_figure"),
             },
         ),
-        "hil": Command(f"{_TOOLS}:hil"),
-        "doctor": Command(f"{_TOOLS}:doctor"),
+        "hil": Command("ppafo.cli.hil:hil"),
+        "doctor": Command("ppafo.cli.doctor:doctor"),
     },
 }
 """Headings of the help, by what somebody has come for, and under each the commands."""

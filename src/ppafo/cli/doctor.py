@@ -5,6 +5,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from ppafo.cli.arguments import Name
 from ppafo.cli.output import Said
 from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError, SimulationError, nearest_name
@@ -35,7 +36,7 @@ JOINED: dict[str, str] = {"size": "design"}
 """Formats that are now part of another one."""
 
 
-def schema_of(name: str) -> Said:
+def _schema_of(name: str) -> Said:
     """Return the schema of a file format, which is JSON in any case."""
     if name in JOINED:
         raise DataError(f"the format '{name}' is now part of '{JOINED[name]}'; print that one")
@@ -46,15 +47,22 @@ def schema_of(name: str) -> Said:
     return Said(json_text(document), document, f"{name}.schema")
 
 
-def examine(warm: bool, clears: bool) -> Said:
-    """Compile or remove programs as requested, and return what is there."""
-    from ppafo.engine.cache import cache_folder, clear, clear_kept, refusal
+def doctor(*, warm: bool = False, clear: bool = False, schema: Name | None = None) -> Said:
+    """Show compilers and compiled models of this computer; print the JSON Schema of a file format.
 
-    if warm and clears:
+    warm: compile the models of the scenarios of the package
+    clear: remove all compiled models, and try each compiler again
+    schema: print the JSON Schema of a file format instead, such as scenario
+    """
+    from ppafo.engine import cache
+
+    if schema is not None:
+        return _schema_of(schema)
+    if warm and clear:
         raise DataError("--clear: not allowed with --warm")
-    folder = cache_folder()
-    cleared = clear_kept(folder) + clear(folder) if clears and folder is not None else 0
-    why_not = "" if clears else refusal(folder)
+    folder = cache.cache_folder()
+    cleared = cache.clear_kept(folder) + cache.clear(folder) if clear and folder is not None else 0
+    why_not = "" if clear else cache.refusal(folder)
     if warm:
         if why_not:
             raise SimulationError(f"--warm: compiled models cannot be kept: {why_not}")
@@ -62,7 +70,7 @@ def examine(warm: bool, clears: bool) -> Said:
         from ppafo.simulation.simulate import compile_models
 
         compile_models(load_scenario(name) for name in list_scenarios())
-    document = _document(folder, why_not) | ({"freed": cleared} if clears else {})
+    document = _document(folder, why_not) | ({"freed": cleared} if clear else {})
     lines = [f"compilers: {', '.join(document['compilers'])}", f"folder: {document['folder'] or 'none'}"]
     if document["not_used"]:
         lines.append(f"not used: {document['not_used']}")

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ppafo.cli import output
+from ppafo.cli.arguments import File, Folder
 from ppafo.cli.output import Said
 from ppafo.errors import DataError, reason
 
@@ -16,8 +17,14 @@ _PICTURES = (".png", ".gif")
 _NAMED = 6
 
 
-def draw_again(folder: Path, out: Path | None) -> Said:
-    """Draw the figures of the folder and write them; where the folder has its figures already, say which."""
+def export_figure(folder: Folder, *, out: File | None = None) -> Said:
+    """Redraw the figures of a result folder.
+
+    Where the folder has its figures already, it is said which.
+
+    folder: a result folder written by ppafo
+    out: a .png, .svg or .pdf file; default figure.png and figure.svg in DIR
+    """
     from ppafo.answers.recording_figure import FIGURE_FORMATS
     from ppafo.answers.style import render_figure
     from ppafo.storage.files import write_file

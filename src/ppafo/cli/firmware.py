@@ -6,15 +6,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ppafo.cli import output
+from ppafo.cli.arguments import Count, Folder, Name, Overrides, Scenario
 from ppafo.cli.output import Said
-from ppafo.control.fixed.torque_laws import TARGETS
 from ppafo.errors import ScenarioError, nearest_name
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ppafo.exports.firmware.lock_step import ChipRun, Comparison, Cost
-    from ppafo.simulation.scenario import Scenario
+    from ppafo.simulation.scenario import Scenario as LoadedScenario
 
 _SHOWN = {"rms_error": ("N m", 1.0), "gas_supplied": ("g", 1.0e3)}
 MOST_SAMPLES = 10_000_000
@@ -24,52 +24,64 @@ SAMPLES_OF_TABLE = 1000
 COMMAND = "export firmware"
 
 
-def firmware_of(scenarios: Sequence[str], target: str | None, overrides: Sequence[str], out: Path | None) -> Said:
-    """Write the firmware of the controller of one scenario into a folder, and return what to do next."""
-    if len(scenarios) != 1 or out is None:
-        raise ScenarioError("give one SCENARIO and --out DIR, or --try; see 'ppafo export firmware --help'")
-    chosen = _checked(target) or TARGETS[0]
-    from ppafo.exports.firmware import firmware
-    from ppafo.simulation.loading import load_scenario
-
-    return output.export(
-        out,
-        COMMAND,
-        lambda: firmware(load_scenario(scenarios[0], overrides), chosen),
-        lambda _: f"make -C {shlex.quote(str(out))}",
-        target=chosen,
-    )
-
-
-def try_firmware(
-    scenarios: Sequence[str],
-    target: str | None,
-    samples: int | None,
-    table: bool,
-    overrides: Sequence[str],
-    out: Path | None,
+def export_firmware(
+    scenarios: Sequence[Scenario] = (),
+    *,
+    target: Name | None = None,
+    try_: bool = False,
+    samples: Count | None = None,
+    table: bool = False,
+    overrides: Overrides = (),
+    out: Folder | None = None,
 ) -> Said:
-    """Run scenarios with the simulator of a processor in charge; exit code 1 where any decision differs."""
+    """Write the controller of a scenario as firmware for a small processor, or run it on the simulator of that one.
+
+    Exit code 1 where any decision on the simulator differs.
+
+    scenarios: name of a scenario, or a .toml file; with --try several
+    target: the processor: msp430f2013 (default), cortex-m0 or cortex-m4; with --table all of them
+    try_: run the scenario with its controller on the simulator of the processor, and compare every decision
+    samples: with --try: compare N drawn samples with the integer controller instead, with edges, jumps and sensor
+        faults
+    table: with --try: compare every integer controller on every target instead (with 1000 samples each)
+    out: the folder to write; with --try text, JSON and figure
+    """
+    from ppafo.control.fixed.torque_laws import TARGETS
+
+    if target is not None and target not in TARGETS:
+        hint = nearest_name(target, TARGETS)
+        raise ScenarioError(f"there is no target '{target}'{hint}; available: {', '.join(TARGETS)}")
+    if not (try_ or table or samples is not None):
+        if len(scenarios) != 1 or out is None:
+            raise ScenarioError("give one SCENARIO and --out DIR, or --try; see 'ppafo export firmware --help'")
+        return _firmware_of(scenarios[0], target or TARGETS[0], overrides, out)
     if samples is not None and samples > MOST_SAMPLES:
         raise ScenarioError(f"--samples {samples}: must be 1 to {MOST_SAMPLES}")
     if table and (scenarios or overrides):
         raise ScenarioError("--table: takes no SCENARIO or --set; its scenarios are given")
     if not table and not scenarios:
         raise ScenarioError("give a SCENARIO, or --table; see 'ppafo export firmware --help'")
-    chosen = _checked(target)
     output.check_output(out, COMMAND)
-    said = _table(chosen, samples) if table else _tried(scenarios, chosen or TARGETS[0], samples, overrides)
+    if table:
+        said = _table(TARGETS if target is None else (target,), samples)
+    else:
+        said = _tried(scenarios, target or TARGETS[0], samples, overrides)
     if out is not None:
         output.write_files(out, output.said_files(said), COMMAND)
     return said
 
 
-def _checked(target: str | None) -> str | None:
-    if target is not None and target not in TARGETS:
-        raise ScenarioError(
-            f"there is no target '{target}'{nearest_name(target, TARGETS)}; available: {', '.join(TARGETS)}"
-        )
-    return target
+def _firmware_of(name: str, target: str, overrides: Sequence[str], out: Path) -> Said:
+    from ppafo.exports.firmware import firmware
+    from ppafo.simulation.loading import load_scenario
+
+    return output.export(
+        out,
+        COMMAND,
+        lambda: firmware(load_scenario(name, overrides), target),
+        lambda _: f"make -C {shlex.quote(str(out))}",
+        target=target,
+    )
 
 
 def _tried(names: Sequence[str], target: str, samples: int | None, overrides: Sequence[str]) -> Said:
@@ -92,7 +104,7 @@ def _said(text: str, document: dict[str, Any], agrees: bool, draw: "Callable[[],
     return Said(text, document, "chip", output.EXIT_GOOD if agrees else output.EXIT_CHECK_FAILED, draw=draw)
 
 
-def _runs(scenarios: "Sequence[Scenario]", target: str) -> Said:
+def _runs(scenarios: "Sequence[LoadedScenario]", target: str) -> Said:
     """Scenarios with the chip in charge, one after the other, and their figure."""
     from ppafo.exports.firmware.lock_step import chip_figure, run_on_chip
 
@@ -139,14 +151,13 @@ def _drawn(found: "Comparison", name: str, period: float, about: dict[str, Any])
     return _said("\n".join(lines), document, not found.differences)
 
 
-def _table(target: str | None, samples: int | None) -> Said:
+def _table(targets: Sequence[str], samples: int | None) -> Said:
     """Every controller on every target, as a table."""
     from ppafo.exports.firmware.lock_step import table_rows
 
     lines = ["| target | controller | flash | data + stack | worst and mean | drawn samples | other decisions |"]
     lines.append("|---|---|---|---|---|---|---|")
     documents = []
-    targets = TARGETS if target is None else (target,)
     for row in table_rows(targets, samples or SAMPLES_OF_TABLE):
         found, own = row.found, {"target": row.target.name, "controller": row.law.replace("`", "")}
         if found is None:

@@ -5,10 +5,10 @@ import os
 import re
 import shlex
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
+from typing import Annotated
 
-from ppafo.cli.examples import list_examples, write_example
+from ppafo.cli.arguments import File, Name, Word
 from ppafo.cli.output import Said
 from ppafo.errors import DataError, nearest_name, one_line
 from ppafo.kinds import kind_at
@@ -16,7 +16,6 @@ from ppafo.kinds import kind_at
 _SUFFIX = ".toml"
 _SCHEMAS = {"set": "parameters"}
 """Kinds that ``ppafo doctor --schema`` has under another name."""
-_TEMPLATES = resources.files("ppafo.cli") / "templates"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 _NAME_LINE = re.compile(r"""^name *= *(["'])(.*?)\1""", re.MULTILINE)
 _PARENT_LINE = re.compile(r"^parent *=.*\n", re.MULTILINE)
@@ -81,13 +80,27 @@ KINDS: dict[str, _NewFile] = {
 EXAMPLE = "example"
 
 
-def begin(kind: str, name: str | None, source: str | None, out: Path | None) -> Said:
-    """Write the file, see that it loads, and say what to run next; or list the examples, or write one."""
+def new(
+    kind: Annotated[str, Word("KIND")],
+    name: Name | None = None,
+    *,
+    source: Annotated[str, Word("SOURCE", option="--from")] | None = None,
+    out: File | None = None,
+) -> Said:
+    """Write an input file to start from: a template, or a copy of a shipped one; or the files of an example.
+
+    kind: scenario, set, study, walk, course, gait-map, bottle, parts, or example: the files of a how-to page
+    name: name of the file and of what it describes; of an example, its name; without it, the examples are listed
+    source: copy this one: a shipped name, or a .toml file
+    out: the .toml file to write, default NAME.toml; of an example, the new folder, default NAME
+    """
     if kind == EXAMPLE:
         if source is not None or (name is None and out is not None):
             raise DataError(
                 "--from: is not for an example" if source else "--out: needs the NAME of the example to write"
             )
+        from ppafo.cli.examples import list_examples, write_example
+
         return list_examples() if name is None else write_example(name, out or Path(name))
     known = (*KINDS, EXAMPLE)
     if kind not in known:
@@ -119,11 +132,14 @@ def begin(kind: str, name: str | None, source: str | None, out: Path | None) -> 
 
 def _content(kind: str, source: str | None, name: str, path: Path) -> str:
     """Return the text of the new file: that of the template or of the source, under the new name."""
+    from importlib import resources
+
     from ppafo.documents.toml_text import TomlKind
 
+    templates = resources.files("ppafo.cli") / "templates"
     shipped = resources.files("ppafo").joinpath(*KINDS[kind].shipped.split("/"))
     files = TomlKind(KINDS[kind].noun, _SCHEMAS.get(kind, kind), shipped, DataError)
-    content = (_TEMPLATES / f"{kind}{_SUFFIX}").read_bytes() if source is None else files.read(source)
+    content = (templates / f"{kind}{_SUFFIX}").read_bytes() if source is None else files.read(source)
     files.parse(content, source or f"template of a {kind}")
     text = content.decode("utf-8")
     table = _FIRST_TABLE.search(text)

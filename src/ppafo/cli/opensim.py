@@ -3,9 +3,10 @@
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from ppafo.cli import output
+from ppafo.cli.arguments import Folder, Gait, Mass, Minutes, Overrides, Word, times
 from ppafo.cli.output import Said
 from ppafo.errors import DataError
 
@@ -15,18 +16,33 @@ _FEW_STRIDES = 0.2
 _RECORDINGS = (".csv", ".nc")
 
 
-def opensim_tables(
-    name: str,
-    gait: str | Path | None,
-    minutes: float | None,
-    side: Literal["right", "left"],
-    strikes: tuple[float, ...] | None,
-    body_mass: float | None,
-    overrides: Sequence[str],
-    out: Path,
+Side = Literal["right", "left"]
+Strikes = Annotated["tuple[float, ...]", Word("T1,T2,...", times)]
+
+
+def export_opensim(
+    walk: Annotated[str, Word("WALK")],
+    *,
+    gait: Gait | None = None,
+    minutes: Minutes | None = None,
+    side: Side = "right",
+    strikes: Strikes | None = None,
+    body_mass: Mass | None = None,
+    overrides: Overrides = (),
+    out: Folder,
 ) -> Said:
-    """Write the tables of a recording, where a file or folder of that name is there, else of a walk."""
-    path = Path(name)
+    """Write a walk, a recording or a result in the names and signs of OpenSim (.sto).
+
+    walk: name of a walk, or a .toml file; or a recording (.csv, .nc) or result folder
+    gait: of a walk: name of a gait, or a gait file
+    minutes: of a walk: time to walk; default: all of a course, else 0.2
+    side: which foot; default right
+    strikes: of a walk: heel strikes of your motion [s], to put the mean stride of the torque on
+        (--strikes=-0.4,0.8 where time begins below 0); default: the walk as it is, from 0 s on
+    body_mass: of a recording: for moments and forces per mass, such as '62 kg'
+    out: the folder to write
+    """
+    path = Path(walk)
     is_recording = path.suffix != ".toml" and (path.is_dir() or path.suffix.lower() in _RECORDINGS)
     of_walk = {"--gait": gait, "--minutes": minutes, "--strikes": strikes, "--set": overrides or None}
     for option, value in (of_walk if is_recording else {"--body-mass": body_mass}).items():
@@ -38,7 +54,7 @@ def opensim_tables(
     return output.export(
         out,
         COMMAND,
-        lambda: _walked(name, overrides, gait, minutes, side, strikes),
+        lambda: _walked(walk, overrides, gait, minutes, side, strikes),
         lambda _: _next(out, "device_torque.sto"),
     )
 
@@ -47,7 +63,7 @@ def _next(out: Path, file: str) -> str:
     return f"load {shlex.quote(str(out / file))} in OpenSim; its header says units and signs"
 
 
-def _recorded(path: Path, side: Literal["right", "left"], mass: float | None, out: Path) -> Said:
+def _recorded(path: Path, side: Side, mass: float | None, out: Path) -> Said:
     from ppafo.storage import read_recording
     from ppafo.storage.opensim import opensim_bytes, opensim_recording
 
@@ -70,7 +86,7 @@ def _walked(
     overrides: Sequence[str],
     gait: str | Path | None,
     minutes: float | None,
-    side: Literal["right", "left"],
+    side: Side,
     strikes: tuple[float, ...] | None,
 ) -> Mapping[str, bytes]:
     from ppafo.exports.opensim import check_strikes, opensim_files

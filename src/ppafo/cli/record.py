@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ppafo.cli import output
+from ppafo.cli.arguments import Count, File, Patience, Port, Time
 from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, EXIT_INTERRUPTED, Said
 from ppafo.errors import DataError
 
@@ -11,8 +12,19 @@ if TYPE_CHECKING:
     from ppafo.exports.hil.recording import Recorded
 
 
-def record_bench(port_name: str, baud: int, duration: float | None, patience: float, out: Path) -> Said:
-    """Record until the bench or a person ends it; exit code 1 where the port broke, 130 where Ctrl-C stopped it."""
+def rig_record(
+    *, port: Port, baud: Count = 921600, duration: Time | None = None, patience: Patience = 5.0, out: File
+) -> Said:
+    """Record a bench that speaks the protocol of 'ppafo hil'.
+
+    Exit code 1 where the port broke, 130 where Ctrl-C stopped it.
+
+    port: where the bench sends: udp:HOST:PORT or serial:DEVICE (extra 'hil'); UDP listens at the address
+    baud: bits per second of a serial line; default 921600
+    duration: end after this time of the bench, for example '10 s'
+    patience: end, or give up, after this time without a sample; default '5 s'
+    out: the .csv file to write
+    """
     if duration is not None and duration <= 0.0:
         raise DataError("--duration: must be above 0 s")
     output.check_new_file(out)
@@ -27,15 +39,15 @@ def record_bench(port_name: str, baud: int, duration: float | None, patience: fl
     from ppafo.exports.hil.wire import open_port
     from ppafo.storage.comma_separated import write_csv
 
-    port = open_port(port_name, baud, listens=True)
+    wire = open_port(port, baud, listens=True)
     try:
-        output.tell(f"listening at {port_name}")
+        output.tell(f"listening at {port}")
         with stop_by_interrupt() as is_stopped, kept_aside(out) as keep:
-            found = record(port, out.stem, duration, patience, is_stopped, keep=keep)
+            found = record(wire, out.stem, duration, patience, is_stopped, keep=keep)
             write_csv(out, found.recording)
-        is_broken = bool(port.failure)
+        is_broken = bool(wire.failure)
     finally:
-        port.close()
+        wire.close()
     from ppafo.exports.hil.wire import described_refusals
 
     recording = found.recording

@@ -1,9 +1,9 @@
 """``ppafo sets show``: what is in a parameter set, value by value."""
 
 import textwrap
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from ppafo.cli.arguments import Overrides, SetName
 from ppafo.cli.output import Said
 
 if TYPE_CHECKING:
@@ -14,8 +14,8 @@ _SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow", "eff
 _COLUMNS = ("path", "value", "unit", "origin", "source")
 
 
-def show_set(name: str, overrides: Sequence[str]) -> Said:
-    """Return every value of a set with its source."""
+def sets_show(name: SetName, *, overrides: Overrides = ()) -> Said:
+    """Show every value of a parameter set with its source."""
     from ppafo.parameters import apply_overrides, load_parameter_set
 
     parameter_set = apply_overrides(load_parameter_set(name), overrides)

@@ -1,10 +1,10 @@
 """``ppafo simulate SCENARIO``: runs a scenario and writes a result folder, with a report that simulates."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ppafo.cli import output
+from ppafo.cli.arguments import Folder, Overrides, Scenario
 from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, Said
 from ppafo.documents.json_text import json_text
 
@@ -19,20 +19,26 @@ CHECK_FILE = "check.json"
 FIGURE = "figure"
 
 
-def simulate_scenario(name: str, check_it: bool, overrides: Sequence[str], out: Path | None) -> Said:
-    """Run a scenario and write its folder; exit code 1 where it diverged, or a check finds it numerically sensitive."""
+def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = (), out: Folder | None = None) -> Said:
+    """Run a scenario and write its recording, metrics and figure.
+
+    Exit code 1 where it diverged, or a check finds it numerically sensitive.
+
+    check: run again with finer steps and from a start moved by 1e-7, and report which metrics can be repeated
+    out: result folder with the report; default out/NAME of the scenario
+    """
     from ppafo.loading import load_scenario
     from ppafo.storage import check_result_folder
 
-    scenario = load_scenario(name, overrides)
-    folder = out if out is not None else DEFAULT_FOLDER / scenario.name
+    chosen = load_scenario(scenario, overrides)
+    folder = out if out is not None else DEFAULT_FOLDER / chosen.name
     with output.blame_out_option():
         check_result_folder(folder)
     from ppafo.simulation.simulate import simulate
 
-    result = simulate(scenario)
-    check = result.check() if check_it and result.status.is_completed else None
-    error = _error(result) if check is None else check.error
+    result = simulate(chosen)
+    checked = result.check() if check and result.status.is_completed else None
+    error = _error(result) if checked is None else checked.error
     from ppafo.answers.drawing import load_drawing
 
     load_drawing()
@@ -40,9 +46,9 @@ def simulate_scenario(name: str, check_it: bool, overrides: Sequence[str], out: 
     from ppafo.answers.writing import REPORT, page_of
 
     figures = figure_files(result.plot())
-    report = page_of(_answer(result, check), {FIGURE: figures[f"{FIGURE}.svg"]})
-    checked = {} if check is None else {CHECK_FILE: f"{json_text(check.document())}\n".encode()}
-    result.save(folder, {**figures, REPORT: report, **checked})
+    report = page_of(_answer(result, checked), {FIGURE: figures[f"{FIGURE}.svg"]})
+    files = {} if checked is None else {CHECK_FILE: f"{json_text(checked.document())}\n".encode()}
+    result.save(folder, {**figures, REPORT: report, **files})
     from ppafo.simulation.scenario import plain
 
     metrics = {name: plain(metric) for name, metric in result.metrics.items()}
@@ -51,15 +57,15 @@ def simulate_scenario(name: str, check_it: bool, overrides: Sequence[str], out: 
         "status": plain(result.status),
         "metrics": metrics,
         **({} if error is None else {"error": plain(error)}),
-        **({} if check is None else {"check": check.document()}),
+        **({} if checked is None else {"check": checked.document()}),
         "folder": str(folder),
     }
-    is_good = result.status.is_completed and (check is None or check.is_determined)
+    is_good = result.status.is_completed and (checked is None or checked.is_determined)
     return Said(
-        _text(result, error, check, folder),
+        _text(result, error, checked, folder),
         document,
         exit_code=EXIT_GOOD if is_good else EXIT_CHECK_FAILED,
-        aside="" if result.status.is_completed else f"{scenario.name}: {result.status.message}",
+        aside="" if result.status.is_completed else f"{chosen.name}: {result.status.message}",
     )
 
 

@@ -74,12 +74,12 @@ _model_construction.create_schema_validator = lambda *_, **__: SchemaValidator(c
 REFUSED = """
 from ppafo.cli import simulate
 from ppafo.errors import ScenarioError
-def interrupted(*given):
+def interrupted(scenario, *, check=False, overrides=(), out=None):
     try:
         os.kill(os.getpid(), signal.NAME)
     except BaseException:
         raise ScenarioError("file: is wrong") from None
-simulate.simulate_scenario = interrupted
+simulate.simulate = interrupted
 """
 """A signal of which somebody makes a mistake of the user."""
 

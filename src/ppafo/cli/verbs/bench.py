@@ -7,13 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from ppafo.cli.arguments import (
-    Count,
-    File,
     Folder,
     Name,
     Overrides,
-    Patience,
-    Port,
     Time,
     Volume,
     Whole,
@@ -69,22 +65,6 @@ def rig_simulate(
     counted = f"{len(made.recording)} samples of {', '.join(made.recording.names)}"
     text = f"{experiment}: {NOTICE}\n{counted}\nwritten: {out} ({', '.join(files)})"
     return Said(text, {"folder": str(out), "files": list(files), **made.truth})
-
-
-def rig_record(
-    *, port: Port, baud: Count = 921600, duration: Time | None = None, patience: Patience = 5.0, out: File
-) -> Said:
-    """Record a bench that speaks the protocol of 'ppafo hil'.
-
-    port: where the bench sends: udp:HOST:PORT or serial:DEVICE (extra 'hil'); UDP listens at the address
-    baud: bits per second of a serial line; default 921600
-    duration: end after this time of the bench, for example '10 s'
-    patience: end, or give up, after this time without a sample; default '5 s'
-    out: the .csv file to write
-    """
-    from ppafo.cli.record import record_bench
-
-    return record_bench(port, baud, duration, patience, out)
 
 
 def identify(
