@@ -7,12 +7,13 @@ import inspect
 import json
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
 
 import ppafo
+from ppafo.cli import output
 from ppafo.cli.command_line import Command, Group, option_of, parameters_of
 from ppafo.cli.commands import COMMANDS, OTHERS, RENAMED
 from ppafo.cli.main import build_parser, main
@@ -54,7 +55,7 @@ def test_every_parameter_of_a_verb_has_its_help_and_every_option_one_meaning(nam
     for parameter, reading in parameters_of(verb):
         said = re.search(rf"^{parameter.name}: \S", inspect.getdoc(verb) or "", re.MULTILINE)
         assert said is not None or reading.word.help, parameter.name
-    options = [option_of(parameter, reading.word) for parameter, reading in parameters_of(verb)]
+    options = [option_of(parameter, reading) for parameter, reading in parameters_of(verb)]
     named = [option for option in options if option]
     assert len(set(named)) == len(named)
     parser = build_parser(name.split())
@@ -105,6 +106,36 @@ def test_a_verb_that_is_mistyped_is_refused_with_the_nearest_one(capsys: pytest.
     ):
         assert main(words) == 2
         assert said in capsys.readouterr().err
+
+
+def plain(name: str, times: int, *, files: Sequence[Path] = (), share: float = 0.5, loud: bool = False) -> output.Said:
+    """Say what was given.
+
+    name: who
+    times: how often
+    files: some files
+    share: a number; 50% unless given
+    loud: whether to say it aloud
+    """
+    given = {"name": name, "times": times, "files": [str(file) for file in files], "share": share, "loud": loud}
+    return output.Said(repr(given), given)
+
+
+def test_a_function_with_plain_types_is_a_command(capsys: pytest.CaptureFixture[str]) -> None:
+    OTHERS["plain"] = plain  # type: ignore[assignment]
+    try:
+        assert main(["plain", "me", "3", "--files", "a", "--files", "b", "--share", "0.25", "--loud", "--json"]) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert found == {"name": "me", "times": 3, "files": ["a", "b"], "share": 0.25, "loud": True}
+        assert main(["plain", "me", "often"]) == 2
+        assert "often: must be a whole number" in capsys.readouterr().err
+        assert main(["plain", "me", "3"]) == 0
+        assert "'loud': False" in capsys.readouterr().out
+        with pytest.raises(SystemExit):
+            main(["plain", "--help"])
+        assert "a number; 50% unless given" in capsys.readouterr().out
+    finally:
+        del OTHERS["plain"]
 
 
 PAGE = "how-to/add-a-question.md"

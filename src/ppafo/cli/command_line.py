@@ -12,7 +12,7 @@ import sys
 import types
 import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, final
@@ -88,13 +88,13 @@ _PARAMETER = re.compile(r"(\w+): (.*)")
 
 
 @dataclass(frozen=True, slots=True)
-class _Reading:
+class Reading:
     """What an annotation says of the text of a parameter."""
 
     word: Word
     is_flag: bool = False
     is_repeated: bool = False
-    choices: tuple[str, ...] | None = field(default=None)
+    choices: tuple[str, ...] | None = None
 
 
 def _help_by_parameter(verb: Callable[..., Any], names: Sequence[str]) -> dict[str, str]:
@@ -113,7 +113,7 @@ def _help_by_parameter(verb: Callable[..., Any], names: Sequence[str]) -> dict[s
     return found
 
 
-def reading_of(annotation: Any) -> _Reading:
+def reading_of(annotation: Any) -> Reading:
     """Return how the text of a parameter with an annotation is read."""
     word, is_repeated = None, False
     while True:
@@ -126,14 +126,14 @@ def reading_of(annotation: Any) -> _Reading:
         elif isinstance(origin, type) and issubclass(origin, Iterable):
             is_repeated, annotation = True, inner[0]
         elif origin is typing.Literal:
-            return _Reading(word or Word("|".join(inner)), choices=inner)
+            return Reading(word or Word("|".join(inner)), choices=inner)
         else:
             is_flag = annotation is bool
             word = word or _PLAIN.get(annotation, Word("TEXT"))
-            return _Reading(word, is_flag, is_repeated or word.is_repeated)
+            return Reading(word, is_flag, is_repeated or word.is_repeated)
 
 
-def parameters_of(verb: Callable[..., Any]) -> Iterator[tuple[inspect.Parameter, _Reading]]:
+def parameters_of(verb: Callable[..., Any]) -> Iterator[tuple[inspect.Parameter, Reading]]:
     """Return each parameter that words of the line fill, with how its text is read."""
     names = vars(sys.modules[verb.__module__])
     for parameter in inspect.signature(verb).parameters.values():
@@ -143,10 +143,10 @@ def parameters_of(verb: Callable[..., Any]) -> Iterator[tuple[inspect.Parameter,
             yield parameter, reading_of(eval(annotation, names) if isinstance(annotation, str) else annotation)
 
 
-def option_of(parameter: inspect.Parameter, word: Word) -> str:
-    """Return the option that fills a parameter, empty where its place in the line does."""
-    if word.option or parameter.kind is not inspect.Parameter.KEYWORD_ONLY:
-        return word.option
+def option_of(parameter: inspect.Parameter, reading: Reading) -> str:
+    """Return the option that fills a parameter, empty where its place in the line does; a flag has no place."""
+    if reading.word.option or not (reading.is_flag or parameter.kind is inspect.Parameter.KEYWORD_ONLY):
+        return reading.word.option
     return f"--{parameter.name.strip('_').replace('_', '-')}"
 
 
@@ -168,13 +168,13 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command) -> None:
 
 
 def _add_parameter(
-    parser: argparse.ArgumentParser, parameter: inspect.Parameter, reading: _Reading, said: str, lists: bool
+    parser: argparse.ArgumentParser, parameter: inspect.Parameter, reading: Reading, said: str, lists: bool
 ) -> None:
     word, is_required = reading.word, parameter.default is inspect.Parameter.empty
     default = None if is_required else parameter.default
     said = said.replace("{default}", f"{100.0 * default:g}%") if isinstance(default, float) else said
     options: dict[str, Any] = {"help": said.replace("%", "%%"), "default": default}
-    option = option_of(parameter, word)
+    option = option_of(parameter, reading)
     if option:
         options["dest"] = parameter.name
     if reading.is_flag:

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from ppafo.cli.output import Said
     from ppafo.questions.parts.solve import Parts
 
-Set = Annotated[str, Word("SET", help="name of a parameter set, or a .toml file")]
-
 
 def workbench(
     scenarios: Sequence[Scenario] = (), *, overrides: Overrides = (), out: File = Path("out/workbench.html")

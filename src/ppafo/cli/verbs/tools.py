@@ -10,7 +10,6 @@ from ppafo.cli.arguments import (
     Overrides,
     Scenario,
     Word,
-    times,
 )
 
 if TYPE_CHECKING:
@@ -23,7 +22,6 @@ Interface = Annotated[
         help="the closed loop, or the plant alone under a command and the motion of its ankle; default loop",
     ),
 ]
-Strikes = Annotated["tuple[float, ...]", Word("T1,T2,...", times)]
 
 
 def export_c(scenario: Scenario, *, interface: Interface = "loop", overrides: Overrides = (), out: Folder) -> Said:
