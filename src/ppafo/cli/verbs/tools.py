@@ -5,12 +5,7 @@ from __future__ import annotations
 import shlex
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from ppafo.cli.arguments import (
-    Folder,
-    Overrides,
-    Scenario,
-    Word,
-)
+from ppafo.cli.arguments import Folder, Overrides, Scenario, Word
 
 if TYPE_CHECKING:
     from ppafo.cli.output import Said
