@@ -28,6 +28,11 @@ CONDUCTANCE = 0.113 * 31.6e-6 * CHOKED
 PER_ANGLE, DEAD, LOWEST, HIGHEST = 51e-6, 2e-6, math.radians(20.0), math.radians(130.0)
 HELD = DEAD + PER_ANGLE * math.radians(55.0)
 RATE = CONDUCTANCE * PRODUCT / HELD
+VOLUMES = (
+    "actuator.volume_per_angle=51 cm^3/rad",
+    "actuator.dead_volume_1=2 cm^3",
+    "actuator.dead_volume_2=2 cm^3",
+)
 SEALED = ("actuator.leak.area=0 mm^2", "controller.kind=constant", "controller.command=0")
 ADIABATIC = (
     "gas_model.kind=thermal",
@@ -64,14 +69,14 @@ def held(command: float, pressure: float, duration: float, *more: str) -> Scenar
     """Chamber 1 of a vane held at 75 deg, with one command."""
     lines = ("actuator.leak.area=0 mm^2", "controller.kind=constant", f"controller.command={command}")
     lines += (f"initial.pressure_1={pressure} Pa_a", f"run.duration={duration} s")
-    return load_scenario("torque-task-proportional", (*lines, *more))
+    return load_scenario("torque-task-proportional", (*lines, *VOLUMES, *more))
 
 
 def thrown(angle: float, speed: float, duration: float, *more: str) -> Scenario:
     """A free vane between two sealed chambers at the pressure of the atmosphere."""
     lines = (*SEALED, f"motion.angle={angle} deg", f"motion.angular_velocity={speed} rad/s")
     lines += (f"run.duration={duration} s", "initial.pressure_2=atmosphere")
-    return load_scenario("step-response", ("motion.kind=free", *lines, *more))
+    return load_scenario("step-response", ("motion.kind=free", *lines, *VOLUMES, *more))
 
 
 @pytest.mark.parametrize(("gas", "exponent"), [((), 1.0), (ADIABATIC, K)], ids=["isothermal", "adiabatic"])

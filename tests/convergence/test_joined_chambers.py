@@ -35,8 +35,8 @@ K, PRODUCT, ROOM, SOURCE = 1.3, 8.314 * 298.0 / 0.044, 101_325.0, 101_325.0 + 50
 CHOKED = math.sqrt(K / PRODUCT * (2.0 / (K + 1.0)) ** ((K + 1.0) / (K - 1.0)))
 CONDUCTANCE = 0.113 * 12.6e-6 * CHOKED
 LEAK = 0.3 / 12.6
-VOLUME_1 = 2e-6 + 51e-6 * math.radians(55.0)
-VOLUME_2 = 2e-6 + 51e-6 * math.radians(55.0)
+VOLUME_1 = 26.5e-6 + 23.5e-6 * math.radians(55.0)
+VOLUME_2 = 26.5e-6 + 23.5e-6 * math.radians(55.0)
 PUSHED, JOINED = 0.15, 0.25
 """End of push-off and length of the joint [s] in the scripted runs."""
 
@@ -136,7 +136,7 @@ def test_joined_chambers_follow_an_independent_integration() -> None:
 
 
 def test_isothermal_chambers_meet_where_both_share_their_gas_and_lose_none() -> None:
-    course = stepped("actuator.leak.area=1e-9 mm^2", "actuator.dead_volume_1=30 cm^3")
+    course = stepped("actuator.leak.area=1e-9 mm^2", "actuator.dead_volume_1=54.5 cm^3")
     volume_1 = VOLUME_1 + 28e-6
     begin, end = (int(np.searchsorted(course.time, moment - 1e-9)) for moment in (PUSHED, PUSHED + JOINED))
     shared = course.pressure_1[begin] * volume_1 + course.pressure_2[begin] * VOLUME_2

@@ -211,8 +211,10 @@ def test_a_walk_keeps_its_gas_and_its_lines_between_zero_and_their_setting(name:
     assert np.min(line_1) < run.plant.supply_pressure - 1.0e3
 
 
-@pytest.mark.parametrize("name", ["solenoid", "proportional"])
-def test_a_walk_with_short_lines_and_hardly_any_droop_is_the_walk_with_a_constant_supply(name: str) -> None:
+@pytest.mark.parametrize(("name", "given_back"), [("solenoid", 0.0), ("proportional", 0.02)])
+def test_a_walk_with_short_lines_and_hardly_any_droop_is_the_walk_with_a_constant_supply(
+    name: str, given_back: float
+) -> None:
     short = SupplyLines(1.0e3, 1.0, 2.0e-7, 1.0e3, 1.0, 2.0e-7, 0.0)
     second = ("supply.dorsiflexion_pressure=45 psi_g",)
     held, ideal = short_walk(name, short, second), short_walk(name, None, second)
@@ -222,7 +224,8 @@ def test_a_walk_with_short_lines_and_hardly_any_droop_is_the_walk_with_a_constan
         for run in (held, ideal, relieving)
     ]
     assert ends[0] == pytest.approx(ends[1], rel=5.0e-3)
-    assert ends[2] < 0.98 * ends[1]
+    # Only chamber 1 behind the spool is pressed above its supply, and gives gas back.
+    assert ends[2] <= (1.0 - given_back) * ends[1]
 
 
 def test_a_walk_with_wide_lines_and_hardly_any_droop_is_the_walk_with_a_constant_relieving_supply() -> None:

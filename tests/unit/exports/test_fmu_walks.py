@@ -123,7 +123,7 @@ def test_a_parameter_that_is_tuned_acts_and_one_that_would_change_the_steps_is_r
     for instance in (plain, tuned):
         instance.go_to(4.0)
     assert tuned.get("net_push_off_work") < plain.get("net_push_off_work")
-    tuned.set("valve.area", 100.0e-6)
+    tuned.set("valve.area", 200.0e-6)
     with pytest.raises(Exception, match="DoStep"):
         tuned.go_to(4.1)
     assert "other steps of the engine" in capfd.readouterr().out

@@ -62,8 +62,10 @@ def mean_curve(recording: Recording, values: NDArray[np.float64]) -> NDArray[np.
 
 @pytest.mark.parametrize("name", SPEEDS)
 def test_a_healthy_wearer_walks_at_the_speed_of_its_file(name: str) -> None:
-    speed, time, stance = mean_stride(walked(f"wearer.reacts={name}"))
+    """With the valves off: the push of the device makes one of them 3 % faster."""
+    speed, _, _ = mean_stride(walked(f"wearer.reacts={name}", "controller.kind=off"))
     assert speed == pytest.approx(SPEEDS[name], rel=0.03)
+    _, time, stance = mean_stride(walked(f"wearer.reacts={name}"))
     assert 0.9 < time < 1.5
     assert 0.55 < stance < 0.65
 
