@@ -40,6 +40,32 @@ MEASURED = Path(__file__).parents[1] / "actuators"
 MUSCLES = Path(__file__).parents[2] / "src" / "ppafo" / "examples" / "add-an-actuator"
 
 
+PUBLICATION = """\
+schema_version = 1
+name = "mine"
+title = "what it is about"
+citation = "Somebody, Journal, 2020"
+
+[[claims]]
+id = "torque_at_60_psig"
+statement = "At 60 psig the device holds 6 N m."
+published = 6.0
+unit = "N m"
+where = "page 3"
+computation = "held_torque"
+arguments = { pressure = "60 psi_g" }
+at_least = 5.5
+at_most = 6.5
+
+[[claims]]
+id = "comfort"
+statement = "Wearers find it comfortable."
+words = "comfortable"
+where = "page 5"
+not_testable = "Nothing here feels anything."
+"""
+
+
 def blocks(page: str, language: str) -> list[str]:
     """The code blocks of a how-to page in one language."""
     return code_blocks(f"how-to/{page}", language)
@@ -316,12 +342,11 @@ def test_the_step_response_of_the_actuator_of_the_page_agrees_with_the_reference
     assert agreement.worst_pressure < 1e-3
 
 
-def test_the_publication_of_the_page_is_judged(
+def test_a_publication_of_your_own_is_judged(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    (text,) = blocks("repeat-a-published-study.md", "toml")
-    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(PUBLICATION, encoding="utf-8")
     assert main(["reproduce", "--study", "mine.toml"]) == 0
     printed = [line.split()[1:] for line in capsys.readouterr().out.splitlines()[1:3]]
     assert [(line[0], line[-1]) for line in printed] == [("torque_at_60_psig", "consistent"), ("comfort", "testable")]
@@ -332,11 +357,11 @@ def test_the_commands_on_published_studies_run_and_recycling_saves_what_the_page
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    commands = [line for block in blocks("repeat-a-published-study.md", "sh") for line in block.splitlines()]
-    assert [main(shlex.split(command)[1:]) for command in commands] == [0] * 4
+    commands = [line for block in code_blocks("the-paper.md", "sh") for line in block.splitlines()]
+    assert [main(shlex.split(command)[1:]) for command in commands] == [0] * 5
     recycling = json.loads((tmp_path / "out" / "recycling" / "walk.json").read_text())["metrics"]["with"]["gas"][
         "value"
     ]
-    page = (PAGES / "repeat-a-published-study.md").read_text(encoding="utf-8")
+    page = (PAGES.parent / "the-paper.md").read_text(encoding="utf-8")
     (shown,) = re.findall(r"takes (0\.\d+) g instead of 0\.649", page)
     assert f"{1e3 * recycling:.3f}" == shown
