@@ -129,7 +129,7 @@ def claims(_long: Path) -> list[Line]:
             f"{sum(counts.values())} claims of five publications",
             "their printed numbers; most rest on values that are not printed",
             words,
-            "the tables in docs/how-to/repeat-a-published-study.md",
+            "the tables in docs/the-paper.md",
             OPEN,
             command,
         )

@@ -15,6 +15,12 @@ def code_blocks(page: str, *languages: str) -> list[str]:
     return [textwrap.dedent(block) for _, block in found]
 
 
+def block_with(page: str, words: str) -> str:
+    """The one code block of a page that has some words."""
+    (block,) = (block for block in code_blocks(page, r"\w+") if words in block)
+    return block
+
+
 def write_package(folder: Path, module: str, text: str, entry_points: str) -> None:
     """Write the one module of a package and what an installer leaves beside it; entry points as in pyproject.toml."""
     package, name = module.split(".")

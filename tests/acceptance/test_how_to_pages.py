@@ -1,7 +1,8 @@
-"""What the how-to pages on scenarios, controllers and valves show is run as it stands there."""
+"""What the how-to pages on scenarios and extensions show is run as it stands there."""
 
 import dataclasses
 import importlib
+import itertools
 import json
 import math
 import re
@@ -31,7 +32,7 @@ from ppafo.simulation.loading import scenario_from_dict
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PrescribedMotion
 from tests.judge.reference_solver import compare_with_reference
-from tests.page_code import code_blocks, write_package
+from tests.page_code import block_with, code_blocks, write_package
 from tests.scenario_text import parse_scenario
 
 PAGES = Path(__file__).parents[2] / "docs" / "how-to"
@@ -39,9 +40,40 @@ MEASURED = Path(__file__).parents[1] / "actuators"
 MUSCLES = Path(__file__).parents[2] / "src" / "ppafo" / "examples" / "add-an-actuator"
 
 
+PUBLICATION = """\
+schema_version = 1
+name = "mine"
+title = "what it is about"
+citation = "Somebody, Journal, 2020"
+
+[[claims]]
+id = "torque_at_60_psig"
+statement = "At 60 psig the device holds 6 N m."
+published = 6.0
+unit = "N m"
+where = "page 3"
+computation = "held_torque"
+arguments = { pressure = "60 psi_g" }
+at_least = 5.5
+at_most = 6.5
+
+[[claims]]
+id = "comfort"
+statement = "Wearers find it comfortable."
+words = "comfortable"
+where = "page 5"
+not_testable = "Nothing here feels anything."
+"""
+
+
 def blocks(page: str, language: str) -> list[str]:
     """The code blocks of a how-to page in one language."""
     return code_blocks(f"how-to/{page}", language)
+
+
+def extension(words: str) -> str:
+    """The code block of the page on extensions that has some words."""
+    return block_with("how-to/extend.md", words)
 
 
 @pytest.fixture
@@ -67,8 +99,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
 @pytest.fixture
 def hysteresis(install: Callable[..., ModuleType]) -> ModuleType:
     """The controller of the page, installed for the length of a test."""
-    offered = blocks("add-a-controller.md", "toml")[1]
-    return install("my_laws.hysteresis", blocks("add-a-controller.md", "python")[2], offered)
+    return install("my_laws.hysteresis", extension("KIND = ControllerKind"), extension("ppafo.controllers"))
 
 
 def test_the_scenario_of_the_page_loads_and_says_what_the_page_says() -> None:
@@ -79,12 +110,19 @@ def test_the_scenario_of_the_page_loads_and_says_what_the_page_says() -> None:
     assert [item.path for item in scenario.assumptions] == ["motion.profile.level"]
 
 
+def test_every_section_of_a_scenario_file_is_in_the_table_of_the_page(capsys: pytest.CaptureFixture[str]) -> None:
+    text = (PAGES / "write-a-scenario.md").read_text(encoding="utf-8")
+    listed = set(re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE))
+    assert main(["schema", "scenario"]) == 0
+    sections = json.loads(capsys.readouterr().out)["$defs"]["vane"]["properties"]
+    assert listed == set(sections) - {"schema_version", "name", "description"}
+
+
 def test_the_python_of_the_scenario_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
     names: dict[str, Any] = {}
     for block in blocks("write-a-scenario.md", "python"):
         exec(block, names)
     assert capsys.readouterr().out == "3.0 0.25\n"
-    assert [scenario.name for scenario in names["levels"]] == ["short-test"] * 3
 
 
 def test_the_overrides_of_the_scenario_page_are_taken() -> None:
@@ -115,12 +153,10 @@ def test_the_check_of_the_scenario_page_finds_what_the_page_shows(
     printed = capsys.readouterr().out
     (shown,) = blocks("write-a-scenario.md", "text")
     tables = [text[text.index("Check of") :].split("\n\n")[0].splitlines() for text in (printed, shown)]
-    names, shown_names = ([line.split("  ")[0] for line in table] for table in tables)
-    assert names == shown_names
-    assert {"rms_error", "angle over time"} <= set(names)
-    cause = "a measurement moved by 1e-07 of its range, far less than anybody can measure"
-    assert cause in " ".join(shown.split())
-    assert cause in printed
+    found, rows = ({line.split("  ")[0]: line.endswith("  sensitive") for line in table} for table in tables)
+    assert set(rows.values()) == {True, False}
+    assert {name: found[name] for name in rows} == rows
+    assert "a measurement moved by 1e-07 of its range, far less than anybody can measure" in printed
 
 
 def test_the_message_on_the_scenario_page_is_the_real_one() -> None:
@@ -138,12 +174,12 @@ def test_the_message_on_the_scenario_page_is_the_real_one() -> None:
 
 def test_the_python_controller_of_the_page_controls(capsys: pytest.CaptureFixture[str]) -> None:
     names: dict[str, Any] = {}
-    exec(blocks("add-a-controller.md", "python")[0], names)
+    exec(extension("class Cautious"), names)
     assert capsys.readouterr().out.startswith("completed ")
     command = names["result"].recording["command"]
     assert command.max() > 0.05
     assert abs(command[1:] - command[:-1]).max() <= 0.1 + 1e-12
-    exec(blocks("add-a-controller.md", "python")[1], names)
+    exec(extension("pair = {"), names)
     assert capsys.readouterr().out == "64\n"
 
 
@@ -180,8 +216,8 @@ def test_the_controller_of_the_page_keeps_its_command_inside_the_band(hysteresis
 
 
 def test_the_message_on_the_controller_page_is_the_real_one() -> None:
-    (shown,) = blocks("add-a-controller.md", "text")
-    law = blocks("add-a-controller.md", "python")[2].replace("measurement.torque", "measurement.torqe").splitlines()
+    shown = extension("my_laws/hysteresis.py:")
+    law = extension("KIND = ControllerKind").replace("measurement.torque", "measurement.torqe").splitlines()
     number = next(place for place, line in enumerate(law, 1) if "measurement.torqe" in line)
     source = "\n".join(
         [
@@ -209,7 +245,7 @@ def test_the_controller_of_the_page_is_compiled_and_named_in_a_scenario(hysteres
     wide = ppafo.simulate(scenario_from_dict(content, ["controller.band=1 N m"]))
     narrow = ppafo.simulate(scenario_from_dict(content))
     assert hysteresis.KIND.name == narrow.scenario.control.kind
-    content["controller"] = tomllib.loads(blocks("add-a-controller.md", "toml")[0])["controller"]
+    content["controller"] = tomllib.loads(extension("[controller]"))["controller"]
     by_module = ppafo.simulate(scenario_from_dict(content))
     assert by_module.scenario.control.kind == "my_laws.hysteresis:KIND"
     assert by_module.metrics == narrow.metrics
@@ -218,8 +254,10 @@ def test_the_controller_of_the_page_is_compiled_and_named_in_a_scenario(hysteres
 
 @pytest.mark.usefixtures("hysteresis")
 def test_the_controller_of_the_page_walks() -> None:
-    assert "controller.kind=hysteresis" in blocks("add-a-controller.md", "sh")[-1]
-    walked = ppafo.walk("proportional", 0.1, ["controller.kind=hysteresis", "controller.band=0.5 N m"])
+    words = shlex.split(extension("ppafo walk"))
+    overrides = [after for word, after in itertools.pairwise(words) if word == "--set"]
+    assert overrides[0] == "controller.kind=hysteresis"
+    walked = ppafo.walk(words[2], 0.1, overrides)
     assert walked.status.is_completed
     assert "safe_state_time" not in walked.metrics
     assert walked.metrics["net_push_off_work"].value > 0.5
@@ -230,14 +268,13 @@ def test_the_controller_of_the_page_walks() -> None:
 @pytest.fixture
 def three_position(install: Callable[..., ModuleType]) -> ModuleType:
     """The valve of the page, installed for the length of a test."""
-    offered, _ = blocks("add-a-valve.md", "toml")
-    return install("my_valves.three_position", blocks("add-a-valve.md", "python")[0], offered)
+    return install("my_valves.three_position", extension("KIND = ValveKind"), extension("ppafo.valves"))
 
 
 @pytest.mark.usefixtures("three_position")
 def test_the_parameter_set_of_the_page_has_its_valve() -> None:
     shipped = (files("ppafo.parameters") / "sets" / "ppafo2011.toml").read_text(encoding="utf-8")
-    valve = blocks("add-a-valve.md", "toml")[1]
+    valve = extension("[valves.main]")
     for kind in ("three_position", "my_valves.three_position:KIND"):
         text = shipped + "\n" + valve.replace('"three_position"', f'"{kind}"')
         device = build_device(parse_parameter_set(text.encode(), "mine.toml"), "main")
@@ -259,7 +296,7 @@ def test_a_set_with_the_section_of_the_page_has_the_actuator_that_was_measured(t
     shipped = (files("ppafo.parameters") / "sets" / "cylinder-lever.toml").read_text(encoding="utf-8")
     before, after = shipped.index("[actuator]"), shipped.index("[actuator.angle_min]")
     (tmp_path / "mine.toml").write_text(
-        shipped[:before] + blocks("add-an-actuator.md", "toml")[0] + "\n" + shipped[after:], encoding="utf-8"
+        shipped[:before] + extension('kind = "table"') + "\n" + shipped[after:], encoding="utf-8"
     )
     (tmp_path / "measured-bladder.csv").write_bytes((MEASURED / "measured-bladder.csv").read_bytes())
     within = ["actuator.angle_max=110 deg", "supply.pressure=65 kPa_g"]
@@ -272,15 +309,14 @@ def test_a_set_with_the_section_of_the_page_has_the_actuator_that_was_measured(t
 
 @pytest.fixture
 def muscles(install: Callable[..., ModuleType]) -> ModuleType:
-    """The actuator of the page, installed for the length of a test."""
-    offered = blocks("add-an-actuator.md", "toml")[1]
-    return install("my_actuators.muscle_pair", blocks("add-an-actuator.md", "python")[0], offered)
+    """The actuator of the example, offered as the page says, for the length of a test."""
+    module = (MUSCLES / "my_actuators" / "muscle_pair.py").read_text(encoding="utf-8")
+    return install("my_actuators.muscle_pair", module, extension("ppafo.actuators"))
 
 
 @pytest.mark.usefixtures("muscles")
 def test_the_actuator_of_the_page_pulls_as_its_catalogue_prints_by_entry_point_and_by_name_of_its_object() -> None:
     shipped = (MUSCLES / "muscle-pair.toml").read_text(encoding="utf-8")
-    assert blocks("add-an-actuator.md", "toml")[2] in shipped
     for kind in ("muscle_pair", "my_actuators.muscle_pair:KIND"):
         text = shipped.replace('kind = "muscle_pair"', f'kind = "{kind}"')
         actuator = build_device(parse_parameter_set(text.encode(), "mine.toml")).actuator
@@ -306,12 +342,11 @@ def test_the_step_response_of_the_actuator_of_the_page_agrees_with_the_reference
     assert agreement.worst_pressure < 1e-3
 
 
-def test_the_publication_of_the_page_is_judged(
+def test_a_publication_of_your_own_is_judged(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    (text,) = blocks("repeat-a-published-study.md", "toml")
-    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(PUBLICATION, encoding="utf-8")
     assert main(["reproduce", "--study", "mine.toml"]) == 0
     printed = [line.split()[1:] for line in capsys.readouterr().out.splitlines()[1:3]]
     assert [(line[0], line[-1]) for line in printed] == [("torque_at_60_psig", "consistent"), ("comfort", "testable")]
@@ -322,11 +357,10 @@ def test_the_commands_on_published_studies_run_and_recycling_saves_what_the_page
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    commands = [line for block in blocks("repeat-a-published-study.md", "sh") for line in block.splitlines()]
-    assert [main(shlex.split(command)[1:]) for command in commands] == [0] * 4
-    recycling = json.loads((tmp_path / "out" / "recycling" / "walk.json").read_text())["metrics"]["with"]["gas"][
-        "value"
-    ]
-    page = (PAGES / "repeat-a-published-study.md").read_text(encoding="utf-8")
+    commands = [line for block in code_blocks("the-paper.md", "sh") for line in block.splitlines()]
+    assert [main(shlex.split(command)[1:]) for command in commands] == [0] * 5
+    walked = json.loads((tmp_path / "out" / "recycling" / "walk.json").read_text())
+    recycling = walked["metrics"]["gas"]["value"]
+    page = (PAGES.parent / "the-paper.md").read_text(encoding="utf-8")
     (shown,) = re.findall(r"takes (0\.\d+) g instead of 0\.649", page)
     assert f"{1e3 * recycling:.3f}" == shown

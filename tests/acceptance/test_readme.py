@@ -2,6 +2,7 @@
 
 import re
 import shlex
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -22,7 +23,7 @@ ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 ASKED, MEASURED_PAGE, STUDIES_PAGE = (
     (ROOT / "docs" / name).read_text(encoding="utf-8")
-    for name in ("what-you-can-ask.md", "accuracy-and-speed.md", "how-to/repeat-a-published-study.md")
+    for name in ("what-you-can-ask.md", "accuracy-and-speed.md", "the-paper.md")
 )
 TEXT = "\n".join((README, ASKED, MEASURED_PAGE))
 MOST_LINES, MOST_WORDS = 120, 1100
@@ -54,7 +55,14 @@ def commands() -> list[list[str]]:
 def shown_claims() -> dict[str, list[str]]:
     """The cells of the tables of claims by claim: published, here, verdict."""
     rows = re.findall(r"^\| [^|]+ \| `(\w+)`" + 3 * r" \| ([^|]+)" + r" \|$", STUDIES_PAGE, re.MULTILINE)
-    return {name: cells for name, *cells in rows}
+    (printed,) = re.findall(r"^```text\nstudy .*?\n(.*?)^```", STUDIES_PAGE, re.DOTALL | re.MULTILINE)
+    return {name: cells for name, *cells in rows} | claims_of(printed)
+
+
+def claims_of(printed: str) -> dict[str, list[str]]:
+    """The same of the lines that the command prints."""
+    rows = [re.split(r" {2,}", line) for line in printed.splitlines()]
+    return {name: cells for _, name, *cells in rows}
 
 
 @pytest.fixture(scope="module")
@@ -165,16 +173,12 @@ def test_the_numbers_of_the_readme_are_those_of_a_run(reproduction: Reproduction
 
 @pytest.mark.short
 def test_the_table_of_claims_is_that_of_a_run(studies: Studies) -> None:
-    lines = [re.split(r" {2,}", line) for line in text_of(studies.answer()).splitlines()[1:-2]]
-    found = {name: [published.removesuffix(" (own sum)"), ours, verdict] for _, name, published, ours, verdict in lines}
-    assert shown_claims() == found
+    assert shown_claims() == claims_of("\n".join(text_of(studies.answer()).splitlines()[1:-2]))
 
 
-def test_the_page_on_studies_shows_what_a_study_prints(studies: Studies) -> None:
-    shown = [line.strip() for line in STUDIES_PAGE.splitlines() if line.startswith("    jrrd-2011")]
-    printed = [line for line in text_of(studies.answer()).splitlines() if line.startswith("jrrd-2011")]
-    assert [line.split() for line in shown] == [line.split() for line in printed]
-    assert shown
+def test_the_interpretations_of_u_on_the_page_are_those_of_a_run(reproduction: Reproduction) -> None:
+    (shown,) = re.findall(r"^    U is .*\n(?:    .*\n){3}", STUDIES_PAGE, re.MULTILINE)
+    assert textwrap.dedent(shown) in text_of(reproduction.answer())
 
 
 def test_the_limits_of_accuracy_are_those_of_the_tests() -> None:

@@ -192,7 +192,7 @@ def test_an_effect_has_its_lines_in_nomenclature_and_equations(effect: Effect) -
 
 
 def test_the_page_on_effects_lists_every_field_of_a_moment_and_every_place() -> None:
-    page = (ROOT / "docs" / "how-to" / "add-an-effect.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "how-to" / "extend.md").read_text(encoding="utf-8")
     laws = [name for name, law in inspect.getmembers(places, inspect.isfunction) if law.__module__ == places.__name__]
     assert [name for name in (*Moment._fields, *laws) if f"`{name}" not in page] == []
 

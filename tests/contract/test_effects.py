@@ -38,7 +38,7 @@ from ppafo.walking.walk import walk
 from tests.built_once import shared_library
 from tests.judge.reference_solver import compare_with_reference
 from tests.modules_under_node import compared, drawn
-from tests.page_code import code_blocks, write_package
+from tests.page_code import block_with, write_package
 
 AREA = "effects.mesh.area"
 NARROW = f"{AREA}=4 mm^2"
@@ -46,7 +46,7 @@ NAME, SHORT = "step-response", ("run.duration=0.3 s",)
 BOTTLE = "bottle.name=paper-co2-9oz"
 ICE = ("effects.ice.blockage_per_gas=3e4 1/kg", "effects.ice.melting_time=30 ms")
 REAL = "effects.second_virial.share=1"
-PAGE = "how-to/add-an-effect.md"
+PAGE = "how-to/extend.md"
 
 
 @pytest.fixture(autouse=True)
@@ -63,7 +63,8 @@ def _forgotten() -> Iterator[None]:
 @pytest.fixture(autouse=True)
 def _installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The package of the page, as an installer leaves it."""
-    write_package(tmp_path / "site", "my_effects.mesh", code_blocks(PAGE, "python")[0], code_blocks(PAGE, "toml")[0])
+    module, entry_points = block_with(PAGE, "EFFECT = Effect"), block_with(PAGE, "ppafo.effects")
+    write_package(tmp_path / "site", "my_effects.mesh", module, entry_points)
     monkeypatch.syspath_prepend(tmp_path / "site")
 
 

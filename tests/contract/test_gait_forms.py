@@ -13,9 +13,9 @@ from ppafo.gait import load_gait, walk_recording
 from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.gait.recorded.form import GaitForm
 from ppafo.gait.recorded.reading import FORMS, read_table
-from tests.page_code import code_blocks, write_package
+from tests.page_code import block_with, write_package
 
-PAGE = "how-to/add-a-gait-form.md"
+PAGE = "how-to/extend.md"
 OWN = list(FORMS)
 GAIT = load_gait("falisse2019-subject1")
 PERCENT = np.linspace(0.0, 1.0, 101)
@@ -25,7 +25,7 @@ PERCENT = np.linspace(0.0, 1.0, 101)
 def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder with the package of the page, as an installer leaves it; forgotten at the end of the test."""
     folder = tmp_path / "site"
-    (module,), (entry_points,) = code_blocks(PAGE, "python"), code_blocks(PAGE, "toml")
+    module, entry_points = block_with(PAGE, "FORM = GaitForm"), block_with(PAGE, "ppafo.gait_forms")
     write_package(folder, "my_forms.goniometer", module, entry_points)
     monkeypatch.syspath_prepend(folder)
     monkeypatch.chdir(tmp_path)

@@ -280,7 +280,7 @@ def _check_path(base: Scenario, given: str, path: str, declared: Mapping[str, Qu
     if base.control.kind == PYTHON_CONTROLLER and path.startswith("controller."):
         raise ScenarioError(
             f"{base.name}: '{given}' cannot vary: a Python object has no declared settings; "
-            "a module with a KIND has them (docs/how-to/add-a-controller.md)"
+            "a module with a KIND has them (docs/how-to/extend.md)"
         )
     hint = nearest_name(path, declared) or f"; for example {', '.join(list(declared)[:6])}"
     raise ScenarioError(f"{base.name}: there is no number '{given}' that could vary{hint}")

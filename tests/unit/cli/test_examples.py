@@ -18,6 +18,8 @@ SCRIPT = "first-steps"
 """The example that is no part of a page: tests/acceptance/test_examples.py runs it."""
 DATA = ("muscle-pair.toml", "step-response-muscles.toml")
 """A set and its scenario, which a page names: too long to be shown."""
+SHOWN_IN_PART = ("muscle_pair.py",)
+"""A module of which a page shows whole functions."""
 
 
 @pytest.fixture(autouse=True)
@@ -37,6 +39,10 @@ def test_the_files_of_an_example_are_what_its_page_shows(name: str) -> None:
         text = content.decode("utf-8")
         if path.name == "pyproject.toml":
             assert any(text.endswith(block) for block in shown), path
+        elif path.name in SHOWN_IN_PART:
+            parts = [block.strip().split("\n\n\n") for block in shown if block.startswith("def ")]
+            assert [part for block in parts for part in block if part not in text] == [], path
+            assert sum(map(len, parts)) > 1
         elif path.name not in ("__init__.py", *DATA):
             assert text in shown, path
 

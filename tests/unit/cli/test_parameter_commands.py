@@ -2,7 +2,6 @@
 
 import importlib
 import json
-import textwrap
 from pathlib import Path
 
 import pytest
@@ -138,7 +137,7 @@ def test_an_audit_shows_first_what_the_set_changes_of_its_parent(capsys: pytest.
     shown = "\n".join(capsys.readouterr().out.splitlines()[:6])
     page = (Path(__file__).parents[3] / "docs/how-to/add-a-parameter-set.md").read_text(encoding="utf-8")
     assert shown.startswith("ppafo2011 changes 25 values of its parent ppafo2011-printed\n")
-    assert textwrap.indent(shown, "   ") in page
+    assert f"```text\n{shown}\n```" in page
 
 
 def test_a_set_without_a_parent_begins_with_its_findings_and_may_be_compared_with_any(

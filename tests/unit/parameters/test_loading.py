@@ -1,5 +1,6 @@
 """Parameter sets from names and files, and every mistake that a file can have."""
 
+import math
 import re
 import textwrap
 from importlib import resources
@@ -8,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.errors import ParameterError
+from ppafo.model.catalog import EFFECTS, VALVES
 from ppafo.parameters import list_sets, load_device, load_parameter_set
 from ppafo.parameters.loading import parameter_set_toml, parse_parameter_set
 
@@ -229,3 +231,25 @@ def test_the_example_of_the_how_to_page_is_a_valid_set() -> None:
     parameter_set = parse_parameter_set("\n".join(map(textwrap.dedent, blocks)).encode(), page.name)
     assert set(parameter_set.accepted) == {"flow-of-main"}
     assert "reported.valves.main.mass_flow" in parameter_set.numbers
+
+
+def data_sheet_table() -> str:
+    page = Path(__file__).parents[3] / "docs" / "how-to" / "add-a-parameter-set.md"
+    return page.read_text(encoding="utf-8").partition("## From a data sheet")[2].partition("\n## ")[0]
+
+
+def test_the_table_of_data_sheets_has_every_key_of_both_kinds_of_valves() -> None:
+    valves = {item.name for kind in ("proportional", "solenoid") for item in VALVES[kind].quantities}
+    orifice = {"sonic_conductance", "critical_ratio", "area", "discharge_coefficient"}
+    named = set(re.findall(r"`(\w+)`", data_sheet_table())) - {"supply_line", "sensors"}
+    assert named == valves | orifice
+    EFFECTS.load_own()
+    effects = {f"effects.{name}.{item.name}" for name in EFFECTS for item in EFFECTS[name].quantities}
+    assert set(re.findall(r"`\[(effects\.[\w.]+)\]`", data_sheet_table())) <= effects
+
+
+def test_the_flow_coefficients_on_the_page_are_those_of_water_at_one_bar_and_one_psi() -> None:
+    density, gallon = 1000.0, 3.785411784e-3
+    kv = 1e6 / 3600.0 / math.sqrt(2.0e5 / density)
+    cv = 1e6 * gallon / 60.0 / math.sqrt(2.0 * 6894.757 / density)
+    assert f"{kv:.1f} mm^2 per Kv, {cv:.1f} mm^2 per Cv" in data_sheet_table()

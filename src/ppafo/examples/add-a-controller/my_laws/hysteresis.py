@@ -26,7 +26,7 @@ def update(
     measurement: Measurement,
     period: float,
 ) -> tuple[float, HysteresisState]:
-    """Command: 1 above the band of the error [N m], -1 below it, unchanged inside."""
+    """Command [-]: 1 above the band of the error, -1 below it, unchanged inside."""
     error = reference - measurement.torque
     outside = 1.0 if error > 0.0 else -1.0
     command = outside if abs(error) > parameters.band else state.command
