@@ -1,0 +1,93 @@
+"""The page on real recordings shows what its command prints, and the recordings are those that it names."""
+
+import hashlib
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.questions.identify.solve import identify
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT))
+from scripts import measured_cylinder as measured  # noqa: E402
+
+PAGE = (ROOT / "docs" / "measured.md").read_text(encoding="utf-8")
+KNOWN_AREA = 5.1875e-4
+
+
+@pytest.fixture(scope="module")
+def seals() -> dict[str, measured.Seal]:
+    return {seal.name: seal for seal in measured.seals_in(measured.EXAMPLE)}
+
+
+def test_the_page_shows_what_the_command_prints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["measured_cylinder.py", "--out", str(tmp_path)])
+    assert measured.main() == 0
+    printed = capsys.readouterr().out
+    for shown in re.findall(r"^```text\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE):
+        assert shown.strip() in printed
+    assert {file.name for file in tmp_path.iterdir()} == {"measured.txt", "friction.png", "leak.png"}
+
+
+def test_the_known_area_is_found(seals: dict[str, measured.Seal]) -> None:
+    assert seals["O-ring257"].area == pytest.approx(KNOWN_AREA, rel=0.0025)
+
+
+def test_a_pressure_is_predicted_or_the_line_is_said_not_to_hold(seals: dict[str, measured.Seal]) -> None:
+    for seal in seals.values():
+        inside = all(one.is_predicted for one in seal.left_out)
+        assert seal.verdict.startswith("a straight line predicts" if inside else "NO STRAIGHT LINE"), seal.name
+    assert "downwards" in seals["NAPN"].verdict
+    assert "upwards" in seals["PK"].verdict
+
+
+def test_what_is_left_out_is_not_seen_by_the_fit(seals: dict[str, measured.Seal]) -> None:
+    readings = list(seals["KDN"].readings)
+    pushed = readings[3].push + np.array([30.0, 0.0, 0.0])
+    spoilt = [*readings[:3], measured.Reading(7.0, pushed, readings[3].pull)]
+    before, after = measured.without(readings, 3), measured.without(spoilt, 3)
+    assert (before.line, before.band, before.constant) == (after.line, after.band, after.constant)
+    assert not after.is_predicted
+
+
+def test_a_tight_line_of_friction_is_predicted_and_a_bent_one_is_not(tmp_path: Path) -> None:
+    area, time = 5.0e-4, np.arange(0.0, 80.0, 0.05)
+    position = 20.0 + 20.0 * (2.0 / np.pi) * np.arcsin(np.sin(2.0 * np.pi * time / 8.0))
+    sign = np.sign(np.gradient(position))
+    for name, bend in (("straight", 0.0), ("bent", 0.25)):
+        for bar in (1, 3, 5, 7):
+            friction = 2.0 + 0.5 * bar + bend * (bar - 4.0) ** 2
+            force = area * bar * 1e5 + sign * friction
+            rows = [time * 1e3, 0 * time, 0 * time, 0 * time, position, bar + 0 * time, force]
+            np.savetxt(tmp_path / f"{name}_{bar}bar.csv", np.column_stack(rows), fmt="%.3f", delimiter="\t")
+    found = {seal.name: seal for seal in measured.seals_in(tmp_path)}
+    assert found["straight"].verdict.startswith("a straight line predicts")
+    assert found["straight"].line == pytest.approx((2.0, 0.5e-5), rel=1e-3)
+    assert "NO STRAIGHT LINE: bends upwards" in found["bent"].verdict
+
+
+def test_a_folder_without_recordings_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["measured_cylinder.py", str(tmp_path)])
+    assert measured.main() == 2
+    assert capsys.readouterr().out.count("\n") == 1
+
+
+def test_the_recordings_are_those_of_the_source_file() -> None:
+    stated = re.findall(r"^([0-9a-f]{64})  (\S+)$", (measured.EXAMPLE / "SOURCE.txt").read_text(), re.MULTILINE)
+    assert len(stated) == 18
+    for digest, name in stated:
+        assert hashlib.sha256((measured.EXAMPLE / name).read_bytes()).hexdigest() == digest, name
+    assert sum(file.stat().st_size for file in measured.EXAMPLE.iterdir()) < 2_000_000
+
+
+def test_a_first_fit_of_a_real_device_finds_the_known_area() -> None:
+    area = identify(measured.EXAMPLE / "cylinder.toml").results[0]["static_torque.area"]
+    assert area.value == pytest.approx(KNOWN_AREA, rel=0.0025)
+    assert area.low <= KNOWN_AREA <= area.high
