@@ -30,7 +30,7 @@ from ppafo.validation.measured import (
     parse_thresholds,
     supply_gauge,
 )
-from ppafo.validation.replay import Motion, Replayed, initial_in_fixed_volume, replay_recording, start_of
+from ppafo.validation.replay import Motion, Replay, Replayed, initial_in_fixed_volume, replay_recording, start_of
 
 DEFAULT_LIMIT = 0.02
 """Largest delay [s] that is looked for; sensors, filters and valves are late by less, and a model by more is wrong."""
@@ -295,7 +295,8 @@ def compare_recording(measured: Measured, device: Device, settings: ReplaySettin
     if settings.motion == "measured" and not measured.has(ANGLE):
         raise DataError(f"{measured.file}: there is no channel '{ANGLE}' to prescribe (--motion measured)")
     start = start_of(measured, device, settings.initial)
-    replayed = replay_recording(measured, device, start, settings.motion, settings.longest_delay, settings.leg)
+    wanted = Replay(measured, device, start, settings.motion, settings.longest_delay, settings.leg)
+    replayed = replay_recording(wanted)
     items = _comparisons(measured, replayed, device, settings)
     delay = common_delay(items, settings.longest_delay)
     channels = tuple(channel_agreement(item, delay.correction, settings.longest_delay) for item in items)
