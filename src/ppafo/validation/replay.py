@@ -3,14 +3,14 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from ppafo.engine.lanes import Floats, replay
+from ppafo.engine.lanes import Batch, Floats, StepInputs, replay
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of
 from ppafo.engine.scheme.actuators import pressures_of, torque_of
-from ppafo.errors import DataError, SimulationError, UnitError, nearest_name, one_line, refused_as
+from ppafo.errors import DataError, PpafoError, SimulationError, UnitError, nearest_name, one_line, refused_as
 from ppafo.parameters.device import Device
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
@@ -73,24 +73,29 @@ class Replay:
 def replay_recording(wanted: Replay) -> Replayed:
     """Return the model on the inputs of a recording; SimulationError where it diverges."""
     found = replay_together([wanted])[0]
-    if isinstance(found, SimulationError):
+    if isinstance(found, PpafoError):
         raise found
     return found
 
 
-def replay_together(wanted: Sequence[Replay]) -> list[Replayed | SimulationError]:
-    """Return many replays; those of one program, one clock and the same inputs are one batch."""
-    planned, groups = [], {}
+def replay_together(wanted: Sequence[Replay]) -> list[Replayed | PpafoError]:
+    """Return many replays, or why one cannot be made; those of one program, clock and inputs are one batch."""
+    found: dict[int, Replayed | PpafoError] = {}
+    planned: dict[int, tuple[Run, StepInputs, Batch]] = {}
+    groups: dict[tuple[Any, ...], list[int]] = {}
     for place, one in enumerate(wanted):
-        run = _plan(one)
+        try:
+            run = _plan(one)
+        except PpafoError as error:
+            found[place] = error
+            continue
         followed = followed_channels(one.measured, one.motion)
         inputs = RecordedInputs(one.measured.recording, followed, float(one.measured.recording.time[0]))
         steps, batch = step_inputs(inputs, one.device, run), batch_of(run)
-        planned.append((run, steps, batch))
+        planned[place] = run, steps, batch
         table = [(name, series.tobytes()) for name, series in steps.parameters.items()]
         command = b"" if steps.command is None else steps.command.tobytes()
         groups.setdefault((batch.program, batch.clock, command, tuple(table)), []).append(place)
-    found: dict[int, Replayed | SimulationError] = {}
     for places in groups.values():
         first, steps, batch = planned[places[0]]
         parameters = np.concatenate([planned[place][2].parameters for place in places], axis=1)
@@ -112,7 +117,9 @@ def _replayed(
         remedy = "check the volumes, the inertia and the valve of the set (ppafo audit)"
         if ends[rows["result.too_many_parts"]]:
             remedy = TOO_MANY_PARTS
-        return SimulationError(f"{one.measured.file}: the model diverged {until:.6g} s after the first sample; {remedy}")
+        return SimulationError(
+            f"{one.measured.file}: the model diverged {until:.6g} s after the first sample; {remedy}"
+        )
     inputs = followed_channels(one.measured, one.motion)
     return Replayed(_recording(one.measured, run, record), run.step, inputs)
 
