@@ -19,7 +19,7 @@ from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM
 from ppafo.parameters.device import Device, Orifice
 from ppafo.progress import Progress, Report, report_nothing
-from ppafo.signals.faults import is_noisy
+from ppafo.signals.faults import is_at_limit, is_noisy, plateaus
 from ppafo.signals.recording import Floats
 from ppafo.simulation.numbers import declared_numbers, number_at, with_numbers
 from ppafo.simulation.recorded import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY, samples_at_rest
@@ -89,10 +89,11 @@ class Sensor:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """How record and device differ from the set: sensors by channel, numbers by path [SI], the rate of the clock."""
+    """How record and device differ from the set: sensors by channel, numbers by path [SI], settings of an effect."""
 
     sensors: Mapping[str, Sensor] = field(default_factory=dict)
     numbers: Mapping[str, float] = field(default_factory=dict)
+    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     is_swapped: bool = False
     clock: float = 1.0
     motion: Motion | None = None
@@ -252,10 +253,11 @@ class _Search:
             recording = replace(recording, time=first + (recording.time - first) / change.clock)
         settings = self.settings if change.motion is None else replace(self.settings, motion=change.motion)
         wanted = replay_of(replace(measured, recording=recording), self.device, settings)
-        if not change.numbers:
-            return wanted
-        scenario = replace(replayed_scenario(wanted), device=wanted.device)
-        return replace(wanted, device=with_numbers(scenario, change.numbers).device)
+        device = replace(wanted.device, effects={**wanted.device.effects, **change.effects})
+        if change.numbers:
+            scenario = replace(replayed_scenario(wanted), device=device)
+            device = with_numbers(scenario, change.numbers).device
+        return replace(wanted, device=device)
 
     def compared(self, candidates: Sequence[Candidate], none: Floats) -> list[Cause]:
         """Return the candidates at the sizes that leave least: the best of a grid, then two Gauss-Newton steps.
@@ -366,7 +368,9 @@ def _fault_of(one: _Channel, time: Floats) -> str:
     for place, word in ((0, "least"), (-1, "largest")):
         others = int(counts[1:-1].max(initial=1))
         is_many = counts[place] >= _FEWEST_CLIPPED * others
-        if is_many and is_noisy(values[values != levels[place]]):
+        # A vane runs into its stops, and only noise tells that from a sensor at its limit.
+        is_sudden = one.name != ANGLE and any(is_at_limit(values, plateau) for plateau in plateaus(values))
+        if is_many and (is_sudden or is_noisy(values[values != levels[place]])):
             return f"is clipped: {counts[place]} samples are exactly its {word} value"
     around = np.lib.stride_tricks.sliding_window_view(np.pad(values, 2, mode="edge"), 5)
     away = np.abs(values - np.median(around, axis=1))
@@ -552,54 +556,46 @@ def _numbers(search: _Search) -> Iterator[Candidate]:
     )
 
 
+_EFFECTS = (
+    ("leak_opening", "the leak seems to open at {:.3g} Pa", ("pressure",), {"rise": 0.3}, (1e3, 4e3, 1.6e4, 6e4, 2e5)),
+    (
+        "stribeck",
+        "friction seems to be higher up to {:.2g} rad/s (Stribeck)",
+        ("velocity",),
+        {"share": 0.9},
+        (0.02, 0.1, 0.4, 1.6, 6.0),
+    ),
+    (
+        "seal_friction",
+        "friction seems to grow with the pressure between the chambers by {:.2g} N m/Pa",
+        ("static_per_pressure", "dynamic_per_pressure"),
+        {},
+        (1e-8, 5e-8, 2e-7, 1e-6, 5e-6),
+    ),
+    (
+        "second_virial",
+        "the gas seems not to be ideal, with {:.2g} times the second virial coefficient of CO2",
+        ("share",),
+        {"coefficient": SECOND_VIRIAL["CO2"]},
+        (0.05, 0.2, 0.7, 2.5, 8.0),
+    ),
+    (
+        "spool_play",
+        "the spool seems to have a play of {:.2g} of its command",
+        ("width",),
+        {},
+        (0.005, 0.02, 0.08, 0.2, 0.4),
+    ),
+)
+"""Effects that a device may have and the model has not: the settings that grow with one size, those given, sizes."""
+
+
 def _effects(device: Device) -> Iterator[Candidate]:
-    """Effects that a device may have and the model has not, each with the size that says how much of it there is."""
-    kinds = [
-        (
-            "leak_opening",
-            "the leak seems to open at {:.3g} Pa",
-            {"pressure": 1.0, "rise": 0.0},
-            {"rise": 0.3},
-            (1e3, 4e3, 1.6e4, 6e4, 2e5),
-        ),
-        (
-            "stribeck",
-            "friction seems to be higher up to {:.2g} rad/s (Stribeck)",
-            {"velocity": 1.0},
-            {"share": 0.9},
-            (0.02, 0.1, 0.4, 1.6, 6.0),
-        ),
-        (
-            "seal_friction",
-            "friction seems to grow with the pressure between the chambers by {:.2g} N m/Pa",
-            {"static_per_pressure": 1.0, "dynamic_per_pressure": 1.0},
-            {},
-            (1e-8, 5e-8, 2e-7, 1e-6, 5e-6),
-        ),
-        (
-            "second_virial",
-            "the gas seems not to be ideal, with {:.2g} times the second virial coefficient of CO2",
-            {"share": 1.0},
-            {"coefficient": SECOND_VIRIAL["CO2"]},
-            (0.05, 0.2, 0.7, 2.5, 8.0),
-        ),
-    ]
-    if device.valve.kind == "proportional":
-        kinds.append(
-            (
-                "spool_play",
-                "the spool seems to have a play of {:.2g} of its command",
-                {"width": 1.0},
-                {},
-                (0.005, 0.02, 0.08, 0.2, 0.4),
+    for name, words, scaled, given, sizes in _EFFECTS:
+        if name not in device.effects:
+            yield Candidate(
+                name,
+                lambda size, w=words: w.format(math.exp(size)),
+                lambda size, n=name, s=scaled, g=given: Change(effects={n: {**g, **dict.fromkeys(s, math.exp(size))}}),
+                tuple(math.log(size) for size in sizes),
             )
-        )
-    for name, words, scaled, given, sizes in kinds:
-        fixed = {f"effects.{name}.{key}": value for key, value in given.items()}
-        paths = [f"effects.{name}.{key}" for key, by in scaled.items() if by]
-        yield Candidate(
-            name,
-            lambda size, w=words: w.format(math.exp(size)),
-            lambda size, p=paths, f=fixed: Change(numbers={**f, **dict.fromkeys(p, math.exp(size))}),
-            tuple(math.log(size) for size in sizes),
-        )
