@@ -9,6 +9,7 @@ for a cause with a size. A start read from noisy samples, and part of a sample o
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -29,11 +30,9 @@ from ppafo.validation.replay import Motion, Replay, Replayed, replay_together, r
 
 ONLY_NOISE = 2.0
 """Mean square left over that of the noise up to which nothing but noise is left."""
-USUAL_ZERO = {ANGLE: math.radians(0.5), PRESSURE_1: 0.3 * PASCALS_PER_PSI, PRESSURE_2: 0.3 * PASCALS_PER_PSI}
-USUAL_GAIN = 0.005
-"""What sensors of any bench are off by: no disagreement."""
+USUAL_ANGLE, USUAL_PRESSURE, USUAL_GAIN, USUAL_DELAY = math.radians(0.5), 0.3 * PASCALS_PER_PSI, 0.005, 1.0e-3
+"""Zeros [rad], [Pa], gain [-] and delay [s] by which sensors of any bench are off: no disagreement."""
 _SENSORS = (ANGLE, PRESSURE_1, PRESSURE_2)
-_SUPPLIES = (SUPPLY, DORSIFLEXION_SUPPLY)
 _TOGETHER = 32
 _STEPS = 2
 _DIFFERENCE = 0.02
@@ -47,8 +46,8 @@ class Cause:
     """One cause: its name, what it seems to be in words, and by how much G [-] it explains more than none.
 
     ``left`` is the largest error over noise [-] of any channel with it; 0 for samples that no sensor made. ``numbers``
-    are those of the set that it changes, by path, each with its SI unit. ``same`` are those that the recordings cannot tell from it.
-    ``is_usual`` says that any bench has as much.
+    are those of the set that it changes, by path, each with its SI unit. ``same`` are those that the recordings cannot
+    tell from it, ``is_usual`` says that any bench has as much.
     """
 
     name: str
@@ -101,17 +100,33 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A cause before its size is known: ``change`` and words of a size, the ``sizes`` that are tried first.
+    """A cause before its size is known: what a size changes, its words with the place of ``shown`` times the size.
 
-    ``usual`` is the largest size that any bench has; a cause with one size has nothing to fit.
+    ``sizes`` are tried first; a cause with one has nothing to fit. A size that ``is_ratio`` is sought as a logarithm.
+    ``usual`` is the largest size, or logarithm, that any bench has; ``unit`` is that of the number of the set.
     """
 
     name: str
-    words: Callable[[float], str]
+    words: str
     change: Callable[[float], Change]
     sizes: tuple[float, ...] = (0.0,)
+    is_ratio: bool = False
+    shown: float = 1.0
     usual: float = 0.0
     unit: str = ""
+
+    @property
+    def grid(self) -> list[float]:
+        """Sizes as they are sought."""
+        return [math.log(size) if self.is_ratio else size for size in self.sizes]
+
+    def at(self, size: float) -> Change:
+        """Return the change of a size that was sought."""
+        return self.change(math.exp(size) if self.is_ratio else size)
+
+    def in_words(self, size: float) -> str:
+        """Return what a cause of this size seems to be."""
+        return self.words.format(self.shown * (math.exp(size) if self.is_ratio else size))
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,8 +172,10 @@ def causes_of(
         tried.sort(key=lambda one: -one.gain)
         named = [one for one in tried if one.left**2 < ONLY_NOISE and one.gain > 0.0]
         if named:
-            same = tuple(one for one in named[1:] if one.gain > named[0].gain - search.penalty)
-            return Causes(replace(named[0], same=same), None, len(tried))
+            # Of those that the recordings cannot tell apart, numbers of the set come first.
+            alike = [one for one in named if one.gain > named[0].gain - search.penalty]
+            first, *others = sorted(alike, key=lambda one: not one.numbers)
+            return Causes(replace(first, same=tuple(others)), None, len(tried))
     return Causes(None, tried[0] if tried else None, len(tried))
 
 
@@ -265,12 +282,12 @@ class _Search:
         A size at an end of its grid is refused.
         """
         best: dict[str, _Tried] = {}
-        self._keep_better(best, [(one, size) for one in candidates for size in one.sizes], none)
+        self._keep_better(best, [(one, size) for one in candidates for size in one.grid], none)
         moved = [one for one in candidates if len(one.sizes) > 1 and one.name in best]
-        between = {one.name: _neighbours(one.sizes, best[one.name].size) for one in moved}
+        between = {one.name: _neighbours(one.grid, best[one.name].size) for one in moved}
         for _ in range(_STEPS):
             lengths = {name: _DIFFERENCE * (high - low) for name, (low, high) in between.items()}
-            beside = self.evaluated([one.change(best[one.name].size + lengths[one.name]) for one in moved])
+            beside = self.evaluated([one.at(best[one.name].size + lengths[one.name]) for one in moved])
             lanes = []
             for one, (squares, left) in zip(moved, beside, strict=True):
                 if squares is not None:
@@ -283,19 +300,19 @@ class _Search:
         return [
             Cause(
                 name=one.name,
-                in_words=one.words(at.size),
+                in_words=one.in_words(at.size),
                 gain=at.gain,
                 left=math.sqrt(float(at.squares.max())),
-                numbers={path: (value, one.unit) for path, value in one.change(at.size).numbers.items() if one.unit},
+                numbers={path: (value, one.unit) for path, value in one.at(at.size).numbers.items() if one.unit},
                 is_usual=0.0 < abs(at.size) <= one.usual,
             )
             for one, at in ((one, best[one.name]) for one in candidates if one.name in best)
-            if len(one.sizes) == 1 or min(one.sizes) < at.size < max(one.sizes)
+            if len(one.sizes) == 1 or min(one.grid) < at.size < max(one.grid)
         ]
 
     def _keep_better(self, best: "dict[str, _Tried]", lanes: Sequence[tuple[Candidate, float]], none: Floats) -> None:
         for (one, size), (squares, left) in zip(
-            lanes, self.evaluated([one.change(size) for one, size in lanes]), strict=True
+            lanes, self.evaluated([one.at(size) for one, size in lanes]), strict=True
         ):
             if squares is None:
                 continue
@@ -381,12 +398,24 @@ def _fault_of(one: _Channel, time: Floats) -> str:
     return f"has {count} isolated outlier{'s' * (count > 1)}, the first at {first:.6g} s"
 
 
-def _fixed(words: str) -> Callable[[float], str]:
-    return lambda _: words
+def _with_gain(names: Iterable[str], about: float, gain: float) -> Change:
+    return Change(dict.fromkeys(names, Sensor(gain, about=about)))
 
 
-def _of_sensors(names: Iterable[str], sensor: Callable[[float], Sensor]) -> Callable[[float], Change]:
-    return lambda size: Change(dict.fromkeys(names, sensor(size)))
+def _with_zero(names: Iterable[str], zero: float) -> Change:
+    return Change(dict.fromkeys(names, Sensor(zero=zero)))
+
+
+def _late(names: Iterable[str], delay: float) -> Change:
+    return Change(dict.fromkeys(names, Sensor(delay=delay)))
+
+
+def _with_number(path: str, own: float, factor: float) -> Change:
+    return Change(numbers={path: factor * own})
+
+
+def _with_effect(name: str, scaled: Iterable[str], given: Mapping[str, float], size: float) -> Change:
+    return Change(effects={name: {**given, **dict.fromkeys(scaled, size)}})
 
 
 def _motions(search: _Search) -> Iterator[Candidate]:
@@ -394,8 +423,8 @@ def _motions(search: _Search) -> Iterator[Candidate]:
     if search.settings.motion in ("free", "leg"):
         angles = [one for record in search.records for one in record.channels if one.name == ANGLE]
         if angles and all(float(np.std(one.values)) < _AT_REST * one.noise for one in angles):
-            words = "the vane seems to be held, as its recorded angle rests (--motion held)"
-            yield Candidate("motion", _fixed(words), lambda _: Change(motion="held"))
+            words = "the vane seems to be held, for its recorded angle rests (--motion held)"
+            yield Candidate("motion", words, lambda _: Change(motion="held"))
 
 
 _UNITS = {
@@ -408,54 +437,49 @@ _UNITS = {
 }
 
 
-def _groups(names: Collection[str]) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Pressure sensors that may be wrong together, in words and by channel."""
+def _groups(names: Collection[str]) -> Iterator[tuple[str, tuple[str, ...], str]]:
+    """Pressure sensors that may be wrong together: in words, by channel, and the verb that goes with them."""
     chambers = tuple(name for name in (PRESSURE_1, PRESSURE_2) if name in names)
-    supplies = tuple(name for name in _SUPPLIES if name in names)
+    supplies = tuple(name for name in (SUPPLY, DORSIFLEXION_SUPPLY) if name in names)
     every = {(name,) for name in (*chambers, *supplies)} | {chambers, supplies, (*chambers, *supplies)}
     for group in sorted(every - {()}, key=lambda one: (-len(one), one)):
         is_all = len(group) > 1 and len(group) == len(chambers) + len(supplies)
-        yield "all pressures" if is_all else " and ".join(group), group
+        words = "all pressures" if is_all else " and ".join(group)
+        yield words, group, "seem" if len(group) > 1 else "seems"
 
 
 def _exchanges(device: Device, names: Collection[str]) -> Iterator[Candidate]:
     """Units, gauge or absolute, swapped channels and signs: mistakes without a size."""
     room, actuator = device.supply.atmospheric_pressure, device.actuator
-    for words, group in _groups(names):
-        verb = "seem" if len(group) > 1 else "seems"
+    for group_words, group, verb in _groups(names):
         for unit, factor in _UNITS.items():
-            sensor = Sensor(factor, about=room)
-            yield Candidate(
-                f"{unit}: {words}", _fixed(f"{words} {verb} to be {unit}"), _of_sensors(group, lambda _, s=sensor: s)
-            )
+            words = f"{group_words} {verb} to be {unit}"
+            yield Candidate(words, words, partial(_with_gain, group, room), (factor,))
         for kind, zero in (("gauge read as absolute", -room), ("absolute read as gauge", room)):
-            sensor = Sensor(zero=zero)
-            yield Candidate(
-                f"{kind}: {words}", _fixed(f"{words} {verb} to be {kind}"), _of_sensors(group, lambda _, s=sensor: s)
-            )
+            words = f"{group_words} {verb} to be {kind}"
+            yield Candidate(words, words, partial(_with_zero, group), (zero,))
     if PRESSURE_1 in names and PRESSURE_2 in names:
-        yield Candidate(
-            "swap", _fixed("pressure_1 and pressure_2 seem to be swapped"), lambda _: Change(is_swapped=True)
-        )
+        yield Candidate("swap", "pressure_1 and pressure_2 seem to be swapped", lambda _: Change(is_swapped=True))
     for name in (COMMAND, EXTERNAL_TORQUE):
         if name in names:
-            change = _of_sensors([name], lambda _: Sensor(-1.0))
-            yield Candidate(f"sign of {name}", _fixed(f"{name} seems to have the wrong sign"), change)
+            words = f"{name} seems to have the wrong sign"
+            yield Candidate(f"sign of {name}", words, partial(_with_gain, [name], 0.0), (-1.0,))
     if ANGLE in names:
         middle = 0.5 * (actuator.angle_min + actuator.angle_max)
-        change = _of_sensors([ANGLE], lambda _: Sensor(-1.0, about=middle))
-        yield Candidate("end of angle", _fixed("the angle seems to be counted from the other end"), change)
+        words = "the angle seems to be counted from the other end"
+        yield Candidate("end of angle", words, partial(_with_gain, [ANGLE], middle), (-1.0,))
 
 
 def _both_ways(*sizes: float) -> tuple[float, ...]:
     return (*(-size for size in reversed(sizes)), *sizes)
 
 
-_GAINS = _both_ways(0.02, 0.06, 0.2, 0.5, 1.0)
+_ZEROS = _both_ways(0.003, 0.01, 0.03, 0.1, 0.3, 0.6)
+"""In radians, full openings and gauge pressures of the supply."""
+_GAINS = (0.3, 0.6, 0.8, 0.95, 0.98, 1.02, 1.05, 1.25, 1.6, 3.0)
 _DELAYS = _both_ways(0.001, 0.003, 0.006, 0.012, 0.025)
 _LONG_DELAYS = _both_ways(0.015, 0.03, 0.05, 0.08, 0.12)
-_RATES = _both_ways(0.005, 0.02, 0.06, 0.15, 0.4)
-_USUAL_DELAY = 1.0e-3
+_RATES = (0.7, 0.85, 0.94, 0.98, 0.995, 1.005, 1.02, 1.06, 1.15, 1.4)
 
 
 def _sizes(device: Device, names: Collection[str], settings: ReplaySettings) -> Iterator[Candidate]:
@@ -463,100 +487,87 @@ def _sizes(device: Device, names: Collection[str], settings: ReplaySettings) -> 
     supply = device.supply
     room = supply.atmospheric_pressure
     gauge = max(supply.pressure, supply.dorsiflexion_pressure) - room
-    sensors = [(words, group, room, gauge, "kPa", 1.0e-3) for words, group in _groups(names)]
-    sensors += [(ANGLE, (ANGLE,), 0.0, 1.0, "deg", math.degrees(1.0))] if ANGLE in names else []
-    sensors.append((COMMAND, (COMMAND,), 0.0, 1.0, "of full opening", 1.0))
-    for words, group, about, size, unit, shown in sensors:
-        usual = USUAL_ZERO.get(ANGLE if ANGLE in group else PRESSURE_1, 0.0) if COMMAND not in group else 0.0
+    sensors = [
+        (words, group, verb, room, gauge, "kPa", 1.0e-3, USUAL_PRESSURE, USUAL_GAIN)
+        for words, group, verb in _groups(names)
+    ]
+    if ANGLE in names:
+        sensors.append((ANGLE, (ANGLE,), "seems", 0.0, 1.0, "deg", math.degrees(1.0), USUAL_ANGLE, USUAL_GAIN))
+    sensors.append((COMMAND, (COMMAND,), "seems", 0.0, 1.0, "of full opening", 1.0, 0.0, 0.0))
+    for words, group, verb, about, size, unit, shown, usual_zero, usual_gain in sensors:
         yield Candidate(
             f"zero of {words}",
-            lambda zero, w=words, u=unit, f=shown: f"the zero of {w} seems to be off by {f * zero:+.3g} {u}",
-            _of_sensors(group, lambda zero: Sensor(zero=zero)),
-            tuple(size * part for part in _both_ways(0.003, 0.01, 0.03, 0.1, 0.3, 0.6)),
-            usual,
+            f"the zero of {words} seems to be off by {{:+.3g}} {unit}",
+            partial(_with_zero, group),
+            tuple(size * part for part in _ZEROS),
+            shown=shown,
+            usual=usual_zero,
         )
         yield Candidate(
             f"gain of {words}",
-            lambda gain, w=words: (
-                f"{w} {'seem' if ' ' in w else 'seems'} to be read {math.exp(gain):.4g} times too large"
-            ),
-            _of_sensors(group, lambda gain, a=about: Sensor(math.exp(gain), about=a)),
+            f"{words} {verb} to be read {{:.4g}} times too large",
+            partial(_with_gain, group, about),
             _GAINS,
-            USUAL_GAIN if COMMAND not in group else 0.0,
+            is_ratio=True,
+            usual=usual_gain,
         )
     if settings.motion == "measured":
+        # The angle, an input, would be late too.
         return
     compared = [name for name in _SENSORS if name in names]
-    for words, group, delays in (
-        *((name, (name,), _DELAYS) for name in compared),
-        ("all channels", compared, _LONG_DELAYS),
-    ):
-        yield Candidate(
-            f"delay of {words}",
-            lambda late, w=words: f"{w} seem{'s' * (' ' not in w)} to be late by {1e3 * late:.3g} ms",
-            _of_sensors(group, lambda late: Sensor(delay=late)),
-            delays,
-            _USUAL_DELAY,
-        )
-    yield Candidate(
-        "rate of the clock",
-        lambda rate: f"the clock of the recording seems to run {math.exp(rate):.4g} times as fast",
-        lambda rate: Change(clock=math.exp(rate)),
-        _RATES,
-    )
+    for name in compared:
+        words = f"{name} seems to be later than the other channels by {{:.3g}} ms"
+        yield Candidate(f"delay of {name}", words, partial(_late, [name]), _DELAYS, shown=1.0e3, usual=USUAL_DELAY)
+    words = "all sensors seem to be later than the command by {:.3g} ms"
+    yield Candidate("delay of all sensors", words, partial(_late, compared), _LONG_DELAYS, shown=1.0e3)
+    words = "the clock of the recording seems to run {:.4g} times as fast"
+    yield Candidate("rate of the clock", words, lambda rate: Change(clock=rate), _RATES, is_ratio=True)
 
 
 _FACTORS = (0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 1.05, 1.25, 2.0, 5.0, 20.0)
-_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow", "valve")
-_NOT_TRIED = ("actuator.angle_min", "actuator.angle_max", "actuator.restitution", "flow.linear_ratio")
+_ROOMS = (0.6, 0.7, 0.8, 0.9, 0.95, 1.03, 1.1)
+_SECTIONS = ("valve", "actuator", "friction", "foot_plate", "supply", "gas")
+_NOT_TRIED = ("actuator.angle_min", "actuator.angle_max", "actuator.restitution")
 _ATMOSPHERE = "supply.atmospheric_pressure"
-_SUPPLY_PATHS = {"supply.pressure": SUPPLY, "supply.dorsiflexion_pressure": DORSIFLEXION_SUPPLY}
+_OF_SUPPLY = {"supply.pressure": SUPPLY, "supply.dorsiflexion_pressure": DORSIFLEXION_SUPPLY}
 
 
 def _numbers(search: _Search) -> Iterator[Candidate]:
     """Each number of the set, and another atmosphere under sensors of gauge pressure."""
     measured = search.records[0].measured
     wanted = replay_of(measured, search.device, search.settings)
-    device, recording = wanted.device, measured.recording
+    device = wanted.device
     scenario = replace(replayed_scenario(wanted), device=device)
-    forms = {"actuator.leak": device.actuator.leak, "valve": device.valve.orifice}
-    unused = {
+    other_forms = {
         f"{section}.{item.name}"
-        for section, orifice in forms.items()
+        for section, orifice in (("actuator.leak", device.actuator.leak), ("valve", device.valve.orifice))
         for item in (SONIC_FORM if isinstance(orifice, Orifice) else AREA_FORM)
     }
-    followed = {path for path, name in _SUPPLY_PATHS.items() if name in recording}
-    followed |= set(_SUPPLY_PATHS) if SUPPLY in recording and device.supply.has_one_pressure else set()
-    for path, quantity in declared_numbers(scenario).items():
-        if path.split(".")[0] not in _SECTIONS or path in (*_NOT_TRIED, *unused, *followed):
-            continue
-        value = number_at(scenario, path)
-        sizes = [math.log(one) for one in _FACTORS if quantity.minimum <= one * value <= quantity.maximum]
-        if value > 0.0 and len(sizes) > 2:
-            yield Candidate(
-                path,
-                lambda size, p=path: f"{p} seems to be {math.exp(size):.3g} times that of the set",
-                lambda size, p=path, v=value: Change(numbers={p: math.exp(size) * v}),
-                tuple(sizes),
-                unit=quantity.unit or "-",
-            )
+    followed = {path for path, name in _OF_SUPPLY.items() if measured.has(name)}
+    followed |= set(_OF_SUPPLY) if measured.has(SUPPLY) and device.supply.has_one_pressure else set()
+    declared = declared_numbers(scenario)
+    chosen = [path for section in _SECTIONS for path in declared if path.split(".")[0] == section]
+    for path in (path for path in chosen if path not in (*_NOT_TRIED, *other_forms, *followed)):
+        quantity = declared[path]
+        own = number_at(scenario, path)
+        factors = tuple(one for one in _FACTORS if quantity.minimum <= one * own <= quantity.maximum)
+        if own > 0.0 and len(factors) > 2:
+            words = f"{path} seems to be {{:.3g}} times that of the set"
+            change = partial(_with_number, path, own)
+            yield Candidate(path, words, change, factors, is_ratio=True, unit=quantity.unit or "-")
     room = device.supply.atmospheric_pressure
+    pressures = {path: number_at(scenario, path) for path in _OF_SUPPLY if path not in followed}
 
-    def under_gauges(size: float) -> Change:
-        higher = math.expm1(size) * room
-        paths = [path for path in _SUPPLY_PATHS if path not in followed]
-        numbers = {_ATMOSPHERE: room + higher, **{path: number_at(scenario, path) + higher for path in paths}}
-        return Change(dict.fromkeys((PRESSURE_1, PRESSURE_2, *_SUPPLIES), Sensor(zero=-higher)), numbers)
+    def in_room(factor: float) -> Change:
+        higher = (factor - 1.0) * room
+        numbers = {_ATMOSPHERE: room + higher, **{path: own + higher for path, own in pressures.items()}}
+        return Change(dict.fromkeys((PRESSURE_1, PRESSURE_2, *_OF_SUPPLY.values()), Sensor(zero=-higher)), numbers)
 
-    yield Candidate(
-        "atmosphere under gauge pressures",
-        lambda size: f"the atmosphere under gauge pressures seems to be {1e-3 * room * math.exp(size):.4g} kPa",
-        under_gauges,
-        tuple(math.log(one) for one in (0.6, 0.7, 0.8, 0.9, 0.95, 1.03, 1.1)),
-    )
+    words = "the atmosphere under gauge pressures seems to be {:.4g} kPa"
+    yield Candidate("atmosphere", words, in_room, _ROOMS, is_ratio=True, shown=1.0e-3 * room)
 
 
-_EFFECTS = (
+_EFFECTS: tuple[tuple[str, str, tuple[str, ...], dict[str, float], tuple[float, ...]], ...] = (
     ("leak_opening", "the leak seems to open at {:.3g} Pa", ("pressure",), {"rise": 0.3}, (1e3, 4e3, 1.6e4, 6e4, 2e5)),
     (
         "stribeck",
@@ -593,9 +604,4 @@ _EFFECTS = (
 def _effects(device: Device) -> Iterator[Candidate]:
     for name, words, scaled, given, sizes in _EFFECTS:
         if name not in device.effects:
-            yield Candidate(
-                name,
-                lambda size, w=words: w.format(math.exp(size)),
-                lambda size, n=name, s=scaled, g=given: Change(effects={n: {**g, **dict.fromkeys(s, math.exp(size))}}),
-                tuple(math.log(size) for size in sizes),
-            )
+            yield Candidate(name, words, partial(_with_effect, name, scaled, given), sizes, is_ratio=True)

@@ -45,7 +45,7 @@ from ppafo.validation.agreement import (
     compare_recording,
     measured_values,
 )
-from ppafo.validation.causes import ONLY_NOISE, Cause, Causes, causes_of
+from ppafo.validation.causes import Cause, Causes, causes_of
 from ppafo.validation.measured import (
     COMPARED,
     PRESSURE_1,
@@ -78,7 +78,7 @@ class Validation(Solved):
 
     @property
     def passes(self) -> bool:
-        """True where every error is within its limit and, unless limits were given, no cause is found that no bench has."""
+        """True where every error is within its limit and, unless limits were given, no cause that no bench has is found."""
         within = all(recording.passes for recording in self.recordings)
         found = self.causes.found
         return within and (self.has_limits or found is None or found.is_usual)
@@ -345,7 +345,8 @@ def verdict(validation: Validation) -> str:
     )
     why = _why(validation.causes)
     if not validation.passes:
-        return f"{name} does not agree: {'; '.join(part for part in (why, size, failed and f'beyond the limit: {failed}') if part)}"
+        parts = [part for part in (why, size, failed and f"beyond the limit: {failed}") if part]
+        return f"{name} does not agree: {'; '.join(parts)}"
     agrees = f"{name} agrees with {count} recording{'s' * (count > 1)}: every RMS error is within its limit"
     return f"{agrees}; {size}; {why}" if why else f"{agrees}; nothing but noise is left"
 
@@ -365,8 +366,13 @@ def _why(causes: Causes) -> str:
 
 def in_words(one: Cause) -> str:
     """Return a cause in words, numbers of the set in the unit in which people see them."""
-    values = [quantity_text(value, quantity_of_unit(unit), ".4g") for value, unit in one.numbers.values()]
-    return one.in_words if len(values) != 1 else f"{one.in_words} ({values[0]})"
+    if len(one.numbers) != 1:
+        return one.in_words
+    ((value, unit),) = one.numbers.values()
+    # An atmosphere in gauge pressure says nothing.
+    absolute, quantity = unit == "Pa_a", quantity_of_unit(unit)
+    shown = f"{1e-3 * value:.4g} kPa" if absolute else quantity_text(value, quantity, ".4g")
+    return f"{one.in_words} ({shown if absolute or quantity else f'{shown} {unit}'.removesuffix(' -')})"
 
 
 def _cause_data(one: Cause | None) -> dict[str, Any] | None:
