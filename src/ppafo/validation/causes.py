@@ -163,6 +163,7 @@ def causes_of(
     faults = tuple(_faults(search.records, none))
     if faults:
         return Causes(replace(faults[0], same=faults[1:]), None, len(none))
+    report(Progress("searching for causes"))
     tried: list[Cause] = []
     names = set.intersection(*(set(one.recording.names) for one in read))
     # Numbers of the set are compared with sensors: the gain of a command is the area of its valve.
@@ -226,7 +227,8 @@ class _Search:
         """Return, for each change, the mean square left in each channel over that of its noise, and what is left."""
         left: list[tuple[Floats | None, Floats]] = []
         for first in range(0, len(changes), _TOGETHER):
-            self.report(Progress("searching for causes", first, len(changes)))
+            if first:
+                self.report(Progress("searching for causes", first, len(changes)))
             some = changes[first : first + _TOGETHER]
             parts = [self._left(record, some) for record in self.records]
             for place in range(len(some)):

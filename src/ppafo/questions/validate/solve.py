@@ -78,7 +78,7 @@ class Validation(Solved):
 
     @property
     def passes(self) -> bool:
-        """True where every error is within its limit and, unless limits were given, no cause that no bench has is found."""
+        """True where every error is within its limit and, without limits given, no cause is found that no bench has."""
         within = all(recording.passes for recording in self.recordings)
         found = self.causes.found
         return within and (self.has_limits or found is None or found.is_usual)
