@@ -3,7 +3,7 @@
 A cause is a model of a sensor, y = h(model; a) + e, or another number of the set: the recorded samples stay as they
 are, so that hypotheses are compared by what they leave of the same samples. G = sum over channels of
 n [ln max(MS0/s^2, 1) - ln max(MSc/s^2, 1)] - k ln N, with MS the mean square left, s the noise of the samples and k = 1
-for a cause with a size. A start read from noisy samples, and part of a sample of delay, are taken out with every cause.
+for a cause with a size. A common delay, and a start that was read from noisy samples, are taken out with every cause.
 """
 
 import math
@@ -253,7 +253,7 @@ class _Search:
         found: list[list[Floats] | None] = []
         for place, change in enumerate(changes):
             one = replayed.get(place)
-            found.append(_freed(record, one, change) if isinstance(one, Replayed) else None)
+            found.append(_freed(record, one, change, self.settings.longest_delay) if isinstance(one, Replayed) else None)
         return found
 
     def _replay(self, measured: Measured, change: Change) -> Replay:
@@ -353,21 +353,25 @@ def _signals(record: _Record, replayed: Replayed, change: Change, offset: float)
     return np.concatenate(readings), np.concatenate(slopes)
 
 
-def _freed(record: _Record, replayed: Replayed, change: Change) -> list[Floats]:
-    """Return what is left in each channel, over its noise, without a sample of delay and the error of the start.
+def _freed(record: _Record, replayed: Replayed, change: Change, longest_delay: float) -> list[Floats]:
+    """Return what is left in each channel, over its noise, without a common delay and the error of the start.
 
-    The delay that was found may be what a wrong model makes: the better of it and none counts.
+    The delay that was found may be what a wrong model makes: it is sought from there and from none.
     """
     measured = np.concatenate([one.values / one.noise for one in record.channels])
+    interval = float(np.median(np.diff(record.measured.recording.time)))
     options = []
-    for offset in {0.0, record.delay}:
-        readings, slope = _signals(record, replayed, change, offset)
-        columns = np.vstack([slope, *record.starts]).T
-        ridge = np.eye(columns.shape[1])
-        left = measured - readings
-        sizes = np.linalg.lstsq(np.vstack([columns, ridge]), np.append(left, np.zeros(len(ridge))))[0]
-        options.append(left - columns @ sizes)
-    return np.split(min(options, key=lambda left: float(left @ left)), len(record.channels))
+    for first in {0.0, record.delay}:
+        offset = first
+        for _ in range(_STEPS + 1):
+            readings, slope = _signals(record, replayed, change, offset)
+            columns = np.vstack([slope, *record.starts])
+            left = measured - readings
+            sizes = np.linalg.solve(columns @ columns.T + np.eye(len(columns)), columns @ left)
+            left = left - sizes @ columns
+            offset = min(max(offset - interval * float(sizes[0]), -longest_delay), longest_delay)
+        options.append(left)
+    return np.split(min(options, key=lambda one: float(one @ one)), len(record.channels))
 
 
 def _faults(records: Sequence[_Record], none: Floats) -> Iterator[Cause]:
